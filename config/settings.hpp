@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/limits.hpp"
+#include "core/pose.hpp"
+#include "core/simulation_settings.hpp"
+#include "core/wrench_law.hpp"
+
+namespace wrenchd {
+
+enum class Realtime : std::uint8_t { required, best_effort, off };
+enum class Pacing : std::uint8_t { clock, device };
+enum class Method : std::uint8_t { exact, planar, translational };
+
+/// [servo]
+struct ServoSettings {
+  double rate_Hz = 1000.0;                 ///< 500 to 8000
+  Pacing pacing = Pacing::clock;
+  Realtime realtime = Realtime::required;
+  int priority = 45;                       ///< SCHED_FIFO, below threaded interrupts (50)
+  int cpu = -1;                            ///< -1: no affinity
+  double late_limit_s = 0.020;             ///< a tick later than this starts the soft start anew
+};
+
+/// [rendering]
+struct RenderingSettings {
+  Method method = Method::exact;
+  int planes = 47;                         ///< N_delta of Eq. (40), for method = "planar"
+};
+
+/// Where a frame stands in another, as config files give it.
+struct PlacementSettings {
+  Vector3d position_m = Vector3d::Zero();
+  Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
+};
+
+/// [device]
+struct DeviceSettings {
+  std::string profile = "loopback";        ///< name of a profile file, without .toml
+  PlacementSettings base_in_world;         ///< X_WB
+  PlacementSettings tool_in_handle;        ///< X_HM: mesh frame of the tool in the handle frame
+};
+
+/// [recording]
+struct RecordingSettings {
+  std::filesystem::path file;              ///< empty: no recording
+};
+
+/// All of wrenchd.toml.
+struct Settings {
+  std::filesystem::path file;
+  std::filesystem::path scene = "scenes/cube_on_table.toml";  ///< looked up along the search path
+  DeviceSettings device;
+  ServoSettings servo;
+  RenderingSettings rendering;
+  WrenchGains wrench;                       ///< [wrench]
+  LimitSettings limits;                     ///< [limits]
+  SimulationSettings simulation;            ///< [simulation]
+  RecordingSettings recording;
+};
+
+}  // namespace wrenchd

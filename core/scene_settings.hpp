@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+/// The virtual body in the hand. M is the frame the mesh file is written in.
+struct ToolSettings {
+  std::filesystem::path mesh;    ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
+  double scale = 1.0;            ///< metres per mesh unit
+  double mass_kg = 1.0;          ///< of the uniform solid; scales T, moves no minimiser
+};
+
+/// Solid where normal_W . x < offset_m.
+struct HalfSpaceSettings {
+  std::string name;
+  Vector3d normal_W = Vector3d::UnitZ();  ///< unit, points out of the solid
+  double offset_m = 0.0;
+};
+
+struct SceneSettings {
+  std::filesystem::path file;             ///< where it was read from, for messages
+  ToolSettings tool;
+  std::vector<HalfSpaceSettings> half_spaces;
+};
+
+}  // namespace wrenchd

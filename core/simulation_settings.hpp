@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+/// One point of the simulated hand's path: where the hand wants the handle, in the device base.
+struct Waypoint {
+  double time_s = 0.0;
+  Vector3d position_m = Vector3d::Zero();
+  Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
+};
+
+/// The body of the simulated device, and the hand that holds it.
+struct SimulationSettings {
+  double handle_mass_kg = 0.15;
+  double handle_inertia_kg_m2 = 2.0e-4;  ///< isotropic, about the handle point
+  double viscous_friction_N_s_per_m = 0.5;
+  double viscous_friction_Nm_s_per_rad = 0.002;
+  double coulomb_friction_N = 0.0;
+  double coulomb_friction_Nm = 0.0;
+  double position_quantum_m = 1.0e-5;    ///< encoder step
+  double rotation_quantum_rad = 1.0e-4;
+  double actuator_max_force_N = 12.0;    ///< what the motors can do, whatever they are told
+  double actuator_max_torque_Nm = 0.6;
+  double report_delay_s = 0.0002;        ///< from sampling to the host
+  double command_delay_s = 0.0002;       ///< from the host to the motors
+  double hand_stiffness_N_per_m = 300.0;
+  double hand_stiffness_Nm_per_rad = 2.0;
+  double hand_damping_N_s_per_m = 6.0;
+  double hand_damping_Nm_s_per_rad = 0.03;
+  bool hand_repeats = true;              ///< the path starts again after its last waypoint
+  std::filesystem::path hand_script;     ///< where hand_path was read from
+  std::vector<Waypoint> hand_path;       ///< at least one; times strictly rising from 0
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "core/clock.hpp"
+#include "core/fault.hpp"
+#include "core/spatial.hpp"
+
+namespace wrenchd {
+
+/// The newest thing a device said. Frames: B = device base, H = handle point.
+struct DeviceSample {
+  Pose X_BH;                      ///< handle in the base
+  Twist V_BH;                     ///< of the handle point, in base axes; zero where the device does not report it
+  double device_time_s = 0.0;     ///< the device's own clock, unwrapped
+  std::uint64_t sequence = 0;     ///< of the report, unwrapped
+  std::uint64_t acknowledged = 0; ///< sequence of the last command the device took, unwrapped
+  TimePoint arrived{};            ///< when the newest report reached the host
+  std::uint32_t skipped = 0;      ///< older reports drained together with this one
+  std::uint32_t missing = 0;      ///< reports lost since the last sample, by sequence number
+  std::uint32_t rejected = 0;     ///< reports dropped in this read: wrong id, length or checksum, backward or duplicate sequence
+  std::uint32_t buttons = 0;      ///< bit mask
+  bool fresh = false;             ///< a new report arrived since the last read
+  bool motors_on = false;
+  bool watchdog_tripped = false;
+  Fault fault = Fault::none;      ///< what is wrong with it; the pose is the last good one then
+};
+
+/// The device contract. A device is opened and closed by an ordinary thread; between the two only the servo
+/// thread speaks with it, and none of these calls may wait, lock, allocate or throw.
+class Device {
+ public:
+  virtual ~Device() = default;
+
+  /// Throws std::runtime_error that names the device and the cure.
+  virtual void open() = 0;
+  /// Drains what has arrived and returns the newest sample. RT safe.
+  virtual DeviceSample read_newest(TimePoint now) noexcept = 0;
+  /// Sends one wrench, on the hand, about the point and in the axes the profile names. RT safe.
+  virtual Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept = 0;
+  /// Sends zero wrench with the motors off, several times; works in every state and never fails. RT safe.
+  virtual void release(TimePoint now) noexcept = 0;
+  /// Sleeps until a report is waiting or the deadline has passed.
+  virtual void wait_readable(TimePoint deadline) noexcept = 0;
+  virtual void close() noexcept = 0;
+};
+
+}  // namespace wrenchd
