@@ -34,8 +34,8 @@ struct SimulationSettings {
   double hand_damping_N_s_per_m = 6.0;
   double hand_damping_Nm_s_per_rad = 0.03;
   bool hand_repeats = true;              ///< the path starts again after its last waypoint
-  std::filesystem::path hand_script;     ///< where hand_path was read from
-  std::vector<Waypoint> hand_path;       ///< at least one; times strictly rising from 0
+  std::filesystem::path hand_script = "hands/press_and_rock.toml";  ///< looked up along the search path
+  std::vector<Waypoint> hand_path;       ///< read from hand_script; at least one; times strictly rising from 0
 };
 
 }  // namespace wrenchd

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/mesh_check.hpp"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Surface_mesh.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <sstream>
+#include <utility>
+
+namespace wrenchd {
+namespace {
+
+namespace PMP = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
+
+std::string place(const Vector3d& p) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << '(' << p.x() << ", " << p.y() << ", " << p.z() << ')';
+  return text.str();
+}
+
+std::string edge_place(const PolygonSoup& soup, const Edge& e) {
+  return place(soup.vertices[e.first]) + " to " + place(soup.vertices[e.second]);
+}
+
+std::string also(std::size_t count) { return count > 1 ? " (" + std::to_string(count) + " in all)" : ""; }
+
+/// First place and number of a kind of defect.
+class Tally {
+ public:
+  void found(std::string sentence) {
+    if (count_++ == 0) first_ = std::move(sentence);
+  }
+  void report(std::vector<std::string>& defects, const std::string& cure) const {
+    if (count_ > 0) defects.push_back(first_ + also(count_) + "; " + cure);
+  }
+  bool any() const { return count_ > 0; }
+
+ private:
+  std::size_t count_ = 0;
+  std::string first_;
+};
+
+/// Numbers, indices and faces that are no polygons. Without these right, nothing else can be asked.
+void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  Tally not_finite, out_of_range, too_few, repeated;
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v)
+    if (!soup.vertices[v].allFinite())
+      not_finite.found("vertex " + std::to_string(v) + " is not a number: " + place(soup.vertices[v]));
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    const auto& face = soup.faces[f];
+    const std::string name = "face " + std::to_string(f);
+    if (face.size() < 3) too_few.found(name + " has " + std::to_string(face.size()) + " vertices");
+    for (const std::size_t v : face)
+      if (v >= soup.vertices.size())
+        out_of_range.found(name + " uses vertex " + std::to_string(v) + ", but there are only " +
+                           std::to_string(soup.vertices.size()));
+    if (std::set<std::size_t>(face.begin(), face.end()).size() != face.size())
+      repeated.found(name + " uses a vertex twice");
+  }
+  not_finite.report(defects, "export the mesh again");
+  out_of_range.report(defects, "vertex numbers start at 0; export the mesh again");
+  too_few.report(defects, "remove it");
+  repeated.report(defects, "remove degenerate faces in the modeller");
+}
+
+double area_of(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
+  Vector3d twice = Vector3d::Zero();
+  for (std::size_t i = 1; i + 1 < face.size(); ++i)
+    twice += (soup.vertices[face[i]] - soup.vertices[face[0]])
+                 .cross(soup.vertices[face[i + 1]] - soup.vertices[face[0]]);
+  return 0.5 * twice.norm();
+}
+
+void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  Tally flat;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f)
+    if (!(area_of(soup, soup.faces[f]) > 0.0))
+      flat.found("face " + std::to_string(f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area");
+  flat.report(defects, "remove degenerate faces in the modeller");
+}
+
+/// Closed and consistently oriented: every directed edge once, and its reverse once.
+void check_edges(const PolygonSoup& soup, MeshReport& report) {
+  std::map<Edge, std::vector<std::size_t>> faces_along;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    const auto& face = soup.faces[f];
+    for (std::size_t i = 0; i < face.size(); ++i)
+      faces_along[{face[i], face[(i + 1) % face.size()]}].push_back(f);
+  }
+  Tally open, crowded, same_way;
+  for (const auto& [edge, faces] : faces_along) {
+    const auto reverse = faces_along.find({edge.second, edge.first});
+    const std::size_t reverse_count = reverse == faces_along.end() ? 0 : reverse->second.size();
+    const bool counted_once = edge.first < edge.second || reverse_count == 0;
+    if (!counted_once) continue;
+    const std::string where = "the edge from " + edge_place(soup, edge);
+    if (faces.size() + reverse_count == 1) {
+      open.found(where + " belongs to face " + std::to_string(faces[0]) + " only: the surface is open");
+    } else if (faces.size() + reverse_count > 2) {
+      crowded.found(where + " belongs to " + std::to_string(faces.size() + reverse_count) + " faces");
+    } else if (faces.size() == 2) {
+      same_way.found("faces " + std::to_string(faces[0]) + " and " + std::to_string(faces[1]) +
+                     " are oriented against each other along " + where);
+    }
+  }
+  open.report(report.defects, "close the hole in the modeller");
+  crowded.report(report.defects, "a solid has two faces at every edge: split or remove the extra ones");
+  same_way.report(report.defects, "make all faces counter-clockwise seen from outside");
+  report.closed = !open.any() && !crowded.any();
+  report.consistent = !same_way.any();
+}
+
+SurfaceMesh surface_mesh(const PolygonSoup& soup) {
+  std::vector<Kernel::Point_3> points;
+  points.reserve(soup.vertices.size());
+  for (const Vector3d& p : soup.vertices) points.emplace_back(p.x(), p.y(), p.z());
+  SurfaceMesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(points, soup.faces, mesh);
+  return mesh;
+}
+
+void check_self_intersection(const PolygonSoup& soup, const SurfaceMesh& mesh, MeshReport& report) {
+  std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
+  PMP::self_intersections(mesh, std::back_inserter(pairs));
+  report.self_intersecting = !pairs.empty();
+  if (pairs.empty()) return;
+  const auto corner = mesh.point(mesh.target(mesh.halfedge(pairs[0].first)));
+  const std::string where = place({corner.x(), corner.y(), corner.z()});
+  // A face of the triangulated mesh beyond the file's own has no number there.
+  const std::size_t a = pairs[0].first, b = pairs[0].second;
+  const std::string which = std::max(a, b) < soup.faces.size()
+                                ? "faces " + std::to_string(a) + " and " + std::to_string(b)
+                                : std::string("two faces");
+  report.defects.push_back(which + " near " + where + " cut through each other" + also(pairs.size()) +
+                           "; unite the parts in the modeller");
+}
+
+void check_volume(const SurfaceMesh& mesh, MeshReport& report) {
+  report.volume = CGAL::to_double(PMP::volume(mesh));
+  report.outward = !report.self_intersecting && report.volume > 0.0 && PMP::does_bound_a_volume(mesh);
+  if (report.outward || report.self_intersecting) return;
+  report.defects.push_back(report.volume < 0.0
+                               ? "all faces look inwards (the volume is negative); flip the faces in the modeller"
+                               : "its shells do not bound a volume: one looks the wrong way, or nothing is inside; "
+                                 "make outer shells look outwards and cavities inwards");
+}
+
+TriangleMesh triangles_of(const SurfaceMesh& mesh) {
+  TriangleMesh out;
+  for (const auto v : mesh.vertices())
+    out.vertices_m.emplace_back(mesh.point(v).x(), mesh.point(v).y(), mesh.point(v).z());
+  for (const auto f : mesh.faces()) {
+    std::array<std::uint32_t, 3> triangle{};
+    std::size_t k = 0;
+    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) triangle[k++ % 3] = v;
+    out.triangles.push_back(triangle);
+  }
+  return out;
+}
+
+}  // namespace
+
+MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
+  MeshReport report;
+  report.vertices = soup.vertices.size();
+  report.faces = soup.faces.size();
+  report.volume = std::numeric_limits<double>::quiet_NaN();
+  check_elements(soup, report.defects);
+  if (!report.defects.empty()) return report;
+  check_areas(soup, report.defects);
+  check_edges(soup, report);
+  if (!report.defects.empty()) return report;
+  if (!PMP::is_polygon_soup_a_polygon_mesh(soup.faces)) {
+    report.defects.emplace_back("two parts of the surface meet in a single vertex; separate them in the modeller");
+    return report;
+  }
+  SurfaceMesh mesh = surface_mesh(soup);
+  if (!PMP::triangulate_faces(mesh)) {
+    report.defects.emplace_back("a face with more than three corners cannot be cut into triangles; make it flat");
+    return report;
+  }
+  check_self_intersection(soup, mesh, report);
+  check_volume(mesh, report);
+  if (triangles != nullptr && report.solid()) *triangles = triangles_of(mesh);
+  return report;
+}
+
+}  // namespace wrenchd

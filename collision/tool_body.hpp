@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/convex_body.hpp"
+#include "core/inertia.hpp"
+#include "core/scene_settings.hpp"
+
+namespace wrenchd {
+
+/// The virtual body in the hand. M: frame of the mesh file. T: the body frame, M's axes at the centre of mass.
+struct ToolBody {
+  SolidProperties solid;  ///< of the uniform solid, in metres and kilograms
+  ConvexBody hull;        ///< what a half-space can touch, in T
+
+  /// Pose of the body frame T in the mesh frame M.
+  Pose X_MT() const noexcept { return {Quaterniond::Identity(), solid.p_MT_m}; }
+};
+
+/// Loads and checks the tool's mesh. Throws MeshError that names the file, the defect, its place and the cure.
+/// Not RT safe.
+ToolBody load_tool(const ToolSettings& settings);
+
+}  // namespace wrenchd

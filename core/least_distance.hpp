@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+namespace wrenchd {
+
+/// The point of a polyhedron in R^N nearest to a given one:
+///
+///   min 1/2 |z - z0|^2   subject to   b_i . z >= c_i,   |b_i| = 1
+///
+/// Solved by the dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at z0, add the
+/// most violated constraint, and keep the multipliers of the active ones non-negative on the way, dropping what
+/// would turn negative. At most N constraints are active, so each step works with an N x N triangle. Redundant and
+/// parallel constraints are met as such: a constraint in the span of the active ones is never added, only exchanged.
+/// RT safe.
+template <int N, std::size_t Capacity>
+class LeastDistance {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+  enum class Status : std::uint8_t { optimal, infeasible, budget_spent };
+
+  void clear() noexcept { count_ = 0; }
+
+  /// Adds b . z >= c. b need not be unit length, but must not be zero.
+  void add(const Vector& b, double c) noexcept {
+    const double length = b.norm();
+    normal_[count_] = b / length;
+    bound_[count_] = c / length;
+    length_[count_] = length;
+    ++count_;
+  }
+
+  /// tolerance: by how much a constraint may stay violated, in units of z.
+  Status solve(const Vector& z0, double tolerance) noexcept {
+    z_ = z0;
+    active_count_ = 0;
+    multiplier_.fill(0.0);
+    for (std::size_t step = 0; step < kMaxSteps; ++step) {
+      const std::size_t p = most_violated(tolerance);
+      if (p == count_) return Status::optimal;
+      if (!activate(p)) return Status::infeasible;
+    }
+    return Status::budget_spent;
+  }
+
+  const Vector& z() const noexcept { return z_; }
+  /// Multiplier of constraint i, for b_i as it was given: z - z0 = sum multiplier_i b_i. Zero where not active.
+  double multiplier(std::size_t i) const noexcept { return multiplier_[i] / length_[i]; }
+  std::size_t count() const noexcept { return count_; }
+
+ private:
+  static constexpr std::size_t kMaxSteps = 8 * N + 2 * Capacity;  ///< typical: as many as are active at the end
+  static constexpr double kDependent = 1e-20;  ///< squared sine below which a normal lies in the active span
+
+  std::size_t most_violated(double tolerance) const noexcept {
+    std::size_t worst = count_;
+    double most = tolerance;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double violation = bound_[i] - normal_[i].dot(z_);
+      if (violation > most) {
+        most = violation;
+        worst = i;
+      }
+    }
+    return worst;
+  }
+
+  /// Makes constraint p active, dropping others on the way as their multipliers reach zero. False: contradiction.
+  bool activate(std::size_t p) noexcept {
+    for (;;) {
+      // b_p = Q r + rest,  Q R = active normals,  d = R^-1 r: how the active multipliers give way to p's.
+      Vector r = Vector::Zero();
+      const Vector rest = project_out(normal_[p], r);
+      const Vector d = back_substitute(r);
+      const double curvature = rest.squaredNorm();
+      const bool independent = curvature > kDependent && active_count_ < N;
+
+      const double violation = bound_[p] - normal_[p].dot(z_);
+      const double full = independent ? violation / curvature : std::numeric_limits<double>::infinity();
+      double partial = std::numeric_limits<double>::infinity();
+      std::size_t leaving = 0;
+      for (std::size_t k = 0; k < active_count_; ++k) {
+        const double dk = d[static_cast<Eigen::Index>(k)];
+        if (dk > 0.0 && multiplier_[active_[k]] < partial * dk) {
+          partial = multiplier_[active_[k]] / dk;
+          leaving = k;
+        }
+      }
+      const double t = std::fmin(full, partial);
+      if (!(t < std::numeric_limits<double>::infinity())) return false;
+
+      for (std::size_t k = 0; k < active_count_; ++k) multiplier_[active_[k]] -= t * d[static_cast<Eigen::Index>(k)];
+      multiplier_[p] += t;
+      if (independent) z_ += t * rest;
+      if (full <= partial) {
+        append(p, r, rest, std::sqrt(curvature));
+        return true;
+      }
+      drop(leaving);
+    }
+  }
+
+  /// b minus its projection on the active normals; r receives the coefficients on Q. Twice, for orthogonality.
+  Vector project_out(const Vector& b, Vector& r) const noexcept {
+    Vector rest = b;
+    for (int pass = 0; pass < 2; ++pass)
+      for (std::size_t k = 0; k < active_count_; ++k) {
+        const double c = q_[k].dot(rest);
+        rest -= c * q_[k];
+        r[static_cast<Eigen::Index>(k)] += c;
+      }
+    return rest;
+  }
+
+  Vector back_substitute(const Vector& r) const noexcept {
+    Vector d = Vector::Zero();
+    for (std::size_t k = active_count_; k-- > 0;) {
+      const auto row = static_cast<Eigen::Index>(k);
+      double sum = r[row];
+      for (std::size_t j = k + 1; j < active_count_; ++j) sum -= r_[j][row] * d[static_cast<Eigen::Index>(j)];
+      d[row] = sum / r_[k][row];
+    }
+    return d;
+  }
+
+  void append(std::size_t p, const Vector& r, const Vector& rest, double length) noexcept {
+    q_[active_count_] = rest / length;
+    r_[active_count_] = r;
+    r_[active_count_][static_cast<Eigen::Index>(active_count_)] = length;
+    active_[active_count_++] = p;
+  }
+
+  /// Removes the k-th active constraint and rebuilds the triangle behind it.
+  void drop(std::size_t k) noexcept {
+    multiplier_[active_[k]] = 0.0;
+    const std::size_t old_count = active_count_;
+    active_count_ = k;
+    for (std::size_t j = k + 1; j < old_count; ++j) {
+      const std::size_t i = active_[j];
+      Vector r = Vector::Zero();
+      const Vector rest = project_out(normal_[i], r);
+      append(i, r, rest, rest.norm());
+    }
+  }
+
+  std::array<Vector, Capacity> normal_;
+  std::array<double, Capacity> bound_;
+  std::array<double, Capacity> length_;
+  std::array<double, Capacity> multiplier_;  ///< for the unit normals
+  std::size_t count_ = 0;
+
+  Vector z_ = Vector::Zero();
+  std::array<std::size_t, N> active_;
+  std::array<Vector, N> q_;  ///< orthonormal columns
+  std::array<Vector, N> r_;  ///< columns of the triangle: active normal k = sum_j q_j r_k[j]
+  std::size_t active_count_ = 0;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/penetration.hpp"
+
+namespace wrenchd {
+namespace {
+
+bool in_contact(const Projection& projection) noexcept {
+  return projection.status == ProjectionStatus::converged || projection.status == ProjectionStatus::budget_spent;
+}
+
+Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept { return log(inverse(X_WP) * X_WQ); }
+
+}  // namespace
+
+PenetrationDepth::PenetrationDepth(const Inertia& M, const ConvexBody& body, Options options)
+    : options_(options), mass_kg_(M.mass_kg), exact_(M), planar_(M, body, options.planes) {}
+
+Penetration PenetrationDepth::follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept {
+  if (options_.method == Method::exact) return exact(X_WP, exact_.project(X_WP, scene, X_last));
+  return query(X_WP, scene);
+}
+
+Penetration PenetrationDepth::query(const Pose& X_WP, const ContactSource& scene) noexcept {
+  switch (options_.method) {
+    case Method::planar:
+      return planar(X_WP, scene);
+    case Method::translational:
+      return translational(X_WP, scene);
+    case Method::exact:
+      break;
+  }
+  return exact(X_WP, exact_.project_globally(X_WP, scene));
+}
+
+Penetration PenetrationDepth::exact(const Pose& X_WP, Projection projection) const noexcept {
+  Penetration out;
+  out.projection = projection;
+  if (!in_contact(projection)) return out;
+  out.contacts = projection.active_count;
+  out.eps = displacement(X_WP, projection.X_WQ);
+  out.drive = out.eps;
+  return out;
+}
+
+/// Every contact on its own (section 5 of the paper adds their wrenches). The pose that is reported is the best of
+/// the family's rotations and of no rotation at all, each lifted until the whole body is out: the family looks at one
+/// cross-section, and a vertex beside it may still be inside.
+Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scene) noexcept {
+  Penetration out = exact(X_WP, exact_.translate(X_WP, scene, X_WP));
+  if (out.projection.status == ProjectionStatus::free) return out;
+  contacts_.clear();
+  while (scene.add_violated(X_WP, 0.0, contacts_) > 0) continue;
+  out.drive.setZero();
+  for (const Contact& contact : contacts_) {
+    const PlanarFamily::Solution one = planar_.project(X_WP, contact);
+    out.drive += displacement(X_WP, one.X_WQ);
+    const Projection lifted = exact_.translate(X_WP, scene, one.X_WQ);
+    if (!in_contact(lifted)) continue;
+    if (!in_contact(out.projection) || lifted.energy < out.projection.energy) out.projection = lifted;
+  }
+  out.contacts = out.projection.active_count;
+  out.eps = displacement(X_WP, out.projection.X_WQ);
+  return out;
+}
+
+/// The depth of each obstacle acts at the mean of the tool's vertices that touch it: an edge or a face that lies flat
+/// has no single deepest vertex, and choosing one would make a torque out of rounding.
+Penetration PenetrationDepth::translational(const Pose& X_WP, const ContactSource& scene) noexcept {
+  Penetration out = exact(X_WP, exact_.translate(X_WP, scene, X_WP));
+  if (!in_contact(out.projection)) return out;
+  const auto active = std::span(out.projection.active).first(out.projection.active_count);
+  Vector3d moment = Vector3d::Zero();
+  for (const ActiveContact& a : active) {
+    double touching = 0.0;
+    double carried = 0.0;
+    for (const ActiveContact& b : active) {
+      if (b.contact.obstacle != a.contact.obstacle) continue;
+      touching += 1.0;
+      carried += b.multiplier;
+    }
+    const Vector3d n_T = X_WP.rotation.conjugate() * a.contact.n_W;
+    moment += a.contact.p_TA_m.cross(n_T) * (carried / touching);
+  }
+  // 2 m s = sum multiplier_i n_i: contact i carries the displacement multiplier_i n_i / (2 m).
+  out.drive.tail<3>() = moment / (2.0 * mass_kg_);
+  return out;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "core/contact.hpp"
+#include "core/convex_body.hpp"
+#include "core/method.hpp"
+#include "core/planar_family.hpp"
+#include "core/projection.hpp"
+
+namespace wrenchd {
+
+/// The generalized penetration depth of one configuration p.
+struct Penetration {
+  Projection projection;  ///< q, T and the contacts. q = p where p is admissible.
+  std::uint16_t contacts = 0;          ///< tool features that touch at q; 0 where p is admissible
+  Vector6d eps = Vector6d::Zero();     ///< Eq. (15): exponential coordinates of p^-1 q
+  /// What enters the wrench law. The same as eps for exact. For planar, the sum of the contacts' own eps, as section 5
+  /// of the paper adds their wrenches. For translational, [d; sum (c_i - x) x d_i]: with the force gain k for both
+  /// halves this is the force k d at each contact and its torque about the centre of mass, which is that method's wrench.
+  Vector6d drive = Vector6d::Zero();
+};
+
+/// Computes the generalized penetration depth by the method chosen. All memory is in the object.
+class PenetrationDepth {
+ public:
+  struct Options {
+    Method method = Method::exact;
+    int planes = 47;  ///< N_delta for planar; 47 is the paper's
+  };
+
+  /// The body is kept by reference and must outlive this.
+  PenetrationDepth(const Inertia& M, const ConvexBody& body, Options options);
+
+  /// Follows a proxy: X_last is last tick's q. RT safe.
+  Penetration follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept;
+  /// Knows no history; exact seeks the global optimum. RT safe, but up to a hundred times dearer.
+  Penetration query(const Pose& X_WP, const ContactSource& scene) noexcept;
+
+ private:
+  Penetration exact(const Pose& X_WP, Projection projection) const noexcept;
+  Penetration planar(const Pose& X_WP, const ContactSource& scene) noexcept;
+  Penetration translational(const Pose& X_WP, const ContactSource& scene) noexcept;
+
+  Options options_;
+  double mass_kg_;
+  ExactProjection exact_;
+  PlanarFamily planar_;
+  ContactSet contacts_;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cstdint>
+
+#include "core/contact.hpp"
+#include "core/inertia.hpp"
+#include "core/least_distance.hpp"
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+enum class ProjectionStatus : std::uint8_t {
+  free,          ///< the pose is admissible: q = p
+  converged,     ///< q is a closest admissible configuration (a KKT point)
+  budget_spent,  ///< q is admissible, and the best found within the iteration budget
+  infeasible,    ///< no admissible pose was found near p: the obstacles contradict each other here
+};
+
+/// A contact that holds q, and the share of the wrench it carries.
+struct ActiveContact {
+  Contact contact;
+  double multiplier = 0.0;  ///< d T / d gap >= 0; zero where the contact touches but carries nothing [kg m]
+};
+
+/// The closest-point projection of Eq. (7).
+struct Projection {
+  Pose X_WQ;                    ///< the admissible configuration q of the tool's body frame in the world
+  double energy = 0.0;          ///< T = d(p, q) of Eq. (8) [kg m^2]
+  ProjectionStatus status = ProjectionStatus::free;
+  std::uint16_t iterations = 0; ///< Newton steps taken
+  double kkt_residual = 0.0;    ///< |grad T - sum multiplier grad gap| / |grad T| at q
+  bool proven_global = false;   ///< no admissible pose is closer: proven by project_globally(), never by project()
+  std::uint16_t active_count = 0;  ///< contacts that touch at q
+  std::array<ActiveContact, ContactSet::kCapacity> active;
+};
+
+/// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy metric,
+/// all contacts together.
+///
+/// Unknowns: u = s/L and the unit quaternion E = (w, v) of R_p' R_q, with s = R_p'(x_q - x_p) and L a length of the
+/// body's own (its radius of gyration), so that nothing below depends on the unit of length. With H^ = H/(m L^2):
+///
+///   T/(m L^2) = |u|^2 + 4 v' H^ v          gap_i/L = n_i . (u + R_E a_i) + c_i
+///
+/// where n_i, a_i/L, c_i = (n_i . x_p - o_i)/L are the contact as seen from p.
+///
+/// For a fixed rotation every gap is affine in u. So the nearest translation is a three-dimensional least-distance
+/// problem with an exact answer, and every iterate of the method is admissible: a Newton step (a six-dimensional
+/// least-distance problem on the linearised gaps, curvature of the contacts included) proposes a rotation, the
+/// translation restores admissibility, and the step is accepted when T falls. The first iterate is the best
+/// translation, or last tick's rotation; T only falls from there, and whenever time is up there is an answer.
+///
+/// All memory is in the object. One object serves one thread.
+class ExactProjection {
+ public:
+  struct Budget {
+    std::uint16_t iterations = 40;  ///< Newton steps, all rounds of constraint generation together
+    std::uint16_t rounds = 24;      ///< of constraint generation
+  };
+
+  explicit ExactProjection(const Inertia& M);
+  ExactProjection(const Inertia& M, Budget budget);
+
+  /// Follows a proxy: the closest admissible configuration to p, sought from the rotation of X_start (last tick's q).
+  /// RT safe.
+  Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept;
+
+  /// The closest admissible configuration to p, whatever came before: tries further starts until the dual bound
+  /// proves that none is closer, or the starts are used up. Up to a hundred times dearer than project(). RT safe.
+  Projection project_globally(const Pose& X_WP, const ContactSource& scene) noexcept;
+
+  /// The closest admissible configuration among those with the rotation of X_rotated: what a method that knows
+  /// translations only would answer (X_rotated = X_WP), or the lift that makes any rotation admissible. RT safe.
+  Projection translate(const Pose& X_WP, const ContactSource& scene, const Pose& X_rotated) noexcept;
+
+ private:
+  /// A contact seen from p, in units of L.
+  struct Seen {
+    Vector3d n;
+    Vector3d a;
+    double c;
+  };
+  struct State {
+    Vector3d u = Vector3d::Zero();
+    Quaterniond E = Quaterniond::Identity();
+    double T = 0.0;  ///< in units of m L^2
+  };
+  struct Slope {
+    Vector6d g;       ///< gradient of T in (u, eta)
+    Matrix6d W;       ///< Hessian of the Lagrangian, made positive definite
+  };
+  enum class Local : std::uint8_t { converged, budget_spent, infeasible };
+  enum class Freedom : std::uint8_t { all, translation };
+
+  Projection project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
+                          Freedom freedom = Freedom::all) noexcept;
+  void see(const Pose& X_WP) noexcept;
+  double scaled_energy(const State& state) const noexcept;
+  bool restore(State& state) noexcept;
+  bool seek_feasible(State& state) noexcept;
+  Local minimise(State& state) noexcept;
+  Local translate_out(State& state) noexcept;
+  Vector6d gradient(const State& state) const noexcept;
+  Slope slope(const State& state) const noexcept;
+  void linearise(const State& state) noexcept;
+  Eigen::LLT<Matrix6d> factorised(const Matrix6d& hessian) const noexcept;
+  bool newton_step(const Slope& slope, Vector6d& dy) noexcept;
+  bool advance(State& state, const Vector6d& dy, double promised) noexcept;
+  void prune(const State& state) noexcept;
+  void report(const Pose& X_WP, Projection& out) noexcept;
+  bool certify(const State& state) noexcept;
+
+  Inertia M_;
+  Budget budget_;
+  double L_;           ///< [m]
+  Matrix3d H_hat_;
+
+  ContactSet contacts_;
+  std::array<Seen, ContactSet::kCapacity> seen_;
+  std::array<double, ContactSet::kCapacity> multiplier_;
+  std::array<Vector6d, ContactSet::kCapacity> J_;  ///< gradient of gap i in (u, eta)
+  std::array<double, ContactSet::kCapacity> gap_;
+  LeastDistance<3, ContactSet::kCapacity> translation_;
+  LeastDistance<6, ContactSet::kCapacity> step_;
+  LeastDistance<7, ContactSet::kCapacity> elastic_;
+  State state_;                  ///< the iterate, and after a query its answer
+  Quaterniond dual_rotation_ = Quaterniond::Identity();  ///< where the dual bound of certify() is attained
+  std::uint16_t iterations_ = 0;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace wrenchd {
+
+/// Real roots of a polynomial of degree four or less, at most four of them.
+struct RealRoots {
+  std::array<double, 4> x{};
+  std::size_t count = 0;
+
+  const double* begin() const noexcept { return x.data(); }
+  const double* end() const noexcept { return x.data() + count; }
+};
+
+/// Real roots of  A x^4 + B x^3 + C x^2 + D x + E = 0  by Ferrari's method (Eq. 25, ref. [24] of the paper), in any
+/// order, a double root once or twice. Any leading coefficients may vanish: what is left is solved as a cubic,
+/// quadratic or line. The zero polynomial has no roots here. Coefficients must be finite. RT safe.
+RealRoots real_roots(double A, double B, double C, double D, double E) noexcept;
+
+}  // namespace wrenchd
