@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/limits.hpp"
+#include "core/method.hpp"
 #include "core/pose.hpp"
 #include "core/simulation_settings.hpp"
 #include "core/wrench_law.hpp"
@@ -15,23 +16,40 @@ namespace wrenchd {
 
 enum class Realtime : std::uint8_t { required, best_effort, off };
 enum class Pacing : std::uint8_t { clock, device };
-enum class Method : std::uint8_t { exact, planar, translational };
 
 /// [servo]
 struct ServoSettings {
-  double rate_Hz = 1000.0;                 ///< 500 to 8000
+  double rate_Hz = 1000.0;  ///< 500 to 8000
   Pacing pacing = Pacing::clock;
   Realtime realtime = Realtime::required;
-  int priority = 45;                       ///< SCHED_FIFO, below threaded interrupts (50)
-  int cpu = -1;                            ///< -1: no affinity
-  double late_limit_s = 0.020;             ///< a tick later than this starts the soft start anew
+  int priority = 45;            ///< SCHED_FIFO, below threaded interrupts (50)
+  int cpu = -1;                 ///< -1: no affinity
+  double late_limit_s = 0.020;  ///< a tick later than this starts the soft start anew
 };
 
 /// [rendering]
 struct RenderingSettings {
   Method method = Method::exact;
-  int planes = 47;                         ///< N_delta of Eq. (40), for method = "planar"
+  int planes = 47;  ///< N_delta of Eq. (40), for method = "planar"
 };
+
+/// diag(linear, linear, linear, angular, angular, angular): the same in all directions, about the centre of
+/// mass.
+inline Matrix6d block_gain(double linear, double angular) {
+  Vector6d diagonal;
+  diagonal << Vector3d::Constant(linear), Vector3d::Constant(angular);
+  return diagonal.asDiagonal();
+}
+
+/// What [wrench] starts from. Sampled at 1 kHz with 1.4 ms of delay, a wall is stable up to
+/// (b + B) / (T/2 + delay) = 3400 N/m for the friction b = 0.5 and hand damping B = 6 N.s/m of the simulated
+/// device; a sixth of that feels firm and leaves room for a hand that lets go.
+inline WrenchGains default_gains() {
+  WrenchGains gains;
+  gains.stiffness = block_gain(600.0, 1.5);
+  gains.damping = block_gain(1.0, 0.002);
+  return gains;
+}
 
 /// Where a frame stands in another, as config files give it.
 struct PlacementSettings {
@@ -41,14 +59,15 @@ struct PlacementSettings {
 
 /// [device]
 struct DeviceSettings {
-  std::string profile = "loopback";        ///< name of a profile file, without .toml
-  PlacementSettings base_in_world;         ///< X_WB
-  PlacementSettings tool_in_handle;        ///< X_HM: mesh frame of the tool in the handle frame
+  std::string profile = "loopback";    ///< name of a profile file, without .toml; or a file, with it
+  std::filesystem::path profile_file;  ///< where the profile was found
+  PlacementSettings base_in_world;     ///< X_WB
+  PlacementSettings tool_in_handle;    ///< X_HM: mesh frame of the tool in the handle frame
 };
 
 /// [recording]
 struct RecordingSettings {
-  std::filesystem::path file;              ///< empty: no recording
+  std::filesystem::path file;  ///< empty: no recording
 };
 
 /// All of wrenchd.toml.
@@ -58,9 +77,9 @@ struct Settings {
   DeviceSettings device;
   ServoSettings servo;
   RenderingSettings rendering;
-  WrenchGains wrench;                       ///< [wrench]
-  LimitSettings limits;                     ///< [limits]
-  SimulationSettings simulation;            ///< [simulation]
+  WrenchGains wrench = default_gains();  ///< [wrench]
+  LimitSettings limits;                  ///< [limits]
+  SimulationSettings simulation;         ///< [simulation]
   RecordingSettings recording;
 };
 

@@ -16,8 +16,14 @@ PenetrationDepth::PenetrationDepth(const Inertia& M, const ConvexBody& body, Opt
     : options_(options), mass_kg_(M.mass_kg), exact_(M), planar_(M, body, options.planes) {}
 
 Penetration PenetrationDepth::follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept {
-  if (options_.method == Method::exact) return exact(X_WP, exact_.project(X_WP, scene, X_last));
-  return query(X_WP, scene);
+  if (options_.method != Method::exact) return query(X_WP, scene);
+  Penetration out = exact(X_WP, exact_.project(X_WP, scene, X_last));
+  if (out.projection.status != ProjectionStatus::infeasible) return out;
+  out.projection.X_WQ = X_last;
+  out.eps = displacement(X_WP, X_last);
+  out.drive = out.eps;
+  out.contacts = 1;
+  return out;
 }
 
 Penetration PenetrationDepth::query(const Pose& X_WP, const ContactSource& scene) noexcept {

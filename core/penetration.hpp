@@ -33,7 +33,8 @@ class PenetrationDepth {
   /// The body is kept by reference and must outlive this.
   PenetrationDepth(const Inertia& M, const ConvexBody& body, Options options);
 
-  /// Follows a proxy: X_last is last tick's q. RT safe.
+  /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p the proxy
+  /// stays there, and draws the hand back to where it came from. RT safe.
   Penetration follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept;
   /// Knows no history; exact seeks the global optimum. RT safe, but up to a hundred times dearer.
   Penetration query(const Pose& X_WP, const ContactSource& scene) noexcept;

@@ -11,20 +11,21 @@ namespace wrenchd {
 
 /// The newest thing a device said. Frames: B = device base, H = handle point.
 struct DeviceSample {
-  Pose X_BH;                      ///< handle in the base
-  Twist V_BH;                     ///< of the handle point, in base axes; zero where the device does not report it
-  double device_time_s = 0.0;     ///< the device's own clock, unwrapped
-  std::uint64_t sequence = 0;     ///< of the report, unwrapped
-  std::uint64_t acknowledged = 0; ///< sequence of the last command the device took, unwrapped
-  TimePoint arrived{};            ///< when the newest report reached the host
-  std::uint32_t skipped = 0;      ///< older reports drained together with this one
-  std::uint32_t missing = 0;      ///< reports lost since the last sample, by sequence number
-  std::uint32_t rejected = 0;     ///< reports dropped in this read: wrong id, length or checksum, backward or duplicate sequence
-  std::uint32_t buttons = 0;      ///< bit mask
-  bool fresh = false;             ///< a new report arrived since the last read
+  Pose X_BH;   ///< handle in the base
+  Twist V_BH;  ///< of the handle point, in base axes; zero where the device does not report it
+  double device_time_s = 0.0;      ///< the device's own clock, unwrapped
+  std::uint64_t sequence = 0;      ///< of the report, unwrapped
+  std::uint64_t acknowledged = 0;  ///< sequence of the last command the device took, unwrapped
+  TimePoint arrived{};             ///< when the newest report reached the host
+  std::uint32_t skipped = 0;       ///< older reports drained together with this one
+  std::uint32_t missing = 0;       ///< reports lost since the last sample, by sequence number
+  std::uint32_t rejected =
+      0;  ///< reports dropped in this read: wrong id, length or checksum, backward or duplicate sequence
+  std::uint32_t buttons = 0;  ///< bit mask
+  bool fresh = false;         ///< a new report arrived since the last read
   bool motors_on = false;
   bool watchdog_tripped = false;
-  Fault fault = Fault::none;      ///< what is wrong with it; the pose is the last good one then
+  Fault fault = Fault::none;  ///< what is wrong with it; the pose is the last good one then
 };
 
 /// The device contract. A device is opened and closed by an ordinary thread; between the two only the servo

@@ -18,8 +18,8 @@ enum class LinkStatus : std::uint8_t {
 
 struct LinkRead {
   LinkStatus status = LinkStatus::empty;
-  std::size_t length = 0;   ///< of the report, even where it was longer than the buffer (then it was cut)
-  TimePoint arrived{};      ///< when the report reached the host
+  std::size_t length = 0;  ///< of the report, even where it was longer than the buffer (then it was cut)
+  TimePoint arrived{};     ///< when the report reached the host
 };
 
 /// A byte transport that keeps report boundaries: report in, report out. It knows nothing of their content.

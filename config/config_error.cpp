@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/config_error.hpp"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+namespace wrenchd {
+namespace {
+
+std::string to_lines(const std::vector<Refusal>& refusals) {
+  std::string lines;
+  for (const Refusal& refusal : refusals) {
+    if (!lines.empty()) lines += '\n';
+    lines += to_text(refusal);
+  }
+  return lines;
+}
+
+bool earlier(const Refusal& a, const Refusal& b) {
+  return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+}
+
+}  // namespace
+
+std::string to_text(const Refusal& refusal) {
+  std::string where = refusal.file.string();
+  if (refusal.place.line > 0) {
+    where += ':' + std::to_string(refusal.place.line) + ':' + std::to_string(refusal.place.column);
+  }
+  return where + ": " + refusal.message;
+}
+
+std::string printable(std::string text, std::size_t longest) {
+  if (text.size() > longest) text = text.substr(0, longest) + "...";
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+ConfigError::ConfigError(std::vector<Refusal> refusals)
+    : std::runtime_error(to_lines(refusals)), refusals_(std::move(refusals)) {}
+
+ConfigError::ConfigError(std::filesystem::path file, Place place, std::string message)
+    : ConfigError(std::vector<Refusal>{{std::move(file), place, std::move(message)}}) {}
+
+void RefusalList::add(Place place, std::string message) {
+  refusals_.push_back({file_, place, std::move(message)});
+}
+
+void RefusalList::throw_if_any() {
+  if (refusals_.empty()) return;
+  std::stable_sort(refusals_.begin(), refusals_.end(), earlier);
+  throw ConfigError(std::move(refusals_));
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "config/config_error.hpp"
+#include "core/device_profile.hpp"
+
+namespace wrenchd {
+
+/// Reads a device profile; config/profiles/example.toml is the manual of the format. Throws ConfigError.
+DeviceProfile load_profile(const std::filesystem::path& file);
+
+}  // namespace wrenchd

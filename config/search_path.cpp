@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/search_path.hpp"
+
+#include <utility>
+
+#include "config/config_error.hpp"
+
+namespace wrenchd {
+namespace fs = std::filesystem;
+
+SearchPath::SearchPath() : SearchPath({"/etc/wrenchd", "/usr/share/wrenchd", WRENCHD_SOURCE_CONFIG_DIR}) {}
+
+SearchPath::SearchPath(std::vector<fs::path> directories) : directories_(std::move(directories)) {}
+
+std::vector<fs::path> SearchPath::candidates(const fs::path& name, const fs::path& named_in) const {
+  if (name.is_absolute()) return {name};
+  std::vector<fs::path> places;
+  if (!named_in.empty()) places.push_back(named_in.parent_path() / name);
+  for (const fs::path& directory : directories_) places.push_back(directory / name);
+  return places;
+}
+
+std::optional<fs::path> SearchPath::find(const fs::path& name, const fs::path& named_in) const {
+  for (const fs::path& place : candidates(name, named_in)) {
+    // What cannot be entered or read counts as there: opening it then fails loudly, where passing it over
+    // would silently put the package's file in place of the administrator's.
+    std::error_code ignored;
+    if (fs::status(place, ignored).type() != fs::file_type::not_found) return place;
+  }
+  return {};
+}
+
+fs::path SearchPath::require(const fs::path& name) const {
+  const auto found = find(name);
+  if (!found) throw ConfigError(name, {}, not_found(name));
+  return *found;
+}
+
+std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in) const {
+  std::string places;
+  for (const fs::path& place : candidates(name, named_in)) {
+    places += (places.empty() ? "" : ", ") + fs::absolute(place).lexically_normal().string();
+  }
+  return "no such file; looked for " + places;
+}
+
+fs::path profile_file(const std::string& name) {
+  return name.ends_with(".toml") ? fs::path(name) : fs::path("profiles") / (name + ".toml");
+}
+
+}  // namespace wrenchd

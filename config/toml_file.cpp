@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/toml_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+
+#include <toml++/toml.h>
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The largest shipped file has 8 kB. A megabyte is somebody's mistake (a mesh, a recording).
+constexpr std::uintmax_t kMaxBytes = 1 << 20;
+
+/// Our formats nest four deep.
+constexpr int kMaxDepth = 16;
+
+/// The parser bounds the nesting of brackets but not of dotted keys, and it frees its tree by recursion: a
+/// key of 500,000 dots overflows the stack. No line of ours needs a tenth of this.
+constexpr std::ptrdiff_t kMaxDotsInLine = 120;
+
+void require_regular_file(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) {
+    throw ConfigError(file, {}, "no such file; looked for " + fs::absolute(file).string());
+  }
+  if (error) throw ConfigError(file, {}, "cannot be read: " + error.message());
+  if (fs::is_directory(status)) throw ConfigError(file, {}, "is a directory; name a file in it");
+  if (!fs::is_regular_file(status)) throw ConfigError(file, {}, "is not a regular file; name a TOML file");
+}
+
+std::string read_text(const fs::path& file) {
+  require_regular_file(file);
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(file, error);
+  if (bytes > kMaxBytes) {
+    throw ConfigError(file, {}, "is larger than 1 MiB; is this really a configuration file?");
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw ConfigError(file, {}, "cannot be opened; check that this user may read it");
+  std::string text(static_cast<std::size_t>(bytes), '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text;
+}
+
+void refuse_many_dots(const fs::path& file, std::string_view text) {
+  unsigned line = 1;
+  while (!text.empty()) {
+    const std::size_t length = std::min(text.find('\n'), text.size());
+    if (std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(length), '.') > kMaxDotsInLine) {
+      throw ConfigError(file, {line, 1},
+                        "has more than " + std::to_string(kMaxDotsInLine) +
+                            " dots in one line; break the line, or nest its keys less deeply");
+    }
+    text.remove_prefix(std::min(length + 1, text.size()));
+    ++line;
+  }
+}
+
+Place to_place(const toml::source_region& source) {
+  return {source.begin.line, source.begin.column};
+}
+
+TomlNode convert(const fs::path& file, const toml::node& node, int depth);
+
+TomlNode::Table convert_table(const fs::path& file, const toml::table& table, int depth) {
+  TomlNode::Table out;
+  for (const auto& [key, node] : table) {
+    out.push_back({std::string(key.str()), to_place(key.source()), convert(file, node, depth)});
+  }
+  return out;
+}
+
+TomlNode::Array convert_array(const fs::path& file, const toml::array& array, int depth) {
+  TomlNode::Array out;
+  for (const toml::node& node : array) out.push_back(convert(file, node, depth));
+  return out;
+}
+
+TomlNode::Value convert_value(const fs::path& file, const toml::node& node, int depth) {
+  if (const auto* table = node.as_table()) return convert_table(file, *table, depth);
+  if (const auto* array = node.as_array()) return convert_array(file, *array, depth);
+  if (const auto* text = node.as_string()) return text->get();
+  if (const auto* number = node.as_floating_point()) return number->get();
+  if (const auto* integer = node.as_integer()) return integer->get();
+  if (const auto* boolean = node.as_boolean()) return boolean->get();
+  return std::monostate{};
+}
+
+TomlNode convert(const fs::path& file, const toml::node& node, int depth) {
+  const Place place = to_place(node.source());
+  if (depth > kMaxDepth) {
+    throw ConfigError(file, place, "is nested more than " + std::to_string(kMaxDepth) + " deep; flatten it");
+  }
+  return {place, convert_value(file, node, depth + 1)};
+}
+
+/// The parser's message is one sentence on what it saw; it may quote a hostile file at length.
+std::string syntax_message(std::string_view description) {
+  std::string message = "is not valid TOML: " + printable(std::string(description), 200);
+  if (description.find("redefine") != std::string_view::npos)
+    message += "; a key stands once, keep one of them";
+  if (description.find("nested") != std::string_view::npos) message += "; flatten it";
+  if (description.find("utf-8") != std::string_view::npos) message += "; save the file as UTF-8";
+  return message;
+}
+
+}  // namespace
+
+TomlNode read_toml_file(const fs::path& file) {
+  const std::string text = read_text(file);
+  refuse_many_dots(file, text);
+  try {
+    return convert(file, toml::parse(std::string_view(text)), 0);
+  } catch (const toml::parse_error& error) {
+    throw ConfigError(file, to_place(error.source()), syntax_message(error.description()));
+  }
+}
+
+std::string to_text(double x) {
+  const double size = std::abs(x);
+  const bool plain = size == 0.0 || (size >= 1e-4 && size < 1e9);
+  const auto format = plain ? std::chars_format::fixed : std::chars_format::general;
+  char buffer[32];
+  const auto end = std::to_chars(std::begin(buffer), std::end(buffer), x, format);
+  return {std::begin(buffer), end.ptr};
+}
+
+std::string describe(const TomlNode& node) {
+  struct Words {
+    std::string operator()(std::monostate) const { return "a date or time"; }
+    std::string operator()(bool b) const { return b ? "true" : "false"; }
+    std::string operator()(std::int64_t i) const { return std::to_string(i); }
+    std::string operator()(double x) const { return to_text(x); }
+    std::string operator()(const std::string& s) const { return "the text \"" + printable(s) + '"'; }
+    std::string operator()(const TomlNode::Array& a) const {
+      return "an array of " + std::to_string(a.size());
+    }
+    std::string operator()(const TomlNode::Table&) const { return "a table"; }
+  };
+  return std::visit(Words{}, node.value);
+}
+
+}  // namespace wrenchd

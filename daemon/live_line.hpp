@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "daemon/loop_timing.hpp"
+#include "daemon/tick_record.hpp"
+
+namespace wrenchd {
+
+/// One line for a person: device time, state, pose of the tool, contacts, force, torque, tick p50/p99.9/max.
+std::string live_line(const TickRecord& record, const LoopTiming& timing);
+
+/// What a run came to.
+struct RunTotals {
+  double seconds = 0.0;
+  std::uint64_t ticks = 0;
+  std::uint64_t ticks_in_contact = 0;  ///< of those that were looked at for the live line
+  std::uint64_t looks = 0;
+  double most_force_N = 0.0;           ///< seen at the looks
+  double most_torque_Nm = 0.0;
+};
+
+/// Adds a look at the loop to the totals.
+void look(RunTotals& totals, const TickRecord& record);
+
+/// Several lines at the end of a run: rate, contact, times of each stage, overruns.
+std::string summary(const RunTotals& totals, const LoopTiming& timing);
+
+}  // namespace wrenchd

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <future>
+#include <memory>
+#include <thread>
+
+#include "daemon/event_log.hpp"
+#include "daemon/live_line.hpp"
+#include "daemon/realtime.hpp"
+#include "daemon/recorder.hpp"
+#include "daemon/station.hpp"
+#include "daemon/version.hpp"
+#include "daemon/wall_clock.hpp"
+
+// Arguments -> plan -> station -> run -> exit code.
+
+namespace {
+
+using namespace wrenchd;
+
+constexpr int kExitRefused = 1;  ///< a file, a device or the kernel said no; nothing was started
+constexpr int kExitFault = 3;    ///< the loop ended with a fault; the hand was released
+
+constexpr auto kLook = std::chrono::milliseconds(100);  ///< how often the live line looks
+
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
+
+ServoLoop* loop_to_release = nullptr;  ///< for std::terminate only
+
+struct Options {
+  PlanFiles files;
+  std::string realtime;
+  std::string record;
+  double seconds = 0.0;
+  bool arm = false;
+  bool live = false;
+  bool virtual_time = false;
+  bool verbose = false;
+};
+
+void describe(CLI::App& app, Options& options) {
+  app.description("wrenchd: a haptic servo daemon. Reads the hand's pose, computes the generalized penetration\n"
+                  "depth of the tool in its scene, and writes the wrench back.");
+  app.footer("Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 a fault ended the loop; others:\n"
+             "usage. On every way out the hand is released: zero wrench, motors off.");
+  app.set_version_flag("--version", std::string("wrenchd ") + kVersion);
+  app.add_option("-c,--config", options.files.config,
+                 "wrenchd.toml; a plain name is looked for in /etc/wrenchd, /usr/share/wrenchd, then the source tree")
+      ->capture_default_str();
+  app.add_option("--scene", options.files.scene, "scene file, instead of the one the configuration names");
+  app.add_option("--profile", options.files.profile, "device profile, instead of the one the configuration names");
+  app.add_option("--realtime", options.realtime, "instead of the configuration's: required, best_effort, off")
+      ->check(CLI::IsMember({"required", "best_effort", "off"}));
+  app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)");
+  app.add_option("--seconds", options.seconds, "stop after this many seconds; without it, run until Ctrl-C")
+      ->check(CLI::PositiveNumber);
+  app.add_flag("--arm", options.arm, "arm at once; without it the loop measures, and the motors stay off");
+  app.add_flag("--live", options.live, "show a live line, and a summary at the end");
+  app.add_flag("--virtual-time", options.virtual_time,
+               "simulated device only: time passes as fast as it can be computed, and every run is the same")
+      ->needs("--seconds");
+  app.add_flag("-v,--verbose", options.verbose, "log more");
+}
+
+/// The command line on top of the configuration.
+Plan plan_of(const Options& options) {
+  Plan plan = read_plan(options.files, SearchPath());
+  if (options.realtime == "required") plan.settings.servo.realtime = Realtime::required;
+  if (options.realtime == "best_effort") plan.settings.servo.realtime = Realtime::best_effort;
+  if (options.realtime == "off" || options.virtual_time) plan.settings.servo.realtime = Realtime::off;
+  if (!options.record.empty()) plan.settings.recording.file = options.record;
+  return plan;
+}
+
+void log_grants(const std::vector<RealtimeGrant>& grants) {
+  for (const RealtimeGrant& grant : grants) {
+    if (grant.granted)
+      spdlog::info("granted: {}", grant.what);
+    else
+      spdlog::warn("refused: {}: {}", grant.what, grant.cure);
+  }
+}
+
+/// Shows the loop to a person: in place on a terminal, a line twice a second elsewhere.
+class LiveView {
+ public:
+  explicit LiveView(bool shown) : shown_(shown), terminal_(isatty(STDOUT_FILENO) != 0) {}
+
+  void look_at(ServoLoop& loop) {
+    TickRecord record;
+    if (!loop.latest().read(record)) return;
+    look(totals_, record);
+    if (!shown_ || (!terminal_ && totals_.looks % 5 != 0)) return;
+    std::fputs(terminal_ ? "\r\x1b[K" : "", stdout);
+    std::fputs(live_line(record, loop.timing()).c_str(), stdout);
+    std::fputs(terminal_ ? "" : "\n", stdout);
+    std::fflush(stdout);
+  }
+
+  void close(const ServoLoop& loop, double seconds) {
+    if (!shown_) return;
+    totals_.seconds = seconds;
+    std::fputs(terminal_ ? "\n" : "", stdout);
+    std::fputs(summary(totals_, loop.timing()).c_str(), stdout);
+    std::fflush(stdout);
+  }
+
+ private:
+  bool shown_;
+  bool terminal_;
+  RunTotals totals_;
+};
+
+/// Wall time: the servo thread ticks, this one looks on.
+Fault run_in_wall_time(Station& station, const Options& options, WallClock& clock, LiveView& view) {
+  const ServoSettings& servo = station.plan().settings.servo;
+  log_grants(lock_memory(servo.realtime));
+  std::promise<std::vector<RealtimeGrant>> prepared;
+  auto grants = prepared.get_future();
+  std::atomic<bool> stop_loop{false};
+  std::atomic<bool> over{false};
+  Fault fault = Fault::none;
+  std::thread servo_thread([&] {
+    try {
+      prepared.set_value(prepare_servo_thread(servo));
+      fault = station.loop().run(clock, stop_loop);
+    } catch (...) {  // only prepare_servo_thread() throws: the loop has not run yet
+      prepared.set_exception(std::current_exception());
+    }
+    over.store(true);
+  });
+  const auto joined = [&]() noexcept {
+    stop_loop.store(true);
+    servo_thread.join();
+  };
+  try {
+    log_grants(grants.get());
+    const TimePoint start = clock.now();
+    while (!stop_requested.load() && !over.load()) {
+      if (options.seconds > 0.0 && seconds(clock.now() - start) >= options.seconds) break;
+      std::this_thread::sleep_for(kLook);
+      view.look_at(station.loop());
+    }
+    joined();
+    view.close(station.loop(), seconds(clock.now() - start));
+  } catch (...) {
+    joined();
+    throw;
+  }
+  return fault;
+}
+
+/// Virtual time: the same ticks one after the other, on this thread.
+Fault run_in_virtual_time(Station& station, const Options& options, VirtualClock& clock, LiveView& view) {
+  const Duration period = from_seconds(1.0 / station.plan().settings.servo.rate_Hz);
+  const TimePoint end = clock.now() + from_seconds(options.seconds);
+  TimePoint next_look = clock.now() + kLook;
+  Fault fault = Fault::none;
+  while (fault == Fault::none && clock.now() < end && !stop_requested.load()) {
+    clock.sleep_until(clock.now() + period);
+    fault = station.loop().tick(clock.now(), clock.now());
+    if (clock.now() < next_look) continue;
+    next_look += kLook;
+    view.look_at(station.loop());
+  }
+  if (fault == Fault::none) station.loop().release(clock.now(), Fault::none);
+  view.close(station.loop(), seconds(clock.now() - TimePoint{}));
+  return fault;
+}
+
+template <class TheClock>
+Fault run(Plan plan, const Options& options, TheClock& clock,
+          Fault (*run_it)(Station&, const Options&, TheClock&, LiveView&)) {
+  Station station(std::move(plan), clock);
+  loop_to_release = &station.loop();
+  spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} half-spaces, {} Hz", kVersion,
+               station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
+               station.scene().half_spaces().size(), station.plan().settings.servo.rate_Hz);
+  std::unique_ptr<Recorder> recorder;
+  if (const auto& file = station.plan().settings.recording.file; !file.empty())
+    recorder = std::make_unique<Recorder>(station.records(), file, station.recording_header());
+  LiveView view(options.live);
+  Fault fault = Fault::none;
+  {
+    const EventLog log(station.loop());
+    if (options.arm) station.loop().arm();
+    fault = run_it(station, options, clock, view);
+  }
+  loop_to_release = nullptr;
+  if (recorder && !recorder->error().empty()) spdlog::error("{}", recorder->error());
+  if (station.loop().dropped_records() > 0)
+    spdlog::warn("{} ticks are missing in the recording: the disk fell behind", station.loop().dropped_records());
+  return fault;
+}
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested.store(true); };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  std::set_terminate([] {
+    if (loop_to_release != nullptr) loop_to_release->release(std::chrono::steady_clock::now(), Fault::none);
+    std::abort();
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app;
+  Options options;
+  describe(app, options);
+  CLI11_PARSE(app, argc, argv);
+  spdlog::set_default_logger(spdlog::stderr_color_mt("wrenchd"));
+  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  if (options.verbose) spdlog::set_level(spdlog::level::debug);
+  catch_signals();
+  try {
+    Plan plan = plan_of(options);
+    Fault fault = Fault::none;
+    if (options.virtual_time) {
+      VirtualClock clock;
+      fault = run<VirtualClock>(std::move(plan), options, clock, run_in_virtual_time);
+    } else {
+      WallClock clock;
+      fault = run<WallClock>(std::move(plan), options, clock, run_in_wall_time);
+    }
+    return fault == Fault::none ? 0 : kExitFault;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "wrenchd: %s\n", error.what());
+    return kExitRefused;
+  }
+}

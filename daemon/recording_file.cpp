@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording_file.hpp"
+
+#include <hdf5.h>
+
+#include <array>
+#include <cstddef>
+#include <tuple>
+
+namespace wrenchd {
+namespace {
+
+constexpr const char* kTable = "/ticks";
+constexpr hsize_t kChunkRows = 1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
+constexpr unsigned kDeflateLevel = 1;
+constexpr hsize_t kStages = std::tuple_size_v<decltype(TickRecord::stage_ns)>;
+
+/// One column of the table: the one place that ties names and units to the fields of TickRecord.
+struct Column {
+  const char* name;
+  const char* unit;
+  std::size_t offset;
+  hid_t (*type)();
+  hsize_t count;
+};
+
+hid_t u64() { return H5T_NATIVE_UINT64; }
+hid_t i64() { return H5T_NATIVE_INT64; }
+hid_t u32() { return H5T_NATIVE_UINT32; }
+hid_t u16() { return H5T_NATIVE_UINT16; }
+hid_t u8() { return H5T_NATIVE_UINT8; }
+hid_t f64() { return H5T_NATIVE_DOUBLE; }
+
+#define WRENCHD_COLUMN(field, unit, type, count) \
+  Column { #field, unit, offsetof(TickRecord, field), type, count }
+constexpr std::array kColumns = {
+    WRENCHD_COLUMN(tick, "1", u64, 1),
+    WRENCHD_COLUMN(now_ns, "ns", i64, 1),
+    WRENCHD_COLUMN(arrived_ns, "ns", i64, 1),
+    WRENCHD_COLUMN(device_time_s, "s", f64, 1),
+    WRENCHD_COLUMN(sequence, "1", u64, 1),
+    WRENCHD_COLUMN(acknowledged, "1", u64, 1),
+    WRENCHD_COLUMN(skipped, "1", u32, 1),
+    WRENCHD_COLUMN(missing, "1", u32, 1),
+    WRENCHD_COLUMN(rejected, "1", u32, 1),
+    WRENCHD_COLUMN(buttons, "bits", u32, 1),
+    WRENCHD_COLUMN(fresh, "bool", u8, 1),
+    WRENCHD_COLUMN(motors_on, "bool", u8, 1),
+    WRENCHD_COLUMN(watchdog_tripped, "bool", u8, 1),
+    WRENCHD_COLUMN(arm_command, "enum", u8, 1),
+    WRENCHD_COLUMN(X_BH, "m m m, qx qy qz qw", f64, 7),
+    WRENCHD_COLUMN(V_BH, "m/s x3, rad/s x3", f64, 6),
+    WRENCHD_COLUMN(X_WP, "m m m, qx qy qz qw", f64, 7),
+    WRENCHD_COLUMN(X_WQ, "m m m, qx qy qz qw", f64, 7),
+    WRENCHD_COLUMN(eps, "m x3, rad x3", f64, 6),
+    WRENCHD_COLUMN(F_T, "N x3, N.m x3", f64, 6),
+    WRENCHD_COLUMN(energy, "kg m^2", f64, 1),
+    WRENCHD_COLUMN(kkt_residual, "1", f64, 1),
+    WRENCHD_COLUMN(contacts, "1", u16, 1),
+    WRENCHD_COLUMN(iterations, "1", u16, 1),
+    WRENCHD_COLUMN(projection_status, "enum", u8, 1),
+    WRENCHD_COLUMN(engagement, "enum", u8, 1),
+    WRENCHD_COLUMN(limit_causes, "bits", u8, 1),
+    WRENCHD_COLUMN(fault, "enum", u8, 1),
+    WRENCHD_COLUMN(released, "bool", u8, 1),
+    WRENCHD_COLUMN(authority, "1", f64, 1),
+    WRENCHD_COLUMN(F_out, "N x3, N.m x3", f64, 6),
+    WRENCHD_COLUMN(wake_latency_ns, "ns", i64, 1),
+    WRENCHD_COLUMN(stage_ns, "ns x5: read projection wrench limits write", i64, kStages),
+};
+#undef WRENCHD_COLUMN
+
+/// Owns an HDF5 identifier.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Handle(hid_t id, Close close) : id_(id), close_(close) {}
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  operator hid_t() const { return id_; }  // NOLINT(google-explicit-constructor): HDF5 takes plain identifiers
+  bool ok() const { return id_ >= 0; }
+
+ private:
+  hid_t id_;
+  Close close_;
+};
+
+/// HDF5 prints its error stack unless told not to; our errors say what matters.
+void quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+hid_t row_type() {
+  const hid_t row = H5Tcreate(H5T_COMPOUND, sizeof(TickRecord));
+  for (const Column& column : kColumns) {
+    if (column.count == 1) {
+      H5Tinsert(row, column.name, column.offset, column.type());
+      continue;
+    }
+    const Handle array(H5Tarray_create2(column.type(), 1, &column.count), H5Tclose);
+    H5Tinsert(row, column.name, column.offset, array);
+  }
+  return row;
+}
+
+std::string units() {
+  std::string text;
+  for (const Column& column : kColumns) text += std::string(column.name) + " [" + column.unit + "]\n";
+  return text;
+}
+
+void write_text(hid_t object, const char* name, const std::string& text) {
+  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type, text.empty() ? 1 : text.size());
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  const std::string padded = text.empty() ? std::string(1, '\0') : text;
+  H5Awrite(attribute, type, padded.data());
+}
+
+std::string read_text(hid_t object, const char* name) {
+  const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.ok()) return {};
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  std::string text(H5Tget_size(type), '\0');
+  if (H5Aread(attribute, type, text.data()) < 0) return {};
+  return text[0] == '\0' ? std::string() : text;
+}
+
+}  // namespace
+
+struct RecordingWriter::File {
+  Handle file;
+  Handle row;
+  Handle table;
+  hsize_t rows = 0;
+};
+
+namespace {
+
+hid_t create_table(hid_t file, hid_t row) {
+  const hsize_t none = 0;
+  const hsize_t unlimited = H5S_UNLIMITED;
+  const Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
+  const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_chunk(layout, 1, &kChunkRows);
+  H5Pset_shuffle(layout);
+  H5Pset_deflate(layout, kDeflateLevel);
+  return H5Dcreate2(file, kTable, row, space, H5P_DEFAULT, layout, H5P_DEFAULT);
+}
+
+}  // namespace
+
+RecordingWriter::RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header) {
+  quiet();
+  if (std::filesystem::exists(file))
+    throw RecordingError(file.string() + ": exists already, and a recording is never overwritten; choose another name");
+  const hid_t id = H5Fcreate(file.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT);
+  if (id < 0)
+    throw RecordingError(file.string() + ": cannot be created; check that the directory exists and may be written to");
+  const hid_t row = row_type();
+  file_.reset(new File{Handle(id, H5Fclose), Handle(row, H5Tclose), Handle(create_table(id, row), H5Dclose)});
+  if (!file_->table.ok()) throw RecordingError(file.string() + ": the table of ticks cannot be created");
+  write_text(file_->table, "units", units());
+  write_text(file_->table, "wrenchd_version", header.version);
+  write_text(file_->table, "settings", header.settings);
+  write_text(file_->table, "scene", header.scene);
+  write_text(file_->table, "profile", header.profile);
+}
+
+RecordingWriter::~RecordingWriter() = default;
+
+void RecordingWriter::append(std::span<const TickRecord> records) {
+  if (records.empty()) return;
+  const hsize_t start = file_->rows;
+  const hsize_t count = records.size();
+  const hsize_t total = start + count;
+  if (H5Dset_extent(file_->table, &total) < 0) throw RecordingError("the recording cannot grow; is the disk full?");
+  const Handle in_file(H5Dget_space(file_->table), H5Sclose);
+  H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &start, nullptr, &count, nullptr);
+  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  if (H5Dwrite(file_->table, file_->row, in_memory, in_file, H5P_DEFAULT, records.data()) < 0)
+    throw RecordingError("a recording could not be written; is the disk full?");
+  H5Fflush(file_->file, H5F_SCOPE_LOCAL);
+  file_->rows = total;
+}
+
+Recording read_recording(const std::filesystem::path& file) {
+  quiet();
+  const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (!opened.ok())
+    throw RecordingError(file.string() + ": is not there, or is not an HDF5 file; name a recording of wrenchd");
+  const Handle table(H5Dopen2(opened, kTable, H5P_DEFAULT), H5Dclose);
+  if (!table.ok()) throw RecordingError(file.string() + ": has no table 'ticks'; name a recording of wrenchd");
+  const Handle space(H5Dget_space(table), H5Sclose);
+  hsize_t rows = 0;
+  H5Sget_simple_extent_dims(space, &rows, nullptr);
+
+  Recording recording;
+  recording.header = {read_text(table, "wrenchd_version"), read_text(table, "settings"), read_text(table, "scene"),
+                      read_text(table, "profile")};
+  recording.ticks.resize(rows);
+  const Handle row(row_type(), H5Tclose);
+  if (rows > 0 && H5Dread(table, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, recording.ticks.data()) < 0)
+    throw RecordingError(file.string() + ": its ticks cannot be read; it was written by another version (" +
+                         recording.header.version + ")");
+  return recording;
+}
+
+}  // namespace wrenchd

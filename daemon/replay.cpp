@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/replay.hpp"
+
+#include <bit>
+#include <span>
+
+namespace wrenchd {
+namespace {
+
+/// A device whose samples come out of a recording, one a tick.
+class RecordedDevice final : public Device {
+ public:
+  void play(const TickRecord& record) noexcept { record_ = &record; }
+
+  void open() override {}
+  DeviceSample read_newest(TimePoint) noexcept override;
+  Fault write(TimePoint, const Wrench&, bool) noexcept override {
+    return write_failed() ? static_cast<Fault>(record_->fault) : Fault::none;
+  }
+  void release(TimePoint) noexcept override {}
+  void wait_readable(TimePoint) noexcept override {}
+  void close() noexcept override {}
+
+ private:
+  /// The faults that a write finds; all others came with the sample, or out of the loop itself.
+  bool write_failed() const noexcept { return record_->fault == static_cast<std::uint8_t>(Fault::write_failed); }
+
+  const TickRecord* record_ = nullptr;
+};
+
+DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
+  const TickRecord& r = *record_;
+  DeviceSample sample;
+  sample.X_BH.translation_m = {r.X_BH[0], r.X_BH[1], r.X_BH[2]};
+  sample.X_BH.rotation.coeffs() << r.X_BH[3], r.X_BH[4], r.X_BH[5], r.X_BH[6];
+  sample.V_BH.linear_m_per_s = {r.V_BH[0], r.V_BH[1], r.V_BH[2]};
+  sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
+  sample.device_time_s = r.device_time_s;
+  sample.sequence = r.sequence;
+  sample.acknowledged = r.acknowledged;
+  sample.arrived = TimePoint(Duration(r.arrived_ns));
+  sample.skipped = r.skipped;
+  sample.missing = r.missing;
+  sample.rejected = r.rejected;
+  sample.buttons = r.buttons;
+  sample.fresh = r.fresh != 0;
+  sample.motors_on = r.motors_on != 0;
+  sample.watchdog_tripped = r.watchdog_tripped != 0;
+  const auto fault = static_cast<Fault>(r.fault);
+  if (fault != Fault::wrench_not_finite && !write_failed()) sample.fault = fault;
+  return sample;
+}
+
+/// Compares two runs of numbers by their bits, so that NaN equals itself and -0 is not 0.
+std::optional<Difference> compare(std::uint64_t tick, const char* field, std::span<const double> recorded,
+                                  std::span<const double> replayed) {
+  for (std::size_t i = 0; i < recorded.size(); ++i)
+    if (std::bit_cast<std::uint64_t>(recorded[i]) != std::bit_cast<std::uint64_t>(replayed[i]))
+      return Difference{tick, std::string(field) + '[' + std::to_string(i) + ']', recorded[i], replayed[i]};
+  return {};
+}
+
+std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
+  const auto whole = [](const TickRecord& r) {
+    return std::array<double, 9>{r.energy, r.authority, static_cast<double>(r.contacts),
+                                 static_cast<double>(r.iterations), static_cast<double>(r.projection_status),
+                                 static_cast<double>(r.engagement), static_cast<double>(r.limit_causes),
+                                 static_cast<double>(r.fault), static_cast<double>(r.released)};
+  };
+  if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
+  if (auto d = compare(then.tick, "X_WQ", then.X_WQ, now.X_WQ)) return d;
+  if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
+  if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
+  if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
+  return compare(then.tick, "energy, authority, contacts, iterations, status, engagement, causes, fault, released",
+                 whole(then), whole(now));
+}
+
+}  // namespace
+
+std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
+  const Scene scene(plan.scene);
+  const VirtualClock clock;
+  RecordedDevice device;
+  ServoLoop loop(plan.settings, plan.profile, device, scene, clock);
+  for (const TickRecord& then : recording.ticks) {
+    device.play(then);
+    const TimePoint now{Duration(then.now_ns)};
+    if (then.arm_command == 1) loop.arm();
+    if (then.arm_command == 2) loop.disarm();
+    // The record of a stop that was asked for is the last tick's, with zero wrench and `released` set.
+    if (then.released != 0 && then.fault == 0)
+      loop.release(now, Fault::none);
+    else
+      loop.tick(now, now);
+    TickRecord replayed;
+    loop.latest().read(replayed);
+    if (auto difference = compare(then, replayed)) return difference;
+  }
+  return {};
+}
+
+}  // namespace wrenchd

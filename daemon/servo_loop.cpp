@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/servo_loop.hpp"
+
+#include <algorithm>
+
+#include "core/finite.hpp"
+
+// What wrenchd does, a thousand times a second or more (Algorithm 1 of the paper):
+//
+//   device -> pose p -> contacts -> projection q -> wrench -> limits -> device
+//
+// tick() is that line. Above it is run(), which waits for the next tick and lets nobody out without release();
+// below it are the stages, in order.
+
+namespace wrenchd {
+namespace {
+
+/// A sample older than this no longer pushes: the wrench is zero until a new one comes. A few reports at 1 kHz.
+constexpr Duration kStaleAfter = std::chrono::milliseconds(3);
+/// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
+constexpr int kDevicePatience_periods = 4;
+
+Pose pose_of(const PlacementSettings& placement) noexcept {
+  Vector6d rotation = Vector6d::Zero();
+  rotation.tail<3>() = placement.rotation_vector_rad;
+  return {exp(rotation).rotation, placement.position_m};
+}
+
+std::array<double, 7> numbers(const Pose& X) noexcept {
+  const auto& [q, p] = X;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
+  return {a.x(), a.y(), a.z(), b.x(), b.y(), b.z()};
+}
+
+}  // namespace
+
+ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
+                     const Clock& clock, RecordRing* records)
+    : device_(device),
+      scene_(scene),
+      clock_(clock),
+      records_(records),
+      X_WB_(pose_of(settings.device.base_in_world)),
+      X_HT_(pose_of(settings.device.tool_in_handle) * scene.tool().X_MT()),
+      wrench_point_(profile.wrench_point),
+      pacing_(settings.servo.pacing),
+      period_(from_seconds(1.0 / settings.servo.rate_Hz)),
+      late_limit_(from_seconds(settings.servo.late_limit_s)),
+      penetration_(scene.tool().solid.inertia, scene.tool().hull,
+                   {settings.rendering.method, settings.rendering.planes}),
+      law_(gains_for(settings.rendering.method, settings.wrench)),
+      limits_(settings.limits, profile.max_force_N, profile.max_torque_Nm),
+      soft_start_(settings.limits.soft_start_s) {}
+
+Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
+  TimePoint due = clock.now();
+  while (!stop.load(std::memory_order_relaxed)) {
+    due = wait_for_next(clock, due);
+    const Fault fault = tick(clock.now(), due);
+    if (fault != Fault::none) return fault;  // tick() has released the hand
+  }
+  return release(clock.now(), Fault::none);
+}
+
+Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
+  begin(now, due);
+
+  const DeviceSample sample = device_.read_newest(now);  // the pose the hand gives
+  record_sample(sample);
+  lap(Stage::read);
+  if (sample.fault != Fault::none) return release(now, sample.fault);
+  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) return release(now, Fault::pose_not_finite);
+
+  if (sample.fresh) project(sample);         // contacts, and the closest admissible configuration q
+  lap(Stage::projection);
+
+  if (sample.fresh) compute_wrench(sample);  // Eq. (16), from p to q
+  lap(Stage::wrench);
+
+  const Limited out = limit(sample, now);    // soft start, magnitude, slew
+  lap(Stage::limits);
+  if ((out.causes & kNotFinite) != 0) return release(now, Fault::wrench_not_finite);
+
+  const Fault written = device_.write(now, out.F, soft_start_.state() >= Engagement::ramping);
+  lap(Stage::write);
+  if (written != Fault::none) return release(now, written);
+
+  finish(now, sample, out);
+  return Fault::none;
+}
+
+Fault ServoLoop::release(TimePoint now, Fault why) noexcept {
+  device_.release(now);
+  soft_start_.disarm();
+  limits_.reset();
+  law_.reset();
+  if (why != Fault::none) say(Event::Kind::fault, now, static_cast<std::uint32_t>(why));
+  say(Event::Kind::released, now);
+  record_.fault = static_cast<std::uint8_t>(why);
+  record_.released = 1;
+  describe(Limited{});
+  publish();
+  return why;
+}
+
+/// Sleeps until the next tick is due, by the clock or by the device's next report. A loop that fell behind leaves out
+/// the ticks it missed: two ticks in a row on old news would help nobody.
+TimePoint ServoLoop::wait_for_next(Clock& clock, TimePoint due) noexcept {
+  if (pacing_ == Pacing::device) {
+    device_.wait_readable(clock.now() + kDevicePatience_periods * period_);
+    return clock.now();
+  }
+  TimePoint next = due + period_;
+  const TimePoint now = clock.now();
+  if (now > next) {
+    const auto missed = (now - next) / period_ + 1;
+    timing_.overruns.fetch_add(1, std::memory_order_relaxed);
+    timing_.skipped.fetch_add(static_cast<std::uint64_t>(missed), std::memory_order_relaxed);
+    next += missed * period_;
+  }
+  clock.sleep_until(next);
+  return next;
+}
+
+/// Starts the tick's record, takes arm and disarm, and looks at the time: after a gap (a stalled machine, a
+/// debugger, a suspend) the hand gets nothing until the soft start has run again.
+void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
+  tick_start_ = lap_start_ = clock_.now();
+  const std::uint64_t tick = record_.tick + (last_tick_ ? 1 : 0);
+  record_ = TickRecord{};
+  record_.tick = tick;
+  record_.now_ns = now.time_since_epoch().count();
+  record_.wake_latency_ns = (now - due).count();
+  record_.arm_command = arm_command_.exchange(0, std::memory_order_relaxed);
+  obey(record_.arm_command);
+
+  const Duration since_last = last_tick_ ? now - *last_tick_ : period_;
+  dt_s_ = std::min(seconds(since_last), 2.0 * seconds(period_));  // a gap must not let the slew limit leap
+  if (since_last > late_limit_ + period_) {
+    soft_start_.interrupt();
+    limits_.reset();
+    say(Event::Kind::late_tick, now, 0, seconds(since_last - period_));
+  }
+  last_tick_ = now;
+}
+
+void ServoLoop::obey(std::uint8_t command) noexcept {
+  if (command == 1) soft_start_.arm();
+  if (command == 2) soft_start_.disarm();
+}
+
+/// Lines 2 to 6: p from the sample, and its projection q. The first sample has no history to follow, so it is projected
+/// globally; from then on q follows the hand as a proxy.
+void ServoLoop::project(const DeviceSample& sample) noexcept {
+  X_WP_ = X_WB_ * sample.X_BH * X_HT_;
+  depth_ = X_WQ_ ? penetration_.follow(X_WP_, scene_, *X_WQ_) : penetration_.query(X_WP_, scene_);
+  X_WQ_ = depth_.projection.X_WQ;
+}
+
+/// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock, which
+/// knows when the poses were taken.
+void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
+  const double dt_s = sampled_ ? sample.device_time_s - sample_time_s_ : 0.0;
+  sample_time_s_ = sample.device_time_s;
+  sampled_ = true;
+  F_T_ = law_.update(depth_.drive, depth_.contacts > 0, dt_s);
+  F_out_ = outgoing(X_WB_ * sample.X_BH);
+}
+
+/// About the handle point in the axes of the device base, or the paper's spatial wrench W_S: as the profile says.
+Wrench ServoLoop::outgoing(const Pose& X_WH) const noexcept {
+  if (wrench_point_ == WrenchPoint::world_origin) return spatial_wrench(X_WP_, F_T_);
+  const Wrench F_H_W = wrench_about(X_WH.translation_m, X_WP_, F_T_);
+  return expressed(X_WB_.rotation.conjugate(), F_H_W);
+}
+
+/// Line 8, before it goes out: what the hand may feel of the wrench now.
+Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
+  stale_ = !sampled_ || now - sample.arrived > kStaleAfter;
+  const double authority = soft_start_.advance(calm(sample), dt_s_);
+  record_.authority = stale_ ? 0.0 : authority;
+  return limits_.apply(F_out_, record_.authority, dt_s_);
+}
+
+bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
+  return !stale_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
+         sample.V_BH.angular_rad_per_s.norm() < kCalmAngularSpeed_rad_per_s &&
+         F_out_.force_N.norm() < kCalmShareOfLimit * limits_.max_force_N() &&
+         F_out_.torque_Nm.norm() < kCalmShareOfLimit * limits_.max_torque_Nm();
+}
+
+/// The tick's record goes to whoever looks, its times into the histograms, its news to the log.
+void ServoLoop::finish(TimePoint now, const DeviceSample& sample, const Limited& out) noexcept {
+  describe(out);
+  say_changes(now, sample);
+  publish();
+  for (std::size_t i = 0; i < kStageCount; ++i) timing_.stage[i].add(Duration(record_.stage_ns[i]));
+  timing_.wake_latency.add(Duration(record_.wake_latency_ns));
+  timing_.tick.add(clock_.now() - tick_start_);
+}
+
+void ServoLoop::describe(const Limited& out) noexcept {
+  record_.X_WP = numbers(X_WP_);
+  record_.X_WQ = numbers(X_WQ_.value_or(X_WP_));
+  record_.eps = numbers(depth_.eps.head<3>(), depth_.eps.tail<3>());
+  record_.F_T = numbers(F_T_.force_N, F_T_.torque_Nm);
+  record_.energy = depth_.projection.energy;
+  record_.kkt_residual = depth_.projection.kkt_residual;
+  record_.contacts = depth_.contacts;
+  record_.iterations = depth_.projection.iterations;
+  record_.projection_status = static_cast<std::uint8_t>(depth_.projection.status);
+  record_.engagement = static_cast<std::uint8_t>(soft_start_.state());
+  record_.limit_causes = out.causes;
+  record_.F_out = numbers(out.F.force_N, out.F.torque_Nm);
+}
+
+void ServoLoop::publish() noexcept {
+  latest_.write(record_);
+  if (records_ != nullptr && !records_->push(record_)) dropped_records_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void ServoLoop::record_sample(const DeviceSample& sample) noexcept {
+  record_.arrived_ns = sample.arrived.time_since_epoch().count();
+  record_.device_time_s = sample.device_time_s;
+  record_.sequence = sample.sequence;
+  record_.acknowledged = sample.acknowledged;
+  record_.skipped = sample.skipped;
+  record_.missing = sample.missing;
+  record_.rejected = sample.rejected;
+  record_.buttons = sample.buttons;
+  record_.fresh = sample.fresh ? 1 : 0;
+  record_.motors_on = sample.motors_on ? 1 : 0;
+  record_.watchdog_tripped = sample.watchdog_tripped ? 1 : 0;
+  record_.fault = static_cast<std::uint8_t>(sample.fault);
+  record_.X_BH = numbers(sample.X_BH);
+  record_.V_BH = numbers(sample.V_BH.linear_m_per_s, sample.V_BH.angular_rad_per_s);
+}
+
+void ServoLoop::say_changes(TimePoint now, const DeviceSample& sample) noexcept {
+  if (sample.missing > 0) say(Event::Kind::reports_missing, now, sample.missing);
+  if (sample.rejected > 0) say(Event::Kind::reports_rejected, now, sample.rejected);
+  if (stale_ && !said_stale_ && sampled_)
+    say(Event::Kind::stale_sample, now, 0, seconds(now - sample.arrived));
+  said_stale_ = stale_;
+  if (soft_start_.state() != said_engagement_)
+    say(Event::Kind::engagement, now, static_cast<std::uint32_t>(soft_start_.state()));
+  said_engagement_ = soft_start_.state();
+  const ProjectionStatus status = depth_.projection.status;
+  if (status != said_status_ && status == ProjectionStatus::infeasible) say(Event::Kind::no_admissible_pose, now);
+  said_status_ = status;
+}
+
+void ServoLoop::lap(Stage stage) noexcept {
+  const TimePoint t = clock_.now();
+  record_.stage_ns[static_cast<std::size_t>(stage)] = (t - lap_start_).count();
+  lap_start_ = t;
+}
+
+void ServoLoop::say(Event::Kind kind, TimePoint at, std::uint32_t detail, double value) noexcept {
+  if (!events_.push(Event{kind, at, detail, value})) dropped_events_.fetch_add(1, std::memory_order_relaxed);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/station.hpp"
+
+#include <fstream>
+#include <sstream>
+
+#include "config/load_profile.hpp"
+#include "config/load_scene.hpp"
+#include "config/load_settings.hpp"
+#include "daemon/recorder.hpp"
+#include "daemon/version.hpp"
+
+namespace wrenchd {
+namespace {
+
+std::string contents(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+std::filesystem::path named_on_command_line(const std::filesystem::path& name, const SearchPath& search) {
+  std::error_code error;
+  return std::filesystem::exists(name, error) ? std::filesystem::absolute(name) : search.require(name);
+}
+
+}  // namespace
+
+Plan read_plan(const PlanFiles& files, const SearchPath& search) {
+  Plan plan;
+  plan.settings = load_settings(named_on_command_line(files.config, search), search);
+  if (!files.scene.empty()) plan.settings.scene = named_on_command_line(files.scene, search);
+  if (!files.profile.empty()) {
+    plan.settings.device.profile = files.profile;
+    plan.settings.device.profile_file = named_on_command_line(profile_file(files.profile), search);
+  }
+  plan.profile = load_profile(plan.settings.device.profile_file);
+  plan.scene = load_scene(plan.settings.scene);
+  return plan;
+}
+
+Station::Station(Plan plan, Clock& clock)
+    : plan_(std::move(plan)),
+      scene_(plan_.scene),
+      simulated_(plan_.profile, plan_.settings.simulation),
+      link_(simulated_, clock, plan_.settings.simulation),
+      device_(plan_.profile, link_),
+      records_(Recorder::kRingRecords),
+      loop_(plan_.settings, plan_.profile, device_, scene_, clock,
+            plan_.settings.recording.file.empty() ? nullptr : &records_) {
+  device_.open();
+}
+
+Station::~Station() { device_.close(); }
+
+RecordingHeader Station::recording_header() const {
+  return {kVersion, contents(plan_.settings.file), contents(plan_.scene.file),
+          contents(plan_.settings.device.profile_file)};
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "collision/scene.hpp"
+#include "config/search_path.hpp"
+#include "config/settings.hpp"
+#include "core/clock.hpp"
+#include "core/device_profile.hpp"
+#include "daemon/recording_file.hpp"
+#include "daemon/servo_loop.hpp"
+#include "devices/loopback_link.hpp"
+#include "devices/profile_device.hpp"
+#include "devices/simulated_device.hpp"
+
+namespace wrenchd {
+
+/// What the files say, read and checked, before anything is built from it.
+struct Plan {
+  Settings settings;
+  DeviceProfile profile;
+  SceneSettings scene;
+};
+
+/// What a command line names: the configuration, and what stands in place of what the configuration names. A file is
+/// taken as it is given, from the working directory, and then looked for along the search path.
+struct PlanFiles {
+  std::filesystem::path config = "wrenchd.toml";
+  std::filesystem::path scene;  ///< empty: the configuration's
+  std::string profile;          ///< name or file; empty: the configuration's
+};
+
+/// Reads the configuration, its scene and its profile. Throws ConfigError.
+Plan read_plan(const PlanFiles& files, const SearchPath& search);
+
+/// The parts of one running wrenchd, built from a plan in the order in which they need each other.
+class Station {
+ public:
+  /// The clock must outlive this. Throws MeshError, std::runtime_error.
+  Station(Plan plan, Clock& clock);
+  ~Station();
+  Station(const Station&) = delete;
+  Station& operator=(const Station&) = delete;
+
+  const Plan& plan() const noexcept { return plan_; }
+  const Scene& scene() const noexcept { return scene_; }
+  SimulatedDevice& simulated() noexcept { return simulated_; }
+  ServoLoop& loop() noexcept { return loop_; }
+  RecordRing& records() noexcept { return records_; }
+
+  /// What a recording of this station must know.
+  RecordingHeader recording_header() const;
+
+ private:
+  Plan plan_;
+  Scene scene_;
+  SimulatedDevice simulated_;
+  LoopbackLink link_;
+  ProfileDevice device_;
+  RecordRing records_;
+  ServoLoop loop_;
+};
+
+}  // namespace wrenchd

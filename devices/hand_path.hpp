@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/clock.hpp"
+#include "core/simulation_settings.hpp"
+#include "core/spatial.hpp"
+
+namespace wrenchd {
+
+/// Where the hand wants the handle, and how fast it wants it to move. B = device base, G = goal of the hand.
+struct HandTarget {
+  Pose X_BG;
+  Twist V_BG;  ///< of G's origin, in base axes
+};
+
+/// The scripted path of the simulated hand: rests at each waypoint, and between two of them moves as people
+/// do, along the line and about the axis that join them, at minimum jerk (Flash and Hogan 1985):
+///
+///   s(u) = 10 u^3 - 15 u^4 + 6 u^5        u = 0..1 between the two times
+class HandPath {
+ public:
+  /// Throws std::invalid_argument where there is no waypoint, a number is not finite, the times do not rise
+  /// strictly from 0, or a path that repeats does not end where it began (to 1e-9 in each coordinate).
+  HandPath(const std::vector<Waypoint>& waypoints, bool repeats);
+
+  /// The target this long after the path began. After the last waypoint the path starts again, or the hand
+  /// stays there. RT safe.
+  HandTarget at(Duration since_start) const noexcept;
+
+ private:
+  struct Segment {
+    Duration start;
+    Duration length;
+    Pose X_BG;          ///< at the start
+    Vector3d way_m;     ///< from the start to the end, in B
+    Vector3d turn_rad;  ///< rotation vector from the start to the end, in B
+  };
+
+  std::vector<Segment> segments_;  ///< one a pair of waypoints
+  HandTarget last_;
+  Duration end_{};
+  bool repeats_;
+};
+
+}  // namespace wrenchd

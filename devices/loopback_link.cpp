@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/loopback_link.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace wrenchd {
+
+using Kind = SimulatedFault::Kind;
+
+LoopbackLink::LoopbackLink(SimulatedDevice& device, Clock& clock, const SimulationSettings& settings)
+    : device_(device),
+      clock_(clock),
+      report_delay_(from_seconds(settings.report_delay_s)),
+      command_delay_(from_seconds(settings.command_delay_s)) {}
+
+void LoopbackLink::open() {
+  close();
+  const TimePoint now = clock_.now();
+  advance_to(now);
+  if (device_.shows(Kind::unplug, now, now))
+    throw std::runtime_error(
+        "loopback device: unplugged by its fault plan; wait until it is plugged in again");
+  reports_.clear();
+  passed_ = now;
+  state_ = State::open;
+}
+
+LinkRead LoopbackLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
+  advance_to(now);
+  if (state_ != State::open) return {LinkStatus::gone, 0, now};
+  const Packet* packet = reports_.arrived(now);
+  if (packet == nullptr) return {LinkStatus::empty, 0, now};
+  const LinkRead read{LinkStatus::ok, packet->length, packet->arrives};
+  const auto bytes = packet->report().first(std::min(packet->length, buffer.size()));
+  std::copy(bytes.begin(), bytes.end(), buffer.begin());
+  reports_.pop();
+  return read;
+}
+
+LinkStatus LoopbackLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  advance_to(now);
+  if (state_ != State::open) return LinkStatus::gone;
+  if (device_.shows(Kind::deaf, now, now)) return LinkStatus::empty;
+  return commands_.push(now + command_delay_, report) ? LinkStatus::ok : LinkStatus::empty;
+}
+
+void LoopbackLink::wait_readable(TimePoint deadline) noexcept {
+  for (TimePoint now = clock_.now(); now < deadline; now = clock_.now()) {
+    advance_to(now);
+    if (state_ != State::open || reports_.arrived(now) != nullptr) return;
+    clock_.sleep_until(std::min(deadline, next_arrival()));
+  }
+}
+
+void LoopbackLink::close() noexcept {
+  state_ = State::closed;
+  reports_.clear();  // commands in flight still arrive
+}
+
+void LoopbackLink::advance_to(TimePoint now) noexcept {
+  while (const Packet* command = commands_.arrived(now)) {
+    device_.advance_to(command->arrives, *this);
+    if (!device_.shows(Kind::unplug, command->arrives, command->arrives))
+      device_.take_command(command->report());
+    commands_.pop();
+  }
+  device_.advance_to(now, *this);
+  if (state_ == State::open && device_.shows(Kind::unplug, passed_, now)) state_ = State::gone;
+  passed_ = std::max(passed_, now);
+}
+
+void LoopbackLink::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
+  if (state_ == State::open && !reports_.push(sent + report_delay_, report)) ++dropped_;
+}
+
+/// When the next report can be read. Later than now wherever none is waiting.
+TimePoint LoopbackLink::next_arrival() const noexcept {
+  return reports_.empty() ? device_.next_report() + report_delay_ : reports_.next_arrival();
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "core/clock.hpp"
+#include "core/simulation_settings.hpp"
+#include "devices/packet_queue.hpp"
+#include "devices/report_link.hpp"
+#include "devices/simulated_device.hpp"
+
+namespace wrenchd {
+
+/// The wire to the simulated device: a delay and a queue in each direction. Reports wait in a ring like that
+/// of hidraw: 64 of them, and a newer one is dropped when it is full.
+///
+/// Time passes for the simulated device only in these calls, up to the `now` they are given; nothing runs in
+/// between and there is no thread.
+class LoopbackLink final : public ReportLink, private ReportSink {
+ public:
+  /// The delays are those of the settings. Device and clock must outlive the link.
+  LoopbackLink(SimulatedDevice& device, Clock& clock, const SimulationSettings& settings);
+
+  /// Throws std::runtime_error while the simulated device is unplugged.
+  void open() override;
+  LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
+  LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
+  void wait_readable(TimePoint deadline) noexcept override;
+  void close() noexcept override;
+
+  /// Lets time pass without a read or write, open or not: commands arrive, reports queue up. RT safe.
+  void advance_to(TimePoint now) noexcept;
+  /// Reports lost because the host did not read them in time.
+  std::uint64_t dropped() const noexcept { return dropped_; }
+
+ private:
+  enum class State : std::uint8_t { closed, open, gone };
+
+  void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override;
+  TimePoint next_arrival() const noexcept;
+
+  SimulatedDevice& device_;
+  Clock& clock_;
+  Duration report_delay_;
+  Duration command_delay_;
+  State state_ = State::closed;
+  TimePoint passed_{};    ///< time up to which unplugging has been looked for
+  PacketQueue reports_;   ///< device to host
+  PacketQueue commands_;  ///< host to device
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/device_profile.hpp"
+#include "core/spatial.hpp"
+
+namespace wrenchd {
+
+/// The longest report wrenchd handles: one packet of a full-speed interrupt endpoint.
+inline constexpr std::size_t kMaxReportBytes = 64;
+
+/// A pose report as it stands in its bytes, in SI units, before anybody judged it. Counters are raw: they
+/// wrap at the width of their field. What the layout does not carry is zero. B = device base, H = handle
+/// point.
+struct PoseReport {
+  Pose X_BH;                       ///< the quaternion exactly as reported, not normalised
+  Twist V_BH;                      ///< of the handle point, in base axes
+  std::uint32_t sequence = 0;      ///< [counts]
+  std::uint32_t device_time = 0;   ///< [counts], layout.device_time.step seconds each
+  std::uint32_t acknowledged = 0;  ///< low bits of the sequence of the last command taken
+  std::uint32_t buttons = 0;       ///< bit mask
+  bool motors_on = false;
+  bool watchdog_tripped = false;
+};
+
+/// A wrench command as it stands in its bytes, in SI units.
+struct WrenchReport {
+  Wrench F;                    ///< on the hand, about the point and in the axes the profile names
+  double hold_time_s = 0.0;    ///< how long the device may hold it; 0: the device's own default
+  std::uint32_t sequence = 0;  ///< raw, wraps at the width of its field
+  bool enable = false;         ///< motors on
+};
+
+/// Whether bytes are the report a layout describes, and if not, why.
+enum class Decoding : std::uint8_t { ok, wrong_length, wrong_id, bad_checksum };
+
+/// A report read from bytes; where the outcome is not ok the report holds only defaults.
+template <class Report>
+struct Decoded {
+  Decoding outcome = Decoding::ok;
+  Report report;
+};
+
+// The four directions. The host decodes poses and encodes wrenches, a firmware does the opposite, and both
+// use these functions. All of them need a layout that has passed check(), and all are RT safe.
+//
+//   value = step * raw        raw: little-endian, two's complement where signed
+//
+// Encoding rounds to the nearest count, ties away from zero, and saturates at the ends of the field. A value
+// that is not finite becomes 0, never full scale; callers refuse such values long before.
+
+Decoded<PoseReport> decode(const PoseReportLayout& layout, std::span<const std::uint8_t> bytes) noexcept;
+Decoded<WrenchReport> decode(const WrenchReportLayout& layout, std::span<const std::uint8_t> bytes) noexcept;
+
+/// Writes the report to the first `layout.length` bytes of `bytes`. Returns that length, or 0 and writes
+/// nothing where `bytes` is too short.
+std::size_t encode(const PoseReportLayout& layout, const PoseReport& report,
+                   std::span<std::uint8_t> bytes) noexcept;
+std::size_t encode(const WrenchReportLayout& layout, const WrenchReport& report,
+                   std::span<std::uint8_t> bytes) noexcept;
+
+/// Refuses a layout whose fields overlap, stick out, have no meaning or leave no room for the checksum.
+/// Throws std::invalid_argument that names the fields and the byte. Not RT safe.
+void check(const PoseReportLayout& layout);
+void check(const WrenchReportLayout& layout);
+
+/// CRC-16/CCITT-FALSE: polynomial 0x1021, initial value 0xFFFF, nothing reflected, no final xor.
+/// The check value over "123456789" is 0x29B1. RT safe.
+std::uint16_t crc16_ccitt_false(std::span<const std::uint8_t> bytes) noexcept;
+
+}  // namespace wrenchd

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/simulated_device.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "core/finite.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Encoder samples a report: enough for the velocity filter to smooth over quanta.
+constexpr std::uint64_t kSamplesPerReport = 8;
+/// Longest substep [s]: a tenth of the fastest time constant of a stiff hand on a light handle.
+constexpr double kMaxSubstep_s = 1.0 / 16000.0;
+
+constexpr double kTeleport_m = 0.1;
+constexpr double kBadQuaternionLength = 0.5;
+
+double report_period(const DeviceProfile& profile) {
+  if (!is_finite(profile.report_rate_Hz) || profile.report_rate_Hz <= 0.0)
+    throw std::invalid_argument("device profile " + profile.name + ": report_rate_Hz must be above 0");
+  return 1.0 / profile.report_rate_Hz;
+}
+
+std::uint64_t substeps_per_sample(const DeviceProfile& profile) {
+  const double sample_period_s = report_period(profile) / static_cast<double>(kSamplesPerReport);
+  return static_cast<std::uint64_t>(std::ceil(sample_period_s / kMaxSubstep_s - 1e-9));
+}
+
+/// Whole nanoseconds, so a report period may be off by half a nanosecond a substep.
+Duration substep_of(const DeviceProfile& profile) {
+  const double substeps = static_cast<double>(kSamplesPerReport * substeps_per_sample(profile));
+  return Duration{std::max(std::llround(1e9 * report_period(profile) / substeps), 1LL)};
+}
+
+const PoseReportLayout& checked(const DeviceProfile& profile) {
+  check(profile.pose_report);
+  check(profile.wrench_report);
+  return profile.pose_report;
+}
+
+}  // namespace
+
+SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationSettings& settings)
+    : pose_layout_(checked(profile)),
+      wrench_point_(profile.wrench_point),
+      substeps_per_sample_(substeps_per_sample(profile)),
+      substeps_per_report_(kSamplesPerReport * substeps_per_sample_),
+      substep_(substep_of(profile)),
+      path_(settings.hand_path, settings.hand_repeats),
+      handle_(settings, path_.at(Duration{0}).X_BG, seconds(substep_)),
+      firmware_(profile, settings, substep_ * static_cast<std::int64_t>(substeps_per_sample_)) {
+  firmware_.settle(handle_.X_BH());
+}
+
+void SimulatedDevice::advance_to(TimePoint t, ReportSink& host) noexcept {
+  if (!powered_) {
+    powered_ = true;
+    power_on_ = now_ = t;
+  }
+  if (t - now_ > kMaxCatchUp) skip_to(t);
+  while (now_ + substep_ <= t) substep(host);
+}
+
+void SimulatedDevice::skip_to(TimePoint t) noexcept {
+  const Duration period = substep_ * static_cast<std::int64_t>(substeps_per_report_);
+  const std::int64_t periods = (t - now_) / period;
+  now_ += periods * period;
+  firmware_.miss_reports(static_cast<std::uint32_t>(periods));
+  firmware_.trip_watchdog();
+  handle_.rest();
+  firmware_.settle(handle_.X_BH());
+}
+
+void SimulatedDevice::substep(ReportSink& host) noexcept {
+  now_ += substep_;
+  handle_.step(path_.at(now_ - power_on_), motor_demand());
+  ++substeps_;
+  if (substeps_ % substeps_per_sample_ == 0) firmware_.sample(handle_.X_BH());
+  if (substeps_ % substeps_per_report_ == 0) send_report(host);
+}
+
+/// What the firmware tells the motors, about the handle point.
+Wrench SimulatedDevice::motor_demand() noexcept {
+  const Wrench F = firmware_.motors(now_);
+  return wrench_point_ == WrenchPoint::handle ? F : shifted(F, handle_.X_BH().translation_m);
+}
+
+void SimulatedDevice::send_report(ReportSink& host) noexcept {
+  using Kind = SimulatedFault::Kind;
+  PoseReport report = firmware_.report(now_ - power_on_);
+  if (shows(Kind::teleport)) report.X_BH.translation_m.x() += kTeleport_m;
+  if (shows(Kind::bad_quaternion)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
+  if (!shows(Kind::freeze)) encode(pose_layout_, report, report_);
+  if (shows(Kind::silence) || shows(Kind::unplug)) return;
+
+  auto bytes = report_;
+  if (shows(Kind::garble)) bytes[pose_layout_.length / 2] ^= 0x10;
+  const std::size_t length = shows(Kind::short_report) ? pose_layout_.length / 2 : pose_layout_.length;
+  host.take_report(now_, std::span(bytes).first(length));
+}
+
+bool SimulatedDevice::take_command(std::span<const std::uint8_t> bytes) noexcept {
+  return firmware_.take_command(now_, bytes);
+}
+
+TimePoint SimulatedDevice::next_report() const noexcept {
+  const std::uint64_t left = substeps_per_report_ - substeps_ % substeps_per_report_;
+  return now_ + substep_ * static_cast<std::int64_t>(left);
+}
+
+bool SimulatedDevice::shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
+  return std::any_of(faults_.begin(), faults_.end(), [&](const SimulatedFault& fault) {
+    const TimePoint start = power_on_ + fault.start;
+    return fault.kind == kind && start <= to && from < start + fault.duration;
+  });
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <iterator>
+#include <random>
+#include <utility>
+
+#include <catch2/catch.hpp>
+#include <sys/stat.h>
+
+#include "config/load_hand_script.hpp"
+#include "config/load_profile.hpp"
+#include "config/load_scene.hpp"
+#include "config/load_settings.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryDirectory;
+
+const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+using Load = void (*)(const fs::path&);
+void as_settings(const fs::path& file) {
+  load_settings(file, SearchPath({kConfig}));
+}
+void as_scene(const fs::path& file) {
+  load_scene(file);
+}
+void as_profile(const fs::path& file) {
+  load_profile(file);
+}
+void as_hand_script(const fs::path& file) {
+  SimulationSettings simulation;
+  load_hand_script(file, simulation);
+}
+
+/// What the file is refused with; empty when it loads.
+std::string refusal(Load load, const fs::path& file) {
+  try {
+    load(file);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+/// A file, where it must be refused, and what the message must say.
+struct Bad {
+  std::string text;
+  std::string place;  ///< line:column
+  std::string cure;
+};
+
+/// One line of the message starts with the place and holds the cure.
+bool told(const std::string& message, const std::string& start, const std::string& cure) {
+  for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1)) {
+    if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
+  }
+  return false;
+}
+
+void check_refused(Load load, const std::vector<Bad>& table) {
+  const TemporaryDirectory dir;
+  dir.write("cube.off", "");
+  for (const Bad& bad : table) {
+    const fs::path file = dir.write("bad.toml", bad.text);
+    const std::string message = refusal(load, file);
+    INFO(bad.text << "\nexpected " << bad.place << " ... " << bad.cure << "\ngot " << message);
+    CHECK(told(message, file.string() + ":" + bad.place + ": ", bad.cure));
+  }
+}
+
+/// `text` with its only `from` replaced. A `from` that is not there would make a test say nothing.
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  REQUIRE(text.find(from, at + 1) == std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+const std::string kProfile = R"(name = "p"
+transport = "loopback"
+report_rate_Hz = 1000
+watchdog_s = 0.01
+[limits]
+max_force_N = 10.0
+max_torque_Nm = 0.5
+max_linear_speed_m_per_s = 1.2
+max_angular_speed_rad_per_s = 12.0
+[pose_report]
+id = 1
+length = 36
+checksum = "crc16_ccitt_false"
+motors_on = { byte = 1, bit = 0 }
+watchdog_tripped = { byte = 1, bit = 1 }
+sequence = { byte = 2, type = "u16" }
+device_time = { byte = 4, type = "u32", step_s = 1e-6 }
+position = { byte = 8, type = "i32", step_m = 1e-7 }
+orientation = { byte = 20, type = "i16", step = 3.06e-5 }
+[wrench_report]
+id = 2
+length = 20
+enable = { byte = 1, bit = 0 }
+sequence = { byte = 2, type = "u16" }
+force = { byte = 4, type = "i16", step_N = 0.001 }
+torque = { byte = 10, type = "i16", step_Nm = 0.0001 }
+hold_time = { byte = 16, type = "u16", step_s = 0.001 }
+)";
+
+const std::string kTool = "[tool]\nmesh = 'cube.off'\n";
+
+const std::string kZeroRows =
+    "[0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]";
+
+std::string point(const std::string& time_s, const std::string& position_m) {
+  return "[[waypoint]]\ntime_s = " + time_s + "\nposition_m = " + position_m + "\n";
+}
+
+}  // namespace
+
+TEST_CASE("bad settings are refused at their place, with the cure", "[config]") {
+  const std::vector<Bad> table = {
+      {"[servo]\nrate_hz = 1000", "2:1", "key 'servo.rate_hz' is not known; did you mean 'rate_Hz'?"},
+      {"[servo]\nrate_kHz = 1", "2:1", "key 'servo.rate_kHz' is not known; give it in Hz as 'rate_Hz'"},
+      {"[servo]\nrate_Hz = 'fast'", "2:11", "expected a number from 500 to 8000 Hz, found the text \"fast\""},
+      {"[servo]\nrate_Hz = 100", "2:11",
+       "key 'servo.rate_Hz': expected a number from 500 to 8000 Hz, found 100"},
+      {"[servo]\nrate_Hz = nan", "2:11", "expected a number from 500 to 8000 Hz, found nan"},
+      {"[servo]\nrate_Hz = inf", "2:11", "expected a number from 500 to 8000 Hz, found inf"},
+      {"[servo]\nrate_Hz = true", "2:11", "expected a number from 500 to 8000 Hz, found true"},
+      {"[servo]\nrate_Hz = 1979-05-27", "2:11", "found a date or time"},
+      {"[servo]\npriority = 50", "2:12", "expected a whole number from 1 to 49, found 50"},
+      {"[servo]\npriority = 40.5", "2:12", "expected a whole number from 1 to 49, found 40.5"},
+      {"[servo]\npriority = [40]", "2:12", "expected a whole number from 1 to 49, found an array of 1"},
+      {"[servo]\nrealtime = 'yes'", "2:12",
+       "expected \"required\", \"best_effort\" or \"off\", found the text \"yes\""},
+      {"[servo]\npacing = 3", "2:10", "expected \"clock\" or \"device\", found 3"},
+      {"[servo]\nlate_limit_ms = 20", "2:1", "give it in s as 'late_limit_s'"},
+      {"[sevro]\nrate_Hz = 1000", "1:2", "key 'sevro' is not known; did you mean 'servo'?"},
+      {"servo = 5", "1:9", "key 'servo': expected a table, found 5"},
+      {"[[servo]]\nrate_Hz = 1000", "1:1", "key 'servo': expected a table, found an array of 1"},
+      {"[device]\nscene = 'x.toml'", "2:1", "key 'device.scene' is not known; known keys here: 'profile'"},
+      {"scene = 'nowhere.toml'", "1:9", "no such file; looked for /"},
+      {"scene = 7", "1:9", "expected a text between quotation marks, found 7"},
+      {"scene = \"a\\u0000b\"", "1:9", "expected a file name without a zero byte"},
+      {"\n[device]\nprofile = 'lopback'", "3:11", "profiles/lopback.toml"},
+      {"[device]\nbase_in_world = { position_mm = [1, 2, 3] }", "2:19", "give it in m as 'position_m'"},
+      {"[device]\nbase_in_world = { position_m = [1, 2] }", "2:32",
+       "expected an array of 3 numbers, found an array of 2"},
+      {"[device]\nbase_in_world = { position_m = [1, 2, 'x'] }", "2:39",
+       "key 'device.base_in_world.position_m[2]': expected a number from -10 to 10 m"},
+      {"[device]\ntool_in_handle = { rotation_deg = [0, 0, 0] }", "2:20",
+       "known keys here: 'position_m', 'rotation_vector_rad'"},
+      {"[device]\ntool_in_handle = { rotation_vector_deg = [0, 0, 90] }", "2:20",
+       "give it in rad as 'rotation_vector_rad'"},
+      {"[device]\ntool_in_handle = [0, 0, 0]", "2:18", "expected a table, found an array of 3"},
+      {"[rendering]\nplanes = 0", "2:10", "expected a whole number from 1 to 1000, found 0"},
+      {"[rendering]\nmethod = \"exakt\"", "2:10", "expected \"exact\", \"planar\" or \"translational\""},
+      {"[wrench]\nstiffness = -5", "2:13", "expected a number from 0 to 100000, found -5"},
+      {"[wrench]\nstiffness = 'high'", "2:13", "key 'wrench.stiffness': expected"},
+      {"[wrench]\nstiffness = { linear_N_per_m = 600 }", "2:13",
+       "key 'wrench.stiffness.angular_Nm_per_rad' is missing"},
+      {"[wrench]\nstiffness = { linear_N_per_mm = 1, angular_Nm_per_rad = 1 }", "2:15",
+       "give it in N/m as 'linear_N_per_m'"},
+      {"[wrench]\ndamping = { linear_N_per_m = 1, angular_Nm_s_per_rad = 1 }", "2:13",
+       "give it in N.s/m as 'linear_N_s_per_m'"},
+      {"[wrench]\nstiffness = [[1, 0, 0, 0, 0, 0]]", "2:13",
+       "expected 6 rows of 6 numbers, found an array of 1"},
+      {"[wrench]\nstiffness = [" + kZeroRows + ", [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0]]", "2:114",
+       "key 'wrench.stiffness[5]': expected an array of 6 numbers, found an array of 5"},
+      {"[wrench]\nstiffness = [" + kZeroRows + ", [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, -3]]", "2:13",
+       "its symmetric part has the eigenvalue -3; it must have none below 0"},
+      {"[wrench]\nintegral_limit_mN = 1", "2:1", "give it in N as 'integral_limit_N'"},
+      {"[limits]\nmax_force_kN = 1", "2:1", "give it in N as 'max_force_N'"},
+      {"[limits]\nmax_force_N = 1e999", "2:20", "is not valid TOML"},
+      {"[limits]\nsoft_start_s = 0", "2:16", "expected a number from 0.25 to 5 s, found 0"},
+      {"[simulation]\nhandle_mass_g = 150", "2:1", "give it in kg as 'handle_mass_kg'"},
+      {"[simulation]\nhandle_mass_kg = 0", "2:18", "expected a number from 0.01 to 10 kg, found 0"},
+      {"[simulation]\nhand_script = 'none.toml'", "2:15", "none.toml"},
+      {"[recording]\nfile = false", "2:8", "expected a text between quotation marks, found false"},
+      {"[recording]\n\"\\u0001\\n\" = 1", "2:1", "key 'recording.?\?' is not known"},
+      {"[servo]\nrate_Hz = 1000\nrate_Hz = 2000", "3:11", "a key stands once, keep one of them"},
+      {"[servo]\nrate_Hz = 1000\n[servo]\ncpu = 1", "3:1", "a key stands once, keep one of them"},
+      {"[servo]\nrate_Hz =", "2:10", "is not valid TOML"},
+      {"[servo\nrate_Hz = 1000", "1:7", "is not valid TOML"},
+      {"scene = \"no end\n", "1:16", "is not valid TOML"},
+      {"scene = \"\xff\xfe\"", "1:9", "save the file as UTF-8"},
+      {std::string("scene = \0", 9), "1:9", "is not valid TOML"},
+      {"\xff\xfes\0c\0e\0n\0e\0", "1:1", "save the file as UTF-8"},
+      {"a = " + std::string(10'000, '['), "1:261", "nested"},
+      {"a = " + std::string(20, '[') + std::string(20, ']'), "1:21",
+       "is nested more than 16 deep; flatten it"},
+      {"\na" +
+           [] {
+             std::string s;
+             for (int i = 0; i < 500'000; ++i) s += ".a";
+             return s;
+           }() +
+           " = 1",
+       "2:1", "has more than 120 dots in one line"},
+  };
+  check_refused(as_settings, table);
+}
+
+TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
+  const std::string plane = kTool + "[[obstacle]]\nhalf_space = ";
+  const std::vector<Bad> table = {
+      {"", "1:1", "key 'tool' is missing; it has no default, so state it here"},
+      {"\n[tool]\nscale = 1.0", "2:1", "key 'tool.mesh' is missing; it has no default"},
+      {"[tool]\nmesh = 'missing.off'", "2:8", "no such file; looked for /"},
+      {"[tool]\nmesh = '.'", "2:8", "name an OFF, OBJ, STL or PLY file"},
+      {"[tool]\nmash = 'cube.off'", "2:1", "key 'tool.mash' is not known; did you mean 'mesh'?"},
+      {kTool + "scale = 0", "3:9", "key 'tool.scale': expected a number from 1e-09 to 1000000 m, found 0"},
+      {kTool + "scale = -1.0", "3:9", "found -1"},
+      {kTool + "mass = 0.0", "3:8", "kg, found 0"},
+      {kTool + "mass_g = 200", "3:1", "give it in kg as 'mass'"},
+      {"mass = 1\n" + kTool + "mass = 1", "4:8", "is also given at the top of the file; keep one of the two"},
+      {plane + "{ normal = [0, 0, 0], offset = 0 }", "4:25", "must not be zero; it points out of the solid"},
+      {plane + "{ normal = [0, nan, 1], offset = 0 }", "4:29", "key 'obstacle[0].half_space.normal[1]'"},
+      {plane + "{ normal = [0, 1], offset = 0 }", "4:25",
+       "expected an array of 3 numbers, found an array of 2"},
+      {plane + "{ normal = 'up', offset = 0 }", "4:25",
+       "expected an array of 3 numbers, found the text \"up\""},
+      {plane + "{ normal = [0, 0, 1] }", "4:14", "key 'obstacle[0].half_space.offset' is missing"},
+      {plane + "{ normal = [0, 0, 1], offset = -inf }", "4:45", "found -inf"},
+      {plane + "{ normal = [0, 0, 1], offset_mm = 3 }", "4:36", "give it in m as 'offset'"},
+      {plane + "[0, 0, 1, 0]", "4:14", "expected a table, found an array of 4"},
+      {kTool + "[[obstacle]]\nmesh = 'cube.off'", "4:8",
+       "mesh obstacles are not supported yet; give a half_space"},
+      {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
+       "key 'obstacle[0].sphere' is not known; known keys here: 'name'"},
+      {kTool + "[[obstacle]]\nname = 'x'", "3:1", "key 'obstacle[0].half_space' is missing"},
+      {kTool + "[obstacle]\nname = 'x'", "3:1", "expected tables, each headed [[obstacle]], found a table"},
+      {kTool + "[[obstacles]]\nname = 'x'", "3:3", "did you mean 'obstacle'?"},
+  };
+  check_refused(as_scene, table);
+}
+
+TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") {
+  const auto changed = [](const std::string& from, const std::string& to) {
+    return with(kProfile, from, to);
+  };
+  const std::string position = R"(position = { byte = 8, type = "i32", step_m = 1e-7 })";
+  const std::vector<Bad> table = {
+      {"", "1:1", "key 'limits' is missing; it has no default"},
+      {changed("max_force_N = 10.0\n", ""), "5:1", "key 'limits.max_force_N' is missing; it has no default"},
+      {changed("max_torque_Nm = 0.5\n", ""), "5:1", "key 'limits.max_torque_Nm' is missing"},
+      {changed("max_force_N = 10.0", "max_force_mN = 10000"), "6:1", "give it in N as 'max_force_N'"},
+      {changed("max_force_N = 10.0", "max_force_N = 0"), "6:15", "from 0.01 to 200 N, found 0"},
+      {changed("max_torque_Nm = 0.5", "max_torque_Nmm = 500"), "7:1", "give it in N.m as 'max_torque_Nm'"},
+      {changed("\"loopback\"", "\"bluetooth\""), "2:13",
+       "expected \"loopback\", found the text \"bluetooth\""},
+      {changed("name = \"p\"", "name = \"\""), "1:8", "must not be empty"},
+      {changed("watchdog_s = 0.01", "watchdog_ms = 10"), "4:1", "give it in s as 'watchdog_s'"},
+      {changed("watchdog_s = 0.01", "watchdog_s = 0"), "4:14", "from 0.001 to 2 s, found 0"},
+      {changed("id = 1\n", "id = 256\n"), "11:6", "expected a whole number from 0 to 255, found 256"},
+      {changed("length = 36", "length = 29"), "19:15",
+       "key 'pose_report.orientation': its last byte is 27, but fields end with byte 26"},
+      {changed("length = 36", "length = 65"), "12:10", "from 4 to 64, found 65"},
+      {changed("\"crc16_ccitt_false\"", "\"crc32\""), "13:12", "expected \"crc16_ccitt_false\" or \"none\""},
+      {changed(position, R"(position = { byte = 7, type = "i32", step_m = 1e-7 })"), "18:12",
+       "key 'pose_report.position': overlaps 'pose_report.device_time', which has bytes 4 to 7; move one of "
+       "them"},
+      {changed("watchdog_tripped = { byte = 1, bit = 1 }", "watchdog_tripped = { byte = 1, bit = 0 }"),
+       "15:20", "overlaps 'pose_report.motors_on'"},
+      {changed(position, R"(position = { byte = 8, type = "u32", step_m = 1e-7 })"), "18:31",
+       R"(expected "i8", "i16" or "i32", found the text "u32")"},
+      {changed(position, R"(position = { byte = 8, type = "i32", step_mm = 1e-4 })"), "18:38",
+       "give it in m as 'step_m'"},
+      {changed(position, R"(position = { byte = 8, type = "i32", step_m = -1e-7 })"), "18:47",
+       "found -1e-07"},
+      {changed(position, R"(position = { byte = 0, type = "i32", step_m = 1e-7 })"), "18:21",
+       "from 1 to 63, found 0"},
+      {changed(position, ""), "10:1", "key 'pose_report.position' is missing"},
+      {changed("step = 3.06e-5", "step = 3e-5"), "19:49", "less than the 0.999 it has to carry"},
+      {changed("step_N = 0.001", "step_N = 0.0001"), "25:44",
+       "16 bits with this step reach 3.2767 N, less than the 10 N it has to carry; use a larger step or a "
+       "wider type"},
+      {changed("hold_time = { byte = 16, type = \"u16\", step_s = 0.001 }", "hold_time = 16"), "27:13",
+       "expected a table, found 16"},
+      {changed("enable = { byte = 1, bit = 0 }", "enable = { byte = 1, bit = 8 }"), "23:28",
+       "from 0 to 7, found 8"},
+  };
+  check_refused(as_profile, table);
+}
+
+TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config]") {
+  const std::string start = point("0", "[0, 0, 0]");
+  const std::vector<Bad> table = {
+      {"", "1:1", "key 'waypoint' is missing"},
+      {"waypoint = []", "1:12", "at least one waypoint is needed"},
+      {"waypoint = 3", "1:12", "expected tables, each headed [[waypoint]], found 3"},
+      {"waypoint = [3]", "1:13", "key 'waypoint[0]': expected a table, found 3"},
+      {point("1", "[0, 0, 0]"), "2:10", "the first waypoint is at time 0"},
+      {start + point("1", "[0, 0, 1]") + point("1", "[0, 0, 0]"), "8:10",
+       "times must rise by 0.001 s or more; the waypoint before is at 1 s"},
+      {start + point("1", "[0, 0, 1]"), "4:1",
+       "ends where it starts; add such a waypoint, or set repeats = false"},
+      {start + point("-1", "[0, 0, 0]"), "5:10", "from 0 to 86400 s, found -1"},
+      {"repeats = 'no'\n" + start, "1:11", "expected true or false, found the text \"no\""},
+      {start + "rotation_vector_deg = [0, 0, 90]", "4:1", "give it in rad as 'rotation_vector_rad'"},
+      {point("0", "[0, 0, 40]"), "3:21", "from -10 to 10 m, found 40"},
+  };
+  check_refused(as_hand_script, table);
+}
+
+TEST_CASE("everything wrong with a file is told at once, in its order", "[config]") {
+  const TemporaryDirectory dir;
+  const auto file = dir.write("w.toml", "[servo]\nrate_Hz = 1\nprioriti = 3\n[limits]\nsoft_start_s = 9\n");
+  try {
+    as_settings(file);
+    FAIL("it loaded");
+  } catch (const ConfigError& error) {
+    REQUIRE(error.refusals().size() == 3);
+    CHECK(error.refusals()[0].place.line == 2);
+    CHECK(error.refusals()[1].place.line == 3);
+    CHECK(error.refusals()[2].place.line == 5);
+  }
+}
+
+TEST_CASE("a misspelt mandatory key is told once", "[config]") {
+  const TemporaryDirectory dir;
+  const auto file = dir.write("p.toml", with(kProfile, "max_force_N = 10.0", "max_force_mN = 10000"));
+  const std::string message = refusal(as_profile, file);
+  CHECK(message.find('\n') == std::string::npos);
+}
+
+TEST_CASE("what is not a readable file of sensible size is refused", "[config]") {
+  const TemporaryDirectory dir;
+  const fs::path absent = dir.path() / "absent.toml";
+  CHECK(refusal(as_scene, absent) == absent.string() + ": no such file; looked for " + absent.string());
+  CHECK(told(refusal(as_scene, dir.path()), dir.path().string() + ": ", "is a directory; name a file in it"));
+  const fs::path pipe = dir.path() / "pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK(told(refusal(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
+  CHECK(refusal(as_scene, "/dev/zero").find("is not a regular file") != std::string::npos);
+  const fs::path big = dir.write("big.toml", std::string((1 << 20) + 1, '#'));
+  CHECK(told(refusal(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
+  CHECK(refusal(as_scene, std::string(5000, 'a')).find("cannot be read") != std::string::npos);
+}
+
+TEST_CASE("a refused hand script changes nothing", "[config]") {
+  const TemporaryDirectory dir;
+  SimulationSettings s;
+  CHECK_THROWS_AS(load_hand_script(dir.write("h.toml", point("0", "[0, 0, 0]") + "x = 1"), s), ConfigError);
+  CHECK(s.hand_path.empty());
+  CHECK(s.hand_script == SimulationSettings{}.hand_script);
+}
+
+TEST_CASE("deep nesting through many lines of dotted keys does not overflow the stack", "[config]") {
+  std::string text = "x = ";
+  std::string dotted = "a";
+  for (int i = 0; i < 119; ++i) dotted += ".a";
+  for (int i = 0; i < 120; ++i) text += "[\n{" + dotted + " = ";
+  text += "1";
+  for (int i = 0; i < 120; ++i) text += "}\n]";
+  const TemporaryDirectory dir;
+  CHECK(told(refusal(as_scene, dir.write("deep.toml", text)), "deep.toml:", "is nested more than 16 deep"));
+}
+
+TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {
+  const std::vector<std::pair<Load, std::string>> sources = {
+      {as_settings, text_of(kConfig / "wrenchd.toml")},
+      {as_scene, text_of(kConfig / "scenes/cube_on_table.toml")},
+      {as_profile, text_of(kConfig / "profiles/example.toml")},
+      {as_hand_script, text_of(kConfig / "hands/press_and_rock.toml")}};
+  constexpr int kMutants = 20'000;
+  const TemporaryDirectory dir;
+  std::mt19937 random(20240607);
+  const auto below = [&](std::size_t n) {
+    return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
+  };
+  int refused = 0;
+  for (int i = 0; i < kMutants; ++i) {
+    const auto& [load, source] = sources[static_cast<std::size_t>(i) % sources.size()];
+    std::string text = source;
+    for (std::size_t n = 1 + below(4); n > 0; --n) text[below(text.size())] = static_cast<char>(below(256));
+    if (below(4) == 0) text.resize(1 + below(text.size()));
+    if (below(4) == 0) text.insert(below(text.size()), text.substr(below(text.size()), below(200)));
+    refused += refusal(load, dir.write("mutant.toml", text)).empty() ? 0 : 1;
+  }
+  CHECK(refused > kMutants / 4);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "config/config_error.hpp"
+#include "config/search_path.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace wrenchd {
+
+using test::TemporaryDirectory;
+
+TEST_CASE("the first directory that has the file wins", "[search_path]") {
+  const TemporaryDirectory dir;
+  const SearchPath search({dir.path() / "etc", dir.path() / "usr"});
+  const auto package = dir.write("usr/scenes/a.toml", "");
+  CHECK(search.find("scenes/a.toml") == package);
+  const auto administrator = dir.write("etc/scenes/a.toml", "");
+  CHECK(search.find("scenes/a.toml") == administrator);
+}
+
+TEST_CASE("a name inside a file is looked for beside that file first", "[search_path]") {
+  const TemporaryDirectory dir;
+  const SearchPath search({dir.path() / "etc"});
+  dir.write("etc/a.toml", "");
+  const auto beside = dir.write("home/a.toml", "");
+  CHECK(search.find("a.toml", dir.path() / "home/wrenchd.toml") == beside);
+  CHECK(search.find("a.toml", dir.path() / "elsewhere/wrenchd.toml") == dir.path() / "etc/a.toml");
+}
+
+TEST_CASE("an absolute name is that file and no other", "[search_path]") {
+  const TemporaryDirectory dir;
+  const SearchPath search({dir.path() / "etc"});
+  dir.write("etc/a.toml", "");
+  CHECK_FALSE(search.find(dir.path() / "a.toml"));
+  CHECK(search.find(dir.path() / "etc/a.toml"));
+}
+
+TEST_CASE("what is not found lists every place looked at", "[search_path]") {
+  const SearchPath search({"/nowhere/etc", "/nowhere/usr"});
+  CHECK_THROWS_AS(search.require("wrenchd.toml"), ConfigError);
+  CHECK_THROWS_WITH(
+      search.require("wrenchd.toml"),
+      "wrenchd.toml: no such file; looked for /nowhere/etc/wrenchd.toml, /nowhere/usr/wrenchd.toml");
+}
+
+TEST_CASE("wrenchd's own directories hold the shipped files", "[search_path]") {
+  CHECK(SearchPath().find("wrenchd.toml"));
+  CHECK(SearchPath().candidates("x").front() == "/etc/wrenchd/x");
+}
+
+TEST_CASE("a profile is named with or without its file", "[search_path]") {
+  CHECK(profile_file("loopback") == "profiles/loopback.toml");
+  CHECK(profile_file("mine/device.toml") == "mine/device.toml");
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/check.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+#include "collision/tool_body.hpp"
+#include "config/load_hand_script.hpp"
+#include "config/load_profile.hpp"
+#include "config/load_scene.hpp"
+#include "config/toml_file.hpp"
+#include "daemon/station.hpp"
+
+namespace wrenchd {
+namespace {
+
+enum class Kind { settings, scene, profile, hand_script };
+
+bool has(const TomlNode::Table& table, const std::string& key) {
+  return std::any_of(table.begin(), table.end(), [&](const TomlEntry& entry) { return entry.key == key; });
+}
+
+Kind kind_of(const std::filesystem::path& file) {
+  const TomlNode root = read_toml_file(file);
+  const auto& table = std::get<TomlNode::Table>(root.value);
+  if (has(table, "waypoint")) return Kind::hand_script;
+  if (has(table, "tool") || has(table, "obstacle")) return Kind::scene;
+  if (has(table, "pose_report") || has(table, "wrench_report") || has(table, "transport")) return Kind::profile;
+  return Kind::settings;
+}
+
+std::string about(const SceneSettings& scene) {
+  const ToolBody tool = load_tool(scene.tool);
+  std::ostringstream text;
+  text << "  tool " << scene.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3 << " m^3, mass "
+       << scene.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size() << " hull vertices\n  "
+       << scene.half_spaces.size() << " half-space(s)\n";
+  return text.str();
+}
+
+std::string about(const DeviceProfile& profile) {
+  std::ostringstream text;
+  text << "  device " << profile.name << ": " << profile.report_rate_Hz << " reports/s, at most "
+       << profile.max_force_N << " N and " << profile.max_torque_Nm << " N.m\n";
+  return text.str();
+}
+
+}  // namespace
+
+std::string check_file(const std::filesystem::path& file) {
+  switch (kind_of(file)) {
+    case Kind::scene:
+      return file.string() + ": a good scene\n" + about(load_scene(file));
+    case Kind::profile:
+      return file.string() + ": a good device profile\n" + about(load_profile(file));
+    case Kind::hand_script: {
+      SimulationSettings simulation;
+      load_hand_script(file, simulation);
+      return file.string() + ": a good hand script of " + std::to_string(simulation.hand_path.size()) +
+             " waypoints\n";
+    }
+    case Kind::settings:
+      break;
+  }
+  const Plan plan = read_plan({file, {}, {}}, SearchPath());
+  return file.string() + ": a good configuration\n" + about(plan.profile) + about(plan.scene);
+}
+
+}  // namespace wrenchd

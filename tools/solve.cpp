@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/solve.hpp"
+
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <ostream>
+
+#include "core/wrench_law.hpp"
+
+namespace wrenchd {
+namespace {
+
+constexpr const char* kHeader =
+    "contacts,energy,px,py,pz,qx,qy,qz,qw,eps_vx,eps_vy,eps_vz,eps_wx,eps_wy,eps_wz,"
+    "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
+    "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
+
+/// A row of numbers, comma between them.
+class Row {
+ public:
+  explicit Row(std::ostream& out) : out_(out) {}
+  Row& operator<<(double x) {
+    std::array<char, 32> text;
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
+    if (!first_) out_ << ',';
+    first_ = false;
+    out_.write(text.data(), end - text.data());
+    return *this;
+  }
+  Row& operator<<(const Vector3d& v) { return *this << v.x() << v.y() << v.z(); }
+
+ private:
+  std::ostream& out_;
+  bool first_ = true;
+};
+
+}  // namespace
+
+std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM, Method method, double k_P) {
+  const ToolBody& tool = scene.tool();
+  const Pose X_MT = tool.X_MT();
+  const Pose X_TM = inverse(X_MT);
+  PenetrationDepth depth(tool.solid.inertia, tool.hull, {method});
+  WrenchGains gains;
+  gains.stiffness = WrenchGains::scalar(k_P);
+  WrenchLaw law(gains_for(method, gains));
+
+  std::vector<SolvedPose> rows;
+  rows.reserve(X_WM.size());
+  for (const Pose& X_WM_p : X_WM) {
+    const Pose X_WP = X_WM_p * X_MT;
+    SolvedPose row;
+    const auto start = std::chrono::steady_clock::now();
+    row.penetration = depth.query(X_WP, scene);
+    row.solve_ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
+    const bool moved = row.penetration.projection.status != ProjectionStatus::free;
+    row.X_WM = moved ? row.penetration.projection.X_WQ * X_TM : X_WM_p;
+    row.F_T = law.update(row.penetration.drive, row.penetration.contacts > 0, 0.0);
+    row.F_S = spatial_wrench(X_WP, row.F_T);
+    if (row.penetration.projection.status == ProjectionStatus::infeasible)
+      row.penetration.projection.energy = std::numeric_limits<double>::quiet_NaN();
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows) {
+  out << kHeader << '\n';
+  for (const SolvedPose& r : rows) {
+    const Quaterniond& q = r.X_WM.rotation;
+    Row row(out);
+    row << r.penetration.contacts << r.penetration.projection.energy << r.X_WM.translation_m << q.x() << q.y()
+        << q.z() << q.w();
+    row << Vector3d(r.penetration.eps.head<3>()) << Vector3d(r.penetration.eps.tail<3>());
+    row << r.F_T.force_N << r.F_T.torque_Nm << r.F_S.force_N << r.F_S.torque_Nm << r.solve_ns;
+    out << '\n';
+  }
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <string>
+
+#include "collision/mesh_check.hpp"
+#include "core/inertia.hpp"
+#include "daemon/version.hpp"
+#include "tools/check.hpp"
+#include "tools/pose_table.hpp"
+#include "tools/solve.hpp"
+#include "config/load_scene.hpp"
+
+namespace {
+
+using namespace wrenchd;
+
+constexpr int kExitRefused = 1;     ///< a file was refused, or cannot be written
+constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is no solid
+constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: a pose had no admissible pose near it
+
+struct SolveOptions {
+  std::filesystem::path scene;
+  std::string poses;
+  std::string output = "-";
+  Method method = Method::exact;
+  double k_P = 1.0;
+};
+
+std::vector<Pose> read_poses_from(const std::string& name) {
+  if (name == "-") return read_poses(std::cin, "standard input");
+  std::ifstream file(name);
+  if (!file || std::filesystem::is_directory(name))
+    throw PoseTableError(name + ": cannot be read; name a CSV file, or - for standard input");
+  return read_poses(file, name);
+}
+
+/// Writes the whole answer or nothing: beside the file first, then in its place.
+void write_answer(const std::string& name, const std::string& text) {
+  if (name == "-") {
+    std::cout << text << std::flush;
+    return;
+  }
+  const std::string beside = name + ".part";
+  std::ofstream file(beside, std::ios::binary);
+  file << text;
+  file.close();
+  std::error_code error;
+  if (file) std::filesystem::rename(beside, name, error);
+  if (!file || error) {
+    std::filesystem::remove(beside, error);
+    throw std::runtime_error(name + ": cannot be written; check that the directory exists and may be written to");
+  }
+}
+
+int run_solve(const SolveOptions& options) {
+  const Scene scene(load_scene(options.scene));
+  const std::vector<Pose> poses = read_poses_from(options.poses);
+  const std::vector<SolvedPose> rows = solve(scene, poses, options.method, options.k_P);
+  std::ostringstream text;
+  write_csv(text, rows);
+  write_answer(options.output, text.str());
+  int exit_code = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].penetration.projection.status != ProjectionStatus::infeasible) continue;
+    std::fprintf(stderr, "wrenchctl: pose %zu: no admissible pose found near it; its energy is nan\n", i + 1);
+    exit_code = kExitInfeasible;
+  }
+  return exit_code;
+}
+
+void print(const char* label, const Vector3d& v, const char* unit) {
+  std::printf("%-18s %.9g %.9g %.9g %s\n", label, v.x(), v.y(), v.z(), unit);
+}
+
+int run_mesh(const std::filesystem::path& file, double scale) {
+  TriangleMesh mesh;
+  const MeshReport report = check_solid(read_mesh_file(file), &mesh);
+  std::printf("%-18s %zu\n%-18s %zu\n", "vertices", report.vertices, "faces", report.faces);
+  std::printf("%-18s %s\n%-18s %s\n", "closed", report.closed ? "yes" : "no", "consistent",
+              report.consistent ? "yes" : "no");
+  if (!report.solid()) {
+    std::fprintf(stderr, "wrenchctl: %s: is not a closed, consistently oriented solid:\n", file.c_str());
+    for (const std::string& defect : report.defects) std::fprintf(stderr, "  %s\n", defect.c_str());
+    return kExitDefects;
+  }
+  for (Vector3d& p : mesh.vertices_m) p *= scale;
+  const SolidProperties solid = solid_properties(mesh, 1.0);
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : mesh.vertices_m) box.extend(p);
+  const Matrix3d& H = solid.inertia.H_kg_m2;
+  std::printf("%-18s %zu\n", "triangles", mesh.triangles.size());
+  print("size", box.sizes(), "m");
+  std::printf("%-18s %.9g m^3\n", "volume", solid.volume_m3);
+  print("centre of mass", solid.p_MT_m, "m");
+  print("inertia xx yy zz", H.diagonal(), "m^2 (per kg, uniform solid, about the centre of mass)");
+  print("inertia xy xz yz", {H(0, 1), H(0, 2), H(1, 2)}, "m^2");
+  return 0;
+}
+
+void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
+  CLI::App* solve = app.add_subcommand("solve", "Closest admissible configuration of each pose of a table");
+  solve->add_option("scene", options.scene, "scene file (TOML)")->required();
+  solve->add_option("--poses", options.poses, "CSV with the header px,py,pz,qx,qy,qz,qw: poses of the mesh's own\n"
+                                              "frame in the world [m]; - reads standard input")->required();
+  solve->add_option("--method", options.method, "exact, planar or translational")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Method>{{"exact", Method::exact},
+                                                                        {"planar", Method::planar},
+                                                                        {"translational", Method::translational}}))
+      ->default_str("exact");
+  solve->add_option("--k-p", options.k_P, "k_P of Eq. (16); no integral, no derivative")->capture_default_str();
+  solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")->capture_default_str();
+  solve->footer(
+      "One row a pose: contacts (tool vertices that touch at the projection; 0 where the pose is admissible), energy T\n"
+      "[kg m^2] of Eq. (8), the projected pose of the same frame, eps of Eq. (15) in the body frame at the centre of\n"
+      "mass, the wrench in that frame and about the world origin, and the time of the solve [ns].\n"
+      "Each pose is solved without history: exact then seeks the global optimum.");
+  solve->callback([&] { exit_code = run_solve(options); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("wrenchctl: checks what wrenchd reads, and computes what it would feel.");
+  app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
+  app.footer("Exit codes: 0 done; 1 refused (a file, its place and the cure are on standard error); 2 mesh: not a solid;\n"
+             "3 solve: a pose had no admissible pose near it; over 100: the command line was not understood.");
+  app.require_subcommand(1);
+  int exit_code = 0;
+
+  SolveOptions solve_options;
+  add_solve(app, solve_options, exit_code);
+
+  std::filesystem::path checked;
+  CLI::App* check = app.add_subcommand("check", "Reads a configuration, scene, profile or hand script, and what it\n"
+                                                "names, and says what is wrong with it");
+  check->add_option("file", checked, "TOML file; its kind is told by what it holds")->required();
+  check->callback([&] { std::cout << check_file(checked); });
+
+  std::filesystem::path mesh_file;
+  double scale = 1.0;
+  CLI::App* mesh = app.add_subcommand("mesh", "What a mesh is: closed, volume, inertia, defects");
+  mesh->add_option("file", mesh_file, "OFF, OBJ, STL or PLY")->required();
+  mesh->add_option("--scale", scale, "metres per mesh unit")->check(CLI::PositiveNumber)->capture_default_str();
+  mesh->callback([&] { exit_code = run_mesh(mesh_file, scale); });
+
+  try {
+    app.parse(argc, argv);
+    return exit_code;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "wrenchctl: %s\n", error.what());
+    return kExitRefused;
+  }
+}
