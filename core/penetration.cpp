@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/penetration.hpp"
 
+#include <limits>
+#include <span>
+
 namespace wrenchd {
 namespace {
 
@@ -48,24 +51,43 @@ Penetration PenetrationDepth::exact(const Pose& X_WP, Projection projection) con
   return out;
 }
 
-/// Every contact on its own (section 5 of the paper adds their wrenches). The pose that is reported is the best of
-/// the family's rotations and of no rotation at all, each lifted until the whole body is out: the family looks at one
-/// cross-section, and a vertex beside it may still be inside.
+/// Every contact on its own, in every plane of its family. Generically one vertex collides, and its projection frees the
+/// whole body: the best that does is the answer. Where none does (the family looks at one cross-section, and a vertex
+/// beside it stays inside), the wrenches of the contacts are added, as section 5 of the paper says, and the pose
+/// reported is the best of their rotations lifted until the whole body is out. Translation alone always is a candidate.
 Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scene) noexcept {
   Penetration out = exact(X_WP, exact_.translate(X_WP, scene, X_WP));
   if (out.projection.status == ProjectionStatus::free) return out;
   contacts_.clear();
   while (scene.add_violated(X_WP, 0.0, contacts_) > 0) continue;
-  out.drive.setZero();
+
+  bool freed = false;
+  Pose X_WQ = out.projection.X_WQ;
+  double T = in_contact(out.projection) ? out.projection.energy : std::numeric_limits<double>::infinity();
+  Vector6d sum = Vector6d::Zero();
   for (const Contact& contact : contacts_) {
-    const PlanarFamily::Solution one = planar_.project(X_WP, contact);
-    out.drive += displacement(X_WP, one.X_WQ);
-    const Projection lifted = exact_.translate(X_WP, scene, one.X_WQ);
-    if (!in_contact(lifted)) continue;
-    if (!in_contact(out.projection) || lifted.energy < out.projection.energy) out.projection = lifted;
+    PlanarFamily::InPlane best = planar_.solve(X_WP, contact, 0);
+    for (int k = 0; k < planar_.planes(); ++k) {
+      const PlanarFamily::InPlane one = planar_.solve(X_WP, contact, k);
+      if (one.minimum.T < best.minimum.T) best = one;
+      if (one.minimum.T >= T) continue;
+      const Pose candidate = PlanarFamily::pose(X_WP, contact, one);
+      probe_.clear();
+      if (scene.add_violated(candidate, exact_.gap_tolerance_m(candidate), probe_) > 0) continue;
+      freed = true;
+      X_WQ = candidate;
+      T = one.minimum.T;
+    }
+    const Pose alone = PlanarFamily::pose(X_WP, contact, best);
+    sum += displacement(X_WP, alone);
+    if (freed) continue;
+    const Projection lifted = exact_.translate(X_WP, scene, alone);
+    if (!in_contact(lifted) || lifted.energy >= T) continue;
+    X_WQ = lifted.X_WQ;
+    T = lifted.energy;
   }
-  out.contacts = out.projection.active_count;
-  out.eps = displacement(X_WP, out.projection.X_WQ);
+  out = exact(X_WP, exact_.translate(X_WP, scene, X_WQ));  // fills in the contacts; moves q by rounding only
+  out.drive = freed ? out.eps : sum;
   return out;
 }
 

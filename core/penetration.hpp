@@ -16,8 +16,8 @@ struct Penetration {
   Projection projection;  ///< q, T and the contacts. q = p where p is admissible.
   std::uint16_t contacts = 0;          ///< tool features that touch at q; 0 where p is admissible
   Vector6d eps = Vector6d::Zero();     ///< Eq. (15): exponential coordinates of p^-1 q
-  /// What enters the wrench law. The same as eps for exact. For planar, the sum of the contacts' own eps, as section 5
-  /// of the paper adds their wrenches. For translational, [d; sum (c_i - x) x d_i]: with the force gain k for both
+  /// What enters the wrench law. The same as eps for exact. For planar too, unless several contacts need each its own
+  /// projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For translational, [d; sum (c_i - x) x d_i]: with the force gain k for both
   /// halves this is the force k d at each contact and its torque about the centre of mass, which is that method's wrench.
   Vector6d drive = Vector6d::Zero();
 };
@@ -48,7 +48,8 @@ class PenetrationDepth {
   double mass_kg_;
   ExactProjection exact_;
   PlanarFamily planar_;
-  ContactSet contacts_;
+  ContactSet contacts_;  ///< what planar works through
+  ContactSet probe_;     ///< what a candidate of it violates
 };
 
 }  // namespace wrenchd

@@ -102,35 +102,28 @@ PlanarSection PlanarFamily::limited(PlanarSection section, const Vector3d& e1, c
   return section;
 }
 
-PlanarFamily::Solution PlanarFamily::project(const Pose& X_WP, const Contact& contact) const noexcept {
+PlanarFamily::InPlane PlanarFamily::solve(const Pose& X_WP, const Contact& contact, int k) const noexcept {
   const Vector3d& n = contact.n_W;
   const auto [X, Z] = axes_of(n);
+  const double delta = std::numbers::pi * k / planes_;
+  const Vector3d w = std::sin(delta) * X + std::cos(delta) * Z;  // the axis w_delta; (34) as sine and cosine
+  const Vector3d e1 = n.cross(w);
   const Vector3d v = X_WP.rotation * contact.p_TA_m;
+  const Vector3d w_T = X_WP.rotation.conjugate() * w;
+  PlanarSection section;
+  section.m = M_.mass_kg;
+  section.H = w_T.dot(M_.H_kg_m2 * w_T);
+  section.vx = e1.dot(v);
+  section.vy = n.dot(v);
+  section.h = n.dot(X_WP.translation_m) - contact.offset_m;
   const Star star{body_, body_.ring_of(contact.vertex), X_WP.rotation, contact.p_TA_m};
+  return {minimise(limited(section, e1, n, w, star)), w};
+}
 
-  PlanarMinimum best;
-  Vector3d best_axis = Z;
-  for (int k = 0; k < planes_; ++k) {
-    const double delta = std::numbers::pi * k / planes_;
-    const Vector3d w = std::sin(delta) * X + std::cos(delta) * Z;  // the axis w_delta; (34) as sine and cosine
-    const Vector3d e1 = n.cross(w);
-    const Vector3d w_T = X_WP.rotation.conjugate() * w;
-    PlanarSection section;
-    section.m = M_.mass_kg;
-    section.H = w_T.dot(M_.H_kg_m2 * w_T);
-    section.vx = e1.dot(v);
-    section.vy = n.dot(v);
-    section.h = n.dot(X_WP.translation_m) - contact.offset_m;
-    const PlanarMinimum candidate = minimise(limited(section, e1, n, w, star));
-    if (k == 0 || candidate.T < best.T) {
-      best = candidate;
-      best_axis = w;
-    }
-  }
-
-  const double h = n.dot(X_WP.translation_m) - contact.offset_m;
-  const Quaterniond turn(Eigen::AngleAxisd(best.theta, best_axis));
-  return {{(turn * X_WP.rotation).normalized(), X_WP.translation_m + (best.beta - h) * n}, best.T};
+Pose PlanarFamily::pose(const Pose& X_WP, const Contact& contact, const InPlane& solution) noexcept {
+  const double h = contact.n_W.dot(X_WP.translation_m) - contact.offset_m;
+  const Quaterniond turn(Eigen::AngleAxisd(solution.minimum.theta, solution.axis_W));
+  return {(turn * X_WP.rotation).normalized(), X_WP.translation_m + (solution.minimum.beta - h) * contact.n_W};
 }
 
 }  // namespace wrenchd

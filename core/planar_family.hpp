@@ -35,13 +35,19 @@ class PlanarFamily {
   /// planes: N_delta of Eq. (40). The body is kept by reference and must outlive this.
   PlanarFamily(const Inertia& M, const ConvexBody& body, int planes);
 
-  struct Solution {
-    Pose X_WQ;       ///< the projection of Eq. (39) for this contact alone
-    double T = 0.0;  ///< its energy
-  };
+  int planes() const noexcept { return planes_; }
 
-  /// The projection for one contact, as if it were the only one. X_WP: body frame T at p. RT safe.
-  Solution project(const Pose& X_WP, const Contact& contact) const noexcept;
+  /// The best rotation within one plane of the family, and its energy.
+  struct InPlane {
+    PlanarMinimum minimum;
+    Vector3d axis_W = Vector3d::UnitZ();  ///< w_delta
+  };
+  /// Plane k of the family, delta = k pi / N_delta, as if this contact were the only one. X_WP: body frame T at p.
+  /// RT safe.
+  InPlane solve(const Pose& X_WP, const Contact& contact, int k) const noexcept;
+
+  /// The configuration that goes with it, Eq. (38). RT safe.
+  static Pose pose(const Pose& X_WP, const Contact& contact, const InPlane& solution) noexcept;
 
  private:
   struct Star;

@@ -78,6 +78,11 @@ Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSour
   return best;
 }
 
+// Rounding of the world coordinates counts too: a body far from the origin has coarser gaps.
+double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
+  return 4.0 * kGapTolerance * (L_ + X_WT.translation_m.lpNorm<Eigen::Infinity>());
+}
+
 /// Constraint generation: solve on the contacts at hand, ask the scene what the answer violates, add it, repeat.
 Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
                                          Freedom freedom) noexcept {
@@ -85,8 +90,7 @@ Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& 
   out.X_WQ = X_WP;
   contacts_.clear();
   iterations_ = 0;
-  // Rounding of the world coordinates counts too: a body far from the origin has coarser gaps.
-  const double tolerance_m = 4.0 * kGapTolerance * (L_ + X_WP.translation_m.lpNorm<Eigen::Infinity>());
+  const double tolerance_m = gap_tolerance_m(X_WP);
   if (scene.add_violated(X_WP, tolerance_m, contacts_) == 0) {
     out.proven_global = true;
     return out;

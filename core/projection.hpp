@@ -76,6 +76,9 @@ class ExactProjection {
   /// translations only would answer (X_rotated = X_WP), or the lift that makes any rotation admissible. RT safe.
   Projection translate(const Pose& X_WP, const ContactSource& scene, const Pose& X_rotated) noexcept;
 
+  /// How far below zero a gap may seem by rounding at this pose [m]. RT safe.
+  double gap_tolerance_m(const Pose& X_WT) const noexcept;
+
  private:
   /// A contact seen from p, in units of L.
   struct Seen {
