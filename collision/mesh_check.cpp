@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "collision/mesh_check.hpp"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/measure.h>
-#include <CGAL/Polygon_mesh_processing/orientation.h>
-#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
-#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
-#include <CGAL/Surface_mesh.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <set>
 #include <sstream>
 #include <utility>
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Surface_mesh.h>
 
 namespace wrenchd {
 namespace {
@@ -37,7 +39,17 @@ std::string edge_place(const PolygonSoup& soup, const Edge& e) {
   return place(soup.vertices[e.first]) + " to " + place(soup.vertices[e.second]);
 }
 
-std::string also(std::size_t count) { return count > 1 ? " (" + std::to_string(count) + " in all)" : ""; }
+std::string also(std::size_t count) {
+  return count > 1 ? " (" + std::to_string(count) + " in all)" : "";
+}
+
+/// A negative index of the file has wrapped around; it is told as it was written.
+std::string index_text(std::size_t v) {
+  return v > std::numeric_limits<std::size_t>::max() / 2 ? "-" + std::to_string(0 - v) : std::to_string(v);
+}
+
+/// Where everything cuts through everything, pairs grow with the square of the faces.
+constexpr std::size_t kMostIntersections = 1000;
 
 /// First place and number of a kind of defect.
 class Tally {
@@ -67,7 +79,7 @@ void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) 
     if (face.size() < 3) too_few.found(name + " has " + std::to_string(face.size()) + " vertices");
     for (const std::size_t v : face)
       if (v >= soup.vertices.size())
-        out_of_range.found(name + " uses vertex " + std::to_string(v) + ", but there are only " +
+        out_of_range.found(name + " uses vertex " + index_text(v) + ", but there are only " +
                            std::to_string(soup.vertices.size()));
     if (std::set<std::size_t>(face.begin(), face.end()).size() != face.size())
       repeated.found(name + " uses a vertex twice");
@@ -90,7 +102,8 @@ void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
   Tally flat;
   for (std::size_t f = 0; f < soup.faces.size(); ++f)
     if (!(area_of(soup, soup.faces[f]) > 0.0))
-      flat.found("face " + std::to_string(f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area");
+      flat.found("face " + std::to_string(f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
+                 " has no area");
   flat.report(defects, "remove degenerate faces in the modeller");
 }
 
@@ -125,39 +138,81 @@ void check_edges(const PolygonSoup& soup, MeshReport& report) {
   report.consistent = !same_way.any();
 }
 
+/// Every edge has two faces here, so the faces around a vertex form rings: the face that leaves the vertex
+/// towards n is followed by the one that comes in from n. A vertex with more than one ring joins parts of the
+/// surface in a point.
+void check_vertices(const PolygonSoup& soup, MeshReport& report) {
+  std::vector<std::map<std::size_t, std::size_t>> around(soup.vertices.size());  // came from -> goes to
+  for (const auto& face : soup.faces)
+    for (std::size_t i = 0; i < face.size(); ++i)
+      around[face[i]][face[(i + face.size() - 1) % face.size()]] = face[(i + 1) % face.size()];
+  Tally pinched;
+  for (std::size_t v = 0; v < around.size(); ++v) {
+    if (around[v].empty()) continue;
+    std::size_t ring = 0;
+    std::size_t at = around[v].begin()->first;
+    do at = around[v].at(at);
+    while (++ring < around[v].size() && at != around[v].begin()->first);
+    if (ring < around[v].size())
+      pinched.found("parts of the surface meet only in vertex " + std::to_string(v) + " at " +
+                    place(soup.vertices[v]));
+  }
+  pinched.report(report.defects, "separate them in the modeller");
+}
+
 SurfaceMesh surface_mesh(const PolygonSoup& soup) {
   std::vector<Kernel::Point_3> points;
   points.reserve(soup.vertices.size());
   for (const Vector3d& p : soup.vertices) points.emplace_back(p.x(), p.y(), p.z());
+  auto faces = soup.faces;
+  PMP::remove_isolated_points_in_polygon_soup(points, faces);  // does_bound_a_volume() falls over them
   SurfaceMesh mesh;
-  PMP::polygon_soup_to_polygon_mesh(points, soup.faces, mesh);
+  PMP::polygon_soup_to_polygon_mesh(points, faces, mesh);
   return mesh;
 }
 
-void check_self_intersection(const PolygonSoup& soup, const SurfaceMesh& mesh, MeshReport& report) {
+/// Cuts every face into triangles. Returns for each triangle its face's number in the file.
+std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh, MeshReport& report) {
+  std::vector<std::size_t> face_of(soup.faces.size());
+  Tally uncut;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    face_of[f] = f;  // its first triangle keeps the number
+    if (soup.faces[f].size() > 3 &&
+        !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh))
+      uncut.found("face " + std::to_string(f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
+                  " cannot be cut into triangles");
+    face_of.resize(mesh.number_of_faces(), f);
+  }
+  uncut.report(report.defects, "make it flat, or cut it in the modeller");
+  return face_of;
+}
+
+void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::size_t>& face_of,
+                             MeshReport& report) {
   std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
-  PMP::self_intersections(mesh, std::back_inserter(pairs));
+  PMP::self_intersections(mesh, std::back_inserter(pairs),
+                          CGAL::parameters::maximum_number(kMostIntersections));
   report.self_intersecting = !pairs.empty();
   if (pairs.empty()) return;
   const auto corner = mesh.point(mesh.target(mesh.halfedge(pairs[0].first)));
-  const std::string where = place({corner.x(), corner.y(), corner.z()});
-  // A face of the triangulated mesh beyond the file's own has no number there.
-  const std::size_t a = pairs[0].first, b = pairs[0].second;
-  const std::string which = std::max(a, b) < soup.faces.size()
-                                ? "faces " + std::to_string(a) + " and " + std::to_string(b)
-                                : std::string("two faces");
-  report.defects.push_back(which + " near " + where + " cut through each other" + also(pairs.size()) +
-                           "; unite the parts in the modeller");
+  const std::size_t a = face_of[pairs[0].first], b = face_of[pairs[0].second];
+  report.defects.push_back(
+      (a == b ? "two halves of face " + std::to_string(a)
+              : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
+      " near " + place({corner.x(), corner.y(), corner.z()}) + " cut through each other" +
+      (pairs.size() < kMostIntersections ? also(pairs.size()) : " (1000 or more in all)") +
+      "; unite the parts in the modeller");
 }
 
 void check_volume(const SurfaceMesh& mesh, MeshReport& report) {
   report.volume = CGAL::to_double(PMP::volume(mesh));
   report.outward = !report.self_intersecting && report.volume > 0.0 && PMP::does_bound_a_volume(mesh);
   if (report.outward || report.self_intersecting) return;
-  report.defects.push_back(report.volume < 0.0
-                               ? "all faces look inwards (the volume is negative); flip the faces in the modeller"
-                               : "its shells do not bound a volume: one looks the wrong way, or nothing is inside; "
-                                 "make outer shells look outwards and cavities inwards");
+  report.defects.push_back(
+      report.volume < 0.0
+          ? "all faces look inwards (the volume is negative); flip the faces in the modeller"
+          : "its shells do not bound a volume: one looks the wrong way, or nothing is inside; "
+            "make outer shells look outwards and cavities inwards");
 }
 
 TriangleMesh triangles_of(const SurfaceMesh& mesh) {
@@ -185,16 +240,12 @@ MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
   check_areas(soup, report.defects);
   check_edges(soup, report);
   if (!report.defects.empty()) return report;
-  if (!PMP::is_polygon_soup_a_polygon_mesh(soup.faces)) {
-    report.defects.emplace_back("two parts of the surface meet in a single vertex; separate them in the modeller");
-    return report;
-  }
+  check_vertices(soup, report);
+  if (!report.defects.empty()) return report;
   SurfaceMesh mesh = surface_mesh(soup);
-  if (!PMP::triangulate_faces(mesh)) {
-    report.defects.emplace_back("a face with more than three corners cannot be cut into triangles; make it flat");
-    return report;
-  }
-  check_self_intersection(soup, mesh, report);
+  const std::vector<std::size_t> face_of = triangulate(soup, mesh, report);
+  if (!report.defects.empty()) return report;
+  check_self_intersection(mesh, face_of, report);
   check_volume(mesh, report);
   if (triangles != nullptr && report.solid()) *triangles = triangles_of(mesh);
   return report;

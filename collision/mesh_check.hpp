@@ -14,18 +14,19 @@ namespace wrenchd {
 struct MeshReport {
   std::size_t vertices = 0;
   std::size_t faces = 0;
-  bool closed = false;       ///< every edge belongs to exactly two faces
-  bool consistent = false;   ///< neighbouring faces run along their common edge in opposite directions
-  bool outward = false;      ///< the faces bound a volume, with their outer side outside
+  bool closed = false;      ///< every edge belongs to exactly two faces
+  bool consistent = false;  ///< neighbouring faces run along their common edge in opposite directions
+  bool outward = false;     ///< the faces bound a volume, with their outer side outside
   bool self_intersecting = false;
-  double volume = 0.0;       ///< in file units cubed; NaN while the mesh is not closed and consistent
+  double volume = 0.0;               ///< in file units cubed; NaN while the mesh is not closed and consistent
   std::vector<std::string> defects;  ///< one sentence each: what, where, how many, and the cure
 
   bool solid() const noexcept { return defects.empty(); }
 };
 
-/// Looks at everything that makes a mesh a closed, consistently oriented solid. Names faces and vertices by their number
-/// in the file, from 0. `triangles` receives the triangulated surface when there is no defect. Not RT safe.
+/// Looks at everything that makes a mesh a closed, consistently oriented solid. Names faces and vertices by
+/// their number in the file, from 0. `triangles` receives the triangulated surface when there is no defect.
+/// Not RT safe.
 MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles = nullptr);
 
 }  // namespace wrenchd

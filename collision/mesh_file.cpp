@@ -1,20 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "collision/mesh_file.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <system_error>
+
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/IO/polygon_soup_io.h>
 #include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
 
-#include <algorithm>
-#include <array>
-#include <cctype>
-#include <system_error>
+#include "collision/mesh_source.hpp"
 
 namespace wrenchd {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
+
+/// A tool of a million triangles has 50 MB as binary STL. Beyond this, somebody named the wrong file.
+constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 30;
 
 constexpr std::array<const char*, 4> kExtensions = {".off", ".obj", ".stl", ".ply"};
 
@@ -34,20 +43,36 @@ void require_readable(const std::filesystem::path& file) {
     throw MeshError(file.string() + ": is not a file; name an OFF, OBJ, STL or PLY file");
   if (std::filesystem::file_size(file, error) == 0)
     throw MeshError(file.string() + ": is empty; export the mesh again");
+  if (std::filesystem::file_size(file, error) > kLargestFile)
+    throw MeshError(file.string() + ": is larger than 1 GiB; simplify the mesh");
   const std::string extension = lower_extension(file);
   if (std::find(kExtensions.begin(), kExtensions.end(), extension) == kExtensions.end())
     throw MeshError(file.string() + ": unknown mesh format '" + extension +
                     "'; save it as .off, .obj, .stl or .ply");
 }
 
-bool read_soup(const std::filesystem::path& file, std::vector<Point>& points,
+MeshSource read_bytes(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  MeshSource source{file, {}};
+  source.bytes.assign(std::istreambuf_iterator<char>(in), {});
+  if (in.bad() || source.bytes.empty())
+    source.refuse(0, "cannot be read; check the file and its permissions");
+  return source;
+}
+
+/// CGAL's readers are handed only what they can be trusted with (collision/mesh_source.hpp).
+bool read_soup(MeshSource source, const std::string& extension, std::vector<Point>& points,
                std::vector<std::vector<std::size_t>>& faces) {
-  const std::string name = file.string();
-  const std::string extension = lower_extension(file);
-  if (extension == ".off") return CGAL::IO::read_OFF(name, points, faces);
-  if (extension == ".obj") return CGAL::IO::read_OBJ(name, points, faces);
-  if (extension == ".ply") return CGAL::IO::read_PLY(name, points, faces);
-  return CGAL::IO::read_STL(name, points, faces);
+  const auto silent = CGAL::parameters::verbose(false);
+  if (extension == ".off") guard_off(source);
+  if (extension == ".ply") guard_ply(source);
+  if (extension == ".stl") guard_stl(source);
+  if (extension == ".obj") source.bytes = guarded_obj(source);
+  std::istringstream in(std::move(source.bytes));
+  if (extension == ".off") return CGAL::IO::read_OFF(in, points, faces, silent);
+  if (extension == ".ply") return CGAL::IO::read_PLY(in, points, faces, silent);
+  if (extension == ".obj") return CGAL::IO::read_OBJ(in, points, faces, silent);
+  return CGAL::IO::read_STL(in, points, faces, silent);
 }
 
 }  // namespace
@@ -58,16 +83,20 @@ PolygonSoup read_mesh_file(const std::filesystem::path& file) {
   PolygonSoup soup;
   bool read = false;
   try {
-    read = read_soup(file, points, soup.faces);
+    read = read_soup(read_bytes(file), lower_extension(file), points, soup.faces);
+  } catch (const MeshError&) {
+    throw;
   } catch (const std::exception&) {
     read = false;  // a reader that threw has not read
   }
   const std::string format = lower_extension(file).substr(1);
   if (!read)
-    throw MeshError(file.string() + ": is not a readable " + format +
-                    " file, or it ends too early; export the mesh again, or check counts and numbers by hand");
+    throw MeshError(
+        file.string() + ": is not a readable " + format +
+        " file, or it ends too early; export the mesh again, or check counts and numbers by hand");
   if (soup.faces.empty()) throw MeshError(file.string() + ": has no faces; a tool needs a closed surface");
-  if (format == "stl") CGAL::Polygon_mesh_processing::merge_duplicate_points_in_polygon_soup(points, soup.faces);
+  if (format == "stl")
+    CGAL::Polygon_mesh_processing::merge_duplicate_points_in_polygon_soup(points, soup.faces);
   soup.vertices.reserve(points.size());
   for (const Point& p : points) soup.vertices.emplace_back(p.x(), p.y(), p.z());
   return soup;

@@ -9,8 +9,8 @@
 
 namespace wrenchd {
 
-/// A mesh that cannot be used: which file, what is wrong with it, where, and what to do. Several lines where there is
-/// more than one defect.
+/// A mesh that cannot be used: which file, what is wrong with it, where, and what to do. Several lines where
+/// there is more than one defect.
 class MeshError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -22,8 +22,8 @@ struct PolygonSoup {
   std::vector<std::vector<std::size_t>> faces;
 };
 
-/// Reads OFF, OBJ, STL or PLY, told apart by the extension. STL has no shared vertices: equal ones are merged.
-/// Throws MeshError. Not RT safe.
+/// Reads OFF, OBJ, STL or PLY, told apart by the extension. STL has no shared vertices: equal ones are
+/// merged. Throws MeshError. Not RT safe.
 PolygonSoup read_mesh_file(const std::filesystem::path& file);
 
 }  // namespace wrenchd

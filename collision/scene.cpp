@@ -13,7 +13,9 @@ template <std::size_t N>
 class Deepest {
  public:
   /// Below this gap a vertex would be kept.
-  double threshold() const noexcept { return count_ < N ? std::numeric_limits<double>::infinity() : gap_[N - 1]; }
+  double threshold() const noexcept {
+    return count_ < N ? std::numeric_limits<double>::infinity() : gap_[N - 1];
+  }
   void insert(double gap, std::uint32_t vertex) noexcept {
     std::size_t at = std::min(count_, N - 1);
     for (; at > 0 && gap < gap_[at - 1]; --at) {

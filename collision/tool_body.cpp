@@ -1,13 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "collision/tool_body.hpp"
 
+#include <locale>
+#include <sstream>
 #include <string>
 
 #include "collision/convex_hull.hpp"
 #include "collision/mesh_check.hpp"
 #include "collision/mesh_file.hpp"
+#include "core/finite.hpp"
 
 namespace wrenchd {
+
+void require_usable(const SolidProperties& solid, const std::filesystem::path& mesh, double scale) {
+  // Volume or inertia underflowed or overflowed: nothing is left to compute with.
+  const Matrix3d& H = solid.inertia.H_kg_m2;
+  if (solid.volume_m3 > 0.0 && is_finite(solid.volume_m3) && H.allFinite() && H.diagonal().minCoeff() > 0.0)
+    return;
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << mesh.string() << ": has no usable volume at scale " << scale
+       << "; give 'scale' in metres per mesh unit";
+  throw MeshError(text.str());
+}
 
 ToolBody load_tool(const ToolSettings& settings) {
   TriangleMesh mesh;
@@ -17,16 +32,14 @@ ToolBody load_tool(const ToolSettings& settings) {
     for (const std::string& defect : report.defects) message += "\n  " + defect;
     throw MeshError(message);
   }
-  for (Vector3d& p : mesh.vertices_m) p *= settings.scale;
-
+  // The hull is taken of the file's own numbers: scaled and shifted, a vertex within a flat face may come to
+  // lie an ulp outside it and become a corner.
   ToolBody tool;
-  tool.solid = solid_properties(mesh, settings.mass_kg);
-  // A scale so small that the volume underflows, or so large that it overflows, leaves nothing to compute with.
-  if (!(tool.solid.volume_m3 > 0.0) || !tool.solid.inertia.H_kg_m2.allFinite())
-    throw MeshError(settings.mesh.string() + ": has no usable volume at scale " + std::to_string(settings.scale) +
-                    "; give 'scale' in metres per mesh unit");
-  for (Vector3d& p : mesh.vertices_m) p -= tool.solid.p_MT_m;
   tool.hull = convex_hull(mesh.vertices_m);
+  for (Vector3d& p : mesh.vertices_m) p *= settings.scale;
+  tool.solid = solid_properties(mesh, settings.mass_kg);
+  require_usable(tool.solid, settings.mesh, settings.scale);
+  for (Vector3d& p : tool.hull.vertices_T_m) p = p * settings.scale - tool.solid.p_MT_m;
   return tool;
 }
 

@@ -7,7 +7,8 @@
 
 namespace wrenchd {
 
-/// The virtual body in the hand. M: frame of the mesh file. T: the body frame, M's axes at the centre of mass.
+/// The virtual body in the hand. M: frame of the mesh file. T: the body frame, M's axes at the centre of
+/// mass.
 struct ToolBody {
   SolidProperties solid;  ///< of the uniform solid, in metres and kilograms
   ConvexBody hull;        ///< what a half-space can touch, in T
@@ -16,8 +17,11 @@ struct ToolBody {
   Pose X_MT() const noexcept { return {Quaterniond::Identity(), solid.p_MT_m}; }
 };
 
-/// Loads and checks the tool's mesh. Throws MeshError that names the file, the defect, its place and the cure.
-/// Not RT safe.
+/// Throws MeshError where the scale made a solid too small or too large to compute with.
+void require_usable(const SolidProperties& solid, const std::filesystem::path& mesh, double scale);
+
+/// Loads and checks the tool's mesh. Throws MeshError that names the file, the defect, its place and the
+/// cure. Not RT safe.
 ToolBody load_tool(const ToolSettings& settings);
 
 }  // namespace wrenchd

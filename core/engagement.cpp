@@ -48,7 +48,7 @@ double SoftStart::advance(bool calm, double dt_s) noexcept {
     state_ = Engagement::active;
   }
   if (state_ == Engagement::active) return 1.0;
-  return state_ == Engagement::ramping ? elapsed_s_ / ramp_s_ : 0.0;
+  return state_ == Engagement::ramping && elapsed_s_ > 0.0 ? elapsed_s_ / ramp_s_ : 0.0;  // no ramp: not 0/0
 }
 
 }  // namespace wrenchd

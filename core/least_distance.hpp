@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+
+#include <Eigen/Core>
 
 namespace wrenchd {
 
@@ -14,15 +15,16 @@ namespace wrenchd {
 ///
 ///   min 1/2 |z - z0|^2   subject to   b_i . z >= c_i,   |b_i| = 1
 ///
-/// Solved by the dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at z0, add the
-/// most violated constraint, and keep the multipliers of the active ones non-negative on the way, dropping what
-/// would turn negative. At most N constraints are active, so each step works with an N x N triangle. Redundant and
-/// parallel constraints are met as such: a constraint in the span of the active ones is never added, only exchanged.
-/// RT safe.
+/// Solved by the dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at z0, add
+/// the most violated constraint, and keep the multipliers of the active ones non-negative on the way,
+/// dropping what would turn negative. At most N constraints are active, so each step works with an N x N
+/// triangle. Redundant and parallel constraints are met as such: a constraint in the span of the active ones
+/// is never added, only exchanged. RT safe.
 template <int N, std::size_t Capacity>
 class LeastDistance {
  public:
   using Vector = Eigen::Matrix<double, N, 1>;
+  using Coefficients = std::array<double, N>;  ///< one for each active constraint, in their order
   enum class Status : std::uint8_t { optimal, infeasible, budget_spent };
 
   void clear() noexcept { count_ = 0; }
@@ -36,34 +38,50 @@ class LeastDistance {
     ++count_;
   }
 
-  /// tolerance: by how much a constraint may stay violated, in units of z.
+  /// tolerance: by how much a constraint may stay violated, in units of z. One that is active may by the
+  /// rounding of b . z, should that be more.
   Status solve(const Vector& z0, double tolerance) noexcept {
     z_ = z0;
     active_count_ = 0;
     multiplier_.fill(0.0);
+    bool refined = true;
     for (std::size_t step = 0; step < kMaxSteps; ++step) {
       const std::size_t p = most_violated(tolerance);
-      if (p == count_) return Status::optimal;
-      if (!activate(p)) return Status::infeasible;
+      if (p == count_) {
+        if (refined) return Status::optimal;
+        refine(tolerance);
+      } else if (!activate(p)) {
+        return Status::infeasible;
+      }
+      refined = p == count_;
     }
     return Status::budget_spent;
   }
 
   const Vector& z() const noexcept { return z_; }
-  /// Multiplier of constraint i, for b_i as it was given: z - z0 = sum multiplier_i b_i. Zero where not active.
+  /// Multiplier of constraint i, for b_i as it was given: z - z0 = sum multiplier_i b_i. Zero where not
+  /// active.
   double multiplier(std::size_t i) const noexcept { return multiplier_[i] / length_[i]; }
   std::size_t count() const noexcept { return count_; }
 
  private:
-  static constexpr std::size_t kMaxSteps = 8 * N + 2 * Capacity;  ///< typical: as many as are active at the end
+  static constexpr std::size_t kMaxSteps =
+      std::size_t{8} * N + 2 * Capacity;       ///< typical: as many as are active at the end
   static constexpr double kDependent = 1e-20;  ///< squared sine below which a normal lies in the active span
 
+  bool is_active(std::size_t i) const noexcept {
+    for (std::size_t k = 0; k < active_count_; ++k)
+      if (active_[k] == i) return true;
+    return false;
+  }
+
+  /// Of those that are not active. An active one is met by construction, whatever rounding makes of it.
   std::size_t most_violated(double tolerance) const noexcept {
     std::size_t worst = count_;
     double most = tolerance;
     for (std::size_t i = 0; i < count_; ++i) {
       const double violation = bound_[i] - normal_[i].dot(z_);
-      if (violation > most) {
+      if (violation > most && !is_active(i)) {
         most = violation;
         worst = i;
       }
@@ -71,13 +89,14 @@ class LeastDistance {
     return worst;
   }
 
-  /// Makes constraint p active, dropping others on the way as their multipliers reach zero. False: contradiction.
+  /// Makes constraint p active, dropping others on the way as their multipliers reach zero. False:
+  /// contradiction.
   bool activate(std::size_t p) noexcept {
     for (;;) {
       // b_p = Q r + rest,  Q R = active normals,  d = R^-1 r: how the active multipliers give way to p's.
-      Vector r = Vector::Zero();
+      Coefficients r{};
       const Vector rest = project_out(normal_[p], r);
-      const Vector d = back_substitute(r);
+      const Coefficients d = back_substitute(r);
       const double curvature = rest.squaredNorm();
       const bool independent = curvature > kDependent && active_count_ < N;
 
@@ -86,7 +105,7 @@ class LeastDistance {
       double partial = std::numeric_limits<double>::infinity();
       std::size_t leaving = 0;
       for (std::size_t k = 0; k < active_count_; ++k) {
-        const double dk = d[static_cast<Eigen::Index>(k)];
+        const double dk = d[k];
         if (dk > 0.0 && multiplier_[active_[k]] < partial * dk) {
           partial = multiplier_[active_[k]] / dk;
           leaving = k;
@@ -95,7 +114,7 @@ class LeastDistance {
       const double t = std::fmin(full, partial);
       if (!(t < std::numeric_limits<double>::infinity())) return false;
 
-      for (std::size_t k = 0; k < active_count_; ++k) multiplier_[active_[k]] -= t * d[static_cast<Eigen::Index>(k)];
+      for (std::size_t k = 0; k < active_count_; ++k) multiplier_[active_[k]] -= t * d[k];
       multiplier_[p] += t;
       if (independent) z_ += t * rest;
       if (full <= partial) {
@@ -106,33 +125,49 @@ class LeastDistance {
     }
   }
 
-  /// b minus its projection on the active normals; r receives the coefficients on Q. Twice, for orthogonality.
-  Vector project_out(const Vector& b, Vector& r) const noexcept {
+  /// Takes out what rounding has left between z and the active constraints: R' y = violations, z += Q y.
+  void refine(double tolerance) noexcept {
+    Coefficients y{};
+    double most = 0.0;
+    for (std::size_t k = 0; k < active_count_; ++k) {
+      const double violation = bound_[active_[k]] - normal_[active_[k]].dot(z_);
+      most = std::fmax(most, violation);
+      double sum = violation;
+      for (std::size_t j = 0; j < k; ++j) sum -= r_[k][j] * y[j];
+      y[k] = sum / r_[k][k];
+    }
+    if (!(most > tolerance)) return;
+    for (std::size_t k = 0; k < active_count_; ++k) z_ += y[k] * q_[k];
+  }
+
+  /// b minus its projection on the active normals; r receives the coefficients on Q. Twice, for
+  /// orthogonality.
+  Vector project_out(const Vector& b, Coefficients& r) const noexcept {
     Vector rest = b;
     for (int pass = 0; pass < 2; ++pass)
       for (std::size_t k = 0; k < active_count_; ++k) {
         const double c = q_[k].dot(rest);
         rest -= c * q_[k];
-        r[static_cast<Eigen::Index>(k)] += c;
+        r[k] += c;
       }
     return rest;
   }
 
-  Vector back_substitute(const Vector& r) const noexcept {
-    Vector d = Vector::Zero();
+  Coefficients back_substitute(const Coefficients& r) const noexcept {
+    Coefficients d{};
     for (std::size_t k = active_count_; k-- > 0;) {
-      const auto row = static_cast<Eigen::Index>(k);
-      double sum = r[row];
-      for (std::size_t j = k + 1; j < active_count_; ++j) sum -= r_[j][row] * d[static_cast<Eigen::Index>(j)];
-      d[row] = sum / r_[k][row];
+      double sum = r[k];
+      for (std::size_t j = k + 1; j < active_count_; ++j) sum -= r_[j][k] * d[j];
+      d[k] = sum / r_[k][k];
     }
     return d;
   }
 
-  void append(std::size_t p, const Vector& r, const Vector& rest, double length) noexcept {
+  void append(std::size_t p, const Coefficients& r, const Vector& rest, double length) noexcept {
+    if (active_count_ >= N) return;  // activate() sees to it; said again for whoever reads only this
     q_[active_count_] = rest / length;
     r_[active_count_] = r;
-    r_[active_count_][static_cast<Eigen::Index>(active_count_)] = length;
+    r_[active_count_][active_count_] = length;
     active_[active_count_++] = p;
   }
 
@@ -143,7 +178,7 @@ class LeastDistance {
     active_count_ = k;
     for (std::size_t j = k + 1; j < old_count; ++j) {
       const std::size_t i = active_[j];
-      Vector r = Vector::Zero();
+      Coefficients r{};
       const Vector rest = project_out(normal_[i], r);
       append(i, r, rest, rest.norm());
     }
@@ -157,8 +192,8 @@ class LeastDistance {
 
   Vector z_ = Vector::Zero();
   std::array<std::size_t, N> active_;
-  std::array<Vector, N> q_;  ///< orthonormal columns
-  std::array<Vector, N> r_;  ///< columns of the triangle: active normal k = sum_j q_j r_k[j]
+  std::array<Vector, N> q_;        ///< orthonormal columns
+  std::array<Coefficients, N> r_;  ///< columns of the triangle: active normal k = sum_j q_j r_k[j]
   std::size_t active_count_ = 0;
 };
 

@@ -3,19 +3,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/finite.hpp"
 
 namespace wrenchd {
 namespace {
 
-double tighter(double setting, double profile) { return setting > 0.0 ? std::min(setting, profile) : profile; }
+double tighter(double setting, double profile) {
+  return setting > 0.0 ? std::min(setting, profile) : profile;
+}
 
-/// Shortens v to the limit, direction kept. The factor is rounded down, so that the result is never above it.
+/// Shortens v to the limit, direction kept, and stays below it by what rounding may add. Taken apart into its
+/// largest component and the rest, because the length of a finite vector may be infinite.
 bool saturate(Vector3d& v, double limit) noexcept {
-  const double length = v.stableNorm();  // does not overflow for any finite v
-  if (!(length > limit)) return false;
-  v *= std::nextafter(limit / length, 0.0);
+  constexpr double kBelow = 1.0 - 4.0 * std::numeric_limits<double>::epsilon();
+  const double largest = v.cwiseAbs().maxCoeff();
+  if (!(largest > 0.0)) return false;
+  const Vector3d shape = v / largest;
+  const double longest = limit / shape.norm();
+  if (!(largest > longest)) return false;
+  v = shape * (kBelow * longest);
   return true;
 }
 
@@ -26,7 +34,8 @@ bool saturate(Vector3d& v, double limit) noexcept {
 bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
   const double last_length = last.norm();
   Vector3d keep = Vector3d::Zero();
-  if (last_length > 0.0) keep = last * (std::clamp(v.dot(last) / last_length, 0.0, last_length) / last_length);
+  if (last_length > 0.0)
+    keep = last * (std::clamp(v.dot(last) / last_length, 0.0, last_length) / last_length);
   const Vector3d rest = v - keep;
   const double length = rest.norm();
   if (!(length > growth)) return false;
@@ -36,7 +45,8 @@ bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
 
 }  // namespace
 
-WrenchLimits::WrenchLimits(const LimitSettings& settings, double profile_max_force_N, double profile_max_torque_Nm)
+WrenchLimits::WrenchLimits(const LimitSettings& settings, double profile_max_force_N,
+                           double profile_max_torque_Nm)
     : max_force_N_(tighter(settings.max_force_N, profile_max_force_N)),
       max_torque_Nm_(tighter(settings.max_torque_Nm, profile_max_torque_Nm)),
       force_slew_N_per_s_(settings.force_slew_N_per_s),

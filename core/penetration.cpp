@@ -20,7 +20,7 @@ PenetrationDepth::PenetrationDepth(const Inertia& M, const ConvexBody& body, Opt
 
 Penetration PenetrationDepth::follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept {
   if (options_.method != Method::exact) return query(X_WP, scene);
-  Penetration out = exact(X_WP, exact_.project(X_WP, scene, X_last));
+  Penetration out = described(X_WP, exact_.project(X_WP, scene, X_last));
   if (out.projection.status != ProjectionStatus::infeasible) return out;
   out.projection.X_WQ = X_last;
   out.eps = displacement(X_WP, X_last);
@@ -38,10 +38,11 @@ Penetration PenetrationDepth::query(const Pose& X_WP, const ContactSource& scene
     case Method::exact:
       break;
   }
-  return exact(X_WP, exact_.project_globally(X_WP, scene));
+  return described(X_WP, exact_.project_globally(X_WP, scene));
 }
 
-Penetration PenetrationDepth::exact(const Pose& X_WP, Projection projection) const noexcept {
+/// What every method says of its answer.
+Penetration PenetrationDepth::described(const Pose& X_WP, const Projection& projection) noexcept {
   Penetration out;
   out.projection = projection;
   if (!in_contact(projection)) return out;
@@ -56,7 +57,7 @@ Penetration PenetrationDepth::exact(const Pose& X_WP, Projection projection) con
 /// beside it stays inside), the wrenches of the contacts are added, as section 5 of the paper says, and the pose
 /// reported is the best of their rotations lifted until the whole body is out. Translation alone always is a candidate.
 Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scene) noexcept {
-  Penetration out = exact(X_WP, exact_.translate(X_WP, scene, X_WP));
+  Penetration out = described(X_WP, exact_.translate(X_WP, scene, X_WP));
   if (out.projection.status == ProjectionStatus::free) return out;
   contacts_.clear();
   while (scene.add_violated(X_WP, 0.0, contacts_) > 0) continue;
@@ -86,7 +87,7 @@ Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scen
     X_WQ = lifted.X_WQ;
     T = lifted.energy;
   }
-  out = exact(X_WP, exact_.translate(X_WP, scene, X_WQ));  // fills in the contacts; moves q by rounding only
+  out = described(X_WP, exact_.translate(X_WP, scene, X_WQ));  // fills in the contacts; moves q by rounding only
   out.drive = freed ? out.eps : sum;
   return out;
 }
@@ -94,7 +95,7 @@ Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scen
 /// The depth of each obstacle acts at the mean of the tool's vertices that touch it: an edge or a face that lies flat
 /// has no single deepest vertex, and choosing one would make a torque out of rounding.
 Penetration PenetrationDepth::translational(const Pose& X_WP, const ContactSource& scene) noexcept {
-  Penetration out = exact(X_WP, exact_.translate(X_WP, scene, X_WP));
+  Penetration out = described(X_WP, exact_.translate(X_WP, scene, X_WP));
   if (!in_contact(out.projection)) return out;
   const auto active = std::span(out.projection.active).first(out.projection.active_count);
   Vector3d moment = Vector3d::Zero();

@@ -40,7 +40,7 @@ class PenetrationDepth {
   Penetration query(const Pose& X_WP, const ContactSource& scene) noexcept;
 
  private:
-  Penetration exact(const Pose& X_WP, Projection projection) const noexcept;
+  static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
   Penetration planar(const Pose& X_WP, const ContactSource& scene) noexcept;
   Penetration translational(const Pose& X_WP, const ContactSource& scene) noexcept;
 

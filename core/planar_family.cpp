@@ -49,7 +49,11 @@ PlanarMinimum minimise(const PlanarSection& s) noexcept {
   try_angle(s.theta_max);
   try_angle(std::numbers::pi);
   try_angle(-std::numbers::pi);
-  for (const double x : real_roots(A1, B1, C1, D1, E1)) try_angle(2.0 * std::atan(x));
+  for (const double x : real_roots(A1, B1, C1, D1, E1)) {
+    const double theta = 2.0 * std::atan(x);
+    try_angle(theta);
+    try_angle(theta + 2.0 * std::numbers::pi);  // an edge below the obstacle at p puts theta_max beyond pi
+  }
   return best;
 }
 
@@ -66,14 +70,15 @@ struct PlanarFamily::Star {
 PlanarFamily::PlanarFamily(const Inertia& M, const ConvexBody& body, int planes)
     : M_(M), body_(body), planes_(std::max(planes, 1)) {}
 
-/// Algorithm 2 for any star: the plane with normal w cuts the faces around the vertex in two directions; between
-/// them lies the body. A face edge in the plane is its own direction. Where the plane meets the body in the vertex
-/// only, nothing limits the angle.
+/// Algorithm 2 for any star: the plane with normal w cuts the faces around the vertex in two directions;
+/// between them lies the body. A face edge in the plane is its own direction. Where the plane meets the body
+/// in the vertex only, nothing limits the angle.
 ///
 /// With the bisector at angle mid from e1 and the inner angle gamma (line 20), both directions stay above the
-/// obstacle for   -mid + gamma/2 <= theta <= pi - mid - gamma/2,   which is Eq. (21) when one lies on it at 0.
-PlanarSection PlanarFamily::limited(PlanarSection section, const Vector3d& e1, const Vector3d& n, const Vector3d& w,
-                                    const Star& star) noexcept {
+/// obstacle for   -mid + gamma/2 <= theta <= pi - mid - gamma/2,   which is Eq. (21) when one lies on it at
+/// 0.
+PlanarSection PlanarFamily::limited(PlanarSection section, const Vector3d& e1, const Vector3d& n,
+                                    const Vector3d& w, const Star& star) noexcept {
   section.theta_min = -std::numbers::pi;
   section.theta_max = std::numbers::pi;
   Vector3d cut[2];
@@ -123,7 +128,8 @@ PlanarFamily::InPlane PlanarFamily::solve(const Pose& X_WP, const Contact& conta
 Pose PlanarFamily::pose(const Pose& X_WP, const Contact& contact, const InPlane& solution) noexcept {
   const double h = contact.n_W.dot(X_WP.translation_m) - contact.offset_m;
   const Quaterniond turn(Eigen::AngleAxisd(solution.minimum.theta, solution.axis_W));
-  return {(turn * X_WP.rotation).normalized(), X_WP.translation_m + (solution.minimum.beta - h) * contact.n_W};
+  return {(turn * X_WP.rotation).normalized(),
+          X_WP.translation_m + (solution.minimum.beta - h) * contact.n_W};
 }
 
 }  // namespace wrenchd

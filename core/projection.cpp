@@ -15,8 +15,15 @@ namespace {
 constexpr double kGapTolerance = 2e-15;
 /// A contact this near, in units of L, touches at q.
 constexpr double kTouching = 1e-9;
-/// Newton converges quadratically: a step this short, in units of L and rad, is followed by one of its square.
+/// Converged: the step left is this short, in units of L and rad, and the KKT residual this small before it is taken.
 constexpr double kShortStep = 1e-7;
+constexpr double kSmallResidual = 1e-9;
+/// Curvature of the Lagrangian, relative to the metric's, that a step may count on where there is less.
+constexpr double kLeastCurvature = 1e-3;
+/// The gradient of a penetration of half a millionth of L: below it, the residual is measured against this.
+constexpr double kLeastGradient = 1e-6;
+/// How many times the budget of a tick a query without history may take for each of its starts.
+constexpr int kPatience = 5;
 /// A dual bound this near to T, relative, proves that q is the global optimum.
 constexpr double kProof = 1e-9;
 
@@ -36,8 +43,11 @@ double positive_length(const Inertia& M) {
 ExactProjection::ExactProjection(const Inertia& M) : ExactProjection(M, Budget{}) {}
 
 ExactProjection::ExactProjection(const Inertia& M, Budget budget)
-    : M_(M), budget_(budget), L_(positive_length(M)), H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
-  multiplier_.fill(0.0);
+    : M_(M), budget_(budget), iteration_limit_(budget.iterations), L_(positive_length(M)), H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
+  Matrix6d metric = Matrix6d::Zero();
+  metric.diagonal().head<3>().setConstant(2.0);
+  metric.bottomRightCorner<3, 3>() = 2.0 * H_hat_;
+  metric_root_ = Eigen::LLT<Matrix6d>(metric).matrixL();
 }
 
 Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept {
@@ -51,6 +61,13 @@ Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& sce
 }
 
 Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSource& scene) noexcept {
+  iteration_limit_ = static_cast<std::uint16_t>(kPatience * budget_.iterations);
+  const Projection best = best_of_all_starts(X_WP, scene);
+  iteration_limit_ = budget_.iterations;
+  return best;
+}
+
+Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSource& scene) noexcept {
   Projection best = project_from(X_WP, scene, Quaterniond::Identity());
   if (best.status == ProjectionStatus::free) return best;
   best.proven_global = best.status != ProjectionStatus::infeasible && certify(state_);
@@ -64,17 +81,21 @@ Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSour
     best = other;
   };
 
-  try_from(Quaterniond(dual_rotation_));
-  // Rotations about the axes of a cube's faces, edges and corners, both ways, near and far.
-  constexpr std::array<double, 4> kAngles_rad = {0.25, 0.6, 1.2, 2.2};
-  for (const double angle : kAngles_rad)
+  const auto try_around = [&](const Quaterniond& centre, double angle) noexcept {
     for (int x = -1; x <= 1; ++x)
       for (int y = -1; y <= 1; ++y)
         for (int z = -1; z <= 1; ++z) {
-          if (best.proven_global) return best;
-          if (x == 0 && y == 0 && z == 0) continue;
-          try_from(Quaterniond(Eigen::AngleAxisd(angle, Vector3d(x, y, z).normalized())));
+          if (best.proven_global || (x == 0 && y == 0 && z == 0)) continue;
+          try_from(centre * Quaterniond(Eigen::AngleAxisd(angle, Vector3d(x, y, z).normalized())));
         }
+  };
+
+  // Where the dual bound is attained; then rotations about the axes of a cube's faces, edges and corners, both ways, near
+  // and far from p; then the same around the best of these.
+  try_from(Quaterniond(dual_rotation_));
+  for (const double angle : {0.25, 0.6, 1.2, 2.2}) try_around(Quaterniond::Identity(), angle);
+  const Quaterniond best_E = (X_WP.rotation.conjugate() * best.X_WQ.rotation).normalized();
+  for (const double angle : {0.4, 0.9}) try_around(best_E, angle);
   return best;
 }
 
@@ -83,51 +104,44 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
   return 4.0 * kGapTolerance * (L_ + X_WT.translation_m.lpNorm<Eigen::Infinity>());
 }
 
-/// Constraint generation: solve on the contacts at hand, ask the scene what the answer violates, add it, repeat.
 Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
                                          Freedom freedom) noexcept {
   Projection out;
   out.X_WQ = X_WP;
+  X_WP_ = X_WP;
+  scene_ = &scene;
+  tolerance_m_ = gap_tolerance_m(X_WP);
   contacts_.clear();
   iterations_ = 0;
-  const double tolerance_m = gap_tolerance_m(X_WP);
-  if (scene.add_violated(X_WP, tolerance_m, contacts_) == 0) {
+  if (scene.add_violated(X_WP, tolerance_m_, contacts_) == 0) {
     out.proven_global = true;
     return out;
   }
-
+  see_from(0);
   state_ = State{};
   state_.E = E_start;
-  for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
-    see(X_WP);
-    const Local local = freedom == Freedom::all ? minimise(state_) : translate_out(state_);
-    if (local == Local::infeasible) break;
-    out.X_WQ = {(X_WP.rotation * state_.E).normalized(),
-                X_WP.translation_m + X_WP.rotation * (L_ * state_.u)};
-    if (contacts_.full()) prune(state_);
-    if (scene.add_violated(out.X_WQ, tolerance_m, contacts_) == 0) {
-      out.status =
-          local == Local::converged ? ProjectionStatus::converged : ProjectionStatus::budget_spent;
-      report(X_WP, out);
-      return out;
-    }
-  }
-  // The obstacles contradict each other near p, or there were more rounds than the budget allows: no pose is known
-  // to be admissible, and the caller keeps its last one.
-  out.X_WQ = X_WP;
-  out.status = ProjectionStatus::infeasible;
+  const Local local = freedom == Freedom::all ? minimise(state_) : translate_out(state_);
   out.iterations = iterations_;
+  out.status = ProjectionStatus::infeasible;
+  if (local == Local::infeasible) return out;
+  out.status = local == Local::converged ? ProjectionStatus::converged : ProjectionStatus::budget_spent;
+  report(out);
   return out;
 }
 
-/// The contacts as p sees them: n in p's axes, a and c in units of L.
-void ExactProjection::see(const Pose& X_WP) noexcept {
-  const Quaterniond R_PW = X_WP.rotation.conjugate();
-  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+Pose ExactProjection::pose_of(const State& state) const noexcept {
+  return {(X_WP_.rotation * state.E).normalized(), X_WP_.translation_m + X_WP_.rotation * (L_ * state.u)};
+}
+
+/// Contacts number `first` and up as p sees them: n in p's axes, a and c in units of L.
+void ExactProjection::see_from(std::size_t first) noexcept {
+  const Quaterniond R_PW = X_WP_.rotation.conjugate();
+  for (std::size_t i = first; i < contacts_.size(); ++i) {
     const Contact& contact = contacts_[i];
     seen_[i].n = R_PW * contact.n_W;
     seen_[i].a = contact.p_TA_m / L_;
-    seen_[i].c = (contact.n_W.dot(X_WP.translation_m) - contact.offset_m) / L_;
+    seen_[i].c = (contact.n_W.dot(X_WP_.translation_m) - contact.offset_m) / L_;
+    multiplier_[i] = 0.0;
   }
 }
 
@@ -136,19 +150,27 @@ double ExactProjection::scaled_energy(const State& state) const noexcept {
   return state.u.squaredNorm() + 4.0 * v.dot(H_hat_ * v);
 }
 
-/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -(n_i . R_E a_i + c_i).
-/// Leaves the multipliers of T (2 u = sum multiplier_i n_i). False where no translation helps.
+/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -(n_i . R_E a_i + c_i),
+/// over all contacts of the scene by constraint generation: solve on the contacts at hand, ask the scene what the answer
+/// violates, add it, repeat. Leaves the multipliers (2 u = sum 2 multiplier_i n_i). False where no translation helps.
 bool ExactProjection::restore(State& state) noexcept {
-  translation_.clear();
-  for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    const Seen& seen = seen_[i];
-    translation_.add(seen.n, -(seen.n.dot(state.E * seen.a) + seen.c));
-  }
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
-  if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
-  state.u = translation_.z();
-  state.T = scaled_energy(state);
-  return true;
+  for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
+    translation_.clear();
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+      const Seen& seen = seen_[i];
+      translation_.add(seen.n, -(seen.n.dot(state.E * seen.a) + seen.c));
+    }
+    if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
+    state.u = translation_.z();
+    const std::size_t known = contacts_.size();
+    if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0) {
+      state.T = scaled_energy(state);
+      return true;
+    }
+    see_from(known);
+  }
+  return false;
 }
 
 /// Gaps and their gradients in (u, eta), eta the small rotation in the axes of q, for E <- E o (1, eta/2):
@@ -194,7 +216,8 @@ ExactProjection::Slope ExactProjection::slope(const State& state) const noexcept
 
 /// W = C C' of the Hessian, made positive definite so that the step is a descent. Where the Hessian is not, the
 /// active gradients are added first: that changes W only across the constraints, where the step is not free, and
-/// keeps the convergence quadratic. If that is not enough (far from a minimum), negative eigenvalues are turned over.
+/// keeps the convergence quadratic. If that is not enough (far from a minimum), negative eigenvalues are turned over, taken
+/// relative to the metric diag(2 I, 2 H^): a needle's roll is a soft direction, not a flat one.
 Eigen::LLT<Matrix6d> ExactProjection::factorised(const Matrix6d& hessian) const noexcept {
   Eigen::LLT<Matrix6d> C(hessian);
   double stiffening = 4.0 * hessian.lpNorm<Eigen::Infinity>();
@@ -205,10 +228,12 @@ Eigen::LLT<Matrix6d> ExactProjection::factorised(const Matrix6d& hessian) const 
     C.compute(W);
   }
   if (C.info() == Eigen::Success) return C;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(hessian);
-  const double least = 1e-3 * eigen.eigenvalues().cwiseAbs().maxCoeff();
-  const Vector6d turned_over = eigen.eigenvalues().cwiseAbs().cwiseMax(least);
-  C.compute(eigen.eigenvectors() * turned_over.asDiagonal() * eigen.eigenvectors().transpose());
+  const Matrix6d S = metric_root_.triangularView<Eigen::Lower>().solve(
+      metric_root_.triangularView<Eigen::Lower>().solve(hessian).transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(S);
+  const Vector6d turned_over = eigen.eigenvalues().cwiseAbs().cwiseMax(kLeastCurvature);
+  const Matrix6d root = metric_root_ * eigen.eigenvectors();
+  C.compute(root * turned_over.asDiagonal() * root.transpose());
   return C;
 }
 
@@ -242,36 +267,50 @@ ExactProjection::Local ExactProjection::minimise(State& state) noexcept {
     if (!seek_feasible(state)) return Local::infeasible;
     translate_out(state);
   }
-  while (iterations_ < budget_.iterations) {
+  while (iterations_ < iteration_limit_) {
     ++iterations_;
+    make_room(state);
     linearise(state);
     const Slope here = slope(state);
     Vector6d dy;
     if (!newton_step(here, dy)) return Local::budget_spent;
     const double promised = -here.g.dot(dy);  // first-order fall of T
-    const bool accepted = advance(state, dy, promised);
-    if (dy.norm() < kShortStep) return Local::converged;
+    const bool last = dy.norm() < kShortStep && residual(here.g) < kSmallResidual;
+    const Advance moved = advance(state, dy, promised);
+    if (moved == Advance::met_contacts) continue;  // the same state again, with a model that knows them
+    if (last) return Local::converged;
     // Rounding hides the fall of T where the promise is smaller than T's own last digits.
-    if (!accepted) return promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
+    if (moved == Advance::stuck) return promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
   }
   return Local::budget_spent;
 }
 
-/// Moves along dy, halving it until T falls by a fair share of what the slope promises.
-bool ExactProjection::advance(State& state, const Vector6d& dy, double promised) noexcept {
+/// |g - sum multiplier_i J_i| / |g|, at the state that was linearised last.
+double ExactProjection::residual(const Vector6d& g) const noexcept {
+  Vector6d rest = g;
+  for (std::size_t i = 0; i < contacts_.size(); ++i) rest -= multiplier_[i] * J_[i];
+  return rest.norm() / std::max(g.norm(), kLeastGradient);
+}
+
+/// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails and has met
+/// contacts the model did not know ends the search: with them the next step will be a better one.
+ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy, double promised) noexcept {
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
-  constexpr double kShortest = 1e-6;   // below this fraction of a step the model is not to be trusted
+  constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d turn = dy.tail<3>();
   const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T : 0.0;
   double fraction = 1.0 / std::max(1.0, turn.norm());  // never more than one radian at a time
-  for (; fraction > kShortest; fraction *= 0.5) {
+  for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
     State trial = state;
     trial.E = turned(state.E, fraction * turn);
-    if (!restore(trial) || trial.T > state.T + rounding - kFairShare * fraction * promised) continue;
-    state = trial;
-    return true;
+    const std::size_t known = contacts_.size();
+    if (restore(trial) && trial.T <= state.T + rounding - kFairShare * fraction * promised) {
+      state = trial;
+      return Advance::fell;
+    }
+    if (contacts_.size() > known) return Advance::met_contacts;
   }
-  return false;
+  return Advance::stuck;
 }
 
 /// Looks for a rotation from which a translation leads out, by Gauss-Newton on the deepest violation t:
@@ -304,8 +343,9 @@ bool ExactProjection::seek_feasible(State& state) noexcept {
   return false;
 }
 
-/// Makes room in a full set: contacts that carry nothing and do not touch are dropped.
-void ExactProjection::prune(const State& state) noexcept {
+/// Drops contacts that carry nothing and do not touch, once the set is more than half full, so that new ones fit in.
+void ExactProjection::make_room(const State& state) noexcept {
+  if (contacts_.size() <= ContactSet::kCapacity / 2) return;
   linearise(state);
   for (std::size_t i = contacts_.size(); i-- > 0;) {
     if (multiplier_[i] > 0.0 || gap_[i] < kTouching) continue;
@@ -318,19 +358,16 @@ void ExactProjection::prune(const State& state) noexcept {
 }
 
 /// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the residual.
-void ExactProjection::report(const Pose& X_WP, Projection& out) noexcept {
+void ExactProjection::report(Projection& out) noexcept {
+  out.X_WQ = pose_of(state_);
   linearise(state_);
-  const Vector6d g = gradient(state_);
-  Vector6d residual = g;
-  out.energy = energy(M_, X_WP, out.X_WQ);
-  out.iterations = iterations_;
+  out.kkt_residual = residual(gradient(state_));
+  out.energy = energy(M_, X_WP_, out.X_WQ);
   out.active_count = 0;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    residual -= multiplier_[i] * J_[i];
     if (gap_[i] > kTouching) continue;
     out.active[out.active_count++] = {contacts_[i], multiplier_[i] * M_.mass_kg * L_};
   }
-  out.kkt_residual = residual.norm() / std::max(g.norm(), 1e-300);
 }
 
 // Weak duality gives a proof of global optimality for the price of a 4 x 4 eigenvalue problem. For any

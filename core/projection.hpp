@@ -31,7 +31,7 @@ struct Projection {
   double energy = 0.0;          ///< T = d(p, q) of Eq. (8) [kg m^2]
   ProjectionStatus status = ProjectionStatus::free;
   std::uint16_t iterations = 0; ///< Newton steps taken
-  double kkt_residual = 0.0;    ///< |grad T - sum multiplier grad gap| / |grad T| at q
+  double kkt_residual = 0.0;    ///< |grad T - sum multiplier grad gap| / |grad T| at q, in the body's own scale
   bool proven_global = false;   ///< no admissible pose is closer: proven by project_globally(), never by project()
   std::uint16_t active_count = 0;  ///< contacts that touch at q
   std::array<ActiveContact, ContactSet::kCapacity> active;
@@ -48,7 +48,7 @@ struct Projection {
 /// where n_i, a_i/L, c_i = (n_i . x_p - o_i)/L are the contact as seen from p.
 ///
 /// For a fixed rotation every gap is affine in u. So the nearest translation is a three-dimensional least-distance
-/// problem with an exact answer, and every iterate of the method is admissible: a Newton step (a six-dimensional
+/// problem with an exact answer, and every iterate of the method is admissible in the whole scene: a Newton step (a six-dimensional
 /// least-distance problem on the linearised gaps, curvature of the contacts included) proposes a rotation, the
 /// translation restores admissibility, and the step is accepted when T falls. The first iterate is the best
 /// translation, or last tick's rotation; T only falls from there, and whenever time is up there is an answer.
@@ -57,8 +57,8 @@ struct Projection {
 class ExactProjection {
  public:
   struct Budget {
-    std::uint16_t iterations = 40;  ///< Newton steps, all rounds of constraint generation together
-    std::uint16_t rounds = 24;      ///< of constraint generation
+    std::uint16_t iterations = 40;  ///< Newton steps
+    std::uint16_t rounds = 24;      ///< of constraint generation, for each step
   };
 
   explicit ExactProjection(const Inertia& M);
@@ -96,31 +96,41 @@ class ExactProjection {
     Matrix6d W;       ///< Hessian of the Lagrangian, made positive definite
   };
   enum class Local : std::uint8_t { converged, budget_spent, infeasible };
+  enum class Advance : std::uint8_t { fell, met_contacts, stuck };
   enum class Freedom : std::uint8_t { all, translation };
 
+  Projection best_of_all_starts(const Pose& X_WP, const ContactSource& scene) noexcept;
   Projection project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
                           Freedom freedom = Freedom::all) noexcept;
-  void see(const Pose& X_WP) noexcept;
+  Pose pose_of(const State& state) const noexcept;
+  void see_from(std::size_t first) noexcept;
   double scaled_energy(const State& state) const noexcept;
   bool restore(State& state) noexcept;
   bool seek_feasible(State& state) noexcept;
   Local minimise(State& state) noexcept;
   Local translate_out(State& state) noexcept;
+  double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
   Slope slope(const State& state) const noexcept;
   void linearise(const State& state) noexcept;
   Eigen::LLT<Matrix6d> factorised(const Matrix6d& hessian) const noexcept;
   bool newton_step(const Slope& slope, Vector6d& dy) noexcept;
-  bool advance(State& state, const Vector6d& dy, double promised) noexcept;
-  void prune(const State& state) noexcept;
-  void report(const Pose& X_WP, Projection& out) noexcept;
+  Advance advance(State& state, const Vector6d& dy, double promised) noexcept;
+  void make_room(const State& state) noexcept;
+  void report(Projection& out) noexcept;
   bool certify(const State& state) noexcept;
 
   Inertia M_;
   Budget budget_;
+  std::uint16_t iteration_limit_;  ///< of the query at hand
   double L_;           ///< [m]
   Matrix3d H_hat_;
+  Matrix6d metric_root_;  ///< Cholesky factor of diag(2 I, 2 H^)
 
+  // The query at hand
+  Pose X_WP_;
+  const ContactSource* scene_ = nullptr;
+  double tolerance_m_ = 0.0;
   ContactSet contacts_;
   std::array<Seen, ContactSet::kCapacity> seen_;
   std::array<double, ContactSet::kCapacity> multiplier_;

@@ -23,7 +23,7 @@ class DurationHistogram {
  private:
   static constexpr unsigned kSubBits = 5;
   static constexpr std::size_t kSub = std::size_t{1} << kSubBits;
-  static constexpr std::size_t kOctaves = 36;  ///< the last bucket starts above half an hour
+  static constexpr std::size_t kOctaves = 36;  ///< the last bucket starts above a quarter of an hour
   static std::size_t bucket_of(std::uint64_t ns) noexcept;
   static std::uint64_t upper_end_ns(std::size_t bucket) noexcept;
 

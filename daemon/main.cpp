@@ -1,9 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
-#include <unistd.h>
-
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -12,8 +7,14 @@
 #include <memory>
 #include <thread>
 
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
 #include "daemon/event_log.hpp"
 #include "daemon/live_line.hpp"
+#include "daemon/option_checks.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/station.hpp"
@@ -48,21 +49,29 @@ struct Options {
 };
 
 void describe(CLI::App& app, Options& options) {
-  app.description("wrenchd: a haptic servo daemon. Reads the hand's pose, computes the generalized penetration\n"
-                  "depth of the tool in its scene, and writes the wrench back.");
-  app.footer("Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 a fault ended the loop; others:\n"
-             "usage. On every way out the hand is released: zero wrench, motors off.");
+  app.description(
+      "wrenchd: a haptic servo daemon. Reads the hand's pose, computes the generalized penetration\n"
+      "depth of the tool in its scene, and writes the wrench back.");
+  app.footer(
+      "Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 a fault ended the loop; others:\n"
+      "usage. On every way out the hand is released: zero wrench, motors off.");
   app.set_version_flag("--version", std::string("wrenchd ") + kVersion);
-  app.add_option("-c,--config", options.files.config,
-                 "wrenchd.toml; a plain name is looked for in /etc/wrenchd, /usr/share/wrenchd, then the source tree")
-      ->capture_default_str();
-  app.add_option("--scene", options.files.scene, "scene file, instead of the one the configuration names");
-  app.add_option("--profile", options.files.profile, "device profile, instead of the one the configuration names");
+  app.add_option(
+         "-c,--config", options.files.config,
+         "wrenchd.toml; a plain name is looked for in /etc/wrenchd, /usr/share/wrenchd, then the source tree")
+      ->capture_default_str()
+      ->check(not_empty());
+  app.add_option("--scene", options.files.scene, "scene file, instead of the one the configuration names")
+      ->check(not_empty());
+  app.add_option("--profile", options.files.profile,
+                 "device profile, instead of the one the configuration names")
+      ->check(not_empty());
   app.add_option("--realtime", options.realtime, "instead of the configuration's: required, best_effort, off")
       ->check(CLI::IsMember({"required", "best_effort", "off"}));
-  app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)");
+  app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)")
+      ->check(not_empty());
   app.add_option("--seconds", options.seconds, "stop after this many seconds; without it, run until Ctrl-C")
-      ->check(CLI::PositiveNumber);
+      ->check(number_from(0.001, 1e9));
   app.add_flag("--arm", options.arm, "arm at once; without it the loop measures, and the motors stay off");
   app.add_flag("--live", options.live, "show a live line, and a summary at the end");
   app.add_flag("--virtual-time", options.virtual_time,
@@ -198,7 +207,8 @@ Fault run(Plan plan, const Options& options, TheClock& clock,
   loop_to_release = nullptr;
   if (recorder && !recorder->error().empty()) spdlog::error("{}", recorder->error());
   if (station.loop().dropped_records() > 0)
-    spdlog::warn("{} ticks are missing in the recording: the disk fell behind", station.loop().dropped_records());
+    spdlog::warn("{} ticks are missing in the recording: the disk fell behind",
+                 station.loop().dropped_records());
   return fault;
 }
 

@@ -14,7 +14,7 @@ namespace wrenchd {
 namespace {
 
 /// More stack than a tick uses: its deepest frames are a few kilobytes of fixed-size matrices.
-constexpr std::size_t kStackBytes = 256 * 1024;
+constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 
 RealtimeGrant outcome(std::string what, int error, const std::string& cure) {
   RealtimeGrant grant{std::move(what), error == 0, {}};

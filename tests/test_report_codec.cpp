@@ -61,7 +61,7 @@ std::string hex(std::span<const std::uint8_t> bytes) {
 
 /// devices/README.md with its line breaks and indents read as single blanks.
 std::string readme() {
-  std::ifstream file(std::filesystem::path(__FILE__).parent_path().parent_path() / "devices/README.md");
+  std::ifstream file(std::filesystem::path(WRENCHD_SOURCE_DIR) / "devices/README.md");
   std::string text, word;
   while (file >> word) text += word + ' ';
   return text;

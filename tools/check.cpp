@@ -25,16 +25,17 @@ Kind kind_of(const std::filesystem::path& file) {
   const auto& table = std::get<TomlNode::Table>(root.value);
   if (has(table, "waypoint")) return Kind::hand_script;
   if (has(table, "tool") || has(table, "obstacle")) return Kind::scene;
-  if (has(table, "pose_report") || has(table, "wrench_report") || has(table, "transport")) return Kind::profile;
+  if (has(table, "pose_report") || has(table, "wrench_report") || has(table, "transport"))
+    return Kind::profile;
   return Kind::settings;
 }
 
 std::string about(const SceneSettings& scene) {
   const ToolBody tool = load_tool(scene.tool);
   std::ostringstream text;
-  text << "  tool " << scene.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3 << " m^3, mass "
-       << scene.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size() << " hull vertices\n  "
-       << scene.half_spaces.size() << " half-space(s)\n";
+  text << "  tool " << scene.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
+       << " m^3, mass " << scene.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
+       << " hull vertices\n  " << scene.half_spaces.size() << " half-space(s)\n";
   return text.str();
 }
 

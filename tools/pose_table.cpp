@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "config/config_error.hpp"
+#include "config/toml_file.hpp"
 #include "core/finite.hpp"
 
 namespace wrenchd {
@@ -15,6 +17,8 @@ constexpr std::string_view kHeader = "px,py,pz,qx,qy,qz,qw";
 constexpr std::array<std::string_view, 7> kColumns = {"px", "py", "pz", "qx", "qy", "qz", "qw"};
 /// How far from 1 a quaternion's norm may be: the rounding of three printed digits.
 constexpr double kNormTolerance = 1e-3;
+/// Farther out [m] a double cannot tell a millimetre; such a number is a slip, or in another unit.
+constexpr double kFarthest_m = 1e9;
 constexpr std::size_t kMostMessages = 10;
 
 std::string_view trimmed(std::string_view text) {
@@ -31,8 +35,8 @@ class Reader {
 
   void refuse(std::size_t line, std::size_t column, const std::string& message) {
     if (count_++ >= kMostMessages) return;
-    text_ += (text_.empty() ? "" : "\n") + name_ + ':' + std::to_string(line) + ':' + std::to_string(column) + ": " +
-             message;
+    text_ += (text_.empty() ? "" : "\n") + name_ + ':' + std::to_string(line) + ':' + std::to_string(column) +
+             ": " + message;
   }
   void throw_if_any() const {
     if (count_ == 0) return;
@@ -40,11 +44,14 @@ class Reader {
     if (count_ > kMostMessages) text += "\nand " + std::to_string(count_ - kMostMessages) + " more";
     throw PoseTableError(text);
   }
-  bool number(std::string_view field, std::size_t line, std::size_t column, std::string_view what, double& out) {
-    const std::string_view text = trimmed(field);
+  bool number(std::string_view field, std::size_t line, std::size_t column, std::string_view what,
+              double& out) {
+    std::string_view text = trimmed(field);
+    const std::string found = text.empty() ? "nothing" : "'" + printable(std::string(text), 40) + "'";
+    if (text.size() > 1 && text[0] == '+' && text[1] != '-')
+      text.remove_prefix(1);  // from_chars knows no plus
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
     if (error == std::errc{} && end == text.data() + text.size() && is_finite(out)) return true;
-    const std::string found = text.empty() ? "nothing" : "'" + std::string(text.substr(0, 40)) + "'";
     refuse(line, column, std::string(what) + " must be a finite number, found " + found);
     return false;
   }
@@ -71,7 +78,8 @@ bool read_pose(Reader& reader, std::string_view text, std::size_t line, Pose& ou
   const auto fields = fields_of(text);
   if (fields.size() != kColumns.size()) {
     reader.refuse(line, 1,
-                  "expected 7 numbers (" + std::string(kHeader) + "), found " + std::to_string(fields.size()) +
+                  "expected 7 numbers (" + std::string(kHeader) + "), found " +
+                      std::to_string(fields.size()) +
                       (fields.size() == 1 ? "; separate them with commas" : ""));
     return false;
   }
@@ -79,12 +87,19 @@ bool read_pose(Reader& reader, std::string_view text, std::size_t line, Pose& ou
   bool good = true;
   for (std::size_t i = 0; i < x.size(); ++i)
     good = reader.number(fields[i].second, line, fields[i].first, kColumns[i], x[i]) && good;
+  for (std::size_t i = 0; i < 3 && good; ++i) {
+    if (std::abs(x[i]) <= kFarthest_m) continue;
+    reader.refuse(
+        line, fields[i].first,
+        std::string(kColumns[i]) + " is " + to_text(x[i]) + ", farther out than 1e9 m; give metres");
+    good = false;
+  }
   if (!good) return false;
   const Quaterniond q(x[6], x[3], x[4], x[5]);
   if (!(std::abs(q.norm() - 1.0) <= kNormTolerance)) {
-    reader.refuse(line, fields[3].first,
-                  "the quaternion qx,qy,qz,qw has norm " + std::to_string(q.norm()) +
-                      "; it must be 1 (is the scalar last?)");
+    reader.refuse(
+        line, fields[3].first,
+        "the quaternion qx,qy,qz,qw has norm " + to_text(q.norm()) + "; it must be 1 (is the scalar last?)");
     return false;
   }
   out = {q.normalized(), {x[0], x[1], x[2]}};
@@ -113,8 +128,9 @@ std::vector<Pose> read_poses(std::istream& in, const std::string& name) {
     if (trimmed(line).empty()) continue;
     if (!header) {
       if (!is_header(line)) {
-        reader.refuse(number, 1, "expected the header '" + std::string(kHeader) + "', found '" +
-                                     std::string(trimmed(line).substr(0, 60)) + "'");
+        reader.refuse(number, 1,
+                      "expected the header '" + std::string(kHeader) + "', found '" +
+                          printable(std::string(trimmed(line))) + "'");
         reader.throw_if_any();
       }
       header = true;

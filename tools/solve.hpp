@@ -15,9 +15,9 @@ namespace wrenchd {
 /// One row of the answer: the projection of one pose, and the wrench it gives.
 struct SolvedPose {
   Penetration penetration;
-  Pose X_WM;        ///< the mesh's own frame at q
-  Wrench F_T;       ///< body wrench, Eq. (16) with K_P = k_P I alone
-  Wrench F_S;       ///< spatial wrench, about the world origin
+  Pose X_WM;   ///< the mesh's own frame at q
+  Wrench F_T;  ///< body wrench, Eq. (16) with K_P = k_P I alone
+  Wrench F_S;  ///< spatial wrench, about the world origin
   double solve_ns = 0.0;
 };
 

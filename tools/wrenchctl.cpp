@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <sstream>
 #include <string>
 
+#include <CLI/CLI.hpp>
+#include <unistd.h>
+
 #include "collision/mesh_check.hpp"
+#include "collision/tool_body.hpp"
+#include "config/load_scene.hpp"
 #include "core/inertia.hpp"
+#include "daemon/option_checks.hpp"
 #include "daemon/version.hpp"
 #include "tools/check.hpp"
 #include "tools/pose_table.hpp"
 #include "tools/solve.hpp"
-#include "config/load_scene.hpp"
 
 namespace {
 
@@ -23,11 +28,14 @@ constexpr int kExitRefused = 1;     ///< a file was refused, or cannot be writte
 constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is no solid
 constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: a pose had no admissible pose near it
 
+const std::map<std::string, Method> kMethods = {
+    {"exact", Method::exact}, {"planar", Method::planar}, {"translational", Method::translational}};
+
 struct SolveOptions {
   std::filesystem::path scene;
   std::string poses;
   std::string output = "-";
-  Method method = Method::exact;
+  std::string method = "exact";
   double k_P = 1.0;
 };
 
@@ -39,35 +47,57 @@ std::vector<Pose> read_poses_from(const std::string& name) {
   return read_poses(file, name);
 }
 
-/// Writes the whole answer or nothing: beside the file first, then in its place.
+/// A file is written whole or not at all: beside its place first, then put there. A symbolic link keeps
+/// pointing.
+bool replace_file(const std::filesystem::path& file, const std::string& text) {
+  std::error_code error;
+  const auto place =
+      std::filesystem::is_symlink(file, error) ? std::filesystem::weakly_canonical(file, error) : file;
+  const std::filesystem::path beside = place.string() + "." + std::to_string(getpid()) + ".part";
+  std::ofstream out(beside, std::ios::binary);
+  out << text;
+  out.close();
+  if (out) std::filesystem::rename(beside, place, error);
+  if (out && !error) return true;
+  std::filesystem::remove(beside, error);
+  return false;
+}
+
+/// A pipe, a terminal or /dev/null cannot be replaced, only written to.
+bool write_into(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  return !out.fail();
+}
+
 void write_answer(const std::string& name, const std::string& text) {
   if (name == "-") {
-    std::cout << text << std::flush;
+    std::cout << text;
     return;
   }
-  const std::string beside = name + ".part";
-  std::ofstream file(beside, std::ios::binary);
-  file << text;
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(beside, name, error);
-  if (!file || error) {
-    std::filesystem::remove(beside, error);
-    throw std::runtime_error(name + ": cannot be written; check that the directory exists and may be written to");
-  }
+  std::error_code ignored;
+  const auto status = std::filesystem::status(name, ignored);
+  const bool replaceable = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
+  if (!(replaceable ? replace_file(name, text) : write_into(name, text)))
+    throw std::runtime_error(
+        name + ": cannot be written; name a file in a directory that exists and may be written to");
 }
 
 int run_solve(const SolveOptions& options) {
   const Scene scene(load_scene(options.scene));
   const std::vector<Pose> poses = read_poses_from(options.poses);
-  const std::vector<SolvedPose> rows = solve(scene, poses, options.method, options.k_P);
+  const std::vector<SolvedPose> rows = solve(scene, poses, kMethods.at(options.method), options.k_P);
   std::ostringstream text;
   write_csv(text, rows);
   write_answer(options.output, text.str());
   int exit_code = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].penetration.projection.status != ProjectionStatus::infeasible) continue;
-    std::fprintf(stderr, "wrenchctl: pose %zu: no admissible pose found near it; its energy is nan\n", i + 1);
+    std::fprintf(stderr,
+                 "wrenchctl: pose %zu of %s: no admissible pose found near it, its energy is nan; do the "
+                 "obstacles leave room for the tool?\n",
+                 i + 1, options.poses.c_str());
     exit_code = kExitInfeasible;
   }
   return exit_code;
@@ -90,6 +120,7 @@ int run_mesh(const std::filesystem::path& file, double scale) {
   }
   for (Vector3d& p : mesh.vertices_m) p *= scale;
   const SolidProperties solid = solid_properties(mesh, 1.0);
+  require_usable(solid, file, scale);
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : mesh.vertices_m) box.extend(p);
   const Matrix3d& H = solid.inertia.H_kg_m2;
@@ -104,21 +135,27 @@ int run_mesh(const std::filesystem::path& file, double scale) {
 
 void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   CLI::App* solve = app.add_subcommand("solve", "Closest admissible configuration of each pose of a table");
-  solve->add_option("scene", options.scene, "scene file (TOML)")->required();
-  solve->add_option("--poses", options.poses, "CSV with the header px,py,pz,qx,qy,qz,qw: poses of the mesh's own\n"
-                                              "frame in the world [m]; - reads standard input")->required();
-  solve->add_option("--method", options.method, "exact, planar or translational")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Method>{{"exact", Method::exact},
-                                                                        {"planar", Method::planar},
-                                                                        {"translational", Method::translational}}))
-      ->default_str("exact");
-  solve->add_option("--k-p", options.k_P, "k_P of Eq. (16); no integral, no derivative")->capture_default_str();
-  solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")->capture_default_str();
+  solve->add_option("scene", options.scene, "scene file (TOML)")->required()->check(not_empty());
+  solve
+      ->add_option("--poses", options.poses,
+                   "CSV with the header px,py,pz,qx,qy,qz,qw: poses of the mesh's own\n"
+                   "frame in the world [m]; - reads standard input")
+      ->required()
+      ->check(not_empty());
+  solve->add_option("--method", options.method, "how the closest admissible pose is found")
+      ->check(CLI::IsMember({"exact", "planar", "translational"}))
+      ->capture_default_str();
+  solve->add_option("--k-p", options.k_P, "k_P of Eq. (16); no integral, no derivative")
+      ->check(number_from(0.0, 1e9))
+      ->capture_default_str();
+  solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")
+      ->check(not_empty())
+      ->capture_default_str();
   solve->footer(
-      "One row a pose: contacts (tool vertices that touch at the projection; 0 where the pose is admissible), energy T\n"
-      "[kg m^2] of Eq. (8), the projected pose of the same frame, eps of Eq. (15) in the body frame at the centre of\n"
-      "mass, the wrench in that frame and about the world origin, and the time of the solve [ns].\n"
-      "Each pose is solved without history: exact then seeks the global optimum.");
+      "One row a pose: contacts (tool vertices that touch at the projection; 0 where the pose is\n"
+      "admissible), energy T [kg m^2] of Eq. (8), the projected pose of the same frame, eps of Eq. (15) in\n"
+      "the body frame at the centre of mass, the wrench in that frame and about the world origin, and the\n"
+      "time of the solve [ns]. Each pose is solved without history: exact then seeks the global optimum.");
   solve->callback([&] { exit_code = run_solve(options); });
 }
 
@@ -127,29 +164,39 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
 int main(int argc, char** argv) {
   CLI::App app("wrenchctl: checks what wrenchd reads, and computes what it would feel.");
   app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
-  app.footer("Exit codes: 0 done; 1 refused (a file, its place and the cure are on standard error); 2 mesh: not a solid;\n"
-             "3 solve: a pose had no admissible pose near it; over 100: the command line was not understood.");
-  app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done; 1 refused (a file, its place and the cure are on standard error);\n"
+      "2 mesh: not a solid; 3 solve: a pose had no admissible pose near it;\n"
+      "over 100: the command line was not understood.");
+  app.require_subcommand(0, 1);  // an unknown one is then told by its name
   int exit_code = 0;
 
   SolveOptions solve_options;
   add_solve(app, solve_options, exit_code);
 
   std::filesystem::path checked;
-  CLI::App* check = app.add_subcommand("check", "Reads a configuration, scene, profile or hand script, and what it\n"
-                                                "names, and says what is wrong with it");
-  check->add_option("file", checked, "TOML file; its kind is told by what it holds")->required();
+  CLI::App* check = app.add_subcommand("check",
+                                       "Reads a configuration, scene, profile or hand script, and what it\n"
+                                       "names, and says what is wrong with it");
+  check->add_option("file", checked, "TOML file; its kind is told by what it holds")
+      ->required()
+      ->check(not_empty());
   check->callback([&] { std::cout << check_file(checked); });
 
   std::filesystem::path mesh_file;
   double scale = 1.0;
   CLI::App* mesh = app.add_subcommand("mesh", "What a mesh is: closed, volume, inertia, defects");
-  mesh->add_option("file", mesh_file, "OFF, OBJ, STL or PLY")->required();
-  mesh->add_option("--scale", scale, "metres per mesh unit")->check(CLI::PositiveNumber)->capture_default_str();
+  mesh->add_option("file", mesh_file, "OFF, OBJ, STL or PLY")->required()->check(not_empty());
+  mesh->add_option("--scale", scale, "metres per mesh unit")
+      ->check(number_from(1e-9, 1e6))
+      ->capture_default_str();
   mesh->callback([&] { exit_code = run_mesh(mesh_file, scale); });
 
   try {
     app.parse(argc, argv);
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("A subcommand (solve, check or mesh)");
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;
   } catch (const CLI::ParseError& error) {
     return app.exit(error);

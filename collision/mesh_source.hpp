@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace wrenchd {
+
+/// The bytes of a mesh file, and its name for messages.
+struct MeshSource {
+  std::filesystem::path file;
+  std::string bytes;
+
+  /// Throws MeshError "FILE: message" or, from line 1 on, "FILE:LINE: message".
+  [[noreturn]] void refuse(std::size_t line, const std::string& message) const;
+};
+
+/// Walks the lines of a text; a carriage return at the end is no part of a line.
+class Lines {
+ public:
+  explicit Lines(std::string_view text) : rest_(text) {}
+
+  bool next(std::string_view& line) noexcept;
+  std::size_t number() const noexcept { return number_; }  ///< of the last line given, from 1
+  std::string_view rest() const noexcept { return rest_; }
+
+ private:
+  std::string_view rest_;
+  std::size_t number_ = 0;
+};
+
+/// The words between blanks, in front of a '#'.
+std::vector<std::string_view> words_of(std::string_view line);
+
+/// The whole word as a number: nothing where it is none, infinite or NaN. Knows no locale.
+std::optional<double> number_of(std::string_view word) noexcept;
+std::optional<long long> whole_number_of(std::string_view word) noexcept;
+
+/// 'WORD', cut short and on one line, as a message may repeat it.
+std::string in_quotes(std::string_view word);
+
+/// What CGAL's readers take on trust, looked at before them: counts that they reserve memory for, types that
+/// they assume, numbers that they round or pass over. Each throws MeshError that names the line and the cure,
+/// and returns when the reader has nothing left to trip on. Time and memory are in proportion to the file.
+void guard_off(const MeshSource& source);
+void guard_stl(const MeshSource& source);
+void guard_ply(const MeshSource& source);
+/// The same for OBJ; returns the vertex and face lines alone, with single blanks, which is all of OBJ that
+/// CGAL reads.
+std::string guarded_obj(const MeshSource& source);
+
+}  // namespace wrenchd

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdlib>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+namespace wrenchd {
+
+/// A number from min to max. CLI11's own range check lets NaN pass.
+inline CLI::Validator number_from(double min, double max) {
+  const std::string range = CLI::detail::to_string(min) + " to " + CLI::detail::to_string(max);
+  return {[=](std::string& text) -> std::string {
+            char* end = nullptr;
+            const double x = std::strtod(text.c_str(), &end);
+            if (end != text.c_str() && *end == '\0' && x >= min && x <= max) return {};
+            return "expected a number from " + range + ", found '" + text + "'";
+          },
+          range};
+}
+
+/// An empty name comes from an unset variable in somebody's script; it must not stand for anything.
+inline CLI::Validator not_empty() {
+  return {
+      [](std::string& text) -> std::string { return text.empty() ? "must not be empty; name a file" : ""; },
+      ""};
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+namespace wrenchd::test {
+
+/// Counts what the servo thread must not do, on the thread that holds it: heap allocation and release (new, malloc and
+/// their kin, also inside libraries), and mutex locks.
+class RealtimeGuard {
+ public:
+  RealtimeGuard() noexcept;
+  ~RealtimeGuard();
+  RealtimeGuard(const RealtimeGuard&) = delete;
+  RealtimeGuard& operator=(const RealtimeGuard&) = delete;
+
+  std::uint64_t allocations() const noexcept;
+  std::uint64_t locks() const noexcept;
+};
+
+}  // namespace wrenchd::test

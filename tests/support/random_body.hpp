@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "collision/convex_hull.hpp"
+#include "collision/scene.hpp"
+#include "core/inertia.hpp"
+#include "tests/support/random_values.hpp"
+
+namespace wrenchd::test {
+
+/// The surface of a convex body as triangles, outward-oriented.
+inline TriangleMesh surface_of(const ConvexBody& body) {
+  TriangleMesh mesh;
+  mesh.vertices_m = body.vertices_T_m;
+  for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v) {
+    const auto ring = body.ring_of(v);
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const std::uint32_t a = ring[i];
+      const std::uint32_t b = ring[(i + 1) % ring.size()];
+      if (v < a && v < b) mesh.triangles.push_back({v, a, b});
+    }
+  }
+  if (solid_properties(mesh, 1.0).volume_m3 < 0.0)
+    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
+/// A tool that is the convex hull of these points, as a uniform solid.
+inline ToolBody tool_of(const std::vector<Vector3d>& points_M, double mass_kg = 1.0) {
+  ToolBody tool;
+  TriangleMesh mesh = surface_of(convex_hull(points_M));
+  tool.solid = solid_properties(mesh, mass_kg);
+  for (Vector3d& p : mesh.vertices_m) p -= tool.solid.p_MT_m;
+  tool.hull = convex_hull(mesh.vertices_m);
+  return tool;
+}
+
+/// A box with its centre at the origin of M.
+inline ToolBody box(const Vector3d& size_m, double mass_kg = 1.0) {
+  std::vector<Vector3d> corners;
+  for (const double x : {-0.5, 0.5})
+    for (const double y : {-0.5, 0.5})
+      for (const double z : {-0.5, 0.5}) corners.push_back(Vector3d(x, y, z).cwiseProduct(size_m));
+  return tool_of(corners, mass_kg);
+}
+
+/// Points on an ellipsoid of random half-axes: compact and elongated bodies alike.
+inline ToolBody random_body(RandomValues& random, int points, double least_axis = 0.2) {
+  const Vector3d axes(random.uniform(least_axis, 1.0), random.uniform(least_axis, 1.0),
+                      random.uniform(least_axis, 1.0));
+  std::vector<Vector3d> p;
+  for (int i = 0; i < points; ++i) p.push_back(random.unit<3>().cwiseProduct(axes));
+  return tool_of(p);
+}
+
+inline HalfSpaceSettings half_space(const Vector3d& normal, double offset_m) {
+  return {"", normal.normalized(), offset_m};
+}
+
+/// The same scene seen from elsewhere: the world moved by a.
+inline std::vector<HalfSpaceSettings> moved(const Pose& a, std::vector<HalfSpaceSettings> half_spaces) {
+  for (HalfSpaceSettings& h : half_spaces) {
+    h.normal_W = a.rotation * h.normal_W;
+    h.offset_m += h.normal_W.dot(a.translation_m);
+  }
+  return half_spaces;
+}
+
+}  // namespace wrenchd::test

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "daemon/station.hpp"
+
+namespace wrenchd::test {
+
+/// The configuration as it is shipped: simulated device, cube on table.
+inline Plan shipped_plan() {
+  return read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}}, SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+}
+
+/// A station in virtual time, ticked by hand.
+struct VirtualStation {
+  VirtualClock clock;
+  Station station;
+  TickRecord last;
+
+  explicit VirtualStation(Plan plan = shipped_plan()) : station(std::move(plan), clock) {}
+
+  Fault tick() { return tick_after(from_seconds(1.0 / station.plan().settings.servo.rate_Hz)); }
+  Fault tick_after(Duration pause) {
+    clock.sleep_until(clock.now() + pause);
+    const Fault fault = station.loop().tick(clock.now(), clock.now());
+    station.loop().latest().read(last);
+    return fault;
+  }
+  /// Ticks until a fault, or for so long. Returns the fault.
+  Fault run(double duration_s) {
+    const TimePoint end = clock.now() + from_seconds(duration_s);
+    Fault fault = Fault::none;
+    while (fault == Fault::none && clock.now() < end) fault = tick();
+    return fault;
+  }
+  double force_N() const { return Vector3d(last.F_out[0], last.F_out[1], last.F_out[2]).norm(); }
+  double torque_Nm() const { return Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm(); }
+  Engagement engagement() const { return static_cast<Engagement>(last.engagement); }
+  void inject(SimulatedFault::Kind kind, double start_s, double duration_s) {
+    station.simulated().inject({kind, from_seconds(start_s), from_seconds(duration_s)});
+  }
+};
+
+}  // namespace wrenchd::test

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+#include "core/metric.hpp"
+#include "core/projection.hpp"
+#include "tests/support/random_body.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+namespace {
+
+/// T for the rotation R_p' R_q = E and the least translation out of one half-space: what is left to minimise over E.
+double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaterniond& E) {
+  const Pose X_WQ{X_WP.rotation * E, X_WP.translation_m};
+  const double lift_m = std::max(0.0, -scene.least_gap_m(X_WQ));
+  const Inertia& M = scene.tool().solid.inertia;
+  return M.mass_kg * lift_m * lift_m + 4.0 * E.vec().dot(M.H_kg_m2 * E.vec());
+}
+
+/// The optimum against one half-space by brute force: random rotations, the best refined by ever smaller random steps.
+double brute_force(const Scene& scene, const Pose& X_WP, RandomValues& random) {
+  double best = std::numeric_limits<double>::infinity();
+  Quaterniond best_E;
+  const auto look = [&](const Quaterniond& E) {
+    const double T = energy_of_rotation(scene, X_WP, E);
+    if (T >= best) return false;
+    best = T;
+    best_E = E;
+    return true;
+  };
+  for (int i = 0; i < 3000; ++i) look(random.rotation(random.uniform(0.0, 2.0)));
+  double step_rad = 0.2;
+  for (int i = 0; i < 6000; ++i) step_rad *= look(best_E * random.rotation(step_rad)) ? 1.2 : 0.99;
+  return best;
+}
+
+/// A random body pressed by 5 to 30 % of unit size into a random half-space.
+struct Case {
+  Scene scene;
+  Pose X_WP;
+};
+Case random_case(RandomValues& random, double least_axis = 0.2) {
+  const Vector3d n = random.unit<3>();
+  Scene scene(random_body(random, random.integer(5, 30), least_axis), {half_space(n, random.normal())});
+  Pose X_WP{random.rotation(), random.vector<3>()};
+  X_WP.translation_m -= (scene.least_gap_m(X_WP) + random.uniform(0.05, 0.3)) * n;
+  return {std::move(scene), X_WP};
+}
+
+void check_consistent(const Scene& scene, const Pose& X_WP, const Projection& q, double residual = 1e-9) {
+  CHECK(scene.least_gap_m(q.X_WQ) > -1e-12);
+  CHECK(q.energy == Approx(energy(scene.tool().solid.inertia, X_WP, q.X_WQ)).epsilon(1e-12));
+  CHECK(q.kkt_residual < residual);
+  for (std::size_t i = 0; i < q.active_count; ++i) CHECK(q.active[i].multiplier > -1e-12);
+}
+
+}  // namespace
+
+TEST_CASE("the exact projection reproduces example 4.1 of the paper", "[projection]") {
+  for (const double scale : {1.0, 10.0}) {
+    const Scene scene(box(Vector3d::Constant(50.0 * scale)), {half_space(Vector3d::UnitY(), 0.0)});
+    const Inertia& M = scene.tool().solid.inertia;
+    CHECK(M.H_kg_m2.isApprox(2500.0 / 6.0 * scale * scale * Matrix3d::Identity(), 1e-12));
+    const Pose X_WP{Quaterniond(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ())), {0.0, 25.0 * scale, 0.0}};
+    ExactProjection exact(M);
+    const Projection q = exact.project_globally(X_WP, scene);
+
+    CHECK(q.status == ProjectionStatus::converged);
+    CHECK(q.proven_global);
+    CHECK(q.active_count == 2);
+    CHECK(std::abs(q.energy / (scale * scale) - 9.63154218539309) < 1e-12);
+    CHECK(std::abs(q.X_WQ.translation_m.y() / scale - 27.0712157435851) < 1e-12);
+    CHECK(std::abs(q.X_WQ.translation_m.x()) < 1e-12 * scale);
+    const Vector6d xi_q = log(q.X_WQ);
+    CHECK(std::abs(xi_q[5] - -0.0867146202807576) < 1e-14);
+    CHECK(std::abs(xi_q[0] / scale - -1.1737351) < 5e-8);
+    CHECK(std::abs(xi_q[1] / scale - 27.05425029) < 5e-9);
+    const Vector6d eps = log(inverse(X_WP) * q.X_WQ);
+    CHECK(std::abs(eps[0] / scale - -0.29606622) < 5e-9);
+    CHECK(std::abs(eps[1] / scale - 2.05106566) < 5e-9);
+    CHECK(std::abs(eps[5] - 0.11328538) < 5e-9);
+  }
+}
+
+TEST_CASE("against a half-space nothing found by brute force is closer", "[projection]") {
+  RandomValues random(1);
+  for (int i = 0; i < 60; ++i) {
+    const Case c = random_case(random);
+    ExactProjection exact(c.scene.tool().solid.inertia);
+    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    INFO("case " << i);
+    REQUIRE(q.status == ProjectionStatus::converged);
+    check_consistent(c.scene, c.X_WP, q);
+    CHECK(q.energy <= brute_force(c.scene, c.X_WP, random) * (1.0 + 1e-9));
+  }
+}
+
+TEST_CASE("optimality is proven in nearly every case, and a proof is never wrong", "[projection]") {
+  RandomValues random(2);
+  int proven = 0;
+  constexpr int kCases = 300;
+  for (int i = 0; i < kCases; ++i) {
+    const Case c = random_case(random);
+    ExactProjection exact(c.scene.tool().solid.inertia);
+    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    if (!q.proven_global) continue;
+    ++proven;
+    for (int start = 0; start < 5; ++start) {
+      const Pose elsewhere{c.X_WP.rotation * random.rotation(random.uniform(0.0, 2.5)), c.X_WP.translation_m};
+      const Projection other = exact.project(c.X_WP, c.scene, elsewhere);
+      CHECK(other.energy >= q.energy * (1.0 - 1e-9));
+    }
+  }
+  CHECK(proven >= kCases * 8 / 10);
+}
+
+TEST_CASE("an admissible pose is its own projection, touching or not", "[projection]") {
+  const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitZ(), 0.0)});
+  ExactProjection exact(scene.tool().solid.inertia);
+  for (const double height_m : {0.5, 0.7}) {
+    const Pose X_WP{Quaterniond::Identity(), {0.3, -0.2, height_m}};
+    const Projection q = exact.project_globally(X_WP, scene);
+    CHECK(q.status == ProjectionStatus::free);
+    CHECK(q.energy == 0.0);
+    CHECK(q.X_WQ.translation_m == X_WP.translation_m);
+    CHECK(q.active_count == 0);
+  }
+}
+
+TEST_CASE("a face pressed flat comes straight out, however many vertices it has", "[projection]") {
+  for (const int corners : {4, 12, 40}) {
+    std::vector<Vector3d> prism;
+    for (int i = 0; i < corners; ++i) {
+      const double angle = 2.0 * M_PI * i / corners;
+      for (const double z : {-0.3, 0.3}) prism.emplace_back(std::cos(angle), std::sin(angle), z);
+    }
+    const Scene scene(tool_of(prism), {half_space(Vector3d::UnitZ(), 0.0)});
+    ExactProjection exact(scene.tool().solid.inertia);
+    const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, 0.25}};
+    const Projection q = exact.project_globally(X_WP, scene);
+    CHECK(q.status == ProjectionStatus::converged);
+    CHECK(std::abs(q.X_WQ.translation_m.z() - 0.3) < 1e-14);
+    CHECK(q.X_WQ.rotation.vec().norm() < 1e-12);
+    double carried = 0.0;
+    for (std::size_t i = 0; i < q.active_count; ++i) carried += q.active[i].multiplier;
+    CHECK(carried == Approx(2.0 * 0.05));  // 2 m s = sum of multipliers times normals
+  }
+}
+
+TEST_CASE("several half-spaces are met together: a box pressed into a corner of the room", "[projection]") {
+  RandomValues random(3);
+  for (int i = 0; i < 50; ++i) {
+    const std::vector<HalfSpaceSettings> room = {half_space(Vector3d::UnitX(), 0.0), half_space(Vector3d::UnitY(), 0.0),
+                                                 half_space(Vector3d::UnitZ(), 0.0)};
+    const Scene scene(box({1.0, 0.8, 0.6}), room);
+    ExactProjection exact(scene.tool().solid.inertia);
+    const Pose X_WP{random.rotation(0.3), {0.4, 0.35, 0.25}};
+    const Projection q = exact.project_globally(X_WP, scene);
+    REQUIRE(q.status == ProjectionStatus::converged);
+    check_consistent(scene, X_WP, q);
+    const Projection lifted = exact.translate(X_WP, scene, X_WP);
+    CHECK(q.energy <= lifted.energy * (1.0 + 1e-12));
+  }
+}
+
+TEST_CASE("a slot that is too narrow at this angle is entered by turning", "[projection]") {
+  // A 1 x 1 x 0.2 plate stands across a slot 0.5 wide: no translation helps, a turn about x does.
+  const Scene scene(box({1.0, 1.0, 0.2}), {half_space(Vector3d::UnitY(), -0.25), half_space(-Vector3d::UnitY(), -0.25)});
+  ExactProjection exact(scene.tool().solid.inertia);
+  const Pose X_WP{Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX())), Vector3d::Zero()};
+  CHECK(exact.translate(X_WP, scene, X_WP).status == ProjectionStatus::infeasible);
+  const Projection q = exact.project_globally(X_WP, scene);
+  REQUIRE(q.status == ProjectionStatus::converged);
+  check_consistent(scene, X_WP, q);
+}
+
+TEST_CASE("obstacles that leave no room are said to be infeasible", "[projection]") {
+  const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
+  ExactProjection exact(scene.tool().solid.inertia);
+  const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, 0.25}};
+  CHECK(exact.project_globally(X_WP, scene).status == ProjectionStatus::infeasible);
+  CHECK(exact.project(X_WP, scene, X_WP).status == ProjectionStatus::infeasible);
+}
+
+TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]") {
+  RandomValues random(4);
+  for (int i = 0; i < 40; ++i) {
+    const Case c = random_case(random);
+    ExactProjection exact(c.scene.tool().solid.inertia);
+    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    for (const double scale : {1e-4, 1e4}) {
+      std::vector<Vector3d> points = c.scene.tool().hull.vertices_T_m;
+      for (Vector3d& p : points) p *= scale;
+      const HalfSpaceSettings& h = c.scene.half_spaces()[0];
+      const Scene scaled(tool_of(points), {half_space(h.normal_W, scale * h.offset_m)});
+      const Pose X_WP{c.X_WP.rotation, scale * c.X_WP.translation_m};
+      ExactProjection other(scaled.tool().solid.inertia);
+      const Projection r = other.project_globally(X_WP, scaled);
+      CHECK(r.energy / (scale * scale) == Approx(q.energy).epsilon(1e-9));
+      CHECK(r.X_WQ.rotation.angularDistance(q.X_WQ.rotation) < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("the projection moves with the world, and does not care where the mesh's frame is", "[projection]") {
+  RandomValues random(5);
+  for (int i = 0; i < 40; ++i) {
+    const Case c = random_case(random);
+    const Inertia& M = c.scene.tool().solid.inertia;
+    ExactProjection exact(M);
+    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    const Pose a = random.pose(3.0);
+    const Scene elsewhere(c.scene.tool(), moved(a, c.scene.half_spaces()));
+    const Projection r = exact.project_globally(a * c.X_WP, elsewhere);
+    CHECK(r.energy == Approx(q.energy).epsilon(1e-10));
+    const Pose difference = inverse(a * q.X_WQ) * r.X_WQ;
+    CHECK(log(difference).norm() < 1e-7);
+  }
+}
+
+TEST_CASE("mass scales the energy and moves nothing", "[projection]") {
+  RandomValues random(6);
+  const Case c = random_case(random);
+  const Inertia& M = c.scene.tool().solid.inertia;
+  ExactProjection light(M);
+  ExactProjection heavy({7.0 * M.mass_kg, 7.0 * M.H_kg_m2});
+  const Projection q = light.project_globally(c.X_WP, c.scene);
+  const Projection r = heavy.project_globally(c.X_WP, c.scene);
+  CHECK(r.energy == Approx(7.0 * q.energy).epsilon(1e-12));
+  CHECK(log(inverse(q.X_WQ) * r.X_WQ).norm() < 1e-9);
+}
+
+TEST_CASE("needles with an inertia of 1 to 1e6 converge like other bodies", "[projection]") {
+  RandomValues random(7);
+  for (int i = 0; i < 60; ++i) {
+    std::vector<Vector3d> points;
+    for (int k = 0; k < 12; ++k) points.push_back(random.unit<3>().cwiseProduct(Vector3d(1.0, 1e-3, 1e-3)));
+    const Vector3d n = random.unit<3>();
+    const Scene scene(tool_of(points), {half_space(n, 0.0)});
+    Pose X_WP{random.rotation(), Vector3d::Zero()};
+    X_WP.translation_m -= (scene.least_gap_m(X_WP) + random.uniform(0.01, 0.1)) * n;
+    ExactProjection exact(scene.tool().solid.inertia);
+    const Projection q = exact.project_globally(X_WP, scene);
+    INFO("case " << i);
+    REQUIRE(q.status == ProjectionStatus::converged);
+    check_consistent(scene, X_WP, q, 1e-7);  // a roll weighs 1e-6 here, and so do its digits
+    CHECK(q.energy <= brute_force(scene, X_WP, random) * (1.0 + 1e-9));
+  }
+}
+
+TEST_CASE("a followed proxy is admissible at every step, and settles where the optimum is", "[projection]") {
+  RandomValues random(8);
+  for (int body = 0; body < 10; ++body) {
+    const Case c = random_case(random);
+    ExactProjection exact(c.scene.tool().solid.inertia);
+    const Vector3d& n = c.scene.half_spaces()[0].normal_W;
+    Pose X_WQ = exact.project_globally({c.X_WP.rotation, c.X_WP.translation_m + n}, c.scene).X_WQ;
+    Pose X_WP = X_WQ;
+    for (int step = 0; step < 500; ++step) {
+      X_WP = Pose{(X_WP.rotation * random.rotation(0.02)).normalized(),
+                  X_WP.translation_m + 0.01 * random.vector<3>() - 0.004 * n};
+      const Projection q = exact.project(X_WP, c.scene, X_WQ);
+      REQUIRE((q.status == ProjectionStatus::free || q.status == ProjectionStatus::converged));
+      X_WQ = q.X_WQ;
+      REQUIRE(c.scene.least_gap_m(X_WQ) > -1e-12);
+      if (q.status == ProjectionStatus::converged) REQUIRE(q.kkt_residual < 1e-8);
+    }
+    const Projection again = exact.project(X_WP, c.scene, X_WQ);
+    CHECK(again.energy == Approx(exact.project(X_WP, c.scene, again.X_WQ).energy).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("a spent budget still answers with an admissible pose, no worse than translation", "[projection]") {
+  RandomValues random(9);
+  for (int i = 0; i < 50; ++i) {
+    const Case c = random_case(random);
+    ExactProjection hurried(c.scene.tool().solid.inertia, {1, 24});
+    const Projection q = hurried.project(c.X_WP, c.scene, c.X_WP);
+    REQUIRE(q.status != ProjectionStatus::infeasible);
+    CHECK(c.scene.least_gap_m(q.X_WQ) > -1e-12);
+    CHECK(q.energy <= hurried.translate(c.X_WP, c.scene, c.X_WP).energy * (1.0 + 1e-9));
+  }
+}

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+
+// The rooms of the source tree, as the README draws them: arrows point one way.
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::map<std::string, std::set<std::string>> kMayInclude = {
+    {"core", {"core"}},
+    {"devices", {"devices", "core"}},
+    {"collision", {"collision", "core"}},
+    {"config", {"config", "core"}},
+    {"daemon", {"daemon", "devices", "collision", "config", "core"}},
+    {"tools", {"tools", "daemon", "devices", "collision", "config", "core"}},
+};
+
+struct Include {
+  fs::path file;
+  std::string name;
+};
+
+std::vector<Include> includes_of(const std::string& room) {
+  std::vector<Include> found;
+  const std::regex line(R"re(^\s*#include\s+["<]([^">]+)[">])re");
+  for (const auto& entry : fs::directory_iterator(fs::path(WRENCHD_SOURCE_DIR) / room)) {
+    const std::string extension = entry.path().extension();
+    if (extension != ".hpp" && extension != ".cpp") continue;
+    std::ifstream in(entry.path());
+    std::smatch match;
+    for (std::string text; std::getline(in, text);)
+      if (std::regex_search(text, match, line)) found.push_back({entry.path(), match[1]});
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("a room includes only the rooms it may know", "[rooms]") {
+  for (const auto& [room, allowed] : kMayInclude) {
+    const auto includes = includes_of(room);
+    REQUIRE(includes.size() > 5);
+    for (const Include& include : includes) {
+      const std::string other = include.name.substr(0, include.name.find('/'));
+      if (kMayInclude.count(other) == 0) continue;
+      INFO(include.file << " includes " << include.name);
+      CHECK(allowed.count(other) == 1);
+    }
+  }
+}
+
+TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
+  for (const Include& include : includes_of("core")) {
+    INFO(include.file << " includes " << include.name);
+    const bool ours = include.name.starts_with("core/");
+    const bool eigen = include.name.starts_with("Eigen/");
+    const bool standard = include.name.find('/') == std::string::npos && include.name.find('.') == std::string::npos;
+    CHECK((ours || eigen || standard));
+  }
+}
+
+TEST_CASE("headers do not carry CGAL, hidapi, toml++ or HDF5 along", "[rooms]") {
+  for (const auto& [room, allowed] : kMayInclude)
+    for (const Include& include : includes_of(room)) {
+      if (include.file.extension() != ".hpp") continue;
+      INFO(include.file << " includes " << include.name);
+      for (const char* heavy : {"CGAL/", "hidapi", "libusb", "toml++", "hdf5", "spdlog"})
+        CHECK(include.name.find(heavy) == std::string::npos);
+    }
+}

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+#include <thread>
+
+#include "core/wrench_law.hpp"
+#include "daemon/event_log.hpp"
+#include "daemon/wall_clock.hpp"
+#include "tests/support/shipped_plan.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+namespace {
+
+/// When the shipped hand is deep in the table, in seconds after power-on.
+constexpr double kPressing_s = 2.4;
+
+Pose pose_of(const std::array<double, 7>& x) {
+  Pose X;
+  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
+  X.translation_m = {x[0], x[1], x[2]};
+  return X;
+}
+
+}  // namespace
+
+TEST_CASE("after every start the loop is disarmed: it measures and projects, and the hand feels nothing", "[servo]") {
+  VirtualStation s;
+  double most_N = 0.0;
+  bool touched = false;
+  for (int i = 0; i < 5000; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    most_N = std::max({most_N, s.force_N(), s.torque_Nm()});
+    touched = touched || s.last.contacts > 0;
+    CHECK(s.engagement() == Engagement::disarmed);
+  }
+  CHECK(touched);
+  CHECK(most_N == 0.0);
+  CHECK(s.station.simulated().motor_wrench().force_N.norm() == 0.0);
+}
+
+TEST_CASE("armed, the simulated hand presses the cube into the table and the table holds it", "[servo]") {
+  VirtualStation s;
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  CHECK(s.engagement() == Engagement::active);
+  CHECK(s.last.contacts == 4);
+  // Pressed flat: the force is K_P times the depth, straight up, and the hand's spring balances it.
+  const double depth_m = 0.025 - s.last.X_WP[2];
+  CHECK(depth_m > 0.0005);
+  CHECK(s.last.F_out[2] == Approx(600.0 * depth_m).epsilon(0.02));
+  CHECK(std::hypot(s.last.F_out[0], s.last.F_out[1]) < 1e-3);
+  CHECK(s.station.simulated().handle().hand_wrench().force_N.z() == Approx(-s.last.F_out[2]).epsilon(0.05));
+  CHECK(pose_of(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
+}
+
+TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the base's axes", "[servo]") {
+  Plan plan = shipped_plan();
+  plan.settings.device.base_in_world = {{0.0, 0.0, 0.0}, {0.0, 0.0, 1.2}};
+  plan.settings.device.tool_in_handle = {{0.01, -0.02, 0.0}, {0.0, 0.3, 0.0}};
+  plan.settings.wrench.damping.setZero();
+  const Matrix6d K = plan.settings.wrench.stiffness;
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  int compared = 0;
+  for (int i = 0; i < 8000; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    if (s.engagement() != Engagement::active || s.last.limit_causes != kNotLimited || s.last.contacts == 0) continue;
+    const Pose X_WP = pose_of(s.last.X_WP);
+    const Vector6d eps = log(inverse(X_WP) * pose_of(s.last.X_WQ));
+    const Vector6d W_T = K * eps;
+    const Pose X_WB{Quaterniond(Eigen::AngleAxisd(1.2, Vector3d::UnitZ())), Vector3d::Zero()};
+    const Pose X_WH = X_WB * pose_of(s.last.X_BH);
+    const Vector3d f_W = X_WP.rotation * W_T.head<3>();
+    const Vector3d t_W = X_WP.rotation * W_T.tail<3>() + (X_WP.translation_m - X_WH.translation_m).cross(f_W);
+    const Vector3d f_B = X_WB.rotation.conjugate() * f_W;
+    const Vector3d t_B = X_WB.rotation.conjugate() * t_W;
+    CHECK((f_B - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-9);
+    CHECK((t_B - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-9);
+    ++compared;
+  }
+  CHECK(compared > 1000);
+}
+
+TEST_CASE("a profile may ask for the paper's spatial wrench about the world origin", "[servo]") {
+  Plan plan = shipped_plan();
+  plan.profile.wrench_point = WrenchPoint::world_origin;
+  plan.settings.wrench.damping.setZero();
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s + 0.6) == Fault::none);
+  REQUIRE(s.last.contacts > 0);
+  const Wrench W_T{{s.last.F_T[0], s.last.F_T[1], s.last.F_T[2]}, {s.last.F_T[3], s.last.F_T[4], s.last.F_T[5]}};
+  const Wrench W_S = spatial_wrench(pose_of(s.last.X_WP), W_T);
+  CHECK((W_S.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-9);
+  CHECK((W_S.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-9);
+}
+
+TEST_CASE("arming in contact waits: no push until the hand has moved out and is calm", "[servo]") {
+  VirtualStation s;
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  REQUIRE(s.last.contacts > 0);
+  s.station.loop().arm();
+  for (int i = 0; i < 300; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    CHECK(s.engagement() == Engagement::waiting);
+    CHECK(s.force_N() == 0.0);
+  }
+}
+
+TEST_CASE("authority rises over the soft start, and the force never faster than the slew limit", "[servo]") {
+  Plan plan = shipped_plan();
+  plan.settings.limits.force_slew_N_per_s = 100.0;
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  double last_N = 0.0;
+  double last_authority = 0.0;
+  for (int i = 0; i < 4000; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    CHECK(s.force_N() <= last_N + 0.1 + 1e-9);
+    if (s.engagement() == Engagement::ramping) CHECK(s.last.authority <= last_authority + 0.0011);
+    last_N = s.force_N();
+    last_authority = s.last.authority;
+  }
+}
+
+TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]") {
+  Plan plan = shipped_plan();
+  plan.settings.limits.max_force_N = 0.5;
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  CHECK((s.last.limit_causes & kForceMagnitude) != 0);
+  CHECK(s.force_N() <= 0.5);
+  CHECK(s.force_N() > 0.499);
+  CHECK(s.last.F_out[2] > 0.499);
+}
+
+TEST_CASE("every way out of the loop releases the hand", "[servo]") {
+  using Kind = SimulatedFault::Kind;
+  const auto [kind, expected] = GENERATE(table<Kind, Fault>({{Kind::unplug, Fault::device_lost},
+                                                             {Kind::silence, Fault::sample_stale},
+                                                             {Kind::freeze, Fault::sample_stale},
+                                                             {Kind::garble, Fault::sample_stale},
+                                                             {Kind::short_report, Fault::sample_stale},
+                                                             {Kind::bad_quaternion, Fault::pose_not_a_rotation},
+                                                             {Kind::teleport, Fault::pose_teleported},
+                                                             {Kind::deaf, Fault::write_failed}}));
+  VirtualStation s;
+  s.station.loop().arm();
+  s.inject(kind, kPressing_s, 1.0);
+  CHECK(s.run(4.0) == expected);
+  CHECK(s.last.released == 1);
+  CHECK(s.last.fault == static_cast<std::uint8_t>(expected));
+  CHECK(s.force_N() == 0.0);
+  CHECK(s.engagement() == Engagement::disarmed);
+  CHECK(seconds(s.clock.now() - TimePoint{}) < kPressing_s + 0.05);
+}
+
+TEST_CASE("while the newest pose is old the hand gets nothing, before it is a fault", "[servo]") {
+  VirtualStation s;
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  REQUIRE(s.force_N() > 0.5);
+  s.inject(SimulatedFault::Kind::silence, kPressing_s, 0.010);
+  bool silent_zero = false;
+  for (int i = 0; i < 9; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    if (i > 5) CHECK(s.force_N() == 0.0);
+    silent_zero = silent_zero || s.force_N() == 0.0;
+  }
+  CHECK(silent_zero);
+  REQUIRE(s.run(0.1) == Fault::none);
+  CHECK(s.force_N() > 0.5);
+}
+
+TEST_CASE("a gap in time starts the soft start anew: no kick after a stall", "[servo]") {
+  VirtualStation s;
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  REQUIRE(s.force_N() > 0.5);
+  const Fault fault = s.tick_after(std::chrono::milliseconds(300));
+  CHECK(s.force_N() == 0.0);
+  if (fault == Fault::none) {
+    CHECK(s.engagement() == Engagement::waiting);
+    REQUIRE(s.tick() == Fault::none);
+    CHECK(s.force_N() == 0.0);
+  }
+}
+
+TEST_CASE("release may be called at any time, and again", "[servo]") {
+  VirtualStation s;
+  s.station.loop().release(s.clock.now(), Fault::none);
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  for (int i = 0; i < 3; ++i) CHECK(s.station.loop().release(s.clock.now(), Fault::overspeed) == Fault::overspeed);
+  CHECK(s.run(0.1) == Fault::none);
+  CHECK(s.force_N() == 0.0);
+  CHECK(s.engagement() == Engagement::disarmed);
+}
+
+TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
+  VirtualStation a;
+  VirtualStation b;
+  a.station.loop().arm();
+  b.station.loop().arm();
+  for (int i = 0; i < 6000; ++i) {
+    REQUIRE(a.tick() == Fault::none);
+    REQUIRE(b.tick() == Fault::none);
+    REQUIRE(a.last.F_out == b.last.F_out);
+    REQUIRE(a.last.X_WQ == b.last.X_WQ);
+  }
+}
+
+TEST_CASE("all three methods hold the cube", "[servo]") {
+  const Method method = GENERATE(Method::exact, Method::planar, Method::translational);
+  Plan plan = shipped_plan();
+  plan.settings.rendering.method = method;
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  CHECK(s.last.F_out[2] > 0.5);
+  REQUIRE(s.run(1.0) == Fault::none);
+}
+
+TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device, and stops when told", "[servo]") {
+  const Pacing pacing = GENERATE(Pacing::clock, Pacing::device);
+  Plan plan = shipped_plan();
+  plan.settings.servo.pacing = pacing;
+  WallClock clock;
+  Station station(plan, clock);
+  station.loop().arm();
+  std::atomic<bool> stop{false};
+  Fault fault = Fault::none;
+  std::thread servo([&] { fault = station.loop().run(clock, stop); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  stop.store(true);
+  servo.join();
+  TickRecord last;
+  REQUIRE(station.loop().latest().read(last));
+  CHECK(fault == Fault::none);
+  CHECK(last.released == 1);
+  CHECK(station.loop().timing().tick.count() > 10);
+  CHECK(station.loop().timing().tick.count() <= 450);
+}
+
+TEST_CASE("what the servo thread says becomes lines that name the cure", "[servo]") {
+  CHECK(to_text({Event::Kind::fault, {}, static_cast<std::uint32_t>(Fault::device_lost), 0.0}) ==
+        "fault device_lost: the device left the bus; plug it in again; wrenchd comes back disarmed");
+  CHECK(to_text({Event::Kind::engagement, {}, static_cast<std::uint32_t>(Engagement::active), 0.0}) ==
+        "engagement: active");
+  CHECK(to_text({Event::Kind::late_tick, {}, 0, 0.0305}).find("30.5 ms late") != std::string::npos);
+}

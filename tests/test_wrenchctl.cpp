@@ -1,0 +1,569 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <map>
+#include <thread>
+
+#include <catch2/catch.hpp>
+#include <sys/stat.h>
+
+#include "core/pose.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/sample_meshes.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+
+constexpr const char* kColumns =
+    "contacts,energy,px,py,pz,qx,qy,qz,qw,eps_vx,eps_vy,eps_vz,eps_wx,eps_wy,eps_wz,"
+    "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
+    "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
+
+/// Example 4.1: a cube of side 50 about its own frame, over the plane y = 0.
+const std::string kCube = as_off(triangulated(box({-25, -25, -25}, {25, 25, 25})));
+
+std::string scene_of(const std::string& tool,
+                     const std::string& half_space = "normal = [0.0, 1.0, 0.0], offset = 0.0") {
+  return "[tool]\n" + tool + "\n[[obstacle]]\nhalf_space = { " + half_space + " }\n";
+}
+const std::string kScene = scene_of("mesh = \"body.off\"\nscale = 1.0");
+
+const std::string kPoseHeader = "px,py,pz,qx,qy,qz,qw\n";
+
+/// Rotation -0.2 about z, at a height of 25 times the scale.
+std::string tilted_pose(double scale) {
+  return "0," + number_text(25 * scale) + ",0,0,0," + number_text(std::sin(-0.1)) + "," +
+         number_text(std::cos(-0.1)) + "\n";
+}
+
+using Row = std::map<std::string, double>;
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, at);) parts.push_back(part);
+  return parts;
+}
+
+std::vector<Row> rows_of(const std::string& csv) {
+  const auto lines = split(csv, '\n');
+  REQUIRE(lines.size() >= 1);
+  REQUIRE(lines[0] == kColumns);
+  const auto columns = split(kColumns, ',');
+  std::vector<Row> rows;
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    const auto fields = split(lines[i], ',');
+    REQUIRE(fields.size() == columns.size());
+    Row& row = rows.emplace_back();
+    for (std::size_t k = 0; k < fields.size(); ++k) row[columns[k]] = std::stod(fields[k]);
+  }
+  return rows;
+}
+
+std::string contents(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Files of a solve, and the solve.
+struct Bench {
+  TemporaryDirectory dir;
+  fs::path scene = dir.write("scene.toml", kScene);
+  fs::path mesh = dir.write("body.off", kCube);
+  fs::path poses = dir.write("poses.csv", kPoseHeader + tilted_pose(1));
+  fs::path out = dir.path() / "out.csv";
+
+  ProgramResult solve(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"solve", scene.string(), "--poses", poses.string(), "-o", out.string()});
+    return run_program("wrenchctl", more);
+  }
+  std::vector<Row> solved(const std::vector<std::string>& more = {}) const {
+    const ProgramResult result = solve(more);
+    CHECK(result.err == "");
+    CHECK(result.out == "");
+    REQUIRE(result.exit_code == 0);
+    return rows_of(contents(out));
+  }
+};
+
+void check_vector(const Row& row, const std::string& name, const Vector3d& expected, double margin) {
+  const Vector3d v(row.at(name + "x"), row.at(name + "y"), row.at(name + "z"));
+  INFO(name << ": " << v.transpose() << " is not " << expected.transpose());
+  CHECK((v - expected).cwiseAbs().maxCoeff() < margin);
+}
+
+Quaterniond rotation(const Row& row) {
+  return {row.at("qw"), row.at("qx"), row.at("qy"), row.at("qz")};
+}
+
+void check_about_z(const Row& row, double angle) {
+  const Quaterniond q = rotation(row);
+  CHECK(std::abs(q.norm() - 1) < 1e-12);
+  CHECK(std::abs(q.x()) + std::abs(q.y()) < 1e-9);
+  CHECK(std::abs(2 * std::atan2(q.z(), q.w()) - angle) < 1e-9);
+}
+
+constexpr double kAngle = -0.0867146202807576;
+constexpr double kHeight = 27.0712157435851;
+constexpr double kEnergy = 9.63154218539309;
+const Vector3d kEpsV(-0.29606622, 2.05106566, 0), kEpsW(0, 0, 0.11328538);
+
+TEST_CASE("wrenchctl solve reproduces example 4.1") {
+  const Bench bench;
+  const auto rows = bench.solved();
+  REQUIRE(rows.size() == 1);
+  const Row& row = rows[0];
+  CHECK(row.at("contacts") == 2);
+  CHECK(std::abs(row.at("energy") - kEnergy) < 1e-9);
+  check_vector(row, "p", {0, kHeight, 0}, 1e-9);
+  check_about_z(row, kAngle);
+  check_vector(row, "eps_v", kEpsV, 1e-8);
+  check_vector(row, "eps_w", kEpsW, 1e-8);
+  CHECK(row.at("solve_ns") > 0);
+
+  // k_P = 1: the body wrench is eps. W_S = Ad_(p^-1)' W_T: turned into world axes, about the world's origin.
+  check_vector(row, "body_f", kEpsV, 1e-8);
+  check_vector(row, "body_t", kEpsW, 1e-8);
+  const Quaterniond R(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ()));
+  check_vector(row, "spatial_f", R * kEpsV, 1e-8);
+  check_vector(row, "spatial_t", R * kEpsW + Vector3d(0, 25, 0).cross(R * kEpsV), 3e-7);
+}
+
+TEST_CASE("ten times the lengths are a hundred times the energy and the same rotation") {
+  Bench bench;
+  bench.scene = bench.dir.write("scene.toml", scene_of("mesh = \"body.off\"\nscale = 10.0"));
+  bench.poses = bench.dir.write("poses.csv", kPoseHeader + tilted_pose(10));
+  const auto rows = bench.solved();
+  REQUIRE(rows.size() == 1);
+  CHECK(rows[0].at("energy") == Approx(100 * kEnergy).epsilon(1e-11));
+  check_vector(rows[0], "p", {0, 10 * kHeight, 0}, 1e-8);
+  check_about_z(rows[0], kAngle);
+}
+
+TEST_CASE("the mass scales the energy and moves nothing") {
+  Bench bench;
+  bench.scene = bench.dir.write("scene.toml", "mass = 3.0\n" + kScene);
+  const Row row = bench.solved().at(0);
+  CHECK(row.at("energy") == Approx(3 * kEnergy).epsilon(1e-11));
+  check_vector(row, "p", {0, kHeight, 0}, 1e-9);
+  check_about_z(row, kAngle);
+}
+
+TEST_CASE("poses are of the mesh's own frame, wherever it is in the body") {
+  Bench bench;
+  const Vector3d shift(70, -30, 20);
+  bench.mesh = bench.dir.write("body.off",
+                               as_off(box(shift - Vector3d::Constant(25), shift + Vector3d::Constant(25))));
+  const Quaterniond R_p(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ())),
+      R_q(Eigen::AngleAxisd(kAngle, Vector3d::UnitZ()));
+  const Vector3d p = Vector3d(0, 25, 0) - R_p * shift;
+  bench.poses = bench.dir.write("poses.csv", kPoseHeader + number_text(p.x()) + "," + number_text(p.y()) +
+                                                 "," + number_text(p.z()) + tilted_pose(1).substr(6));
+  const Row row = bench.solved().at(0);
+  CHECK(row.at("energy") == Approx(kEnergy).epsilon(1e-11));
+  check_vector(row, "p", Vector3d(0, kHeight, 0) - R_q * shift, 1e-8);
+  check_about_z(row, kAngle);
+  check_vector(row, "eps_v", kEpsV, 1e-8);  // of the body frame, at the centre of mass
+}
+
+TEST_CASE("every format of mesh and every way to write the plane give the same answer") {
+  for (const auto& [name, text] : std::map<std::string, std::string>{
+           {"body.obj", as_obj(box({-25, -25, -25}, {25, 25, 25}))},
+           {"body.stl", as_binary_stl(triangulated(box({-25, -25, -25}, {25, 25, 25})))},
+           {"body.ply", as_binary_ply(box({-25, -25, -25}, {25, 25, 25}))}}) {
+    Bench bench;
+    bench.dir.write(name, text);
+    bench.scene =
+        bench.dir.write("scene.toml", scene_of("mesh = \"" + name + "\"", "normal = [0, 7, 0], offset = 0"));
+    INFO(name);
+    CHECK(std::abs(bench.solved().at(0).at("energy") - kEnergy) < 1e-9);
+  }
+}
+
+TEST_CASE("each method of wrenchctl solve answers") {
+  const Bench bench;
+  CHECK(std::abs(bench.solved({"--method", "exact"}).at(0).at("energy") - kEnergy) < 1e-9);
+  // The optimum turns about z, and the family has the plane of that turn among its own.
+  const Row planar = bench.solved({"--method", "planar"}).at(0);
+  CHECK(planar.at("energy") == Approx(kEnergy).epsilon(1e-2));
+  CHECK(planar.at("energy") > kEnergy - 1e-9);
+  constexpr double kDepth = 4.46839771590757;
+  const Row translational = bench.solved({"--method", "translational"}).at(0);
+  CHECK(std::abs(translational.at("energy") - kDepth * kDepth) < 1e-9);
+  check_vector(translational, "p", {0, 25 + kDepth, 0}, 1e-9);
+  check_about_z(translational, -0.2);
+}
+
+TEST_CASE("a stiffness scales the wrench") {
+  const Bench bench;
+  const Row row = bench.solved({"--k-p", "250"}).at(0);
+  check_vector(row, "body_f", 250 * kEpsV, 250e-8);
+  check_vector(row, "body_t", 250 * kEpsW, 250e-8);
+  check_vector(row, "eps_v", kEpsV, 1e-8);
+}
+
+TEST_CASE("an admissible pose comes back as it was, without contact") {
+  Bench bench;
+  bench.poses = bench.dir.write("poses.csv", kPoseHeader + "0.1,100,-7,0,0.6,0,0.8\n");
+  const Row row = bench.solved().at(0);
+  CHECK(row.at("contacts") == 0);
+  CHECK(row.at("energy") == 0);
+  check_vector(row, "p", {0.1, 100, -7}, 1e-300);
+  CHECK(row.at("qy") == Approx(0.6).epsilon(1e-15));
+  for (const char* name : {"eps_v", "eps_w", "body_f", "body_t", "spatial_f", "spatial_t"})
+    check_vector(row, name, Vector3d::Zero(), 1e-300);
+}
+
+TEST_CASE("one row a pose, in their order, each without history") {
+  Bench bench;
+  bench.poses = bench.dir.write(
+      "poses.csv", kPoseHeader + "0,100,0,0,0,0,1\n" + tilted_pose(1) + "0,20,0,0,0,0,1\n" + tilted_pose(1));
+  const auto rows = bench.solved();
+  REQUIRE(rows.size() == 4);
+  CHECK(rows[0].at("energy") == 0);
+  CHECK(std::abs(rows[1].at("energy") - kEnergy) < 1e-9);
+  CHECK(rows[2].at("contacts") == 4);
+  CHECK(rows[2].at("energy") == Approx(25).epsilon(1e-12));
+  for (const auto& [name, value] : rows[1])
+    if (name != "solve_ns") CHECK(rows[3].at(name) == value);
+
+  bench.poses = bench.dir.write("none.csv", kPoseHeader);
+  CHECK(bench.solved().empty());
+}
+
+TEST_CASE("- reads and writes the standard streams") {
+  const Bench bench;
+  const std::string table = kPoseHeader + tilted_pose(1);
+  const ProgramResult result =
+      run_program("wrenchctl", {"solve", bench.scene.string(), "--poses", "-", "-o", "-"}, table);
+  CHECK(result.exit_code == 0);
+  CHECK(result.err == "");
+  CHECK(std::abs(rows_of(result.out).at(0).at("energy") - kEnergy) < 1e-9);
+  const ProgramResult by_default =
+      run_program("wrenchctl", {"solve", bench.scene.string(), "--poses", "-"}, table);
+  CHECK(rows_of(by_default.out).size() == 1);
+
+  const ProgramResult bad =
+      run_program("wrenchctl", {"solve", bench.scene.string(), "--poses", "-"}, kPoseHeader + "1\n");
+  CHECK(bad.exit_code == 1);
+  CHECK(bad.out == "");
+  CHECK(bad.err.find("wrenchctl: standard input:2:1: expected 7 numbers") == 0);
+}
+
+TEST_CASE("an answer replaces a file, follows a link, and fills a pipe") {
+  Bench bench;
+  bench.dir.write("out.csv", "old");
+  CHECK(bench.solved().size() == 1);
+
+  const fs::path real = bench.dir.write("real.csv", "old");
+  bench.out = bench.dir.path() / "link.csv";
+  fs::create_symlink("real.csv", bench.out);
+  CHECK(bench.solved().size() == 1);
+  CHECK(fs::is_symlink(bench.out));
+  CHECK(rows_of(contents(real)).size() == 1);
+
+  bench.out = bench.dir.path() / "pipe";
+  REQUIRE(mkfifo(bench.out.c_str(), 0600) == 0);
+  std::string piped;
+  std::thread reader([&] { piped = contents(bench.out); });
+  CHECK(bench.solve().exit_code == 0);
+  reader.join();
+  CHECK(rows_of(piped).size() == 1);
+  CHECK(fs::is_fifo(bench.out));
+}
+
+TEST_CASE("a pose without an admissible one near it is told, and the rest is answered") {
+  Bench bench;
+  // A slot of 10 between two walls, for a cube of 50; the other poses are no better.
+  bench.scene = bench.dir.write(
+      "scene.toml", kScene + "[[obstacle]]\nhalf_space = { normal = [0, -1, 0], offset = -10 }\n");
+  for (const char* method : {"exact", "planar", "translational"}) {
+    INFO(method);
+    const ProgramResult result = bench.solve({"--method", method});
+    CHECK(result.exit_code == 3);
+    CHECK(result.err.find("wrenchctl: pose 1 of " + bench.poses.string() +
+                          ": no admissible pose found near it") == 0);
+    const auto rows = rows_of(contents(bench.out));
+    REQUIRE(rows.size() == 1);
+    CHECK(std::isnan(rows[0].at("energy")));
+    check_vector(rows[0], "body_f", Vector3d::Zero(), 1e-300);
+  }
+}
+
+/// What is spoilt, and how it must be told.
+struct Bad {
+  std::string what;
+  std::string file;  ///< which of scene.toml, body.off, poses.csv to write; empty: none
+  std::string text;
+  std::string place;  ///< that standard error holds, behind the file's name
+  std::string cure;
+};
+
+void check_refused(const std::vector<Bad>& table) {
+  for (const Bad& bad : table) {
+    const Bench bench;
+    bench.dir.write("out.csv", "untouched");
+    const fs::path file = bad.file.empty() ? fs::path() : bench.dir.write(bad.file, bad.text);
+    const auto before = std::distance(fs::directory_iterator(bench.dir.path()), fs::directory_iterator());
+    const ProgramResult result = bench.solve();
+    INFO(bad.what << "\nexpected " << file << bad.place << " ... " << bad.cure << "\ngot " << result.err);
+    CHECK(result.exit_code == 1);
+    CHECK(result.out == "");
+    CHECK(result.err.find("wrenchctl: ") == 0);
+    CHECK(result.err.find(file.string() + bad.place + ": ") != std::string::npos);
+    CHECK(result.err.find(bad.cure) != std::string::npos);
+    CHECK(contents(bench.out) == "untouched");
+    CHECK(std::distance(fs::directory_iterator(bench.dir.path()), fs::directory_iterator()) == before);
+  }
+}
+
+TEST_CASE("wrenchctl solve refuses bad scenes") {
+  const std::string plane = "\n[[obstacle]]\nhalf_space = { normal = [0, 1, 0], offset = 0 }\n";
+  const auto tool = [&](const std::string& lines) { return "[tool]\n" + lines + plane; };
+  check_refused({
+      {"empty", "scene.toml", "", ":1:1", "key 'tool' is missing"},
+      {"not TOML", "scene.toml", "tool = = 3\n", ":1:8", "is not valid TOML"},
+      {"typo", "scene.toml", tool("mesh = \"body.off\"\nscal = 2.0"), ":3:1", "did you mean 'scale'?"},
+      {"no mesh", "scene.toml", tool("scale = 1.0"), ":1:1", "key 'tool.mesh' is missing"},
+      {"mesh is no text", "scene.toml", tool("mesh = 3"), ":2:8", "expected a text between quotation marks"},
+      {"mesh is not there", "scene.toml", tool("mesh = \"no.off\""), ":2:8", "no such file; looked for "},
+      {"scale of another type", "scene.toml", tool("mesh = \"body.off\"\nscale = \"mm\""), ":3:9",
+       "expected a number"},
+      {"scale zero", "scene.toml", tool("mesh = \"body.off\"\nscale = 0"), ":3:9", "from 1e-09 to 1000000 m"},
+      {"scale negative", "scene.toml", tool("mesh = \"body.off\"\nscale = -1.0"), ":3:9",
+       "expected a number from"},
+      {"scale NaN", "scene.toml", tool("mesh = \"body.off\"\nscale = nan"), ":3:9", "expected a number from"},
+      {"mass NaN", "scene.toml", "mass = nan\n" + kScene, ":1:8", "key 'mass': expected a number"},
+      {"mass given twice", "scene.toml", "mass = 1\n" + tool("mesh = \"body.off\"\nmass = 2"), ":4:8",
+       "keep one of the two"},
+      {"normal zero", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, 0, 0], offset = 0"),
+       ":4:25", "must not be zero"},
+      {"normal of two", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, 1], offset = 0"), ":4:25",
+       "expected an array of 3 numbers"},
+      {"normal infinite", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, inf, 0], offset = 0"),
+       ":4:29", "expected a number"},
+      {"no offset", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, 1, 0]"), ":4:14",
+       "half_space.offset' is missing"},
+      {"mesh obstacle", "scene.toml", "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"body.off\"\n",
+       ":4:8", "mesh obstacles are not supported yet; give a half_space"},
+      {"binary", "scene.toml",
+       std::string("\x7f"
+                   "ELF\0\1\2",
+                   7),
+       ":1:1", "is not valid TOML"},
+  });
+}
+
+TEST_CASE("wrenchctl solve refuses bad meshes") {
+  const std::string cube = as_off(box({-25, -25, -25}, {25, 25, 25}));
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = cube;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  check_refused({
+      {"empty", "body.off", "", "", "is empty; export the mesh again"},
+      {"no OFF", "body.off", "solid box\nendsolid\n", ":1", "expected OFF"},
+      {"cut short", "body.off", cube.substr(0, cube.size() - 20), "", "export the mesh again"},
+      {"counts", "body.off", with("8 6 0", "2000000000 6 0"), ":2", "correct the counts"},
+      {"NaN", "body.off", with("\n25 -25 -25", "\n25 nan -25"), ":4",
+       "vertex 1: expected a finite number, found 'nan'"},
+      {"index", "body.off", with("4 0 4 6 2", "4 0 4 6 8"), ":11", "there is no vertex '8'"},
+      {"two corners", "body.off", with("4 0 4 6 2", "2 0 4"), "", "face 0 has 2 vertices; remove it"},
+      {"repeated", "body.off", with("4 0 4 6 2", "4 0 4 6 4"), "", "face 0 uses a vertex twice"},
+      {"open", "body.off", as_off({box({-25, -25, -25}, {25, 25, 25}).vertices, {{0, 4, 6, 2}}}), "",
+       "belongs to face 0 only: the surface is open (4 in all); close the hole"},
+      {"flipped", "body.off", with("4 0 4 6 2", "4 2 6 4 0"), "",
+       "make all faces counter-clockwise seen from outside"},
+      {"inside out", "body.off", as_off(inside_out(box({-25, -25, -25}, {25, 25, 25}))), "",
+       "flip the faces"},
+      {"self-intersecting", "body.off", as_off(both(box({0, 0, 0}, {2, 2, 2}), box({1, 1, 1}, {3, 3, 3}))),
+       "", "cut through each other"},
+  });
+}
+
+TEST_CASE("wrenchctl solve refuses bad poses") {
+  const auto row = [](const std::string& text) { return kPoseHeader + "0,0,0,0,0,0,1\n" + text + "\n"; };
+  check_refused({
+      {"empty", "poses.csv", "", ":1:1", "is empty; expected the header"},
+      {"no header", "poses.csv", "0,0,0,0,0,0,1\n", ":1:1", "expected the header 'px,py,pz,qx,qy,qz,qw'"},
+      {"scalar first", "poses.csv", "px,py,pz,qw,qx,qy,qz\n", ":1:1", "expected the header"},
+      {"six", "poses.csv", row("0,0,0,0,0,0"), ":3:1", "expected 7 numbers"},
+      {"semicolons", "poses.csv", row("0;0;0;0;0;0;1"), ":3:1", "separate them with commas"},
+      {"NaN", "poses.csv", row("0,nan,0,0,0,0,1"), ":3:3", "py must be a finite number, found 'nan'"},
+      {"infinite", "poses.csv", row("0,0,inf,0,0,0,1"), ":3:5", "pz must be a finite number, found 'inf'"},
+      {"word", "poses.csv", row("0,0,0,0,0,0,one"), ":3:13", "qw must be a finite number, found 'one'"},
+      {"not unit", "poses.csv", row("0,0,0,0,0,0,2"), ":3:7", "it must be 1"},
+      {"zero quaternion", "poses.csv", row("0,0,0,0,0,0,0"), ":3:7", "it must be 1"},
+      {"far", "poses.csv", row("0,-1e300,0,0,0,0,1"), ":3:3", "give metres"},
+      {"binary", "poses.csv", as_binary_stl({}), ":1:1", "expected the header"},
+  });
+}
+
+TEST_CASE("wrenchctl refuses files that are not there, and places that cannot be written to") {
+  const Bench bench;
+  const std::string scene = bench.scene.string(), poses = bench.poses.string(),
+                    dir = bench.dir.path().string();
+  const std::string missing = dir + "/missing";
+  struct {
+    std::vector<std::string> arguments;
+    std::string told;
+  } const table[] = {
+      {{"solve", missing, "--poses", poses}, missing + ": no such file"},
+      {{"solve", dir, "--poses", poses}, dir + ": is a directory; name a file in it"},
+      {{"solve", bench.mesh.string(), "--poses", poses}, bench.mesh.string() + ":1:4: is not valid TOML"},
+      {{"solve", scene, "--poses", missing},
+       missing + ": cannot be read; name a CSV file, or - for standard input"},
+      {{"solve", scene, "--poses", dir}, dir + ": cannot be read; name a CSV file, or - for standard input"},
+      {{"solve", scene, "--poses", poses, "-o", missing + "/out.csv"},
+       missing + "/out.csv: cannot be written; name a file"},
+      {{"solve", scene, "--poses", poses, "-o", dir}, dir + ": cannot be written; name a file"},
+      {{"solve", scene, "--poses", poses, "-o", poses + "/out.csv"},
+       poses + "/out.csv: cannot be written; name a file"},
+      {{"check", missing}, missing + ": no such file"},
+      {{"check", dir}, dir + ": is a directory; name a file in it"},
+      {{"mesh", missing}, missing + ": no such file; check the path"},
+      {{"mesh", dir}, dir + ": is not a file; name an OFF, OBJ, STL or PLY file"},
+      {{"mesh", poses}, poses + ": unknown mesh format '.csv'; save it as .off, .obj, .stl or .ply"},
+  };
+  for (const auto& [arguments, told] : table) {
+    const ProgramResult result = run_program("wrenchctl", arguments);
+    INFO(told << "\ngot " << result.err);
+    CHECK(result.exit_code == 1);
+    CHECK(result.out == "");
+    CHECK(result.err.find("wrenchctl: " + told) == 0);
+  }
+  CHECK(std::distance(fs::directory_iterator(bench.dir.path()), fs::directory_iterator()) == 3);
+}
+
+TEST_CASE("wrenchctl refuses a command line that it does not understand") {
+  const Bench bench;
+  const std::string scene = bench.scene.string(), poses = bench.poses.string(), mesh = bench.mesh.string();
+  struct {
+    std::vector<std::string> arguments;
+    std::string told;
+  } const table[] = {
+      {{}, "A subcommand (solve, check or mesh) is required"},
+      {{"dance"}, "not expected: dance"},
+      {{"solve"}, "scene is required"},
+      {{"solve", scene}, "--poses is required"},
+      {{"solve", scene, "--poses", poses, "--method", "nonsense"},
+       "nonsense not in {exact,planar,translational}"},
+      {{"solve", scene, "--poses", poses, "--method", "Exact"}, "{exact,planar,translational}"},
+      {{"solve", scene, "--poses", poses, "--method"}, "--method"},
+      {{"solve", scene, "--poses", poses, "--k-p", "nan"},
+       "--k-p: expected a number from 0 to 1e+09, found 'nan'"},
+      {{"solve", scene, "--poses", poses, "--k-p", "-1"}, "--k-p: expected a number from 0"},
+      {{"solve", scene, "--poses", poses, "--k-p", "stiff"}, "--k-p: expected a number from 0"},
+      {{"solve", scene, "--poses", poses, "-o", ""}, "--output: must not be empty; name a file"},
+      {{"solve", scene, "--poses", ""}, "--poses: must not be empty; name a file"},
+      {{"solve", "", "--poses", poses}, "scene: must not be empty; name a file"},
+      {{"solve", scene, poses}, "--poses is required"},
+      {{"solve", scene, "--poses", poses, "--bogus"}, "--bogus"},
+      {{"check"}, "file is required"},
+      {{"check", ""}, "file: must not be empty; name a file"},
+      {{"mesh"}, "file is required"},
+      {{"mesh", mesh, "--scale", "0"}, "--scale: expected a number from 1e-09 to 1e+06, found '0'"},
+      {{"mesh", mesh, "--scale", "nan"}, "--scale: expected a number from"},
+      {{"mesh", mesh, mesh}, mesh},
+  };
+  for (const auto& [arguments, told] : table) {
+    const ProgramResult result = run_program("wrenchctl", arguments);
+    INFO(told << "\ngot " << result.err);
+    CHECK(result.exit_code > 100);
+    CHECK(result.out == "");
+    CHECK(result.err.find(told) != std::string::npos);
+  }
+}
+
+TEST_CASE("wrenchctl check accepts every file that is shipped") {
+  int count = 0;
+  for (const fs::path& file : fs::recursive_directory_iterator(fs::path(WRENCHD_SOURCE_DIR) / "config")) {
+    if (file.extension() != ".toml") continue;
+    ++count;
+    const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
+    INFO(file << "\n" << result.err);
+    CHECK(result.exit_code == 0);
+    CHECK(result.err == "");
+    CHECK(result.out.find(file.string() + ": a good ") == 0);
+  }
+  CHECK(count >= 5);  // configuration, scene, two profiles, hand script
+}
+
+TEST_CASE("wrenchctl check refuses what the daemon would refuse, by its kind") {
+  const Bench bench;
+  const auto bad = [&](const std::string& name, const std::string& text, const std::string& told) {
+    const fs::path file = bench.dir.write(name, text);
+    const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
+    INFO(name << "\n" << result.err);
+    CHECK(result.exit_code == 1);
+    CHECK(result.out == "");
+    CHECK(result.err.find(told) != std::string::npos);
+  };
+  const auto shipped = [](const std::string& name) {
+    return contents(fs::path(WRENCHD_SOURCE_DIR) / "config" / name);
+  };
+  const auto without = [](std::string text, const std::string& line_with) {
+    const std::size_t start = text.rfind('\n', text.find("\n" + line_with) + 1) + 1;
+    REQUIRE(start != 0);
+    return text.erase(start, text.find('\n', start) - start);
+  };
+  bad("config.toml", "[servo]\nrate = 1000\n",
+      ":2:1: key 'servo.rate' is not known; give it in Hz as 'rate_Hz'");
+  bad("scene_named.toml", "scene = \"no.toml\"\n", ":1:9: key 'scene': no such file");
+  bad("deeper.toml", "scene = \"bad_scene.toml\"\n", "bad_scene.toml");
+  bad("obstacle.toml", "[[obstacle]]\nhalf_space = { normal = [0, 1, 0], offset = 0 }\n",
+      "key 'tool' is missing");
+  bad("profile.toml", without(shipped("profiles/loopback.toml"), "max_force_N"),
+      "key 'limits.max_force_N' is missing");
+  bad("hand.toml", "[[waypoint]]\n", "hand.toml:1:");
+  bench.dir.write("body.off", as_off({box({0, 0, 0}, {1, 1, 1}).vertices, {{0, 4, 6, 2}}}));
+  bad("open.toml", kScene, "body.off: is not a closed, consistently oriented solid:\n  the edge from (");
+}
+
+TEST_CASE("wrenchctl mesh tells what a mesh is") {
+  const Bench bench;
+  const ProgramResult good = run_program("wrenchctl", {"mesh", bench.mesh.string(), "--scale", "0.001"});
+  CHECK(good.exit_code == 0);
+  CHECK(good.err == "");
+  for (const char* line : {"vertices           8\n", "faces              12\n", "closed             yes\n",
+                           "consistent         yes\n", "size               0.05 0.05 0.05 m\n",
+                           "volume             0.000125 m^3\n", "centre of mass     ",
+                           "0.000416666667 0.000416666667 0.000416666667 m^2"})
+    CHECK(good.out.find(line) != std::string::npos);
+
+  PolygonSoup open = box({-25, -25, -25}, {25, 25, 25});
+  open.faces.pop_back();
+  const fs::path file = bench.dir.write("open.ply", as_ascii_ply(open));
+  const ProgramResult bad = run_program("wrenchctl", {"mesh", file.string()});
+  CHECK(bad.exit_code == 2);
+  CHECK(bad.out.find("closed             no\n") != std::string::npos);
+  CHECK(bad.err.find("wrenchctl: " + file.string() +
+                     ": is not a closed, consistently oriented solid:\n  the edge from (") == 0);
+
+  const fs::path vast =
+      bench.dir.write("vast.off", as_off(triangulated(box({0, 0, 0}, {1e110, 1e110, 1e110}))));
+  const ProgramResult overflow = run_program("wrenchctl", {"mesh", vast.string()});
+  CHECK(overflow.exit_code != 0);
+  CHECK(overflow.err.find(vast.string() + ": has no usable volume at scale 1") != std::string::npos);
+}
+
+TEST_CASE("wrenchctl explains itself") {
+  const ProgramResult help = run_program("wrenchctl", {"--help"});
+  CHECK(help.exit_code == 0);
+  CHECK(help.err == "");
+  for (const char* word : {"solve", "check", "mesh", "Exit codes: 0 done; 1 refused", "2 mesh: not a solid",
+                           "3 solve: a pose had no admissible pose", "over 100"})
+    CHECK(help.out.find(word) != std::string::npos);
+  const ProgramResult solve = run_program("wrenchctl", {"solve", "--help"});
+  for (const char* word : {"--poses", "--method", "{exact,planar,translational}", "--output",
+                           "px,py,pz,qx,qy,qz,qw", "standard input"})
+    CHECK(solve.out.find(word) != std::string::npos);
+  const ProgramResult version = run_program("wrenchctl", {"--version"});
+  CHECK(version.exit_code == 0);
+  CHECK(version.out.find("wrenchctl ") == 0);
+}
+
+}  // namespace
+}  // namespace wrenchd
