@@ -9,7 +9,9 @@ namespace wrenchd {
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::nanoseconds;
 
-inline double seconds(Duration d) noexcept { return std::chrono::duration<double>(d).count(); }
+inline double seconds(Duration d) noexcept {
+  return std::chrono::duration<double>(d).count();
+}
 inline Duration from_seconds(double s) noexcept {
   return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s));
 }

@@ -32,7 +32,8 @@ inline bool same_features(const Contact& a, const Contact& b) noexcept {
   return a.vertex == b.vertex && a.obstacle == b.obstacle;
 }
 
-/// Contacts of one query. The capacity is fixed, so that a tick never allocates. Adding to a full set does nothing.
+/// Contacts of one query. The capacity is fixed, so that a tick never allocates. Adding to a full set does
+/// nothing.
 class ContactSet {
  public:
   static constexpr std::size_t kCapacity = 64;  ///< an optimum of 6 unknowns has few active contacts
@@ -61,16 +62,17 @@ class ContactSet {
   std::size_t size_ = 0;
 };
 
-/// What the projection asks of a scene: which contacts does a pose violate? A scene of any size answers with the
-/// few that matter, so the projection never lists them all (constraint generation).
+/// What the projection asks of a scene: which contacts does a pose violate? A scene of any size answers with
+/// the few that matter, so the projection never lists them all (constraint generation).
 class ContactSource {
  public:
   virtual ~ContactSource() = default;
 
-  /// Adds contacts that the pose violates by more than tolerance_m and that are not in the set yet: the deepest of
-  /// each obstacle. Returns how many were added; 0 means that the pose is admissible, or that the set is full.
-  /// X_WT: pose of the tool's body frame in the world. RT safe.
-  virtual std::size_t add_violated(const Pose& X_WT, double tolerance_m, ContactSet& contacts) const noexcept = 0;
+  /// Adds contacts that the pose violates by more than tolerance_m and that are not in the set yet: the
+  /// deepest of each obstacle. Returns how many were added; 0 means that the pose is admissible, or that the
+  /// set is full. X_WT: pose of the tool's body frame in the world. RT safe.
+  virtual std::size_t add_violated(const Pose& X_WT, double tolerance_m,
+                                   ContactSet& contacts) const noexcept = 0;
 };
 
 }  // namespace wrenchd

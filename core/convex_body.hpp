@@ -10,11 +10,12 @@
 
 namespace wrenchd {
 
-/// A convex polyhedron: vertices in the body frame T, and for each vertex its neighbours in order around it (the
-/// sequence N_v of section 3.3). Built once, then only read.
+/// A convex polyhedron: vertices in the body frame T, and for each vertex its neighbours in order around it
+/// (the sequence N_v of section 3.3). Built once, then only read.
 struct ConvexBody {
   std::vector<Vector3d> vertices_T_m;
-  std::vector<std::uint32_t> ring_begin;  ///< ring of vertex i: ring[ring_begin[i]] up to ring[ring_begin[i + 1]]
+  std::vector<std::uint32_t>
+      ring_begin;  ///< ring of vertex i: ring[ring_begin[i]] up to ring[ring_begin[i + 1]]
   std::vector<std::uint32_t> ring;
 
   std::span<const std::uint32_t> ring_of(std::size_t vertex) const noexcept {

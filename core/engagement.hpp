@@ -15,8 +15,9 @@ enum class Engagement : std::uint8_t {
 
 const char* name(Engagement state) noexcept;
 
-/// The way from disarmed to full authority, without a kick: armed, calm for a moment, then a ramp. Anything that breaks
-/// the loop's continuity (a late tick, a stale sample) goes back to waiting. No clock, no I/O. RT safe.
+/// The way from disarmed to full authority, without a kick: armed, calm for a moment, then a ramp. Anything
+/// that breaks the loop's continuity (a late tick, a stale sample) goes back to waiting. No clock, no I/O. RT
+/// safe.
 class SoftStart {
  public:
   explicit SoftStart(double ramp_s) : ramp_s_(ramp_s) {}
@@ -26,8 +27,8 @@ class SoftStart {
   /// Authority drops to zero at once; an armed loop starts again from waiting.
   void interrupt() noexcept;
 
-  /// One tick further. calm: the handle is slow and the wrench that full authority would give is small. Returns the
-  /// authority, 0 to 1, for this tick.
+  /// One tick further. calm: the handle is slow and the wrench that full authority would give is small.
+  /// Returns the authority, 0 to 1, for this tick.
   double advance(bool calm, double dt_s) noexcept;
 
   Engagement state() const noexcept { return state_; }

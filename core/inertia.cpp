@@ -10,8 +10,8 @@ namespace wrenchd {
 //   int x   = sum d s / 24
 //   int xx' = sum d (a a' + b b' + c c' + s s') / 120
 //
-// and H = m (tr(C) I - C), C = int (x - c)(x - c)' / V. The reference point is the vertex mean, so that a body
-// far from the mesh's origin keeps its digits.
+// and H = m (tr(C) I - C), C = int (x - c)(x - c)' / V. The reference point is the vertex mean, so that a
+// body far from the mesh's origin keeps its digits.
 SolidProperties solid_properties(const TriangleMesh& mesh, double mass_kg) {
   Vector3d r = Vector3d::Zero();
   for (const Vector3d& p : mesh.vertices_m) r += p;

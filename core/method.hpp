@@ -7,9 +7,9 @@ namespace wrenchd {
 
 /// How the closest admissible configuration is found.
 enum class Method : std::uint8_t {
-  exact,         ///< all contacts together, no discretisation (core/projection.hpp)
-  planar,        ///< the paper's family of planes, contact by contact (core/planar_family.hpp)
-  translational, ///< the traditional penalty method of section 4: translation only
+  exact,          ///< all contacts together, no discretisation (core/projection.hpp)
+  planar,         ///< the paper's family of planes, contact by contact (core/planar_family.hpp)
+  translational,  ///< the traditional penalty method of section 4: translation only
 };
 
 }  // namespace wrenchd

@@ -8,17 +8,21 @@ namespace wrenchd {
 namespace {
 
 bool in_contact(const Projection& projection) noexcept {
-  return projection.status == ProjectionStatus::converged || projection.status == ProjectionStatus::budget_spent;
+  return projection.status == ProjectionStatus::converged ||
+         projection.status == ProjectionStatus::budget_spent;
 }
 
-Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept { return log(inverse(X_WP) * X_WQ); }
+Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
+  return log(inverse(X_WP) * X_WQ);
+}
 
 }  // namespace
 
 PenetrationDepth::PenetrationDepth(const Inertia& M, const ConvexBody& body, Options options)
     : options_(options), mass_kg_(M.mass_kg), exact_(M), planar_(M, body, options.planes) {}
 
-Penetration PenetrationDepth::follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept {
+Penetration PenetrationDepth::follow(const Pose& X_WP, const ContactSource& scene,
+                                     const Pose& X_last) noexcept {
   if (options_.method != Method::exact) return query(X_WP, scene);
   Penetration out = described(X_WP, exact_.project(X_WP, scene, X_last));
   if (out.projection.status != ProjectionStatus::infeasible) return out;
@@ -52,10 +56,11 @@ Penetration PenetrationDepth::described(const Pose& X_WP, const Projection& proj
   return out;
 }
 
-/// Every contact on its own, in every plane of its family. Generically one vertex collides, and its projection frees the
-/// whole body: the best that does is the answer. Where none does (the family looks at one cross-section, and a vertex
-/// beside it stays inside), the wrenches of the contacts are added, as section 5 of the paper says, and the pose
-/// reported is the best of their rotations lifted until the whole body is out. Translation alone always is a candidate.
+/// Every contact on its own, in every plane of its family. Generically one vertex collides, and its
+/// projection frees the whole body: the best that does is the answer. Where none does (the family looks at
+/// one cross-section, and a vertex beside it stays inside), the wrenches of the contacts are added, as
+/// section 5 of the paper says, and the pose reported is the best of their rotations lifted until the whole
+/// body is out. Translation alone always is a candidate.
 Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scene) noexcept {
   Penetration out = described(X_WP, exact_.translate(X_WP, scene, X_WP));
   if (out.projection.status == ProjectionStatus::free) return out;
@@ -87,13 +92,14 @@ Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scen
     X_WQ = lifted.X_WQ;
     T = lifted.energy;
   }
-  out = described(X_WP, exact_.translate(X_WP, scene, X_WQ));  // fills in the contacts; moves q by rounding only
+  out = described(X_WP,
+                  exact_.translate(X_WP, scene, X_WQ));  // fills in the contacts; moves q by rounding only
   out.drive = freed ? out.eps : sum;
   return out;
 }
 
-/// The depth of each obstacle acts at the mean of the tool's vertices that touch it: an edge or a face that lies flat
-/// has no single deepest vertex, and choosing one would make a torque out of rounding.
+/// The depth of each obstacle acts at the mean of the tool's vertices that touch it: an edge or a face that
+/// lies flat has no single deepest vertex, and choosing one would make a torque out of rounding.
 Penetration PenetrationDepth::translational(const Pose& X_WP, const ContactSource& scene) noexcept {
   Penetration out = described(X_WP, exact_.translate(X_WP, scene, X_WP));
   if (!in_contact(out.projection)) return out;

@@ -13,12 +13,13 @@ namespace wrenchd {
 
 /// The generalized penetration depth of one configuration p.
 struct Penetration {
-  Projection projection;  ///< q, T and the contacts. q = p where p is admissible.
-  std::uint16_t contacts = 0;          ///< tool features that touch at q; 0 where p is admissible
-  Vector6d eps = Vector6d::Zero();     ///< Eq. (15): exponential coordinates of p^-1 q
-  /// What enters the wrench law. The same as eps for exact. For planar too, unless several contacts need each its own
-  /// projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For translational, [d; sum (c_i - x) x d_i]: with the force gain k for both
-  /// halves this is the force k d at each contact and its torque about the centre of mass, which is that method's wrench.
+  Projection projection;            ///< q, T and the contacts. q = p where p is admissible.
+  std::uint16_t contacts = 0;       ///< tool features that touch at q; 0 where p is admissible
+  Vector6d eps = Vector6d::Zero();  ///< Eq. (15): exponential coordinates of p^-1 q
+  /// What enters the wrench law. The same as eps for exact. For planar too, unless several contacts need each
+  /// its own projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For
+  /// translational, [d; sum (c_i - x) x d_i]: with the force gain k for both halves this is the force k d at
+  /// each contact and its torque about the centre of mass, which is that method's wrench.
   Vector6d drive = Vector6d::Zero();
 };
 
@@ -33,8 +34,8 @@ class PenetrationDepth {
   /// The body is kept by reference and must outlive this.
   PenetrationDepth(const Inertia& M, const ConvexBody& body, Options options);
 
-  /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p the proxy
-  /// stays there, and draws the hand back to where it came from. RT safe.
+  /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
+  /// the proxy stays there, and draws the hand back to where it came from. RT safe.
   Penetration follow(const Pose& X_WP, const ContactSource& scene, const Pose& X_last) noexcept;
   /// Knows no history; exact seeks the global optimum. RT safe, but up to a hundred times dearer.
   Penetration query(const Pose& X_WP, const ContactSource& scene) noexcept;

@@ -43,7 +43,8 @@ Pose inverse(const Pose& X_AB) noexcept {
   return {R_BA, -(R_BA * X_AB.translation_m)};
 }
 
-//   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2        (Murray, Li, Sastry, ref. [18] of the paper)
+//   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2        (Murray, Li, Sastry, ref. [18] of the
+//   paper)
 Pose exp(const Vector6d& xi) noexcept {
   const Vector3d v = xi.head<3>();
   const Vector3d w = xi.tail<3>();

@@ -32,7 +32,8 @@ Pose operator*(const Pose& X_AB, const Pose& X_BC) noexcept;
 /// X_BA from X_AB.
 Pose inverse(const Pose& X_AB) noexcept;
 
-/// Exponential coordinates to configuration. xi = [v; w] (linear [m] first, angular [rad] second, section 2.2).
+/// Exponential coordinates to configuration. xi = [v; w] (linear [m] first, angular [rad] second,
+/// section 2.2).
 Pose exp(const Vector6d& xi) noexcept;
 
 /// Exponential coordinates xi = [v; w] of a configuration, |w| <= pi. Inverse of exp().

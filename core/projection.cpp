@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/projection.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "core/metric.hpp"
 
@@ -15,7 +16,8 @@ namespace {
 constexpr double kGapTolerance = 2e-15;
 /// A contact this near, in units of L, touches at q.
 constexpr double kTouching = 1e-9;
-/// Converged: the step left is this short, in units of L and rad, and the KKT residual this small before it is taken.
+/// Converged: the step left is this short, in units of L and rad, and the KKT residual this small before it
+/// is taken.
 constexpr double kShortStep = 1e-7;
 constexpr double kSmallResidual = 1e-9;
 /// Curvature of the Lagrangian, relative to the metric's, that a step may count on where there is less.
@@ -43,14 +45,19 @@ double positive_length(const Inertia& M) {
 ExactProjection::ExactProjection(const Inertia& M) : ExactProjection(M, Budget{}) {}
 
 ExactProjection::ExactProjection(const Inertia& M, Budget budget)
-    : M_(M), budget_(budget), iteration_limit_(budget.iterations), L_(positive_length(M)), H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
+    : M_(M),
+      budget_(budget),
+      iteration_limit_(budget.iterations),
+      L_(positive_length(M)),
+      H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
   Matrix6d metric = Matrix6d::Zero();
   metric.diagonal().head<3>().setConstant(2.0);
   metric.bottomRightCorner<3, 3>() = 2.0 * H_hat_;
   metric_root_ = Eigen::LLT<Matrix6d>(metric).matrixL();
 }
 
-Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept {
+Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene,
+                                    const Pose& X_start) noexcept {
   return project_from(X_WP, scene, (X_WP.rotation.conjugate() * X_start.rotation).normalized());
 }
 
@@ -90,8 +97,8 @@ Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSo
         }
   };
 
-  // Where the dual bound is attained; then rotations about the axes of a cube's faces, edges and corners, both ways, near
-  // and far from p; then the same around the best of these.
+  // Where the dual bound is attained; then rotations about the axes of a cube's faces, edges and corners,
+  // both ways, near and far from p; then the same around the best of these.
   try_from(Quaterniond(dual_rotation_));
   for (const double angle : {0.25, 0.6, 1.2, 2.2}) try_around(Quaterniond::Identity(), angle);
   const Quaterniond best_E = (X_WP.rotation.conjugate() * best.X_WQ.rotation).normalized();
@@ -104,8 +111,8 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
   return 4.0 * kGapTolerance * (L_ + X_WT.translation_m.lpNorm<Eigen::Infinity>());
 }
 
-Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
-                                         Freedom freedom) noexcept {
+Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& scene,
+                                         const Quaterniond& E_start, Freedom freedom) noexcept {
   Projection out;
   out.X_WQ = X_WP;
   X_WP_ = X_WP;
@@ -150,9 +157,10 @@ double ExactProjection::scaled_energy(const State& state) const noexcept {
   return state.u.squaredNorm() + 4.0 * v.dot(H_hat_ * v);
 }
 
-/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -(n_i . R_E a_i + c_i),
-/// over all contacts of the scene by constraint generation: solve on the contacts at hand, ask the scene what the answer
-/// violates, add it, repeat. Leaves the multipliers (2 u = sum 2 multiplier_i n_i). False where no translation helps.
+/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -(n_i . R_E a_i +
+/// c_i), over all contacts of the scene by constraint generation: solve on the contacts at hand, ask the
+/// scene what the answer violates, add it, repeat. Leaves the multipliers (2 u = sum 2 multiplier_i n_i).
+/// False where no translation helps.
 bool ExactProjection::restore(State& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
   for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
@@ -214,10 +222,11 @@ ExactProjection::Slope ExactProjection::slope(const State& state) const noexcept
   return out;
 }
 
-/// W = C C' of the Hessian, made positive definite so that the step is a descent. Where the Hessian is not, the
-/// active gradients are added first: that changes W only across the constraints, where the step is not free, and
-/// keeps the convergence quadratic. If that is not enough (far from a minimum), negative eigenvalues are turned over, taken
-/// relative to the metric diag(2 I, 2 H^): a needle's roll is a soft direction, not a flat one.
+/// W = C C' of the Hessian, made positive definite so that the step is a descent. Where the Hessian is not,
+/// the active gradients are added first: that changes W only across the constraints, where the step is not
+/// free, and keeps the convergence quadratic. If that is not enough (far from a minimum), negative
+/// eigenvalues are turned over, taken relative to the metric diag(2 I, 2 H^): a needle's roll is a soft
+/// direction, not a flat one.
 Eigen::LLT<Matrix6d> ExactProjection::factorised(const Matrix6d& hessian) const noexcept {
   Eigen::LLT<Matrix6d> C(hessian);
   double stiffening = 4.0 * hessian.lpNorm<Eigen::Infinity>();
@@ -241,13 +250,14 @@ Eigen::LLT<Matrix6d> ExactProjection::factorised(const Matrix6d& hessian) const 
 ///
 ///   min 1/2 dy' W dy + g' dy   s.t.   J_i dy >= -gap_i
 ///
-/// With W = C C' and z = C' dy this is a least-distance problem from z0 = -C^-1 g. At an admissible state dy = 0 is
-/// allowed, so there always is an answer. Leaves the multipliers.
+/// With W = C C' and z = C' dy this is a least-distance problem from z0 = -C^-1 g. At an admissible state dy
+/// = 0 is allowed, so there always is an answer. Leaves the multipliers.
 bool ExactProjection::newton_step(const Slope& slope, Vector6d& dy) noexcept {
   const Eigen::LLT<Matrix6d> C = factorised(slope.W);
   if (C.info() != Eigen::Success) return false;
   step_.clear();
-  for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(C.matrixL().solve(J_[i]), -std::max(gap_[i], 0.0));
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    step_.add(C.matrixL().solve(J_[i]), -std::max(gap_[i], 0.0));
   using Status = LeastDistance<6, ContactSet::kCapacity>::Status;
   if (step_.solve(-C.matrixL().solve(slope.g), kGapTolerance) != Status::optimal) return false;
   dy = C.matrixU().solve(step_.z());
@@ -261,7 +271,8 @@ ExactProjection::Local ExactProjection::translate_out(State& state) noexcept {
   return Local::converged;
 }
 
-/// Newton's method on the contacts at hand, from the state's rotation. Every accepted state is admissible for them.
+/// Newton's method on the contacts at hand, from the state's rotation. Every accepted state is admissible for
+/// them.
 ExactProjection::Local ExactProjection::minimise(State& state) noexcept {
   if (translate_out(state) == Local::infeasible) {
     if (!seek_feasible(state)) return Local::infeasible;
@@ -292,9 +303,10 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
   return rest.norm() / std::max(g.norm(), kLeastGradient);
 }
 
-/// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails and has met
-/// contacts the model did not know ends the search: with them the next step will be a better one.
-ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy, double promised) noexcept {
+/// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails
+/// and has met contacts the model did not know ends the search: with them the next step will be a better one.
+ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy,
+                                                  double promised) noexcept {
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d turn = dy.tail<3>();
@@ -343,7 +355,8 @@ bool ExactProjection::seek_feasible(State& state) noexcept {
   return false;
 }
 
-/// Drops contacts that carry nothing and do not touch, once the set is more than half full, so that new ones fit in.
+/// Drops contacts that carry nothing and do not touch, once the set is more than half full, so that new ones
+/// fit in.
 void ExactProjection::make_room(const State& state) noexcept {
   if (contacts_.size() <= ContactSet::kCapacity / 2) return;
   linearise(state);
@@ -357,7 +370,8 @@ void ExactProjection::make_room(const State& state) noexcept {
   }
 }
 
-/// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the residual.
+/// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the
+/// residual.
 void ExactProjection::report(Projection& out) noexcept {
   out.X_WQ = pose_of(state_);
   linearise(state_);
@@ -371,8 +385,8 @@ void ExactProjection::report(Projection& out) noexcept {
 }
 
 // Weak duality gives a proof of global optimality for the price of a 4 x 4 eigenvalue problem. For any
-// multipliers >= 0, the least value of the Lagrangian over all u and all unit quaternions q bounds T from below.
-// A vertex-face gap is quadratic in q, n . R(q) a = q' A q with
+// multipliers >= 0, the least value of the Lagrangian over all u and all unit quaternions q bounds T from
+// below. A vertex-face gap is quadratic in q, n . R(q) a = q' A q with
 //
 //   A = [ n.a      (a x n)'              ]
 //       [ a x n    n a' + a n' - (n.a) I ]

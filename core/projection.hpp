@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cstdint>
+
+#include <Eigen/Cholesky>
 
 #include "core/contact.hpp"
 #include "core/inertia.hpp"
@@ -27,31 +28,34 @@ struct ActiveContact {
 
 /// The closest-point projection of Eq. (7).
 struct Projection {
-  Pose X_WQ;                    ///< the admissible configuration q of the tool's body frame in the world
-  double energy = 0.0;          ///< T = d(p, q) of Eq. (8) [kg m^2]
+  Pose X_WQ;            ///< the admissible configuration q of the tool's body frame in the world
+  double energy = 0.0;  ///< T = d(p, q) of Eq. (8) [kg m^2]
   ProjectionStatus status = ProjectionStatus::free;
-  std::uint16_t iterations = 0; ///< Newton steps taken
-  double kkt_residual = 0.0;    ///< |grad T - sum multiplier grad gap| / |grad T| at q, in the body's own scale
-  bool proven_global = false;   ///< no admissible pose is closer: proven by project_globally(), never by project()
+  std::uint16_t iterations = 0;  ///< Newton steps taken
+  double kkt_residual = 0.0;  ///< |grad T - sum multiplier grad gap| / |grad T| at q, in the body's own scale
+  bool proven_global =
+      false;  ///< no admissible pose is closer: proven by project_globally(), never by project()
   std::uint16_t active_count = 0;  ///< contacts that touch at q
   std::array<ActiveContact, ContactSet::kCapacity> active;
 };
 
-/// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy metric,
-/// all contacts together.
+/// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy
+/// metric, all contacts together.
 ///
-/// Unknowns: u = s/L and the unit quaternion E = (w, v) of R_p' R_q, with s = R_p'(x_q - x_p) and L a length of the
-/// body's own (its radius of gyration), so that nothing below depends on the unit of length. With H^ = H/(m L^2):
+/// Unknowns: u = s/L and the unit quaternion E = (w, v) of R_p' R_q, with s = R_p'(x_q - x_p) and L a length
+/// of the body's own (its radius of gyration), so that nothing below depends on the unit of length. With H^ =
+/// H/(m L^2):
 ///
 ///   T/(m L^2) = |u|^2 + 4 v' H^ v          gap_i/L = n_i . (u + R_E a_i) + c_i
 ///
 /// where n_i, a_i/L, c_i = (n_i . x_p - o_i)/L are the contact as seen from p.
 ///
-/// For a fixed rotation every gap is affine in u. So the nearest translation is a three-dimensional least-distance
-/// problem with an exact answer, and every iterate of the method is admissible in the whole scene: a Newton step (a six-dimensional
-/// least-distance problem on the linearised gaps, curvature of the contacts included) proposes a rotation, the
-/// translation restores admissibility, and the step is accepted when T falls. The first iterate is the best
-/// translation, or last tick's rotation; T only falls from there, and whenever time is up there is an answer.
+/// For a fixed rotation every gap is affine in u. So the nearest translation is a three-dimensional
+/// least-distance problem with an exact answer, and every iterate of the method is admissible in the whole
+/// scene: a Newton step (a six-dimensional least-distance problem on the linearised gaps, curvature of the
+/// contacts included) proposes a rotation, the translation restores admissibility, and the step is accepted
+/// when T falls. The first iterate is the best translation, or last tick's rotation; T only falls from there,
+/// and whenever time is up there is an answer.
 ///
 /// All memory is in the object. One object serves one thread.
 class ExactProjection {
@@ -64,16 +68,18 @@ class ExactProjection {
   explicit ExactProjection(const Inertia& M);
   ExactProjection(const Inertia& M, Budget budget);
 
-  /// Follows a proxy: the closest admissible configuration to p, sought from the rotation of X_start (last tick's q).
-  /// RT safe.
+  /// Follows a proxy: the closest admissible configuration to p, sought from the rotation of X_start (last
+  /// tick's q). RT safe.
   Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept;
 
-  /// The closest admissible configuration to p, whatever came before: tries further starts until the dual bound
-  /// proves that none is closer, or the starts are used up. Up to a hundred times dearer than project(). RT safe.
+  /// The closest admissible configuration to p, whatever came before: tries further starts until the dual
+  /// bound proves that none is closer, or the starts are used up. Up to a hundred times dearer than
+  /// project(). RT safe.
   Projection project_globally(const Pose& X_WP, const ContactSource& scene) noexcept;
 
-  /// The closest admissible configuration among those with the rotation of X_rotated: what a method that knows
-  /// translations only would answer (X_rotated = X_WP), or the lift that makes any rotation admissible. RT safe.
+  /// The closest admissible configuration among those with the rotation of X_rotated: what a method that
+  /// knows translations only would answer (X_rotated = X_WP), or the lift that makes any rotation admissible.
+  /// RT safe.
   Projection translate(const Pose& X_WP, const ContactSource& scene, const Pose& X_rotated) noexcept;
 
   /// How far below zero a gap may seem by rounding at this pose [m]. RT safe.
@@ -92,8 +98,8 @@ class ExactProjection {
     double T = 0.0;  ///< in units of m L^2
   };
   struct Slope {
-    Vector6d g;       ///< gradient of T in (u, eta)
-    Matrix6d W;       ///< Hessian of the Lagrangian, made positive definite
+    Vector6d g;  ///< gradient of T in (u, eta)
+    Matrix6d W;  ///< Hessian of the Lagrangian, made positive definite
   };
   enum class Local : std::uint8_t { converged, budget_spent, infeasible };
   enum class Advance : std::uint8_t { fell, met_contacts, stuck };
@@ -123,7 +129,7 @@ class ExactProjection {
   Inertia M_;
   Budget budget_;
   std::uint16_t iteration_limit_;  ///< of the query at hand
-  double L_;           ///< [m]
+  double L_;                       ///< [m]
   Matrix3d H_hat_;
   Matrix6d metric_root_;  ///< Cholesky factor of diag(2 I, 2 H^)
 
@@ -139,7 +145,7 @@ class ExactProjection {
   LeastDistance<3, ContactSet::kCapacity> translation_;
   LeastDistance<6, ContactSet::kCapacity> step_;
   LeastDistance<7, ContactSet::kCapacity> elastic_;
-  State state_;                  ///< the iterate, and after a query its answer
+  State state_;                                          ///< the iterate, and after a query its answer
   Quaterniond dual_rotation_ = Quaterniond::Identity();  ///< where the dual bound of certify() is attained
   std::uint16_t iterations_ = 0;
 };

@@ -11,9 +11,9 @@ namespace wrenchd {
 
 /// The virtual body in the hand. M is the frame the mesh file is written in.
 struct ToolSettings {
-  std::filesystem::path mesh;    ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
-  double scale = 1.0;            ///< metres per mesh unit
-  double mass_kg = 1.0;          ///< of the uniform solid; scales T, moves no minimiser
+  std::filesystem::path mesh;  ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
+  double scale = 1.0;          ///< metres per mesh unit
+  double mass_kg = 1.0;        ///< of the uniform solid; scales T, moves no minimiser
 };
 
 /// Solid where normal_W . x < offset_m.
@@ -24,7 +24,7 @@ struct HalfSpaceSettings {
 };
 
 struct SceneSettings {
-  std::filesystem::path file;             ///< where it was read from, for messages
+  std::filesystem::path file;  ///< where it was read from, for messages
   ToolSettings tool;
   std::vector<HalfSpaceSettings> half_spaces;
 };

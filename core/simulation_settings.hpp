@@ -23,19 +23,19 @@ struct SimulationSettings {
   double viscous_friction_Nm_s_per_rad = 0.002;
   double coulomb_friction_N = 0.0;
   double coulomb_friction_Nm = 0.0;
-  double position_quantum_m = 1.0e-5;    ///< encoder step
+  double position_quantum_m = 1.0e-5;  ///< encoder step
   double rotation_quantum_rad = 1.0e-4;
-  double actuator_max_force_N = 12.0;    ///< what the motors can do, whatever they are told
+  double actuator_max_force_N = 12.0;  ///< what the motors can do, whatever they are told
   double actuator_max_torque_Nm = 0.6;
-  double report_delay_s = 0.0002;        ///< from sampling to the host
-  double command_delay_s = 0.0002;       ///< from the host to the motors
+  double report_delay_s = 0.0002;   ///< from sampling to the host
+  double command_delay_s = 0.0002;  ///< from the host to the motors
   double hand_stiffness_N_per_m = 300.0;
   double hand_stiffness_Nm_per_rad = 2.0;
   double hand_damping_N_s_per_m = 6.0;
   double hand_damping_Nm_s_per_rad = 0.03;
-  bool hand_repeats = true;              ///< the path starts again after its last waypoint
+  bool hand_repeats = true;  ///< the path starts again after its last waypoint
   std::filesystem::path hand_script = "hands/press_and_rock.toml";  ///< looked up along the search path
-  std::vector<Waypoint> hand_path;       ///< read from hand_script; at least one; times strictly rising from 0
+  std::vector<Waypoint> hand_path;  ///< read from hand_script; at least one; times strictly rising from 0
 };
 
 }  // namespace wrenchd

@@ -22,7 +22,8 @@ inline Wrench operator+(const Wrench& a, const Wrench& b) noexcept {
   return {a.force_N + b.force_N, a.torque_Nm + b.torque_Nm};
 }
 
-/// The same wrench about another point. p_old_new: from the old point to the new one, in the wrench's axes [m].
+/// The same wrench about another point. p_old_new: from the old point to the new one, in the wrench's axes
+/// [m].
 ///
 ///   tau_new = tau_old - p_old_new x f
 inline Wrench shifted(const Wrench& F, const Vector3d& p_old_new) noexcept {

@@ -30,7 +30,8 @@ Wrench WrenchLaw::update(const Vector6d& eps, bool in_contact, double dt_s) noex
   return {W_T.head<3>(), W_T.tail<3>()};
 }
 
-/// Rectangle rule; then the integral is scaled back so that neither its force nor its torque passes its limit.
+/// Rectangle rule; then the integral is scaled back so that neither its force nor its torque passes its
+/// limit.
 void WrenchLaw::integrate(const Vector6d& eps, double dt_s) noexcept {
   integral_ += dt_s * eps;
   const Vector6d W_I = gains_.integral * integral_;

@@ -25,22 +25,24 @@ struct WrenchGains {
   }
 };
 
-/// The gains a method's drive asks for. The translational method's torque is the lever of its force, so both halves
-/// take the mean force gain; the other methods take the gains as they are.
+/// The gains a method's drive asks for. The translational method's torque is the lever of its force, so both
+/// halves take the mean force gain; the other methods take the gains as they are.
 WrenchGains gains_for(Method method, const WrenchGains& gains) noexcept;
 
 /// The wrench law of Eq. (16):
 ///
 ///   W_T(t) = K_P eps(t) + K_I int eps dt + K_D d eps/dt
 ///
-/// in the body frame, on the body, pulling p towards q. The derivative passes a first-order low pass; the integral
-/// stops at its limits (anti-windup); both are forgotten when contact ends, so that a new contact starts clean.
+/// in the body frame, on the body, pulling p towards q. The derivative passes a first-order low pass; the
+/// integral stops at its limits (anti-windup); both are forgotten when contact ends, so that a new contact
+/// starts clean.
 class WrenchLaw {
  public:
   explicit WrenchLaw(const WrenchGains& gains) : gains_(gains) {}
 
-  /// eps: Eq. (15) or what the method puts in its place, in T. in_contact: false forgets integral and derivative and
-  /// gives zero. dt_s: time since the last call; not positive means no time has passed. RT safe.
+  /// eps: Eq. (15) or what the method puts in its place, in T. in_contact: false forgets integral and
+  /// derivative and gives zero. dt_s: time since the last call; not positive means no time has passed. RT
+  /// safe.
   Wrench update(const Vector6d& eps, bool in_contact, double dt_s) noexcept;
   void reset() noexcept;
 

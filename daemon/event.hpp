@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <boost/lockfree/spsc_queue.hpp>
 #include <cstdint>
+
+#include <boost/lockfree/spsc_queue.hpp>
 
 #include "core/clock.hpp"
 
@@ -11,14 +12,14 @@ namespace wrenchd {
 /// Something worth a line in the log, as the servo thread says it: no text, no allocation.
 struct Event {
   enum class Kind : std::uint8_t {
-    engagement,       ///< detail: the new Engagement
-    fault,            ///< detail: the Fault
-    late_tick,        ///< value: how late [s]; the soft start began anew
-    stale_sample,     ///< value: its age [s]; the wrench is zero until a new one comes
-    reports_missing,  ///< detail: how many, by sequence number
-    reports_rejected, ///< detail: how many were short, long, of another id, garbled or out of order
+    engagement,          ///< detail: the new Engagement
+    fault,               ///< detail: the Fault
+    late_tick,           ///< value: how late [s]; the soft start began anew
+    stale_sample,        ///< value: its age [s]; the wrench is zero until a new one comes
+    reports_missing,     ///< detail: how many, by sequence number
+    reports_rejected,    ///< detail: how many were short, long, of another id, garbled or out of order
     no_admissible_pose,  ///< the obstacles contradict each other where the hand is; the proxy stays
-    released,         ///< the hand was released
+    released,            ///< the hand was released
   };
   Kind kind = Kind::engagement;
   TimePoint at{};
@@ -26,7 +27,8 @@ struct Event {
   double value = 0.0;
 };
 
-/// From the servo thread to the log thread. When it is full, events are counted and dropped: the loop never waits.
+/// From the servo thread to the log thread. When it is full, events are counted and dropped: the loop never
+/// waits.
 using EventRing = boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<1024>>;
 
 }  // namespace wrenchd

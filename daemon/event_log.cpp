@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/event_log.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
+
+#include <spdlog/spdlog.h>
 
 #include "core/fault.hpp"
 
@@ -37,11 +37,13 @@ std::string to_text(const Event& event) {
     case Event::Kind::late_tick:
       return fmt::format("a tick came {:.1f} ms late; the soft start begins anew", 1e3 * event.value);
     case Event::Kind::stale_sample:
-      return fmt::format("the newest pose is {:.1f} ms old; zero wrench until a new one comes", 1e3 * event.value);
+      return fmt::format("the newest pose is {:.1f} ms old; zero wrench until a new one comes",
+                         1e3 * event.value);
     case Event::Kind::reports_missing:
       return fmt::format("{} reports of the device are missing", event.detail);
     case Event::Kind::reports_rejected:
-      return fmt::format("{} reports rejected: garbled, of another length or id, or out of order", event.detail);
+      return fmt::format("{} reports rejected: garbled, of another length or id, or out of order",
+                         event.detail);
     case Event::Kind::no_admissible_pose:
       return "no admissible pose near the hand: the obstacles leave no room; the proxy stays where it was";
     case Event::Kind::released:
@@ -68,7 +70,8 @@ void EventLog::drain() {
   Event event;
   while (loop_.events().pop(event)) spdlog::log(level_of(event.kind), "{}", to_text(event));
   const std::uint64_t dropped = loop_.dropped_events();
-  if (dropped > dropped_said_) spdlog::warn("{} events were dropped: the log fell behind", dropped - dropped_said_);
+  if (dropped > dropped_said_)
+    spdlog::warn("{} events were dropped: the log fell behind", dropped - dropped_said_);
   dropped_said_ = dropped;
 }
 

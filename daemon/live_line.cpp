@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/live_line.hpp"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include <spdlog/fmt/fmt.h>
 
 #include "core/engagement.hpp"
 #include "core/fault.hpp"
@@ -13,9 +13,13 @@
 namespace wrenchd {
 namespace {
 
-double microseconds(Duration d) { return 1e-3 * static_cast<double>(d.count()); }
+double microseconds(Duration d) {
+  return 1e-3 * static_cast<double>(d.count());
+}
 
-double length(const double* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+double length(const double* v) {
+  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
 
 std::string times(const DurationHistogram& h) {
   return fmt::format("{:.1f}/{:.1f}/{:.1f}", microseconds(h.quantile(0.5)), microseconds(h.quantile(0.999)),
@@ -23,7 +27,9 @@ std::string times(const DurationHistogram& h) {
 }
 
 /// Rotation angle of x y z qx qy qz qw [rad].
-double angle(const std::array<double, 7>& X) { return 2.0 * std::atan2(length(&X[3]), std::abs(X[6])); }
+double angle(const std::array<double, 7>& X) {
+  return 2.0 * std::atan2(length(&X[3]), std::abs(X[6]));
+}
 
 std::string state(const TickRecord& r) {
   if (r.fault != 0) return fmt::format("fault:{}", text(static_cast<Fault>(r.fault)).name);
@@ -37,8 +43,8 @@ std::string live_line(const TickRecord& r, const LoopTiming& timing) {
       "{:7.2f} s {:<8} | tool {:+6.1f} {:+6.1f} {:+6.1f} mm {:4.1f} deg | {} contacts | "
       "F {:+5.2f} {:+5.2f} {:+5.2f} N | T {:+6.1f} {:+6.1f} {:+6.1f} mN.m | tick {} us",
       r.device_time_s, state(r), 1e3 * r.X_WP[0], 1e3 * r.X_WP[1], 1e3 * r.X_WP[2],
-      angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts, r.F_out[0], r.F_out[1], r.F_out[2], 1e3 * r.F_out[3],
-      1e3 * r.F_out[4], 1e3 * r.F_out[5], times(timing.tick));
+      angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts, r.F_out[0], r.F_out[1], r.F_out[2],
+      1e3 * r.F_out[3], 1e3 * r.F_out[4], 1e3 * r.F_out[5], times(timing.tick));
 }
 
 void look(RunTotals& totals, const TickRecord& r) {
@@ -51,7 +57,8 @@ void look(RunTotals& totals, const TickRecord& r) {
 
 std::string summary(const RunTotals& totals, const LoopTiming& timing) {
   std::string text = fmt::format(
-      "{} ticks in {:.2f} s ({:.1f} Hz); in contact at {} of {} looks; largest force {:.2f} N, torque {:.1f} mN.m\n",
+      "{} ticks in {:.2f} s ({:.1f} Hz); in contact at {} of {} looks; largest force {:.2f} N, torque {:.1f} "
+      "mN.m\n",
       totals.ticks, totals.seconds, static_cast<double>(totals.ticks) / std::max(totals.seconds, 1e-9),
       totals.ticks_in_contact, totals.looks, totals.most_force_N, 1e3 * totals.most_torque_Nm);
   text += fmt::format("{:<14} {:>24}\n", "", "p50 / p99.9 / max [us]");

@@ -17,7 +17,7 @@ struct RunTotals {
   std::uint64_t ticks = 0;
   std::uint64_t ticks_in_contact = 0;  ///< of those that were looked at for the live line
   std::uint64_t looks = 0;
-  double most_force_N = 0.0;           ///< seen at the looks
+  double most_force_N = 0.0;  ///< seen at the looks
   double most_torque_Nm = 0.0;
 };
 

@@ -7,7 +7,8 @@
 
 namespace wrenchd {
 
-// Up to 32 ns one bucket a nanosecond; above, the five bits below the leading one choose the bucket in its octave.
+// Up to 32 ns one bucket a nanosecond; above, the five bits below the leading one choose the bucket in its
+// octave.
 std::size_t DurationHistogram::bucket_of(std::uint64_t ns) noexcept {
   if (ns < kSub) return ns;
   const unsigned shift = static_cast<unsigned>(std::bit_width(ns)) - 1 - kSubBits;

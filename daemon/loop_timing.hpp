@@ -10,8 +10,8 @@
 
 namespace wrenchd {
 
-/// Counts durations in fixed buckets, 32 to each power of two: any quantile is right within 3 %, the maximum exactly.
-/// One thread adds, any thread reads; nobody waits. RT safe.
+/// Counts durations in fixed buckets, 32 to each power of two: any quantile is right within 3 %, the maximum
+/// exactly. One thread adds, any thread reads; nobody waits. RT safe.
 class DurationHistogram {
  public:
   void add(Duration duration) noexcept;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/realtime.hpp"
 
+#include <array>
+#include <cerrno>
+#include <cstring>
+
 #include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
-
-#include <array>
-#include <cerrno>
-#include <cstring>
 
 namespace wrenchd {
 namespace {
@@ -46,7 +46,8 @@ std::vector<RealtimeGrant> lock_memory(Realtime mode) {
   mallopt(M_TRIM_THRESHOLD, -1);
   mallopt(M_MMAP_MAX, 0);
   const int error = mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
-  return required_or_told(mode, {outcome("memory locked", error, "raise the memlock limit (LimitMEMLOCK=, ulimit -l)")});
+  return required_or_told(
+      mode, {outcome("memory locked", error, "raise the memlock limit (LimitMEMLOCK=, ulimit -l)")});
 }
 
 std::vector<RealtimeGrant> prepare_servo_thread(const ServoSettings& settings) {

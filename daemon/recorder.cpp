@@ -11,14 +11,19 @@ constexpr auto kPause = std::chrono::milliseconds(100);
 }  // namespace
 
 Recorder::Recorder(RecordRing& ring, const std::filesystem::path& file, const RecordingHeader& header)
-    : ring_(ring), writer_(file, header), batch_(kRingRecords), thread_([this](const std::stop_token& s) { run(s); }) {}
+    : ring_(ring),
+      writer_(file, header),
+      batch_(kRingRecords),
+      thread_([this](const std::stop_token& s) { run(s); }) {}
 
 Recorder::~Recorder() {
   thread_.request_stop();
   thread_.join();
 }
 
-std::string Recorder::error() const { return failed_.load(std::memory_order_acquire) ? error_ : std::string(); }
+std::string Recorder::error() const {
+  return failed_.load(std::memory_order_acquire) ? error_ : std::string();
+}
 
 void Recorder::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {

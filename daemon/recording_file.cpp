@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recording_file.hpp"
 
-#include <hdf5.h>
-
 #include <array>
 #include <cstddef>
 #include <tuple>
+
+#include <hdf5.h>
 
 namespace wrenchd {
 namespace {
 
 constexpr const char* kTable = "/ticks";
-constexpr hsize_t kChunkRows = 1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
+constexpr hsize_t kChunkRows =
+    1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;
 constexpr hsize_t kStages = std::tuple_size_v<decltype(TickRecord::stage_ns)>;
 
@@ -24,15 +25,29 @@ struct Column {
   hsize_t count;
 };
 
-hid_t u64() { return H5T_NATIVE_UINT64; }
-hid_t i64() { return H5T_NATIVE_INT64; }
-hid_t u32() { return H5T_NATIVE_UINT32; }
-hid_t u16() { return H5T_NATIVE_UINT16; }
-hid_t u8() { return H5T_NATIVE_UINT8; }
-hid_t f64() { return H5T_NATIVE_DOUBLE; }
+hid_t u64() {
+  return H5T_NATIVE_UINT64;
+}
+hid_t i64() {
+  return H5T_NATIVE_INT64;
+}
+hid_t u32() {
+  return H5T_NATIVE_UINT32;
+}
+hid_t u16() {
+  return H5T_NATIVE_UINT16;
+}
+hid_t u8() {
+  return H5T_NATIVE_UINT8;
+}
+hid_t f64() {
+  return H5T_NATIVE_DOUBLE;
+}
 
-#define WRENCHD_COLUMN(field, unit, type, count) \
-  Column { #field, unit, offsetof(TickRecord, field), type, count }
+#define WRENCHD_COLUMN(field, unit, type, count)           \
+  Column {                                                 \
+#field, unit, offsetof(TickRecord, field), type, count \
+  }
 constexpr std::array kColumns = {
     WRENCHD_COLUMN(tick, "1", u64, 1),
     WRENCHD_COLUMN(now_ns, "ns", i64, 1),
@@ -89,7 +104,9 @@ class Handle {
 };
 
 /// HDF5 prints its error stack unless told not to; our errors say what matters.
-void quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void quiet() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 hid_t row_type() {
   const hid_t row = H5Tcreate(H5T_COMPOUND, sizeof(TickRecord));
@@ -156,10 +173,12 @@ hid_t create_table(hid_t file, hid_t row) {
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header) {
   quiet();
   if (std::filesystem::exists(file))
-    throw RecordingError(file.string() + ": exists already, and a recording is never overwritten; choose another name");
+    throw RecordingError(file.string() +
+                         ": exists already, and a recording is never overwritten; choose another name");
   const hid_t id = H5Fcreate(file.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT);
   if (id < 0)
-    throw RecordingError(file.string() + ": cannot be created; check that the directory exists and may be written to");
+    throw RecordingError(file.string() +
+                         ": cannot be created; check that the directory exists and may be written to");
   const hid_t row = row_type();
   file_.reset(new File{Handle(id, H5Fclose), Handle(row, H5Tclose), Handle(create_table(id, row), H5Dclose)});
   if (!file_->table.ok()) throw RecordingError(file.string() + ": the table of ticks cannot be created");
@@ -177,7 +196,8 @@ void RecordingWriter::append(std::span<const TickRecord> records) {
   const hsize_t start = file_->rows;
   const hsize_t count = records.size();
   const hsize_t total = start + count;
-  if (H5Dset_extent(file_->table, &total) < 0) throw RecordingError("the recording cannot grow; is the disk full?");
+  if (H5Dset_extent(file_->table, &total) < 0)
+    throw RecordingError("the recording cannot grow; is the disk full?");
   const Handle in_file(H5Dget_space(file_->table), H5Sclose);
   H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &start, nullptr, &count, nullptr);
   const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
@@ -191,16 +211,18 @@ Recording read_recording(const std::filesystem::path& file) {
   quiet();
   const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!opened.ok())
-    throw RecordingError(file.string() + ": is not there, or is not an HDF5 file; name a recording of wrenchd");
+    throw RecordingError(file.string() +
+                         ": is not there, or is not an HDF5 file; name a recording of wrenchd");
   const Handle table(H5Dopen2(opened, kTable, H5P_DEFAULT), H5Dclose);
-  if (!table.ok()) throw RecordingError(file.string() + ": has no table 'ticks'; name a recording of wrenchd");
+  if (!table.ok())
+    throw RecordingError(file.string() + ": has no table 'ticks'; name a recording of wrenchd");
   const Handle space(H5Dget_space(table), H5Sclose);
   hsize_t rows = 0;
   H5Sget_simple_extent_dims(space, &rows, nullptr);
 
   Recording recording;
-  recording.header = {read_text(table, "wrenchd_version"), read_text(table, "settings"), read_text(table, "scene"),
-                      read_text(table, "profile")};
+  recording.header = {read_text(table, "wrenchd_version"), read_text(table, "settings"),
+                      read_text(table, "scene"), read_text(table, "profile")};
   recording.ticks.resize(rows);
   const Handle row(row_type(), H5Tclose);
   if (rows > 0 && H5Dread(table, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, recording.ticks.data()) < 0)

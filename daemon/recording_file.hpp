@@ -27,8 +27,8 @@ struct RecordingHeader {
   std::string profile;
 };
 
-/// An HDF5 file with one table, /ticks: one row a tick, one named column a field, units in the attribute "units" of
-/// the table. Any HDF5 reader opens it: h5dump, h5py, MATLAB. Not RT safe.
+/// An HDF5 file with one table, /ticks: one row a tick, one named column a field, units in the attribute
+/// "units" of the table. Any HDF5 reader opens it: h5dump, h5py, MATLAB. Not RT safe.
 class RecordingWriter {
  public:
   /// Throws RecordingError. An existing file is refused: a recording is never overwritten.

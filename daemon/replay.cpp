@@ -23,7 +23,9 @@ class RecordedDevice final : public Device {
 
  private:
   /// The faults that a write finds; all others came with the sample, or out of the loop itself.
-  bool write_failed() const noexcept { return record_->fault == static_cast<std::uint8_t>(Fault::write_failed); }
+  bool write_failed() const noexcept {
+    return record_->fault == static_cast<std::uint8_t>(Fault::write_failed);
+  }
 
   const TickRecord* record_ = nullptr;
 };
@@ -62,17 +64,23 @@ std::optional<Difference> compare(std::uint64_t tick, const char* field, std::sp
 
 std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
   const auto whole = [](const TickRecord& r) {
-    return std::array<double, 9>{r.energy, r.authority, static_cast<double>(r.contacts),
-                                 static_cast<double>(r.iterations), static_cast<double>(r.projection_status),
-                                 static_cast<double>(r.engagement), static_cast<double>(r.limit_causes),
-                                 static_cast<double>(r.fault), static_cast<double>(r.released)};
+    return std::array<double, 9>{r.energy,
+                                 r.authority,
+                                 static_cast<double>(r.contacts),
+                                 static_cast<double>(r.iterations),
+                                 static_cast<double>(r.projection_status),
+                                 static_cast<double>(r.engagement),
+                                 static_cast<double>(r.limit_causes),
+                                 static_cast<double>(r.fault),
+                                 static_cast<double>(r.released)};
   };
   if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
   if (auto d = compare(then.tick, "X_WQ", then.X_WQ, now.X_WQ)) return d;
   if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
-  return compare(then.tick, "energy, authority, contacts, iterations, status, engagement, causes, fault, released",
+  return compare(then.tick,
+                 "energy, authority, contacts, iterations, status, engagement, causes, fault, released",
                  whole(then), whole(now));
 }
 

@@ -18,8 +18,8 @@ struct Difference {
   double replayed = 0.0;
 };
 
-/// Feeds the recorded samples through a servo loop of the same plan, offline and at once, and compares what came out
-/// then with what comes out now, bit for bit. Nothing: all ticks agree. Times are not compared.
+/// Feeds the recorded samples through a servo loop of the same plan, offline and at once, and compares what
+/// came out then with what comes out now, bit for bit. Nothing: all ticks agree. Times are not compared.
 std::optional<Difference> replay(const Recording& recording, const Plan& plan);
 
 }  // namespace wrenchd

@@ -9,13 +9,14 @@
 //
 //   device -> pose p -> contacts -> projection q -> wrench -> limits -> device
 //
-// tick() is that line. Above it is run(), which waits for the next tick and lets nobody out without release();
-// below it are the stages, in order.
+// tick() is that line. Above it is run(), which waits for the next tick and lets nobody out without
+// release(); below it are the stages, in order.
 
 namespace wrenchd {
 namespace {
 
-/// A sample older than this no longer pushes: the wrench is zero until a new one comes. A few reports at 1 kHz.
+/// A sample older than this no longer pushes: the wrench is zero until a new one comes. A few reports at 1
+/// kHz.
 constexpr Duration kStaleAfter = std::chrono::milliseconds(3);
 /// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
 constexpr int kDevicePatience_periods = 4;
@@ -37,8 +38,8 @@ std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
 
 }  // namespace
 
-ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
-                     const Clock& clock, RecordRing* records)
+ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
+                     const Scene& scene, const Clock& clock, RecordRing* records)
     : device_(device),
       scene_(scene),
       clock_(clock),
@@ -74,13 +75,13 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   if (sample.fault != Fault::none) return release(now, sample.fault);
   if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) return release(now, Fault::pose_not_finite);
 
-  if (sample.fresh) project(sample);         // contacts, and the closest admissible configuration q
+  if (sample.fresh) project(sample);  // contacts, and the closest admissible configuration q
   lap(Stage::projection);
 
   if (sample.fresh) compute_wrench(sample);  // Eq. (16), from p to q
   lap(Stage::wrench);
 
-  const Limited out = limit(sample, now);    // soft start, magnitude, slew
+  const Limited out = limit(sample, now);  // soft start, magnitude, slew
   lap(Stage::limits);
   if ((out.causes & kNotFinite) != 0) return release(now, Fault::wrench_not_finite);
 
@@ -106,8 +107,8 @@ Fault ServoLoop::release(TimePoint now, Fault why) noexcept {
   return why;
 }
 
-/// Sleeps until the next tick is due, by the clock or by the device's next report. A loop that fell behind leaves out
-/// the ticks it missed: two ticks in a row on old news would help nobody.
+/// Sleeps until the next tick is due, by the clock or by the device's next report. A loop that fell behind
+/// leaves out the ticks it missed: two ticks in a row on old news would help nobody.
 TimePoint ServoLoop::wait_for_next(Clock& clock, TimePoint due) noexcept {
   if (pacing_ == Pacing::device) {
     device_.wait_readable(clock.now() + kDevicePatience_periods * period_);
@@ -152,16 +153,16 @@ void ServoLoop::obey(std::uint8_t command) noexcept {
   if (command == 2) soft_start_.disarm();
 }
 
-/// Lines 2 to 6: p from the sample, and its projection q. The first sample has no history to follow, so it is projected
-/// globally; from then on q follows the hand as a proxy.
+/// Lines 2 to 6: p from the sample, and its projection q. The first sample has no history to follow, so it is
+/// projected globally; from then on q follows the hand as a proxy.
 void ServoLoop::project(const DeviceSample& sample) noexcept {
   X_WP_ = X_WB_ * sample.X_BH * X_HT_;
   depth_ = X_WQ_ ? penetration_.follow(X_WP_, scene_, *X_WQ_) : penetration_.query(X_WP_, scene_);
   X_WQ_ = depth_.projection.X_WQ;
 }
 
-/// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock, which
-/// knows when the poses were taken.
+/// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,
+/// which knows when the poses were taken.
 void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const double dt_s = sampled_ ? sample.device_time_s - sample_time_s_ : 0.0;
   sample_time_s_ = sample.device_time_s;
@@ -170,7 +171,8 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   F_out_ = outgoing(X_WB_ * sample.X_BH);
 }
 
-/// About the handle point in the axes of the device base, or the paper's spatial wrench W_S: as the profile says.
+/// About the handle point in the axes of the device base, or the paper's spatial wrench W_S: as the profile
+/// says.
 Wrench ServoLoop::outgoing(const Pose& X_WH) const noexcept {
   if (wrench_point_ == WrenchPoint::world_origin) return spatial_wrench(X_WP_, F_T_);
   const Wrench F_H_W = wrench_about(X_WH.translation_m, X_WP_, F_T_);
@@ -219,7 +221,8 @@ void ServoLoop::describe(const Limited& out) noexcept {
 
 void ServoLoop::publish() noexcept {
   latest_.write(record_);
-  if (records_ != nullptr && !records_->push(record_)) dropped_records_.fetch_add(1, std::memory_order_relaxed);
+  if (records_ != nullptr && !records_->push(record_))
+    dropped_records_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void ServoLoop::record_sample(const DeviceSample& sample) noexcept {
@@ -249,7 +252,8 @@ void ServoLoop::say_changes(TimePoint now, const DeviceSample& sample) noexcept 
     say(Event::Kind::engagement, now, static_cast<std::uint32_t>(soft_start_.state()));
   said_engagement_ = soft_start_.state();
   const ProjectionStatus status = depth_.projection.status;
-  if (status != said_status_ && status == ProjectionStatus::infeasible) say(Event::Kind::no_admissible_pose, now);
+  if (status != said_status_ && status == ProjectionStatus::infeasible)
+    say(Event::Kind::no_admissible_pose, now);
   said_status_ = status;
 }
 

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <atomic>
-#include <boost/lockfree/spsc_queue.hpp>
 #include <optional>
+
+#include <boost/lockfree/spsc_queue.hpp>
 
 #include "collision/scene.hpp"
 #include "config/settings.hpp"
@@ -26,22 +27,23 @@ using RecordRing = boost::lockfree::spsc_queue<TickRecord>;
 
 /// The servo loop: holds the hand and the virtual body together.
 ///
-/// Frames: W world, B device base, H handle point, M mesh of the tool, T body frame of the tool at its centre of mass.
-/// p and q are the paper's: the configuration of T that the hand asks for, and its projection.
+/// Frames: W world, B device base, H handle point, M mesh of the tool, T body frame of the tool at its centre
+/// of mass. p and q are the paper's: the configuration of T that the hand asks for, and its projection.
 ///
 /// After construction nothing here allocates, locks, logs, throws or waits, but for the sleep in run().
 class ServoLoop {
  public:
-  /// Everything is kept by reference or copied; the device is open. records may be null: then nothing is recorded.
+  /// Everything is kept by reference or copied; the device is open. records may be null: then nothing is
+  /// recorded.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
             const Clock& clock, RecordRing* records = nullptr);
 
-  /// Ticks until stop is set or a fault ends the loop, and releases the hand on every way out. Returns the fault.
-  /// clock: the same as at construction, to sleep on.
+  /// Ticks until stop is set or a fault ends the loop, and releases the hand on every way out. Returns the
+  /// fault. clock: the same as at construction, to sleep on.
   Fault run(Clock& clock, const std::atomic<bool>& stop) noexcept;
 
-  /// One cycle of the paper's Algorithm 1. A fault ends the loop; the hand has been released then. due: when this tick
-  /// should have started. RT safe.
+  /// One cycle of the paper's Algorithm 1. A fault ends the loop; the hand has been released then. due: when
+  /// this tick should have started. RT safe.
   Fault tick(TimePoint now, TimePoint due) noexcept;
 
   /// The one way out: zero wrench, motors off, whatever the state. Harmless when called again. RT safe.
@@ -92,12 +94,12 @@ class ServoLoop {
   WrenchLaw law_;
   WrenchLimits limits_;
   SoftStart soft_start_;
-  std::optional<Pose> X_WQ_;   ///< last tick's projection: the proxy
+  std::optional<Pose> X_WQ_;  ///< last tick's projection: the proxy
   Pose X_WP_;
   Penetration depth_;
-  Wrench F_T_;                 ///< Eq. (16), body frame
-  Wrench F_out_;               ///< the same as the device wants it, before limits
-  double sample_time_s_ = 0.0; ///< device time of the last fresh sample
+  Wrench F_T_;                  ///< Eq. (16), body frame
+  Wrench F_out_;                ///< the same as the device wants it, before limits
+  double sample_time_s_ = 0.0;  ///< device time of the last fresh sample
   bool sampled_ = false;
   bool stale_ = false;
 

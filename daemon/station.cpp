@@ -52,7 +52,9 @@ Station::Station(Plan plan, Clock& clock)
   device_.open();
 }
 
-Station::~Station() { device_.close(); }
+Station::~Station() {
+  device_.close();
+}
 
 RecordingHeader Station::recording_header() const {
   return {kVersion, contents(plan_.settings.file), contents(plan_.scene.file),

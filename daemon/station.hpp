@@ -24,8 +24,8 @@ struct Plan {
   SceneSettings scene;
 };
 
-/// What a command line names: the configuration, and what stands in place of what the configuration names. A file is
-/// taken as it is given, from the working directory, and then looked for along the search path.
+/// What a command line names: the configuration, and what stands in place of what the configuration names. A
+/// file is taken as it is given, from the working directory, and then looked for along the search path.
 struct PlanFiles {
   std::filesystem::path config = "wrenchd.toml";
   std::filesystem::path scene;  ///< empty: the configuration's

@@ -6,16 +6,16 @@
 
 namespace wrenchd {
 
-/// Everything one tick saw and did, in plain numbers: what the live line shows, what a recording keeps, what a replay
-/// compares. Field names carry frame and unit; daemon/recording_file.cpp lists them for the file.
+/// Everything one tick saw and did, in plain numbers: what the live line shows, what a recording keeps, what
+/// a replay compares. Field names carry frame and unit; daemon/recording_file.cpp lists them for the file.
 ///
 /// Poses are x y z [m], qx qy qz qw. Wrenches are fx fy fz [N], tx ty tz [N.m].
 struct TickRecord {
   std::uint64_t tick = 0;
-  std::int64_t now_ns = 0;             ///< monotonic time at which the tick started
+  std::int64_t now_ns = 0;  ///< monotonic time at which the tick started
 
   // What came in
-  std::int64_t arrived_ns = 0;         ///< when the sample reached the host
+  std::int64_t arrived_ns = 0;  ///< when the sample reached the host
   double device_time_s = 0.0;
   std::uint64_t sequence = 0;
   std::uint64_t acknowledged = 0;
@@ -26,31 +26,31 @@ struct TickRecord {
   std::uint8_t fresh = 0;
   std::uint8_t motors_on = 0;
   std::uint8_t watchdog_tripped = 0;
-  std::uint8_t arm_command = 0;        ///< 1: arm was asked for since the last tick, 2: disarm
-  std::array<double, 7> X_BH{};        ///< handle in the device base
-  std::array<double, 6> V_BH{};        ///< linear [m/s], angular [rad/s]
+  std::uint8_t arm_command = 0;  ///< 1: arm was asked for since the last tick, 2: disarm
+  std::array<double, 7> X_BH{};  ///< handle in the device base
+  std::array<double, 6> V_BH{};  ///< linear [m/s], angular [rad/s]
 
   // What was made of it
-  std::array<double, 7> X_WP{};        ///< body frame at the device pose, p
-  std::array<double, 7> X_WQ{};        ///< its projection, q
-  std::array<double, 6> eps{};         ///< Eq. (15) [m, rad]
-  std::array<double, 6> F_T{};         ///< body wrench, Eq. (16), before limits
-  double energy = 0.0;                 ///< T of Eq. (8) [kg m^2]
+  std::array<double, 7> X_WP{};  ///< body frame at the device pose, p
+  std::array<double, 7> X_WQ{};  ///< its projection, q
+  std::array<double, 6> eps{};   ///< Eq. (15) [m, rad]
+  std::array<double, 6> F_T{};   ///< body wrench, Eq. (16), before limits
+  double energy = 0.0;           ///< T of Eq. (8) [kg m^2]
   double kkt_residual = 0.0;
   std::uint16_t contacts = 0;
   std::uint16_t iterations = 0;
   std::uint8_t projection_status = 0;  ///< ProjectionStatus
 
   // What went out
-  std::uint8_t engagement = 0;         ///< Engagement
-  std::uint8_t limit_causes = 0;       ///< LimitCause bits
-  std::uint8_t fault = 0;              ///< Fault
-  std::uint8_t released = 0;           ///< 1: the hand was released in this record; F_out is zero
+  std::uint8_t engagement = 0;    ///< Engagement
+  std::uint8_t limit_causes = 0;  ///< LimitCause bits
+  std::uint8_t fault = 0;         ///< Fault
+  std::uint8_t released = 0;      ///< 1: the hand was released in this record; F_out is zero
   double authority = 0.0;
-  std::array<double, 6> F_out{};       ///< about the point and in the axes the profile names
+  std::array<double, 6> F_out{};  ///< about the point and in the axes the profile names
 
   // What it cost
-  std::int64_t wake_latency_ns = 0;    ///< from the time the tick was due to its start
+  std::int64_t wake_latency_ns = 0;        ///< from the time the tick was due to its start
   std::array<std::int64_t, 5> stage_ns{};  ///< read, projection, wrench, limits, write
 };
 

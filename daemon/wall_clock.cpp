@@ -6,7 +6,9 @@
 
 namespace wrenchd {
 
-TimePoint WallClock::now() const noexcept { return std::chrono::steady_clock::now(); }
+TimePoint WallClock::now() const noexcept {
+  return std::chrono::steady_clock::now();
+}
 
 void WallClock::sleep_until(TimePoint t) noexcept {
   const auto ns = t.time_since_epoch().count();  // steady_clock is CLOCK_MONOTONIC on Linux

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <catch2/catch.hpp>
 #include <algorithm>
 #include <vector>
+
+#include <catch2/catch.hpp>
 
 #include "daemon/loop_timing.hpp"
 #include "tests/support/random_values.hpp"

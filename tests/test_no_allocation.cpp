@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <catch2/catch.hpp>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
+
+#include <catch2/catch.hpp>
 
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/shipped_plan.hpp"
@@ -25,7 +26,8 @@ TEST_CASE("the guard sees what it is there to see", "[realtime]") {
 #endif
 }
 
-TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neither allocate nor lock", "[realtime]") {
+TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neither allocate nor lock",
+          "[realtime]") {
   const Method method = GENERATE(Method::exact, Method::planar, Method::translational);
   Plan plan = shipped_plan();
   plan.settings.rendering.method = method;

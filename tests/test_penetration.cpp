@@ -44,7 +44,8 @@ TEST_CASE("every method's pose is admissible, and exact is never above the other
     CHECK(planar.projection.energy <= translational.projection.energy * (1.0 + 1e-9));
     most_excess = std::max(most_excess, planar.projection.energy / T - 1.0);
   }
-  CHECK(most_excess > 0.01);  // the paper's family is not optimal for a general inertia: its axis stays in the plane
+  CHECK(most_excess >
+        0.01);  // the paper's family is not optimal for a general inertia: its axis stays in the plane
 }
 
 TEST_CASE("planar solves example 4.1 exactly: the rotation lies in one of its planes", "[penetration]") {
@@ -89,7 +90,8 @@ TEST_CASE("an edge that lies flat gives translational no torque along itself", "
 }
 
 TEST_CASE("where there is no room the proxy stays, and draws the hand back", "[penetration]") {
-  const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
+  const Scene scene(box({1.0, 1.0, 1.0}),
+                    {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
   PenetrationDepth exact = depth_by(Method::exact, scene);
   const Pose X_last{Quaterniond::Identity(), {0.0, 0.0, 2.0}};
   const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, 0.3}};

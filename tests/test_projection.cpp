@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+
+#include <catch2/catch.hpp>
 
 #include "core/metric.hpp"
 #include "core/projection.hpp"
@@ -12,7 +13,8 @@ using namespace wrenchd::test;
 
 namespace {
 
-/// T for the rotation R_p' R_q = E and the least translation out of one half-space: what is left to minimise over E.
+/// T for the rotation R_p' R_q = E and the least translation out of one half-space: what is left to minimise
+/// over E.
 double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaterniond& E) {
   const Pose X_WQ{X_WP.rotation * E, X_WP.translation_m};
   const double lift_m = std::max(0.0, -scene.least_gap_m(X_WQ));
@@ -20,7 +22,8 @@ double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaternion
   return M.mass_kg * lift_m * lift_m + 4.0 * E.vec().dot(M.H_kg_m2 * E.vec());
 }
 
-/// The optimum against one half-space by brute force: random rotations, the best refined by ever smaller random steps.
+/// The optimum against one half-space by brute force: random rotations, the best refined by ever smaller
+/// random steps.
 double brute_force(const Scene& scene, const Pose& X_WP, RandomValues& random) {
   double best = std::numeric_limits<double>::infinity();
   Quaterniond best_E;
@@ -153,7 +156,8 @@ TEST_CASE("a face pressed flat comes straight out, however many vertices it has"
 TEST_CASE("several half-spaces are met together: a box pressed into a corner of the room", "[projection]") {
   RandomValues random(3);
   for (int i = 0; i < 50; ++i) {
-    const std::vector<HalfSpaceSettings> room = {half_space(Vector3d::UnitX(), 0.0), half_space(Vector3d::UnitY(), 0.0),
+    const std::vector<HalfSpaceSettings> room = {half_space(Vector3d::UnitX(), 0.0),
+                                                 half_space(Vector3d::UnitY(), 0.0),
                                                  half_space(Vector3d::UnitZ(), 0.0)};
     const Scene scene(box({1.0, 0.8, 0.6}), room);
     ExactProjection exact(scene.tool().solid.inertia);
@@ -168,7 +172,8 @@ TEST_CASE("several half-spaces are met together: a box pressed into a corner of 
 
 TEST_CASE("a slot that is too narrow at this angle is entered by turning", "[projection]") {
   // A 1 x 1 x 0.2 plate stands across a slot 0.5 wide: no translation helps, a turn about x does.
-  const Scene scene(box({1.0, 1.0, 0.2}), {half_space(Vector3d::UnitY(), -0.25), half_space(-Vector3d::UnitY(), -0.25)});
+  const Scene scene(box({1.0, 1.0, 0.2}),
+                    {half_space(Vector3d::UnitY(), -0.25), half_space(-Vector3d::UnitY(), -0.25)});
   ExactProjection exact(scene.tool().solid.inertia);
   const Pose X_WP{Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX())), Vector3d::Zero()};
   CHECK(exact.translate(X_WP, scene, X_WP).status == ProjectionStatus::infeasible);
@@ -178,7 +183,8 @@ TEST_CASE("a slot that is too narrow at this angle is entered by turning", "[pro
 }
 
 TEST_CASE("obstacles that leave no room are said to be infeasible", "[projection]") {
-  const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
+  const Scene scene(box({1.0, 1.0, 1.0}),
+                    {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
   ExactProjection exact(scene.tool().solid.inertia);
   const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, 0.25}};
   CHECK(exact.project_globally(X_WP, scene).status == ProjectionStatus::infeasible);
@@ -205,7 +211,8 @@ TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]"
   }
 }
 
-TEST_CASE("the projection moves with the world, and does not care where the mesh's frame is", "[projection]") {
+TEST_CASE("the projection moves with the world, and does not care where the mesh's frame is",
+          "[projection]") {
   RandomValues random(5);
   for (int i = 0; i < 40; ++i) {
     const Case c = random_case(random);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
 #include <limits>
+
+#include <catch2/catch.hpp>
 
 #include "daemon/recording_file.hpp"
 #include "tests/support/random_values.hpp"
@@ -16,7 +17,9 @@ namespace {
 /// A record with random bits in every field, padding left zero.
 TickRecord random_record(RandomValues& random) {
   TickRecord r;
-  const auto any = [&](auto& field) { field = static_cast<std::remove_reference_t<decltype(field)>>(random.bits()); };
+  const auto any = [&](auto& field) {
+    field = static_cast<std::remove_reference_t<decltype(field)>>(random.bits());
+  };
   any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged), any(r.skipped);
   any(r.missing), any(r.rejected), any(r.buttons), any(r.fresh), any(r.motors_on), any(r.watchdog_tripped);
   any(r.arm_command), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.engagement);
@@ -62,7 +65,8 @@ TEST_CASE("recordings are refused with the file and the cure", "[recording]") {
   { const RecordingWriter writer(file, {}); }
   CHECK(read_recording(file).ticks.empty());
   CHECK_THROWS_WITH(RecordingWriter(file, {}), Catch::Contains("never overwritten"));
-  CHECK_THROWS_WITH(RecordingWriter(directory.path() / "no" / "run.h5", {}), Catch::Contains("cannot be created"));
+  CHECK_THROWS_WITH(RecordingWriter(directory.path() / "no" / "run.h5", {}),
+                    Catch::Contains("cannot be created"));
   CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("is not there"));
   std::ofstream(directory.path() / "text.h5") << "not HDF5";
   CHECK_THROWS_WITH(read_recording(directory.path() / "text.h5"), Catch::Contains("is not an HDF5 file"));

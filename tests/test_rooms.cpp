@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <regex>
 #include <set>
 #include <string>
+
+#include <catch2/catch.hpp>
 
 // The rooms of the source tree, as the README draws them: arrows point one way.
 
@@ -61,7 +62,8 @@ TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
     INFO(include.file << " includes " << include.name);
     const bool ours = include.name.starts_with("core/");
     const bool eigen = include.name.starts_with("Eigen/");
-    const bool standard = include.name.find('/') == std::string::npos && include.name.find('.') == std::string::npos;
+    const bool standard =
+        include.name.find('/') == std::string::npos && include.name.find('.') == std::string::npos;
     CHECK((ours || eigen || standard));
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <catch2/catch.hpp>
 #include <thread>
+
+#include <catch2/catch.hpp>
 
 #include "core/wrench_law.hpp"
 #include "daemon/event_log.hpp"
@@ -24,7 +25,8 @@ Pose pose_of(const std::array<double, 7>& x) {
 
 }  // namespace
 
-TEST_CASE("after every start the loop is disarmed: it measures and projects, and the hand feels nothing", "[servo]") {
+TEST_CASE("after every start the loop is disarmed: it measures and projects, and the hand feels nothing",
+          "[servo]") {
   VirtualStation s;
   double most_N = 0.0;
   bool touched = false;
@@ -65,7 +67,8 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   int compared = 0;
   for (int i = 0; i < 8000; ++i) {
     REQUIRE(s.tick() == Fault::none);
-    if (s.engagement() != Engagement::active || s.last.limit_causes != kNotLimited || s.last.contacts == 0) continue;
+    if (s.engagement() != Engagement::active || s.last.limit_causes != kNotLimited || s.last.contacts == 0)
+      continue;
     const Pose X_WP = pose_of(s.last.X_WP);
     const Vector6d eps = log(inverse(X_WP) * pose_of(s.last.X_WQ));
     const Vector6d W_T = K * eps;
@@ -90,7 +93,8 @@ TEST_CASE("a profile may ask for the paper's spatial wrench about the world orig
   s.station.loop().arm();
   REQUIRE(s.run(kPressing_s + 0.6) == Fault::none);
   REQUIRE(s.last.contacts > 0);
-  const Wrench W_T{{s.last.F_T[0], s.last.F_T[1], s.last.F_T[2]}, {s.last.F_T[3], s.last.F_T[4], s.last.F_T[5]}};
+  const Wrench W_T{{s.last.F_T[0], s.last.F_T[1], s.last.F_T[2]},
+                   {s.last.F_T[3], s.last.F_T[4], s.last.F_T[5]}};
   const Wrench W_S = spatial_wrench(pose_of(s.last.X_WP), W_T);
   CHECK((W_S.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-9);
   CHECK((W_S.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-9);
@@ -138,14 +142,15 @@ TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]")
 
 TEST_CASE("every way out of the loop releases the hand", "[servo]") {
   using Kind = SimulatedFault::Kind;
-  const auto [kind, expected] = GENERATE(table<Kind, Fault>({{Kind::unplug, Fault::device_lost},
-                                                             {Kind::silence, Fault::sample_stale},
-                                                             {Kind::freeze, Fault::sample_stale},
-                                                             {Kind::garble, Fault::sample_stale},
-                                                             {Kind::short_report, Fault::sample_stale},
-                                                             {Kind::bad_quaternion, Fault::pose_not_a_rotation},
-                                                             {Kind::teleport, Fault::pose_teleported},
-                                                             {Kind::deaf, Fault::write_failed}}));
+  const auto [kind, expected] =
+      GENERATE(table<Kind, Fault>({{Kind::unplug, Fault::device_lost},
+                                   {Kind::silence, Fault::sample_stale},
+                                   {Kind::freeze, Fault::sample_stale},
+                                   {Kind::garble, Fault::sample_stale},
+                                   {Kind::short_report, Fault::sample_stale},
+                                   {Kind::bad_quaternion, Fault::pose_not_a_rotation},
+                                   {Kind::teleport, Fault::pose_teleported},
+                                   {Kind::deaf, Fault::write_failed}}));
   VirtualStation s;
   s.station.loop().arm();
   s.inject(kind, kPressing_s, 1.0);
@@ -193,7 +198,8 @@ TEST_CASE("release may be called at any time, and again", "[servo]") {
   s.station.loop().release(s.clock.now(), Fault::none);
   s.station.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
-  for (int i = 0; i < 3; ++i) CHECK(s.station.loop().release(s.clock.now(), Fault::overspeed) == Fault::overspeed);
+  for (int i = 0; i < 3; ++i)
+    CHECK(s.station.loop().release(s.clock.now(), Fault::overspeed) == Fault::overspeed);
   CHECK(s.run(0.1) == Fault::none);
   CHECK(s.force_N() == 0.0);
   CHECK(s.engagement() == Engagement::disarmed);
@@ -223,7 +229,8 @@ TEST_CASE("all three methods hold the cube", "[servo]") {
   REQUIRE(s.run(1.0) == Fault::none);
 }
 
-TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device, and stops when told", "[servo]") {
+TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device, and stops when told",
+          "[servo]") {
   const Pacing pacing = GENERATE(Pacing::clock, Pacing::device);
   Plan plan = shipped_plan();
   plan.settings.servo.pacing = pacing;

@@ -233,7 +233,7 @@ TEST_CASE("one row a pose, in their order, each without history") {
   CHECK(bench.solved().empty());
 }
 
-TEST_CASE("- reads and writes the standard streams") {
+TEST_CASE("a dash stands for the standard streams") {
   const Bench bench;
   const std::string table = kPoseHeader + tilted_pose(1);
   const ProgramResult result =

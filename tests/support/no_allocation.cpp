@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/support/no_allocation.hpp"
 
-#include <dlfcn.h>
-#include <pthread.h>
-
 #include <cstddef>
 #include <cstdlib>
 
-// The program's own malloc stands before glibc's and hands on to it, so that every allocation in the process passes
-// here, whoever asks. Under a sanitizer malloc is the sanitizer's, which tells through a hook instead.
+#include <dlfcn.h>
+#include <pthread.h>
+
+// The program's own malloc stands before glibc's and hands on to it, so that every allocation in the process
+// passes here, whoever asks. Under a sanitizer malloc is the sanitizer's, which tells through a hook instead.
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define WRENCHD_SANITIZED 1
@@ -36,7 +36,9 @@ void saw_allocation() {
 }
 
 #if WRENCHD_SANITIZED
-void on_malloc(const volatile void*, std::size_t) { saw_allocation(); }
+void on_malloc(const volatile void*, std::size_t) {
+  saw_allocation();
+}
 void on_free(const volatile void* pointer) {
   if (pointer != nullptr) saw_allocation();
 }
@@ -94,9 +96,15 @@ RealtimeGuard::RealtimeGuard() noexcept {
   guarded = true;
 }
 
-RealtimeGuard::~RealtimeGuard() { guarded = false; }
+RealtimeGuard::~RealtimeGuard() {
+  guarded = false;
+}
 
-std::uint64_t RealtimeGuard::allocations() const noexcept { return allocations_seen; }
-std::uint64_t RealtimeGuard::locks() const noexcept { return locks_seen; }
+std::uint64_t RealtimeGuard::allocations() const noexcept {
+  return allocations_seen;
+}
+std::uint64_t RealtimeGuard::locks() const noexcept {
+  return locks_seen;
+}
 
 }  // namespace wrenchd::test

@@ -7,7 +7,8 @@ namespace wrenchd::test {
 
 /// The configuration as it is shipped: simulated device, cube on table.
 inline Plan shipped_plan() {
-  return read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}}, SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  return read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}},
+                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
 }
 
 /// A station in virtual time, ticked by hand.
