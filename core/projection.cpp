@@ -69,7 +69,7 @@ Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& sce
 
 Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSource& scene) noexcept {
   iteration_limit_ = static_cast<std::uint16_t>(kPatience * budget_.iterations);
-  const Projection best = best_of_all_starts(X_WP, scene);
+  Projection best = best_of_all_starts(X_WP, scene);
   iteration_limit_ = budget_.iterations;
   return best;
 }

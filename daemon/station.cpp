@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "config/config_error.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
@@ -21,8 +22,11 @@ std::string contents(const std::filesystem::path& file) {
 }
 
 std::filesystem::path named_on_command_line(const std::filesystem::path& name, const SearchPath& search) {
+  const auto given = std::filesystem::absolute(name);
   std::error_code error;
-  return std::filesystem::exists(name, error) ? std::filesystem::absolute(name) : search.require(name);
+  if (std::filesystem::exists(given, error)) return given;
+  if (const auto found = search.find(name)) return *found;
+  throw ConfigError(name, {}, search.not_found(name) + ", and from here " + given.lexically_normal().string());
 }
 
 }  // namespace
