@@ -76,7 +76,7 @@ void read_blocks(TomlTable& table, const GainKeys& keys, Matrix6d& K) {
   double angular = 0.0;
   table.mandatory(keys.linear).number(linear, kGain);
   table.mandatory(keys.angular).number(angular, kGain);
-  K = block_gain(linear, angular);
+  K = WrenchGains::blockwise(linear, angular);
 }
 
 /// f . v = v^T K v must not be negative, or the law pushes where it should hold: the symmetric part of K has
@@ -109,7 +109,7 @@ void read_gain(const TomlValue& value, const GainKeys& keys, Matrix6d& K) {
   if (value.is_table()) return value.table(read_blocks, keys, K);
   if (value.is_array()) return read_rows(value, K);
   double k = 0.0;
-  if (value.number(k, kGain)) K = block_gain(k, k);
+  if (value.number(k, kGain)) K = WrenchGains::blockwise(k, k);
 }
 
 void read_wrench(TomlTable& table, WrenchGains& gains) {

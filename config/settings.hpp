@@ -33,21 +33,13 @@ struct RenderingSettings {
   int planes = 47;  ///< N_delta of Eq. (40), for method = "planar"
 };
 
-/// diag(linear, linear, linear, angular, angular, angular): the same in all directions, about the centre of
-/// mass.
-inline Matrix6d block_gain(double linear, double angular) {
-  Vector6d diagonal;
-  diagonal << Vector3d::Constant(linear), Vector3d::Constant(angular);
-  return diagonal.asDiagonal();
-}
-
 /// What [wrench] starts from. Sampled at 1 kHz with 1.4 ms of delay, a wall is stable up to
 /// (b + B) / (T/2 + delay) = 3400 N/m for the friction b = 0.5 and hand damping B = 6 N.s/m of the simulated
 /// device; a sixth of that feels firm and leaves room for a hand that lets go.
 inline WrenchGains default_gains() {
   WrenchGains gains;
-  gains.stiffness = block_gain(600.0, 1.5);
-  gains.damping = block_gain(1.0, 0.002);
+  gains.stiffness = WrenchGains::blockwise(600.0, 1.5);
+  gains.damping = WrenchGains::blockwise(1.0, 0.002);
   return gains;
 }
 

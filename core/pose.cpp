@@ -23,15 +23,6 @@ JacobianTerms jacobian_terms(double theta) noexcept {
   return {2.0 * s * s / t2, (theta - std::sin(theta)) / (t2 * theta)};
 }
 
-/// Rotation vector of a unit quaternion, |w| <= pi.
-Vector3d rotation_vector(const Quaterniond& q) noexcept {
-  const double sign = q.w() < 0.0 ? -1.0 : 1.0;
-  const Vector3d v = sign * q.vec();
-  const double n = v.norm();  // sin(theta/2)
-  const double theta = 2.0 * std::atan2(n, sign * q.w());
-  return n < 0.5 * kSmallAngle_rad ? Vector3d(2.0 * v * (1.0 + n * n / 6.0)) : Vector3d(v * (theta / n));
-}
-
 }  // namespace
 
 Pose operator*(const Pose& X_AB, const Pose& X_BC) noexcept {
@@ -43,20 +34,32 @@ Pose inverse(const Pose& X_AB) noexcept {
   return {R_BA, -(R_BA * X_AB.translation_m)};
 }
 
+Quaterniond rotation_from(const Vector3d& w) noexcept {
+  const double theta = w.norm();
+  const double half_sinc =
+      theta < kSmallAngle_rad ? 0.5 - theta * theta / 48.0 : std::sin(0.5 * theta) / theta;
+  Quaterniond q;
+  q.w() = std::cos(0.5 * theta);
+  q.vec() = half_sinc * w;
+  return q.normalized();
+}
+
+Vector3d rotation_vector(const Quaterniond& R) noexcept {
+  const double sign = R.w() < 0.0 ? -1.0 : 1.0;
+  const Vector3d v = sign * R.vec();
+  const double n = v.norm();  // sin(theta/2)
+  const double theta = 2.0 * std::atan2(n, sign * R.w());
+  return n < 0.5 * kSmallAngle_rad ? Vector3d(2.0 * v * (1.0 + n * n / 6.0)) : Vector3d(v * (theta / n));
+}
+
 //   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2        (Murray, Li, Sastry, ref. [18] of the
 //   paper)
 Pose exp(const Vector6d& xi) noexcept {
   const Vector3d v = xi.head<3>();
   const Vector3d w = xi.tail<3>();
-  const double theta = w.norm();
-  const double half_sinc =
-      theta < kSmallAngle_rad ? 0.5 - theta * theta / 48.0 : std::sin(0.5 * theta) / theta;
-  const auto [b, c] = jacobian_terms(theta);
-  Quaterniond q;
-  q.w() = std::cos(0.5 * theta);
-  q.vec() = half_sinc * w;
+  const auto [b, c] = jacobian_terms(w.norm());
   const Vector3d wv = w.cross(v);
-  return {q.normalized(), v + b * wv + c * w.cross(wv)};
+  return {rotation_from(w), v + b * wv + c * w.cross(wv)};
 }
 
 //   V^-1 = I - w^/2 + (1/t^2)(1 - a/(2 b)) w^^2,   a = sin t / t,  b as above

@@ -39,6 +39,12 @@ Pose exp(const Vector6d& xi) noexcept;
 /// Exponential coordinates xi = [v; w] of a configuration, |w| <= pi. Inverse of exp().
 Vector6d log(const Pose& X) noexcept;
 
+/// Rotation by |w| about w [rad]: the rotational half of exp().
+Quaterniond rotation_from(const Vector3d& w) noexcept;
+
+/// Axis times angle of a unit quaternion [rad], at most pi long: the rotational half of log().
+Vector3d rotation_vector(const Quaterniond& R) noexcept;
+
 /// The 6x6 adjoint transformation of section 2.4, acting on [v; w]:
 ///
 ///   Ad_p = [ R  d^R ]

@@ -22,9 +22,7 @@ constexpr Duration kStaleAfter = std::chrono::milliseconds(3);
 constexpr int kDevicePatience_periods = 4;
 
 Pose pose_of(const PlacementSettings& placement) noexcept {
-  Vector6d rotation = Vector6d::Zero();
-  rotation.tail<3>() = placement.rotation_vector_rad;
-  return {exp(rotation).rotation, placement.position_m};
+  return {rotation_from(placement.rotation_vector_rad), placement.position_m};
 }
 
 std::array<double, 7> numbers(const Pose& X) noexcept {

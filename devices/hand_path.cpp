@@ -7,7 +7,6 @@
 #include <string>
 
 #include "core/finite.hpp"
-#include "devices/rotation_vector.hpp"
 
 namespace wrenchd {
 namespace {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "devices/rotation_vector.hpp"
 
 namespace wrenchd {
 namespace {

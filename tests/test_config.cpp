@@ -161,7 +161,7 @@ TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {
 TEST_CASE("a gain is a number, two blocks, or a matrix", "[config]") {
   CHECK(settings_from("[wrench]\nstiffness = 5").wrench.stiffness == 5.0 * Matrix6d::Identity());
   CHECK(settings_from("[wrench]\nstiffness = { linear_N_per_m = 2, angular_Nm_per_rad = 3.5 }")
-            .wrench.stiffness == block_gain(2.0, 3.5));
+            .wrench.stiffness == WrenchGains::blockwise(2.0, 3.5));
   const Matrix6d K = settings_from(
                          "[wrench]\ndamping = [[2, 1, 0, 0, 0, 0], [-1, 2, 0, 0, 0, 0],"
                          "[0, 0, 3, 0, 0, 0], [0, 0, 0, 4, 0, 0.5], [0, 0, 0, 0, 5, 0],"

@@ -444,7 +444,7 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
     std::vector<std::string> arguments;
     std::string told;
   } const table[] = {
-      {{}, "A subcommand (solve, check or mesh) is required"},
+      {{}, "A subcommand (solve, check, mesh or replay) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},

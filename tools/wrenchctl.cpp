@@ -15,6 +15,8 @@
 #include "config/load_scene.hpp"
 #include "core/inertia.hpp"
 #include "daemon/option_checks.hpp"
+#include "daemon/replay.hpp"
+#include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "tools/check.hpp"
 #include "tools/pose_table.hpp"
@@ -26,6 +28,7 @@ using namespace wrenchd;
 
 constexpr int kExitRefused = 1;     ///< a file was refused, or cannot be written
 constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is no solid
+constexpr int kExitDiffers = 4;     ///< wrenchctl replay: a tick came out differently
 constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: a pose had no admissible pose near it
 
 const std::map<std::string, Method> kMethods = {
@@ -133,6 +136,19 @@ int run_mesh(const std::filesystem::path& file, double scale) {
   return 0;
 }
 
+int run_replay(const std::filesystem::path& file, const PlanFiles& files) {
+  const Recording recording = read_recording(file);
+  const auto difference = replay(recording, read_plan(files, SearchPath()));
+  if (!difference) {
+    std::printf("%zu ticks, all the same, bit for bit\n", recording.ticks.size());
+    return 0;
+  }
+  std::printf("tick %llu differs first: %s was %.17g and is %.17g\n",
+              static_cast<unsigned long long>(difference->tick), difference->field.c_str(),
+              difference->recorded, difference->replayed);
+  return kExitDiffers;
+}
+
 void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   CLI::App* solve = app.add_subcommand("solve", "Closest admissible configuration of each pose of a table");
   solve->add_option("scene", options.scene, "scene file (TOML)")->required()->check(not_empty());
@@ -166,7 +182,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
   app.footer(
       "Exit codes: 0 done; 1 refused (a file, its place and the cure are on standard error);\n"
-      "2 mesh: not a solid; 3 solve: a pose had no admissible pose near it;\n"
+      "2 mesh: not a solid; 3 solve: a pose had no admissible pose near it; 4 replay: a tick differs;\n"
       "over 100: the command line was not understood.");
   app.require_subcommand(0, 1);  // an unknown one is then told by its name
   int exit_code = 0;
@@ -192,9 +208,24 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   mesh->callback([&] { exit_code = run_mesh(mesh_file, scale); });
 
+  std::filesystem::path recording;
+  PlanFiles files;
+  CLI::App* again = app.add_subcommand("replay",
+                                       "Feeds a recording through the servo loop again, and names the first\n"
+                                       "tick that comes out differently");
+  again->add_option("recording", recording, "HDF5 file of wrenchd --record")->required()->check(not_empty());
+  again->add_option("-c,--config", files.config, "the configuration it was recorded with")
+      ->capture_default_str()
+      ->check(not_empty());
+  again->add_option("--scene", files.scene, "the scene, where the command line named one")
+      ->check(not_empty());
+  again->add_option("--profile", files.profile, "the profile, likewise")->check(not_empty());
+  again->callback([&] { exit_code = run_replay(recording, files); });
+
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("A subcommand (solve, check or mesh)");
+    if (app.get_subcommands().empty())
+      throw CLI::RequiredError("A subcommand (solve, check, mesh or replay)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;
