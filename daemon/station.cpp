@@ -26,7 +26,8 @@ std::filesystem::path named_on_command_line(const std::filesystem::path& name, c
   std::error_code error;
   if (std::filesystem::exists(given, error)) return given;
   if (const auto found = search.find(name)) return *found;
-  throw ConfigError(name, {}, search.not_found(name) + ", and from here " + given.lexically_normal().string());
+  throw ConfigError(name, {},
+                    search.not_found(name) + ", and from here " + given.lexically_normal().string());
 }
 
 }  // namespace
