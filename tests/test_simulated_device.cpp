@@ -10,7 +10,6 @@
 #include "devices/loopback_link.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/reference_layout.hpp"
-#include "devices/rotation_vector.hpp"
 #include "devices/simulated_device.hpp"
 
 using namespace wrenchd;
