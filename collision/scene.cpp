@@ -2,74 +2,60 @@
 #include "collision/scene.hpp"
 
 #include <algorithm>
-#include <array>
-#include <limits>
+#include <cmath>
+
+#include "collision/convex_hull.hpp"
+#include "collision/mesh_solid.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// The few smallest of a stream of gaps, smallest first.
-template <std::size_t N>
-class Deepest {
- public:
-  /// Below this gap a vertex would be kept.
-  double threshold() const noexcept {
-    return count_ < N ? std::numeric_limits<double>::infinity() : gap_[N - 1];
+std::vector<ConvexObstacle> load_obstacles(const SceneSettings& settings) {
+  std::vector<ConvexObstacle> obstacles;
+  for (const MeshObstacleSettings& obstacle : settings.meshes) {
+    const TriangleMesh solid = load_solid(obstacle.mesh);
+    ConvexBody body = convex_hull(solid.vertices_m);
+    require_convex(obstacle.mesh, solid, body);
+    for (Vector3d& p : body.vertices_T_m) p = obstacle.X_WM * Vector3d(p * obstacle.scale);
+    obstacles.push_back(convex_obstacle(obstacle.name, std::move(body)));
   }
-  void insert(double gap, std::uint32_t vertex) noexcept {
-    std::size_t at = std::min(count_, N - 1);
-    for (; at > 0 && gap < gap_[at - 1]; --at) {
-      gap_[at] = gap_[at - 1];
-      vertex_[at] = vertex_[at - 1];
-    }
-    gap_[at] = gap;
-    vertex_[at] = vertex;
-    count_ = std::min(count_ + 1, N);
-  }
-  std::size_t count() const noexcept { return count_; }
-  std::uint32_t vertex(std::size_t i) const noexcept { return vertex_[i]; }
+  return obstacles;
+}
 
- private:
-  std::array<double, N> gap_{};
-  std::array<std::uint32_t, N> vertex_{};
-  std::size_t count_ = 0;
-};
+/// Half-spaces feel no more of the tool than its hull; convex obstacles would.
+ToolBody load_tool_for(const SceneSettings& settings) {
+  ToolBody tool = load_tool(settings.tool);
+  if (!settings.meshes.empty()) {
+    const TriangleMesh solid = load_solid(settings.tool.mesh);
+    require_convex(settings.tool.mesh, solid, convex_hull(solid.vertices_m));
+  }
+  return tool;
+}
+
+double radius_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
+  double squared = 0.0;
+  for (const Vector3d& p : points) squared = std::max(squared, (p - centre).squaredNorm());
+  return std::sqrt(squared);
+}
 
 }  // namespace
 
-Scene::Scene(const SceneSettings& settings) : Scene(load_tool(settings.tool), settings.half_spaces) {}
-
-Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces)
-    : tool_(std::move(tool)), half_spaces_(std::move(half_spaces)) {}
-
-//   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
-std::size_t Scene::add_violated(const Pose& X_WT, double tolerance_m, ContactSet& contacts) const noexcept {
-  const std::size_t before = contacts.size();
-  const auto& vertices = tool_.hull.vertices_T_m;
-  for (std::uint32_t k = 0; k < half_spaces_.size(); ++k) {
-    const Vector3d& n_W = half_spaces_[k].normal_W;
-    const double offset_m = half_spaces_[k].offset_m;
-    const Vector3d n_T = X_WT.rotation.conjugate() * n_W;
-    const double below = offset_m - n_W.dot(X_WT.translation_m);
-    const auto contact_of = [&](std::uint32_t v) { return Contact{vertices[v], n_W, offset_m, v, k}; };
-
-    Deepest<kPerObstacle> deepest;
-    for (std::uint32_t v = 0; v < vertices.size(); ++v) {
-      const double gap = n_T.dot(vertices[v]) - below;
-      if (gap >= -tolerance_m || gap >= deepest.threshold()) continue;
-      if (!contacts.contains(contact_of(v))) deepest.insert(gap, v);
-    }
-    for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(contact_of(deepest.vertex(i)));
-  }
-  return contacts.size() - before;
+ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
+  ConvexObstacle obstacle{std::move(name), std::move(body_W)};
+  obstacle.body.find_faces();
+  for (const Vector3d& p : obstacle.body.vertices_T_m)
+    obstacle.centre_W_m += p / static_cast<double>(obstacle.body.vertices_T_m.size());
+  obstacle.radius_m = radius_m(obstacle.body.vertices_T_m, obstacle.centre_W_m);
+  return obstacle;
 }
 
-double Scene::least_gap_m(const Pose& X_WT) const noexcept {
-  double least = std::numeric_limits<double>::infinity();
-  for (const HalfSpaceSettings& half_space : half_spaces_)
-    for (const Vector3d& a : tool_.hull.vertices_T_m)
-      least = std::min(least, half_space.normal_W.dot(X_WT * a) - half_space.offset_m);
-  return least;
-}
+Scene::Scene(const SceneSettings& settings)
+    : Scene(load_tool_for(settings), settings.half_spaces, load_obstacles(settings)) {}
+
+Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex)
+    : tool_(std::move(tool)),
+      tool_radius_m_(radius_m(tool_.hull.vertices_T_m, Vector3d::Zero())),
+      half_spaces_(std::move(half_spaces)),
+      convex_(std::move(convex)) {}
 
 }  // namespace wrenchd

@@ -3,11 +3,10 @@
 
 #include <locale>
 #include <sstream>
-#include <string>
 
 #include "collision/convex_hull.hpp"
-#include "collision/mesh_check.hpp"
 #include "collision/mesh_file.hpp"
+#include "collision/mesh_solid.hpp"
 #include "core/finite.hpp"
 
 namespace wrenchd {
@@ -25,13 +24,7 @@ void require_usable(const SolidProperties& solid, const std::filesystem::path& m
 }
 
 ToolBody load_tool(const ToolSettings& settings) {
-  TriangleMesh mesh;
-  const MeshReport report = check_solid(read_mesh_file(settings.mesh), &mesh);
-  if (!report.solid()) {
-    std::string message = settings.mesh.string() + ": is not a closed, consistently oriented solid:";
-    for (const std::string& defect : report.defects) message += "\n  " + defect;
-    throw MeshError(message);
-  }
+  TriangleMesh mesh = load_solid(settings.mesh);
   // The hull is taken of the file's own numbers: scaled and shifted, a vertex within a flat face may come to
   // lie an ulp outside it and become a corner.
   ToolBody tool;
@@ -40,6 +33,7 @@ ToolBody load_tool(const ToolSettings& settings) {
   tool.solid = solid_properties(mesh, settings.mass_kg);
   require_usable(tool.solid, settings.mesh, settings.scale);
   for (Vector3d& p : tool.hull.vertices_T_m) p = p * settings.scale - tool.solid.p_MT_m;
+  tool.hull.find_faces();
   return tool;
 }
 

@@ -11,6 +11,7 @@ namespace fs = std::filesystem;
 constexpr Range kScale = {1e-9, 1e6};
 constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kAny = {-1e9, 1e9};
+constexpr Range kTurn = {-10.0, 10.0};
 
 /// Shorter than this a normal is a slip of the keyboard rather than a direction.
 constexpr double kMinNormal = 1e-9;
@@ -46,12 +47,40 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   half_space.offset_m /= length;
 }
 
-/// Other shapes get their key beside half_space.
+/// What goes with `mesh` and means nothing to a half-space.
+struct MeshKeys {
+  TomlValue scale, position, rotation;
+};
+
+void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettings& scene,
+                        const std::string& name) {
+  MeshObstacleSettings obstacle;
+  obstacle.name = name;
+  read_mesh(mesh, scene, obstacle.mesh);
+  keys.scale.number(obstacle.scale, kScale);
+  keys.position.vector(obstacle.X_WM.translation_m, kAny);
+  Vector3d rotation_vector_rad = Vector3d::Zero();
+  keys.rotation.vector(rotation_vector_rad, kTurn);
+  obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
+  scene.meshes.push_back(obstacle);
+}
+
+/// One shape each: half_space or mesh.
 void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
-  HalfSpaceSettings half_space{place, Vector3d::UnitZ(), 0.0};
-  table.optional("name").text(half_space.name);
+  std::string name = place;
+  table.optional("name").text(name);
   const TomlValue mesh = table.optional("mesh");
-  if (mesh) mesh.refuse("mesh obstacles are not supported yet; give a half_space");
+  const MeshKeys keys = {table.optional("scale", "m"), table.optional("position_m"),
+                         table.optional("rotation_vector_rad")};
+  if (mesh) {
+    const TomlValue half_space = table.optional("half_space");
+    if (half_space)
+      half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
+    return read_mesh_obstacle(mesh, keys, scene, name);
+  }
+  for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
+    if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
+  HalfSpaceSettings half_space{name, Vector3d::UnitZ(), 0.0};
   table.mandatory("half_space").table(read_half_space, half_space);
   scene.half_spaces.push_back(half_space);
 }

@@ -60,9 +60,10 @@ void read_servo(TomlTable& table, ServoSettings& servo) {
 }
 
 void read_rendering(TomlTable& table, RenderingSettings& rendering) {
-  table.optional("method").choice(
-      rendering.method,
-      {{"exact", Method::exact}, {"planar", Method::planar}, {"translational", Method::translational}});
+  table.optional("method").choice(rendering.method, {{"exact", Method::exact},
+                                                     {"planar", Method::planar},
+                                                     {"descent", Method::descent},
+                                                     {"translational", Method::translational}});
   table.optional("planes").integer(rendering.planes, {1, 1000});
 }
 

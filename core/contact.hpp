@@ -1,65 +1,91 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
+#include "core/fixed_list.hpp"
 #include "core/pose.hpp"
 
 namespace wrenchd {
 
-/// A vertex of the tool that a face of the scene must keep out (section 2 of the method):
+/// Which features of tool (A) and obstacle (B) meet, and with it how the normal moves (section 2 of the
+/// method).
+enum class ContactKind : std::uint8_t {
+  vertex_face,  ///< a face of the obstacle: the normal stands still in the world
+  face_vertex,  ///< a face of the tool: the normal turns with the tool
+  edge_edge,    ///< two edges: the normal is their common one
+};
+
+/// A feature pair with a signed gap. T is the tool's body frame at its centre of mass, q = (R, x) its pose:
 ///
-///   gap(q) = n_W . (R a + x) - o        q = (R, x)        > 0 apart, < 0 overlapping
+///   gap(q) = n(q) . (R a + x - b)        > 0 apart, < 0 overlapping
 ///
-/// T is the tool's body frame at its centre of mass.
+///   vertex_face   n = n_W
+///   face_vertex   n = R d_T              d_T = -(outward normal of the tool's face)
+///   edge_edge     n = R d_T x d_W / |R d_T x d_W|        d_T, d_W: along the edges, signed so that n leaves
+///   B
 struct Contact {
-  Vector3d p_TA_m = Vector3d::Zero();  ///< a: the vertex in T [m]
-  Vector3d n_W = Vector3d::UnitZ();    ///< unit normal of the face, points out of the solid
-  double offset_m = 0.0;               ///< o: the face lies in n_W . x = o
-  std::uint32_t vertex = 0;            ///< which vertex of the tool
+  ContactKind kind = ContactKind::vertex_face;
+  Vector3d p_TA_m = Vector3d::Zero();  ///< a: a point of the tool's feature, in T [m]
+  Vector3d p_WB_m = Vector3d::Zero();  ///< b: a point of the obstacle's feature, in W [m]
+  Vector3d n_W = Vector3d::UnitZ();    ///< unit normal from B to A, at the pose where the contact was found
+  double offset_m = 0.0;               ///< n_W . b, known better than from b for a face [m]
+  Vector3d d_T = Vector3d::Zero();     ///< see above; zero for vertex_face
+  Vector3d d_W = Vector3d::Zero();     ///< see above; zero but for edge_edge
+  std::uint32_t vertex = 0;            ///< which vertex of the tool a is
+  std::uint32_t obstacle_vertex = 0;   ///< which vertex of the obstacle b is; 0 for vertex_face
   std::uint32_t obstacle = 0;          ///< which obstacle of the scene
 };
 
+/// Unit normal of a contact at a pose of T, from the obstacle to the tool. RT safe.
+inline Vector3d normal_W(const Contact& c, const Pose& X_WT) noexcept {
+  switch (c.kind) {
+    case ContactKind::face_vertex:
+      return X_WT.rotation * c.d_T;
+    case ContactKind::edge_edge:
+      return (X_WT.rotation * c.d_T).cross(c.d_W).normalized();
+    case ContactKind::vertex_face:
+      break;
+  }
+  return c.n_W;
+}
+
 /// Signed gap of a contact at a pose of T [m]. RT safe.
 inline double gap_m(const Contact& c, const Pose& X_WT) noexcept {
-  return c.n_W.dot(X_WT * c.p_TA_m) - c.offset_m;
+  if (c.kind == ContactKind::vertex_face) return c.n_W.dot(X_WT * c.p_TA_m) - c.offset_m;
+  return normal_W(c, X_WT).dot(X_WT * c.p_TA_m - c.p_WB_m);
 }
 
+/// Where the two features touch, or would: the tool's vertex, the obstacle's, or where its edge passes the
+/// tool's [m]. RT safe.
+inline Vector3d contact_point_W(const Contact& c, const Pose& X_WT) noexcept {
+  if (c.kind == ContactKind::face_vertex) return c.p_WB_m;
+  const Vector3d a_W = X_WT * c.p_TA_m;
+  if (c.kind == ContactKind::vertex_face) return a_W;
+  const Vector3d d = X_WT.rotation * c.d_T;
+  const Vector3d N = d.cross(c.d_W);
+  return a_W + d * ((c.p_WB_m - a_W).cross(c.d_W).dot(N) / N.squaredNorm());
+}
+
+/// The same pair with the same law of its normal.
 inline bool same_features(const Contact& a, const Contact& b) noexcept {
-  return a.vertex == b.vertex && a.obstacle == b.obstacle;
+  return a.kind == b.kind && a.vertex == b.vertex && a.obstacle_vertex == b.obstacle_vertex &&
+         a.obstacle == b.obstacle && a.d_T == b.d_T && a.d_W == b.d_W &&
+         (a.kind != ContactKind::vertex_face || a.n_W == b.n_W);
 }
 
-/// Contacts of one query. The capacity is fixed, so that a tick never allocates. Adding to a full set does
-/// nothing.
-class ContactSet {
+/// Contacts of one query. The capacity is fixed, so that a tick never allocates; an optimum of 6 unknowns has
+/// few active contacts.
+class ContactSet : public FixedList<Contact, 64> {
  public:
-  static constexpr std::size_t kCapacity = 64;  ///< an optimum of 6 unknowns has few active contacts
-
-  std::size_t size() const noexcept { return size_; }
-  bool full() const noexcept { return size_ == kCapacity; }
-  const Contact& operator[](std::size_t i) const noexcept { return contacts_[i]; }
-  const Contact* begin() const noexcept { return contacts_.data(); }
-  const Contact* end() const noexcept { return contacts_.data() + size_; }
+  static constexpr std::size_t kCapacity = 64;
 
   bool contains(const Contact& c) const noexcept {
     for (const Contact& mine : *this)
       if (same_features(mine, c)) return true;
     return false;
   }
-  bool add(const Contact& c) noexcept {
-    if (full()) return false;
-    contacts_[size_++] = c;
-    return true;
-  }
-  void remove_unordered(std::size_t i) noexcept { contacts_[i] = contacts_[--size_]; }
-  void clear() noexcept { size_ = 0; }
-
- private:
-  std::array<Contact, kCapacity> contacts_{};
-  std::size_t size_ = 0;
 };
 
 /// What the projection asks of a scene: which contacts does a pose violate? A scene of any size answers with
@@ -73,6 +99,9 @@ class ContactSource {
   /// set is full. X_WT: pose of the tool's body frame in the world. RT safe.
   virtual std::size_t add_violated(const Pose& X_WT, double tolerance_m,
                                    ContactSet& contacts) const noexcept = 0;
+
+  /// Is there no such contact at all? RT safe.
+  virtual bool admits(const Pose& X_WT, double tolerance_m) const noexcept = 0;
 };
 
 }  // namespace wrenchd

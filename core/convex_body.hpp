@@ -10,17 +10,50 @@
 
 namespace wrenchd {
 
-/// A convex polyhedron: vertices in the body frame T, and for each vertex its neighbours in order around it
+/// A convex polyhedron in a frame of its own: vertices, and for each vertex its neighbours in order around it
 /// (the sequence N_v of section 3.3). Built once, then only read.
 struct ConvexBody {
+  /// The solid lies in n . x <= offset. Triangles in one plane are one face.
+  struct Face {
+    Vector3d n;  ///< unit, outward
+    double offset_m;
+  };
+  /// Where two faces meet at an angle. A plane touches the body along the edge where its outward normal m is
+  /// at right angles to the edge and m . side[0] >= 0, m . side[1] >= 0: between the normals of the faces.
+  struct Edge {
+    std::uint32_t from, to;
+    Vector3d d;  ///< unit, from `from` to `to`
+    Vector3d side[2];
+  };
+
   std::vector<Vector3d> vertices_T_m;
   std::vector<std::uint32_t>
       ring_begin;  ///< ring of vertex i: ring[ring_begin[i]] up to ring[ring_begin[i + 1]]
   std::vector<std::uint32_t> ring;
+  std::vector<Face> faces;
+  std::vector<Edge> edges;
+  std::vector<std::uint32_t> faces_begin;  ///< the faces of vertex i, laid out as the rings
+  std::vector<std::uint32_t> faces_at;
 
   std::span<const std::uint32_t> ring_of(std::size_t vertex) const noexcept {
     return std::span(ring).subspan(ring_begin[vertex], ring_begin[vertex + 1] - ring_begin[vertex]);
   }
+  std::span<const std::uint32_t> faces_of(std::size_t vertex) const noexcept {
+    return std::span(faces_at).subspan(faces_begin[vertex], faces_begin[vertex + 1] - faces_begin[vertex]);
+  }
+
+  /// Fills in faces, faces_of and edges from vertices and rings. Not RT safe.
+  void find_faces();
+
+  /// The vertex farthest along a direction. RT safe.
+  std::uint32_t support(const Vector3d& direction) const noexcept;
+
+  /// Is a point inside, or no farther than tolerance_m outside? RT safe.
+  bool contains(const Vector3d& p_T_m, double tolerance_m) const noexcept;
+
+ private:
+  void add_edge(std::uint32_t from, std::uint32_t to, std::span<const std::uint32_t> faces_from,
+                std::span<const std::uint32_t> faces_to);
 };
 
 }  // namespace wrenchd

@@ -32,10 +32,24 @@ class LeastDistance {
   /// Adds b . z >= c. b need not be unit length, but must not be zero.
   void add(const Vector& b, double c) noexcept {
     const double length = b.norm();
-    normal_[count_] = b / length;
-    bound_[count_] = c / length;
-    length_[count_] = length;
+    add_unit(b / length, c / length);
+    length_[count_ - 1] = length;
+  }
+  /// The same for a b of unit length.
+  void add_unit(const Vector& b, double c) noexcept {
+    normal_[count_] = b;
+    bound_[count_] = c;
+    length_[count_] = 1.0;
     ++count_;
+  }
+
+  /// The last constraint takes the place of the i-th. What solve() found is lost, but for its multipliers.
+  void remove_unordered(std::size_t i) noexcept {
+    --count_;
+    normal_[i] = normal_[count_];
+    bound_[i] = bound_[count_];
+    length_[i] = length_[count_];
+    multiplier_[i] = multiplier_[count_];
   }
 
   /// tolerance: by how much a constraint may stay violated, in units of z. One that is active may by the
@@ -43,7 +57,7 @@ class LeastDistance {
   Status solve(const Vector& z0, double tolerance) noexcept {
     z_ = z0;
     active_count_ = 0;
-    multiplier_.fill(0.0);
+    for (std::size_t i = 0; i < count_; ++i) multiplier_[i] = 0.0;
     bool refined = true;
     for (std::size_t step = 0; step < kMaxSteps; ++step) {
       const std::size_t p = most_violated(tolerance);

@@ -19,20 +19,37 @@ constexpr double kTouching = 1e-9;
 /// Converged: the step left is this short, in units of L and rad, and the KKT residual this small before it
 /// is taken.
 constexpr double kShortStep = 1e-7;
-constexpr double kSmallResidual = 1e-9;
+constexpr double kSmallResidual = 2e-10;
 /// Curvature of the Lagrangian, relative to the metric's, that a step may count on where there is less.
 constexpr double kLeastCurvature = 1e-3;
 /// The gradient of a penetration of half a millionth of L: below it, the residual is measured against this.
 constexpr double kLeastGradient = 1e-6;
+/// With more contacts than this, idle ones are dropped.
+constexpr std::size_t kCrowded = 24;
 /// How many times the budget of a tick a query without history may take for each of its starts.
 constexpr int kPatience = 5;
-/// A dual bound this near to T, relative, proves that q is the global optimum.
-constexpr double kProof = 1e-9;
 
-Quaterniond turned(const Quaterniond& E, const Vector3d& eta) noexcept {
-  // q o (1, eta/2) normalised: a retraction that agrees with exp to second order.
-  const Quaterniond step(1.0, 0.5 * eta.x(), 0.5 * eta.y(), 0.5 * eta.z());
-  return (E * step).normalized();
+/// Lower triangular root of a symmetric matrix, inverted. False where the matrix is not safely positive
+/// definite: a pivot that is all rounding would make the step all rounding.
+bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
+  constexpr double kLeastPivot = 1e-13;
+  const auto safe = [](double pivot, double diagonal) { return pivot > kLeastPivot * diagonal; };
+  if (!(A(0, 0) > 0.0)) return false;
+  const double l00 = std::sqrt(A(0, 0));
+  const double l10 = A(1, 0) / l00;
+  const double l20 = A(2, 0) / l00;
+  const double d1 = A(1, 1) - l10 * l10;
+  if (!safe(d1, std::abs(A(1, 1)))) return false;
+  const double l11 = std::sqrt(d1);
+  const double l21 = (A(2, 1) - l20 * l10) / l11;
+  const double d2 = A(2, 2) - l20 * l20 - l21 * l21;
+  if (!safe(d2, std::abs(A(2, 2)))) return false;
+  const double i0 = 1.0 / l00;
+  const double i1 = 1.0 / l11;
+  const double i2 = 1.0 / std::sqrt(d2);
+  const double i10 = -l10 * i0 * i1;
+  inverse << i0, 0.0, 0.0, i10, i1, 0.0, -(l20 * i0 + l21 * i10) * i2, -l21 * i1 * i2, i2;
+  return true;
 }
 
 double positive_length(const Inertia& M) {
@@ -56,15 +73,15 @@ ExactProjection::ExactProjection(const Inertia& M, Budget budget)
   metric_root_ = Eigen::LLT<Matrix6d>(metric).matrixL();
 }
 
-Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene,
-                                    const Pose& X_start) noexcept {
-  return project_from(X_WP, scene, (X_WP.rotation.conjugate() * X_start.rotation).normalized());
+Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start,
+                                    std::span<const ActiveContact> known) noexcept {
+  return project_from(X_WP, scene, (X_WP.rotation.conjugate() * X_start.rotation).normalized(), known);
 }
 
 Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& scene,
                                       const Pose& X_rotated) noexcept {
   const Quaterniond E = (X_WP.rotation.conjugate() * X_rotated.rotation).normalized();
-  return project_from(X_WP, scene, E, Freedom::translation);
+  return project_from(X_WP, scene, E, {}, Freedom::translation);
 }
 
 Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSource& scene) noexcept {
@@ -75,16 +92,18 @@ Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSour
 }
 
 Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSource& scene) noexcept {
-  Projection best = project_from(X_WP, scene, Quaterniond::Identity());
+  Projection best = project_from(X_WP, scene, Quaterniond::Identity(), {});
   if (best.status == ProjectionStatus::free) return best;
-  best.proven_global = best.status != ProjectionStatus::infeasible && certify(state_);
+  best.proven_global = best.status == ProjectionStatus::converged && proven();
   if (best.proven_global) return best;
+  const Quaterniond dual_optimum =
+      best.status == ProjectionStatus::infeasible ? Quaterniond::Identity() : dual_rotation();
 
   const auto try_from = [&](const Quaterniond& E) noexcept {
-    Projection other = project_from(X_WP, scene, E);
+    Projection other = project_from(X_WP, scene, E, {});
     if (other.status == ProjectionStatus::infeasible) return;
     if (best.status != ProjectionStatus::infeasible && best.energy <= other.energy) return;
-    other.proven_global = certify(state_);
+    other.proven_global = other.status == ProjectionStatus::converged && proven();
     best = other;
   };
 
@@ -99,7 +118,7 @@ Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSo
 
   // Where the dual bound is attained; then rotations about the axes of a cube's faces, edges and corners,
   // both ways, near and far from p; then the same around the best of these.
-  try_from(Quaterniond(dual_rotation_));
+  try_from(dual_optimum);
   for (const double angle : {0.25, 0.6, 1.2, 2.2}) try_around(Quaterniond::Identity(), angle);
   const Quaterniond best_E = (X_WP.rotation.conjugate() * best.X_WQ.rotation).normalized();
   for (const double angle : {0.4, 0.9}) try_around(best_E, angle);
@@ -112,22 +131,25 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
 }
 
 Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& scene,
-                                         const Quaterniond& E_start, Freedom freedom) noexcept {
+                                         const Quaterniond& E_start, std::span<const ActiveContact> known,
+                                         Freedom freedom) noexcept {
   Projection out;
   out.X_WQ = X_WP;
   X_WP_ = X_WP;
   scene_ = &scene;
   tolerance_m_ = gap_tolerance_m(X_WP);
-  contacts_.clear();
   iterations_ = 0;
-  if (scene.add_violated(X_WP, tolerance_m_, contacts_) == 0) {
+  if (scene.admits(X_WP, tolerance_m_)) {
     out.proven_global = true;
     return out;
   }
-  see_from(0);
+  gather(known);
   state_ = State{};
   state_.E = E_start;
-  const Local local = freedom == Freedom::all ? minimise(state_) : translate_out(state_);
+  state_.R = E_start.toRotationMatrix();
+  const Local local = freedom == Freedom::all ? minimise(state_)
+                      : translate_out(state_) ? Local::converged
+                                              : Local::infeasible;
   out.iterations = iterations_;
   out.status = ProjectionStatus::infeasible;
   if (local == Local::infeasible) return out;
@@ -136,20 +158,53 @@ Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& 
   return out;
 }
 
+/// Gathers the contacts to begin with: those known, or else what p violates.
+void ExactProjection::gather(std::span<const ActiveContact> known) noexcept {
+  contacts_.clear();
+  for (const ActiveContact& active : known) contacts_.add(active.contact);
+  if (known.empty()) scene_->add_violated(X_WP_, tolerance_m_, contacts_);
+  see_from(0);
+  for (std::size_t i = 0; i < std::min(known.size(), contacts_.size()); ++i)
+    multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
+}
+
 Pose ExactProjection::pose_of(const State& state) const noexcept {
   return {(X_WP_.rotation * state.E).normalized(), X_WP_.translation_m + X_WP_.rotation * (L_ * state.u)};
 }
 
-/// Contacts number `first` and up as p sees them: n in p's axes, a and c in units of L.
+/// Contacts number `first` and up as p sees them: directions in p's axes, lengths in units of L.
 void ExactProjection::see_from(std::size_t first) noexcept {
-  const Quaterniond R_PW = X_WP_.rotation.conjugate();
+  if (first == contacts_.size()) return;
+  const Matrix3d R_PW = X_WP_.rotation.toRotationMatrix().transpose();
   for (std::size_t i = first; i < contacts_.size(); ++i) {
     const Contact& contact = contacts_[i];
-    seen_[i].n = R_PW * contact.n_W;
-    seen_[i].a = contact.p_TA_m / L_;
-    seen_[i].c = (contact.n_W.dot(X_WP_.translation_m) - contact.offset_m) / L_;
+    Seen& seen = seen_[i];
+    seen.kind = contact.kind;
+    seen.n = R_PW * contact.n_W;
+    seen.a = contact.p_TA_m / L_;
+    seen.c = (contact.n_W.dot(X_WP_.translation_m) - contact.offset_m) / L_;
     multiplier_[i] = 0.0;
+    if (contact.kind == ContactKind::vertex_face) continue;
+    seen.b = R_PW * (contact.p_WB_m - X_WP_.translation_m) / L_;
+    seen.d = contact.d_T;
+    seen.dB = R_PW * contact.d_W;
   }
+}
+
+ExactProjection::Affine ExactProjection::affine(const Seen& seen, const Matrix3d& R) const noexcept {
+  switch (seen.kind) {
+    case ContactKind::vertex_face:
+      break;
+    case ContactKind::face_vertex: {
+      const Vector3d n = R * seen.d;
+      return {n, seen.d.dot(seen.a) - n.dot(seen.b)};
+    }
+    case ContactKind::edge_edge: {
+      const Vector3d n = (R * seen.d).cross(seen.dB).normalized();
+      return {n, n.dot(R * seen.a - seen.b)};
+    }
+  }
+  return {seen.n, seen.n.dot(R * seen.a) + seen.c};
 }
 
 double ExactProjection::scaled_energy(const State& state) const noexcept {
@@ -157,39 +212,62 @@ double ExactProjection::scaled_energy(const State& state) const noexcept {
   return state.u.squaredNorm() + 4.0 * v.dot(H_hat_ * v);
 }
 
-/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -(n_i . R_E a_i +
-/// c_i), over all contacts of the scene by constraint generation: solve on the contacts at hand, ask the
-/// scene what the answer violates, add it, repeat. Leaves the multipliers (2 u = sum 2 multiplier_i n_i).
-/// False where no translation helps.
+/// E <- E o (1, eta/2), normalised: a retraction that agrees with exp to second order.
+void ExactProjection::turn(State& state, const Vector3d& eta) const noexcept {
+  const Quaterniond step(1.0, 0.5 * eta.x(), 0.5 * eta.y(), 0.5 * eta.z());
+  state.E = (state.E * step).normalized();
+  state.R = state.E.toRotationMatrix();
+}
+
+/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -h_i, over all
+/// contacts of the scene by constraint generation: solve on the contacts at hand, ask the scene what the
+/// answer violates, add it, repeat. Idle contacts make room for new ones: |u| only grows from round to round,
+/// so none comes back for ever. False where no translation helps, or none was found in the rounds allowed.
 bool ExactProjection::restore(State& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
+  translation_.clear();
   for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
-    translation_.clear();
-    for (std::size_t i = 0; i < contacts_.size(); ++i) {
-      const Seen& seen = seen_[i];
-      translation_.add(seen.n, -(seen.n.dot(state.E * seen.a) + seen.c));
+    for (std::size_t i = translation_.count(); i < contacts_.size(); ++i) {
+      const Affine gap = affine(seen_[i], state.R);
+      translation_.add_unit(gap.n, -gap.h);
     }
     if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
     state.u = translation_.z();
+    if (contacts_.size() > kCrowded) make_room(state);
     const std::size_t known = contacts_.size();
     if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0) {
       state.T = scaled_energy(state);
-      return true;
+      return !contacts_.full();  // a full set cannot tell of what it has no room for
     }
     see_from(known);
   }
   return false;
 }
 
-/// Gaps and their gradients in (u, eta), eta the small rotation in the axes of q, for E <- E o (1, eta/2):
-///
-///   J_i = [ n_i ; a_i x R_E' n_i ]
+// For E <- E o (1, eta/2) and n_Q = R'n, r = R'(u - b) + a, all in the axes of q, the gradient of a gap is
+//
+//   J_i = [ n_i ; a x n_Q + (how the normal turns) ]
+//
+//   vertex_face   nothing
+//   face_vertex   d x r                                      n_Q = d
+//   edge_edge     d x (dB_Q x r_t) / s                       r_t: r without its part along n,  s = |d x dB_Q|
 void ExactProjection::linearise(const State& state) noexcept {
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const Seen& seen = seen_[i];
-    const Vector3d n_Q = state.E.conjugate() * seen.n;
-    J_[i] << seen.n, seen.a.cross(n_Q);
-    gap_[i] = seen.n.dot(state.u) + n_Q.dot(seen.a) + seen.c;
+    const Affine at = affine(seen, state.R);
+    const Vector3d n_Q = state.R.transpose() * at.n;
+    gap_[i] = at.n.dot(state.u) + at.h;
+    Vector3d turning = seen.a.cross(n_Q);
+    if (seen.kind != ContactKind::vertex_face) {
+      const Vector3d r = state.R.transpose() * (state.u - seen.b) + seen.a;
+      if (seen.kind == ContactKind::face_vertex) {
+        turning += seen.d.cross(r);
+      } else {
+        const Vector3d dB = state.R.transpose() * seen.dB;
+        turning += seen.d.cross(dB.cross(r - gap_[i] * n_Q)) / seen.d.cross(dB).norm();
+      }
+    }
+    J_[i] << at.n, turning;
   }
 }
 
@@ -202,104 +280,181 @@ Vector6d ExactProjection::gradient(const State& state) const noexcept {
   return g;
 }
 
-/// Gradient of T and Hessian of the Lagrangian T - sum multiplier_i gap_i:
+/// Hessian of the Lagrangian T - sum multiplier_i gap_i:
 ///
-///   W   = diag( 2 I,  8 G' H^ G - 2 (v' H^ v) I - sum multiplier_i K_i )
-///   K_i = (n a' + a n')/2 - (n . a) I,   n = R_E' n_i: the curvature of gap i, for R = I + eta^ + eta^^2/2
-ExactProjection::Slope ExactProjection::slope(const State& state) const noexcept {
+///   [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ] - sum multiplier_i K_i
+ExactProjection::Curvature ExactProjection::curvature(const State& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Matrix3d G = 0.5 * (state.E.w() * Matrix3d::Identity() + hat(v));
-  Matrix3d W_eta = 8.0 * G.transpose() * H_hat_ * G - 2.0 * v.dot(H_hat_ * v) * Matrix3d::Identity();
-  for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    if (!(multiplier_[i] > 0.0)) continue;
-    const Vector3d n = state.E.conjugate() * seen_[i].n;
-    const Matrix3d na = n * seen_[i].a.transpose();
-    W_eta -= multiplier_[i] * (0.5 * (na + na.transpose()) - na.trace() * Matrix3d::Identity());
-  }
-  Slope out{gradient(state), Matrix6d::Zero()};
-  out.W.diagonal().head<3>().setConstant(2.0);
-  out.W.bottomRightCorner<3, 3>() = W_eta;
-  return out;
+  Curvature W;
+  W.B = 8.0 * G.transpose() * H_hat_ * G;
+  W.B.diagonal().array() -= 2.0 * v.dot(H_hat_ * v);
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (multiplier_[i] > 0.0) bend(state, i, W);
+  return W;
 }
 
-/// W = C C' of the Hessian, made positive definite so that the step is a descent. Where the Hessian is not,
-/// the active gradients are added first: that changes W only across the constraints, where the step is not
-/// free, and keeps the convergence quadratic. If that is not enough (far from a minimum), negative
-/// eigenvalues are turned over, taken relative to the metric diag(2 I, 2 H^): a needle's roll is a soft
-/// direction, not a flat one.
-Eigen::LLT<Matrix6d> ExactProjection::factorised(const Matrix6d& hessian) const noexcept {
-  Eigen::LLT<Matrix6d> C(hessian);
-  double stiffening = 4.0 * hessian.lpNorm<Eigen::Infinity>();
-  for (int attempt = 0; C.info() != Eigen::Success && attempt < 3; ++attempt, stiffening *= 30.0) {
-    Matrix6d W = hessian;
-    for (std::size_t i = 0; i < contacts_.size(); ++i)
-      if (multiplier_[i] > 0.0) W += stiffening * J_[i] * J_[i].transpose();
-    C.compute(W);
+// K_i, the curvature of gap i, for R = I + eta^ + eta^^2/2, in the axes of q. With sym(x, y) = (x y' + y
+// x')/2 and M(x, y) = sym(x, y) - (x . y) I, which is the Hessian of x . R y:
+//
+//   vertex_face   eta eta: M(n, a)
+//   face_vertex   eta eta: M(d, w), w = R'(u - b)            eta u: d^ R'
+//   edge_edge     gap = f/s with f = (d x dB) . r, s = |d x dB|:
+//     f:  eta eta: M(dB x r, d) - 2 sym(dB, d x a) + M(d x dB, a)         eta u: d^ dB^ R'
+//     s:  gradient g_s = -(d . dB) n
+//     gap: (K_f - J g_s' - g_s J')/s, but for a term with the gap itself, which is zero where it matters
+void ExactProjection::bend(const State& state, std::size_t i, Curvature& W) const noexcept {
+  const Seen& seen = seen_[i];
+  const double m = multiplier_[i];
+  const auto sym = [](const Vector3d& x, const Vector3d& y) -> Matrix3d {
+    const Matrix3d xy = x * y.transpose();
+    return 0.5 * (xy + xy.transpose());
+  };
+  const auto add = [&](double weight, const Vector3d& x, const Vector3d& y) {
+    W.B -= weight * sym(x, y);
+    W.B.diagonal().array() += weight * x.dot(y);
+  };
+  const auto n = J_[i].head<3>();
+  const Matrix3d R_T = state.R.transpose();
+  const Vector3d n_Q = R_T * n;
+  switch (seen.kind) {
+    case ContactKind::vertex_face:
+      add(m, n_Q, seen.a);
+      return;
+    case ContactKind::face_vertex:
+      add(m, seen.d, R_T * (state.u - seen.b));
+      W.C -= m * (hat(seen.d) * R_T).transpose();
+      return;
+    case ContactKind::edge_edge:
+      break;
   }
-  if (C.info() == Eigen::Success) return C;
-  const Matrix6d S = metric_root_.triangularView<Eigen::Lower>().solve(
-      metric_root_.triangularView<Eigen::Lower>().solve(hessian).transpose());
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(S);
+  const Vector3d dB = R_T * seen.dB;
+  const Vector3d r = R_T * (state.u - seen.b) + seen.a;
+  const Vector3d N = seen.d.cross(dB);
+  const double s = N.norm();
+  const Vector3d g_s = -seen.d.dot(dB) * n_Q;
+  add(m / s, dB.cross(r), seen.d);
+  add(m / s, N, seen.a);
+  W.B += (2.0 * m / s) * (sym(dB, seen.d.cross(seen.a)) + sym(J_[i].tail<3>(), g_s));
+  W.C -= (m / s) * ((hat(seen.d) * hat(dB) * R_T).transpose() - n * g_s.transpose());
+}
+
+/// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. False where it is not
+/// positive definite.
+bool ExactProjection::factorise(const Curvature& W, Root& root) const noexcept {
+  constexpr double kSqrtHalf = 0.70710678118654752440;
+  if (!inverse_root(W.B - 0.5 * W.C.transpose() * W.C, root.S_inverse)) return false;
+  root.P_inverse = kSqrtHalf * Matrix3d::Identity();
+  root.Q = kSqrtHalf * W.C.transpose();
+  return true;
+}
+
+/// Where the Hessian is not positive definite it is made so, so that the step is a descent: the active
+/// gradients are added first, which changes it only across the constraints, where the step is not free, and
+/// keeps the convergence quadratic. If that is not enough (far from a minimum), negative eigenvalues are
+/// turned over, taken relative to the metric diag(2 I, 2 H^): a needle's roll is a soft direction, not a flat
+/// one.
+void ExactProjection::factorise_convex_part(const Curvature& curvature, Root& root) const noexcept {
+  Matrix6d W;
+  W << 2.0 * Matrix3d::Identity(), curvature.C, curvature.C.transpose(), curvature.B;
+  Matrix6d L;
+  const auto split = [&](const Matrix6d& A) {
+    const Eigen::LLT<Matrix6d> llt(A);
+    if (llt.info() != Eigen::Success) return false;
+    L = llt.matrixL();
+    const Matrix3d P = L.topLeftCorner<3, 3>();
+    const Matrix3d S = L.bottomRightCorner<3, 3>();
+    root.P_inverse = P.triangularView<Eigen::Lower>().solve(Matrix3d::Identity());
+    root.S_inverse = S.triangularView<Eigen::Lower>().solve(Matrix3d::Identity());
+    root.Q = L.bottomLeftCorner<3, 3>();
+    return true;
+  };
+  double stiffening = 4.0 * W.lpNorm<Eigen::Infinity>();
+  for (int attempt = 0; attempt < 3; ++attempt, stiffening *= 30.0) {
+    Matrix6d stiffened = W;
+    for (std::size_t i = 0; i < contacts_.size(); ++i)
+      if (multiplier_[i] > 0.0) stiffened += stiffening * J_[i] * J_[i].transpose();
+    if (split(stiffened)) return;
+  }
+  const Matrix6d scaled = metric_root_.triangularView<Eigen::Lower>().solve(
+      metric_root_.triangularView<Eigen::Lower>().solve(W).transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled);
   const Vector6d turned_over = eigen.eigenvalues().cwiseAbs().cwiseMax(kLeastCurvature);
-  const Matrix6d root = metric_root_ * eigen.eigenvectors();
-  C.compute(root * turned_over.asDiagonal() * root.transpose());
-  return C;
+  const Matrix6d factor = metric_root_ * eigen.eigenvectors();
+  if (split(factor * turned_over.asDiagonal() * factor.transpose())) return;
+  split(metric_root_ * metric_root_.transpose());
+}
+
+Vector6d ExactProjection::Root::solve(const Vector6d& y) const noexcept {
+  Vector6d z;
+  const Vector3d upper = P_inverse * y.head<3>();
+  z << upper, S_inverse * (y.tail<3>() - Q * upper);
+  return z;
+}
+
+Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexcept {
+  Vector6d y;
+  const Vector3d lower = S_inverse.transpose() * z.tail<3>();
+  y << P_inverse.transpose() * (z.head<3>() - Q.transpose() * lower), lower;
+  return y;
 }
 
 /// The step that minimises the quadratic model within the linearised gaps:
 ///
 ///   min 1/2 dy' W dy + g' dy   s.t.   J_i dy >= -gap_i
 ///
-/// With W = C C' and z = C' dy this is a least-distance problem from z0 = -C^-1 g. At an admissible state dy
-/// = 0 is allowed, so there always is an answer. Leaves the multipliers.
-bool ExactProjection::newton_step(const Slope& slope, Vector6d& dy) noexcept {
-  const Eigen::LLT<Matrix6d> C = factorised(slope.W);
-  if (C.info() != Eigen::Success) return false;
+/// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g. At an
+/// admissible state dy = 0 is allowed, so there always is an answer. Leaves the multipliers.
+bool ExactProjection::newton_step(const State& state, const Vector6d& g, Vector6d& dy) noexcept {
+  const Curvature W = curvature(state);
+  Root root;
+  if (!factorise(W, root)) factorise_convex_part(W, root);
   step_.clear();
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    step_.add(C.matrixL().solve(J_[i]), -std::max(gap_[i], 0.0));
+  for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root.solve(J_[i]), -std::max(gap_[i], 0.0));
   using Status = LeastDistance<6, ContactSet::kCapacity>::Status;
-  if (step_.solve(-C.matrixL().solve(slope.g), kGapTolerance) != Status::optimal) return false;
-  dy = C.matrixU().solve(step_.z());
+  if (step_.solve(-root.solve(g), kGapTolerance) != Status::optimal) return false;
+  dy = root.solve_transposed(step_.z());
   for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = step_.multiplier(i);
   return true;
 }
 
-ExactProjection::Local ExactProjection::translate_out(State& state) noexcept {
-  if (!restore(state)) return Local::infeasible;
+bool ExactProjection::translate_out(State& state) noexcept {
+  if (!restore(state)) return false;
   for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = 2.0 * translation_.multiplier(i);
-  return Local::converged;
+  return true;
 }
 
 /// Newton's method on the contacts at hand, from the state's rotation. Every accepted state is admissible for
 /// them.
 ExactProjection::Local ExactProjection::minimise(State& state) noexcept {
-  if (translate_out(state) == Local::infeasible) {
+  const bool warm = std::any_of(multiplier_.begin(), multiplier_.begin() + contacts_.size(),
+                                [](double m) { return m > 0.0; });
+  if (!(warm ? restore(state) : translate_out(state))) {
     if (!seek_feasible(state)) return Local::infeasible;
     translate_out(state);
   }
-  while (iterations_ < iteration_limit_) {
-    ++iterations_;
-    make_room(state);
+  for (;;) {
     linearise(state);
-    const Slope here = slope(state);
+    const Vector6d g = gradient(state);
+    if (residual(g) <= kSmallResidual) return Local::converged;
+    if (iterations_ == iteration_limit_) return Local::budget_spent;
+    ++iterations_;
     Vector6d dy;
-    if (!newton_step(here, dy)) return Local::budget_spent;
-    const double promised = -here.g.dot(dy);  // first-order fall of T
-    const bool last = dy.norm() < kShortStep && residual(here.g) < kSmallResidual;
+    if (!newton_step(state, g, dy)) return Local::budget_spent;
+    const double promised = -g.dot(dy);  // first-order fall of T
     const Advance moved = advance(state, dy, promised);
     if (moved == Advance::met_contacts) continue;  // the same state again, with a model that knows them
-    if (last) return Local::converged;
     // Rounding hides the fall of T where the promise is smaller than T's own last digits.
     if (moved == Advance::stuck) return promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
   }
-  return Local::budget_spent;
 }
 
-/// |g - sum multiplier_i J_i| / |g|, at the state that was linearised last.
+/// |g - sum multiplier_i J_i| / |g|, at the state that was linearised last. A contact that is apart carries
+/// nothing: what it seems to carry counts as missing.
 double ExactProjection::residual(const Vector6d& g) const noexcept {
   Vector6d rest = g;
-  for (std::size_t i = 0; i < contacts_.size(); ++i) rest -= multiplier_[i] * J_[i];
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (multiplier_[i] > 0.0 && gap_[i] <= kTouching) rest -= multiplier_[i] * J_[i];
   return rest.norm() / std::max(g.norm(), kLeastGradient);
 }
 
@@ -309,12 +464,12 @@ ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& 
                                                   double promised) noexcept {
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
-  const Vector3d turn = dy.tail<3>();
+  const Vector3d eta = dy.tail<3>();
   const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T : 0.0;
-  double fraction = 1.0 / std::max(1.0, turn.norm());  // never more than one radian at a time
+  double fraction = 1.0 / std::max(1.0, eta.norm());  // never more than one radian at a time
   for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
     State trial = state;
-    trial.E = turned(state.E, fraction * turn);
+    turn(trial, fraction * eta);
     const std::size_t known = contacts_.size();
     if (restore(trial) && trial.T <= state.T + rounding - kFairShare * fraction * promised) {
       state = trial;
@@ -349,24 +504,24 @@ bool ExactProjection::seek_feasible(State& state) noexcept {
     if (largest_turn > 0.5) dy *= 0.5 / largest_turn;
     if (dy.norm() < kShortStep) return false;
     state.u += dy.head<3>();
-    state.E = turned(state.E, dy.tail<3>());
+    turn(state, dy.tail<3>());
     if (restore(state)) return true;
   }
   return false;
 }
 
-/// Drops contacts that carry nothing and do not touch, once the set is more than half full, so that new ones
-/// fit in.
+/// Drops contacts that are apart and carry nothing, neither of the last step nor of the translation just
+/// solved.
 void ExactProjection::make_room(const State& state) noexcept {
-  if (contacts_.size() <= ContactSet::kCapacity / 2) return;
-  linearise(state);
   for (std::size_t i = contacts_.size(); i-- > 0;) {
-    if (multiplier_[i] > 0.0 || gap_[i] < kTouching) continue;
+    const Affine gap = affine(seen_[i], state.R);
+    if (multiplier_[i] > 0.0 || translation_.multiplier(i) > 0.0 || gap.n.dot(state.u) + gap.h < kTouching)
+      continue;
     contacts_.remove_unordered(i);
     const std::size_t last = contacts_.size();
     seen_[i] = seen_[last];
     multiplier_[i] = multiplier_[last];
-    gap_[i] = gap_[last];
+    translation_.remove_unordered(i);
   }
 }
 
@@ -374,48 +529,54 @@ void ExactProjection::make_room(const State& state) noexcept {
 /// residual.
 void ExactProjection::report(Projection& out) noexcept {
   out.X_WQ = pose_of(state_);
+  const std::size_t known = contacts_.size();
+  while (scene_->add_violated(out.X_WQ, -kTouching * L_, contacts_) > 0) continue;  // what touches idly
+  see_from(known);
   linearise(state_);
   out.kkt_residual = residual(gradient(state_));
-  out.energy = energy(M_, X_WP_, out.X_WQ);
-  out.active_count = 0;
-  for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    if (gap_[i] > kTouching) continue;
-    out.active[out.active_count++] = {contacts_[i], multiplier_[i] * M_.mass_kg * L_};
-  }
+  out.energy = state_.T * M_.mass_kg * L_ * L_;
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (gap_[i] <= kTouching) out.active.add({contacts_[i], multiplier_[i] * M_.mass_kg * L_});
 }
 
-// Weak duality gives a proof of global optimality for the price of a 4 x 4 eigenvalue problem. For any
-// multipliers >= 0, the least value of the Lagrangian over all u and all unit quaternions q bounds T from
-// below. A vertex-face gap is quadratic in q, n . R(q) a = q' A q with
+// Weak duality gives a proof of global optimality. For any multipliers m_i >= 0, the least value of the
+// Lagrangian over all u and all unit quaternions q bounds T from below. A vertex-face gap is quadratic in q,
+// n . R(q) a = q' A q with
 //
 //   A = [ n.a      (a x n)'              ]
 //       [ a x n    n a' + a n' - (n.a) I ]
 //
-// so the bound is  -sum m_i c_i - |sum m_i n_i|^2 / 4 + lambda_min( 4 diag(0, H^) - sum m_i A_i ),
-// and where it meets T no admissible pose is closer.
-bool ExactProjection::certify(const State& state) noexcept {
+// so the Lagrangian is |u|^2 - sum m_i n_i . u - sum m_i c_i + q' Z q with Z = 4 diag(0, H^) - sum m_i A_i.
+// At a KKT point u is its minimiser and q an eigenvector of Z. The bound meets T, and no admissible pose is
+// closer, where the eigenvalue is the least one: where q' Z q curves upwards on the sphere at q, in all three
+// directions. That is the eta block of the Lagrangian's Hessian, so the proof costs one Cholesky factor.
+bool ExactProjection::proven() noexcept {
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    if (multiplier_[i] > 0.0 && contacts_[i].kind != ContactKind::vertex_face) return false;
+  Root root;
+  return factorise(curvature(state_), root);
+}
+
+/// The rotation at which the dual bound is attained, the eigenvector of the least eigenvalue of Z: where it
+/// is not the optimum it is at least where the Lagrangian would rather be.
+Quaterniond ExactProjection::dual_rotation() const noexcept {
   Eigen::Matrix4d Z = Eigen::Matrix4d::Zero();
   Z.bottomRightCorner<3, 3>() = 4.0 * H_hat_;
-  Vector3d pull = Vector3d::Zero();
-  double bound = 0.0;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const double m = multiplier_[i];
     if (!(m > 0.0)) continue;
-    const auto& [n, a, c] = seen_[i];
+    const Vector3d& n = seen_[i].n;
+    const Vector3d& a = seen_[i].a;
     const Vector3d an = a.cross(n);
     const Matrix3d na = n * a.transpose();
     Z(0, 0) -= m * n.dot(a);
     Z.topRightCorner<1, 3>() -= m * an.transpose();
     Z.bottomLeftCorner<3, 1>() -= m * an;
     Z.bottomRightCorner<3, 3>() -= m * (na + na.transpose() - n.dot(a) * Matrix3d::Identity());
-    pull += m * n;
-    bound -= m * c;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(Z);
   const Eigen::Vector4d q = eigen.eigenvectors().col(0);
-  dual_rotation_ = Quaterniond(q[0], q[1], q[2], q[3]);
-  bound += eigen.eigenvalues()[0] - 0.25 * pull.squaredNorm();
-  return state.T - bound <= kProof * std::max(state.T, 1e-12);
+  return {q[0], q[1], q[2], q[3]};
 }
 
 }  // namespace wrenchd

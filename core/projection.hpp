@@ -3,8 +3,7 @@
 
 #include <array>
 #include <cstdint>
-
-#include <Eigen/Cholesky>
+#include <span>
 
 #include "core/contact.hpp"
 #include "core/inertia.hpp"
@@ -35,8 +34,7 @@ struct Projection {
   double kkt_residual = 0.0;  ///< |grad T - sum multiplier grad gap| / |grad T| at q, in the body's own scale
   bool proven_global =
       false;  ///< no admissible pose is closer: proven by project_globally(), never by project()
-  std::uint16_t active_count = 0;  ///< contacts that touch at q
-  std::array<ActiveContact, ContactSet::kCapacity> active;
+  FixedList<ActiveContact, ContactSet::kCapacity> active;  ///< contacts that touch at q
 };
 
 /// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy
@@ -46,16 +44,16 @@ struct Projection {
 /// of the body's own (its radius of gyration), so that nothing below depends on the unit of length. With H^ =
 /// H/(m L^2):
 ///
-///   T/(m L^2) = |u|^2 + 4 v' H^ v          gap_i/L = n_i . (u + R_E a_i) + c_i
+///   T/(m L^2) = |u|^2 + 4 v' H^ v          gap_i/L = n_i(E) . (u + R_E a_i - b_i)
 ///
-/// where n_i, a_i/L, c_i = (n_i . x_p - o_i)/L are the contact as seen from p.
+/// where n_i, a_i/L and b_i/L are the contact as seen from p.
 ///
-/// For a fixed rotation every gap is affine in u. So the nearest translation is a three-dimensional
-/// least-distance problem with an exact answer, and every iterate of the method is admissible in the whole
-/// scene: a Newton step (a six-dimensional least-distance problem on the linearised gaps, curvature of the
-/// contacts included) proposes a rotation, the translation restores admissibility, and the step is accepted
-/// when T falls. The first iterate is the best translation, or last tick's rotation; T only falls from there,
-/// and whenever time is up there is an answer.
+/// For a fixed rotation every gap is affine in u, whatever the kind of the contact. So the nearest
+/// translation is a three-dimensional least-distance problem with an exact answer, and every iterate of the
+/// method is admissible in the whole scene: a Newton step (a six-dimensional least-distance problem on the
+/// linearised gaps, curvature of the contacts included) proposes a rotation, the translation restores
+/// admissibility, and the step is accepted when T falls. The first iterate is the best translation, or last
+/// tick's rotation; T only falls from there, and whenever time is up there is an answer.
 ///
 /// All memory is in the object. One object serves one thread.
 class ExactProjection {
@@ -69,12 +67,14 @@ class ExactProjection {
   ExactProjection(const Inertia& M, Budget budget);
 
   /// Follows a proxy: the closest admissible configuration to p, sought from the rotation of X_start (last
-  /// tick's q). RT safe.
-  Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept;
+  /// tick's q). known: contacts to begin with, last tick's active ones, with their multipliers; the answer
+  /// does not depend on them, the time does. RT safe.
+  Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start,
+                     std::span<const ActiveContact> known = {}) noexcept;
 
   /// The closest admissible configuration to p, whatever came before: tries further starts until the dual
-  /// bound proves that none is closer, or the starts are used up. Up to a hundred times dearer than
-  /// project(). RT safe.
+  /// bound proves that none is closer, or the starts are used up. Where the first start is proven, as almost
+  /// always, this costs what project() costs; otherwise up to a hundred times as much. RT safe.
   Projection project_globally(const Pose& X_WP, const ContactSource& scene) noexcept;
 
   /// The closest admissible configuration among those with the rotation of X_rotated: what a method that
@@ -88,18 +88,36 @@ class ExactProjection {
  private:
   /// A contact seen from p, in units of L.
   struct Seen {
+    Vector3d n;   ///< vertex_face: the normal
+    Vector3d a;   ///< in T
+    Vector3d b;   ///< face_vertex, edge_edge
+    double c;     ///< vertex_face: n . (x_p - b)
+    Vector3d d;   ///< d_T
+    Vector3d dB;  ///< d_W
+    ContactKind kind;
+  };
+  /// A gap at one rotation: n . u + h.
+  struct Affine {
     Vector3d n;
-    Vector3d a;
-    double c;
+    double h;
   };
   struct State {
     Vector3d u = Vector3d::Zero();
     Quaterniond E = Quaterniond::Identity();
-    double T = 0.0;  ///< in units of m L^2
+    Matrix3d R = Matrix3d::Identity();  ///< of E
+    double T = 0.0;                     ///< in units of m L^2
   };
-  struct Slope {
-    Vector6d g;  ///< gradient of T in (u, eta)
-    Matrix6d W;  ///< Hessian of the Lagrangian, made positive definite
+  /// Hessian of the Lagrangian in (u, eta), [2 I, C; C', B].
+  struct Curvature {
+    Matrix3d C = Matrix3d::Zero();
+    Matrix3d B = Matrix3d::Zero();
+  };
+  /// Triangular root [P 0; Q S] of a positive definite matrix, with P and S inverted.
+  struct Root {
+    Matrix3d P_inverse, Q, S_inverse;
+
+    Vector6d solve(const Vector6d& y) const noexcept;             ///< root^-1 y
+    Vector6d solve_transposed(const Vector6d& z) const noexcept;  ///< root'^-1 z
   };
   enum class Local : std::uint8_t { converged, budget_spent, infeasible };
   enum class Advance : std::uint8_t { fell, met_contacts, stuck };
@@ -107,24 +125,30 @@ class ExactProjection {
 
   Projection best_of_all_starts(const Pose& X_WP, const ContactSource& scene) noexcept;
   Projection project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
-                          Freedom freedom = Freedom::all) noexcept;
+                          std::span<const ActiveContact> known, Freedom freedom = Freedom::all) noexcept;
+  void gather(std::span<const ActiveContact> known) noexcept;
   Pose pose_of(const State& state) const noexcept;
   void see_from(std::size_t first) noexcept;
+  Affine affine(const Seen& seen, const Matrix3d& R) const noexcept;
   double scaled_energy(const State& state) const noexcept;
+  void turn(State& state, const Vector3d& eta) const noexcept;
   bool restore(State& state) noexcept;
   bool seek_feasible(State& state) noexcept;
   Local minimise(State& state) noexcept;
-  Local translate_out(State& state) noexcept;
+  bool translate_out(State& state) noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
-  Slope slope(const State& state) const noexcept;
+  Curvature curvature(const State& state) const noexcept;
+  void bend(const State& state, std::size_t i, Curvature& W) const noexcept;
   void linearise(const State& state) noexcept;
-  Eigen::LLT<Matrix6d> factorised(const Matrix6d& hessian) const noexcept;
-  bool newton_step(const Slope& slope, Vector6d& dy) noexcept;
+  bool factorise(const Curvature& W, Root& root) const noexcept;
+  void factorise_convex_part(const Curvature& W, Root& root) const noexcept;
+  bool newton_step(const State& state, const Vector6d& g, Vector6d& dy) noexcept;
   Advance advance(State& state, const Vector6d& dy, double promised) noexcept;
   void make_room(const State& state) noexcept;
   void report(Projection& out) noexcept;
-  bool certify(const State& state) noexcept;
+  bool proven() noexcept;
+  Quaterniond dual_rotation() const noexcept;
 
   Inertia M_;
   Budget budget_;
@@ -145,8 +169,7 @@ class ExactProjection {
   LeastDistance<3, ContactSet::kCapacity> translation_;
   LeastDistance<6, ContactSet::kCapacity> step_;
   LeastDistance<7, ContactSet::kCapacity> elastic_;
-  State state_;                                          ///< the iterate, and after a query its answer
-  Quaterniond dual_rotation_ = Quaterniond::Identity();  ///< where the dual bound of certify() is attained
+  State state_;  ///< the iterate, and after a query its answer
   std::uint16_t iterations_ = 0;
 };
 

@@ -23,10 +23,19 @@ struct HalfSpaceSettings {
   double offset_m = 0.0;
 };
 
+/// A convex solid that stands still. M is the frame its mesh file is written in.
+struct MeshObstacleSettings {
+  std::string name;
+  std::filesystem::path mesh;
+  double scale = 1.0;  ///< metres per mesh unit
+  Pose X_WM;
+};
+
 struct SceneSettings {
   std::filesystem::path file;  ///< where it was read from, for messages
   ToolSettings tool;
   std::vector<HalfSpaceSettings> half_spaces;
+  std::vector<MeshObstacleSettings> meshes;
 };
 
 }  // namespace wrenchd

@@ -39,7 +39,6 @@ std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
 ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
                      const Scene& scene, const Clock& clock, RecordRing* records)
     : device_(device),
-      scene_(scene),
       clock_(clock),
       records_(records),
       X_WB_(pose_of(settings.device.base_in_world)),
@@ -48,8 +47,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       pacing_(settings.servo.pacing),
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
       late_limit_(from_seconds(settings.servo.late_limit_s)),
-      penetration_(scene.tool().solid.inertia, scene.tool().hull,
-                   {settings.rendering.method, settings.rendering.planes}),
+      penetration_(scene, {settings.rendering.method, settings.rendering.planes}),
       law_(gains_for(settings.rendering.method, settings.wrench)),
       limits_(settings.limits, profile.max_force_N, profile.max_torque_Nm),
       soft_start_(settings.limits.soft_start_s) {}
@@ -155,7 +153,7 @@ void ServoLoop::obey(std::uint8_t command) noexcept {
 /// projected globally; from then on q follows the hand as a proxy.
 void ServoLoop::project(const DeviceSample& sample) noexcept {
   X_WP_ = X_WB_ * sample.X_BH * X_HT_;
-  depth_ = X_WQ_ ? penetration_.follow(X_WP_, scene_, *X_WQ_) : penetration_.query(X_WP_, scene_);
+  depth_ = X_WQ_ ? penetration_.follow(X_WP_, *X_WQ_) : penetration_.query(X_WP_);
   X_WQ_ = depth_.projection.X_WQ;
 }
 

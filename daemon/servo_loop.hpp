@@ -13,7 +13,7 @@
 #include "core/engagement.hpp"
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
-#include "core/penetration.hpp"
+#include "collision/penetration.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/event.hpp"
 #include "daemon/loop_timing.hpp"
@@ -79,7 +79,6 @@ class ServoLoop {
 
   // Constant after construction
   Device& device_;
-  const Scene& scene_;
   const Clock& clock_;
   RecordRing* records_;
   Pose X_WB_;

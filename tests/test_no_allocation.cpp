@@ -28,7 +28,7 @@ TEST_CASE("the guard sees what it is there to see", "[realtime]") {
 
 TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neither allocate nor lock",
           "[realtime]") {
-  const Method method = GENERATE(Method::exact, Method::planar, Method::translational);
+  const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
   Plan plan = shipped_plan();
   plan.settings.rendering.method = method;
   plan.settings.limits.max_force_N = 1.0;

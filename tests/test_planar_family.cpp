@@ -6,8 +6,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "collision/penetration.hpp"
 #include "core/metric.hpp"
-#include "core/penetration.hpp"
 #include "core/planar_family.hpp"
 #include "tests/support/random_body.hpp"
 
@@ -298,8 +298,8 @@ TEST_CASE("planar is never better than exact and never worse than translation, h
     const Pressed c = random_pressed(random);
     const Scene scene(c.tool, {half_space(c.contact.n_W, c.contact.offset_m)});
     const auto depth = [&](Method method, int planes) {
-      PenetrationDepth solver(c.tool.solid.inertia, c.tool.hull, {method, planes});
-      return solver.query(c.X_WP, scene).projection.energy;
+      PenetrationDepth solver(scene, {method, planes});
+      return solver.query(c.X_WP).projection.energy;
     };
     const double exact = depth(Method::exact, 1);
     const double translational = depth(Method::translational, 1);

@@ -17,7 +17,7 @@ namespace {
 /// over E.
 double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaterniond& E) {
   const Pose X_WQ{X_WP.rotation * E, X_WP.translation_m};
-  const double lift_m = std::max(0.0, -scene.least_gap_m(X_WQ));
+  const double lift_m = std::max(0.0, -least_gap_m(scene, X_WQ));
   const Inertia& M = scene.tool().solid.inertia;
   return M.mass_kg * lift_m * lift_m + 4.0 * E.vec().dot(M.H_kg_m2 * E.vec());
 }
@@ -49,15 +49,15 @@ Case random_case(RandomValues& random, double least_axis = 0.2) {
   const Vector3d n = random.unit<3>();
   Scene scene(random_body(random, random.integer(5, 30), least_axis), {half_space(n, random.normal())});
   Pose X_WP{random.rotation(), random.vector<3>()};
-  X_WP.translation_m -= (scene.least_gap_m(X_WP) + random.uniform(0.05, 0.3)) * n;
+  X_WP.translation_m -= (least_gap_m(scene, X_WP) + random.uniform(0.05, 0.3)) * n;
   return {std::move(scene), X_WP};
 }
 
 void check_consistent(const Scene& scene, const Pose& X_WP, const Projection& q, double residual = 1e-9) {
-  CHECK(scene.least_gap_m(q.X_WQ) > -1e-12);
+  CHECK(least_gap_m(scene, q.X_WQ) > -1e-12);
   CHECK(q.energy == Approx(energy(scene.tool().solid.inertia, X_WP, q.X_WQ)).epsilon(1e-12));
   CHECK(q.kkt_residual < residual);
-  for (std::size_t i = 0; i < q.active_count; ++i) CHECK(q.active[i].multiplier > -1e-12);
+  for (std::size_t i = 0; i < q.active.size(); ++i) CHECK(q.active[i].multiplier > -1e-12);
 }
 
 }  // namespace
@@ -69,11 +69,11 @@ TEST_CASE("the exact projection reproduces example 4.1 of the paper", "[projecti
     CHECK(M.H_kg_m2.isApprox(2500.0 / 6.0 * scale * scale * Matrix3d::Identity(), 1e-12));
     const Pose X_WP{Quaterniond(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ())), {0.0, 25.0 * scale, 0.0}};
     ExactProjection exact(M);
-    const Projection q = exact.project_globally(X_WP, scene);
+    const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
 
     CHECK(q.status == ProjectionStatus::converged);
     CHECK(q.proven_global);
-    CHECK(q.active_count == 2);
+    CHECK(q.active.size() == 2);
     CHECK(std::abs(q.energy / (scale * scale) - 9.63154218539309) < 1e-12);
     CHECK(std::abs(q.X_WQ.translation_m.y() / scale - 27.0712157435851) < 1e-12);
     CHECK(std::abs(q.X_WQ.translation_m.x()) < 1e-12 * scale);
@@ -93,7 +93,7 @@ TEST_CASE("against a half-space nothing found by brute force is closer", "[proje
   for (int i = 0; i < 60; ++i) {
     const Case c = random_case(random);
     ExactProjection exact(c.scene.tool().solid.inertia);
-    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     INFO("case " << i);
     REQUIRE(q.status == ProjectionStatus::converged);
     check_consistent(c.scene, c.X_WP, q);
@@ -108,12 +108,12 @@ TEST_CASE("optimality is proven in nearly every case, and a proof is never wrong
   for (int i = 0; i < kCases; ++i) {
     const Case c = random_case(random);
     ExactProjection exact(c.scene.tool().solid.inertia);
-    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     if (!q.proven_global) continue;
     ++proven;
     for (int start = 0; start < 5; ++start) {
       const Pose elsewhere{c.X_WP.rotation * random.rotation(random.uniform(0.0, 2.5)), c.X_WP.translation_m};
-      const Projection other = exact.project(c.X_WP, c.scene, elsewhere);
+      const Projection other = exact.project(c.X_WP, SceneContacts(c.scene), elsewhere);
       CHECK(other.energy >= q.energy * (1.0 - 1e-9));
     }
   }
@@ -125,11 +125,11 @@ TEST_CASE("an admissible pose is its own projection, touching or not", "[project
   ExactProjection exact(scene.tool().solid.inertia);
   for (const double height_m : {0.5, 0.7}) {
     const Pose X_WP{Quaterniond::Identity(), {0.3, -0.2, height_m}};
-    const Projection q = exact.project_globally(X_WP, scene);
+    const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
     CHECK(q.status == ProjectionStatus::free);
     CHECK(q.energy == 0.0);
     CHECK(q.X_WQ.translation_m == X_WP.translation_m);
-    CHECK(q.active_count == 0);
+    CHECK(q.active.size() == 0);
   }
 }
 
@@ -143,12 +143,12 @@ TEST_CASE("a face pressed flat comes straight out, however many vertices it has"
     const Scene scene(tool_of(prism), {half_space(Vector3d::UnitZ(), 0.0)});
     ExactProjection exact(scene.tool().solid.inertia);
     const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, 0.25}};
-    const Projection q = exact.project_globally(X_WP, scene);
+    const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
     CHECK(q.status == ProjectionStatus::converged);
     CHECK(std::abs(q.X_WQ.translation_m.z() - 0.3) < 1e-14);
     CHECK(q.X_WQ.rotation.vec().norm() < 1e-12);
     double carried = 0.0;
-    for (std::size_t i = 0; i < q.active_count; ++i) carried += q.active[i].multiplier;
+    for (std::size_t i = 0; i < q.active.size(); ++i) carried += q.active[i].multiplier;
     CHECK(carried == Approx(2.0 * 0.05));  // 2 m s = sum of multipliers times normals
   }
 }
@@ -162,10 +162,10 @@ TEST_CASE("several half-spaces are met together: a box pressed into a corner of 
     const Scene scene(box({1.0, 0.8, 0.6}), room);
     ExactProjection exact(scene.tool().solid.inertia);
     const Pose X_WP{random.rotation(0.3), {0.4, 0.35, 0.25}};
-    const Projection q = exact.project_globally(X_WP, scene);
+    const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
     REQUIRE(q.status == ProjectionStatus::converged);
     check_consistent(scene, X_WP, q);
-    const Projection lifted = exact.translate(X_WP, scene, X_WP);
+    const Projection lifted = exact.translate(X_WP, SceneContacts(scene), X_WP);
     CHECK(q.energy <= lifted.energy * (1.0 + 1e-12));
   }
 }
@@ -176,8 +176,8 @@ TEST_CASE("a slot that is too narrow at this angle is entered by turning", "[pro
                     {half_space(Vector3d::UnitY(), -0.25), half_space(-Vector3d::UnitY(), -0.25)});
   ExactProjection exact(scene.tool().solid.inertia);
   const Pose X_WP{Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX())), Vector3d::Zero()};
-  CHECK(exact.translate(X_WP, scene, X_WP).status == ProjectionStatus::infeasible);
-  const Projection q = exact.project_globally(X_WP, scene);
+  CHECK(exact.translate(X_WP, SceneContacts(scene), X_WP).status == ProjectionStatus::infeasible);
+  const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
   REQUIRE(q.status == ProjectionStatus::converged);
   check_consistent(scene, X_WP, q);
 }
@@ -187,8 +187,8 @@ TEST_CASE("obstacles that leave no room are said to be infeasible", "[projection
                     {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
   ExactProjection exact(scene.tool().solid.inertia);
   const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, 0.25}};
-  CHECK(exact.project_globally(X_WP, scene).status == ProjectionStatus::infeasible);
-  CHECK(exact.project(X_WP, scene, X_WP).status == ProjectionStatus::infeasible);
+  CHECK(exact.project_globally(X_WP, SceneContacts(scene)).status == ProjectionStatus::infeasible);
+  CHECK(exact.project(X_WP, SceneContacts(scene), X_WP).status == ProjectionStatus::infeasible);
 }
 
 TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]") {
@@ -196,7 +196,7 @@ TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]"
   for (int i = 0; i < 40; ++i) {
     const Case c = random_case(random);
     ExactProjection exact(c.scene.tool().solid.inertia);
-    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     for (const double scale : {1e-4, 1e4}) {
       std::vector<Vector3d> points = c.scene.tool().hull.vertices_T_m;
       for (Vector3d& p : points) p *= scale;
@@ -204,7 +204,7 @@ TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]"
       const Scene scaled(tool_of(points), {half_space(h.normal_W, scale * h.offset_m)});
       const Pose X_WP{c.X_WP.rotation, scale * c.X_WP.translation_m};
       ExactProjection other(scaled.tool().solid.inertia);
-      const Projection r = other.project_globally(X_WP, scaled);
+      const Projection r = other.project_globally(X_WP, SceneContacts(scaled));
       CHECK(r.energy / (scale * scale) == Approx(q.energy).epsilon(1e-9));
       CHECK(r.X_WQ.rotation.angularDistance(q.X_WQ.rotation) < 1e-7);
     }
@@ -218,10 +218,10 @@ TEST_CASE("the projection moves with the world, and does not care where the mesh
     const Case c = random_case(random);
     const Inertia& M = c.scene.tool().solid.inertia;
     ExactProjection exact(M);
-    const Projection q = exact.project_globally(c.X_WP, c.scene);
+    const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     const Pose a = random.pose(3.0);
     const Scene elsewhere(c.scene.tool(), moved(a, c.scene.half_spaces()));
-    const Projection r = exact.project_globally(a * c.X_WP, elsewhere);
+    const Projection r = exact.project_globally(a * c.X_WP, SceneContacts(elsewhere));
     CHECK(r.energy == Approx(q.energy).epsilon(1e-10));
     const Pose difference = inverse(a * q.X_WQ) * r.X_WQ;
     CHECK(log(difference).norm() < 1e-7);
@@ -234,8 +234,8 @@ TEST_CASE("mass scales the energy and moves nothing", "[projection]") {
   const Inertia& M = c.scene.tool().solid.inertia;
   ExactProjection light(M);
   ExactProjection heavy({7.0 * M.mass_kg, 7.0 * M.H_kg_m2});
-  const Projection q = light.project_globally(c.X_WP, c.scene);
-  const Projection r = heavy.project_globally(c.X_WP, c.scene);
+  const Projection q = light.project_globally(c.X_WP, SceneContacts(c.scene));
+  const Projection r = heavy.project_globally(c.X_WP, SceneContacts(c.scene));
   CHECK(r.energy == Approx(7.0 * q.energy).epsilon(1e-12));
   CHECK(log(inverse(q.X_WQ) * r.X_WQ).norm() < 1e-9);
 }
@@ -248,9 +248,9 @@ TEST_CASE("needles with an inertia of 1 to 1e6 converge like other bodies", "[pr
     const Vector3d n = random.unit<3>();
     const Scene scene(tool_of(points), {half_space(n, 0.0)});
     Pose X_WP{random.rotation(), Vector3d::Zero()};
-    X_WP.translation_m -= (scene.least_gap_m(X_WP) + random.uniform(0.01, 0.1)) * n;
+    X_WP.translation_m -= (least_gap_m(scene, X_WP) + random.uniform(0.01, 0.1)) * n;
     ExactProjection exact(scene.tool().solid.inertia);
-    const Projection q = exact.project_globally(X_WP, scene);
+    const Projection q = exact.project_globally(X_WP, SceneContacts(scene));
     INFO("case " << i);
     REQUIRE(q.status == ProjectionStatus::converged);
     check_consistent(scene, X_WP, q, 1e-7);  // a roll weighs 1e-6 here, and so do its digits
@@ -264,19 +264,21 @@ TEST_CASE("a followed proxy is admissible at every step, and settles where the o
     const Case c = random_case(random);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Vector3d& n = c.scene.half_spaces()[0].normal_W;
-    Pose X_WQ = exact.project_globally({c.X_WP.rotation, c.X_WP.translation_m + n}, c.scene).X_WQ;
+    Pose X_WQ =
+        exact.project_globally({c.X_WP.rotation, c.X_WP.translation_m + n}, SceneContacts(c.scene)).X_WQ;
     Pose X_WP = X_WQ;
     for (int step = 0; step < 500; ++step) {
       X_WP = Pose{(X_WP.rotation * random.rotation(0.02)).normalized(),
                   X_WP.translation_m + 0.01 * random.vector<3>() - 0.004 * n};
-      const Projection q = exact.project(X_WP, c.scene, X_WQ);
+      const Projection q = exact.project(X_WP, SceneContacts(c.scene), X_WQ);
       REQUIRE((q.status == ProjectionStatus::free || q.status == ProjectionStatus::converged));
       X_WQ = q.X_WQ;
-      REQUIRE(c.scene.least_gap_m(X_WQ) > -1e-12);
+      REQUIRE(least_gap_m(c.scene, X_WQ) > -1e-12);
       if (q.status == ProjectionStatus::converged) REQUIRE(q.kkt_residual < 1e-8);
     }
-    const Projection again = exact.project(X_WP, c.scene, X_WQ);
-    CHECK(again.energy == Approx(exact.project(X_WP, c.scene, again.X_WQ).energy).epsilon(1e-12));
+    const Projection again = exact.project(X_WP, SceneContacts(c.scene), X_WQ);
+    CHECK(again.energy ==
+          Approx(exact.project(X_WP, SceneContacts(c.scene), again.X_WQ).energy).epsilon(1e-12));
   }
 }
 
@@ -285,9 +287,9 @@ TEST_CASE("a spent budget still answers with an admissible pose, no worse than t
   for (int i = 0; i < 50; ++i) {
     const Case c = random_case(random);
     ExactProjection hurried(c.scene.tool().solid.inertia, {1, 24});
-    const Projection q = hurried.project(c.X_WP, c.scene, c.X_WP);
+    const Projection q = hurried.project(c.X_WP, SceneContacts(c.scene), c.X_WP);
     REQUIRE(q.status != ProjectionStatus::infeasible);
-    CHECK(c.scene.least_gap_m(q.X_WQ) > -1e-12);
-    CHECK(q.energy <= hurried.translate(c.X_WP, c.scene, c.X_WP).energy * (1.0 + 1e-9));
+    CHECK(least_gap_m(c.scene, q.X_WQ) > -1e-12);
+    CHECK(q.energy <= hurried.translate(c.X_WP, SceneContacts(c.scene), c.X_WP).energy * (1.0 + 1e-9));
   }
 }

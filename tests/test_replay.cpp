@@ -40,7 +40,7 @@ Plan recording_plan(Method method) {
 }  // namespace
 
 TEST_CASE("a replayed recording gives the same bits", "[replay]") {
-  const Method method = GENERATE(Method::exact, Method::planar, Method::translational);
+  const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   const Plan plan = recording_plan(method);

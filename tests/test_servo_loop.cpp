@@ -219,7 +219,7 @@ TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
 }
 
 TEST_CASE("all three methods hold the cube", "[servo]") {
-  const Method method = GENERATE(Method::exact, Method::planar, Method::translational);
+  const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
   Plan plan = shipped_plan();
   plan.settings.rendering.method = method;
   VirtualStation s(plan);

@@ -279,7 +279,7 @@ TEST_CASE("a pose without an admissible one near it is told, and the rest is ans
   // A slot of 10 between two walls, for a cube of 50; the other poses are no better.
   bench.scene = bench.dir.write(
       "scene.toml", kScene + "[[obstacle]]\nhalf_space = { normal = [0, -1, 0], offset = -10 }\n");
-  for (const char* method : {"exact", "planar", "translational"}) {
+  for (const char* method : {"exact", "planar", "descent", "translational"}) {
     INFO(method);
     const ProgramResult result = bench.solve({"--method", method});
     CHECK(result.exit_code == 3);
@@ -346,8 +346,8 @@ TEST_CASE("wrenchctl solve refuses bad scenes") {
        ":4:29", "expected a number"},
       {"no offset", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, 1, 0]"), ":4:14",
        "half_space.offset' is missing"},
-      {"mesh obstacle", "scene.toml", "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"body.off\"\n",
-       ":4:8", "mesh obstacles are not supported yet; give a half_space"},
+      {"mesh obstacle", "scene.toml", "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"none.off\"\n",
+       ":4:8", "no such file; looked for"},
       {"binary", "scene.toml",
        std::string("\x7f"
                    "ELF\0\1\2",
@@ -449,8 +449,8 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},
       {{"solve", scene, "--poses", poses, "--method", "nonsense"},
-       "nonsense not in {exact,planar,translational}"},
-      {{"solve", scene, "--poses", poses, "--method", "Exact"}, "{exact,planar,translational}"},
+       "nonsense not in {exact,planar,descent,translational}"},
+      {{"solve", scene, "--poses", poses, "--method", "Exact"}, "{exact,planar,descent,translational}"},
       {{"solve", scene, "--poses", poses, "--method"}, "--method"},
       {{"solve", scene, "--poses", poses, "--k-p", "nan"},
        "--k-p: expected a number from 0 to 1e+09, found 'nan'"},
@@ -557,7 +557,7 @@ TEST_CASE("wrenchctl explains itself") {
                            "3 solve: a pose had no admissible pose", "over 100"})
     CHECK(help.out.find(word) != std::string::npos);
   const ProgramResult solve = run_program("wrenchctl", {"solve", "--help"});
-  for (const char* word : {"--poses", "--method", "{exact,planar,translational}", "--output",
+  for (const char* word : {"--poses", "--method", "{exact,planar,descent,translational}", "--output",
                            "px,py,pz,qx,qy,qz,qw", "standard input"})
     CHECK(solve.out.find(word) != std::string::npos);
   const ProgramResult version = run_program("wrenchctl", {"--version"});

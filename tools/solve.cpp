@@ -43,7 +43,7 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
   const ToolBody& tool = scene.tool();
   const Pose X_MT = tool.X_MT();
   const Pose X_TM = inverse(X_MT);
-  PenetrationDepth depth(tool.solid.inertia, tool.hull, {method});
+  PenetrationDepth depth(scene, {method});
   WrenchGains gains;
   gains.stiffness = WrenchGains::scalar(k_P);
   WrenchLaw law(gains_for(method, gains));
@@ -54,7 +54,7 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
     const Pose X_WP = X_WM_p * X_MT;
     SolvedPose row;
     const auto start = std::chrono::steady_clock::now();
-    row.penetration = depth.query(X_WP, scene);
+    row.penetration = depth.query(X_WP);
     row.solve_ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
     const bool moved = row.penetration.projection.status != ProjectionStatus::free;
     row.X_WM = moved ? row.penetration.projection.X_WQ * X_TM : X_WM_p;

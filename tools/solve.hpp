@@ -7,7 +7,7 @@
 
 #include "collision/scene.hpp"
 #include "core/method.hpp"
-#include "core/penetration.hpp"
+#include "collision/penetration.hpp"
 #include "core/spatial.hpp"
 
 namespace wrenchd {

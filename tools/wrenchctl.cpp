@@ -31,8 +31,10 @@ constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is no solid
 constexpr int kExitDiffers = 4;     ///< wrenchctl replay: a tick came out differently
 constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: a pose had no admissible pose near it
 
-const std::map<std::string, Method> kMethods = {
-    {"exact", Method::exact}, {"planar", Method::planar}, {"translational", Method::translational}};
+const std::map<std::string, Method> kMethods = {{"exact", Method::exact},
+                                                {"planar", Method::planar},
+                                                {"descent", Method::descent},
+                                                {"translational", Method::translational}};
 
 struct SolveOptions {
   std::filesystem::path scene;
@@ -159,7 +161,7 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
       ->required()
       ->check(not_empty());
   solve->add_option("--method", options.method, "how the closest admissible pose is found")
-      ->check(CLI::IsMember({"exact", "planar", "translational"}))
+      ->check(CLI::IsMember({"exact", "planar", "descent", "translational"}))
       ->capture_default_str();
   solve->add_option("--k-p", options.k_P, "k_P of Eq. (16); no integral, no derivative")
       ->check(number_from(0.0, 1e9))

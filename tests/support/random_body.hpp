@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "collision/convex_hull.hpp"
 #include "collision/scene.hpp"
+#include "collision/scene_contacts.hpp"
 #include "core/inertia.hpp"
 #include "tests/support/random_values.hpp"
 
@@ -57,6 +60,15 @@ inline ToolBody random_body(RandomValues& random, int points, double least_axis 
 
 inline HalfSpaceSettings half_space(const Vector3d& normal, double offset_m) {
   return {"", normal.normalized(), offset_m};
+}
+
+/// The least gap of the tool to any half-space of the scene [m]: negative where they overlap.
+inline double least_gap_m(const Scene& scene, const Pose& X_WT) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const HalfSpaceSettings& half_space : scene.half_spaces())
+    for (const Vector3d& a : scene.tool().hull.vertices_T_m)
+      least = std::min(least, half_space.normal_W.dot(X_WT * a) - half_space.offset_m);
+  return least;
 }
 
 /// The same scene seen from elsewhere: the world moved by a.

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/penetration.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <span>
+
+namespace wrenchd {
+namespace {
+
+bool in_contact(const Projection& projection) noexcept {
+  return projection.status == ProjectionStatus::converged ||
+         projection.status == ProjectionStatus::budget_spent;
+}
+
+Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
+  return log(inverse(X_WP) * X_WQ);
+}
+
+}  // namespace
+
+PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
+    : options_(options),
+      mass_kg_(scene.tool().solid.inertia.mass_kg),
+      scene_(scene),
+      exact_(scene.tool().solid.inertia),
+      descent_(scene.tool().solid.inertia, exact_),
+      planar_(scene.tool().solid.inertia, scene.tool().hull, options.planes),
+      saved_(scene.convex().size()),
+      best_(scene.convex().size()) {}
+
+Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last) noexcept {
+  scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
+  if (options_.method != Method::exact) return approximate(X_WP, X_last);
+  const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
+  const std::span known(known_.begin(), known_.end());
+  Penetration out = described(X_WP, settle(exact_.project(X_WP, scene_, X_last, known), solve));
+  known_.clear();
+  for (const ActiveContact& active : out.projection.active)
+    if (active.multiplier > 0.0) known_.add(active);
+  if (out.projection.status != ProjectionStatus::infeasible) return out;
+  out.projection.X_WQ = X_last;
+  out.eps = displacement(X_WP, X_last);
+  out.drive = out.eps;
+  out.contacts = 1;
+  return out;
+}
+
+Penetration PenetrationDepth::query(const Pose& X_WP) noexcept {
+  known_.clear();
+  if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP));
+  scene_.survey(X_WP);
+  return approximate(X_WP, X_WP);
+}
+
+/// What the paper has: none of it seeks the global optimum.
+Penetration PenetrationDepth::approximate(const Pose& X_WP, const Pose& X_start) noexcept {
+  if (options_.method == Method::descent) return descend(X_WP, X_start);
+  return options_.method == Method::planar ? planar(X_WP) : translational(X_WP);
+}
+
+Penetration PenetrationDepth::descend(const Pose& X_WP, const Pose& X_start) noexcept {
+  const auto solve = [&](const Pose& X_from) { return descent_.project(X_WP, scene_, X_from); };
+  return described(X_WP, settle(solve(X_start), solve));
+}
+
+/// Changes the planes held until no other plane that admits the answer gives a better one. solve: the answer
+/// for the planes held, sought from a pose.
+template <class Solve>
+Projection PenetrationDepth::settle(Projection best, const Solve& solve) noexcept {
+  constexpr int kChanges = 12;        // typical: none or one
+  constexpr std::size_t kTries = 16;  // of the planes that touch, the widest apart first
+  constexpr double kBetter = 1.0 - 1e-10;
+  for (int change = 0; change < kChanges; ++change) {
+    if (!in_contact(best) || scene_.settled(best)) return best;
+    const std::size_t choices =
+        std::min(kTries, scene_.find_near_choices(best.X_WQ, exact_.gap_tolerance_m(best.X_WQ)));
+    bool improved = false;
+    saved_ = scene_.held();
+    for (std::size_t i = 0; i < choices && !improved; ++i) {
+      scene_.take(i);
+      const Projection other = solve(best.X_WQ);
+      improved = other.status != ProjectionStatus::infeasible && other.energy < kBetter * best.energy;
+      if (improved)
+        best = other;
+      else
+        scene_.hold(saved_);
+    }
+    if (!improved) return best;
+  }
+  return best;
+}
+
+/// The best answer from every plane worth a try, one obstacle at a time. Half-spaces leave no choice.
+Projection PenetrationDepth::project_globally(const Pose& X_WP) noexcept {
+  const std::size_t openings = scene_.survey(X_WP);
+  if (openings == 0) return exact_.project_globally(X_WP, scene_);
+  const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
+  Projection best = settle(solve(X_WP), solve);
+  best_ = scene_.held();
+  for (std::size_t i = 0; i < openings && best.status != ProjectionStatus::free; ++i) {
+    scene_.open(i);
+    const Projection other = settle(solve(X_WP), solve);
+    if (other.status == ProjectionStatus::infeasible) continue;
+    if (best.status != ProjectionStatus::infeasible && other.energy >= best.energy) continue;
+    best = other;
+    best_ = scene_.held();
+  }
+  scene_.hold(best_);
+  return best;
+}
+
+/// The nearest translation, over the planes that touch.
+Projection PenetrationDepth::translate(const Pose& X_WP) noexcept {
+  const auto solve = [&](const Pose&) { return exact_.translate(X_WP, scene_, X_WP); };
+  return settle(solve(X_WP), solve);
+}
+
+/// What every method says of its answer.
+Penetration PenetrationDepth::described(const Pose& X_WP, const Projection& projection) noexcept {
+  Penetration out;
+  out.projection = projection;
+  if (!in_contact(projection)) return out;
+  out.contacts = static_cast<std::uint16_t>(projection.active.size());
+  out.eps = displacement(X_WP, projection.X_WQ);
+  out.drive = out.eps;
+  return out;
+}
+
+/// Every contact on its own, in every plane of its family; a convex obstacle counts as the half-space of the
+/// plane held, which for two edges is that of their common normal. Generically one vertex collides, and its
+/// projection frees the whole body: the best that does is the answer. Where none does (the family looks at
+/// one cross-section, and a vertex beside it stays inside), the wrenches of the contacts are added, as
+/// section 5 of the paper says, and the pose reported is the best of their rotations lifted until the whole
+/// body is out. Translation alone always is a candidate.
+Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
+  Penetration out = described(X_WP, translate(X_WP));
+  if (out.projection.status == ProjectionStatus::free) return out;
+  scene_.fix_to_world(X_WP);
+  contacts_.clear();
+  while (scene_.add_violated(X_WP, 0.0, contacts_) > 0) continue;
+
+  bool freed = false;
+  Pose X_WQ = out.projection.X_WQ;
+  double T = in_contact(out.projection) ? out.projection.energy : std::numeric_limits<double>::infinity();
+  Vector6d sum = Vector6d::Zero();
+  for (const Contact& contact : contacts_) {
+    PlanarFamily::InPlane best = planar_.solve(X_WP, contact, 0);
+    for (int k = 0; k < planar_.planes(); ++k) {
+      const PlanarFamily::InPlane one = planar_.solve(X_WP, contact, k);
+      if (one.minimum.T < best.minimum.T) best = one;
+      if (one.minimum.T >= T) continue;
+      const Pose candidate = PlanarFamily::pose(X_WP, contact, one);
+      probe_.clear();
+      if (scene_.add_violated(candidate, exact_.gap_tolerance_m(candidate), probe_) > 0) continue;
+      freed = true;
+      X_WQ = candidate;
+      T = one.minimum.T;
+    }
+    const Pose alone = PlanarFamily::pose(X_WP, contact, best);
+    sum += displacement(X_WP, alone);
+    if (freed) continue;
+    const Projection lifted = exact_.translate(X_WP, scene_, alone);
+    if (!in_contact(lifted) || lifted.energy >= T) continue;
+    X_WQ = lifted.X_WQ;
+    T = lifted.energy;
+  }
+  out = described(X_WP,
+                  exact_.translate(X_WP, scene_, X_WQ));  // fills in the contacts; moves q by rounding only
+  out.drive = freed ? out.eps : sum;
+  return out;
+}
+
+/// The depth of each obstacle acts at the mean of the tool's vertices that touch it: an edge or a face that
+/// lies flat has no single deepest vertex, and choosing one would make a torque out of rounding.
+Penetration PenetrationDepth::translational(const Pose& X_WP) noexcept {
+  Penetration out = described(X_WP, translate(X_WP));
+  if (!in_contact(out.projection)) return out;
+  const auto& active = out.projection.active;
+  Vector3d moment = Vector3d::Zero();
+  for (const ActiveContact& a : active) {
+    double touching = 0.0;
+    double carried = 0.0;
+    for (const ActiveContact& b : active) {
+      if (b.contact.obstacle != a.contact.obstacle) continue;
+      touching += 1.0;
+      carried += b.multiplier;
+    }
+    const Vector3d lever_W =
+        contact_point_W(a.contact, out.projection.X_WQ) - out.projection.X_WQ.translation_m;
+    moment += X_WP.rotation.conjugate() * lever_W.cross(a.contact.n_W) * (carried / touching);
+  }
+  // 2 m s = sum multiplier_i n_i: contact i carries the displacement multiplier_i n_i / (2 m).
+  out.drive.tail<3>() = moment / (2.0 * mass_kg_);
+  return out;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "collision/scene_contacts.hpp"
+#include "core/contact.hpp"
+#include "core/descent.hpp"
+#include "core/method.hpp"
+#include "core/planar_family.hpp"
+#include "core/projection.hpp"
+
+namespace wrenchd {
+
+/// The generalized penetration depth of one configuration p.
+struct Penetration {
+  Projection projection;            ///< q, T and the contacts. q = p where p is admissible.
+  std::uint16_t contacts = 0;       ///< feature pairs that touch at q; 0 where p is admissible
+  Vector6d eps = Vector6d::Zero();  ///< Eq. (15): exponential coordinates of p^-1 q
+  /// What enters the wrench law. The same as eps for exact. For planar too, unless several contacts need each
+  /// its own projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For
+  /// translational, [d; sum (c_i - x) x d_i]: with the force gain k for both halves this is the force k d at
+  /// each contact and its torque about the centre of mass, which is that method's wrench.
+  Vector6d drive = Vector6d::Zero();
+};
+
+/// Computes the generalized penetration depth of a scene's tool by the method chosen. All memory is taken at
+/// construction.
+class PenetrationDepth {
+ public:
+  struct Options {
+    Method method = Method::exact;
+    int planes = 47;  ///< N_delta for planar; 47 is the paper's
+  };
+
+  /// The scene is kept by reference and must outlive this.
+  PenetrationDepth(const Scene& scene, Options options);
+  PenetrationDepth(const PenetrationDepth&) = delete;
+  PenetrationDepth& operator=(const PenetrationDepth&) = delete;
+
+  /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
+  /// the proxy stays there, and draws the hand back to where it came from. RT safe.
+  Penetration follow(const Pose& X_WP, const Pose& X_last) noexcept;
+  /// Knows no history; exact seeks the global optimum. RT safe, but up to a thousand times dearer.
+  Penetration query(const Pose& X_WP) noexcept;
+
+ private:
+  static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
+  template <class Solve>
+  Projection settle(Projection best, const Solve& solve) noexcept;
+  Projection project_globally(const Pose& X_WP) noexcept;
+  Projection translate(const Pose& X_WP) noexcept;
+  Penetration approximate(const Pose& X_WP, const Pose& X_start) noexcept;
+  Penetration descend(const Pose& X_WP, const Pose& X_start) noexcept;
+  Penetration planar(const Pose& X_WP) noexcept;
+  Penetration translational(const Pose& X_WP) noexcept;
+
+  Options options_;
+  double mass_kg_;
+  SceneContacts scene_;
+  ExactProjection exact_;
+  Descent descent_;  ///< works with exact_
+  PlanarFamily planar_;
+  ContactSet contacts_;                                    ///< what planar works through
+  ContactSet probe_;                                       ///< what a candidate of it violates
+  FixedList<ActiveContact, ContactSet::kCapacity> known_;  ///< what carried at the last answer of follow()
+  std::vector<HeldPlane> saved_;                           ///< while other planes are tried
+  std::vector<HeldPlane> best_;                            ///< of the best answer so far
+};
+
+}  // namespace wrenchd

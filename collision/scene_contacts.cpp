@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/scene_contacts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace wrenchd {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Edges nearer to parallel than this [rad] have no common normal to rely on.
+constexpr double kParallel = 1e-7;
+/// Features this near to a plane touch it, in units of the tool's radius.
+constexpr double kTouching = 1e-7;
+/// The centre of pressure may lie this far outside a body, in units of the tool's radius.
+constexpr double kPressure = 1e-8;
+/// Normals that differ by less are the same plane.
+constexpr double kSamePlane = 1e-9;
+
+/// The few smallest of a stream of gaps, smallest first.
+template <std::size_t N>
+class Deepest {
+ public:
+  /// Below this gap a vertex would be kept.
+  double threshold() const noexcept { return count_ < N ? kInfinity : gap_[N - 1]; }
+  void insert(double gap, std::uint32_t vertex) noexcept {
+    std::size_t at = std::min(count_, N - 1);
+    for (; at > 0 && gap < gap_[at - 1]; --at) {
+      gap_[at] = gap_[at - 1];
+      vertex_[at] = vertex_[at - 1];
+    }
+    gap_[at] = gap;
+    vertex_[at] = vertex;
+    count_ = std::min(count_ + 1, N);
+  }
+  std::size_t count() const noexcept { return count_; }
+  std::uint32_t vertex(std::size_t i) const noexcept { return vertex_[i]; }
+
+ private:
+  std::array<double, N> gap_{};
+  std::array<std::uint32_t, N> vertex_{};
+  std::size_t count_ = 0;
+};
+
+/// Of a plane at a pose. Edges that are parallel have none: then it is that of the pose where the plane was
+/// taken.
+Vector3d normal_of(const HeldPlane& plane, const Pose& X_WT, bool* degenerate = nullptr) noexcept {
+  switch (plane.kind) {
+    case ContactKind::vertex_face:
+      break;
+    case ContactKind::face_vertex:
+      return X_WT.rotation * plane.d_T;
+    case ContactKind::edge_edge: {
+      const Vector3d N = (X_WT.rotation * plane.d_T).cross(plane.d_W);
+      const double s = N.norm();
+      if (s > kParallel) return N / s;
+      if (degenerate != nullptr) *degenerate = true;
+    }
+  }
+  return plane.n_W;
+}
+
+bool between_faces(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
+  return m.dot(edge.side[0]) >= 0.0 && m.dot(edge.side[1]) >= 0.0;
+}
+
+}  // namespace
+
+SceneContacts::SceneContacts(const Scene& scene)
+    : scene_(scene), planes_(scene.convex().size()), best_(planes_) {
+  choices_.reserve(kMaxChoices);
+  openings_.reserve(kMaxChoices);
+  tool_touching_.reserve(scene.tool().hull.vertices_T_m.size());
+  std::size_t most = 0;
+  for (const ConvexObstacle& obstacle : scene.convex())
+    most = std::max(most, obstacle.body.vertices_T_m.size());
+  obstacle_touching_.reserve(most);
+}
+
+std::size_t SceneContacts::add_violated(const Pose& X_WT, double tolerance_m,
+                                        ContactSet& contacts) const noexcept {
+  const std::size_t before = contacts.size();
+  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k)
+    add_half_space(k, X_WT, tolerance_m, contacts);
+  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
+    if (!far_above(k, X_WT)) add_convex(k, X_WT, tolerance_m, contacts);
+  return contacts.size() - before;
+}
+
+bool SceneContacts::admits(const Pose& X_WT, double tolerance_m) const noexcept {
+  for (const HalfSpaceSettings& half_space : scene_.half_spaces()) {
+    const Vector3d n_T = X_WT.rotation.conjugate() * half_space.normal_W;
+    const ConvexBody& tool = scene_.tool().hull;
+    const double lowest = n_T.dot(tool.vertices_T_m[tool.support(-n_T)]);
+    if (lowest + half_space.normal_W.dot(X_WT.translation_m) - half_space.offset_m < -tolerance_m)
+      return false;
+  }
+  for (std::uint32_t k = 0; k < planes_.size(); ++k)
+    if (!out_of_reach(k, X_WT) && stand(k, planes_[k], X_WT).separation_m < -tolerance_m) return false;
+  return true;
+}
+
+void SceneContacts::admit(const Pose& X_WT, double tolerance_m) noexcept {
+  for (std::uint32_t k = 0; k < planes_.size(); ++k) {
+    if (far_above(k, X_WT) || stand(k, planes_[k], X_WT).separation_m >= -tolerance_m) continue;
+    choices_.clear();
+    if (out_of_reach(k, X_WT)) {
+      const Vector3d apart = X_WT.translation_m - scene_.convex()[k].centre_W_m;
+      consider(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, 0.0);
+    } else {
+      consider_widest(k, X_WT);
+    }
+    if (!choices_.empty()) take(0);
+  }
+}
+
+//   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
+void SceneContacts::add_half_space(std::uint32_t k, const Pose& X_WT, double tolerance_m,
+                                   ContactSet& contacts) const noexcept {
+  const auto& vertices = scene_.tool().hull.vertices_T_m;
+  Contact contact;
+  contact.n_W = scene_.half_spaces()[k].normal_W;
+  contact.offset_m = scene_.half_spaces()[k].offset_m;
+  contact.p_WB_m = contact.offset_m * contact.n_W;
+  contact.obstacle = k;
+  const Vector3d n_T = X_WT.rotation.conjugate() * contact.n_W;
+  const double below = contact.offset_m - contact.n_W.dot(X_WT.translation_m);
+  const auto with_vertex = [&](std::uint32_t v) -> const Contact& {
+    contact.p_TA_m = vertices[v];
+    contact.vertex = v;
+    return contact;
+  };
+
+  Deepest<kPerObstacle> deepest;
+  for (std::uint32_t v = 0; v < vertices.size(); ++v) {
+    const double gap = n_T.dot(vertices[v]) - below;
+    if (gap >= -tolerance_m || gap >= deepest.threshold()) continue;
+    if (!contacts.contains(with_vertex(v))) deepest.insert(gap, v);
+  }
+  for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(with_vertex(deepest.vertex(i)));
+}
+
+bool SceneContacts::out_of_reach(std::uint32_t k, const Pose& X_WT) const noexcept {
+  const ConvexObstacle& obstacle = scene_.convex()[k];
+  const double reach = scene_.tool_radius_m() + obstacle.radius_m;
+  return (X_WT.translation_m - obstacle.centre_W_m).squaredNorm() > reach * reach;
+}
+
+/// The spheres around tool and obstacle are apart along the plane held: most obstacles are told so.
+bool SceneContacts::far_above(std::uint32_t k, const Pose& X_WT) const noexcept {
+  const ConvexObstacle& obstacle = scene_.convex()[k];
+  const Vector3d n_W = normal_of(planes_[k], X_WT);
+  return n_W.dot(X_WT.translation_m - obstacle.centre_W_m) > scene_.tool_radius_m() + obstacle.radius_m;
+}
+
+/// The normal of a plane at this pose, the vertices of both bodies that lie farthest towards each other along
+/// it, and how far they are apart.
+SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const HeldPlane& plane,
+                                             const Pose& X_WT) const noexcept {
+  const ConvexBody& tool = scene_.tool().hull;
+  const ConvexBody& obstacle = scene_.convex()[k].body;
+  Standing out{};
+  out.n_W = normal_of(plane, X_WT, &out.degenerate);
+  out.tool_vertex = tool.support(X_WT.rotation.conjugate() * -out.n_W);
+  out.obstacle_vertex = obstacle.support(out.n_W);
+  out.separation_m =
+      out.n_W.dot(X_WT * tool.vertices_T_m[out.tool_vertex] - obstacle.vertices_T_m[out.obstacle_vertex]);
+  return out;
+}
+
+/// The deepest pair, and those of its neighbours that lie beyond the plane too: on the side of the tool where
+/// the plane belongs to the obstacle, and the other way round.
+void SceneContacts::add_convex(std::uint32_t k, const Pose& X_WT, double tolerance_m,
+                               ContactSet& contacts) const noexcept {
+  const HeldPlane& plane = planes_[k];
+  const Standing at = stand(k, plane, X_WT);
+  if (at.separation_m >= -tolerance_m) return;
+  const ConvexBody& tool = scene_.tool().hull;
+  const ConvexBody& obstacle = scene_.convex()[k].body;
+
+  Contact contact;
+  contact.kind = at.degenerate ? ContactKind::vertex_face : plane.kind;
+  contact.n_W = at.n_W;
+  contact.obstacle = static_cast<std::uint32_t>(scene_.half_spaces().size()) + k;
+  if (contact.kind != ContactKind::vertex_face) contact.d_T = plane.d_T;
+  if (contact.kind == ContactKind::edge_edge) contact.d_W = plane.d_W;
+  const auto add = [&](std::uint32_t a, std::uint32_t b) {
+    contact.p_TA_m = tool.vertices_T_m[a];
+    contact.p_WB_m = obstacle.vertices_T_m[b];
+    contact.offset_m = contact.n_W.dot(contact.p_WB_m);
+    contact.vertex = a;
+    contact.obstacle_vertex = b;
+    const double gap = contact.n_W.dot(X_WT * contact.p_TA_m - contact.p_WB_m);
+    if (gap < -tolerance_m && !contacts.contains(contact)) contacts.add(contact);
+  };
+
+  add(at.tool_vertex, at.obstacle_vertex);
+  std::size_t room = kPerObstacle - 1;
+  const bool tool_side = contact.kind == ContactKind::vertex_face;
+  const auto neighbours = tool_side ? tool.ring_of(at.tool_vertex) : obstacle.ring_of(at.obstacle_vertex);
+  for (const std::uint32_t v : neighbours) {
+    const std::size_t known = contacts.size();
+    if (tool_side)
+      add(v, at.obstacle_vertex);
+    else
+      add(at.tool_vertex, v);
+    if (contacts.size() > known && --room == 0) return;
+  }
+}
+
+bool SceneContacts::settled(const Projection& q) const noexcept {
+  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
+    if (!press_settled(k, q)) return false;
+  return true;
+}
+
+// The forces of one obstacle's contacts all act along n. They balance on a plane that is free to tilt where
+// their resultant passes through both bodies: where the centre of pressure c = sum m_i c_i / sum m_i lies in
+// the tool and in the obstacle.
+bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) const noexcept {
+  const auto number = static_cast<std::uint32_t>(scene_.half_spaces().size()) + k;
+  Vector3d sum_W = Vector3d::Zero();
+  double pressure = 0.0;
+  for (const auto& [contact, multiplier] : q.active) {
+    if (contact.obstacle != number || !(multiplier > 0.0)) continue;
+    sum_W += multiplier * contact_point_W(contact, q.X_WQ);
+    pressure += multiplier;
+  }
+  if (!(pressure > 0.0)) return true;
+  const Vector3d centre_W = sum_W / pressure;
+  const double tolerance_m = kPressure * scene_.tool_radius_m();
+  return scene_.convex()[k].body.contains(centre_W, tolerance_m) &&
+         scene_.tool().hull.contains(inverse(q.X_WQ) * centre_W, tolerance_m);
+}
+
+/// Keeps a plane as a choice if it separates well enough.
+void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Pose& X_WT,
+                             double least_separation_m) noexcept {
+  const Standing at = stand(k, plane, X_WT);
+  if (at.degenerate || !(at.separation_m >= least_separation_m)) return;
+  plane.n_W = at.n_W;
+  if (choices_.size() == kMaxChoices) {
+    const auto worst =
+        std::min_element(choices_.begin(), choices_.end(),
+                         [](const Choice& x, const Choice& y) { return x.separation_m < y.separation_m; });
+    if (worst->separation_m >= at.separation_m) return;
+    *worst = {k, plane, at.separation_m};
+    return;
+  }
+  choices_.push_back({k, plane, at.separation_m});
+}
+
+void SceneContacts::consider_faces(std::uint32_t k, const Pose& X_WT) noexcept {
+  for (const auto& face : scene_.convex()[k].body.faces)
+    consider(k, {ContactKind::vertex_face, face.n}, X_WT, -kInfinity);
+  for (const auto& face : scene_.tool().hull.faces)
+    consider(k, {ContactKind::face_vertex, Vector3d::UnitZ(), -face.n}, X_WT, -kInfinity);
+}
+
+/// The common normal of two edges counts where each is the farthest part of its body along it: that is a
+/// facet of the set of all translations that collide. All others are behind one of those.
+void SceneContacts::consider_edge_pair(std::uint32_t k, const Pose& X_WT, const Matrix3d& R,
+                                       const ConvexBody::Edge& a, const ConvexBody::Edge& b,
+                                       double least_separation_m) noexcept {
+  const Vector3d N = (R * a.d).cross(b.d);
+  if (!(N.squaredNorm() > kParallel * kParallel)) return;
+  for (const double sign : {1.0, -1.0}) {
+    const Vector3d n_W = sign * N;
+    if (!between_faces(b, n_W) || !between_faces(a, R.transpose() * -n_W)) continue;
+    consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
+  }
+}
+
+void SceneContacts::consider_edge_pairs(std::uint32_t k, const Pose& X_WT) noexcept {
+  const ConvexBody& tool = scene_.tool().hull;
+  const ConvexBody& obstacle = scene_.convex()[k].body;
+  if (tool.edges.size() * obstacle.edges.size() > kMaxEdgePairs) return;
+  const Matrix3d R = X_WT.rotation.toRotationMatrix();
+  for (const auto& a : tool.edges)
+    for (const auto& b : obstacle.edges) consider_edge_pair(k, X_WT, R, a, b, -kInfinity);
+}
+
+// Of two bodies that are apart, the widest gap along any n is a least-distance problem by constraint
+// generation:  min |w|^2  s.t.  w . (p_a - p_b) >= 1 for all pairs,  n = w/|w|, and the gap is 1/|w|.
+void SceneContacts::consider_widest(std::uint32_t k, const Pose& X_WT) noexcept {
+  using Status = LeastDistance<3, 64>::Status;
+  constexpr std::size_t kPairs = 64;
+  constexpr double kGoodEnough = 0.999;
+  const ConvexBody& tool = scene_.tool().hull;
+  const ConvexBody& obstacle = scene_.convex()[k].body;
+  const double unit_m = scene_.tool_radius_m();
+  HeldPlane plane = planes_[k];
+  plane.n_W = stand(k, plane, X_WT).n_W;
+  plane.kind = ContactKind::vertex_face;
+  widest_.clear();
+  for (std::size_t pair = 0; pair < kPairs; ++pair) {
+    const Standing at = stand(k, plane, X_WT);
+    const double promised_m = widest_.count() == 0 ? kInfinity : unit_m / widest_.z().norm();
+    if (at.separation_m > 0.0 && at.separation_m >= kGoodEnough * promised_m) break;
+    const Vector3d apart =
+        X_WT * tool.vertices_T_m[at.tool_vertex] - obstacle.vertices_T_m[at.obstacle_vertex];
+    if (!(apart.squaredNorm() > 0.0)) return;
+    widest_.add(apart / unit_m, 1.0);
+    if (widest_.solve(Vector3d::Zero(), 1e-12) != Status::optimal) return;  // they overlap
+    plane.n_W = widest_.z().normalized();
+  }
+  consider(k, plane, X_WT, 0.0);
+}
+
+void SceneContacts::sort_choices() noexcept {
+  std::sort(choices_.begin(), choices_.end(),
+            [](const Choice& x, const Choice& y) { return x.separation_m > y.separation_m; });
+}
+
+std::size_t SceneContacts::survey(const Pose& X_WT) noexcept {
+  choices_.clear();
+  for (std::uint32_t k = 0; k < planes_.size(); ++k) {
+    if (out_of_reach(k, X_WT)) continue;
+    consider_faces(k, X_WT);
+    consider_edge_pairs(k, X_WT);
+    consider_widest(k, X_WT);
+  }
+  sort_choices();
+  openings_ = choices_;
+  for (std::size_t i = choices_.size(); i-- > 0;) take(i);
+  best_ = planes_;
+  return openings_.size();
+}
+
+void SceneContacts::open(std::size_t i) noexcept {
+  planes_ = best_;
+  planes_[openings_[i].obstacle] = openings_[i].plane;
+}
+
+void SceneContacts::fix_to_world(const Pose& X_WT) noexcept {
+  for (std::uint32_t k = 0; k < planes_.size(); ++k) {
+    planes_[k].n_W = stand(k, planes_[k], X_WT).n_W;
+    planes_[k].kind = ContactKind::vertex_face;
+  }
+}
+
+std::size_t SceneContacts::find_near_choices(const Pose& X_WT, double tolerance_m) noexcept {
+  choices_.clear();
+  const ConvexBody& tool = scene_.tool().hull;
+  const Matrix3d R = X_WT.rotation.toRotationMatrix();
+  const double touching_m = kTouching * scene_.tool_radius_m();
+  for (std::uint32_t k = 0; k < planes_.size(); ++k) {
+    if (out_of_reach(k, X_WT)) continue;
+    const ConvexBody& obstacle = scene_.convex()[k].body;
+    const Standing held = stand(k, planes_[k], X_WT);
+    if (held.separation_m > touching_m) continue;
+
+    const Vector3d n_T = R.transpose() * held.n_W;
+    const auto collect = [&](const ConvexBody& body, const Vector3d& towards, std::uint32_t farthest,
+                             std::vector<std::uint32_t>& out) {
+      out.clear();
+      const double top = towards.dot(body.vertices_T_m[farthest]) - touching_m;
+      for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v)
+        if (towards.dot(body.vertices_T_m[v]) >= top) out.push_back(v);
+    };
+    collect(tool, -n_T, held.tool_vertex, tool_touching_);
+    collect(obstacle, held.n_W, held.obstacle_vertex, obstacle_touching_);
+    const auto touches = [](const std::vector<std::uint32_t>& set, const ConvexBody::Edge& edge) {
+      return std::find(set.begin(), set.end(), edge.from) != set.end() ||
+             std::find(set.begin(), set.end(), edge.to) != set.end();
+    };
+
+    for (const std::uint32_t v : obstacle_touching_)
+      for (const std::uint32_t f : obstacle.faces_of(v))
+        consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -tolerance_m);
+    for (const std::uint32_t v : tool_touching_)
+      for (const std::uint32_t f : tool.faces_of(v))
+        consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -tolerance_m);
+    for (const auto& a : tool.edges)
+      if (touches(tool_touching_, a))
+        for (const auto& b : obstacle.edges)
+          if (touches(obstacle_touching_, b)) consider_edge_pair(k, X_WT, R, a, b, -tolerance_m);
+    consider_widest(k, X_WT);
+
+    const auto same = [&](const Choice& choice) {
+      return choice.obstacle == k && choice.plane.kind == planes_[k].kind &&
+             (choice.plane.n_W - held.n_W).norm() < kSamePlane;
+    };
+    choices_.erase(std::remove_if(choices_.begin(), choices_.end(), same), choices_.end());
+  }
+  sort_choices();
+  return choices_.size();
+}
+
+}  // namespace wrenchd

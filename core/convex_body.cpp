@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/convex_body.hpp"
+
+#include <algorithm>
+
+namespace wrenchd {
+namespace {
+
+/// Normals that differ by less are of one plane: well above the rounding of a triangle's corners.
+constexpr double kSamePlane = 1e-9;
+
+}  // namespace
+
+void ConvexBody::find_faces() {
+  faces.clear();
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : vertices_T_m) middle += p / static_cast<double>(vertices_T_m.size());
+  std::vector<std::vector<std::uint32_t>> at(vertices_T_m.size());
+
+  const auto face_like = [&](const Vector3d& n, std::uint32_t vertex) {
+    for (const std::uint32_t f : at[vertex])
+      if ((faces[f].n - n).norm() < kSamePlane) return static_cast<std::int64_t>(f);
+    return std::int64_t{-1};
+  };
+  const auto add = [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+    const Vector3d& p = vertices_T_m[i];
+    Vector3d n = (vertices_T_m[j] - p).cross(vertices_T_m[k] - p);
+    if (!(n.squaredNorm() > 0.0)) return;  // a sliver without a plane of its own
+    n.normalize();
+    if (n.dot(p - middle) < 0.0) n = -n;
+    std::int64_t face = face_like(n, i);
+    if (face < 0) face = face_like(n, j);
+    if (face < 0) face = face_like(n, k);
+    if (face < 0) {
+      face = static_cast<std::int64_t>(faces.size());
+      faces.push_back({n, n.dot(vertices_T_m[support(n)])});
+    }
+    const auto f = static_cast<std::uint32_t>(face);
+    for (const std::uint32_t v : {i, j, k})
+      if (std::find(at[v].begin(), at[v].end(), f) == at[v].end()) at[v].push_back(f);
+  };
+  for (std::uint32_t v = 0; v < vertices_T_m.size(); ++v) {
+    const auto around = ring_of(v);
+    for (std::size_t i = 0; i < around.size(); ++i) {
+      const std::uint32_t a = around[i];
+      const std::uint32_t b = around[(i + 1) % around.size()];
+      if (v < a && v < b) add(v, a, b);
+    }
+  }
+
+  faces_begin.clear();
+  faces_at.clear();
+  for (const auto& of_vertex : at) {
+    faces_begin.push_back(static_cast<std::uint32_t>(faces_at.size()));
+    faces_at.insert(faces_at.end(), of_vertex.begin(), of_vertex.end());
+  }
+  faces_begin.push_back(static_cast<std::uint32_t>(faces_at.size()));
+
+  edges.clear();
+  for (std::uint32_t v = 0; v < vertices_T_m.size(); ++v)
+    for (const std::uint32_t w : ring_of(v))
+      if (v < w) add_edge(v, w, at[v], at[w]);
+}
+
+/// An edge within a flat face has that face only, and is none.
+void ConvexBody::add_edge(std::uint32_t from, std::uint32_t to, std::span<const std::uint32_t> faces_from,
+                          std::span<const std::uint32_t> faces_to) {
+  std::vector<std::uint32_t> both;
+  for (const std::uint32_t f : faces_from)
+    if (std::find(faces_to.begin(), faces_to.end(), f) != faces_to.end()) both.push_back(f);
+  if (both.size() < 2) return;
+  const Vector3d d = (vertices_T_m[to] - vertices_T_m[from]).normalized();
+  const auto towards = [&](const Vector3d& n, const Vector3d& other) -> Vector3d {
+    const Vector3d t = d.cross(n);
+    return t.dot(other) < 0.0 ? Vector3d(-t) : t;
+  };
+  const Vector3d& n0 = faces[both[0]].n;
+  const Vector3d& n1 = faces[both[1]].n;
+  edges.push_back({from, to, d, {towards(n0, n1), towards(n1, n0)}});
+}
+
+// Every vertex is looked at. Climbing from neighbour to neighbour would look at few, but where a face is
+// split into triangles that are flat but for rounding, the climb ends at a vertex whose neighbours all seem
+// level with it, as far below the true support as the body is wide; and the projection would take that for
+// admissible.
+std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
+  std::uint32_t best = 0;
+  double height = direction.dot(vertices_T_m[0]);
+  for (std::uint32_t v = 1; v < vertices_T_m.size(); ++v) {
+    const double h = direction.dot(vertices_T_m[v]);
+    if (h <= height) continue;
+    best = v;
+    height = h;
+  }
+  return best;
+}
+
+bool ConvexBody::contains(const Vector3d& p_T_m, double tolerance_m) const noexcept {
+  return std::all_of(faces.begin(), faces.end(),
+                     [&](const Face& face) { return face.n.dot(p_T_m) <= face.offset_m + tolerance_m; });
+}
+
+}  // namespace wrenchd

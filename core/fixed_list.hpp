@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <type_traits>
+
+namespace wrenchd {
+
+/// A list with room for N elements in the object itself, so that growing never allocates and copying moves
+/// only what is there: elements beyond size() do not exist. RT safe.
+template <class T, std::size_t N>
+class FixedList {
+  static_assert(
+      std::is_trivially_destructible_v<T>);  // Eigen does not say so, but its fixed sizes do not throw
+
+ public:
+  FixedList() noexcept {}
+  FixedList(const FixedList& other) noexcept : size_(other.size_) {
+    std::uninitialized_copy(other.begin(), other.end(), elements_);
+  }
+  FixedList& operator=(const FixedList& other) noexcept {
+    size_ = other.size_;
+    std::uninitialized_copy(other.begin(), other.end(), elements_);
+    return *this;
+  }
+
+  std::size_t size() const noexcept { return size_; }
+  bool empty() const noexcept { return size_ == 0; }
+  bool full() const noexcept { return size_ == N; }
+  const T& operator[](std::size_t i) const noexcept { return elements_[i]; }
+  const T* begin() const noexcept { return elements_; }
+  const T* end() const noexcept { return elements_ + size_; }
+
+  /// False, and nothing is done, where the list is full.
+  bool add(const T& element) noexcept {
+    if (full()) return false;
+    std::construct_at(elements_ + size_++, element);
+    return true;
+  }
+  /// The last element takes the place of the i-th.
+  void remove_unordered(std::size_t i) noexcept { elements_[i] = elements_[--size_]; }
+  void clear() noexcept { size_ = 0; }
+
+ private:
+  union {
+    T elements_[N];  // raw memory until an element is added
+  };
+  std::size_t size_ = 0;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+
+#include <catch2/catch.hpp>
+
+#include "core/convex_body.hpp"
+#include "tests/support/random_body.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+TEST_CASE("a box has six faces, twelve edges and no diagonal", "[convex_body]") {
+  const ConvexBody body = box({1.0, 2.0, 3.0}).hull;
+  CHECK(body.faces.size() == 6);
+  CHECK(body.edges.size() == 12);
+  for (const auto& face : body.faces)
+    CHECK(face.offset_m == Approx(0.5 * Vector3d(1.0, 2.0, 3.0).dot(face.n.cwiseAbs())));
+  for (std::uint32_t v = 0; v < 8; ++v) CHECK(body.faces_of(v).size() == 3);
+}
+
+TEST_CASE("the support is the farthest vertex", "[convex_body]") {
+  RandomValues random(1);
+  for (int i = 0; i < 300; ++i) {
+    const ConvexBody body = random_body(random, random.integer(4, 60)).hull;
+    const Vector3d direction = random.unit<3>();
+    double highest = -1e9;
+    for (const Vector3d& p : body.vertices_T_m) highest = std::max(highest, direction.dot(p));
+    CHECK(direction.dot(body.vertices_T_m[body.support(direction)]) == highest);
+  }
+}
+
+TEST_CASE("faces bound the body, and contains agrees with them", "[convex_body]") {
+  RandomValues random(2);
+  for (int i = 0; i < 100; ++i) {
+    const ConvexBody body = random_body(random, random.integer(4, 40)).hull;
+    for (const Vector3d& p : body.vertices_T_m) CHECK(body.contains(p, 1e-12));
+    CHECK(body.contains(Vector3d::Zero(), 0.0));  // the centre of mass
+    const auto& face = body.faces[0];
+    CHECK_FALSE(body.contains((face.offset_m + 1e-6) * face.n + 10.0 * face.n, 1e-9));
+    for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v)
+      for (const std::uint32_t f : body.faces_of(v))
+        CHECK(body.faces[f].n.dot(body.vertices_T_m[v]) == Approx(body.faces[f].offset_m).margin(1e-12));
+  }
+}
+
+TEST_CASE("an edge is touched by planes whose normals lie between those of its faces", "[convex_body]") {
+  RandomValues random(3);
+  for (int i = 0; i < 50; ++i) {
+    const ConvexBody body = random_body(random, random.integer(4, 40)).hull;
+    for (const auto& edge : body.edges) {
+      const Vector3d m = edge.d.cross(random.unit<3>()).normalized();
+      const double height = m.dot(body.vertices_T_m[edge.from]);
+      const double highest = m.dot(body.vertices_T_m[body.support(m)]);
+      const double slack = std::min(m.dot(edge.side[0]), m.dot(edge.side[1]));
+      if (std::abs(slack) < 1e-6) continue;
+      CHECK((slack > 0.0) == (highest - height < 1e-12));
+    }
+  }
+}

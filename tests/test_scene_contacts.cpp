@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <limits>
+#include <random>
+
+#include <catch2/catch.hpp>
+
+#include "collision/scene_contacts.hpp"
+#include "tests/support/random_body.hpp"
+#include "tests/support/separation.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+ToolBody cube() {
+  return test::box(Vector3d::Constant(2.0));
+}
+
+const HalfSpaceSettings kFloor = half_space(Vector3d::UnitZ(), 0.0);
+
+/// Tilted, so that the eight corners stand at eight heights.
+const Quaterniond kTilt(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 0).normalized()));
+
+std::vector<double> heights(const Scene& scene, const Pose& X_WT) {
+  std::vector<double> z;
+  for (const Vector3d& a : scene.tool().hull.vertices_T_m) z.push_back((X_WT * a).z());
+  std::sort(z.begin(), z.end());
+  return z;
+}
+
+TEST_CASE("the deepest contacts come first, at most four of an obstacle, and none twice") {
+  const Scene scene(cube(), {kFloor});
+  const Pose X_WT{kTilt, {0, 0, -2}};  // all eight corners are below
+  const std::vector<double> z = heights(scene, X_WT);
+  ContactSet contacts;
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 4);
+  CHECK(contacts.size() == 4);
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 4);
+  REQUIRE(contacts.size() == 8);
+  for (std::size_t i = 0; i < 8; ++i) CHECK(gap_m(contacts[i], X_WT) == Approx(z[i]));
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 0);
+  CHECK(contacts.size() == 8);
+}
+
+TEST_CASE("a contact tells its vertex, its face and its obstacle") {
+  const HalfSpaceSettings wall = half_space({3, 0, 4}, 0.5);
+  const Scene scene(cube(), {kFloor, wall});
+  const Pose X_WT{kTilt, {0.1, 0.2, 0.3}};
+  ContactSet contacts;
+  SceneContacts(scene).add_violated(X_WT, 0.0, contacts);
+  REQUIRE(contacts.size() > 0);
+  bool floor = false, other = false;
+  for (const Contact& c : contacts) {
+    const HalfSpaceSettings& obstacle = scene.half_spaces()[c.obstacle];
+    CHECK(c.p_TA_m == scene.tool().hull.vertices_T_m[c.vertex]);
+    CHECK(c.n_W == obstacle.normal_W);
+    CHECK(c.offset_m == obstacle.offset_m);
+    CHECK(gap_m(c, X_WT) < 0);
+    (c.obstacle == 0 ? floor : other) = true;
+  }
+  CHECK(floor);
+  CHECK(other);
+}
+
+TEST_CASE("a gap within the tolerance is no violation") {
+  const Scene scene(cube(), {kFloor});
+  ContactSet contacts;
+  const Pose above{Quaterniond::Identity(), {0, 0, 1}};  // four corners touch
+  CHECK(SceneContacts(scene).add_violated(above, 0.0, contacts) == 0);
+  const Pose below{Quaterniond::Identity(), {0, 0, 1 - 1e-6}};
+  CHECK(SceneContacts(scene).add_violated(below, 2e-6, contacts) == 0);
+  CHECK(contacts.size() == 0);
+  CHECK(SceneContacts(scene).add_violated(below, 0.5e-6, contacts) == 4);
+}
+
+TEST_CASE("every obstacle adds its own contacts") {
+  const Scene scene(cube(),
+                    {kFloor, half_space(-Vector3d::UnitZ(), -0.5), half_space(Vector3d::UnitX(), -5)});
+  ContactSet contacts;
+  const Pose X_WT{Quaterniond::Identity(), {0, 0, 0.25}};  // wedged between floor and ceiling
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 8);
+  int count[3] = {0, 0, 0};
+  for (const Contact& c : contacts) ++count[c.obstacle];
+  CHECK(count[0] == 4);
+  CHECK(count[1] == 4);
+  CHECK(count[2] == 0);
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 0);
+}
+
+TEST_CASE("the same vertex may touch two obstacles") {
+  const Scene scene(cube(), {kFloor, kFloor});
+  ContactSet contacts;
+  CHECK(SceneContacts(scene).add_violated({Quaterniond::Identity(), {0, 0, 0.9}}, 0.0, contacts) == 8);
+}
+
+TEST_CASE("a full set takes no more, and the count says so") {
+  const Scene scene(cube(), {kFloor});
+  const Pose X_WT{kTilt, {0, 0, -2}};
+  ContactSet contacts;
+  Contact other;
+  other.obstacle = 1000;
+  while (contacts.size() < ContactSet::kCapacity - 1) contacts.add(other);
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 1);
+  CHECK(contacts.full());
+  CHECK(gap_m(contacts[ContactSet::kCapacity - 1], X_WT) == Approx(heights(scene, X_WT)[0]));
+  CHECK(SceneContacts(scene).add_violated(X_WT, 0.0, contacts) == 0);
+  CHECK(contacts.size() == ContactSet::kCapacity);
+}
+
+TEST_CASE("rounds of add_violated find every violated vertex, in order of depth") {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const auto vector = [&] { return Vector3d(normal(random), normal(random), normal(random)); };
+  for (int round = 0; round < 50; ++round) {
+    std::vector<Vector3d> points(30);
+    for (Vector3d& p : points) p = vector();
+    const HalfSpaceSettings obstacle = half_space(vector(), 0.3 * normal(random));
+    const Scene scene(tool_of(points), {obstacle});
+    const Pose X_WT{Quaterniond(Eigen::AngleAxisd(2 * normal(random), vector().normalized())),
+                    0.5 * vector()};
+
+    std::size_t expected = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Vector3d& a : scene.tool().hull.vertices_T_m) {
+      const double gap = obstacle.normal_W.dot(X_WT * a) - obstacle.offset_m;
+      least = std::min(least, gap);
+      expected += gap < -1e-9 ? 1 : 0;
+    }
+    CHECK(least_gap_m(scene, X_WT) == Approx(least).margin(1e-12));
+
+    ContactSet contacts;
+    while (SceneContacts(scene).add_violated(X_WT, 1e-9, contacts) > 0) continue;
+    CHECK(contacts.size() == expected);
+    for (std::size_t i = 1; i < contacts.size(); ++i)
+      CHECK(gap_m(contacts[i - 1], X_WT) <= gap_m(contacts[i], X_WT) + 1e-12);
+    for (std::size_t i = 0; i < contacts.size(); ++i)
+      for (std::size_t k = 0; k < i; ++k) CHECK_FALSE(same_features(contacts[i], contacts[k]));
+  }
+}
+
+TEST_CASE("an empty scene touches nothing") {
+  const Scene scene(cube(), {});
+  ContactSet contacts;
+  CHECK(SceneContacts(scene).add_violated(Pose(), 0.0, contacts) == 0);
+}
+
+/// Two random bodies, the tool moved towards the obstacle until they overlap by about depth_m.
+struct Met {
+  Scene scene;
+  Pose X_WT;
+};
+
+Met random_met(RandomValues& random, double depth_m) {
+  ToolBody tool = random_body(random, random.integer(6, 30));
+  const ToolBody other = random_body(random, random.integer(6, 30));
+  Met met{Scene(std::move(tool), {}, {convex_obstacle("other", other.hull)}),
+          {random.rotation(), Vector3d::Zero()}};
+  const Vector3d direction = random.unit<3>();
+  double near = 0.0;
+  double far = 10.0;
+  for (int i = 0; i < 60; ++i) {
+    met.X_WT.translation_m = 0.5 * (near + far) * direction;
+    (separation_m(met.scene, met.X_WT) < -depth_m ? near : far) = 0.5 * (near + far);
+  }
+  return met;
+}
+
+TEST_CASE("the best plane of a survey is the separating axis of least depth") {
+  RandomValues random(11);
+  for (int i = 0; i < 200; ++i) {
+    const Met met = random_met(random, random.uniform(0.01, 0.2));
+    SceneContacts contacts(met.scene);
+    REQUIRE(contacts.survey(met.X_WT) > 1);
+    ContactSet violated;
+    REQUIRE(contacts.add_violated(met.X_WT, 0.0, violated) > 0);
+    INFO("case " << i);
+    CHECK(gap_m(violated[0], met.X_WT) == Approx(separation_m(met.scene, met.X_WT)).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("what the planes held admit does not overlap, whichever they are") {
+  RandomValues random(12);
+  int admitted = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Met met = random_met(random, 0.05);
+    SceneContacts contacts(met.scene);
+    const std::size_t openings = contacts.survey(met.X_WT);
+    for (std::size_t k = 0; k < openings; ++k) {
+      contacts.open(k);
+      Pose X_WT = met.X_WT;
+      X_WT.translation_m += 0.1 * random.vector<3>();
+      ContactSet violated;
+      if (contacts.add_violated(X_WT, 0.0, violated) > 0) continue;
+      ++admitted;
+      REQUIRE(separation_m(met.scene, X_WT) >= -1e-14);
+    }
+  }
+  CHECK(admitted > 100);
+}
+
+TEST_CASE("a gap of every kind has the slope that its contact tells") {
+  RandomValues random(13);
+  int seen[3] = {};
+  for (int i = 0; i < 200; ++i) {
+    const Met met = random_met(random, 0.1);
+    SceneContacts contacts(met.scene);
+    const std::size_t openings = contacts.survey(met.X_WT);
+    for (std::size_t k = 0; k < std::min<std::size_t>(openings, 12); ++k) {
+      contacts.open(k);
+      ContactSet violated;
+      if (contacts.add_violated(met.X_WT, 0.0, violated) == 0) continue;
+      const Contact& contact = violated[0];
+      ++seen[static_cast<int>(contact.kind)];
+      // J = [n ; (c - x) x n] for a pair that touches: move the tool until it does.
+      Pose X_WT = met.X_WT;
+      X_WT.translation_m -= gap_m(contact, X_WT) * normal_W(contact, X_WT);
+      const Vector3d n = normal_W(contact, X_WT);
+      const Vector3d lever = contact_point_W(contact, X_WT) - X_WT.translation_m;
+      Vector6d J;
+      J << n, lever.cross(n);
+      const Vector6d step = 1e-6 * random.unit<6>();
+      const auto moved = [&](double sign) {
+        return Pose{rotation_from(sign * step.tail<3>()) * X_WT.rotation,
+                    X_WT.translation_m + sign * step.head<3>()};
+      };
+      const double difference = gap_m(contact, moved(1.0)) - gap_m(contact, moved(-1.0));
+      CHECK(difference == Approx(2.0 * J.dot(step)).margin(1e-12));
+    }
+  }
+  for (const int count : seen) CHECK(count > 50);
+}
+
+TEST_CASE("an obstacle out of reach is not asked") {
+  RandomValues random(14);
+  const Met met = random_met(random, 0.1);
+  SceneContacts contacts(met.scene);
+  const Pose far{met.X_WT.rotation, {100.0, 0.0, 0.0}};
+  ContactSet violated;
+  CHECK(contacts.survey(far) == 0);
+  CHECK(contacts.add_violated(far, 0.0, violated) == 0);
+}
+
+}  // namespace
+}  // namespace wrenchd
