@@ -151,11 +151,14 @@ struct Factors {
   Quadratic g;
 };
 
-/// The largest real root of  t^3 = 3 p t + 2 q; NaN where all three are zero.
+/// The largest real root of  t^3 = 3 p t + 2 q; NaN where p and q are zero.
 ///
 /// With D = q^2 - p^3 > 0 it is the only one (Cardano):  t = w + p/w,  w^3 = q +- sqrt(D), taken with the
-/// sign of q. Where p < 0 the two cancel:  w - |p|/w = 2|q| / (w^2 + |p| + p^2/w^2)  does not. Else  t =
-/// sqrt(p) z  with  z^3 = 3 z + 2 k,  |k| <= 1,  1 <= z = 2 cos(acos(k)/3) <= 2.
+/// sign of q. Where p < 0 the two cancel, and
+///
+///   w - |p|/w = 2 |q| / (w^2 + |p| + p^2/w^2)
+///
+/// does not. Else (Vieta)  t = 2 sqrt(p) cos(acos(k)/3),  k = q / p^(3/2).
 double largest_root(double p, double q) noexcept {
   const double D = q * q - p * p * p;
   if (D > 0.0) {
@@ -163,23 +166,30 @@ double largest_root(double p, double q) noexcept {
     const double v = p / w;
     return std::copysign(p >= 0.0 ? w + v : 2.0 * std::abs(q) / (w * w - p + v * v), q);
   }
-  // z is smooth in s = sqrt(1 + k). The parabola has its value and slope at s = 0 and its value at s =
-  // sqrt(2); from there three steps of Newton's method, a third of the price of cos and acos, leave nothing
-  // to correct.
-  constexpr double kSlope = 0.816496580927726;       // sqrt(2/3)
-  constexpr double kCurvature = 0.0773502691896258;  // 1/sqrt(3) - 1/2
   const double root_p = std::sqrt(p);
-  const double k = q / (p * root_p);
-  const double s = std::sqrt(std::max(1.0 + k, 0.0));
-  double z = 1.0 + s * (kSlope - kCurvature * s);
-  for (int step = 0; step < 3; ++step) z -= (z * (z * z - 3.0) - 2.0 * k) / (3.0 * (z * z - 1.0));
-  return root_p * z;
+  const double k = std::clamp(q / (p * root_p), -1.0, 1.0);
+  return 2.0 * root_p * std::cos(std::acos(k) / 3.0);
+}
+
+struct Around {
+  double minus;
+  double plus;
+};
+
+/// middle - half and middle + half, whose product is given: the smaller of the two is a quotient, not a
+/// difference.
+Around around(double middle, double half, double product) noexcept {
+  Around out{middle - half, middle + half};
+  double& larger = middle * half >= 0.0 ? out.plus : out.minus;
+  double& smaller = middle * half >= 0.0 ? out.minus : out.plus;
+  if (larger != 0.0) smaller = product / larger;
+  return out;
 }
 
 // Ferrari (ref. [24] of the paper). For every y
 //
-//   x^4 + b x^3 + c x^2 + d x + e = (x^2 + b/2 x + y/2)^2 - [(b^2/4 - c + y) x^2 + (b y/2 - d) x + (y^2/4 -
-//   e)]
+//   x^4 + b x^3 + c x^2 + d x + e = (x^2 + b/2 x + y/2)^2
+//                                   - [(b^2/4 - c + y) x^2 + (b y/2 - d) x + (y^2/4 - e)]
 //
 // and the bracket is a square (R x + S)^2,  R^2 = b^2/4 - c + y,  S^2 = y^2/4 - e,  2 R S = b y/2 - d,  where
 // its discriminant vanishes, which is the resolvent cubic
@@ -187,7 +197,9 @@ double largest_root(double p, double q) noexcept {
 //   y^3 - c y^2 + (b d - 4 e) y + (4 c - b^2) e - d^2 = 0,      t = y - c/3,   t^3 = 3 p t + 2 q,
 //   p = (c^2 - 3 b d + 12 e) / 9,   q = (2 c^3 - 9 b c d + 27 d^2 + 27 b^2 e - 72 c e) / 54.
 //
-// A difference of squares is a product:  (x^2 + (b/2 - R) x + y/2 - S) (x^2 + (b/2 + R) x + y/2 + S).
+// A difference of squares is a product:  (x^2 + (b/2 - R) x + y/2 - S) (x^2 + (b/2 + R) x + y/2 + S),
+// where the product of the two b is c - y and that of the two c is e.
+//
 // The largest real y is the one for which R^2 >= 0 is certain. Of R and S one may vanish (R for a biquadratic
 // with e < 0): the one further from zero is taken by its root, the other follows.
 Factors ferrari(const Monic& a) noexcept {
@@ -203,7 +215,9 @@ Factors ferrari(const Monic& a) noexcept {
   const double second = RS / first;
   const double R = R_first ? first : second;
   const double S = R_first ? second : first;
-  return {{0.5 * b - R, 0.5 * y - S}, {0.5 * b + R, 0.5 * y + S}};
+  const auto [b_f, b_g] = around(0.5 * b, R, c - y);
+  const auto [c_f, c_g] = around(0.5 * y, S, e);
+  return {{b_f, c_f}, {b_g, c_g}};
 }
 
 /// The same for  x (x^3 + b x^2 + c x + d): one root r of the cubic goes with the zero.
@@ -290,7 +304,7 @@ double polished(const Monic& a, double x) noexcept {
 
 /// The factors, where they vouch for the number of real roots. Not all of a is zero.
 std::optional<Factors> factors_of(const Monic& a) noexcept {
-  constexpr int kCorrections = 2;  // the first is seldom needed, a third seldom helps
+  constexpr int kCorrections = 2;  // seldom needed; a third would seldom help
   if (a.d == 0.0 && a.e == 0.0) {
     const Factors by{{0.0, 0.0}, {a.b, a.c}};
     const bool certain = std::abs(by.g.discriminant()) >= kApart * (a.b * a.b + std::abs(a.c));
