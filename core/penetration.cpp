@@ -72,9 +72,10 @@ Penetration PenetrationDepth::planar(const Pose& X_WP, const ContactSource& scen
   double T = in_contact(out.projection) ? out.projection.energy : std::numeric_limits<double>::infinity();
   Vector6d sum = Vector6d::Zero();
   for (const Contact& contact : contacts_) {
-    PlanarFamily::InPlane best = planar_.solve(X_WP, contact, 0);
+    const PlanarFamily::AtContact family = planar_.at(X_WP, contact);
+    PlanarFamily::InPlane best = family.solve(0);
     for (int k = 0; k < planar_.planes(); ++k) {
-      const PlanarFamily::InPlane one = planar_.solve(X_WP, contact, k);
+      const PlanarFamily::InPlane one = family.solve(k);
       if (one.minimum.T < best.minimum.T) best = one;
       if (one.minimum.T >= T) continue;
       const Pose candidate = PlanarFamily::pose(X_WP, contact, one);
