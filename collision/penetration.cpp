@@ -145,9 +145,10 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
   double T = in_contact(out.projection) ? out.projection.energy : std::numeric_limits<double>::infinity();
   Vector6d sum = Vector6d::Zero();
   for (const Contact& contact : contacts_) {
-    PlanarFamily::InPlane best = planar_.solve(X_WP, contact, 0);
+    const auto family = planar_.at(X_WP, contact);
+    PlanarFamily::InPlane best = family.solve(0);
     for (int k = 0; k < planar_.planes(); ++k) {
-      const PlanarFamily::InPlane one = planar_.solve(X_WP, contact, k);
+      const PlanarFamily::InPlane one = family.solve(k);
       if (one.minimum.T < best.minimum.T) best = one;
       if (one.minimum.T >= T) continue;
       const Pose candidate = PlanarFamily::pose(X_WP, contact, one);
@@ -165,8 +166,8 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
     X_WQ = lifted.X_WQ;
     T = lifted.energy;
   }
-  out = described(X_WP,
-                  exact_.translate(X_WP, scene_, X_WQ));  // fills in the contacts; moves q by rounding only
+  const auto lift = [&](const Pose&) { return exact_.translate(X_WP, scene_, X_WQ); };
+  out = described(X_WP, settle(lift(X_WQ), lift));  // lets q down onto what it stands clear of
   out.drive = freed ? out.eps : sum;
   return out;
 }

@@ -2,127 +2,185 @@
 #include "core/planar_family.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "core/quartic.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Eq. (20) with the vertex on the plane:  beta = -vx sin(theta) - vy cos(theta).
-PlanarMinimum at(const PlanarSection& s, double theta) noexcept {
-  const double beta = -s.vx * std::sin(theta) - s.vy * std::cos(theta);
-  const double half = std::sin(0.5 * theta);
-  return {theta, beta, s.m * (beta - s.h) * (beta - s.h) + 4.0 * s.H * half * half};  // Eq. (18), phi = 0
-}
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Two directions that span the obstacle plane: Z, and X = n x Z, so that (X, n, Z) is right-handed.
-struct PlaneAxes {
-  Vector3d X;
-  Vector3d Z;
+/// A rotation by theta, from x = tan(theta/2) of Eq. (24); infinite for half a turn. No angle is needed to
+/// compare energies, and none of these loses digits for a small one.
+struct Turn {
+  double x;
+  double sine;        ///< sin(theta)
+  double half_sine2;  ///< sin^2(theta/2)
+
+  explicit Turn(double tan_half) noexcept : x(tan_half) {
+    const bool less_than_quarter = std::abs(x) <= 1.0;
+    const double t = less_than_quarter ? x : 1.0 / x;
+    const double u = 1.0 / (1.0 + t * t);
+    sine = 2.0 * t * u;
+    half_sine2 = less_than_quarter ? t * t * u : u;
+  }
 };
 
-PlaneAxes axes_of(const Vector3d& n) noexcept {
-  const Vector3d along = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
-  const Vector3d Z = (along - along.dot(n) * n).normalized();
-  return {n.cross(Z), Z};
+/// Eq. (22) with phi = 0. There  beta - h = -vx sin(theta) - vy cos(theta) - h  by Eq. (20).
+double energy(const PlanarBody& s, const Turn& turn) noexcept {
+  const double lift = 2.0 * s.vy * turn.half_sine2 - s.vx * turn.sine - (s.vy + s.h);
+  return s.m * lift * lift + 4.0 * s.H * turn.half_sine2;
+}
+
+/// The angles of Eq. (21) as x = tan(theta/2), which rises with theta: from min up to max or, where half a
+/// turn lies between, from min up to infinity and from there to max.
+struct Range {
+  double min = -kInfinity;
+  double max = kInfinity;
+  bool through_half_turn = false;
+
+  bool contains(double x) const noexcept {
+    return through_half_turn ? min <= x || x <= max : min <= x && x <= max;
+  }
+};
+
+struct Least {
+  Turn turn;
+  double T;
+};
+
+/// Eqs. (31) and (32). Stationary angles solve the quartic (25) in x, with the coefficients (26)-(30) at phi
+/// = 0, where vy + h and vy - h factor out: a shallow contact has a small vy + h, which must keep its digits.
+/// Where A_1 vanishes a root has gone to x = infinity: half a turn, which is tried as well.
+Least least(const PlanarBody& s, const Range& range) noexcept {
+  const double sum = s.vy + s.h;
+  const double difference = s.vy - s.h;
+  const double A1 = s.m * s.vx * difference;
+  const double B1 = 2.0 * (s.H + s.m * (s.vy * difference - s.vx * s.vx));
+  const double C1 = -6.0 * s.m * s.vx * s.vy;
+  const double D1 = 2.0 * (s.H - s.m * (s.vy * sum - s.vx * s.vx));
+  const double E1 = s.m * s.vx * sum;
+
+  Least best{Turn(0.0), kInfinity};
+  const auto try_turn = [&](double x) noexcept {
+    const Turn turn(x);
+    const double T = energy(s, turn);
+    if (T < best.T) best = {turn, T};
+  };
+  try_turn(range.min);
+  try_turn(range.max);
+  if (range.through_half_turn) try_turn(kInfinity);
+  for (const double x : real_roots(A1, B1, C1, D1, E1))
+    if (range.contains(x)) try_turn(x);
+  return best;
+}
+
+PlanarMinimum minimum_at(const PlanarBody& s, const Least& best) noexcept {
+  const auto& [x, sine, half_sine2] = best.turn;
+  const double beta = -s.vx * sine - s.vy * (1.0 - 2.0 * half_sine2);  // Eq. (20)
+  return {2.0 * std::atan(x), beta, best.T};                           // Eq. (24)
+}
+
+/// A direction in the section, x along e1 and y along the obstacle's normal; of any length.
+struct Direction2 {
+  double x;
+  double y;
+  double length() const noexcept { return std::sqrt(x * x + y * y); }
+};
+
+/// Between the directions a and b of its edges lies the body. Let alpha be the angle from the x-axis of the
+/// one from which a turn by less than pi leads through the body to the other, at angle alpha + gamma. Both
+/// stay above the obstacle for
+///
+///   -alpha <= theta <= pi - (alpha + gamma)
+///
+/// which is Eq. (21) when alpha = 0.
+Range range_of(Direction2 a, Direction2 b) noexcept {
+  if (a.x * b.y < a.y * b.x) std::swap(a, b);
+  const double tan_a = a.x >= 0.0 ? a.y / (a.length() + a.x) : (a.length() - a.x) / a.y;  // tan(alpha/2)
+  const double cot_b = b.x >= 0.0 ? (b.length() + b.x) / b.y : b.y / (b.length() - b.x);
+  return {-tan_a, cot_b, std::signbit(a.y) && b.y < 0.0};
 }
 
 }  // namespace
 
-// Stationary angles solve the quartic (25) in x = tan(theta/2), Eq. (24), with the coefficients (26)-(30) at
-// phi = 0. Where A_1 vanishes a root has gone to x = infinity: theta = pi, which is tried as well.
 PlanarMinimum minimise(const PlanarSection& s) noexcept {
-  const double A1 = s.m * s.vx * s.vy - s.m * s.vx * s.h;
-  const double B1 = 2.0 * (s.H - s.m * s.h * s.vy - s.m * s.vx * s.vx + s.m * s.vy * s.vy);
-  const double C1 = -6.0 * s.m * s.vx * s.vy;
-  const double D1 = 2.0 * (s.H - s.m * s.h * s.vy + s.m * s.vx * s.vx - s.m * s.vy * s.vy);
-  const double E1 = s.m * s.vx * s.vy + s.m * s.vx * s.h;
-
-  PlanarMinimum best = at(s, s.theta_min);  // the border values of Eqs. (31), (32)
-  const auto try_angle = [&](double theta) {
-    if (theta < s.theta_min || theta > s.theta_max) return;
-    const PlanarMinimum candidate = at(s, theta);
-    if (candidate.T < best.T) best = candidate;
-  };
-  try_angle(s.theta_max);
-  try_angle(std::numbers::pi);
-  try_angle(-std::numbers::pi);
-  for (const double x : real_roots(A1, B1, C1, D1, E1)) {
-    const double theta = 2.0 * std::atan(x);
-    try_angle(theta);
-    try_angle(theta + 2.0 * std::numbers::pi);  // an edge below the obstacle at p puts theta_max beyond pi
-  }
-  return best;
+  using std::numbers::pi;
+  const Range range{std::tan(0.5 * s.theta_min), std::tan(0.5 * s.theta_max), s.theta_max > pi};
+  const Least best = least(s, range);
+  PlanarMinimum minimum = minimum_at(s, best);
+  if (range.through_half_turn && best.turn.x <= range.max) minimum.theta += 2.0 * pi;
+  minimum.theta = std::clamp(minimum.theta, s.theta_min, s.theta_max);
+  return minimum;
 }
 
-/// The faces around a vertex: its neighbours relative to it, in world axes at p.
-struct PlanarFamily::Star {
-  const ConvexBody& body;
-  std::span<const std::uint32_t> ring;
-  Quaterniond R_WP;
-  Vector3d apex_T;
+PlanarFamily::PlanarFamily(const Inertia& M, const ConvexBody& body, int planes) : M_(M), body_(body) {
+  const int count = std::max(planes, 1);
+  for (int k = 0; k < count; ++k) {
+    const double delta = std::numbers::pi * k / count;
+    directions_.push_back({std::sin(delta), std::cos(delta)});
+  }
+}
 
-  Vector3d edge(std::size_t i) const noexcept { return R_WP * (body.vertices_T_m[ring[i]] - apex_T); }
-};
+PlanarFamily::AtContact::AtContact(const PlanarFamily& family, const Pose& X_WP,
+                                   const Contact& contact) noexcept
+    : family_(family), ring_(family.body_.ring_of(contact.vertex)), apex_T_(contact.p_TA_m) {
+  const Vector3d& n = contact.n_W;
+  const Vector3d along = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
+  Z_W_ = (along - along.dot(n) * n).normalized();
+  X_W_ = n.cross(Z_W_);
+  const Matrix3d R_PW = X_WP.rotation.conjugate().toRotationMatrix();
+  X_T_ = R_PW * X_W_;
+  n_T_ = R_PW * n;
+  Z_T_ = R_PW * Z_W_;
+  v_X_ = X_T_.dot(apex_T_);
+  v_n_ = n_T_.dot(apex_T_);
+  v_Z_ = Z_T_.dot(apex_T_);
+  const Matrix3d& H = family.M_.H_kg_m2;
+  H_XX_ = X_T_.dot(H * X_T_);
+  H_XZ_ = X_T_.dot(H * Z_T_);
+  H_ZZ_ = Z_T_.dot(H * Z_T_);
+  h_ = n.dot(X_WP.translation_m) - contact.offset_m;
+}
 
-PlanarFamily::PlanarFamily(const Inertia& M, const ConvexBody& body, int planes)
-    : M_(M), body_(body), planes_(std::max(planes, 1)) {}
+PlanarFamily::InPlane PlanarFamily::AtContact::solve(int k) const noexcept {
+  // The axis w_delta, (34) as sine and cosine, and e1 = n x w: the section's axes are (e1, n, w).
+  const auto [sine, cosine] = family_.directions_[static_cast<std::size_t>(k)];
+  const Vector3d w_T = sine * X_T_ + cosine * Z_T_;
+  const Vector3d e1_T = cosine * X_T_ - sine * Z_T_;
+  PlanarBody section;
+  section.m = family_.M_.mass_kg;
+  section.H = sine * sine * H_XX_ + 2.0 * sine * cosine * H_XZ_ + cosine * cosine * H_ZZ_;
+  section.vx = cosine * v_X_ - sine * v_Z_;
+  section.vy = v_n_;
+  section.h = h_;
 
-/// Algorithm 2 for any star: the plane with normal w cuts the faces around the vertex in two directions;
-/// between them lies the body. A face edge in the plane is its own direction. Where the plane meets the body
-/// in the vertex only, nothing limits the angle.
-///
-/// With the bisector at angle mid from e1 and the inner angle gamma (line 20), both directions stay above the
-/// obstacle for   -mid + gamma/2 <= theta <= pi - mid - gamma/2,   which is Eq. (21) when one lies on it at
-/// 0.
-PlanarSection PlanarFamily::limited(PlanarSection section, const Vector3d& e1, const Vector3d& n,
-                                    const Vector3d& w, const Star& star) noexcept {
-  section.theta_min = -std::numbers::pi;
-  section.theta_max = std::numbers::pi;
-  Vector3d cut[2];
-  int cuts = 0;
-  Vector3d previous = star.edge(star.ring.size() - 1);
-  double d_previous = w.dot(previous);
-  for (std::size_t i = 0; i < star.ring.size() && cuts < 2; ++i) {
-    const Vector3d edge = star.edge(i);
-    const double d = w.dot(edge);
+  // Algorithm 2 for any star of faces: the plane cuts them in two directions. A face edge in the plane is its
+  // own direction. Where the plane meets the body in the vertex only, nothing limits the angle.
+  const auto& vertices = family_.body_.vertices_T_m;
+  std::array<Direction2, 2> cut;
+  std::size_t cuts = 0;
+  const auto add = [&](const Vector3d& p_T) noexcept { cut[cuts++] = {e1_T.dot(p_T), n_T_.dot(p_T)}; };
+  Vector3d previous = vertices[ring_.back()] - apex_T_;
+  double d_previous = w_T.dot(previous);
+  for (std::size_t i = 0; i < ring_.size() && cuts < 2; ++i) {
+    const Vector3d edge = vertices[ring_[i]] - apex_T_;
+    const double d = w_T.dot(edge);
     if (d == 0.0) {
-      cut[cuts++] = edge;  // lines 1-8: the plane passes through an edge
+      add(edge);  // lines 1-8: the plane passes through an edge
     } else if (d * d_previous < 0.0) {
-      cut[cuts++] = previous + (d_previous / (d_previous - d)) * (edge - previous);  // lines 10-15
+      add(std::abs(d_previous) * edge + std::abs(d) * previous);  // lines 10-15, but for the length
     }
     previous = edge;
     d_previous = d;
   }
-  if (cuts < 2) return section;
-  const Vector3d a = cut[0].normalized();
-  const Vector3d b = cut[1].normalized();
-  const Vector3d bisector = a + b;
-  const double mid = std::atan2(n.dot(bisector), e1.dot(bisector));
-  const double gamma = 2.0 * std::atan2((a - b).norm(), bisector.norm());
-  section.theta_min = -mid + 0.5 * gamma;
-  section.theta_max = std::numbers::pi - mid - 0.5 * gamma;
-  return section;
-}
-
-PlanarFamily::InPlane PlanarFamily::solve(const Pose& X_WP, const Contact& contact, int k) const noexcept {
-  const Vector3d& n = contact.n_W;
-  const auto [X, Z] = axes_of(n);
-  const double delta = std::numbers::pi * k / planes_;
-  const Vector3d w = std::sin(delta) * X + std::cos(delta) * Z;  // the axis w_delta; (34) as sine and cosine
-  const Vector3d e1 = n.cross(w);
-  const Vector3d v = X_WP.rotation * contact.p_TA_m;
-  const Vector3d w_T = X_WP.rotation.conjugate() * w;
-  PlanarSection section;
-  section.m = M_.mass_kg;
-  section.H = w_T.dot(M_.H_kg_m2 * w_T);
-  section.vx = e1.dot(v);
-  section.vy = n.dot(v);
-  section.h = n.dot(X_WP.translation_m) - contact.offset_m;
-  const Star star{body_, body_.ring_of(contact.vertex), X_WP.rotation, contact.p_TA_m};
-  return {minimise(limited(section, e1, n, w, star)), w};
+  const Range range = cuts < 2 ? Range{} : range_of(cut[0], cut[1]);
+  return {minimum_at(section, least(section, range)), sine * X_W_ + cosine * Z_W_};
 }
 
 Pose PlanarFamily::pose(const Pose& X_WP, const Contact& contact, const InPlane& solution) noexcept {

@@ -22,4 +22,8 @@ struct RealRoots {
 /// Coefficients must be finite. RT safe.
 RealRoots real_roots(double A, double B, double C, double D, double E) noexcept;
 
+/// The same by a search that works whatever the polynomial, at seven times the price: what real_roots() falls
+/// back on where the closed form cannot vouch for its answer, and what tests hold it against. RT safe.
+RealRoots real_roots_by_bracketing(double A, double B, double C, double D, double E) noexcept;
+
 }  // namespace wrenchd

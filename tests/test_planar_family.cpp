@@ -94,6 +94,43 @@ Pressed random_pressed(RandomValues& random) {
   return c;
 }
 
+/// No multiple of 1.8 degrees about any axis of the family frees the whole body for less.
+void require_least_of_free(const Pressed& c, const PlanarFamily& family) {
+  const auto free = [&c](const Pose& X_WQ) {
+    return std::all_of(
+        c.tool.hull.vertices_T_m.begin(), c.tool.hull.vertices_T_m.end(),
+        [&](const Vector3d& p) { return c.contact.n_W.dot(X_WQ * p) - c.contact.offset_m > 1e-9; });
+  };
+  for (int k = 0; k < family.planes(); ++k) {
+    const auto solution = family.solve(c.X_WP, c.contact, k);
+    for (int step = -100; step <= 100; ++step) {
+      const Quaterniond turn(Eigen::AngleAxisd(step * pi / 100.0, solution.axis_W));
+      Pose X_WQ{(turn * c.X_WP.rotation).normalized(), c.X_WP.translation_m};
+      X_WQ.translation_m += (1e-8 - gap_m(c.contact, X_WQ)) * c.contact.n_W;
+      if (!free(X_WQ)) continue;
+      REQUIRE(energy(c.tool.solid.inertia, c.X_WP, X_WQ) >= solution.minimum.T * (1.0 - 1e-6));
+    }
+  }
+}
+
+/// The directions in which a plane cuts the faces around the vertex are above the obstacle at q (Eq. 21).
+void require_section_free(const Pressed& c, const PlanarFamily::InPlane& solution) {
+  const Pose X_WQ = PlanarFamily::pose(c.X_WP, c.contact, solution);
+  const auto edge = [&c](std::uint32_t neighbour) -> Vector3d {
+    return c.X_WP.rotation * (c.tool.hull.vertices_T_m[neighbour] - c.contact.p_TA_m);
+  };
+  const auto ring = c.tool.hull.ring_of(c.contact.vertex);
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Vector3d one = edge(ring[i]);
+    const Vector3d next = edge(ring[(i + 1) % ring.size()]);
+    const double d_one = solution.axis_W.dot(one);
+    const double d_next = solution.axis_W.dot(next);
+    if (d_one * d_next >= 0.0) continue;
+    const Vector3d cut = one + d_one / (d_one - d_next) * (next - one);
+    REQUIRE(c.contact.n_W.dot(X_WQ.rotation * c.X_WP.rotation.conjugate() * cut) >= -1e-13);
+  }
+}
+
 /// The cube of example 4.1 as a section: v in axes with the obstacle's normal as y, as it stands at p.
 PlanarSection example(double scale) {
   constexpr double kPhi = -0.2;
@@ -272,22 +309,63 @@ TEST_CASE("no rotation of a plane's family that frees the whole body has less en
   RandomValues random(12);
   for (int i = 0; i < 40; ++i) {
     const Pressed c = random_pressed(random);
+    require_least_of_free(c, PlanarFamily(c.tool.solid.inertia, c.tool.hull, 5));
+  }
+}
+
+TEST_CASE("nor at a vertex that is not the deepest, where the angles may lie on either side of half a turn",
+          "[planar_family]") {
+  RandomValues random(16);
+  int beyond_quarter = 0;
+  for (int i = 0; i < 80; ++i) {
+    Pressed c = random_pressed(random);
+    const auto& vertices = c.tool.hull.vertices_T_m;
+    c.contact.vertex = static_cast<std::uint32_t>(random.integer(0, static_cast<int>(vertices.size()) - 1));
+    c.contact.p_TA_m = vertices[c.contact.vertex];
     const PlanarFamily family(c.tool.solid.inertia, c.tool.hull, 5);
-    const auto free = [&c](const Pose& X_WQ) {
-      return std::all_of(
-          c.tool.hull.vertices_T_m.begin(), c.tool.hull.vertices_T_m.end(),
-          [&](const Vector3d& p) { return c.contact.n_W.dot(X_WQ * p) - c.contact.offset_m > 1e-9; });
-    };
+    require_least_of_free(c, family);
     for (int k = 0; k < family.planes(); ++k) {
       const auto solution = family.solve(c.X_WP, c.contact, k);
-      for (int step = -100; step <= 100; ++step) {
-        const Quaterniond turn(Eigen::AngleAxisd(step * pi / 100.0, solution.axis_W));
-        Pose X_WQ{(turn * c.X_WP.rotation).normalized(), c.X_WP.translation_m};
-        X_WQ.translation_m += (1e-8 - gap_m(c.contact, X_WQ)) * c.contact.n_W;
-        if (!free(X_WQ)) continue;
-        REQUIRE(energy(c.tool.solid.inertia, c.X_WP, X_WQ) >= solution.minimum.T * (1.0 - 1e-6));
-      }
+      require_section_free(c, solution);
+      const double theta = solution.minimum.theta;
+      REQUIRE(std::abs(theta) <= pi);
+      beyond_quarter += std::abs(theta) > 0.5 * pi ? 1 : 0;
     }
+  }
+  REQUIRE(beyond_quarter > 20);  // or nothing was asked
+}
+
+TEST_CASE("what the planes of a contact share is the same for one plane alone", "[planar_family]") {
+  RandomValues random(17);
+  const Pressed c = random_pressed(random);
+  const PlanarFamily family(c.tool.solid.inertia, c.tool.hull, 47);
+  const PlanarFamily::AtContact at = family.at(c.X_WP, c.contact);
+  for (int k = 0; k < family.planes(); ++k) {
+    const auto together = at.solve(k);
+    const auto alone = family.solve(c.X_WP, c.contact, k);
+    REQUIRE(together.minimum.theta == alone.minimum.theta);
+    REQUIRE(together.minimum.beta == alone.minimum.beta);
+    REQUIRE(together.minimum.T == alone.minimum.T);
+    REQUIRE(together.axis_W == alone.axis_W);
+  }
+}
+
+TEST_CASE("the energy of a shallow contact keeps its digits", "[planar_family]") {
+  // To first order the vertex has the compliance  1/m + vx^2/H  along the normal:  T = depth^2 / (1/m +
+  // vx^2/H).
+  RandomValues random(18);
+  for (int i = 0; i < 1'000; ++i) {
+    PlanarSection s;
+    s.m = random.decades(0.1, 10.0);
+    s.H = s.m * random.uniform(0.05, 0.5);
+    s.vx = random.uniform(-0.5, 0.5);
+    s.vy = -random.uniform(0.3, 0.9);
+    s.h = -s.vy - random.decades(1e-11, 1e-10);
+    s.theta_min = -0.5;
+    s.theta_max = 0.5;
+    const double depth = -(s.vy + s.h);
+    const PlanarMinimum found = minimise(s);
+    REQUIRE(found.T == Approx(depth * depth / (1.0 / s.m + s.vx * s.vx / s.H)).epsilon(1e-7));
   }
 }
 

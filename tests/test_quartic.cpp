@@ -112,6 +112,21 @@ void require_solved(const Made& made) {
   require_separated_found(made, c, found);
 }
 
+/// The closed form and the search have the same roots, but for what the coefficients' rounding leaves open.
+void require_same_as_bracketing(const std::array<double, 5>& c) {
+  const RealRoots found = solve(c);
+  const RealRoots searched = real_roots_by_bracketing(c[0], c[1], c[2], c[3], c[4]);
+  INFO(c[0] << " " << c[1] << " " << c[2] << " " << c[3] << " " << c[4]);
+  require_no_spurious(c, found);
+  REQUIRE(found.count == searched.count);
+  for (std::size_t i = 0; i < found.count; ++i) {
+    const double x = searched.x[i];
+    const double least = std::numeric_limits<double>::min();  // what is left of a zero that was searched for
+    const double uncertain = noise_at(c, x) / std::abs(slope_at(c, x));
+    if (found.x[i] != x) REQUIRE(std::abs(found.x[i] - x) <= 4.0 * uncertain + least);
+  }
+}
+
 double leading(RandomValues& random) {
   return random.decades(1e-3, 1e3) * (random.chance(0.5) ? 1.0 : -1.0);
 }
@@ -349,4 +364,95 @@ TEST_CASE("the largest and the smallest coefficients there are", "[quartic]") {
             REQUIRE(found.count <= 4);
             for (const double x : found) REQUIRE(std::isfinite(x));
           }
+}
+
+TEST_CASE("the closed form has the roots that the search has, from known roots of any scale", "[quartic]") {
+  RandomValues random(15);
+  for (const double most : {1.0, 1e2, 1e4, 1e8, 1e15}) {
+    const auto any = [&] { return random.normal() * random.decades(1.0 / most, most); };
+    for (int i = 0; i < 2'000; ++i) {
+      require_same_as_bracketing(
+          Made(leading(random)).root(any()).root(any()).root(any()).root(any()).coefficients());
+      require_same_as_bracketing(
+          Made(leading(random)).root(any()).root(any()).pair(any(), any()).coefficients());
+      require_same_as_bracketing(Made(leading(random)).pair(any(), any()).pair(any(), any()).coefficients());
+      require_same_as_bracketing(Made(leading(random)).root(any()).root(any()).root(any()).coefficients());
+      require_same_as_bracketing(Made(leading(random)).root(any()).pair(any(), any()).coefficients());
+      require_same_as_bracketing(Made(leading(random)).root(any()).root(any()).coefficients());
+      require_same_as_bracketing(Made(leading(random)).pair(any(), any()).coefficients());
+      require_same_as_bracketing(Made(leading(random)).root(any()).coefficients());
+    }
+  }
+}
+
+TEST_CASE("the same with any of the coefficients zero, tiny or huge", "[quartic]") {
+  RandomValues random(16);
+  for (const double odd : {0.0, 1e-300, 1e-100, 1e-17, 1e-8, 1e-4, 1e4, 1e8, 1e17, 1e60})
+    for (int which = 1; which < 32; ++which)
+      for (int i = 0; i < 60; ++i) {
+        std::array<double, 5> c;
+        for (int k = 0; k < 5; ++k)
+          c[static_cast<std::size_t>(k)] = random.normal() * ((which >> k) % 2 == 0 ? 1.0 : odd);
+        require_same_as_bracketing(c);
+      }
+}
+
+TEST_CASE("the same at multiple roots, nearly so, and where two pairs nearly agree", "[quartic]") {
+  RandomValues random(17);
+  for (int i = 0; i < 3'000; ++i) {
+    const double r = random.normal();
+    const double im = random.normal();
+    const double s = r + random.normal() * (i % 5 == 0 ? 0.0 : random.decades(1e-14, 1e-1));
+    const double apart = (s - r) * random.normal();
+    for (const Made& made :
+         {Made(1.0).root(r).root(s).root(random.normal()).root(random.normal()),
+          Made(1.0).root(r).root(s).pair(random.normal(), random.normal()),
+          Made(1.0).pair(r, s - r).root(random.normal()).root(random.normal()),
+          Made(1.0).pair(r, s - r).pair(random.normal(), random.normal()), Made(1.0).pair(r, im).pair(s, im),
+          Made(1.0).pair(r, im).pair(r, im + apart), Made(1.0).root(r).root(r).root(s).root(s),
+          Made(1.0).root(r).root(s).root(r + apart).root(random.normal()),
+          Made(1.0).root(r).root(s).root(r + apart)}) {
+      const auto c = made.coefficients();
+      require_no_spurious(c, solve(c));
+      require_separated_found(made, c, solve(c));
+    }
+  }
+}
+
+TEST_CASE("a vertex nearly below the centre of mass: the least of the roots is not lost", "[quartic]") {
+  // Eqs. (26)-(30) at phi = 0. Two coefficients of 1e-8 among ones once gave a half turn for an answer.
+  RandomValues random(18);
+  for (int i = 0; i < 5'000; ++i) {
+    const double m = 1.0, H = random.uniform(0.02, 0.5), vy = -random.uniform(0.3, 0.9);
+    const double vx = random.normal() * random.decades(1e-18, 1e-1);
+    const double h = -vy - random.decades(1e-9, 0.3);
+    require_same_as_bracketing({m * vx * vy - m * vx * h, 2.0 * (H - m * h * vy - m * vx * vx + m * vy * vy),
+                                -6.0 * m * vx * vy, 2.0 * (H - m * h * vy + m * vx * vx - m * vy * vy),
+                                m * vx * vy + m * vx * h});
+  }
+}
+
+TEST_CASE("roots that agree in eight digits, beside one at 1e13, are not taken for certain", "[quartic]") {
+  // A resultant with too much rounding once did: its terms were larger than the roots ask for.
+  require_same_as_bracketing(
+      {1.0, 17386765417461.773, -3575334326662.4648, 161440795724.83173, -2099485800.5785661});
+  require_same_as_bracketing(
+      {1.0, -619835687117844.0, 3029575534.8516641, -3702.3660256170242, 1.0905661672880543e-06});
+  require_same_as_bracketing(
+      {1.0, -712605607013475.62, 10717106309.629679, 30734.579894808445, 0.020287685223639978});
+}
+
+TEST_CASE("pure powers", "[quartic]") {
+  CHECK(real_roots(1.0, 0.0, 0.0, 0.0, 1.0).count == 0);
+  const RealRoots fourth = real_roots(1.0, 0.0, 0.0, 0.0, -16.0);
+  REQUIRE(fourth.count == 2);
+  CHECK(fourth.x[0] == -2.0);
+  CHECK(fourth.x[1] == 2.0);
+  const RealRoots third = real_roots(0.0, 1.0, 0.0, 0.0, -27.0);
+  REQUIRE(third.count == 1);
+  CHECK(third.x[0] == Approx(3.0).epsilon(1e-15));
+  const RealRoots with_zero = real_roots(1.0, 0.0, 0.0, -27.0, 0.0);
+  REQUIRE(with_zero.count == 2);
+  CHECK(with_zero.x[0] == 0.0);
+  CHECK(with_zero.x[1] == Approx(3.0).epsilon(1e-15));
 }
