@@ -152,8 +152,7 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
       if (one.minimum.T < best.minimum.T) best = one;
       if (one.minimum.T >= T) continue;
       const Pose candidate = PlanarFamily::pose(X_WP, contact, one);
-      probe_.clear();
-      if (scene_.add_violated(candidate, exact_.gap_tolerance_m(candidate), probe_) > 0) continue;
+      if (!scene_.admits(candidate, exact_.gap_tolerance_m(candidate))) continue;
       freed = true;
       X_WQ = candidate;
       T = one.minimum.T;

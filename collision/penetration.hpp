@@ -64,7 +64,6 @@ class PenetrationDepth {
   Descent descent_;  ///< works with exact_
   PlanarFamily planar_;
   ContactSet contacts_;                                    ///< what planar works through
-  ContactSet probe_;                                       ///< what a candidate of it violates
   FixedList<ActiveContact, ContactSet::kCapacity> known_;  ///< what carried at the last answer of follow()
   std::vector<HeldPlane> saved_;                           ///< while other planes are tried
   std::vector<HeldPlane> best_;                            ///< of the best answer so far
