@@ -73,8 +73,7 @@ Projection PenetrationDepth::settle(Projection best, const Solve& solve) noexcep
   constexpr double kBetter = 1.0 - 1e-10;
   for (int change = 0; change < kChanges; ++change) {
     if (!in_contact(best) || scene_.settled(best)) return best;
-    const std::size_t choices =
-        std::min(kTries, scene_.find_near_choices(best.X_WQ, exact_.gap_tolerance_m(best.X_WQ)));
+    const std::size_t choices = std::min(kTries, scene_.find_near_choices(best.X_WQ));
     bool improved = false;
     saved_ = scene_.held();
     for (std::size_t i = 0; i < choices && !improved; ++i) {

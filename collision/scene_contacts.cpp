@@ -62,8 +62,18 @@ Vector3d normal_of(const HeldPlane& plane, const Pose& X_WT, bool* degenerate = 
   return plane.n_W;
 }
 
-bool between_faces(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
-  return m.dot(edge.side[0]) >= 0.0 && m.dot(edge.side[1]) >= 0.0;
+/// Does a plane with outward normal m touch the body along this edge? One that touches along a face of the
+/// edge does, whatever rounding makes of it.
+bool touches_along(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
+  const double least = -kSamePlane * m.norm();
+  return m.dot(edge.side[0]) >= least && m.dot(edge.side[1]) >= least;
+}
+
+/// Fixed to the same features?
+bool same_plane(const HeldPlane& a, const HeldPlane& b) noexcept {
+  if (a.kind != b.kind) return false;
+  if (a.kind == ContactKind::vertex_face) return (a.n_W - b.n_W).norm() < kSamePlane;
+  return a.d_T == b.d_T && a.d_W == b.d_W;
 }
 
 }  // namespace
@@ -240,6 +250,8 @@ void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Pose& X_WT,
                              double least_separation_m) noexcept {
   const Standing at = stand(k, plane, X_WT);
   if (at.degenerate || !(at.separation_m >= least_separation_m)) return;
+  for (const Choice& choice : choices_)
+    if (choice.obstacle == k && same_plane(choice.plane, plane)) return;
   plane.n_W = at.n_W;
   if (choices_.size() == kMaxChoices) {
     const auto worst =
@@ -268,7 +280,7 @@ void SceneContacts::consider_edge_pair(std::uint32_t k, const Pose& X_WT, const 
   if (!(N.squaredNorm() > kParallel * kParallel)) return;
   for (const double sign : {1.0, -1.0}) {
     const Vector3d n_W = sign * N;
-    if (!between_faces(b, n_W) || !between_faces(a, R.transpose() * -n_W)) continue;
+    if (!touches_along(b, n_W) || !touches_along(a, R.transpose() * -n_W)) continue;
     consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
   }
 }
@@ -341,7 +353,7 @@ void SceneContacts::fix_to_world(const Pose& X_WT) noexcept {
   }
 }
 
-std::size_t SceneContacts::find_near_choices(const Pose& X_WT, double tolerance_m) noexcept {
+std::size_t SceneContacts::find_near_choices(const Pose& X_WT) noexcept {
   choices_.clear();
   const ConvexBody& tool = scene_.tool().hull;
   const Matrix3d R = X_WT.rotation.toRotationMatrix();
@@ -369,19 +381,18 @@ std::size_t SceneContacts::find_near_choices(const Pose& X_WT, double tolerance_
 
     for (const std::uint32_t v : obstacle_touching_)
       for (const std::uint32_t f : obstacle.faces_of(v))
-        consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -tolerance_m);
+        consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
     for (const std::uint32_t v : tool_touching_)
       for (const std::uint32_t f : tool.faces_of(v))
-        consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -tolerance_m);
+        consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -touching_m);
     for (const auto& a : tool.edges)
       if (touches(tool_touching_, a))
         for (const auto& b : obstacle.edges)
-          if (touches(obstacle_touching_, b)) consider_edge_pair(k, X_WT, R, a, b, -tolerance_m);
+          if (touches(obstacle_touching_, b)) consider_edge_pair(k, X_WT, R, a, b, -touching_m);
     consider_widest(k, X_WT);
 
     const auto same = [&](const Choice& choice) {
-      return choice.obstacle == k && choice.plane.kind == planes_[k].kind &&
-             (choice.plane.n_W - held.n_W).norm() < kSamePlane;
+      return choice.obstacle == k && same_plane(choice.plane, planes_[k]);
     };
     choices_.erase(std::remove_if(choices_.begin(), choices_.end(), same), choices_.end());
   }

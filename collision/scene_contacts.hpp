@@ -56,7 +56,7 @@ class SceneContacts final : public ContactSource {
 
   /// Collects the planes other than those held that admit this pose, the widest apart first, among the
   /// features that touch the planes held. Returns how many. RT safe.
-  std::size_t find_near_choices(const Pose& X_WT, double tolerance_m) noexcept;
+  std::size_t find_near_choices(const Pose& X_WT) noexcept;
 
   /// Holds the i-th of them.
   void take(std::size_t i) noexcept { planes_[choices_[i].obstacle] = choices_[i].plane; }
