@@ -144,11 +144,13 @@ void SceneContacts::add_half_space(std::uint32_t k, const Pose& X_WT, double tol
   };
 
   Deepest<kPerObstacle> deepest;
-  for (std::uint32_t v = 0; v < vertices.size(); ++v) {
-    const double gap = n_T.dot(vertices[v]) - below;
-    if (gap >= -tolerance_m || gap >= deepest.threshold()) continue;
-    if (!contacts.contains(with_vertex(v))) deepest.insert(gap, v);
-  }
+  scene_.tool().hull.visit_above(
+      -n_T, [&] { return -below - std::min(-tolerance_m, deepest.threshold()); },
+      [&](std::uint32_t v, double depth) {
+        const double gap = -depth - below;
+        if (gap >= -tolerance_m || gap >= deepest.threshold()) return;
+        if (!contacts.contains(with_vertex(v))) deepest.insert(gap, v);
+      });
   for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(with_vertex(deepest.vertex(i)));
 }
 

@@ -2,6 +2,10 @@
 #include "core/convex_body.hpp"
 
 #include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include <Eigen/Geometry>
 
 namespace wrenchd {
 namespace {
@@ -12,6 +16,13 @@ constexpr double kSamePlane = 1e-9;
 }  // namespace
 
 void ConvexBody::find_faces() {
+  order_.resize(vertices_T_m.size());
+  std::iota(order_.begin(), order_.end(), 0u);
+  blocks_.clear();
+  build_blocks(0, static_cast<std::uint32_t>(order_.size()));
+  ordered_m_.clear();
+  for (const std::uint32_t v : order_) ordered_m_.push_back(vertices_T_m[v]);
+
   faces.clear();
   Vector3d middle = Vector3d::Zero();
   for (const Vector3d& p : vertices_T_m) middle += p / static_cast<double>(vertices_T_m.size());
@@ -79,19 +90,54 @@ void ConvexBody::add_edge(std::uint32_t from, std::uint32_t to, std::span<const 
   edges.push_back({from, to, d, {towards(n0, n1), towards(n1, n0)}});
 }
 
-// Every vertex is looked at. Climbing from neighbour to neighbour would look at few, but where a face is
-// split into triangles that are flat but for rounding, the climb ends at a vertex whose neighbours all seem
-// level with it, as far below the true support as the body is wide; and the projection would take that for
-// admissible.
+/// Halves the vertices along the longest side of their box until few are left.
+void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
+  constexpr std::uint32_t kFew = 16;
+  Eigen::AlignedBox3d extent;
+  for (std::uint32_t i = begin; i < end; ++i) extent.extend(vertices_T_m[order_[i]]);
+  if (end - begin > kFew) {
+    Eigen::Index axis = 0;
+    extent.sizes().maxCoeff(&axis);
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    const auto before = [&](std::uint32_t x, std::uint32_t y) {
+      return vertices_T_m[x][axis] < vertices_T_m[y][axis];
+    };
+    std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, before);
+    build_blocks(begin, middle);
+    build_blocks(middle, end);
+    return;
+  }
+  Block block{extent.center(), 0.0, begin, end};
+  for (std::uint32_t i = begin; i < end; ++i)
+    block.radius_m = std::max(block.radius_m, (vertices_T_m[order_[i]] - block.centre_m).norm());
+  block.radius_m *= 1.0 + 1e-12;  // its own rounding, and that of the dot products it stands for
+  blocks_.push_back(block);
+}
+
+// Climbing from neighbour to neighbour would look at fewer vertices. But where a face is split into triangles
+// that are flat but for rounding, the climb ends at a vertex whose neighbours all seem level with it, as far
+// below the true support as the body is wide, and the projection would take that for admissible. Blocks are
+// left out only where none of their vertices can be the one.
 std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
   std::uint32_t best = 0;
-  double height = direction.dot(vertices_T_m[0]);
-  for (std::uint32_t v = 1; v < vertices_T_m.size(); ++v) {
-    const double h = direction.dot(vertices_T_m[v]);
-    if (h <= height) continue;
-    best = v;
-    height = h;
+  double height = 0.0;
+  const double length = direction.norm();
+  double most = -std::numeric_limits<double>::infinity();
+  for (const Block& block :
+       blocks_) {  // the block that reaches highest first: it leaves little to the others
+    const double reach = direction.dot(block.centre_m) + length * block.radius_m;
+    if (reach <= most) continue;
+    most = reach;
+    best = order_[block.begin];
   }
+  height = direction.dot(vertices_T_m[best]);
+  visit_above(
+      direction, [&] { return height; },
+      [&](std::uint32_t v, double h) {
+        if (h <= height) return;
+        height = h;
+        best = v;
+      });
   return best;
 }
 

@@ -42,18 +42,41 @@ struct ConvexBody {
     return std::span(faces_at).subspan(faces_begin[vertex], faces_begin[vertex + 1] - faces_begin[vertex]);
   }
 
-  /// Fills in faces, faces_of and edges from vertices and rings. Not RT safe.
+  /// Fills in faces, faces_of, edges and what support() works with from vertices and rings. Not RT safe.
   void find_faces();
 
-  /// The vertex farthest along a direction. RT safe.
+  /// The vertex farthest along a direction, of any length. RT safe.
   std::uint32_t support(const Vector3d& direction) const noexcept;
+
+  /// Calls visit(vertex, direction . p) for every vertex that lies higher along the direction than least(),
+  /// which may rise meanwhile, and for some others. RT safe if they are.
+  template <class Least, class Visit>
+  void visit_above(const Vector3d& direction, const Least& least, const Visit& visit) const noexcept {
+    const double length = direction.norm();
+    for (const Block& block : blocks_) {
+      if (direction.dot(block.centre_m) + length * block.radius_m < least()) continue;
+      for (std::uint32_t i = block.begin; i < block.end; ++i) visit(order_[i], direction.dot(ordered_m_[i]));
+    }
+  }
 
   /// Is a point inside, or no farther than tolerance_m outside? RT safe.
   bool contains(const Vector3d& p_T_m, double tolerance_m) const noexcept;
 
  private:
+  /// Some vertices that lie close together, in a sphere.
+  struct Block {
+    Vector3d centre_m;
+    double radius_m;
+    std::uint32_t begin, end;  ///< in order_
+  };
+
+  void build_blocks(std::uint32_t begin, std::uint32_t end);
   void add_edge(std::uint32_t from, std::uint32_t to, std::span<const std::uint32_t> faces_from,
                 std::span<const std::uint32_t> faces_to);
+
+  std::vector<std::uint32_t> order_;  ///< the vertices, block by block
+  std::vector<Vector3d> ordered_m_;   ///< and where they are
+  std::vector<Block> blocks_;
 };
 
 }  // namespace wrenchd

@@ -267,7 +267,8 @@ void ExactProjection::linearise(const State& state) noexcept {
         turning += seen.d.cross(dB.cross(r - gap_[i] * n_Q)) / seen.d.cross(dB).norm();
       }
     }
-    J_[i] << at.n, turning;
+    J_[i].head<3>() = at.n;
+    J_[i].tail<3>() = turning;
   }
 }
 
@@ -276,19 +277,24 @@ Vector6d ExactProjection::gradient(const State& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Vector3d Hv = H_hat_ * v;
   Vector6d g;
-  g << 2.0 * state.u, 4.0 * (state.E.w() * Hv - v.cross(Hv));
+  g.head<3>() = 2.0 * state.u;
+  g.tail<3>() = 4.0 * (state.E.w() * Hv - v.cross(Hv));
   return g;
 }
 
 /// Hessian of the Lagrangian T - sum multiplier_i gap_i:
 ///
 ///   [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ] - sum multiplier_i K_i
-ExactProjection::Curvature ExactProjection::curvature(const State& state) const noexcept {
+ExactProjection::Curvature ExactProjection::curvature_of_metric(const State& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Matrix3d G = 0.5 * (state.E.w() * Matrix3d::Identity() + hat(v));
   Curvature W;
   W.B = 8.0 * G.transpose() * H_hat_ * G;
   W.B.diagonal().array() -= 2.0 * v.dot(H_hat_ * v);
+  return W;
+}
+ExactProjection::Curvature ExactProjection::curvature(const State& state) const noexcept {
+  Curvature W = curvature_of_metric(state);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (multiplier_[i] > 0.0) bend(state, i, W);
   return W;
@@ -388,14 +394,16 @@ void ExactProjection::factorise_convex_part(const Curvature& curvature, Root& ro
 Vector6d ExactProjection::Root::solve(const Vector6d& y) const noexcept {
   Vector6d z;
   const Vector3d upper = P_inverse * y.head<3>();
-  z << upper, S_inverse * (y.tail<3>() - Q * upper);
+  z.head<3>() = upper;
+  z.tail<3>() = S_inverse * (y.tail<3>() - Q * upper);
   return z;
 }
 
 Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexcept {
   Vector6d y;
   const Vector3d lower = S_inverse.transpose() * z.tail<3>();
-  y << P_inverse.transpose() * (z.head<3>() - Q.transpose() * lower), lower;
+  y.head<3>() = P_inverse.transpose() * (z.head<3>() - Q.transpose() * lower);
+  y.tail<3>() = lower;
   return y;
 }
 
@@ -408,7 +416,10 @@ Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexce
 bool ExactProjection::newton_step(const State& state, const Vector6d& g, Vector6d& dy) noexcept {
   const Curvature W = curvature(state);
   Root root;
-  if (!factorise(W, root)) factorise_convex_part(W, root);
+  if (!factorise(W, root)) {
+    Curvature metric = curvature_of_metric(state);
+    if (iterations_ > 2 || !factorise(metric, root)) factorise_convex_part(W, root);
+  }
   step_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root.solve(J_[i]), -std::max(gap_[i], 0.0));
   using Status = LeastDistance<6, ContactSet::kCapacity>::Status;

@@ -138,6 +138,7 @@ class ExactProjection {
   bool translate_out(State& state) noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
+  Curvature curvature_of_metric(const State& state) const noexcept;
   Curvature curvature(const State& state) const noexcept;
   void bend(const State& state, std::size_t i, Curvature& W) const noexcept;
   void linearise(const State& state) noexcept;
