@@ -44,24 +44,6 @@ class Deepest {
   std::size_t count_ = 0;
 };
 
-/// Of a plane at a pose. Edges that are parallel have none: then it is that of the pose where the plane was
-/// taken.
-Vector3d normal_of(const HeldPlane& plane, const Pose& X_WT, bool* degenerate = nullptr) noexcept {
-  switch (plane.kind) {
-    case ContactKind::vertex_face:
-      break;
-    case ContactKind::face_vertex:
-      return X_WT.rotation * plane.d_T;
-    case ContactKind::edge_edge: {
-      const Vector3d N = (X_WT.rotation * plane.d_T).cross(plane.d_W);
-      const double s = N.norm();
-      if (s > kParallel) return N / s;
-      if (degenerate != nullptr) *degenerate = true;
-    }
-  }
-  return plane.n_W;
-}
-
 /// Does a plane with outward normal m touch the body along this edge? One that touches along a face of the
 /// edge does, whatever rounding makes of it.
 bool touches_along(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
@@ -89,35 +71,38 @@ SceneContacts::SceneContacts(const Scene& scene)
   obstacle_touching_.reserve(most);
 }
 
-std::size_t SceneContacts::add_violated(const Pose& X_WT, double tolerance_m,
+std::size_t SceneContacts::add_violated(const Pose& pose, double tolerance_m,
                                         ContactSet& contacts) const noexcept {
+  const Frame X_WT(pose);
   const std::size_t before = contacts.size();
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k)
     add_half_space(k, X_WT, tolerance_m, contacts);
-  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
-    if (!far_above(k, X_WT)) add_convex(k, X_WT, tolerance_m, contacts);
+  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k) add_convex(k, X_WT, tolerance_m, contacts);
   return contacts.size() - before;
 }
 
-bool SceneContacts::admits(const Pose& X_WT, double tolerance_m) const noexcept {
+bool SceneContacts::admits(const Pose& pose, double tolerance_m) const noexcept {
+  const Frame X_WT(pose);
   for (const HalfSpaceSettings& half_space : scene_.half_spaces()) {
-    const Vector3d n_T = X_WT.rotation.conjugate() * half_space.normal_W;
+    const Vector3d n_T = X_WT.R.transpose() * half_space.normal_W;
     const ConvexBody& tool = scene_.tool().hull;
     const double lowest = n_T.dot(tool.vertices_T_m[tool.support(-n_T)]);
-    if (lowest + half_space.normal_W.dot(X_WT.translation_m) - half_space.offset_m < -tolerance_m)
-      return false;
+    if (lowest + half_space.normal_W.dot(X_WT.x_m) - half_space.offset_m < -tolerance_m) return false;
   }
   for (std::uint32_t k = 0; k < planes_.size(); ++k)
-    if (!out_of_reach(k, X_WT) && stand(k, planes_[k], X_WT).separation_m < -tolerance_m) return false;
+    if (!out_of_reach(k, X_WT) && !far_above(k, X_WT) &&
+        stand(k, planes_[k], X_WT).separation_m < -tolerance_m)
+      return false;
   return true;
 }
 
-void SceneContacts::admit(const Pose& X_WT, double tolerance_m) noexcept {
+void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
+  const Frame X_WT(pose);
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (far_above(k, X_WT) || stand(k, planes_[k], X_WT).separation_m >= -tolerance_m) continue;
     choices_.clear();
     if (out_of_reach(k, X_WT)) {
-      const Vector3d apart = X_WT.translation_m - scene_.convex()[k].centre_W_m;
+      const Vector3d apart = X_WT.x_m - scene_.convex()[k].centre_W_m;
       consider(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, 0.0);
     } else {
       consider_widest(k, X_WT);
@@ -127,7 +112,7 @@ void SceneContacts::admit(const Pose& X_WT, double tolerance_m) noexcept {
 }
 
 //   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
-void SceneContacts::add_half_space(std::uint32_t k, const Pose& X_WT, double tolerance_m,
+void SceneContacts::add_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
                                    ContactSet& contacts) const noexcept {
   const auto& vertices = scene_.tool().hull.vertices_T_m;
   Contact contact;
@@ -135,8 +120,8 @@ void SceneContacts::add_half_space(std::uint32_t k, const Pose& X_WT, double tol
   contact.offset_m = scene_.half_spaces()[k].offset_m;
   contact.p_WB_m = contact.offset_m * contact.n_W;
   contact.obstacle = k;
-  const Vector3d n_T = X_WT.rotation.conjugate() * contact.n_W;
-  const double below = contact.offset_m - contact.n_W.dot(X_WT.translation_m);
+  const Vector3d n_T = X_WT.R.transpose() * contact.n_W;
+  const double below = contact.offset_m - contact.n_W.dot(X_WT.x_m);
   const auto with_vertex = [&](std::uint32_t v) -> const Contact& {
     contact.p_TA_m = vertices[v];
     contact.vertex = v;
@@ -154,28 +139,46 @@ void SceneContacts::add_half_space(std::uint32_t k, const Pose& X_WT, double tol
   for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(with_vertex(deepest.vertex(i)));
 }
 
-bool SceneContacts::out_of_reach(std::uint32_t k, const Pose& X_WT) const noexcept {
+bool SceneContacts::out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept {
   const ConvexObstacle& obstacle = scene_.convex()[k];
   const double reach = scene_.tool_radius_m() + obstacle.radius_m;
-  return (X_WT.translation_m - obstacle.centre_W_m).squaredNorm() > reach * reach;
+  return (X_WT.x_m - obstacle.centre_W_m).squaredNorm() > reach * reach;
+}
+
+/// Of a plane at a pose. Edges that are parallel have none: then it is that of the pose where the plane was
+/// taken.
+Vector3d SceneContacts::normal_of(const HeldPlane& plane, const Frame& X_WT, bool* degenerate) noexcept {
+  switch (plane.kind) {
+    case ContactKind::vertex_face:
+      break;
+    case ContactKind::face_vertex:
+      return X_WT.R * plane.d_T;
+    case ContactKind::edge_edge: {
+      const Vector3d N = (X_WT.R * plane.d_T).cross(plane.d_W);
+      const double s = N.norm();
+      if (s > kParallel) return N / s;
+      if (degenerate != nullptr) *degenerate = true;
+    }
+  }
+  return plane.n_W;
 }
 
 /// The spheres around tool and obstacle are apart along the plane held: most obstacles are told so.
-bool SceneContacts::far_above(std::uint32_t k, const Pose& X_WT) const noexcept {
+bool SceneContacts::far_above(std::uint32_t k, const Frame& X_WT) const noexcept {
   const ConvexObstacle& obstacle = scene_.convex()[k];
-  const Vector3d n_W = normal_of(planes_[k], X_WT);
-  return n_W.dot(X_WT.translation_m - obstacle.centre_W_m) > scene_.tool_radius_m() + obstacle.radius_m;
+  const Vector3d n_W = normal_of(planes_[k], X_WT, nullptr);
+  return n_W.dot(X_WT.x_m - obstacle.centre_W_m) > scene_.tool_radius_m() + obstacle.radius_m;
 }
 
 /// The normal of a plane at this pose, the vertices of both bodies that lie farthest towards each other along
 /// it, and how far they are apart.
 SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const HeldPlane& plane,
-                                             const Pose& X_WT) const noexcept {
+                                             const Frame& X_WT) const noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   Standing out{};
   out.n_W = normal_of(plane, X_WT, &out.degenerate);
-  out.tool_vertex = tool.support(X_WT.rotation.conjugate() * -out.n_W);
+  out.tool_vertex = tool.support(X_WT.R.transpose() * -out.n_W);
   out.obstacle_vertex = obstacle.support(out.n_W);
   out.separation_m =
       out.n_W.dot(X_WT * tool.vertices_T_m[out.tool_vertex] - obstacle.vertices_T_m[out.obstacle_vertex]);
@@ -184,8 +187,9 @@ SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const HeldPlane& p
 
 /// The deepest pair, and those of its neighbours that lie beyond the plane too: on the side of the tool where
 /// the plane belongs to the obstacle, and the other way round.
-void SceneContacts::add_convex(std::uint32_t k, const Pose& X_WT, double tolerance_m,
+void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m,
                                ContactSet& contacts) const noexcept {
+  if (far_above(k, X_WT)) return;
   const HeldPlane& plane = planes_[k];
   const Standing at = stand(k, plane, X_WT);
   if (at.separation_m >= -tolerance_m) return;
@@ -248,7 +252,7 @@ bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) const no
 }
 
 /// Keeps a plane as a choice if it separates well enough.
-void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Pose& X_WT,
+void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT,
                              double least_separation_m) noexcept {
   const Standing at = stand(k, plane, X_WT);
   if (at.degenerate || !(at.separation_m >= least_separation_m)) return;
@@ -266,7 +270,7 @@ void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Pose& X_WT,
   choices_.push_back({k, plane, at.separation_m});
 }
 
-void SceneContacts::consider_faces(std::uint32_t k, const Pose& X_WT) noexcept {
+void SceneContacts::consider_faces(std::uint32_t k, const Frame& X_WT) noexcept {
   for (const auto& face : scene_.convex()[k].body.faces)
     consider(k, {ContactKind::vertex_face, face.n}, X_WT, -kInfinity);
   for (const auto& face : scene_.tool().hull.faces)
@@ -275,7 +279,7 @@ void SceneContacts::consider_faces(std::uint32_t k, const Pose& X_WT) noexcept {
 
 /// The common normal of two edges counts where each is the farthest part of its body along it: that is a
 /// facet of the set of all translations that collide. All others are behind one of those.
-void SceneContacts::consider_edge_pair(std::uint32_t k, const Pose& X_WT, const Matrix3d& R,
+void SceneContacts::consider_edge_pair(std::uint32_t k, const Frame& X_WT, const Matrix3d& R,
                                        const ConvexBody::Edge& a, const ConvexBody::Edge& b,
                                        double least_separation_m) noexcept {
   const Vector3d N = (R * a.d).cross(b.d);
@@ -287,18 +291,18 @@ void SceneContacts::consider_edge_pair(std::uint32_t k, const Pose& X_WT, const 
   }
 }
 
-void SceneContacts::consider_edge_pairs(std::uint32_t k, const Pose& X_WT) noexcept {
+void SceneContacts::consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   if (tool.edges.size() * obstacle.edges.size() > kMaxEdgePairs) return;
-  const Matrix3d R = X_WT.rotation.toRotationMatrix();
+  const Matrix3d& R = X_WT.R;
   for (const auto& a : tool.edges)
     for (const auto& b : obstacle.edges) consider_edge_pair(k, X_WT, R, a, b, -kInfinity);
 }
 
 // Of two bodies that are apart, the widest gap along any n is a least-distance problem by constraint
 // generation:  min |w|^2  s.t.  w . (p_a - p_b) >= 1 for all pairs,  n = w/|w|, and the gap is 1/|w|.
-void SceneContacts::consider_widest(std::uint32_t k, const Pose& X_WT) noexcept {
+void SceneContacts::consider_widest(std::uint32_t k, const Frame& X_WT) noexcept {
   using Status = LeastDistance<3, 64>::Status;
   constexpr std::size_t kPairs = 64;
   constexpr double kGoodEnough = 0.999;
@@ -328,7 +332,8 @@ void SceneContacts::sort_choices() noexcept {
             [](const Choice& x, const Choice& y) { return x.separation_m > y.separation_m; });
 }
 
-std::size_t SceneContacts::survey(const Pose& X_WT) noexcept {
+std::size_t SceneContacts::survey(const Pose& pose) noexcept {
+  const Frame X_WT(pose);
   choices_.clear();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;
@@ -348,17 +353,19 @@ void SceneContacts::open(std::size_t i) noexcept {
   planes_[openings_[i].obstacle] = openings_[i].plane;
 }
 
-void SceneContacts::fix_to_world(const Pose& X_WT) noexcept {
+void SceneContacts::fix_to_world(const Pose& pose) noexcept {
+  const Frame X_WT(pose);
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     planes_[k].n_W = stand(k, planes_[k], X_WT).n_W;
     planes_[k].kind = ContactKind::vertex_face;
   }
 }
 
-std::size_t SceneContacts::find_near_choices(const Pose& X_WT) noexcept {
+std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
+  const Frame X_WT(pose);
   choices_.clear();
   const ConvexBody& tool = scene_.tool().hull;
-  const Matrix3d R = X_WT.rotation.toRotationMatrix();
+  const Matrix3d& R = X_WT.R;
   const double touching_m = kTouching * scene_.tool_radius_m();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;

@@ -75,6 +75,13 @@ class SceneContacts final : public ContactSource {
     HeldPlane plane;
     double separation_m;
   };
+  /// A pose with its rotation as a matrix, which turns many vectors at less cost.
+  struct Frame {
+    explicit Frame(const Pose& X) noexcept : R(X.rotation.toRotationMatrix()), x_m(X.translation_m) {}
+    Vector3d operator*(const Vector3d& p_m) const noexcept { return R * p_m + x_m; }
+    Matrix3d R;
+    Vector3d x_m;
+  };
   /// A plane at one pose.
   struct Standing {
     Vector3d n_W;
@@ -90,19 +97,21 @@ class SceneContacts final : public ContactSource {
   static constexpr std::size_t kMaxChoices = 96;
   static constexpr std::size_t kMaxEdgePairs = 200000;  ///< compared at once by survey(): some milliseconds
 
-  void add_half_space(std::uint32_t k, const Pose& X_WT, double tolerance_m,
+  void add_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
                       ContactSet& contacts) const noexcept;
-  void add_convex(std::uint32_t k, const Pose& X_WT, double tolerance_m, ContactSet& contacts) const noexcept;
-  Standing stand(std::uint32_t k, const HeldPlane& plane, const Pose& X_WT) const noexcept;
-  bool far_above(std::uint32_t k, const Pose& X_WT) const noexcept;
-  bool out_of_reach(std::uint32_t k, const Pose& X_WT) const noexcept;
+  void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m,
+                  ContactSet& contacts) const noexcept;
+  Standing stand(std::uint32_t k, const HeldPlane& plane, const Frame& X_WT) const noexcept;
+  static Vector3d normal_of(const HeldPlane& plane, const Frame& X_WT, bool* degenerate) noexcept;
+  bool far_above(std::uint32_t k, const Frame& X_WT) const noexcept;
+  bool out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept;
   bool press_settled(std::uint32_t k, const Projection& q) const noexcept;
-  void consider(std::uint32_t k, HeldPlane plane, const Pose& X_WT, double least_separation_m) noexcept;
-  void consider_faces(std::uint32_t k, const Pose& X_WT) noexcept;
-  void consider_edge_pairs(std::uint32_t k, const Pose& X_WT) noexcept;
-  void consider_edge_pair(std::uint32_t k, const Pose& X_WT, const Matrix3d& R, const ConvexBody::Edge& a,
+  void consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT, double least_separation_m) noexcept;
+  void consider_faces(std::uint32_t k, const Frame& X_WT) noexcept;
+  void consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept;
+  void consider_edge_pair(std::uint32_t k, const Frame& X_WT, const Matrix3d& R, const ConvexBody::Edge& a,
                           const ConvexBody::Edge& b, double least_separation_m) noexcept;
-  void consider_widest(std::uint32_t k, const Pose& X_WT) noexcept;
+  void consider_widest(std::uint32_t k, const Frame& X_WT) noexcept;
   void sort_choices() noexcept;
 
   const Scene& scene_;

@@ -121,6 +121,16 @@ void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
 std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
   std::uint32_t best = 0;
   double height = 0.0;
+  if (blocks_.size() == 1) {
+    height = direction.dot(vertices_T_m[0]);
+    for (std::uint32_t v = 1; v < vertices_T_m.size(); ++v) {
+      const double h = direction.dot(vertices_T_m[v]);
+      if (h <= height) continue;
+      height = h;
+      best = v;
+    }
+    return best;
+  }
   const double length = direction.norm();
   double most = -std::numeric_limits<double>::infinity();
   for (const Block& block :

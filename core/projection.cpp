@@ -540,11 +540,12 @@ void ExactProjection::make_room(const State& state) noexcept {
 /// residual.
 void ExactProjection::report(Projection& out) noexcept {
   out.X_WQ = pose_of(state_);
+  linearise(state_);
+  out.kkt_residual = residual(gradient(state_));
   const std::size_t known = contacts_.size();
   while (scene_->add_violated(out.X_WQ, -kTouching * L_, contacts_) > 0) continue;  // what touches idly
   see_from(known);
-  linearise(state_);
-  out.kkt_residual = residual(gradient(state_));
+  for (std::size_t i = known; i < contacts_.size(); ++i) gap_[i] = 0.0;
   out.energy = state_.T * M_.mass_kg * L_ * L_;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (gap_[i] <= kTouching) out.active.add({contacts_[i], multiplier_[i] * M_.mass_kg * L_});
