@@ -8,6 +8,9 @@
 namespace wrenchd {
 namespace {
 
+/// An answer is better where its energy is less by more than rounding.
+constexpr double kBetter = 1.0 - 1e-10;
+
 bool in_contact(const Projection& projection) noexcept {
   return projection.status == ProjectionStatus::converged ||
          projection.status == ProjectionStatus::budget_spent;
@@ -70,7 +73,6 @@ template <class Solve>
 Projection PenetrationDepth::settle(Projection best, const Solve& solve) noexcept {
   constexpr int kChanges = 12;        // typical: none or one
   constexpr std::size_t kTries = 16;  // of the planes that touch, the widest apart first
-  constexpr double kBetter = 1.0 - 1e-10;
   for (int change = 0; change < kChanges; ++change) {
     if (!in_contact(best) || scene_.settled(best)) return best;
     const std::size_t choices = std::min(kTries, scene_.find_near_choices(best.X_WQ));
@@ -90,21 +92,31 @@ Projection PenetrationDepth::settle(Projection best, const Solve& solve) noexcep
   return best;
 }
 
-/// The best answer from every plane worth a try, one obstacle at a time. Half-spaces leave no choice.
+/// The best answer from every plane worth a try, one obstacle at a time: from the rotation of p, then from
+/// that of the best answer so far, until a round finds nothing better. Half-spaces leave no choice.
 Projection PenetrationDepth::project_globally(const Pose& X_WP) noexcept {
   const std::size_t openings = scene_.survey(X_WP);
   if (openings == 0) return exact_.project_globally(X_WP, scene_);
   const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
   Projection best = settle(solve(X_WP), solve);
   best_ = scene_.held();
-  for (std::size_t i = 0; i < openings && best.status != ProjectionStatus::free; ++i) {
-    scene_.open(i);
-    const Projection other = settle(solve(X_WP), solve);
-    if (other.status == ProjectionStatus::infeasible) continue;
-    if (best.status != ProjectionStatus::infeasible && other.energy >= best.energy) continue;
-    best = other;
-    best_ = scene_.held();
-  }
+  const auto try_all_from = [&](const Pose& X_start) {
+    bool improved = false;
+    for (std::size_t i = 0; i < openings && best.status != ProjectionStatus::free; ++i) {
+      scene_.open(i);
+      const Projection other = settle(solve(X_start), solve);
+      if (other.status == ProjectionStatus::infeasible) continue;
+      if (best.status != ProjectionStatus::infeasible && !(other.energy < kBetter * best.energy)) continue;
+      best = other;
+      best_ = scene_.held();
+      improved = true;
+    }
+    return improved;
+  };
+  constexpr int kRounds = 4;
+  try_all_from(X_WP);
+  for (int round = 0; round < kRounds && in_contact(best); ++round)
+    if (!try_all_from(Pose(best.X_WQ))) break;
   scene_.hold(best_);
   return best;
 }

@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kIterations = 200;
 constexpr int kHalvings = 30;
-/// The gradient has vanished, relative to that of the start.
-constexpr double kSmall = 1e-9;
+/// The gradient has vanished, relative to that of the start: less would be lost in the last digits of T.
+constexpr double kSmall = 1e-6;
 /// Armijo's constant, the usual value.
 constexpr double kFairShare = 1e-4;
 
