@@ -238,6 +238,8 @@ TEST_CASE("an obstacle out of reach is not asked") {
   const Pose far{met.X_WT.rotation, {100.0, 0.0, 0.0}};
   ContactSet violated;
   CHECK(contacts.survey(far) == 0);
+  contacts.admit(far, 0.0);
+  CHECK(contacts.admits(far, 0.0));
   CHECK(contacts.add_violated(far, 0.0, violated) == 0);
 }
 
