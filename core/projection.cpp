@@ -282,9 +282,7 @@ Vector6d ExactProjection::gradient(const State& state) const noexcept {
   return g;
 }
 
-/// Hessian of the Lagrangian T - sum multiplier_i gap_i:
-///
-///   [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ] - sum multiplier_i K_i
+/// Hessian of T:  [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ]
 ExactProjection::Curvature ExactProjection::curvature_of_metric(const State& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Matrix3d G = 0.5 * (state.E.w() * Matrix3d::Identity() + hat(v));
@@ -293,6 +291,8 @@ ExactProjection::Curvature ExactProjection::curvature_of_metric(const State& sta
   W.B.diagonal().array() -= 2.0 * v.dot(H_hat_ * v);
   return W;
 }
+
+/// Hessian of the Lagrangian T - sum multiplier_i gap_i: that of T, less sum multiplier_i K_i.
 ExactProjection::Curvature ExactProjection::curvature(const State& state) const noexcept {
   Curvature W = curvature_of_metric(state);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -413,12 +413,15 @@ Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexce
 ///
 /// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g. At an
 /// admissible state dy = 0 is allowed, so there always is an answer. Leaves the multipliers.
+///
+/// The first multipliers are those of a pure translation, too large where a rotation will do: a Lagrangian
+/// that they bend too far gives way to the metric alone.
 bool ExactProjection::newton_step(const State& state, const Vector6d& g, Vector6d& dy) noexcept {
   const Curvature W = curvature(state);
   Root root;
   if (!factorise(W, root)) {
-    Curvature metric = curvature_of_metric(state);
-    if (iterations_ > 2 || !factorise(metric, root)) factorise_convex_part(W, root);
+    constexpr int kEarly = 2;
+    if (iterations_ > kEarly || !factorise(curvature_of_metric(state), root)) factorise_convex_part(W, root);
   }
   step_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root.solve(J_[i]), -std::max(gap_[i], 0.0));
