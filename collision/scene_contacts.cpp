@@ -63,7 +63,7 @@ bool same_plane(const HeldPlane& a, const HeldPlane& b) noexcept {
 SceneContacts::SceneContacts(const Scene& scene)
     : scene_(scene), planes_(scene.convex().size()), best_(planes_) {
   choices_.reserve(kMaxChoices);
-  openings_.reserve(kMaxChoices);
+  openings_.reserve(kMaxOpenings);
   tool_touching_.reserve(scene.tool().hull.vertices_T_m.size());
   std::size_t most = 0;
   for (const ConvexObstacle& obstacle : scene.convex())
@@ -101,12 +101,10 @@ void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (far_above(k, X_WT) || stand(k, planes_[k], X_WT).separation_m >= -tolerance_m) continue;
     choices_.clear();
-    if (out_of_reach(k, X_WT)) {
-      const Vector3d apart = X_WT.x_m - scene_.convex()[k].centre_W_m;
-      consider(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, 0.0);
-    } else {
+    if (out_of_reach(k, X_WT))
+      consider_between_centres(k, X_WT);
+    else
       consider_widest(k, X_WT);
-    }
     if (!choices_.empty()) take(0);
   }
 }
@@ -270,6 +268,12 @@ void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT
   choices_.push_back({k, plane, at.separation_m});
 }
 
+/// Spheres that are apart are so along the line between their centres.
+void SceneContacts::consider_between_centres(std::uint32_t k, const Frame& X_WT) noexcept {
+  const Vector3d apart = X_WT.x_m - scene_.convex()[k].centre_W_m;
+  consider(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, -kInfinity);
+}
+
 void SceneContacts::consider_faces(std::uint32_t k, const Frame& X_WT) noexcept {
   for (const auto& face : scene_.convex()[k].body.faces)
     consider(k, {ContactKind::vertex_face, face.n}, X_WT, -kInfinity);
@@ -334,16 +338,24 @@ void SceneContacts::sort_choices() noexcept {
 
 std::size_t SceneContacts::survey(const Pose& pose) noexcept {
   const Frame X_WT(pose);
-  choices_.clear();
+  openings_.clear();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
-    if (out_of_reach(k, X_WT)) continue;
-    consider_faces(k, X_WT);
-    consider_edge_pairs(k, X_WT);
-    consider_widest(k, X_WT);
+    choices_.clear();
+    if (out_of_reach(k, X_WT)) {
+      consider_between_centres(k, X_WT);
+    } else {
+      consider_faces(k, X_WT);
+      consider_edge_pairs(k, X_WT);
+      consider_widest(k, X_WT);
+    }
+    if (choices_.empty()) continue;
+    sort_choices();
+    take(0);
+    if (choices_[0].separation_m >= 0.0) continue;  // one plane is enough for what does not overlap
+    const std::size_t room = kMaxOpenings - openings_.size();
+    openings_.insert(openings_.end(), choices_.begin(),
+                     choices_.begin() + static_cast<std::ptrdiff_t>(std::min(room, choices_.size())));
   }
-  sort_choices();
-  openings_ = choices_;
-  for (std::size_t i = choices_.size(); i-- > 0;) take(i);
   best_ = planes_;
   return openings_.size();
 }

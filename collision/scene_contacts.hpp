@@ -94,7 +94,8 @@ class SceneContacts final : public ContactSource {
   /// How many new contacts one obstacle contributes to one round of constraint generation: three hold a face,
   /// and one more tells which way it would tip.
   static constexpr std::size_t kPerObstacle = 4;
-  static constexpr std::size_t kMaxChoices = 96;
+  static constexpr std::size_t kMaxChoices = 96;        ///< for one obstacle
+  static constexpr std::size_t kMaxOpenings = 288;      ///< for all
   static constexpr std::size_t kMaxEdgePairs = 200000;  ///< compared at once by survey(): some milliseconds
 
   void add_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
@@ -107,6 +108,7 @@ class SceneContacts final : public ContactSource {
   bool out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept;
   bool press_settled(std::uint32_t k, const Projection& q) const noexcept;
   void consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT, double least_separation_m) noexcept;
+  void consider_between_centres(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_faces(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_edge_pair(std::uint32_t k, const Frame& X_WT, const Matrix3d& R, const ConvexBody::Edge& a,

@@ -237,10 +237,26 @@ TEST_CASE("an obstacle out of reach is not asked") {
   SceneContacts contacts(met.scene);
   const Pose far{met.X_WT.rotation, {100.0, 0.0, 0.0}};
   ContactSet violated;
-  CHECK(contacts.survey(far) == 0);
   contacts.admit(far, 0.0);
   CHECK(contacts.admits(far, 0.0));
+  CHECK(SceneContacts(met.scene).survey(far) == 0);
   CHECK(contacts.add_violated(far, 0.0, violated) == 0);
+}
+
+TEST_CASE("a far obstacle takes no part in what a near one does") {
+  RandomValues random(15);
+  for (int i = 0; i < 20; ++i) {
+    const Met met = random_met(random, 0.1);
+    ConvexBody far = met.scene.convex()[0].body;
+    for (Vector3d& p : far.vertices_T_m) p += Vector3d(0.0, 0.0, 50.0);
+    const Scene both(met.scene.tool(), {half_space(Vector3d::UnitX(), -90.0)},
+                     {convex_obstacle("far", far), met.scene.convex()[0]});
+    SceneContacts contacts(both);
+    CHECK(contacts.survey(met.X_WT) > 0);
+    ContactSet violated;
+    CHECK(contacts.add_violated(met.X_WT, 0.0, violated) > 0);
+    for (const Contact& contact : violated) CHECK(contact.obstacle == 2);
+  }
 }
 
 }  // namespace
