@@ -6,6 +6,7 @@
 
 #include <boost/lockfree/spsc_queue.hpp>
 
+#include "collision/penetration.hpp"
 #include "collision/scene.hpp"
 #include "config/settings.hpp"
 #include "core/clock.hpp"
@@ -13,7 +14,6 @@
 #include "core/engagement.hpp"
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
-#include "collision/penetration.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/event.hpp"
 #include "daemon/loop_timing.hpp"

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "collision/penetration.hpp"
 #include "collision/scene.hpp"
 #include "core/method.hpp"
-#include "collision/penetration.hpp"
 #include "core/spatial.hpp"
 
 namespace wrenchd {
