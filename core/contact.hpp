@@ -61,8 +61,8 @@ inline double gap_m(const Contact& c, const Pose& X_WT) noexcept {
 /// tool's [m]. RT safe.
 inline Vector3d contact_point_W(const Contact& c, const Pose& X_WT) noexcept {
   if (c.kind == ContactKind::face_vertex) return c.p_WB_m;
+  if (c.kind == ContactKind::vertex_face) return X_WT * c.p_TA_m;
   const Vector3d a_W = X_WT * c.p_TA_m;
-  if (c.kind == ContactKind::vertex_face) return a_W;
   const Vector3d d = X_WT.rotation * c.d_T;
   const Vector3d N = d.cross(c.d_W);
   return a_W + d * ((c.p_WB_m - a_W).cross(c.d_W).dot(N) / N.squaredNorm());
