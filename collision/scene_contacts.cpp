@@ -105,6 +105,11 @@ void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
       consider_between_centres(k, X_WT);
     else
       consider_widest(k, X_WT);
+    if (choices_.empty()) {  // they touch: no plane has a width, but one of these has none below zero
+      consider_faces(k, X_WT);
+      consider_edge_pairs(k, X_WT);
+      sort_choices();
+    }
     if (!choices_.empty()) take(0);
   }
 }

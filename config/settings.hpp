@@ -33,7 +33,7 @@ struct RenderingSettings {
   int planes = 47;  ///< N_delta of Eq. (40), for method = "planar"
 };
 
-/// What [wrench] starts from. Sampled at 1 kHz with 1.4 ms of delay, a wall is stable up to
+/// What the gains of [wrench] start from. Sampled at 1 kHz with 1.4 ms of delay, a wall is stable up to
 /// (b + B) / (T/2 + delay) = 3400 N/m for the friction b = 0.5 and hand damping B = 6 N.s/m of the simulated
 /// device; a sixth of that feels firm and leaves room for a hand that lets go.
 inline WrenchGains default_gains() {
@@ -42,6 +42,13 @@ inline WrenchGains default_gains() {
   gains.damping = WrenchGains::blockwise(1.0, 0.002);
   return gains;
 }
+
+/// [wrench]
+struct WrenchSettings {
+  SpringLaw law = SpringLaw::pid;
+  double energy_stiffness_per_s2 = 3000.0;  ///< k of the energy law: 600 N/m for the shipped cube of 0.2 kg
+  WrenchGains gains = default_gains();
+};
 
 /// Where a frame stands in another, as config files give it.
 struct PlacementSettings {
@@ -69,9 +76,9 @@ struct Settings {
   DeviceSettings device;
   ServoSettings servo;
   RenderingSettings rendering;
-  WrenchGains wrench = default_gains();  ///< [wrench]
-  LimitSettings limits;                  ///< [limits]
-  SimulationSettings simulation;         ///< [simulation]
+  WrenchSettings wrench;
+  LimitSettings limits;           ///< [limits]
+  SimulationSettings simulation;  ///< [simulation]
   RecordingSettings recording;
 };
 

@@ -30,6 +30,17 @@ Wrench WrenchLaw::update(const Vector6d& eps, bool in_contact, double dt_s) noex
   return {W_T.head<3>(), W_T.tail<3>()};
 }
 
+Wrench WrenchLaw::update_damping(const Wrench& spring, const Vector6d& eps, bool in_contact,
+                                 double dt_s) noexcept {
+  if (!in_contact) {
+    reset();
+    return {};
+  }
+  if (dt_s > 0.0) differentiate(eps, dt_s);
+  const Vector6d W_D = gains_.damping * rate_;
+  return {spring.force_N + W_D.head<3>(), spring.torque_Nm + W_D.tail<3>()};
+}
+
 /// Rectangle rule; then the integral is scaled back so that neither its force nor its torque passes its
 /// limit.
 void WrenchLaw::integrate(const Vector6d& eps, double dt_s) noexcept {

@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+
 #include "core/method.hpp"
 #include "core/spatial.hpp"
 
 namespace wrenchd {
+
+/// What makes a wrench of a penetration.
+enum class SpringLaw : std::uint8_t {
+  pid,     ///< Eq. (16)
+  energy,  ///< the gradient of (k/2) T (core/energy_law.hpp), with the damping of Eq. (16)
+};
 
 /// Gains of Eq. (16), in the body frame T at the centre of mass: [f; tau] = K [v; w].
 struct WrenchGains {
@@ -44,6 +52,9 @@ class WrenchLaw {
   /// derivative and gives zero. dt_s: time since the last call; not positive means no time has passed. RT
   /// safe.
   Wrench update(const Vector6d& eps, bool in_contact, double dt_s) noexcept;
+
+  /// The same with another spring:  W_T(t) = spring + K_D d eps/dt.  RT safe.
+  Wrench update_damping(const Wrench& spring, const Vector6d& eps, bool in_contact, double dt_s) noexcept;
   void reset() noexcept;
 
  private:

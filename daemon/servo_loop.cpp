@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/energy_law.hpp"
 #include "core/finite.hpp"
 
 // What wrenchd does, a thousand times a second or more (Algorithm 1 of the paper):
@@ -48,7 +49,10 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
       late_limit_(from_seconds(settings.servo.late_limit_s)),
       penetration_(scene, {settings.rendering.method, settings.rendering.planes}),
-      law_(gains_for(settings.rendering.method, settings.wrench)),
+      spring_(settings.wrench.law),
+      energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
+      M_(scene.tool().solid.inertia),
+      law_(gains_for(settings.rendering.method, settings.wrench.gains)),
       limits_(settings.limits, profile.max_force_N, profile.max_torque_Nm),
       soft_start_(settings.limits.soft_start_s) {}
 
@@ -74,7 +78,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   if (sample.fresh) project(sample);  // contacts, and the closest admissible configuration q
   lap(Stage::projection);
 
-  if (sample.fresh) compute_wrench(sample);  // Eq. (16), from p to q
+  if (sample.fresh) compute_wrench(sample);  // Eq. (16) or the energy law, from p to q
   lap(Stage::wrench);
 
   const Limited out = limit(sample, now);  // soft start, magnitude, slew
@@ -163,7 +167,11 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const double dt_s = sampled_ ? sample.device_time_s - sample_time_s_ : 0.0;
   sample_time_s_ = sample.device_time_s;
   sampled_ = true;
-  F_T_ = law_.update(depth_.drive, depth_.contacts > 0, dt_s);
+  const bool in_contact = depth_.contacts > 0;
+  F_T_ = spring_ == SpringLaw::pid
+             ? law_.update(depth_.drive, in_contact, dt_s)
+             : law_.update_damping(energy_wrench(M_, energy_stiffness_per_s2_, X_WP_, *X_WQ_), depth_.drive,
+                                   in_contact, dt_s);
   F_out_ = outgoing(X_WB_ * sample.X_BH);
 }
 

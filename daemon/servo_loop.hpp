@@ -90,13 +90,16 @@ class ServoLoop {
 
   // The state of the rendering
   PenetrationDepth penetration_;
+  SpringLaw spring_;
+  double energy_stiffness_per_s2_;
+  Inertia M_;
   WrenchLaw law_;
   WrenchLimits limits_;
   SoftStart soft_start_;
   std::optional<Pose> X_WQ_;  ///< last tick's projection: the proxy
   Pose X_WP_;
   Penetration depth_;
-  Wrench F_T_;                  ///< Eq. (16), body frame
+  Wrench F_T_;                  ///< of the law chosen, body frame
   Wrench F_out_;                ///< the same as the device wants it, before limits
   double sample_time_s_ = 0.0;  ///< device time of the last fresh sample
   bool sampled_ = false;

@@ -53,11 +53,12 @@ std::string printed(const Settings& s) {
   out << s.servo.rate_Hz << ' ' << int(s.servo.pacing) << int(s.servo.realtime) << ' ' << s.servo.priority
       << ' ' << s.servo.cpu << ' ' << s.servo.late_limit_s << '\n'
       << int(s.rendering.method) << ' ' << s.rendering.planes << '\n'
-      << s.wrench.stiffness << '\n'
-      << s.wrench.integral << '\n'
-      << s.wrench.damping << '\n'
-      << s.wrench.integral_limit_N << ' ' << s.wrench.integral_limit_Nm << ' '
-      << s.wrench.derivative_cutoff_Hz << '\n'
+      << static_cast<int>(s.wrench.law) << ' ' << s.wrench.energy_stiffness_per_s2 << '\n'
+      << s.wrench.gains.stiffness << '\n'
+      << s.wrench.gains.integral << '\n'
+      << s.wrench.gains.damping << '\n'
+      << s.wrench.gains.integral_limit_N << ' ' << s.wrench.gains.integral_limit_Nm << ' '
+      << s.wrench.gains.derivative_cutoff_Hz << '\n'
       << s.limits.max_force_N << ' ' << s.limits.max_torque_Nm << ' ' << s.limits.force_slew_N_per_s << ' '
       << s.limits.torque_slew_Nm_per_s << ' ' << s.limits.soft_start_s << '\n';
   print(out, s.simulation);
@@ -159,14 +160,16 @@ TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {
 }
 
 TEST_CASE("a gain is a number, two blocks, or a matrix", "[config]") {
-  CHECK(settings_from("[wrench]\nstiffness = 5").wrench.stiffness == 5.0 * Matrix6d::Identity());
+  CHECK(settings_from("[wrench]\nlaw = 'energy'").wrench.law == SpringLaw::energy);
+  CHECK(settings_from("[wrench]\nenergy_stiffness_per_s2 = 12").wrench.energy_stiffness_per_s2 == 12.0);
+  CHECK(settings_from("[wrench]\nstiffness = 5").wrench.gains.stiffness == 5.0 * Matrix6d::Identity());
   CHECK(settings_from("[wrench]\nstiffness = { linear_N_per_m = 2, angular_Nm_per_rad = 3.5 }")
-            .wrench.stiffness == WrenchGains::blockwise(2.0, 3.5));
+            .wrench.gains.stiffness == WrenchGains::blockwise(2.0, 3.5));
   const Matrix6d K = settings_from(
                          "[wrench]\ndamping = [[2, 1, 0, 0, 0, 0], [-1, 2, 0, 0, 0, 0],"
                          "[0, 0, 3, 0, 0, 0], [0, 0, 0, 4, 0, 0.5], [0, 0, 0, 0, 5, 0],"
                          "[0, 0, 0, 0.5, 0, 6]]")
-                         .wrench.damping;
+                         .wrench.gains.damping;
   CHECK(K(0, 1) == 1.0);
   CHECK(K(1, 0) == -1.0);
   CHECK(K(5, 3) == 0.5);

@@ -31,7 +31,7 @@ void record_run(const Plan& plan, const std::filesystem::path& file, double dura
 Plan recording_plan(Method method) {
   Plan plan = shipped_plan();
   plan.settings.rendering.method = method;
-  plan.settings.wrench.integral = WrenchGains::blockwise(100.0, 0.3);
+  plan.settings.wrench.gains.integral = WrenchGains::blockwise(100.0, 0.3);
   plan.settings.limits.max_force_N = 1.2;
   plan.settings.recording.file = "set";  // so that the loop records; the test writes the file itself
   return plan;
@@ -66,7 +66,7 @@ TEST_CASE("a replay names the first tick and field that differ", "[replay]") {
   CHECK(difference->field == "F_out[2]");
 
   recording = read_recording(file);
-  plan.settings.wrench.stiffness *= 1.0000001;
+  plan.settings.wrench.gains.stiffness *= 1.0000001;
   difference = replay(recording, plan);
   REQUIRE(difference.has_value());
   CHECK(difference->field == "F_T[2]");

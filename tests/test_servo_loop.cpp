@@ -60,8 +60,8 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   Plan plan = shipped_plan();
   plan.settings.device.base_in_world = {{0.0, 0.0, 0.0}, {0.0, 0.0, 1.2}};
   plan.settings.device.tool_in_handle = {{0.01, -0.02, 0.0}, {0.0, 0.3, 0.0}};
-  plan.settings.wrench.damping.setZero();
-  const Matrix6d K = plan.settings.wrench.stiffness;
+  plan.settings.wrench.gains.damping.setZero();
+  const Matrix6d K = plan.settings.wrench.gains.stiffness;
   VirtualStation s(plan);
   s.station.loop().arm();
   int compared = 0;
@@ -88,7 +88,7 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
 TEST_CASE("a profile may ask for the paper's spatial wrench about the world origin", "[servo]") {
   Plan plan = shipped_plan();
   plan.profile.wrench_point = WrenchPoint::world_origin;
-  plan.settings.wrench.damping.setZero();
+  plan.settings.wrench.gains.damping.setZero();
   VirtualStation s(plan);
   s.station.loop().arm();
   REQUIRE(s.run(kPressing_s + 0.6) == Fault::none);
