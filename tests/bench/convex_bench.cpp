@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/bench/convex_bench.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "collision/penetration.hpp"
+#include "tests/bench/convex_pair.hpp"
+
+namespace wrenchd::bench {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kDouble = 1e-6;  ///< relative error of a depth that is right in double precision
+constexpr double kFloat = 1e-3;   ///< and in single precision
+/// A method whose depth is wrong more often than at one pose in a hundred cannot set the pace for others.
+constexpr double kRightOften = 0.99;
+/// Depths nearer than this share are the same.
+constexpr double kSameDepth = 1e-9;
+/// An overlap that is left at q: well above rounding, well below what a hand or a display can tell.
+constexpr double kStillOverlapping_m = 1e-9;
+
+/// wrenchd, warm: it knows the answer of the pose before.
+class Follower {
+ public:
+  Follower(const ConvexPair& pair, Method method) : pair_(pair) { options_.method = method; }
+
+  /// As if it had been there before: the object that follows must have seen how it came to touch.
+  void restart() {
+    depth_ = std::make_unique<PenetrationDepth>(pair_.scene, options_);
+    X_last_ = depth_->query(pair_.X_WP.front()).projection.X_WQ;
+  }
+  Projection follow(std::size_t i) {
+    const Projection q = depth_->follow(pair_.X_WP[i], X_last_).projection;
+    X_last_ = q.X_WQ;
+    return q;
+  }
+
+ private:
+  const ConvexPair& pair_;
+  PenetrationDepth::Options options_;
+  std::unique_ptr<PenetrationDepth> depth_;
+  Pose X_last_;
+};
+
+/// The value is the depth that the energy is worth as a translation, T = m depth^2: for the translational
+/// method the penetration depth itself.
+Runner wrenchd_runner(std::string name, const ConvexPair& pair, Method method) {
+  const auto follower = std::make_shared<Follower>(pair, method);
+  const double mass_kg = pair.scene.tool().solid.inertia.mass_kg;
+  return {std::move(name), [follower] { follower->restart(); },
+          [follower, mass_kg](std::size_t i) -> Answer {
+            const Projection q = follower->follow(i);
+            const bool found = q.status != ProjectionStatus::infeasible && q.status != ProjectionStatus::free;
+            return {found ? std::sqrt(q.energy / mass_kg) : kNaN, q.kkt_residual, q.active.size(),
+                    q.status == ProjectionStatus::converged};
+          }};
+}
+
+std::vector<Runner> peer_runners(const ConvexPair& pair, const PeerModule& module) {
+  std::vector<PeerPose> converted;
+  for (const Pose& X_WP : pair.X_WP) converted.push_back(peer_pose(X_WP));
+  const auto poses = std::make_shared<const std::vector<PeerPose>>(std::move(converted));
+  std::vector<Runner> runners;
+  for (int q = 0; q < static_cast<int>(module.queries().size()); ++q)
+    runners.push_back({module.queries()[static_cast<std::size_t>(q)], [] {},
+                       [opened = module.open(pair.tool_T, pair.obstacle_W), poses, q](std::size_t i) {
+                         return Answer{opened.depth_m(q, (*poses)[i])};
+                       }});
+  return runners;
+}
+
+/// How the depths of a method compare with the exact ones.
+struct Depths {
+  std::size_t missed = 0;                     ///< overlaps it did not see
+  std::size_t off_double = 0, off_float = 0;  ///< wrong by more than kDouble, kFloat
+  double shallowest = 0.0, deepest = 0.0;     ///< relative errors, the worst on either side
+};
+
+Depths compare(const Result& result, const std::vector<double>& exact_m) {
+  Depths depths;
+  for (std::size_t i = 0; i < exact_m.size(); ++i) {
+    const double error = result.answers[i].value / exact_m[i] - 1.0;
+    if (std::isnan(error)) {
+      ++depths.missed;
+      continue;
+    }
+    depths.off_double += std::abs(error) > kDouble ? 1 : 0;
+    depths.off_float += std::abs(error) > kFloat ? 1 : 0;
+    depths.shallowest = std::min(depths.shallowest, error);
+    depths.deepest = std::max(depths.deepest, error);
+  }
+  return depths;
+}
+
+/// May it be called a method that answers the question?
+bool right(const Depths& depths, std::size_t poses) {
+  const std::size_t wrong = depths.missed + depths.off_float;
+  return static_cast<double>(poses - wrong) >= kRightOften * static_cast<double>(poses);
+}
+
+/// How the exact method's answers stand: out of the obstacle, and no worse than the best translation? A proxy
+/// that keeps to its side of an edge may be.
+struct Soundness {
+  std::size_t above_translation = 0;
+  double worst_above = 0.0;  ///< of the depth its energy is worth, relative
+  std::size_t overlapping = 0;
+  std::size_t unconverged = 0;
+  double worst_residual = 0.0;
+};
+
+Soundness examine(const ConvexPair& pair, const Result& exact) {
+  Soundness found;
+  Follower follower(pair, Method::exact);
+  follower.restart();
+  for (std::size_t i = 0; i < pair.X_WP.size(); ++i) {
+    const Pose X_WQ = follower.follow(i).X_WQ;
+    const Overlap left = overlap(pair.tool_surface_T.moved(X_WQ), pair.obstacle_surface_W);
+    found.overlapping += left.depth_m > kStillOverlapping_m ? 1 : 0;
+    const Answer& answer = exact.answers[i];
+    found.above_translation += answer.value <= pair.depth_m[i] * (1.0 + kSameDepth) ? 0 : 1;
+    found.worst_above = std::max(found.worst_above, answer.value / pair.depth_m[i] - 1.0);
+    found.unconverged += answer.converged ? 0 : 1;
+    found.worst_residual = std::max(found.worst_residual, answer.kkt_residual);
+  }
+  return found;
+}
+
+struct Tables {
+  Table times{"convex on convex: time of one query [ns]",
+              {"p50", "p99", "p99.9", "max", "/ exact p50", "/ exact p99", "spread %", "verdict"}};
+  Table depths{"convex on convex: depths against the exact ones (poses, relative errors)",
+               {"poses", "missed", "off > 1e-6", "off > 1e-3", "shallowest", "deepest", "right"}};
+  Table soundness{
+      "convex on convex: the exact method's answers (poses)",
+      {"poses", "above translation", "worst above", "overlapping at q", "unconverged", "worst KKT"}};
+  Table ratios{"convex on convex: peer / wrenchd exact",
+               {"p50 ratio", "p99 ratio", "p50 ratio to translational", "verdict"}};
+};
+
+/// The fastest by p50 among those that may be; null where there is none.
+template <class Allowed>
+const Result* fastest(std::span<const Result> results, const Allowed& allowed) {
+  const Result* best = nullptr;
+  for (const Result& result : results)
+    if (allowed(result) && (best == nullptr || result.ns.p50 < best->ns.p50)) best = &result;
+  return best;
+}
+
+void add_ratio(const std::string& of_case, const std::string& which, const Result* peer, const Result& exact,
+               const Result& translational, Table& ratios) {
+  if (peer == nullptr) {
+    ratios.add(of_case, which + ": none", {"-", "-", "-", ""});
+    return;
+  }
+  const bool clear = verdict(*peer).empty() && verdict(exact).empty();
+  ratios.add(of_case, which + ": " + peer->name,
+             {fixed(peer->ns.p50 / exact.ns.p50, 2), fixed(peer->ns.p99 / exact.ns.p99, 2),
+              fixed(peer->ns.p50 / translational.ns.p50, 2), clear ? "" : "inconclusive"});
+}
+
+void bench_pair(const ConvexPair& pair, const Effort& effort, const TickScale& scale,
+                std::span<const PeerModule> peers, Tables& tables) {
+  std::vector<Runner> runners = {wrenchd_runner("wrenchd exact", pair, Method::exact),
+                                 wrenchd_runner("wrenchd translational", pair, Method::translational)};
+  for (const PeerModule& module : peers)
+    for (Runner& runner : peer_runners(pair, module)) runners.push_back(std::move(runner));
+  const std::vector<Result> results = race(runners, pair.X_WP.size(), effort.passes, scale);
+
+  const Result& exact = results[0];
+  const std::size_t poses = pair.X_WP.size();
+  for (const Result& result : results) {
+    tables.times.add(
+        pair.name, result.name,
+        {fixed(result.ns.p50, 0), fixed(result.ns.p99, 0), fixed(result.ns.p999, 0), fixed(result.ns.max, 0),
+         fixed(result.ns.p50 / exact.ns.p50, 2), fixed(result.ns.p99 / exact.ns.p99, 2),
+         fixed(100.0 * result.spread, 1), verdict(result)});
+    if (&result == &exact) continue;  // its depth is another one: rotations make it less
+    const Depths depths = compare(result, pair.depth_m);
+    tables.depths.add(
+        pair.name, result.name,
+        {whole(poses), whole(depths.missed), whole(depths.off_double), whole(depths.off_float),
+         scientific(depths.shallowest), scientific(depths.deepest), right(depths, poses) ? "yes" : "no"});
+  }
+  const Soundness found = examine(pair, exact);
+  tables.soundness.add(
+      pair.name, exact.name,
+      {whole(poses), whole(found.above_translation), scientific(found.worst_above), whole(found.overlapping),
+       whole(found.unconverged), scientific(found.worst_residual)});
+
+  const auto of_peers = std::span(results).subspan(2);
+  add_ratio(
+      pair.name, "best right",
+      fastest(of_peers, [&](const Result& result) { return right(compare(result, pair.depth_m), poses); }),
+      exact, results[1], tables.ratios);
+  add_ratio(pair.name, "fastest, right or wrong", fastest(of_peers, [](const Result&) { return true; }),
+            exact, results[1], tables.ratios);
+}
+
+}  // namespace
+
+std::vector<Table> bench_convex(const Effort& effort, const TickScale& scale,
+                                std::span<const PeerModule> peers) {
+  Tables tables;
+  for (const std::size_t vertices : {8u, 42u, 162u, 642u}) {
+    if (effort.quick && vertices > 42) break;
+    bench_pair(sliding_pair(vertices, effort.poses), effort, scale, peers, tables);
+  }
+  return {tables.times, tables.depths, tables.ratios, tables.soundness};
+}
+
+}  // namespace wrenchd::bench

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "tests/bench/peer.hpp"
+#include "tests/bench/race.hpp"
+#include "tests/bench/table.hpp"
+
+namespace wrenchd::bench {
+
+/// A convex body on another: wrenchd against the penetration query of each peer.
+std::vector<Table> bench_convex(const Effort& effort, const TickScale& scale,
+                                std::span<const PeerModule> peers);
+
+}  // namespace wrenchd::bench

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "collision/scene.hpp"
+#include "core/triangle_mesh.hpp"
+#include "tests/bench/overlap.hpp"
+
+namespace wrenchd::bench {
+
+/// A convex tool that slides and turns on a larger convex obstacle, and the poses p of its body frame, a
+/// millisecond apart: it goes around at about 0.1 m/s, turns at 1 to 2.4 rad/s, and is 0.1 to 0.9 mm deep.
+struct ConvexPair {
+  std::string name;
+  Scene scene;
+  TriangleMesh tool_T, obstacle_W;  ///< the same solids, as the peers want them
+  ConvexSurface tool_surface_T, obstacle_surface_W;
+  std::vector<Pose> X_WP;
+  std::vector<double> depth_m;  ///< exact, for translations
+};
+
+/// vertices of each body: 8 are cubes of 60 and 96 mm, more are points strewn over ellipsoids of
+/// (1, 0.8, 0.6) times 35 and 55 mm.
+ConvexPair sliding_pair(std::size_t vertices, std::size_t poses);
+
+}  // namespace wrenchd::bench

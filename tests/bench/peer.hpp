@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/pose.hpp"
+#include "core/triangle_mesh.hpp"
+#include "tests/bench/peer_interface.h"
+
+namespace wrenchd::bench {
+
+/// A peer's shared module. Its symbols stay its own.
+class PeerModule {
+ public:
+  /// Throws std::runtime_error that says why it cannot be loaded.
+  explicit PeerModule(const std::filesystem::path& file);
+
+  const std::vector<std::string>& queries() const { return queries_; }
+
+  /// A pair of bodies in this peer. Must not outlive the module.
+  class Pair {
+   public:
+    /// Depth of query q at a pose [m]; NaN where the peer sees no overlap.
+    double depth_m(int q, const PeerPose& X_BA) const;
+
+   private:
+    friend class PeerModule;
+    Pair(const PeerModule& module, const TriangleMesh& A, const TriangleMesh& B);
+
+    const PeerModule& module_;
+    std::shared_ptr<void> peer_;
+  };
+  Pair open(const TriangleMesh& A, const TriangleMesh& B) const { return {*this, A, B}; }
+
+ private:
+  template <class Function>
+  void find(Function*& function, const char* name);
+
+  std::filesystem::path file_;
+  std::shared_ptr<void> library_;
+  decltype(&peer_query_name) query_name_ = nullptr;
+  decltype(&peer_open) open_ = nullptr;
+  decltype(&peer_close) close_ = nullptr;
+  decltype(&peer_ask) ask_ = nullptr;
+  std::vector<std::string> queries_;
+};
+
+PeerPose peer_pose(const Pose& X_BA);
+
+/// The peers whose modules were built, out of the directory of the running program. missing: the names of the
+/// others.
+std::vector<PeerModule> load_peers(std::vector<std::string>& missing);
+
+}  // namespace wrenchd::bench
