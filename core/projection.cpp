@@ -479,7 +479,10 @@ ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& 
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d eta = dy.tail<3>();
-  const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T : 0.0;
+  // What T may seem to rise by: its own rounding, and that of the translation, which meets its gaps to
+  // kGapTolerance only.
+  const double rounding =
+      dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * kGapTolerance * state.u.norm() : 0.0;
   double fraction = 1.0 / std::max(1.0, eta.norm());  // never more than one radian at a time
   for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
     State trial = state;

@@ -252,6 +252,19 @@ TEST_CASE("a dash stands for the standard streams") {
   CHECK(bad.err.find("wrenchctl: standard input:2:1: expected 7 numbers") == 0);
 }
 
+TEST_CASE("wrenchctl solve: more planes are nearer the optimum, and the energy law pulls along the energy") {
+  const Bench bench;
+  const double one = bench.solved({"--method", "planar", "--planes", "1"}).at(0).at("energy");
+  const double many = bench.solved({"--method", "planar", "--planes", "64"}).at(0).at("energy");
+  const Row exact = bench.solved({"--law", "energy", "--energy-stiffness", "2"}).at(0);
+  CHECK(many <= one);
+  CHECK(exact.at("energy") <= many * (1.0 + 1e-12));
+  // f = k m (x_q - x_p) in the axes of p, which is turned by -0.2 about z: world y is (sin -0.2, cos -0.2).
+  const double lift = exact.at("py") - 25.0;
+  CHECK(exact.at("body_fy") == Approx(2.0 * lift * std::cos(0.2)).epsilon(1e-9));
+  CHECK(exact.at("body_fx") == Approx(-2.0 * lift * std::sin(0.2)).epsilon(1e-9));
+}
+
 TEST_CASE("an answer replaces a file, follows a link, and fills a pipe") {
   Bench bench;
   bench.dir.write("out.csv", "old");

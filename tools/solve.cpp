@@ -8,7 +8,7 @@
 #include <limits>
 #include <ostream>
 
-#include "core/wrench_law.hpp"
+#include "core/energy_law.hpp"
 
 namespace wrenchd {
 namespace {
@@ -39,14 +39,15 @@ class Row {
 
 }  // namespace
 
-std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM, Method method, double k_P) {
+std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
+                              const SolveSettings& settings) {
   const ToolBody& tool = scene.tool();
   const Pose X_MT = tool.X_MT();
   const Pose X_TM = inverse(X_MT);
-  PenetrationDepth depth(scene, {method});
+  PenetrationDepth depth(scene, settings.depth);
   WrenchGains gains;
-  gains.stiffness = WrenchGains::scalar(k_P);
-  WrenchLaw law(gains_for(method, gains));
+  gains.stiffness = WrenchGains::scalar(settings.k_P);
+  WrenchLaw law(gains_for(settings.depth.method, gains));
 
   std::vector<SolvedPose> rows;
   rows.reserve(X_WM.size());
@@ -58,7 +59,10 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
     row.solve_ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
     const bool moved = row.penetration.projection.status != ProjectionStatus::free;
     row.X_WM = moved ? row.penetration.projection.X_WQ * X_TM : X_WM_p;
-    row.F_T = law.update(row.penetration.drive, row.penetration.contacts > 0, 0.0);
+    row.F_T = settings.law == SpringLaw::pid
+                  ? law.update(row.penetration.drive, row.penetration.contacts > 0, 0.0)
+                  : energy_wrench(tool.solid.inertia, settings.energy_stiffness_per_s2, X_WP,
+                                  row.penetration.projection.X_WQ);
     row.F_S = spatial_wrench(X_WP, row.F_T);
     if (row.penetration.projection.status == ProjectionStatus::infeasible)
       row.penetration.projection.energy = std::numeric_limits<double>::quiet_NaN();

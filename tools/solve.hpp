@@ -7,8 +7,8 @@
 
 #include "collision/penetration.hpp"
 #include "collision/scene.hpp"
-#include "core/method.hpp"
 #include "core/spatial.hpp"
+#include "core/wrench_law.hpp"
 
 namespace wrenchd {
 
@@ -16,13 +16,22 @@ namespace wrenchd {
 struct SolvedPose {
   Penetration penetration;
   Pose X_WM;   ///< the mesh's own frame at q
-  Wrench F_T;  ///< body wrench, Eq. (16) with K_P = k_P I alone
+  Wrench F_T;  ///< body wrench, of the law asked for
   Wrench F_S;  ///< spatial wrench, about the world origin
   double solve_ns = 0.0;
 };
 
+/// How the poses are projected, and what makes a wrench of it.
+struct SolveSettings {
+  PenetrationDepth::Options depth;
+  SpringLaw law = SpringLaw::pid;
+  double k_P = 1.0;  ///< pid: K_P = k_P I, no integral, no derivative
+  double energy_stiffness_per_s2 = 1.0;
+};
+
 /// Projects every pose (of the mesh's own frame, in the world) on its own, without history.
-std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM, Method method, double k_P);
+std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
+                              const SolveSettings& settings);
 
 /// The rows as CSV, with a header, numbers in the shortest form that reads back the same.
 void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows);

@@ -41,7 +41,8 @@ struct SolveOptions {
   std::string poses;
   std::string output = "-";
   std::string method = "exact";
-  double k_P = 1.0;
+  std::string law = "pid";
+  SolveSettings settings;
 };
 
 std::vector<Pose> read_poses_from(const std::string& name) {
@@ -92,7 +93,10 @@ void write_answer(const std::string& name, const std::string& text) {
 int run_solve(const SolveOptions& options) {
   const Scene scene(load_scene(options.scene));
   const std::vector<Pose> poses = read_poses_from(options.poses);
-  const std::vector<SolvedPose> rows = solve(scene, poses, kMethods.at(options.method), options.k_P);
+  SolveSettings settings = options.settings;
+  settings.depth.method = kMethods.at(options.method);
+  settings.law = options.law == "energy" ? SpringLaw::energy : SpringLaw::pid;
+  const std::vector<SolvedPose> rows = solve(scene, poses, settings);
   std::ostringstream text;
   write_csv(text, rows);
   write_answer(options.output, text.str());
@@ -163,7 +167,16 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   solve->add_option("--method", options.method, "how the closest admissible pose is found")
       ->check(CLI::IsMember({"exact", "planar", "descent", "translational"}))
       ->capture_default_str();
-  solve->add_option("--k-p", options.k_P, "k_P of Eq. (16); no integral, no derivative")
+  solve->add_option("--planes", options.settings.depth.planes, "N_delta of Eq. (40), for method planar")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  solve->add_option("--law", options.law, "what makes a wrench of it: Eq. (16), or the gradient of (k/2) T")
+      ->check(CLI::IsMember({"pid", "energy"}))
+      ->capture_default_str();
+  solve->add_option("--energy-stiffness", options.settings.energy_stiffness_per_s2, "k of law energy [1/s2]")
+      ->check(number_from(0.0, 1e9))
+      ->capture_default_str();
+  solve->add_option("--k-p", options.settings.k_P, "k_P of Eq. (16); no integral, no derivative")
       ->check(number_from(0.0, 1e9))
       ->capture_default_str();
   solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")
