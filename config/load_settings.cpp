@@ -115,7 +115,7 @@ void read_gain(const TomlValue& value, const GainKeys& keys, Matrix6d& K) {
 
 void read_wrench(TomlTable& table, WrenchSettings& wrench) {
   table.optional("law").choice(wrench.law, {{"pid", SpringLaw::pid}, {"energy", SpringLaw::energy}});
-  table.optional("energy_stiffness_per_s2").number(wrench.energy_stiffness_per_s2, {0, 1e9});
+  table.optional("energy_stiffness_per_s2", "per_s2").number(wrench.energy_stiffness_per_s2, {0, 1e9});
   WrenchGains& gains = wrench.gains;
   read_gain(table.optional("stiffness"), {"linear_N_per_m", "angular_Nm_per_rad"}, gains.stiffness);
   read_gain(table.optional("integral"), {"linear_N_per_m_s", "angular_Nm_per_rad_s"}, gains.integral);

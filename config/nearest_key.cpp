@@ -88,7 +88,10 @@ std::string readable_unit(std::string_view unit) {
       below = true;
       continue;
     }
-    if (!text.empty()) text += below ? "/" : ".";
+    if (below)
+      text += text.empty() ? "1/" : "/";
+    else if (!text.empty())
+      text += ".";
     text += word == "Nm" ? "N.m" : word;
   }
   return text;

@@ -121,7 +121,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 41);
+  CHECK(options == 43);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {

@@ -109,7 +109,7 @@ void integrate(Follower& follower, double t_a, const Rate& a, double t_b, const 
   const Rate middle = follower.at(t, a.X_WQ);
   const double h = t_b - t_a;
   const double kink = std::abs(a.energy_law - 2.0 * middle.energy_law + b.energy_law) * h;
-  const bool fine = kink < 5e-8 * middle.potential;
+  const bool fine = kink < 2e-8 * middle.potential;
   if (!fine && halvings > 0) {
     integrate(follower, t_a, a, t, middle, halvings - 1, work);
     integrate(follower, t, middle, t_b, b, halvings - 1, work);

@@ -42,6 +42,7 @@ TEST_CASE("a unit reads as people write it", "[nearest_key]") {
   CHECK(readable_unit("Hz") == "Hz");
   CHECK(readable_unit("N_s_per_m") == "N.s/m");
   CHECK(readable_unit("Nm_per_rad_s") == "N.m/rad/s");
+  CHECK(readable_unit("per_s2") == "1/s2");
   CHECK(readable_unit("kg_m2") == "kg.m2");
   CHECK(readable_unit("").empty());
 }
