@@ -182,24 +182,15 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
   return out;
 }
 
-/// The depth of each obstacle acts at the mean of the tool's vertices that touch it: an edge or a face that
-/// lies flat has no single deepest vertex, and choosing one would make a torque out of rounding.
+/// The depth of each obstacle acts at the mean of the contacts that touch it.
 Penetration PenetrationDepth::translational(const Pose& X_WP) noexcept {
   Penetration out = described(X_WP, translate(X_WP));
   if (!in_contact(out.projection)) return out;
-  const auto& active = out.projection.active;
+  const Pose& X_WQ = out.projection.X_WQ;
   Vector3d moment = Vector3d::Zero();
-  for (const ActiveContact& a : active) {
-    double touching = 0.0;
-    double carried = 0.0;
-    for (const ActiveContact& b : active) {
-      if (b.contact.obstacle != a.contact.obstacle) continue;
-      touching += 1.0;
-      carried += b.multiplier;
-    }
-    const Vector3d lever_W =
-        contact_point_W(a.contact, out.projection.X_WQ) - out.projection.X_WQ.translation_m;
-    moment += X_WP.rotation.conjugate() * lever_W.cross(a.contact.n_W) * (carried / touching);
+  for (const auto& [contact, multiplier] : shared_evenly(out.projection)) {
+    const Vector3d lever_W = contact_point_W(contact, X_WQ) - X_WQ.translation_m;
+    moment += multiplier * (X_WP.rotation.conjugate() * lever_W.cross(normal_W(contact, X_WQ)));
   }
   // 2 m s = sum multiplier_i n_i: contact i carries the displacement multiplier_i n_i / (2 m).
   out.drive.tail<3>() = moment / (2.0 * mass_kg_);

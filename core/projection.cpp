@@ -59,6 +59,21 @@ double positive_length(const Inertia& M) {
 
 }  // namespace
 
+FixedList<ActiveContact, ContactSet::kCapacity> shared_evenly(const Projection& projection) noexcept {
+  FixedList<ActiveContact, ContactSet::kCapacity> shared;
+  for (const ActiveContact& a : projection.active) {
+    double touching = 0.0;
+    double carried = 0.0;
+    for (const ActiveContact& b : projection.active) {
+      if (b.contact.obstacle != a.contact.obstacle) continue;
+      touching += 1.0;
+      carried += b.multiplier;
+    }
+    shared.add({a.contact, carried / touching});
+  }
+  return shared;
+}
+
 ExactProjection::ExactProjection(const Inertia& M) : ExactProjection(M, Budget{}) {}
 
 ExactProjection::ExactProjection(const Inertia& M, Budget budget)

@@ -37,6 +37,11 @@ struct Projection {
   FixedList<ActiveContact, ContactSet::kCapacity> active;  ///< contacts that touch at q
 };
 
+/// The contacts of an answer, with what those of one obstacle carry together shared evenly among them. Where
+/// an edge or a face lies flat no single vertex is the deepest, and a method that does not balance torques
+/// would make one out of rounding by choosing one. RT safe.
+FixedList<ActiveContact, ContactSet::kCapacity> shared_evenly(const Projection& projection) noexcept;
+
 /// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy
 /// metric, all contacts together.
 ///

@@ -102,6 +102,13 @@ TEST_CASE("descent comes down to the optimum where one contact holds it, and sto
   CHECK(met > 30);
 }
 
+TEST_CASE("descent solves example 4.1, where an edge lies flat on the way", "[penetration][descent]") {
+  const Scene scene(box(Vector3d::Constant(50.0)), {half_space(Vector3d::UnitY(), 0.0)});
+  const Pose X_WP{Quaterniond(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ())), {0.0, 25.0, 0.0}};
+  const Penetration descent = depth_by(Method::descent, scene).query(X_WP);
+  CHECK(descent.projection.energy == Approx(9.63154218539309).epsilon(1e-9));
+}
+
 TEST_CASE("an edge that lies flat gives translational no torque along itself", "[penetration]") {
   const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitY(), 0.0)});
   const Pose X_WP{Quaterniond(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ())), {0.0, 0.5, 0.0}};
