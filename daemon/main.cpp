@@ -191,9 +191,9 @@ Fault run(Plan plan, const Options& options, TheClock& clock,
           Fault (*run_it)(Station&, const Options&, TheClock&, LiveView&)) {
   Station station(std::move(plan), clock);
   loop_to_release = &station.loop();
-  spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} half-spaces, {} Hz", kVersion,
+  spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
-               station.scene().half_spaces().size(), station.plan().settings.servo.rate_Hz);
+               station.scene().obstacle_count(), station.plan().settings.servo.rate_Hz);
   std::unique_ptr<Recorder> recorder;
   if (const auto& file = station.plan().settings.recording.file; !file.empty())
     recorder = std::make_unique<Recorder>(station.records(), file, station.recording_header());

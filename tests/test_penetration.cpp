@@ -160,8 +160,8 @@ namespace {
 
 /// Two random convex bodies that overlap by up to depth_m along their separating axis.
 Pressed random_met(RandomValues& random, double depth_m) {
-  ToolBody tool = random_body(random, random.integer(6, 30));
-  const ToolBody other = random_body(random, random.integer(6, 30));
+  ToolBody tool = random_body(random, random.integer(6, 14));
+  const ToolBody other = random_body(random, random.integer(6, 14));
   Pressed met{Scene(std::move(tool), {}, {convex_obstacle("other", other.hull)}), {}};
   met.X_WP.rotation = random.rotation();
   const Vector3d direction = random.unit<3>();

@@ -152,8 +152,8 @@ struct Met {
 };
 
 Met random_met(RandomValues& random, double depth_m) {
-  ToolBody tool = random_body(random, random.integer(6, 30));
-  const ToolBody other = random_body(random, random.integer(6, 30));
+  ToolBody tool = random_body(random, random.integer(6, 14));
+  const ToolBody other = random_body(random, random.integer(6, 14));
   Met met{Scene(std::move(tool), {}, {convex_obstacle("other", other.hull)}),
           {random.rotation(), Vector3d::Zero()}};
   const Vector3d direction = random.unit<3>();

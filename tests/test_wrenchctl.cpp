@@ -265,6 +265,21 @@ TEST_CASE("wrenchctl solve: more planes are nearer the optimum, and the energy l
   CHECK(exact.at("body_fx") == Approx(-2.0 * lift * std::sin(0.2)).epsilon(1e-9));
 }
 
+TEST_CASE("wrenchctl replay refuses what is no recording, by its name") {
+  const TemporaryDirectory dir;
+  const std::string signature("\x89HDF\r\n\x1a\n", 8);
+  for (const fs::path& file :
+       {dir.path() / "none.h5", dir.write("text.h5", "px,py,pz\n"), dir.write("empty.h5", ""),
+        dir.write("cut.h5", signature + std::string(40, '\0'))}) {
+    const ProgramResult result = run_program("wrenchctl", {"replay", file.string()});
+    INFO(result.err);
+    CHECK(result.exit_code == 1);
+    CHECK(result.out == "");
+    CHECK(result.err.find("wrenchctl: " + file.string() + ": ") == 0);
+    CHECK(result.err.find("name a recording of wrenchd") != std::string::npos);
+  }
+}
+
 TEST_CASE("an answer replaces a file, follows a link, and fills a pipe") {
   Bench bench;
   bench.dir.write("out.csv", "old");

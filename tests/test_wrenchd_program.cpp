@@ -54,7 +54,7 @@ TEST_CASE("wrenchd shows contact and a plausible force on the simulated device")
   CHECK(most_force_N <= 10.0);  // the profile's limit
   CHECK(result.out.find("5000 ticks in 5.00 s (1000.0 Hz); in contact at ") != std::string::npos);
   CHECK(result.out.find("overruns 0, ticks left out 0") != std::string::npos);
-  CHECK(result.err.find("device loopback, tool of 8 hull vertices, 1 half-spaces, 1000 Hz") !=
+  CHECK(result.err.find("device loopback, tool of 8 hull vertices, 1 obstacles, 1000 Hz") !=
         std::string::npos);
   CHECK(result.err.find("engagement: active") != std::string::npos);
   CHECK(result.err.find(kReleased) != std::string::npos);
@@ -90,7 +90,7 @@ TEST_CASE("wrenchd takes another scene, configuration and profile") {
       {"--arm", "--live", "--scene", scene.string(), "--config", config.string(), "--profile", "loopback"});
   INFO(result.err);
   CHECK(result.exit_code == 0);
-  CHECK(result.err.find("tool of 8 hull vertices, 0 half-spaces, 2000 Hz") != std::string::npos);
+  CHECK(result.err.find("tool of 8 hull vertices, 0 obstacles, 2000 Hz") != std::string::npos);
   CHECK(result.out.find("10000 ticks in 5.00 s (2000.0 Hz); in contact at 0 of 50 looks") !=
         std::string::npos);
 }

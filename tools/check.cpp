@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "collision/tool_body.hpp"
+#include "collision/scene.hpp"
 #include "config/load_hand_script.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
@@ -30,12 +30,14 @@ Kind kind_of(const std::filesystem::path& file) {
   return Kind::settings;
 }
 
-std::string about(const SceneSettings& scene) {
-  const ToolBody tool = load_tool(scene.tool);
+std::string about(const SceneSettings& settings) {
+  const Scene scene(settings);
+  const ToolBody& tool = scene.tool();
   std::ostringstream text;
-  text << "  tool " << scene.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
-       << " m^3, mass " << scene.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
-       << " hull vertices\n  " << scene.half_spaces.size() << " half-space(s)\n";
+  text << "  tool " << settings.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
+       << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
+       << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.convex().size()
+       << " mesh obstacle(s)\n";
   return text.str();
 }
 
