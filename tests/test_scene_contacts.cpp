@@ -182,7 +182,7 @@ TEST_CASE("the best plane of a survey is the separating axis of least depth") {
 TEST_CASE("what the planes held admit does not overlap, whichever they are") {
   RandomValues random(12);
   int admitted = 0;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 200; ++i) {
     const Met met = random_met(random, 0.05);
     SceneContacts contacts(met.scene);
     const std::size_t openings = contacts.survey(met.X_WT);
