@@ -288,14 +288,13 @@ void SceneContacts::consider_faces(std::uint32_t k, const Frame& X_WT) noexcept 
 
 /// The common normal of two edges counts where each is the farthest part of its body along it: that is a
 /// facet of the set of all translations that collide. All others are behind one of those.
-void SceneContacts::consider_edge_pair(std::uint32_t k, const Frame& X_WT, const Matrix3d& R,
-                                       const ConvexBody::Edge& a, const ConvexBody::Edge& b,
-                                       double least_separation_m) noexcept {
-  const Vector3d N = (R * a.d).cross(b.d);
+void SceneContacts::consider_edge_pair(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
+                                       const ConvexBody::Edge& b, double least_separation_m) noexcept {
+  const Vector3d N = (X_WT.R * a.d).cross(b.d);
   if (!(N.squaredNorm() > kParallel * kParallel)) return;
   for (const double sign : {1.0, -1.0}) {
     const Vector3d n_W = sign * N;
-    if (!touches_along(b, n_W) || !touches_along(a, R.transpose() * -n_W)) continue;
+    if (!touches_along(b, n_W) || !touches_along(a, X_WT.R.transpose() * -n_W)) continue;
     consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
   }
 }
@@ -304,9 +303,8 @@ void SceneContacts::consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noex
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   if (tool.edges.size() * obstacle.edges.size() > kMaxEdgePairs) return;
-  const Matrix3d& R = X_WT.R;
   for (const auto& a : tool.edges)
-    for (const auto& b : obstacle.edges) consider_edge_pair(k, X_WT, R, a, b, -kInfinity);
+    for (const auto& b : obstacle.edges) consider_edge_pair(k, X_WT, a, b, -kInfinity);
 }
 
 // Of two bodies that are apart, the widest gap along any n is a least-distance problem by constraint
@@ -382,7 +380,6 @@ std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
   const Frame X_WT(pose);
   choices_.clear();
   const ConvexBody& tool = scene_.tool().hull;
-  const Matrix3d& R = X_WT.R;
   const double touching_m = kTouching * scene_.tool_radius_m();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;
@@ -390,7 +387,7 @@ std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
     const Standing held = stand(k, planes_[k], X_WT);
     if (held.separation_m > touching_m) continue;
 
-    const Vector3d n_T = R.transpose() * held.n_W;
+    const Vector3d n_T = X_WT.R.transpose() * held.n_W;
     const auto collect = [&](const ConvexBody& body, const Vector3d& towards, std::uint32_t farthest,
                              std::vector<std::uint32_t>& out) {
       out.clear();
@@ -414,7 +411,7 @@ std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
     for (const auto& a : tool.edges)
       if (touches(tool_touching_, a))
         for (const auto& b : obstacle.edges)
-          if (touches(obstacle_touching_, b)) consider_edge_pair(k, X_WT, R, a, b, -touching_m);
+          if (touches(obstacle_touching_, b)) consider_edge_pair(k, X_WT, a, b, -touching_m);
     consider_widest(k, X_WT);
 
     const auto same = [&](const Choice& choice) {

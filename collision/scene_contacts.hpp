@@ -111,7 +111,7 @@ class SceneContacts final : public ContactSource {
   void consider_between_centres(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_faces(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept;
-  void consider_edge_pair(std::uint32_t k, const Frame& X_WT, const Matrix3d& R, const ConvexBody::Edge& a,
+  void consider_edge_pair(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
                           const ConvexBody::Edge& b, double least_separation_m) noexcept;
   void consider_widest(std::uint32_t k, const Frame& X_WT) noexcept;
   void sort_choices() noexcept;

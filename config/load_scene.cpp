@@ -70,19 +70,19 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   std::string name = place;
   table.optional("name").text(name);
   const TomlValue mesh = table.optional("mesh");
+  const TomlValue half_space = table.mandatory_unless("mesh", "half_space");
   const MeshKeys keys = {table.optional("scale", "m"), table.optional("position_m"),
                          table.optional("rotation_vector_rad")};
   if (mesh) {
-    const TomlValue half_space = table.optional("half_space");
     if (half_space)
       half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
     return read_mesh_obstacle(mesh, keys, scene, name);
   }
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
     if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
-  HalfSpaceSettings half_space{name, Vector3d::UnitZ(), 0.0};
-  table.mandatory("half_space").table(read_half_space, half_space);
-  scene.half_spaces.push_back(half_space);
+  HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
+  half_space.table(read_half_space, settings);
+  if (half_space) scene.half_spaces.push_back(settings);
 }
 
 void read_scene(TomlTable& table, SceneSettings& scene) {

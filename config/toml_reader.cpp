@@ -148,14 +148,21 @@ TomlValue TomlTable::optional(std::string_view key, std::string_view unit) {
 }
 
 TomlValue TomlTable::mandatory(std::string_view key, std::string_view unit) {
-  if (!find(key)) missing_.emplace_back(key);
+  if (!find(key)) missing_.push_back({std::string(key), {}});
   return optional(key, unit);
+}
+
+TomlValue TomlTable::mandatory_unless(std::string_view other, std::string_view key) {
+  if (!find(key) && !find(other)) missing_.push_back({std::string(key), std::string(other)});
+  return optional(key);
 }
 
 void TomlTable::close() {
   for (const TomlEntry& entry : std::get<TomlNode::Table>(node_.value)) refuse_unknown(entry);
-  for (const std::string& key : missing_) {
-    refusals_.add(node_.place, "key '" + dotted(key) + "' is missing; it has no default, so state it here");
+  for (const MissingKey& key : missing_) {
+    const std::string cure =
+        key.other.empty() ? "it has no default, so state it here" : "state it, or '" + key.other + "', here";
+    refusals_.add(node_.place, "key '" + dotted(key.name) + "' is missing; " + cure);
   }
 }
 
@@ -165,7 +172,9 @@ void TomlTable::refuse_unknown(const TomlEntry& entry) {
   if (std::any_of(known_.begin(), known_.end(), same)) return;
   const NearestKey nearest = nearest_key(entry.key, known_);
   refusals_.add(entry.place, "key '" + dotted(printable(entry.key)) + "' is not known; " + nearest.advice);
-  std::erase(missing_, nearest.name);
+  std::erase_if(missing_, [&](const MissingKey& key) {
+    return key.name == nearest.name || (!key.other.empty() && key.other == nearest.name);
+  });
 }
 
 std::string TomlTable::dotted(std::string_view key) const {

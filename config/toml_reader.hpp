@@ -82,6 +82,11 @@ class TomlValue {
 /// A table, and the keys somebody asked it for. A loader asks for every key its format has, so the loader
 /// reads as the format's description, and what is left over is a mistake.
 class TomlTable {
+  struct MissingKey {
+    std::string name;
+    std::string other;  ///< would do as well; may be empty
+  };
+
  public:
   TomlTable(RefusalList& refusals, const TomlNode& node, std::string name)
       : refusals_(refusals), node_(node), name_(std::move(name)) {}
@@ -89,6 +94,8 @@ class TomlTable {
   /// The unit is the one the key name ends with, unless it is given here.
   TomlValue optional(std::string_view key, std::string_view unit = {});
   TomlValue mandatory(std::string_view key, std::string_view unit = {});
+  /// Where another key, which is optional, would do as well. Both have been asked for then.
+  TomlValue mandatory_unless(std::string_view other, std::string_view key);
 
   /// Refuses keys that nobody asked for, and mandatory keys that are not there.
   void close();
@@ -102,7 +109,7 @@ class TomlTable {
   const TomlNode& node_;
   std::string name_;
   std::vector<KnownKey> known_;
-  std::vector<std::string> missing_;
+  std::vector<MissingKey> missing_;
 };
 
 /// Reads FILE through read(TomlTable&, args...). Throws one ConfigError that tells everything wrong with it.

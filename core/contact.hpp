@@ -23,8 +23,7 @@ enum class ContactKind : std::uint8_t {
 ///
 ///   vertex_face   n = n_W
 ///   face_vertex   n = R d_T              d_T = -(outward normal of the tool's face)
-///   edge_edge     n = R d_T x d_W / |R d_T x d_W|        d_T, d_W: along the edges, signed so that n leaves
-///   B
+///   edge_edge     n = R d_T x d_W / |R d_T x d_W|        d_T, d_W: along the edges, so that n leaves B
 struct Contact {
   ContactKind kind = ContactKind::vertex_face;
   Vector3d p_TA_m = Vector3d::Zero();  ///< a: a point of the tool's feature, in T [m]

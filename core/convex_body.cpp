@@ -133,8 +133,8 @@ std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
   }
   const double length = direction.norm();
   double most = -std::numeric_limits<double>::infinity();
-  for (const Block& block :
-       blocks_) {  // the block that reaches highest first: it leaves little to the others
+  // The block that reaches highest first: it leaves little to the others.
+  for (const Block& block : blocks_) {
     const double reach = direction.dot(block.centre_m) + length * block.radius_m;
     if (reach <= most) continue;
     most = reach;

@@ -27,8 +27,8 @@ struct ConvexBody {
   };
 
   std::vector<Vector3d> vertices_T_m;
-  std::vector<std::uint32_t>
-      ring_begin;  ///< ring of vertex i: ring[ring_begin[i]] up to ring[ring_begin[i + 1]]
+  /// Ring of vertex i: ring[ring_begin[i]] up to ring[ring_begin[i + 1]].
+  std::vector<std::uint32_t> ring_begin;
   std::vector<std::uint32_t> ring;
   std::vector<Face> faces;
   std::vector<Edge> edges;

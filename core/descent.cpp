@@ -57,10 +57,11 @@ Projection Descent::project(const Pose& X_WP, const ContactSource& scene, const 
     step = std::min(2.0 * step, 1.0 / std::max(direction.norm(), 1e-300));  // never more than a radian
     Projection trial;
     bool fell = false;
-    for (int halving = 0; halving < kHalvings && !fell; ++halving, step *= fell ? 1.0 : 0.5) {
+    for (int halving = 0; halving < kHalvings && !fell; ++halving) {
       const Pose X_trial{best.X_WQ.rotation * rotation_from(step * direction), best.X_WQ.translation_m};
       trial = translations_.translate(X_WP, scene, X_trial);
       fell = admissible(trial) && trial.energy < best.energy + kFairShare * step * slope;
+      if (!fell) step *= 0.5;
     }
     if (!fell) return best;
     const Vector3d g_new = gradient(X_WP, trial);

@@ -6,10 +6,9 @@ namespace wrenchd {
 // q* minimises T for p, so to first order moving p does not gain by moving q* along (envelope theorem): dU is
 // that of T at fixed q. With T = m |x_q - x_p|^2 + 4 v' H v and (w, v) the unit quaternion of p^-1 q:
 //
-//   a translation ds of p, in its own axes:   dU = -k m (R_p'(x_q - x_p)) . ds
-//   a rotation eta of p, in its own axes:     (w, v) becomes (1, -eta/2) o (w, v), so dv = (v x eta - w
-//   eta)/2
-//                                             dU = 4 k dv' H v = -2 k (w H v + v x (H v)) . eta
+//   p moves by ds in its own axes:   dU = -k m (R_p'(x_q - x_p)) . ds
+//   p turns by eta in its own axes:  (w, v) becomes (1, -eta/2) o (w, v), dv = (v x eta - w eta)/2
+//                                    dU = 4 k dv' H v = -2 k (w H v + v x (H v)) . eta
 //
 // The wrench is minus the gradient:
 //

@@ -11,8 +11,8 @@ namespace wrenchd {
 /// only what is there: elements beyond size() do not exist. RT safe.
 template <class T, std::size_t N>
 class FixedList {
-  static_assert(
-      std::is_trivially_destructible_v<T>);  // Eigen does not say so, but its fixed sizes do not throw
+  // Elements are overwritten and forgotten without a destructor.
+  static_assert(std::is_trivially_destructible_v<T>);
 
  public:
   FixedList() noexcept {}

@@ -7,8 +7,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "core/metric.hpp"
-
 namespace wrenchd {
 namespace {
 
@@ -315,8 +313,8 @@ ExactProjection::Curvature ExactProjection::curvature(const State& state) const 
   return W;
 }
 
-// K_i, the curvature of gap i, for R = I + eta^ + eta^^2/2, in the axes of q. With sym(x, y) = (x y' + y
-// x')/2 and M(x, y) = sym(x, y) - (x . y) I, which is the Hessian of x . R y:
+// K_i, the curvature of gap i, for R = I + eta^ + eta^^2/2, in the axes of q. With
+// sym(x, y) = (x y' + y x')/2 and M(x, y) = sym(x, y) - (x . y) I, which is the Hessian of x . R y:
 //
 //   vertex_face   eta eta: M(n, a)
 //   face_vertex   eta eta: M(d, w), w = R'(u - b)            eta u: d^ R'

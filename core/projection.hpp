@@ -31,9 +31,10 @@ struct Projection {
   double energy = 0.0;  ///< T = d(p, q) of Eq. (8) [kg m^2]
   ProjectionStatus status = ProjectionStatus::free;
   std::uint16_t iterations = 0;  ///< Newton steps taken
-  double kkt_residual = 0.0;  ///< |grad T - sum multiplier grad gap| / |grad T| at q, in the body's own scale
-  bool proven_global =
-      false;  ///< no admissible pose is closer: proven by project_globally(), never by project()
+  /// |grad T - sum multiplier grad gap| / |grad T| at q, in the body's own scale.
+  double kkt_residual = 0.0;
+  /// No admissible pose is closer: proven by project_globally(), never by project().
+  bool proven_global = false;
   FixedList<ActiveContact, ContactSet::kCapacity> active;  ///< contacts that touch at q
 };
 

@@ -241,8 +241,10 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
        "belongs to a mesh; a half_space says where it is by normal and offset"},
       {kTool + "[[obstacle]]\nmesh = 'cube.off'\nposition_m = [0, 0]", "5:14", "3 numbers"},
       {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
-       "key 'obstacle[0].sphere' is not known; known keys here: 'name'"},
-      {kTool + "[[obstacle]]\nname = 'x'", "3:1", "key 'obstacle[0].half_space' is missing"},
+       "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'half_space', 'scale'"},
+      {kTool + "[[obstacle]]\nname = 'x'", "3:1",
+       "key 'obstacle[0].half_space' is missing; state it, or 'mesh', here"},
+      {kTool + "[[obstacle]]\nmehs = 'cube.off'", "4:1", "did you mean 'mesh'?"},
       {kTool + "[obstacle]\nname = 'x'", "3:1", "expected tables, each headed [[obstacle]], found a table"},
       {kTool + "[[obstacles]]\nname = 'x'", "3:3", "did you mean 'obstacle'?"},
   };

@@ -9,7 +9,7 @@
 #include "core/energy_law.hpp"
 #include "core/metric.hpp"
 #include "core/wrench_law.hpp"
-#include "tests/support/random_body.hpp"
+#include "tests/support/pressed.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -27,22 +27,6 @@ template <class Potential>
 double pull(const Potential& U, const Pose& X_WP, const Vector6d& xi) {
   constexpr double h = 1e-5;
   return -(U(X_WP * exp(Vector6d(h * xi))) - U(X_WP * exp(Vector6d(-h * xi)))) / (2.0 * h);
-}
-
-struct Pressed {
-  Scene scene;
-  Pose X_WP;
-};
-
-Pressed random_pressed(RandomValues& random, int half_spaces, double depth_m) {
-  std::vector<HalfSpaceSettings> walls;
-  for (int i = 0; i < half_spaces; ++i) walls.push_back(half_space(random.unit<3>(), 0.0));
-  Scene scene(random_body(random, random.integer(6, 20), 0.4), walls);
-  Pose X_WP{random.rotation(), Vector3d::Zero()};
-  for (int round = 0; round < 20; ++round)
-    for (const HalfSpaceSettings& wall : walls)
-      X_WP.translation_m -= (least_gap_m(Scene(scene.tool(), {wall}), X_WP) + depth_m) * wall.normal_W;
-  return {std::move(scene), X_WP};
 }
 
 /// A smooth closed path about p:  p exp(a cos t + b sin t + c cos 2t).
@@ -163,7 +147,7 @@ TEST_CASE("the energy wrench is minus the gradient of the potential at fixed q",
 TEST_CASE("and it is so with q where the projection puts it", "[energy_law]") {
   RandomValues random(2);
   for (int i = 0; i < 60; ++i) {
-    const Pressed c = random_pressed(random, 1, random.uniform(0.05, 0.15));
+    const Pressed c = into_corner(random, 1, random.uniform(0.05, 0.15));
     PenetrationDepth depth(c.scene, {});
     const auto U = [&](const Pose& X) { return 0.5 * depth.query(X).projection.energy; };
     const Pose X_WQ = depth.query(c.X_WP).projection.X_WQ;
@@ -190,7 +174,7 @@ TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
   double worst_pid = 0.0;
   int jumped = 0;
   for (int loops = 0; loops < kLoops;) {
-    const Pressed c = random_pressed(random, random.integer(1, 2), random.uniform(0.1, 0.2));
+    const Pressed c = into_corner(random, random.integer(1, 2), random.uniform(0.1, 0.2));
     const Loop loop{c.X_WP, 0.05 * random.unit<6>(), 0.05 * random.unit<6>(), 0.02 * random.unit<6>()};
     const Work work = around(loop, c.scene);
     if (!work.smooth) {  // q went over to another minimum, or the hand left the wall: not a closed path of U

@@ -6,7 +6,7 @@
 
 #include "core/metric.hpp"
 #include "core/projection.hpp"
-#include "tests/support/random_body.hpp"
+#include "tests/support/pressed.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -38,19 +38,6 @@ double brute_force(const Scene& scene, const Pose& X_WP, RandomValues& random) {
   double step_rad = 0.2;
   for (int i = 0; i < 6000; ++i) step_rad *= look(best_E * random.rotation(step_rad)) ? 1.2 : 0.99;
   return best;
-}
-
-/// A random body pressed by 5 to 30 % of unit size into a random half-space.
-struct Case {
-  Scene scene;
-  Pose X_WP;
-};
-Case random_case(RandomValues& random, double least_axis = 0.2) {
-  const Vector3d n = random.unit<3>();
-  Scene scene(random_body(random, random.integer(5, 30), least_axis), {half_space(n, random.normal())});
-  Pose X_WP{random.rotation(), random.vector<3>()};
-  X_WP.translation_m -= (least_gap_m(scene, X_WP) + random.uniform(0.05, 0.3)) * n;
-  return {std::move(scene), X_WP};
 }
 
 void check_consistent(const Scene& scene, const Pose& X_WP, const Projection& q, double residual = 1e-9) {
@@ -91,7 +78,7 @@ TEST_CASE("the exact projection reproduces example 4.1 of the paper", "[projecti
 TEST_CASE("against a half-space nothing found by brute force is closer", "[projection]") {
   RandomValues random(1);
   for (int i = 0; i < 60; ++i) {
-    const Case c = random_case(random);
+    const Pressed c = into_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     INFO("case " << i);
@@ -106,7 +93,7 @@ TEST_CASE("optimality is proven in nearly every case, and a proof is never wrong
   int proven = 0;
   constexpr int kCases = 300;
   for (int i = 0; i < kCases; ++i) {
-    const Case c = random_case(random);
+    const Pressed c = into_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     if (!q.proven_global) continue;
@@ -194,7 +181,7 @@ TEST_CASE("obstacles that leave no room are said to be infeasible", "[projection
 TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]") {
   RandomValues random(4);
   for (int i = 0; i < 40; ++i) {
-    const Case c = random_case(random);
+    const Pressed c = into_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     for (const double scale : {1e-4, 1e4}) {
@@ -215,7 +202,7 @@ TEST_CASE("the projection moves with the world, and does not care where the mesh
           "[projection]") {
   RandomValues random(5);
   for (int i = 0; i < 40; ++i) {
-    const Case c = random_case(random);
+    const Pressed c = into_half_space(random, 0.05, 0.3);
     const Inertia& M = c.scene.tool().solid.inertia;
     ExactProjection exact(M);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
@@ -230,7 +217,7 @@ TEST_CASE("the projection moves with the world, and does not care where the mesh
 
 TEST_CASE("mass scales the energy and moves nothing", "[projection]") {
   RandomValues random(6);
-  const Case c = random_case(random);
+  const Pressed c = into_half_space(random, 0.05, 0.3);
   const Inertia& M = c.scene.tool().solid.inertia;
   ExactProjection light(M);
   ExactProjection heavy({7.0 * M.mass_kg, 7.0 * M.H_kg_m2});
@@ -261,7 +248,7 @@ TEST_CASE("needles with an inertia of 1 to 1e6 converge like other bodies", "[pr
 TEST_CASE("a followed proxy is admissible at every step, and settles where the optimum is", "[projection]") {
   RandomValues random(8);
   for (int body = 0; body < 10; ++body) {
-    const Case c = random_case(random);
+    const Pressed c = into_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Vector3d& n = c.scene.half_spaces()[0].normal_W;
     Pose X_WQ =
@@ -285,7 +272,7 @@ TEST_CASE("a followed proxy is admissible at every step, and settles where the o
 TEST_CASE("a spent budget still answers with an admissible pose, no worse than translation", "[projection]") {
   RandomValues random(9);
   for (int i = 0; i < 50; ++i) {
-    const Case c = random_case(random);
+    const Pressed c = into_half_space(random, 0.05, 0.3);
     ExactProjection hurried(c.scene.tool().solid.inertia, {1, 24});
     const Projection q = hurried.project(c.X_WP, SceneContacts(c.scene), c.X_WP);
     REQUIRE(q.status != ProjectionStatus::infeasible);

@@ -5,8 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "collision/scene_contacts.hpp"
-#include "tests/support/random_body.hpp"
-#include "tests/support/separation.hpp"
+#include "tests/support/pressed.hpp"
 
 namespace wrenchd {
 namespace {
@@ -145,37 +144,16 @@ TEST_CASE("an empty scene touches nothing") {
   CHECK(SceneContacts(scene).add_violated(Pose(), 0.0, contacts) == 0);
 }
 
-/// Two random bodies, the tool moved towards the obstacle until they overlap by about depth_m.
-struct Met {
-  Scene scene;
-  Pose X_WT;
-};
-
-Met random_met(RandomValues& random, double depth_m) {
-  ToolBody tool = random_body(random, random.integer(6, 14));
-  const ToolBody other = random_body(random, random.integer(6, 14));
-  Met met{Scene(std::move(tool), {}, {convex_obstacle("other", other.hull)}),
-          {random.rotation(), Vector3d::Zero()}};
-  const Vector3d direction = random.unit<3>();
-  double near = 0.0;
-  double far = 10.0;
-  for (int i = 0; i < 60; ++i) {
-    met.X_WT.translation_m = 0.5 * (near + far) * direction;
-    (separation_m(met.scene, met.X_WT) < -depth_m ? near : far) = 0.5 * (near + far);
-  }
-  return met;
-}
-
 TEST_CASE("the best plane of a survey is the separating axis of least depth") {
   RandomValues random(11);
   for (int i = 0; i < 200; ++i) {
-    const Met met = random_met(random, random.uniform(0.01, 0.2));
+    const Pressed met = into_body(random, random.uniform(0.01, 0.2));
     SceneContacts contacts(met.scene);
-    REQUIRE(contacts.survey(met.X_WT) > 1);
+    REQUIRE(contacts.survey(met.X_WP) > 1);
     ContactSet violated;
-    REQUIRE(contacts.add_violated(met.X_WT, 0.0, violated) > 0);
+    REQUIRE(contacts.add_violated(met.X_WP, 0.0, violated) > 0);
     INFO("case " << i);
-    CHECK(gap_m(violated[0], met.X_WT) == Approx(separation_m(met.scene, met.X_WT)).epsilon(1e-12));
+    CHECK(gap_m(violated[0], met.X_WP) == Approx(separation_m(met.scene, met.X_WP)).epsilon(1e-12));
   }
 }
 
@@ -183,12 +161,12 @@ TEST_CASE("what the planes held admit does not overlap, whichever they are") {
   RandomValues random(12);
   int admitted = 0;
   for (int i = 0; i < 200; ++i) {
-    const Met met = random_met(random, 0.05);
+    const Pressed met = into_body(random, 0.05);
     SceneContacts contacts(met.scene);
-    const std::size_t openings = contacts.survey(met.X_WT);
+    const std::size_t openings = contacts.survey(met.X_WP);
     for (std::size_t k = 0; k < openings; ++k) {
       contacts.open(k);
-      Pose X_WT = met.X_WT;
+      Pose X_WT = met.X_WP;
       X_WT.translation_m += 0.1 * random.vector<3>();
       ContactSet violated;
       if (contacts.add_violated(X_WT, 0.0, violated) > 0) continue;
@@ -203,17 +181,17 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
   RandomValues random(13);
   int seen[3] = {};
   for (int i = 0; i < 200; ++i) {
-    const Met met = random_met(random, 0.1);
+    const Pressed met = into_body(random, 0.1);
     SceneContacts contacts(met.scene);
-    const std::size_t openings = contacts.survey(met.X_WT);
+    const std::size_t openings = contacts.survey(met.X_WP);
     for (std::size_t k = 0; k < std::min<std::size_t>(openings, 12); ++k) {
       contacts.open(k);
       ContactSet violated;
-      if (contacts.add_violated(met.X_WT, 0.0, violated) == 0) continue;
+      if (contacts.add_violated(met.X_WP, 0.0, violated) == 0) continue;
       const Contact& contact = violated[0];
       ++seen[static_cast<int>(contact.kind)];
       // J = [n ; (c - x) x n] for a pair that touches: move the tool until it does.
-      Pose X_WT = met.X_WT;
+      Pose X_WT = met.X_WP;
       X_WT.translation_m -= gap_m(contact, X_WT) * normal_W(contact, X_WT);
       const Vector3d n = normal_W(contact, X_WT);
       const Vector3d lever = contact_point_W(contact, X_WT) - X_WT.translation_m;
@@ -233,9 +211,9 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
 
 TEST_CASE("an obstacle out of reach is not asked") {
   RandomValues random(14);
-  const Met met = random_met(random, 0.1);
+  const Pressed met = into_body(random, 0.1);
   SceneContacts contacts(met.scene);
-  const Pose far{met.X_WT.rotation, {100.0, 0.0, 0.0}};
+  const Pose far{met.X_WP.rotation, {100.0, 0.0, 0.0}};
   ContactSet violated;
   contacts.admit(far, 0.0);
   CHECK(contacts.admits(far, 0.0));
@@ -246,15 +224,15 @@ TEST_CASE("an obstacle out of reach is not asked") {
 TEST_CASE("a far obstacle takes no part in what a near one does") {
   RandomValues random(15);
   for (int i = 0; i < 20; ++i) {
-    const Met met = random_met(random, 0.1);
+    const Pressed met = into_body(random, 0.1);
     ConvexBody far = met.scene.convex()[0].body;
     for (Vector3d& p : far.vertices_T_m) p += Vector3d(0.0, 0.0, 50.0);
     const Scene both(met.scene.tool(), {half_space(Vector3d::UnitX(), -90.0)},
                      {convex_obstacle("far", far), met.scene.convex()[0]});
     SceneContacts contacts(both);
-    CHECK(contacts.survey(met.X_WT) > 0);
+    CHECK(contacts.survey(met.X_WP) > 0);
     ContactSet violated;
-    CHECK(contacts.add_violated(met.X_WT, 0.0, violated) > 0);
+    CHECK(contacts.add_violated(met.X_WP, 0.0, violated) > 0);
     for (const Contact& contact : violated) CHECK(contact.obstacle == 2);
   }
 }

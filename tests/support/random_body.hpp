@@ -40,13 +40,23 @@ inline ToolBody tool_of(const std::vector<Vector3d>& points_M, double mass_kg = 
   return tool;
 }
 
+/// Corners of a box whose faces are split into n x n squares.
+inline std::vector<Vector3d> split_box(int n, const Vector3d& size_m) {
+  std::vector<Vector3d> points;
+  for (int i = 0; i <= n; ++i)
+    for (int j = 0; j <= n; ++j)
+      for (const double side : {-0.5, 0.5}) {
+        const double a = static_cast<double>(i) / n - 0.5;
+        const double b = static_cast<double>(j) / n - 0.5;
+        for (const Vector3d& p : {Vector3d(a, b, side), Vector3d(a, side, b), Vector3d(side, a, b)})
+          points.push_back(p.cwiseProduct(size_m));
+      }
+  return points;
+}
+
 /// A box with its centre at the origin of M.
 inline ToolBody box(const Vector3d& size_m, double mass_kg = 1.0) {
-  std::vector<Vector3d> corners;
-  for (const double x : {-0.5, 0.5})
-    for (const double y : {-0.5, 0.5})
-      for (const double z : {-0.5, 0.5}) corners.push_back(Vector3d(x, y, z).cwiseProduct(size_m));
-  return tool_of(corners, mass_kg);
+  return tool_of(split_box(1, size_m), mass_kg);
 }
 
 /// Points on an ellipsoid of random half-axes: compact and elongated bodies alike.
