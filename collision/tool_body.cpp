@@ -23,17 +23,21 @@ void require_usable(const SolidProperties& solid, const std::filesystem::path& m
   throw MeshError(text.str());
 }
 
-ToolBody load_tool(const ToolSettings& settings) {
-  TriangleMesh mesh = load_solid(settings.mesh);
+ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
   // The hull is taken of the file's own numbers: scaled and shifted, a vertex within a flat face may come to
   // lie an ulp outside it and become a corner.
   ToolBody tool;
   tool.hull = convex_hull(mesh.vertices_m);
-  for (Vector3d& p : mesh.vertices_m) p *= settings.scale;
-  tool.solid = solid_properties(mesh, settings.mass_kg);
-  require_usable(tool.solid, settings.mesh, settings.scale);
-  for (Vector3d& p : tool.hull.vertices_T_m) p = p * settings.scale - tool.solid.p_MT_m;
+  for (Vector3d& p : mesh.vertices_m) p *= scale;
+  tool.solid = solid_properties(mesh, mass_kg);
+  for (Vector3d& p : tool.hull.vertices_T_m) p = p * scale - tool.solid.p_MT_m;
   tool.hull.find_faces();
+  return tool;
+}
+
+ToolBody load_tool(const ToolSettings& settings) {
+  ToolBody tool = tool_body(load_solid(settings.mesh), settings.scale, settings.mass_kg);
+  require_usable(tool.solid, settings.mesh, settings.scale);
   return tool;
 }
 

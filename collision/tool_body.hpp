@@ -20,6 +20,9 @@ struct ToolBody {
 /// Throws MeshError where the scale made a solid too small or too large to compute with.
 void require_usable(const SolidProperties& solid, const std::filesystem::path& mesh, double scale);
 
+/// A closed, outward-oriented mesh as a uniform solid of this mass. scale: metres per mesh unit. Not RT safe.
+ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg);
+
 /// Loads and checks the tool's mesh. Throws MeshError that names the file, the defect, its place and the
 /// cure. Not RT safe.
 ToolBody load_tool(const ToolSettings& settings);

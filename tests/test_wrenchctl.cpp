@@ -472,7 +472,7 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
     std::vector<std::string> arguments;
     std::string told;
   } const table[] = {
-      {{}, "A subcommand (solve, check, mesh or replay) is required"},
+      {{}, "A subcommand (solve, check, mesh, paper or replay) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},
@@ -489,6 +489,13 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
       {{"solve", "", "--poses", poses}, "scene: must not be empty; name a file"},
       {{"solve", scene, poses}, "--poses is required"},
       {{"solve", scene, "--poses", poses, "--bogus"}, "--bogus"},
+      {{"solve", scene, "--poses", poses, "--law", "Energy"}, "{pid,energy}"},
+      {{"solve", scene, "--poses", poses, "--planes", "0"}, "--planes: Value 0 not in range 1 to 1000"},
+      {{"solve", scene, "--poses", poses, "--planes", "many"}, "--planes"},
+      {{"solve", scene, "--poses", poses, "--energy-stiffness", "-3"},
+       "--energy-stiffness: expected a number from 0"},
+      {{"paper", "figures"}, "not expected: figures"},
+      {{"paper", "-o", ""}, "--output: must not be empty"},
       {{"check"}, "file is required"},
       {{"check", ""}, "file: must not be empty; name a file"},
       {{"mesh"}, "file is required"},
@@ -503,6 +510,20 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
     CHECK(result.out == "");
     CHECK(result.err.find(told) != std::string::npos);
   }
+}
+
+TEST_CASE("wrenchctl paper prints the paper's examples and draws its figures") {
+  const TemporaryDirectory dir;
+  const ProgramResult result = run_program("wrenchctl", {"paper", "-o", (dir.path() / "figures").string()});
+  CHECK(result.exit_code == 0);
+  CHECK(result.err == "");
+  CHECK(result.out.find("Example 4.1") == 0);
+  CHECK(result.out.find("Example 4.2") != std::string::npos);
+  CHECK(fs::file_size(dir.path() / "figures" / "fig13.png") > 20000);
+
+  const ProgramResult refused = run_program("wrenchctl", {"paper", "-o", "/dev/null/figures"});
+  CHECK(refused.exit_code == 1);
+  CHECK(refused.err.find("wrenchctl: /dev/null/figures: is no directory") == 0);
 }
 
 TEST_CASE("wrenchctl check accepts every file that is shipped") {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/solve.hpp"
 
-#include <array>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <ostream>
 
 #include "core/energy_law.hpp"
+#include "tools/csv_row.hpp"
 
 namespace wrenchd {
 namespace {
@@ -17,25 +16,6 @@ constexpr const char* kHeader =
     "contacts,energy,px,py,pz,qx,qy,qz,qw,eps_vx,eps_vy,eps_vz,eps_wx,eps_wy,eps_wz,"
     "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
     "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
-
-/// A row of numbers, comma between them.
-class Row {
- public:
-  explicit Row(std::ostream& out) : out_(out) {}
-  Row& operator<<(double x) {
-    std::array<char, 32> text;
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
-    if (!first_) out_ << ',';
-    first_ = false;
-    out_.write(text.data(), end - text.data());
-    return *this;
-  }
-  Row& operator<<(const Vector3d& v) { return *this << v.x() << v.y() << v.z(); }
-
- private:
-  std::ostream& out_;
-  bool first_ = true;
-};
 
 }  // namespace
 
@@ -75,12 +55,11 @@ void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows) {
   out << kHeader << '\n';
   for (const SolvedPose& r : rows) {
     const Quaterniond& q = r.X_WM.rotation;
-    Row row(out);
+    CsvRow row(out);
     row << r.penetration.contacts << r.penetration.projection.energy << r.X_WM.translation_m << q.x() << q.y()
         << q.z() << q.w();
     row << Vector3d(r.penetration.eps.head<3>()) << Vector3d(r.penetration.eps.tail<3>());
     row << r.F_T.force_N << r.F_T.torque_Nm << r.F_S.force_N << r.F_S.torque_Nm << r.solve_ns;
-    out << '\n';
   }
 }
 

@@ -8,7 +8,6 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <unistd.h>
 
 #include "collision/mesh_check.hpp"
 #include "collision/tool_body.hpp"
@@ -19,6 +18,9 @@
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "tools/check.hpp"
+#include "tools/output_file.hpp"
+#include "tools/paper_figures.hpp"
+#include "tools/paper_tables.hpp"
 #include "tools/pose_table.hpp"
 #include "tools/solve.hpp"
 
@@ -53,43 +55,6 @@ std::vector<Pose> read_poses_from(const std::string& name) {
   return read_poses(file, name);
 }
 
-/// A file is written whole or not at all: beside its place first, then put there. A symbolic link keeps
-/// pointing.
-bool replace_file(const std::filesystem::path& file, const std::string& text) {
-  std::error_code error;
-  const auto place =
-      std::filesystem::is_symlink(file, error) ? std::filesystem::weakly_canonical(file, error) : file;
-  const std::filesystem::path beside = place.string() + "." + std::to_string(getpid()) + ".part";
-  std::ofstream out(beside, std::ios::binary);
-  out << text;
-  out.close();
-  if (out) std::filesystem::rename(beside, place, error);
-  if (out && !error) return true;
-  std::filesystem::remove(beside, error);
-  return false;
-}
-
-/// A pipe, a terminal or /dev/null cannot be replaced, only written to.
-bool write_into(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  return !out.fail();
-}
-
-void write_answer(const std::string& name, const std::string& text) {
-  if (name == "-") {
-    std::cout << text;
-    return;
-  }
-  std::error_code ignored;
-  const auto status = std::filesystem::status(name, ignored);
-  const bool replaceable = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
-  if (!(replaceable ? replace_file(name, text) : write_into(name, text)))
-    throw std::runtime_error(
-        name + ": cannot be written; name a file in a directory that exists and may be written to");
-}
-
 int run_solve(const SolveOptions& options) {
   const Scene scene(load_scene(options.scene));
   const std::vector<Pose> poses = read_poses_from(options.poses);
@@ -99,7 +64,7 @@ int run_solve(const SolveOptions& options) {
   const std::vector<SolvedPose> rows = solve(scene, poses, settings);
   std::ostringstream text;
   write_csv(text, rows);
-  write_answer(options.output, text.str());
+  write_output(options.output, text.str());
   int exit_code = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (rows[i].penetration.projection.status != ProjectionStatus::infeasible) continue;
@@ -190,6 +155,21 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   solve->callback([&] { exit_code = run_solve(options); });
 }
 
+void add_paper(CLI::App& app, std::filesystem::path& directory) {
+  CLI::App* paper =
+      app.add_subcommand("paper",
+                         "The examples of Kolesnikov and Zefran's paper, beside the numbers it\n"
+                         "prints, and its Figs. 11 to 15");
+  paper->add_option("-o,--output", directory, "directory for the figures (PNG) and what they show (CSV)")
+      ->check(not_empty())
+      ->capture_default_str();
+  paper->callback([&] {
+    std::cout << paper_tables() << std::flush;
+    write_paper_figures(directory);
+    std::cout << "\nFigs. 11 to 15 (fig11.png, fig11.csv, ...) are in " << directory.string() << '\n';
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -223,6 +203,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   mesh->callback([&] { exit_code = run_mesh(mesh_file, scale); });
 
+  std::filesystem::path paper_directory = "wrenchd-paper";
+  add_paper(app, paper_directory);
+
   std::filesystem::path recording;
   PlanFiles files;
   CLI::App* again = app.add_subcommand("replay",
@@ -240,7 +223,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
-      throw CLI::RequiredError("A subcommand (solve, check, mesh or replay)");
+      throw CLI::RequiredError("A subcommand (solve, check, mesh, paper or replay)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <charconv>
+#include <ostream>
+
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+/// A row of numbers, comma between them, each in the shortest form that reads back the same. The row ends
+/// with this object.
+class CsvRow {
+ public:
+  explicit CsvRow(std::ostream& out) : out_(out) {}
+  ~CsvRow() { out_ << '\n'; }
+  CsvRow(const CsvRow&) = delete;
+  CsvRow& operator=(const CsvRow&) = delete;
+
+  CsvRow& operator<<(double x) {
+    std::array<char, 32> text;
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
+    if (!first_) out_ << ',';
+    first_ = false;
+    out_.write(text.data(), end - text.data());
+    return *this;
+  }
+  CsvRow& operator<<(const Vector3d& v) { return *this << v.x() << v.y() << v.z(); }
+
+ private:
+  std::ostream& out_;
+  bool first_ = true;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/output_file.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+
+#include <unistd.h>
+
+namespace wrenchd {
+namespace {
+
+/// A file is written whole or not at all: beside its place first, then put there. A symbolic link keeps
+/// pointing.
+bool replace_file(const std::filesystem::path& file, const std::string& text) {
+  std::error_code error;
+  const auto place =
+      std::filesystem::is_symlink(file, error) ? std::filesystem::weakly_canonical(file, error) : file;
+  const std::filesystem::path beside = place.string() + "." + std::to_string(getpid()) + ".part";
+  std::ofstream out(beside, std::ios::binary);
+  out << text;
+  out.close();
+  if (out) std::filesystem::rename(beside, place, error);
+  if (out && !error) return true;
+  std::filesystem::remove(beside, error);
+  return false;
+}
+
+/// A pipe, a terminal or /dev/null cannot be replaced, only written to.
+bool write_into(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  return !out.fail();
+}
+
+}  // namespace
+
+void write_output(const std::string& name, const std::string& text) {
+  if (name == "-") {
+    std::cout << text;
+    return;
+  }
+  std::error_code ignored;
+  const auto status = std::filesystem::status(name, ignored);
+  const bool replaceable = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
+  if (!(replaceable ? replace_file(name, text) : write_into(name, text)))
+    throw std::runtime_error(
+        name + ": cannot be written; name a file in a directory that exists and may be written to");
+}
+
+}  // namespace wrenchd
