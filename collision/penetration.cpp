@@ -16,6 +16,10 @@ bool in_contact(const Projection& projection) noexcept {
          projection.status == ProjectionStatus::budget_spent;
 }
 
+bool same_bits(const Pose& a, const Pose& b) noexcept {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
+}
+
 Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
   return log(inverse(X_WP) * X_WQ);
 }
@@ -33,8 +37,16 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
       best_(scene.convex().size()) {}
 
 Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last) noexcept {
-  scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
-  if (options_.method != Method::exact) return approximate(X_WP, X_last);
+  const bool admitted = X_answered_ && same_bits(*X_answered_, X_last);
+  if (!admitted) scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
+  Penetration out =
+      options_.method == Method::exact ? follow_exactly(X_WP, X_last) : approximate(X_WP, X_last);
+  X_answered_.reset();
+  if (out.projection.status != ProjectionStatus::infeasible) X_answered_ = out.projection.X_WQ;
+  return out;
+}
+
+Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept {
   const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
   const std::span known(known_.begin(), known_.end());
   Penetration out = described(X_WP, settle(exact_.project(X_WP, scene_, X_last, known), solve));
@@ -51,6 +63,7 @@ Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last) noexc
 
 Penetration PenetrationDepth::query(const Pose& X_WP) noexcept {
   known_.clear();
+  X_answered_.reset();
   if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP));
   scene_.survey(X_WP);
   return approximate(X_WP, X_WP);

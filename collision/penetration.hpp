@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -47,6 +48,7 @@ class PenetrationDepth {
   Penetration query(const Pose& X_WP) noexcept;
 
  private:
+  Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;
   static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
   template <class Solve>
   Projection settle(Projection best, const Solve& solve) noexcept;
@@ -65,6 +67,7 @@ class PenetrationDepth {
   PlanarFamily planar_;
   ContactSet contacts_;                                    ///< what planar works through
   FixedList<ActiveContact, ContactSet::kCapacity> known_;  ///< what carried at the last answer of follow()
+  std::optional<Pose> X_answered_;                         ///< that answer: the planes held admit it
   std::vector<HeldPlane> saved_;                           ///< while other planes are tried
   std::vector<HeldPlane> best_;                            ///< of the best answer so far
 };

@@ -76,9 +76,18 @@ std::size_t SceneContacts::add_violated(const Pose& pose, double tolerance_m,
   const Frame X_WT(pose);
   const std::size_t before = contacts.size();
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k)
-    add_half_space(k, X_WT, tolerance_m, contacts);
-  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k) add_convex(k, X_WT, tolerance_m, contacts);
+    add_deepest_of_half_space(k, X_WT, tolerance_m, contacts);
+  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
+    add_convex(k, X_WT, tolerance_m, kPerObstacle, contacts);
   return contacts.size() - before;
+}
+
+void SceneContacts::add_touching(const Pose& pose, double within_m, ContactSet& contacts) const noexcept {
+  const Frame X_WT(pose);
+  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k)
+    add_all_of_half_space(k, X_WT, within_m, contacts);
+  for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
+    add_convex(k, X_WT, -within_m, ContactSet::kCapacity, contacts);
 }
 
 bool SceneContacts::admits(const Pose& pose, double tolerance_m) const noexcept {
@@ -115,31 +124,49 @@ void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
 }
 
 //   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
-void SceneContacts::add_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
-                                   ContactSet& contacts) const noexcept {
-  const auto& vertices = scene_.tool().hull.vertices_T_m;
+SceneContacts::Seen SceneContacts::see(std::uint32_t k, const Frame& X_WT) const noexcept {
+  const HalfSpaceSettings& half_space = scene_.half_spaces()[k];
+  return {X_WT.R.transpose() * half_space.normal_W, half_space.offset_m - half_space.normal_W.dot(X_WT.x_m)};
+}
+
+Contact SceneContacts::half_space_contact(std::uint32_t k, std::uint32_t vertex) const noexcept {
   Contact contact;
   contact.n_W = scene_.half_spaces()[k].normal_W;
   contact.offset_m = scene_.half_spaces()[k].offset_m;
   contact.p_WB_m = contact.offset_m * contact.n_W;
   contact.obstacle = k;
-  const Vector3d n_T = X_WT.R.transpose() * contact.n_W;
-  const double below = contact.offset_m - contact.n_W.dot(X_WT.x_m);
-  const auto with_vertex = [&](std::uint32_t v) -> const Contact& {
-    contact.p_TA_m = vertices[v];
-    contact.vertex = v;
-    return contact;
-  };
+  contact.p_TA_m = scene_.tool().hull.vertices_T_m[vertex];
+  contact.vertex = vertex;
+  return contact;
+}
 
+void SceneContacts::add_deepest_of_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
+                                              ContactSet& contacts) const noexcept {
+  const Seen seen = see(k, X_WT);
   Deepest<kPerObstacle> deepest;
   scene_.tool().hull.visit_above(
-      -n_T, [&] { return -below - std::min(-tolerance_m, deepest.threshold()); },
+      -seen.n_T, [&] { return -seen.below_m - std::min(-tolerance_m, deepest.threshold()); },
       [&](std::uint32_t v, double depth) {
-        const double gap = -depth - below;
+        const double gap = -depth - seen.below_m;
         if (gap >= -tolerance_m || gap >= deepest.threshold()) return;
-        if (!contacts.contains(with_vertex(v))) deepest.insert(gap, v);
+        if (!contacts.contains(half_space_contact(k, v))) deepest.insert(gap, v);
       });
-  for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(with_vertex(deepest.vertex(i)));
+  for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(half_space_contact(k, deepest.vertex(i)));
+}
+
+void SceneContacts::add_all_of_half_space(std::uint32_t k, const Frame& X_WT, double within_m,
+                                          ContactSet& contacts) const noexcept {
+  const Seen seen = see(k, X_WT);
+  const std::size_t known = contacts.size();
+  const auto is_known = [&](std::uint32_t v) {
+    return std::any_of(contacts.begin(), contacts.begin() + known,
+                       [&](const Contact& c) { return c.obstacle == k && c.vertex == v; });
+  };
+  scene_.tool().hull.visit_above(
+      -seen.n_T, [&] { return -seen.below_m - within_m; },
+      [&](std::uint32_t v, double depth) {
+        if (-depth - seen.below_m < within_m && !is_known(v)) contacts.add(half_space_contact(k, v));
+      });
 }
 
 bool SceneContacts::out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept {
@@ -190,7 +217,7 @@ SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const HeldPlane& p
 
 /// The deepest pair, and those of its neighbours that lie beyond the plane too: on the side of the tool where
 /// the plane belongs to the obstacle, and the other way round.
-void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m,
+void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
                                ContactSet& contacts) const noexcept {
   if (far_above(k, X_WT)) return;
   const HeldPlane& plane = planes_[k];
@@ -216,7 +243,7 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
   };
 
   add(at.tool_vertex, at.obstacle_vertex);
-  std::size_t room = kPerObstacle - 1;
+  std::size_t room = most - 1;
   const bool tool_side = contact.kind == ContactKind::vertex_face;
   const auto neighbours = tool_side ? tool.ring_of(at.tool_vertex) : obstacle.ring_of(at.obstacle_vertex);
   for (const std::uint32_t v : neighbours) {
@@ -376,44 +403,48 @@ void SceneContacts::fix_to_world(const Pose& pose) noexcept {
   }
 }
 
+/// The vertices of a body that lie no more than depth_m below its farthest one along a direction.
+void SceneContacts::collect_farthest(const ConvexBody& body, const Vector3d& direction, double depth_m,
+                                     std::uint32_t farthest, std::vector<std::uint32_t>& out) noexcept {
+  out.clear();
+  const double least = direction.dot(body.vertices_T_m[farthest]) - depth_m;
+  body.visit_above(
+      direction, [&] { return least; },
+      [&](std::uint32_t v, double height) {
+        if (height >= least) out.push_back(v);
+      });
+}
+
+/// Planes of the features that touch the plane held, and of the widest gap.
+void SceneContacts::consider_near(std::uint32_t k, const Standing& held, double touching_m,
+                                  const Frame& X_WT) noexcept {
+  const ConvexBody& tool = scene_.tool().hull;
+  const ConvexBody& obstacle = scene_.convex()[k].body;
+  collect_farthest(tool, X_WT.R.transpose() * -held.n_W, touching_m, held.tool_vertex, tool_touching_);
+  collect_farthest(obstacle, held.n_W, touching_m, held.obstacle_vertex, obstacle_touching_);
+  for (const std::uint32_t v : obstacle_touching_)
+    for (const std::uint32_t f : obstacle.faces_of(v))
+      consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
+  for (const std::uint32_t v : tool_touching_)
+    for (const std::uint32_t f : tool.faces_of(v))
+      consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -touching_m);
+  for (const std::uint32_t v : tool_touching_)
+    for (const std::uint32_t a : tool.edges_of(v))
+      for (const std::uint32_t w : obstacle_touching_)
+        for (const std::uint32_t b : obstacle.edges_of(w))
+          consider_edge_pair(k, X_WT, tool.edges[a], obstacle.edges[b], -touching_m);
+  consider_widest(k, X_WT);
+}
+
 std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
   const Frame X_WT(pose);
   choices_.clear();
-  const ConvexBody& tool = scene_.tool().hull;
   const double touching_m = kTouching * scene_.tool_radius_m();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;
-    const ConvexBody& obstacle = scene_.convex()[k].body;
     const Standing held = stand(k, planes_[k], X_WT);
     if (held.separation_m > touching_m) continue;
-
-    const Vector3d n_T = X_WT.R.transpose() * held.n_W;
-    const auto collect = [&](const ConvexBody& body, const Vector3d& towards, std::uint32_t farthest,
-                             std::vector<std::uint32_t>& out) {
-      out.clear();
-      const double top = towards.dot(body.vertices_T_m[farthest]) - touching_m;
-      for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v)
-        if (towards.dot(body.vertices_T_m[v]) >= top) out.push_back(v);
-    };
-    collect(tool, -n_T, held.tool_vertex, tool_touching_);
-    collect(obstacle, held.n_W, held.obstacle_vertex, obstacle_touching_);
-    const auto touches = [](const std::vector<std::uint32_t>& set, const ConvexBody::Edge& edge) {
-      return std::find(set.begin(), set.end(), edge.from) != set.end() ||
-             std::find(set.begin(), set.end(), edge.to) != set.end();
-    };
-
-    for (const std::uint32_t v : obstacle_touching_)
-      for (const std::uint32_t f : obstacle.faces_of(v))
-        consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
-    for (const std::uint32_t v : tool_touching_)
-      for (const std::uint32_t f : tool.faces_of(v))
-        consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -touching_m);
-    for (const auto& a : tool.edges)
-      if (touches(tool_touching_, a))
-        for (const auto& b : obstacle.edges)
-          if (touches(obstacle_touching_, b)) consider_edge_pair(k, X_WT, a, b, -touching_m);
-    consider_widest(k, X_WT);
-
+    consider_near(k, held, touching_m, X_WT);
     const auto same = [&](const Choice& choice) {
       return choice.obstacle == k && same_plane(choice.plane, planes_[k]);
     };

@@ -38,6 +38,8 @@ class SceneContacts final : public ContactSource {
   std::size_t add_violated(const Pose& X_WT, double tolerance_m,
                            ContactSet& contacts) const noexcept override;
 
+  void add_touching(const Pose& X_WT, double within_m, ContactSet& contacts) const noexcept override;
+
   bool admits(const Pose& X_WT, double tolerance_m) const noexcept override;
 
   /// Sees to it that the planes held admit a pose that overlaps nothing: takes the widest apart where they do
@@ -98,9 +100,18 @@ class SceneContacts final : public ContactSource {
   static constexpr std::size_t kMaxOpenings = 288;      ///< for all
   static constexpr std::size_t kMaxEdgePairs = 200000;  ///< compared at once by survey(): some milliseconds
 
-  void add_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
-                      ContactSet& contacts) const noexcept;
-  void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m,
+  /// A half-space seen from the tool: gap of vertex a = n_T . a - below_m.
+  struct Seen {
+    Vector3d n_T;
+    double below_m;
+  };
+  Seen see(std::uint32_t k, const Frame& X_WT) const noexcept;
+  Contact half_space_contact(std::uint32_t k, std::uint32_t vertex) const noexcept;
+  void add_deepest_of_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
+                                 ContactSet& contacts) const noexcept;
+  void add_all_of_half_space(std::uint32_t k, const Frame& X_WT, double within_m,
+                             ContactSet& contacts) const noexcept;
+  void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
                   ContactSet& contacts) const noexcept;
   Standing stand(std::uint32_t k, const HeldPlane& plane, const Frame& X_WT) const noexcept;
   static Vector3d normal_of(const HeldPlane& plane, const Frame& X_WT, bool* degenerate) noexcept;
@@ -113,6 +124,9 @@ class SceneContacts final : public ContactSource {
   void consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_edge_pair(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
                           const ConvexBody::Edge& b, double least_separation_m) noexcept;
+  static void collect_farthest(const ConvexBody& body, const Vector3d& direction, double depth_m,
+                               std::uint32_t farthest, std::vector<std::uint32_t>& out) noexcept;
+  void consider_near(std::uint32_t k, const Standing& held, double touching_m, const Frame& X_WT) noexcept;
   void consider_widest(std::uint32_t k, const Frame& X_WT) noexcept;
   void sort_choices() noexcept;
 

@@ -99,7 +99,11 @@ class ContactSource {
   virtual std::size_t add_violated(const Pose& X_WT, double tolerance_m,
                                    ContactSet& contacts) const noexcept = 0;
 
-  /// Is there no such contact at all? RT safe.
+  /// Adds all contacts that are no farther apart than within_m at this pose and not in the set yet, as far as
+  /// there is room. RT safe.
+  virtual void add_touching(const Pose& X_WT, double within_m, ContactSet& contacts) const noexcept = 0;
+
+  /// Is there no contact that add_violated would add to an empty set? RT safe.
   virtual bool admits(const Pose& X_WT, double tolerance_m) const noexcept = 0;
 };
 

@@ -13,6 +13,18 @@ namespace {
 /// Normals that differ by less are of one plane: well above the rounding of a triangle's corners.
 constexpr double kSamePlane = 1e-9;
 
+/// What each vertex has, one behind the other: that of vertex i from begin[i] up to begin[i + 1].
+void lay_out(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std::uint32_t>& begin,
+             std::vector<std::uint32_t>& all) {
+  begin.clear();
+  all.clear();
+  for (const auto& of_vertex : at) {
+    begin.push_back(static_cast<std::uint32_t>(all.size()));
+    all.insert(all.end(), of_vertex.begin(), of_vertex.end());
+  }
+  begin.push_back(static_cast<std::uint32_t>(all.size()));
+}
+
 }  // namespace
 
 void ConvexBody::find_faces() {
@@ -59,18 +71,18 @@ void ConvexBody::find_faces() {
     }
   }
 
-  faces_begin.clear();
-  faces_at.clear();
-  for (const auto& of_vertex : at) {
-    faces_begin.push_back(static_cast<std::uint32_t>(faces_at.size()));
-    faces_at.insert(faces_at.end(), of_vertex.begin(), of_vertex.end());
-  }
-  faces_begin.push_back(static_cast<std::uint32_t>(faces_at.size()));
+  lay_out(at, faces_begin, faces_at);
 
   edges.clear();
   for (std::uint32_t v = 0; v < vertices_T_m.size(); ++v)
     for (const std::uint32_t w : ring_of(v))
       if (v < w) add_edge(v, w, at[v], at[w]);
+  at.assign(vertices_T_m.size(), {});
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    at[edges[e].from].push_back(e);
+    at[edges[e].to].push_back(e);
+  }
+  lay_out(at, edges_begin, edges_at);
 }
 
 /// An edge within a flat face has that face only, and is none.

@@ -34,15 +34,21 @@ struct ConvexBody {
   std::vector<Edge> edges;
   std::vector<std::uint32_t> faces_begin;  ///< the faces of vertex i, laid out as the rings
   std::vector<std::uint32_t> faces_at;
+  std::vector<std::uint32_t> edges_begin;  ///< and its edges
+  std::vector<std::uint32_t> edges_at;
 
   std::span<const std::uint32_t> ring_of(std::size_t vertex) const noexcept {
-    return std::span(ring).subspan(ring_begin[vertex], ring_begin[vertex + 1] - ring_begin[vertex]);
+    return of(vertex, ring_begin, ring);
   }
   std::span<const std::uint32_t> faces_of(std::size_t vertex) const noexcept {
-    return std::span(faces_at).subspan(faces_begin[vertex], faces_begin[vertex + 1] - faces_begin[vertex]);
+    return of(vertex, faces_begin, faces_at);
+  }
+  std::span<const std::uint32_t> edges_of(std::size_t vertex) const noexcept {
+    return of(vertex, edges_begin, edges_at);
   }
 
-  /// Fills in faces, faces_of, edges and what support() works with from vertices and rings. Not RT safe.
+  /// Fills in faces, edges, which of them are at which vertex, and what support() works with from vertices
+  /// and rings. Not RT safe.
   void find_faces();
 
   /// The vertex farthest along a direction, of any length. RT safe.
@@ -70,6 +76,10 @@ struct ConvexBody {
     std::uint32_t begin, end;  ///< in order_
   };
 
+  static std::span<const std::uint32_t> of(std::size_t vertex, const std::vector<std::uint32_t>& begin,
+                                           const std::vector<std::uint32_t>& all) noexcept {
+    return std::span(all).subspan(begin[vertex], begin[vertex + 1] - begin[vertex]);
+  }
   void build_blocks(std::uint32_t begin, std::uint32_t end);
   void add_edge(std::uint32_t from, std::uint32_t to, std::span<const std::uint32_t> faces_from,
                 std::span<const std::uint32_t> faces_to);

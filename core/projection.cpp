@@ -562,7 +562,7 @@ void ExactProjection::report(Projection& out) noexcept {
   linearise(state_);
   out.kkt_residual = residual(gradient(state_));
   const std::size_t known = contacts_.size();
-  while (scene_->add_violated(out.X_WQ, -kTouching * L_, contacts_) > 0) continue;  // what touches idly
+  scene_->add_touching(out.X_WQ, kTouching * L_, contacts_);
   see_from(known);
   for (std::size_t i = known; i < contacts_.size(); ++i) gap_[i] = 0.0;
   out.energy = state_.T * M_.mass_kg * L_ * L_;

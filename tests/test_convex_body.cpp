@@ -18,6 +18,18 @@ TEST_CASE("a box has six faces, twelve edges and no diagonal", "[convex_body]") 
   for (std::uint32_t v = 0; v < 8; ++v) CHECK(body.faces_of(v).size() == 3);
 }
 
+TEST_CASE("each vertex knows the edges that end there", "[convex_body]") {
+  RandomValues random(5);
+  const ConvexBody body = random_body(random, 30).hull;
+  std::size_t ends = 0;
+  for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v)
+    for (const std::uint32_t e : body.edges_of(v)) {
+      ++ends;
+      CHECK((body.edges[e].from == v || body.edges[e].to == v));
+    }
+  CHECK(ends == 2 * body.edges.size());
+}
+
 TEST_CASE("the support is the farthest vertex", "[convex_body]") {
   RandomValues random(1);
   for (int i = 0; i < 300; ++i) {

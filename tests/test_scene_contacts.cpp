@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include <catch2/catch.hpp>
@@ -136,6 +138,28 @@ TEST_CASE("rounds of add_violated find every violated vertex, in order of depth"
     for (std::size_t i = 0; i < contacts.size(); ++i)
       for (std::size_t k = 0; k < i; ++k) CHECK_FALSE(same_features(contacts[i], contacts[k]));
   }
+}
+
+TEST_CASE("what touches is added at once, however much it is, and none twice") {
+  std::vector<Vector3d> corners;
+  for (int i = 0; i < 20; ++i)
+    for (const double z : {0.0, 1.0})
+      corners.emplace_back(std::cos(i * 0.1 * std::numbers::pi), std::sin(i * 0.1 * std::numbers::pi), z);
+  const Scene scene(tool_of(corners), {kFloor});
+  const Pose on_the_floor{Quaterniond::Identity(), {0.0, 0.0, 0.5}};
+  ContactSet contacts;
+  SceneContacts touching(scene);
+  CHECK(touching.add_violated(on_the_floor, -1e-9, contacts) == 4);
+  touching.add_touching(on_the_floor, 1e-9, contacts);
+  CHECK(contacts.size() == 20);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    CHECK(std::abs(gap_m(contacts[i], on_the_floor)) < 1e-15);
+    for (std::size_t k = 0; k < i; ++k) CHECK_FALSE(same_features(contacts[i], contacts[k]));
+  }
+  const Pose above{Quaterniond::Identity(), {0.0, 0.0, 0.6}};
+  ContactSet none;
+  touching.add_touching(above, 1e-9, none);
+  CHECK(none.size() == 0);
 }
 
 TEST_CASE("an empty scene touches nothing") {
