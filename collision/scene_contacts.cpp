@@ -51,6 +51,11 @@ bool touches_along(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
   return m.dot(edge.side[0]) >= least && m.dot(edge.side[1]) >= least;
 }
 
+/// The gap of two edges is the same at all their points: its first end stands for the second.
+std::uint32_t first_end(const ConvexBody::Edge& edge, std::uint32_t vertex) noexcept {
+  return vertex == edge.to ? edge.from : vertex;
+}
+
 /// Fixed to the same features?
 bool same_plane(const HeldPlane& a, const HeldPlane& b) noexcept {
   if (a.kind != b.kind) return false;
@@ -99,16 +104,14 @@ bool SceneContacts::admits(const Pose& pose, double tolerance_m) const noexcept 
     if (lowest + half_space.normal_W.dot(X_WT.x_m) - half_space.offset_m < -tolerance_m) return false;
   }
   for (std::uint32_t k = 0; k < planes_.size(); ++k)
-    if (!out_of_reach(k, X_WT) && !far_above(k, X_WT) &&
-        stand(k, planes_[k], X_WT).separation_m < -tolerance_m)
-      return false;
+    if (!out_of_reach(k, X_WT) && !separates(k, X_WT, tolerance_m)) return false;
   return true;
 }
 
 void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
   const Frame X_WT(pose);
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
-    if (far_above(k, X_WT) || stand(k, planes_[k], X_WT).separation_m >= -tolerance_m) continue;
+    if (separates(k, X_WT, tolerance_m)) continue;
     choices_.clear();
     if (out_of_reach(k, X_WT))
       consider_between_centres(k, X_WT);
@@ -175,53 +178,54 @@ bool SceneContacts::out_of_reach(std::uint32_t k, const Frame& X_WT) const noexc
   return (X_WT.x_m - obstacle.centre_W_m).squaredNorm() > reach * reach;
 }
 
-/// Of a plane at a pose. Edges that are parallel have none: then it is that of the pose where the plane was
-/// taken.
-Vector3d SceneContacts::normal_of(const HeldPlane& plane, const Frame& X_WT, bool* degenerate) noexcept {
+/// Edges that are parallel have no common normal: then it is that of the pose where the plane was taken.
+SceneContacts::Normal SceneContacts::normal_of(const HeldPlane& plane, const Frame& X_WT) noexcept {
   switch (plane.kind) {
     case ContactKind::vertex_face:
       break;
     case ContactKind::face_vertex:
-      return X_WT.R * plane.d_T;
+      return {X_WT.R * plane.d_T, false};
     case ContactKind::edge_edge: {
       const Vector3d N = (X_WT.R * plane.d_T).cross(plane.d_W);
       const double s = N.norm();
-      if (s > kParallel) return N / s;
-      if (degenerate != nullptr) *degenerate = true;
+      return s > kParallel ? Normal{N / s, false} : Normal{plane.n_W, true};
     }
   }
-  return plane.n_W;
+  return {plane.n_W, false};
 }
 
-/// The spheres around tool and obstacle are apart along the plane held: most obstacles are told so.
-bool SceneContacts::far_above(std::uint32_t k, const Frame& X_WT) const noexcept {
+/// The spheres around tool and obstacle are apart along n: most obstacles are told so.
+bool SceneContacts::far_above(std::uint32_t k, const Vector3d& n_W, const Frame& X_WT) const noexcept {
   const ConvexObstacle& obstacle = scene_.convex()[k];
-  const Vector3d n_W = normal_of(planes_[k], X_WT, nullptr);
   return n_W.dot(X_WT.x_m - obstacle.centre_W_m) > scene_.tool_radius_m() + obstacle.radius_m;
 }
 
-/// The normal of a plane at this pose, the vertices of both bodies that lie farthest towards each other along
-/// it, and how far they are apart.
-SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const HeldPlane& plane,
+/// The vertices of both bodies that lie farthest towards each other along a normal, and how far they are
+/// apart.
+SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const Normal& normal,
                                              const Frame& X_WT) const noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
-  Standing out{};
-  out.n_W = normal_of(plane, X_WT, &out.degenerate);
-  out.tool_vertex = tool.support(X_WT.R.transpose() * -out.n_W);
-  out.obstacle_vertex = obstacle.support(out.n_W);
-  out.separation_m =
-      out.n_W.dot(X_WT * tool.vertices_T_m[out.tool_vertex] - obstacle.vertices_T_m[out.obstacle_vertex]);
-  return out;
+  const Vector3d& n_W = normal.n_W;
+  const std::uint32_t a = tool.support(X_WT.R.transpose() * -n_W);
+  const std::uint32_t b = obstacle.support(n_W);
+  const double separation_m = n_W.dot(X_WT * tool.vertices_T_m[a] - obstacle.vertices_T_m[b]);
+  return {n_W, a, b, separation_m, normal.degenerate};
+}
+
+bool SceneContacts::separates(std::uint32_t k, const Frame& X_WT, double tolerance_m) const noexcept {
+  const Normal normal = normal_of(planes_[k], X_WT);
+  return far_above(k, normal.n_W, X_WT) || stand(k, normal, X_WT).separation_m >= -tolerance_m;
 }
 
 /// The deepest pair, and those of its neighbours that lie beyond the plane too: on the side of the tool where
 /// the plane belongs to the obstacle, and the other way round.
 void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
                                ContactSet& contacts) const noexcept {
-  if (far_above(k, X_WT)) return;
   const HeldPlane& plane = planes_[k];
-  const Standing at = stand(k, plane, X_WT);
+  const Normal normal = normal_of(plane, X_WT);
+  if (far_above(k, normal.n_W, X_WT)) return;
+  const Standing at = stand(k, normal, X_WT);
   if (at.separation_m >= -tolerance_m) return;
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
@@ -233,20 +237,27 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
   if (contact.kind != ContactKind::vertex_face) contact.d_T = plane.d_T;
   if (contact.kind == ContactKind::edge_edge) contact.d_W = plane.d_W;
   const auto add = [&](std::uint32_t a, std::uint32_t b) {
+    if (contact.kind == ContactKind::edge_edge) {
+      a = first_end(*plane.tool_edge, a);
+      b = first_end(*plane.obstacle_edge, b);
+    }
     contact.p_TA_m = tool.vertices_T_m[a];
     contact.p_WB_m = obstacle.vertices_T_m[b];
     contact.offset_m = contact.n_W.dot(contact.p_WB_m);
     contact.vertex = a;
     contact.obstacle_vertex = b;
-    const double gap = contact.n_W.dot(X_WT * contact.p_TA_m - contact.p_WB_m);
-    if (gap < -tolerance_m && !contacts.contains(contact)) contacts.add(contact);
+    if (!contacts.contains(contact)) contacts.add(contact);
   };
 
   add(at.tool_vertex, at.obstacle_vertex);
   std::size_t room = most - 1;
   const bool tool_side = contact.kind == ContactKind::vertex_face;
-  const auto neighbours = tool_side ? tool.ring_of(at.tool_vertex) : obstacle.ring_of(at.obstacle_vertex);
-  for (const std::uint32_t v : neighbours) {
+  const ConvexBody& body = tool_side ? tool : obstacle;
+  const std::uint32_t deepest = tool_side ? at.tool_vertex : at.obstacle_vertex;
+  const Vector3d up = tool_side ? Vector3d(X_WT.R.transpose() * at.n_W) : Vector3d(-at.n_W);
+  const double below_m = -tolerance_m - at.separation_m;
+  for (const std::uint32_t v : body.ring_of(deepest)) {
+    if (up.dot(body.vertices_T_m[v] - body.vertices_T_m[deepest]) >= below_m) continue;
     const std::size_t known = contacts.size();
     if (tool_side)
       add(v, at.obstacle_vertex);
@@ -275,16 +286,19 @@ bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) const no
     pressure += multiplier;
   }
   if (!(pressure > 0.0)) return true;
+  // A mean of vertices lies in their body.
+  const ContactKind kind = planes_[k].kind;
   const Vector3d centre_W = sum_W / pressure;
   const double tolerance_m = kPressure * scene_.tool_radius_m();
-  return scene_.convex()[k].body.contains(centre_W, tolerance_m) &&
-         scene_.tool().hull.contains(inverse(q.X_WQ) * centre_W, tolerance_m);
+  return (kind == ContactKind::face_vertex || scene_.convex()[k].body.contains(centre_W, tolerance_m)) &&
+         (kind == ContactKind::vertex_face ||
+          scene_.tool().hull.contains(inverse(q.X_WQ) * centre_W, tolerance_m));
 }
 
 /// Keeps a plane as a choice if it separates well enough.
 void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT,
                              double least_separation_m) noexcept {
-  const Standing at = stand(k, plane, X_WT);
+  const Standing at = stand(k, normal_of(plane, X_WT), X_WT);
   if (at.degenerate || !(at.separation_m >= least_separation_m)) return;
   for (const Choice& choice : choices_)
     if (choice.obstacle == k && same_plane(choice.plane, plane)) return;
@@ -322,7 +336,7 @@ void SceneContacts::consider_edge_pair(std::uint32_t k, const Frame& X_WT, const
   for (const double sign : {1.0, -1.0}) {
     const Vector3d n_W = sign * N;
     if (!touches_along(b, n_W) || !touches_along(a, X_WT.R.transpose() * -n_W)) continue;
-    consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
+    consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d, &a, &b}, X_WT, least_separation_m);
   }
 }
 
@@ -344,11 +358,11 @@ void SceneContacts::consider_widest(std::uint32_t k, const Frame& X_WT) noexcept
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const double unit_m = scene_.tool_radius_m();
   HeldPlane plane = planes_[k];
-  plane.n_W = stand(k, plane, X_WT).n_W;
+  plane.n_W = normal_of(plane, X_WT).n_W;
   plane.kind = ContactKind::vertex_face;
   widest_.clear();
   for (std::size_t pair = 0; pair < kPairs; ++pair) {
-    const Standing at = stand(k, plane, X_WT);
+    const Standing at = stand(k, {plane.n_W, false}, X_WT);
     const double promised_m = widest_.count() == 0 ? kInfinity : unit_m / widest_.z().norm();
     if (at.separation_m > 0.0 && at.separation_m >= kGoodEnough * promised_m) break;
     const Vector3d apart =
@@ -398,7 +412,7 @@ void SceneContacts::open(std::size_t i) noexcept {
 void SceneContacts::fix_to_world(const Pose& pose) noexcept {
   const Frame X_WT(pose);
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
-    planes_[k].n_W = stand(k, planes_[k], X_WT).n_W;
+    planes_[k].n_W = normal_of(planes_[k], X_WT).n_W;
     planes_[k].kind = ContactKind::vertex_face;
   }
 }
@@ -442,7 +456,7 @@ std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
   const double touching_m = kTouching * scene_.tool_radius_m();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;
-    const Standing held = stand(k, planes_[k], X_WT);
+    const Standing held = stand(k, normal_of(planes_[k], X_WT), X_WT);
     if (held.separation_m > touching_m) continue;
     consider_near(k, held, touching_m, X_WT);
     const auto same = [&](const Choice& choice) {

@@ -18,6 +18,8 @@ struct HeldPlane {
   Vector3d n_W = Vector3d::UnitZ();  ///< from the obstacle to the tool; of the pose where it was taken
   Vector3d d_T = Vector3d::Zero();   ///< as in Contact
   Vector3d d_W = Vector3d::Zero();   ///< as in Contact
+  const ConvexBody::Edge* tool_edge = nullptr;
+  const ConvexBody::Edge* obstacle_edge = nullptr;  ///< both of edge_edge, null else
 };
 
 /// The contacts of a scene, for one user.
@@ -84,13 +86,18 @@ class SceneContacts final : public ContactSource {
     Matrix3d R;
     Vector3d x_m;
   };
+  /// Of a plane at one pose.
+  struct Normal {
+    Vector3d n_W;
+    bool degenerate;  ///< parallel edges: no common normal
+  };
   /// A plane at one pose.
   struct Standing {
     Vector3d n_W;
     std::uint32_t tool_vertex;
     std::uint32_t obstacle_vertex;
     double separation_m;
-    bool degenerate;  ///< parallel edges: no common normal
+    bool degenerate;  ///< as in Normal
   };
 
   /// How many new contacts one obstacle contributes to one round of constraint generation: three hold a face,
@@ -113,9 +120,10 @@ class SceneContacts final : public ContactSource {
                              ContactSet& contacts) const noexcept;
   void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
                   ContactSet& contacts) const noexcept;
-  Standing stand(std::uint32_t k, const HeldPlane& plane, const Frame& X_WT) const noexcept;
-  static Vector3d normal_of(const HeldPlane& plane, const Frame& X_WT, bool* degenerate) noexcept;
-  bool far_above(std::uint32_t k, const Frame& X_WT) const noexcept;
+  static Normal normal_of(const HeldPlane& plane, const Frame& X_WT) noexcept;
+  bool far_above(std::uint32_t k, const Vector3d& n_W, const Frame& X_WT) const noexcept;
+  Standing stand(std::uint32_t k, const Normal& normal, const Frame& X_WT) const noexcept;
+  bool separates(std::uint32_t k, const Frame& X_WT, double tolerance_m) const noexcept;
   bool out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept;
   bool press_settled(std::uint32_t k, const Projection& q) const noexcept;
   void consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT, double least_separation_m) noexcept;

@@ -154,16 +154,19 @@ class LeastDistance {
     for (std::size_t k = 0; k < active_count_; ++k) z_ += y[k] * q_[k];
   }
 
-  /// b minus its projection on the active normals; r receives the coefficients on Q. Twice, for
-  /// orthogonality.
+  /// b minus its projection on the active normals; r receives the coefficients on Q. Twice where cancellation
+  /// would spoil orthogonality: twice is enough.
   Vector project_out(const Vector& b, Coefficients& r) const noexcept {
+    constexpr double kLittleLost = 0.5;  // of the squared length, which is 1
     Vector rest = b;
-    for (int pass = 0; pass < 2; ++pass)
+    for (int pass = 0; pass < 2; ++pass) {
       for (std::size_t k = 0; k < active_count_; ++k) {
         const double c = q_[k].dot(rest);
         rest -= c * q_[k];
         r[k] += c;
       }
+      if (active_count_ == 0 || rest.squaredNorm() > kLittleLost) break;
+    }
     return rest;
   }
 

@@ -50,6 +50,19 @@ bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
   return true;
 }
 
+/// B += weight (x y' + y x')/2
+void add_symmetric(double weight, const Vector3d& x, const Vector3d& y, Matrix3d& B) noexcept {
+  const Vector3d half = 0.5 * weight * y;
+  for (int i = 0; i < 3; ++i) {
+    B(i, i) += 2.0 * half[i] * x[i];
+    for (int j = 0; j < i; ++j) {
+      const double xy = half[i] * x[j] + half[j] * x[i];
+      B(i, j) += xy;
+      B(j, i) += xy;
+    }
+  }
+}
+
 double positive_length(const Inertia& M) {
   const double squared = M.H_kg_m2.trace() / (2.0 * M.mass_kg);
   return squared > 0.0 ? std::sqrt(squared) : 1.0;
@@ -88,24 +101,26 @@ ExactProjection::ExactProjection(const Inertia& M, Budget budget)
 
 Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start,
                                     std::span<const ActiveContact> known) noexcept {
-  return project_from(X_WP, scene, (X_WP.rotation.conjugate() * X_start.rotation).normalized(), known);
+  begin(X_WP, scene);
+  return known.empty() ? solve(turned_to(X_start.rotation)) : follow(X_start, known);
 }
 
 Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& scene,
                                       const Pose& X_rotated) noexcept {
-  const Quaterniond E = (X_WP.rotation.conjugate() * X_rotated.rotation).normalized();
-  return project_from(X_WP, scene, E, {}, Freedom::translation);
+  begin(X_WP, scene);
+  return solve(turned_to(X_rotated.rotation), Freedom::translation);
 }
 
 Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSource& scene) noexcept {
   iteration_limit_ = static_cast<std::uint16_t>(kPatience * budget_.iterations);
-  Projection best = best_of_all_starts(X_WP, scene);
+  begin(X_WP, scene);
+  Projection best = best_of_all_starts();
   iteration_limit_ = budget_.iterations;
   return best;
 }
 
-Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSource& scene) noexcept {
-  Projection best = project_from(X_WP, scene, Quaterniond::Identity(), {});
+Projection ExactProjection::best_of_all_starts() noexcept {
+  Projection best = solve(Quaterniond::Identity());
   if (best.status == ProjectionStatus::free) return best;
   best.proven_global = best.status == ProjectionStatus::converged && proven();
   if (best.proven_global) return best;
@@ -113,7 +128,7 @@ Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSo
       best.status == ProjectionStatus::infeasible ? Quaterniond::Identity() : dual_rotation();
 
   const auto try_from = [&](const Quaterniond& E) noexcept {
-    Projection other = project_from(X_WP, scene, E, {});
+    Projection other = solve(E);
     if (other.status == ProjectionStatus::infeasible) return;
     if (best.status != ProjectionStatus::infeasible && best.energy <= other.energy) return;
     other.proven_global = other.status == ProjectionStatus::converged && proven();
@@ -133,7 +148,7 @@ Projection ExactProjection::best_of_all_starts(const Pose& X_WP, const ContactSo
   // both ways, near and far from p; then the same around the best of these.
   try_from(dual_optimum);
   for (const double angle : {0.25, 0.6, 1.2, 2.2}) try_around(Quaterniond::Identity(), angle);
-  const Quaterniond best_E = (X_WP.rotation.conjugate() * best.X_WQ.rotation).normalized();
+  const Quaterniond best_E = turned_to(best.X_WQ.rotation);
   for (const double angle : {0.4, 0.9}) try_around(best_E, angle);
   return best;
 }
@@ -143,42 +158,68 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
   return 4.0 * kGapTolerance * (L_ + X_WT.translation_m.lpNorm<Eigen::Infinity>());
 }
 
-Projection ExactProjection::project_from(const Pose& X_WP, const ContactSource& scene,
-                                         const Quaterniond& E_start, std::span<const ActiveContact> known,
-                                         Freedom freedom) noexcept {
-  Projection out;
-  out.X_WQ = X_WP;
+/// What all attempts at one p share.
+void ExactProjection::begin(const Pose& X_WP, const ContactSource& scene) noexcept {
   X_WP_ = X_WP;
   scene_ = &scene;
   tolerance_m_ = gap_tolerance_m(X_WP);
+}
+
+Quaterniond ExactProjection::turned_to(const Quaterniond& R_WT) const noexcept {
+  return (X_WP_.rotation.conjugate() * R_WT).normalized();
+}
+
+/// Without history: the contacts to begin with are those that p violates.
+Projection ExactProjection::solve(const Quaterniond& E_start, Freedom freedom) noexcept {
+  if (scene_->admits(X_WP_, tolerance_m_)) return free();
+  contacts_.clear();
+  scene_->add_violated(X_WP_, tolerance_m_, contacts_);
+  see_from(0);
   iterations_ = 0;
-  if (scene.admits(X_WP, tolerance_m_)) {
-    out.proven_global = true;
-    return out;
-  }
-  gather(known);
   state_ = State{};
   state_.E = E_start;
   state_.R = E_start.toRotationMatrix();
-  const Local local = freedom == Freedom::all ? minimise(state_)
-                      : translate_out(state_) ? Local::converged
-                                              : Local::infeasible;
+  if (freedom == Freedom::translation) return answer(lift(state_) ? Local::converged : Local::infeasible);
+  return answer(lift_turning(state_) ? minimise(state_, true) : Local::infeasible);
+}
+
+/// From an admissible pose and the contacts that hold it. Most often one of them tells without asking the
+/// scene that p is not admissible.
+Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept {
+  contacts_.clear();
+  for (const ActiveContact& active : known) contacts_.add(active.contact);
+  see_from(0);
+  bool apart = true;
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
+    apart = apart && affine(seen_[i], Matrix3d::Identity()).h * L_ >= -tolerance_m_;
+  }
+  if (apart && scene_->admits(X_WP_, tolerance_m_)) return free();
+  iterations_ = 0;
+  state_.E = turned_to(X_start.rotation);
+  state_.R = state_.E.toRotationMatrix();
+  translation_.clear();
+  if (translate(state_)) return answer(minimise(state_, false));
+  return answer(lift_turning(state_) ? minimise(state_, true) : Local::infeasible);
+}
+
+Projection ExactProjection::free() const noexcept {
+  Projection out;
+  out.X_WQ = X_WP_;
+  out.proven_global = true;
+  return out;
+}
+
+/// What became of the attempt.
+Projection ExactProjection::answer(Local local) noexcept {
+  Projection out;
+  out.X_WQ = X_WP_;
   out.iterations = iterations_;
   out.status = ProjectionStatus::infeasible;
   if (local == Local::infeasible) return out;
   out.status = local == Local::converged ? ProjectionStatus::converged : ProjectionStatus::budget_spent;
   report(out);
   return out;
-}
-
-/// Gathers the contacts to begin with: those known, or else what p violates.
-void ExactProjection::gather(std::span<const ActiveContact> known) noexcept {
-  contacts_.clear();
-  for (const ActiveContact& active : known) contacts_.add(active.contact);
-  if (known.empty()) scene_->add_violated(X_WP_, tolerance_m_, contacts_);
-  see_from(0);
-  for (std::size_t i = 0; i < std::min(known.size(), contacts_.size()); ++i)
-    multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
 }
 
 Pose ExactProjection::pose_of(const State& state) const noexcept {
@@ -232,26 +273,32 @@ void ExactProjection::turn(State& state, const Vector3d& eta) const noexcept {
   state.R = state.E.toRotationMatrix();
 }
 
-/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -h_i, over all
-/// contacts of the scene by constraint generation: solve on the contacts at hand, ask the scene what the
-/// answer violates, add it, repeat. Idle contacts make room for new ones: |u| only grows from round to round,
-/// so none comes back for ever. False where no translation helps, or none was found in the rounds allowed.
-bool ExactProjection::restore(State& state) noexcept {
+/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -h_i, over the
+/// contacts at hand. False where no translation helps.
+bool ExactProjection::translate(State& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
+  for (std::size_t i = translation_.count(); i < contacts_.size(); ++i) {
+    const Affine gap = affine(seen_[i], state.R);
+    translation_.add_unit(gap.n, -gap.h);
+  }
+  if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
+  state.u = translation_.z();
+  state.T = scaled_energy(state);
+  return true;
+}
+
+/// The same over all contacts of the scene by constraint generation: solve on the contacts at hand, ask the
+/// scene what the answer violates, add it, repeat. Idle contacts make room for new ones: |u| only grows from
+/// round to round, so none comes back for ever. False where no translation helps, or none was found in the
+/// rounds allowed.
+bool ExactProjection::restore(State& state) noexcept {
   translation_.clear();
   for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
-    for (std::size_t i = translation_.count(); i < contacts_.size(); ++i) {
-      const Affine gap = affine(seen_[i], state.R);
-      translation_.add_unit(gap.n, -gap.h);
-    }
-    if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
-    state.u = translation_.z();
+    if (!translate(state)) return false;
     if (contacts_.size() > kCrowded) make_room(state);
     const std::size_t known = contacts_.size();
-    if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0) {
-      state.T = scaled_energy(state);
+    if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0)
       return !contacts_.full();  // a full set cannot tell of what it has no room for
-    }
     see_from(known);
   }
   return false;
@@ -317,24 +364,21 @@ ExactProjection::Curvature ExactProjection::curvature(const State& state) const 
 // sym(x, y) = (x y' + y x')/2 and M(x, y) = sym(x, y) - (x . y) I, which is the Hessian of x . R y:
 //
 //   vertex_face   eta eta: M(n, a)
-//   face_vertex   eta eta: M(d, w), w = R'(u - b)            eta u: d^ R'
+//   face_vertex   eta eta: M(d, w), w = R'(u - b)            eta u: d^ R' = -(n^ R)'
 //   edge_edge     gap = f/s with f = (d x dB) . r, s = |d x dB|:
-//     f:  eta eta: M(dB x r, d) - 2 sym(dB, d x a) + M(d x dB, a)         eta u: d^ dB^ R'
+//     f:  eta eta: M(dB x r, d) - 2 sym(dB, d x a) + M(d x dB, a)
+//         eta u: d^ dB^ R' = (R d dB' - (d . dB) R)'
 //     s:  gradient g_s = -(d . dB) n
 //     gap: (K_f - J g_s' - g_s J')/s, but for a term with the gap itself, which is zero where it matters
 void ExactProjection::bend(const State& state, std::size_t i, Curvature& W) const noexcept {
   const Seen& seen = seen_[i];
   const double m = multiplier_[i];
-  const auto sym = [](const Vector3d& x, const Vector3d& y) -> Matrix3d {
-    const Matrix3d xy = x * y.transpose();
-    return 0.5 * (xy + xy.transpose());
-  };
   const auto add = [&](double weight, const Vector3d& x, const Vector3d& y) {
-    W.B -= weight * sym(x, y);
+    add_symmetric(-weight, x, y, W.B);
     W.B.diagonal().array() += weight * x.dot(y);
   };
-  const auto n = J_[i].head<3>();
-  const Matrix3d R_T = state.R.transpose();
+  const Vector3d n = J_[i].head<3>();
+  const auto R_T = state.R.transpose();
   const Vector3d n_Q = R_T * n;
   switch (seen.kind) {
     case ContactKind::vertex_face:
@@ -342,7 +386,7 @@ void ExactProjection::bend(const State& state, std::size_t i, Curvature& W) cons
       return;
     case ContactKind::face_vertex:
       add(m, seen.d, R_T * (state.u - seen.b));
-      W.C -= m * (hat(seen.d) * R_T).transpose();
+      for (int j = 0; j < 3; ++j) W.C.col(j) += m * n.cross(state.R.col(j));
       return;
     case ContactKind::edge_edge:
       break;
@@ -354,8 +398,9 @@ void ExactProjection::bend(const State& state, std::size_t i, Curvature& W) cons
   const Vector3d g_s = -seen.d.dot(dB) * n_Q;
   add(m / s, dB.cross(r), seen.d);
   add(m / s, N, seen.a);
-  W.B += (2.0 * m / s) * (sym(dB, seen.d.cross(seen.a)) + sym(J_[i].tail<3>(), g_s));
-  W.C -= (m / s) * ((hat(seen.d) * hat(dB) * R_T).transpose() - n * g_s.transpose());
+  add_symmetric(2.0 * m / s, dB, seen.d.cross(seen.a), W.B);
+  add_symmetric(2.0 * m / s, J_[i].tail<3>(), g_s, W.B);
+  W.C -= (m / s) * (state.R * seen.d * dB.transpose() + seen.d.dot(dB) * (n * n_Q.transpose() - state.R));
 }
 
 /// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. False where it is not
@@ -420,6 +465,17 @@ Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexce
   return y;
 }
 
+/// Takes the curvature of the Lagrangian.
+///
+/// The first multipliers are those of a pure translation, too large where a rotation will do: a Lagrangian
+/// that they bend too far gives way to the metric alone.
+void ExactProjection::model(const State& state) noexcept {
+  constexpr int kEarly = 2;
+  const Curvature W = curvature(state);
+  if (factorise(W, root_)) return;
+  if (iterations_ > kEarly || !factorise(curvature_of_metric(state), root_)) factorise_convex_part(W, root_);
+}
+
 /// The step that minimises the quadratic model within the linearised gaps:
 ///
 ///   min 1/2 dy' W dy + g' dy   s.t.   J_i dy >= -gap_i
@@ -427,52 +483,62 @@ Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexce
 /// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g. At an
 /// admissible state dy = 0 is allowed, so there always is an answer. Leaves the multipliers.
 ///
-/// The first multipliers are those of a pure translation, too large where a rotation will do: a Lagrangian
-/// that they bend too far gives way to the metric alone.
-bool ExactProjection::newton_step(const State& state, const Vector6d& g, Vector6d& dy) noexcept {
-  const Curvature W = curvature(state);
-  Root root;
-  if (!factorise(W, root)) {
-    constexpr int kEarly = 2;
-    if (iterations_ > kEarly || !factorise(curvature_of_metric(state), root)) factorise_convex_part(W, root);
-  }
+bool ExactProjection::newton_step(const Vector6d& g, Vector6d& dy) noexcept {
   step_.clear();
-  for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root.solve(J_[i]), -std::max(gap_[i], 0.0));
+  for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root_.solve(J_[i]), -std::max(gap_[i], 0.0));
   using Status = LeastDistance<6, ContactSet::kCapacity>::Status;
-  if (step_.solve(-root.solve(g), kGapTolerance) != Status::optimal) return false;
-  dy = root.solve_transposed(step_.z());
+  if (step_.solve(-root_.solve(g), kGapTolerance) != Status::optimal) return false;
+  dy = root_.solve_transposed(step_.z());
   for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = step_.multiplier(i);
   return true;
 }
 
-bool ExactProjection::translate_out(State& state) noexcept {
+/// The nearest translation out, with its multipliers.
+bool ExactProjection::lift(State& state) noexcept {
   if (!restore(state)) return false;
   for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = 2.0 * translation_.multiplier(i);
+  linearise(state);
+  residual_ = residual(gradient(state));
   return true;
 }
 
-/// Newton's method on the contacts at hand, from the state's rotation. Every accepted state is admissible for
-/// them.
-ExactProjection::Local ExactProjection::minimise(State& state) noexcept {
-  const bool warm = std::any_of(multiplier_.begin(), multiplier_.begin() + contacts_.size(),
-                                [](double m) { return m > 0.0; });
-  if (!(warm ? restore(state) : translate_out(state))) {
-    if (!seek_feasible(state)) return Local::infeasible;
-    translate_out(state);
-  }
+/// The same, from another rotation where no translation helps at this one.
+bool ExactProjection::lift_turning(State& state) noexcept {
+  return lift(state) || (seek_feasible(state) && lift(state));
+}
+
+/// Newton's method on the contacts at hand, with first guesses of their multipliers. Leaves the gaps of the
+/// last state. lifted: the state is admissible in the whole scene. One that is only for the contacts at hand
+/// will do to begin with, because every step that is taken is lifted, but not for an answer.
+ExactProjection::Local ExactProjection::minimise(State& state, bool lifted) noexcept {
   for (;;) {
     linearise(state);
     const Vector6d g = gradient(state);
-    if (residual(g) <= kSmallResidual) return Local::converged;
-    if (iterations_ == iteration_limit_) return Local::budget_spent;
+    residual_ = residual(g);
+    if (residual_ <= kSmallResidual) {
+      if (lifted) return Local::converged;
+      if (!(lifted = restore(state))) return Local::infeasible;
+      continue;
+    }
+    if (iterations_ == iteration_limit_) return lifted ? Local::budget_spent : Local::infeasible;
     ++iterations_;
+    model(state);
     Vector6d dy;
-    if (!newton_step(state, g, dy)) return Local::budget_spent;
+    if (!newton_step(g, dy)) return lifted ? Local::budget_spent : Local::infeasible;
     const double promised = -g.dot(dy);  // first-order fall of T
     const Advance moved = advance(state, dy, promised);
-    if (moved == Advance::met_contacts) continue;  // the same state again, with a model that knows them
+    if (moved == Advance::fell) lifted = true;
+    if (moved != Advance::stuck)
+      continue;  // met contacts: the same state again, with a model that knows them
+    if (!lifted) {
+      if (!lift_turning(state)) return Local::infeasible;
+      lifted = true;
+      continue;
+    }
+    linearise(state);  // contacts may have made room for others
+    residual_ = residual(gradient(state));
     // Rounding hides the fall of T where the promise is smaller than T's own last digits.
-    if (moved == Advance::stuck) return promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
+    return promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
   }
 }
 
@@ -559,8 +625,7 @@ void ExactProjection::make_room(const State& state) noexcept {
 /// residual.
 void ExactProjection::report(Projection& out) noexcept {
   out.X_WQ = pose_of(state_);
-  linearise(state_);
-  out.kkt_residual = residual(gradient(state_));
+  out.kkt_residual = residual_;
   const std::size_t known = contacts_.size();
   scene_->add_touching(out.X_WQ, kTouching * L_, contacts_);
   see_from(known);

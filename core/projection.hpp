@@ -72,9 +72,9 @@ class ExactProjection {
   explicit ExactProjection(const Inertia& M);
   ExactProjection(const Inertia& M, Budget budget);
 
-  /// Follows a proxy: the closest admissible configuration to p, sought from the rotation of X_start (last
-  /// tick's q). known: contacts to begin with, last tick's active ones, with their multipliers; the answer
-  /// does not depend on them, the time does. RT safe.
+  /// Follows a proxy: the closest admissible configuration to p, sought from X_start, last tick's q. known:
+  /// the contacts that carried there, with their multipliers; X_start must be admissible then. Without them
+  /// the search starts from the best translation at the rotation of X_start. RT safe.
   Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start,
                      std::span<const ActiveContact> known = {}) noexcept;
 
@@ -129,19 +129,24 @@ class ExactProjection {
   enum class Advance : std::uint8_t { fell, met_contacts, stuck };
   enum class Freedom : std::uint8_t { all, translation };
 
-  Projection best_of_all_starts(const Pose& X_WP, const ContactSource& scene) noexcept;
-  Projection project_from(const Pose& X_WP, const ContactSource& scene, const Quaterniond& E_start,
-                          std::span<const ActiveContact> known, Freedom freedom = Freedom::all) noexcept;
-  void gather(std::span<const ActiveContact> known) noexcept;
+  void begin(const Pose& X_WP, const ContactSource& scene) noexcept;
+  Quaterniond turned_to(const Quaterniond& R_WT) const noexcept;
+  Projection best_of_all_starts() noexcept;
+  Projection solve(const Quaterniond& E_start, Freedom freedom = Freedom::all) noexcept;
+  Projection follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept;
+  Projection free() const noexcept;
+  Projection answer(Local local) noexcept;
   Pose pose_of(const State& state) const noexcept;
   void see_from(std::size_t first) noexcept;
   Affine affine(const Seen& seen, const Matrix3d& R) const noexcept;
   double scaled_energy(const State& state) const noexcept;
   void turn(State& state, const Vector3d& eta) const noexcept;
+  bool translate(State& state) noexcept;
   bool restore(State& state) noexcept;
   bool seek_feasible(State& state) noexcept;
-  Local minimise(State& state) noexcept;
-  bool translate_out(State& state) noexcept;
+  bool lift(State& state) noexcept;
+  bool lift_turning(State& state) noexcept;
+  Local minimise(State& state, bool lifted) noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
   Curvature curvature_of_metric(const State& state) const noexcept;
@@ -150,7 +155,8 @@ class ExactProjection {
   void linearise(const State& state) noexcept;
   bool factorise(const Curvature& W, Root& root) const noexcept;
   void factorise_convex_part(const Curvature& W, Root& root) const noexcept;
-  bool newton_step(const State& state, const Vector6d& g, Vector6d& dy) noexcept;
+  void model(const State& state) noexcept;
+  bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
   Advance advance(State& state, const Vector6d& dy, double promised) noexcept;
   void make_room(const State& state) noexcept;
   void report(Projection& out) noexcept;
@@ -176,7 +182,9 @@ class ExactProjection {
   LeastDistance<3, ContactSet::kCapacity> translation_;
   LeastDistance<6, ContactSet::kCapacity> step_;
   LeastDistance<7, ContactSet::kCapacity> elastic_;
-  State state_;  ///< the iterate, and after a query its answer
+  Root root_;              ///< of the model at hand
+  double residual_ = 0.0;  ///< of the state linearised last
+  State state_;            ///< the iterate, and after a query its answer
   std::uint16_t iterations_ = 0;
 };
 
