@@ -66,7 +66,7 @@ bool same_plane(const HeldPlane& a, const HeldPlane& b) noexcept {
 }  // namespace
 
 SceneContacts::SceneContacts(const Scene& scene)
-    : scene_(scene), planes_(scene.convex().size()), best_(planes_) {
+    : scene_(scene), planes_(scene.convex().size()), best_(planes_), last_(planes_.size()) {
   choices_.reserve(kMaxChoices);
   openings_.reserve(kMaxOpenings);
   tool_touching_.reserve(scene.tool().hull.vertices_T_m.size());
@@ -207,10 +207,17 @@ SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const Normal& norm
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const Vector3d& n_W = normal.n_W;
-  const std::uint32_t a = tool.support(X_WT.R.transpose() * -n_W);
-  const std::uint32_t b = obstacle.support(n_W);
-  const double separation_m = n_W.dot(X_WT * tool.vertices_T_m[a] - obstacle.vertices_T_m[b]);
-  return {n_W, a, b, separation_m, normal.degenerate};
+  Pair& nearest = last_[k];
+  nearest.tool_vertex = tool.support(X_WT.R.transpose() * -n_W, nearest.tool_vertex);
+  nearest.obstacle_vertex = obstacle.support(n_W, nearest.obstacle_vertex);
+  return {n_W, nearest, separation_m(k, n_W, nearest, X_WT), normal.degenerate};
+}
+
+/// How far a pair is apart along a normal.
+double SceneContacts::separation_m(std::uint32_t k, const Vector3d& n_W, Pair pair,
+                                   const Frame& X_WT) const noexcept {
+  const Vector3d a_W = X_WT * scene_.tool().hull.vertices_T_m[pair.tool_vertex];
+  return n_W.dot(a_W - scene_.convex()[k].body.vertices_T_m[pair.obstacle_vertex]);
 }
 
 bool SceneContacts::separates(std::uint32_t k, const Frame& X_WT, double tolerance_m) const noexcept {
@@ -249,25 +256,25 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
     if (!contacts.contains(contact)) contacts.add(contact);
   };
 
-  add(at.tool_vertex, at.obstacle_vertex);
+  add(at.nearest.tool_vertex, at.nearest.obstacle_vertex);
   std::size_t room = most - 1;
   const bool tool_side = contact.kind == ContactKind::vertex_face;
   const ConvexBody& body = tool_side ? tool : obstacle;
-  const std::uint32_t deepest = tool_side ? at.tool_vertex : at.obstacle_vertex;
+  const std::uint32_t deepest = tool_side ? at.nearest.tool_vertex : at.nearest.obstacle_vertex;
   const Vector3d up = tool_side ? Vector3d(X_WT.R.transpose() * at.n_W) : Vector3d(-at.n_W);
   const double below_m = -tolerance_m - at.separation_m;
   for (const std::uint32_t v : body.ring_of(deepest)) {
     if (up.dot(body.vertices_T_m[v] - body.vertices_T_m[deepest]) >= below_m) continue;
     const std::size_t known = contacts.size();
     if (tool_side)
-      add(v, at.obstacle_vertex);
+      add(v, at.nearest.obstacle_vertex);
     else
-      add(at.tool_vertex, v);
+      add(at.nearest.tool_vertex, v);
     if (contacts.size() > known && --room == 0) return;
   }
 }
 
-bool SceneContacts::settled(const Projection& q) const noexcept {
+bool SceneContacts::settled(const Projection& q) noexcept {
   for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
     if (!press_settled(k, q)) return false;
   return true;
@@ -275,31 +282,49 @@ bool SceneContacts::settled(const Projection& q) const noexcept {
 
 // The forces of one obstacle's contacts all act along n. They balance on a plane that is free to tilt where
 // their resultant passes through both bodies: where the centre of pressure c = sum m_i c_i / sum m_i lies in
-// the tool and in the obstacle.
-bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) const noexcept {
+// the tool and in the obstacle. As it lies on the plane, that is where it lies in what touches the plane of
+// either, and only faces that meet there can leave it out.
+bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept {
   const auto number = static_cast<std::uint32_t>(scene_.half_spaces().size()) + k;
   Vector3d sum_W = Vector3d::Zero();
   double pressure = 0.0;
+  Pair pressing;
   for (const auto& [contact, multiplier] : q.active) {
     if (contact.obstacle != number || !(multiplier > 0.0)) continue;
+    pressing = {contact.vertex, contact.obstacle_vertex};
     sum_W += multiplier * contact_point_W(contact, q.X_WQ);
     pressure += multiplier;
   }
   if (!(pressure > 0.0)) return true;
-  // A mean of vertices lies in their body.
-  const ContactKind kind = planes_[k].kind;
+  const Frame X_WT(q.X_WQ);
   const Vector3d centre_W = sum_W / pressure;
-  const double tolerance_m = kPressure * scene_.tool_radius_m();
-  return (kind == ContactKind::face_vertex || scene_.convex()[k].body.contains(centre_W, tolerance_m)) &&
-         (kind == ContactKind::vertex_face ||
-          scene_.tool().hull.contains(inverse(q.X_WQ) * centre_W, tolerance_m));
+  const Vector3d n_W = normal_of(planes_[k], X_WT).n_W;
+  const auto within = [&](const ConvexBody& body, const std::vector<std::uint32_t>& touching,
+                          const Vector3d& centre) {
+    const double tolerance_m = kPressure * scene_.tool_radius_m();
+    for (const std::uint32_t v : touching)
+      for (const std::uint32_t f : body.faces_of(v))
+        if (body.faces[f].n.dot(centre) > body.faces[f].offset_m + tolerance_m) return false;
+    return true;
+  };
+  // A mean of vertices lies in their body.
+  if (planes_[k].kind != ContactKind::face_vertex) {
+    collect_touching_obstacle(k, n_W, pressing);
+    if (!within(scene_.convex()[k].body, obstacle_touching_, centre_W)) return false;
+  }
+  if (planes_[k].kind == ContactKind::vertex_face) return true;
+  collect_touching_tool(n_W, pressing, X_WT);
+  return within(scene_.tool().hull, tool_touching_, X_WT.R.transpose() * (centre_W - X_WT.x_m));
 }
 
 /// Keeps a plane as a choice if it separates well enough.
 void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT,
                              double least_separation_m) noexcept {
-  const Standing at = stand(k, normal_of(plane, X_WT), X_WT);
-  if (at.degenerate || !(at.separation_m >= least_separation_m)) return;
+  const Normal normal = normal_of(plane, X_WT);
+  // Any pair tells how far they are apart at most: most planes need no more.
+  if (normal.degenerate || separation_m(k, normal.n_W, last_[k], X_WT) < least_separation_m) return;
+  const Standing at = stand(k, normal, X_WT);
+  if (!(at.separation_m >= least_separation_m)) return;
   for (const Choice& choice : choices_)
     if (choice.obstacle == k && same_plane(choice.plane, plane)) return;
   plane.n_W = at.n_W;
@@ -366,7 +391,7 @@ void SceneContacts::consider_widest(std::uint32_t k, const Frame& X_WT) noexcept
     const double promised_m = widest_.count() == 0 ? kInfinity : unit_m / widest_.z().norm();
     if (at.separation_m > 0.0 && at.separation_m >= kGoodEnough * promised_m) break;
     const Vector3d apart =
-        X_WT * tool.vertices_T_m[at.tool_vertex] - obstacle.vertices_T_m[at.obstacle_vertex];
+        X_WT * tool.vertices_T_m[at.nearest.tool_vertex] - obstacle.vertices_T_m[at.nearest.obstacle_vertex];
     if (!(apart.squaredNorm() > 0.0)) return;
     widest_.add(apart / unit_m, 1.0);
     if (widest_.solve(Vector3d::Zero(), 1e-12) != Status::optimal) return;  // they overlap
@@ -417,25 +442,33 @@ void SceneContacts::fix_to_world(const Pose& pose) noexcept {
   }
 }
 
-/// The vertices of a body that lie no more than depth_m below its farthest one along a direction.
-void SceneContacts::collect_farthest(const ConvexBody& body, const Vector3d& direction, double depth_m,
-                                     std::uint32_t farthest, std::vector<std::uint32_t>& out) noexcept {
+/// The vertices of a body that touch a plane with this outward normal; farthest is one.
+void SceneContacts::collect_touching(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
+                                     std::vector<std::uint32_t>& out) const noexcept {
   out.clear();
-  const double least = direction.dot(body.vertices_T_m[farthest]) - depth_m;
+  const double least = normal.dot(body.vertices_T_m[farthest]) - kTouching * scene_.tool_radius_m();
   body.visit_above(
-      direction, [&] { return least; },
+      normal, [&] { return least; },
       [&](std::uint32_t v, double height) {
         if (height >= least) out.push_back(v);
       });
 }
 
+void SceneContacts::collect_touching_tool(const Vector3d& n_W, Pair nearest, const Frame& X_WT) noexcept {
+  collect_touching(scene_.tool().hull, X_WT.R.transpose() * -n_W, nearest.tool_vertex, tool_touching_);
+}
+
+void SceneContacts::collect_touching_obstacle(std::uint32_t k, const Vector3d& n_W, Pair nearest) noexcept {
+  collect_touching(scene_.convex()[k].body, n_W, nearest.obstacle_vertex, obstacle_touching_);
+}
+
 /// Planes of the features that touch the plane held, and of the widest gap.
-void SceneContacts::consider_near(std::uint32_t k, const Standing& held, double touching_m,
-                                  const Frame& X_WT) noexcept {
+void SceneContacts::consider_near(std::uint32_t k, const Standing& held, const Frame& X_WT) noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
-  collect_farthest(tool, X_WT.R.transpose() * -held.n_W, touching_m, held.tool_vertex, tool_touching_);
-  collect_farthest(obstacle, held.n_W, touching_m, held.obstacle_vertex, obstacle_touching_);
+  const double touching_m = kTouching * scene_.tool_radius_m();
+  collect_touching_tool(held.n_W, held.nearest, X_WT);
+  collect_touching_obstacle(k, held.n_W, held.nearest);
   for (const std::uint32_t v : obstacle_touching_)
     for (const std::uint32_t f : obstacle.faces_of(v))
       consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
@@ -447,7 +480,10 @@ void SceneContacts::consider_near(std::uint32_t k, const Standing& held, double 
       for (const std::uint32_t w : obstacle_touching_)
         for (const std::uint32_t b : obstacle.edges_of(w))
           consider_edge_pair(k, X_WT, tool.edges[a], obstacle.edges[b], -touching_m);
-  consider_widest(k, X_WT);
+  const bool apart = std::any_of(choices_.begin(), choices_.end(), [&](const Choice& choice) {
+    return choice.obstacle == k && choice.separation_m > touching_m;
+  });
+  if (!apart) consider_widest(k, X_WT);
 }
 
 std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
@@ -458,7 +494,7 @@ std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
     if (out_of_reach(k, X_WT)) continue;
     const Standing held = stand(k, normal_of(planes_[k], X_WT), X_WT);
     if (held.separation_m > touching_m) continue;
-    consider_near(k, held, touching_m, X_WT);
+    consider_near(k, held, X_WT);
     const auto same = [&](const Choice& choice) {
       return choice.obstacle == k && same_plane(choice.plane, planes_[k]);
     };

@@ -71,7 +71,7 @@ class SceneContacts final : public ContactSource {
 
   /// Do the planes held press where both bodies are? Then no other plane does better: the forces that keep
   /// the tool at q also balance on the plane. RT safe.
-  bool settled(const Projection& q) const noexcept;
+  bool settled(const Projection& q) noexcept;
 
  private:
   struct Choice {
@@ -86,6 +86,11 @@ class SceneContacts final : public ContactSource {
     Matrix3d R;
     Vector3d x_m;
   };
+  /// Vertices of both bodies.
+  struct Pair {
+    std::uint32_t tool_vertex = 0;
+    std::uint32_t obstacle_vertex = 0;
+  };
   /// Of a plane at one pose.
   struct Normal {
     Vector3d n_W;
@@ -94,8 +99,7 @@ class SceneContacts final : public ContactSource {
   /// A plane at one pose.
   struct Standing {
     Vector3d n_W;
-    std::uint32_t tool_vertex;
-    std::uint32_t obstacle_vertex;
+    Pair nearest;
     double separation_m;
     bool degenerate;  ///< as in Normal
   };
@@ -123,18 +127,21 @@ class SceneContacts final : public ContactSource {
   static Normal normal_of(const HeldPlane& plane, const Frame& X_WT) noexcept;
   bool far_above(std::uint32_t k, const Vector3d& n_W, const Frame& X_WT) const noexcept;
   Standing stand(std::uint32_t k, const Normal& normal, const Frame& X_WT) const noexcept;
+  double separation_m(std::uint32_t k, const Vector3d& n_W, Pair pair, const Frame& X_WT) const noexcept;
   bool separates(std::uint32_t k, const Frame& X_WT, double tolerance_m) const noexcept;
   bool out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept;
-  bool press_settled(std::uint32_t k, const Projection& q) const noexcept;
+  bool press_settled(std::uint32_t k, const Projection& q) noexcept;
   void consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT, double least_separation_m) noexcept;
   void consider_between_centres(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_faces(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_edge_pair(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
                           const ConvexBody::Edge& b, double least_separation_m) noexcept;
-  static void collect_farthest(const ConvexBody& body, const Vector3d& direction, double depth_m,
-                               std::uint32_t farthest, std::vector<std::uint32_t>& out) noexcept;
-  void consider_near(std::uint32_t k, const Standing& held, double touching_m, const Frame& X_WT) noexcept;
+  void collect_touching(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
+                        std::vector<std::uint32_t>& out) const noexcept;
+  void collect_touching_tool(const Vector3d& n_W, Pair nearest, const Frame& X_WT) noexcept;
+  void collect_touching_obstacle(std::uint32_t k, const Vector3d& n_W, Pair nearest) noexcept;
+  void consider_near(std::uint32_t k, const Standing& held, const Frame& X_WT) noexcept;
   void consider_widest(std::uint32_t k, const Frame& X_WT) noexcept;
   void sort_choices() noexcept;
 
@@ -143,6 +150,7 @@ class SceneContacts final : public ContactSource {
   std::vector<HeldPlane> best_;    ///< of the last survey
   std::vector<Choice> choices_;
   std::vector<Choice> openings_;
+  mutable std::vector<Pair> last_;  ///< what was found nearest last: where to look first
   LeastDistance<3, 64> widest_;
   std::vector<std::uint32_t> tool_touching_;  ///< vertices
   std::vector<std::uint32_t> obstacle_touching_;

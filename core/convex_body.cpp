@@ -130,29 +130,9 @@ void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
 // that are flat but for rounding, the climb ends at a vertex whose neighbours all seem level with it, as far
 // below the true support as the body is wide, and the projection would take that for admissible. Blocks are
 // left out only where none of their vertices can be the one.
-std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
-  std::uint32_t best = 0;
-  double height = 0.0;
-  if (blocks_.size() == 1) {
-    height = direction.dot(vertices_T_m[0]);
-    for (std::uint32_t v = 1; v < vertices_T_m.size(); ++v) {
-      const double h = direction.dot(vertices_T_m[v]);
-      if (h <= height) continue;
-      height = h;
-      best = v;
-    }
-    return best;
-  }
-  const double length = direction.norm();
-  double most = -std::numeric_limits<double>::infinity();
-  // The block that reaches highest first: it leaves little to the others.
-  for (const Block& block : blocks_) {
-    const double reach = direction.dot(block.centre_m) + length * block.radius_m;
-    if (reach <= most) continue;
-    most = reach;
-    best = order_[block.begin];
-  }
-  height = direction.dot(vertices_T_m[best]);
+std::uint32_t ConvexBody::support(const Vector3d& direction, std::uint32_t near) const noexcept {
+  std::uint32_t best = near;
+  double height = direction.dot(vertices_T_m[near]);
   visit_above(
       direction, [&] { return height; },
       [&](std::uint32_t v, double h) {
@@ -163,9 +143,15 @@ std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
   return best;
 }
 
-bool ConvexBody::contains(const Vector3d& p_T_m, double tolerance_m) const noexcept {
-  return std::all_of(faces.begin(), faces.end(),
-                     [&](const Face& face) { return face.n.dot(p_T_m) <= face.offset_m + tolerance_m; });
+std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
+  // The block that reaches highest leaves little to the others.
+  const double length = direction.norm();
+  const auto reach = [&](const Block& block) {
+    return direction.dot(block.centre_m) + length * block.radius_m;
+  };
+  const auto highest = std::max_element(blocks_.begin(), blocks_.end(),
+                                        [&](const Block& x, const Block& y) { return reach(x) < reach(y); });
+  return support(direction, order_[highest->begin]);
 }
 
 }  // namespace wrenchd

@@ -51,22 +51,22 @@ struct ConvexBody {
   /// and rings. Not RT safe.
   void find_faces();
 
-  /// The vertex farthest along a direction, of any length. RT safe.
+  /// The vertex farthest along a direction, of any length. near: one that is known to be far along it, which
+  /// saves time. RT safe.
   std::uint32_t support(const Vector3d& direction) const noexcept;
+  std::uint32_t support(const Vector3d& direction, std::uint32_t near) const noexcept;
 
   /// Calls visit(vertex, direction . p) for every vertex that lies higher along the direction than least(),
   /// which may rise meanwhile, and for some others. RT safe if they are.
   template <class Least, class Visit>
   void visit_above(const Vector3d& direction, const Least& least, const Visit& visit) const noexcept {
-    const double length = direction.norm();
+    const bool one = blocks_.size() == 1;
+    const double length = one ? 0.0 : direction.norm();
     for (const Block& block : blocks_) {
-      if (direction.dot(block.centre_m) + length * block.radius_m < least()) continue;
+      if (!one && direction.dot(block.centre_m) + length * block.radius_m < least()) continue;
       for (std::uint32_t i = block.begin; i < block.end; ++i) visit(order_[i], direction.dot(ordered_m_[i]));
     }
   }
-
-  /// Is a point inside, or no farther than tolerance_m outside? RT safe.
-  bool contains(const Vector3d& p_T_m, double tolerance_m) const noexcept;
 
  private:
   /// Some vertices that lie close together, in a sphere.

@@ -38,17 +38,19 @@ TEST_CASE("the support is the farthest vertex", "[convex_body]") {
     double highest = -1e9;
     for (const Vector3d& p : body.vertices_T_m) highest = std::max(highest, direction.dot(p));
     CHECK(direction.dot(body.vertices_T_m[body.support(direction)]) == highest);
+    const auto anywhere = static_cast<std::uint32_t>(random.integer(0, 3));
+    CHECK(direction.dot(body.vertices_T_m[body.support(direction, anywhere)]) == highest);
   }
 }
 
-TEST_CASE("faces bound the body, and contains agrees with them", "[convex_body]") {
+TEST_CASE("faces bound the body", "[convex_body]") {
   RandomValues random(2);
   for (int i = 0; i < 100; ++i) {
     const ConvexBody body = random_body(random, random.integer(4, 40)).hull;
-    for (const Vector3d& p : body.vertices_T_m) CHECK(body.contains(p, 1e-12));
-    CHECK(body.contains(Vector3d::Zero(), 0.0));  // the centre of mass
-    const auto& face = body.faces[0];
-    CHECK_FALSE(body.contains((face.offset_m + 1e-6) * face.n + 10.0 * face.n, 1e-9));
+    for (const auto& face : body.faces) {
+      CHECK(face.offset_m > 0.0);  // the centre of mass is inside
+      for (const Vector3d& p : body.vertices_T_m) CHECK(face.n.dot(p) <= face.offset_m + 1e-12);
+    }
     for (std::uint32_t v = 0; v < body.vertices_T_m.size(); ++v)
       for (const std::uint32_t f : body.faces_of(v))
         CHECK(body.faces[f].n.dot(body.vertices_T_m[v]) == Approx(body.faces[f].offset_m).margin(1e-12));
