@@ -16,6 +16,8 @@ constexpr double kParallel = 1e-7;
 constexpr double kTouching = 1e-7;
 /// The centre of pressure may lie this far outside a body, in units of the tool's radius.
 constexpr double kPressure = 1e-8;
+/// With no more faces than this, all are looked at: finding those that matter would take longer.
+constexpr std::size_t kFewFaces = 16;
 /// Normals that differ by less are the same plane.
 constexpr double kSamePlane = 1e-9;
 
@@ -69,10 +71,10 @@ SceneContacts::SceneContacts(const Scene& scene)
     : scene_(scene), planes_(scene.convex().size()), best_(planes_), last_(planes_.size()) {
   choices_.reserve(kMaxChoices);
   openings_.reserve(kMaxOpenings);
-  tool_touching_.reserve(scene.tool().hull.vertices_T_m.size());
-  std::size_t most = 0;
+  std::size_t most = scene.tool().hull.vertices_T_m.size();
   for (const ConvexObstacle& obstacle : scene.convex())
     most = std::max(most, obstacle.body.vertices_T_m.size());
+  touching_.reserve(most);
   obstacle_touching_.reserve(most);
 }
 
@@ -299,22 +301,27 @@ bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept
   const Frame X_WT(q.X_WQ);
   const Vector3d centre_W = sum_W / pressure;
   const Vector3d n_W = normal_of(planes_[k], X_WT).n_W;
-  const auto within = [&](const ConvexBody& body, const std::vector<std::uint32_t>& touching,
-                          const Vector3d& centre) {
-    const double tolerance_m = kPressure * scene_.tool_radius_m();
-    for (const std::uint32_t v : touching)
+  const double tolerance_m = kPressure * scene_.tool_radius_m();
+  const auto below = [&](const ConvexBody::Face& face, const Vector3d& p) {
+    return face.n.dot(p) <= face.offset_m + tolerance_m;
+  };
+  const auto within = [&](const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
+                          const Vector3d& p) {
+    if (body.faces.size() <= kFewFaces)
+      return std::all_of(body.faces.begin(), body.faces.end(), [&](const auto& f) { return below(f, p); });
+    collect_touching(body, normal, farthest, touching_);
+    for (const std::uint32_t v : touching_)
       for (const std::uint32_t f : body.faces_of(v))
-        if (body.faces[f].n.dot(centre) > body.faces[f].offset_m + tolerance_m) return false;
+        if (!below(body.faces[f], p)) return false;
     return true;
   };
   // A mean of vertices lies in their body.
-  if (planes_[k].kind != ContactKind::face_vertex) {
-    collect_touching_obstacle(k, n_W, pressing);
-    if (!within(scene_.convex()[k].body, obstacle_touching_, centre_W)) return false;
-  }
-  if (planes_[k].kind == ContactKind::vertex_face) return true;
-  collect_touching_tool(n_W, pressing, X_WT);
-  return within(scene_.tool().hull, tool_touching_, X_WT.R.transpose() * (centre_W - X_WT.x_m));
+  const ContactKind kind = planes_[k].kind;
+  const auto R_TW = X_WT.R.transpose();
+  return (kind == ContactKind::face_vertex ||
+          within(scene_.convex()[k].body, n_W, pressing.obstacle_vertex, centre_W)) &&
+         (kind == ContactKind::vertex_face ||
+          within(scene_.tool().hull, R_TW * -n_W, pressing.tool_vertex, R_TW * (centre_W - X_WT.x_m)));
 }
 
 /// Keeps a plane as a choice if it separates well enough.
@@ -454,28 +461,20 @@ void SceneContacts::collect_touching(const ConvexBody& body, const Vector3d& nor
       });
 }
 
-void SceneContacts::collect_touching_tool(const Vector3d& n_W, Pair nearest, const Frame& X_WT) noexcept {
-  collect_touching(scene_.tool().hull, X_WT.R.transpose() * -n_W, nearest.tool_vertex, tool_touching_);
-}
-
-void SceneContacts::collect_touching_obstacle(std::uint32_t k, const Vector3d& n_W, Pair nearest) noexcept {
-  collect_touching(scene_.convex()[k].body, n_W, nearest.obstacle_vertex, obstacle_touching_);
-}
-
 /// Planes of the features that touch the plane held, and of the widest gap.
 void SceneContacts::consider_near(std::uint32_t k, const Standing& held, const Frame& X_WT) noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const double touching_m = kTouching * scene_.tool_radius_m();
-  collect_touching_tool(held.n_W, held.nearest, X_WT);
-  collect_touching_obstacle(k, held.n_W, held.nearest);
+  collect_touching(tool, X_WT.R.transpose() * -held.n_W, held.nearest.tool_vertex, touching_);
+  collect_touching(obstacle, held.n_W, held.nearest.obstacle_vertex, obstacle_touching_);
   for (const std::uint32_t v : obstacle_touching_)
     for (const std::uint32_t f : obstacle.faces_of(v))
       consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
-  for (const std::uint32_t v : tool_touching_)
+  for (const std::uint32_t v : touching_)
     for (const std::uint32_t f : tool.faces_of(v))
       consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -touching_m);
-  for (const std::uint32_t v : tool_touching_)
+  for (const std::uint32_t v : touching_)
     for (const std::uint32_t a : tool.edges_of(v))
       for (const std::uint32_t w : obstacle_touching_)
         for (const std::uint32_t b : obstacle.edges_of(w))

@@ -139,8 +139,6 @@ class SceneContacts final : public ContactSource {
                           const ConvexBody::Edge& b, double least_separation_m) noexcept;
   void collect_touching(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
                         std::vector<std::uint32_t>& out) const noexcept;
-  void collect_touching_tool(const Vector3d& n_W, Pair nearest, const Frame& X_WT) noexcept;
-  void collect_touching_obstacle(std::uint32_t k, const Vector3d& n_W, Pair nearest) noexcept;
   void consider_near(std::uint32_t k, const Standing& held, const Frame& X_WT) noexcept;
   void consider_widest(std::uint32_t k, const Frame& X_WT) noexcept;
   void sort_choices() noexcept;
@@ -152,7 +150,7 @@ class SceneContacts final : public ContactSource {
   std::vector<Choice> openings_;
   mutable std::vector<Pair> last_;  ///< what was found nearest last: where to look first
   LeastDistance<3, 64> widest_;
-  std::vector<std::uint32_t> tool_touching_;  ///< vertices
+  std::vector<std::uint32_t> touching_;  ///< vertices, of the tool where both bodies are looked at
   std::vector<std::uint32_t> obstacle_touching_;
 };
 

@@ -67,11 +67,15 @@ inline Vector3d contact_point_W(const Contact& c, const Pose& X_WT) noexcept {
   return a_W + d * ((c.p_WB_m - a_W).cross(c.d_W).dot(N) / N.squaredNorm());
 }
 
+/// Do the normals of two contacts move as one?
+inline bool same_normal(const Contact& a, const Contact& b) noexcept {
+  return a.kind == b.kind && a.obstacle == b.obstacle && a.d_T == b.d_T && a.d_W == b.d_W &&
+         (a.kind != ContactKind::vertex_face || a.n_W == b.n_W);
+}
+
 /// The same pair with the same law of its normal.
 inline bool same_features(const Contact& a, const Contact& b) noexcept {
-  return a.kind == b.kind && a.vertex == b.vertex && a.obstacle_vertex == b.obstacle_vertex &&
-         a.obstacle == b.obstacle && a.d_T == b.d_T && a.d_W == b.d_W &&
-         (a.kind != ContactKind::vertex_face || a.n_W == b.n_W);
+  return a.vertex == b.vertex && a.obstacle_vertex == b.obstacle_vertex && same_normal(a, b);
 }
 
 /// Contacts of one query. The capacity is fixed, so that a tick never allocates; an optimum of 6 unknowns has

@@ -53,14 +53,8 @@ bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
 /// B += weight (x y' + y x')/2
 void add_symmetric(double weight, const Vector3d& x, const Vector3d& y, Matrix3d& B) noexcept {
   const Vector3d half = 0.5 * weight * y;
-  for (int i = 0; i < 3; ++i) {
-    B(i, i) += 2.0 * half[i] * x[i];
-    for (int j = 0; j < i; ++j) {
-      const double xy = half[i] * x[j] + half[j] * x[i];
-      B(i, j) += xy;
-      B(j, i) += xy;
-    }
-  }
+  const Matrix3d xy = x * half.transpose();
+  B += xy + xy.transpose();
 }
 
 double positive_length(const Inertia& M) {
@@ -198,7 +192,6 @@ Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveCo
   iterations_ = 0;
   state_.E = turned_to(X_start.rotation);
   state_.R = state_.E.toRotationMatrix();
-  translation_.clear();
   if (translate(state_)) return answer(minimise(state_, false));
   return answer(lift_turning(state_) ? minimise(state_, true) : Local::infeasible);
 }
@@ -236,6 +229,7 @@ void ExactProjection::see_from(std::size_t first) noexcept {
     seen.kind = contact.kind;
     seen.n = R_PW * contact.n_W;
     seen.a = contact.p_TA_m / L_;
+    seen.b.setZero();
     seen.c = (contact.n_W.dot(X_WP_.translation_m) - contact.offset_m) / L_;
     multiplier_[i] = 0.0;
     if (contact.kind == ContactKind::vertex_face) continue;
@@ -276,6 +270,12 @@ void ExactProjection::turn(State& state, const Vector3d& eta) const noexcept {
 /// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -h_i, over the
 /// contacts at hand. False where no translation helps.
 bool ExactProjection::translate(State& state) noexcept {
+  translation_.clear();
+  return translate_further(state);
+}
+
+/// The same with contacts that have come since.
+bool ExactProjection::translate_further(State& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
   for (std::size_t i = translation_.count(); i < contacts_.size(); ++i) {
     const Affine gap = affine(seen_[i], state.R);
@@ -294,7 +294,7 @@ bool ExactProjection::translate(State& state) noexcept {
 bool ExactProjection::restore(State& state) noexcept {
   translation_.clear();
   for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
-    if (!translate(state)) return false;
+    if (!translate_further(state)) return false;
     if (contacts_.size() > kCrowded) make_room(state);
     const std::size_t known = contacts_.size();
     if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0)
@@ -352,11 +352,27 @@ ExactProjection::Curvature ExactProjection::curvature_of_metric(const State& sta
   return W;
 }
 
-/// Hessian of the Lagrangian T - sum multiplier_i gap_i: that of T, less sum multiplier_i K_i.
+/// Hessian of the Lagrangian T - sum multiplier_i gap_i: that of T, less sum multiplier_i K_i. K is linear in
+/// what contacts of the same normal differ in, so each normal bends once.
 ExactProjection::Curvature ExactProjection::curvature(const State& state) const noexcept {
   Curvature W = curvature_of_metric(state);
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (multiplier_[i] > 0.0) bend(state, i, W);
+  const auto carries = [&](std::size_t i) { return multiplier_[i] > 0.0; };
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    const auto is_of_i = [&](std::size_t j) { return carries(j) && same_normal(contacts_[i], contacts_[j]); };
+    if (!carries(i)) continue;
+    bool done = false;
+    for (std::size_t j = 0; j < i; ++j) done = done || is_of_i(j);
+    if (done) continue;
+    Load load;
+    for (std::size_t j = i; j < contacts_.size(); ++j) {
+      if (!is_of_i(j)) continue;
+      load.m += multiplier_[j];
+      load.a += multiplier_[j] * seen_[j].a;
+      load.b += multiplier_[j] * seen_[j].b;
+      load.turning += multiplier_[j] * J_[j].tail<3>();
+    }
+    bend(state, i, load, W);
+  }
   return W;
 }
 
@@ -370,9 +386,10 @@ ExactProjection::Curvature ExactProjection::curvature(const State& state) const 
 //         eta u: d^ dB^ R' = (R d dB' - (d . dB) R)'
 //     s:  gradient g_s = -(d . dB) n
 //     gap: (K_f - J g_s' - g_s J')/s, but for a term with the gap itself, which is zero where it matters
-void ExactProjection::bend(const State& state, std::size_t i, Curvature& W) const noexcept {
+//
+// load: a, b and J of all contacts with this normal, and 1, each times its multiplier.
+void ExactProjection::bend(const State& state, std::size_t i, const Load& load, Curvature& W) const noexcept {
   const Seen& seen = seen_[i];
-  const double m = multiplier_[i];
   const auto add = [&](double weight, const Vector3d& x, const Vector3d& y) {
     add_symmetric(-weight, x, y, W.B);
     W.B.diagonal().array() += weight * x.dot(y);
@@ -380,27 +397,25 @@ void ExactProjection::bend(const State& state, std::size_t i, Curvature& W) cons
   const Vector3d n = J_[i].head<3>();
   const auto R_T = state.R.transpose();
   const Vector3d n_Q = R_T * n;
-  switch (seen.kind) {
-    case ContactKind::vertex_face:
-      add(m, n_Q, seen.a);
-      return;
-    case ContactKind::face_vertex:
-      add(m, seen.d, R_T * (state.u - seen.b));
-      for (int j = 0; j < 3; ++j) W.C.col(j) += m * n.cross(state.R.col(j));
-      return;
-    case ContactKind::edge_edge:
-      break;
+  if (seen.kind == ContactKind::vertex_face) {
+    add(1.0, n_Q, load.a);
+    return;
+  }
+  const Vector3d w = R_T * (load.m * state.u - load.b);
+  if (seen.kind == ContactKind::face_vertex) {
+    add(1.0, seen.d, w);
+    for (int j = 0; j < 3; ++j) W.C.col(j) += load.m * n.cross(state.R.col(j));
+    return;
   }
   const Vector3d dB = R_T * seen.dB;
-  const Vector3d r = R_T * (state.u - seen.b) + seen.a;
   const Vector3d N = seen.d.cross(dB);
   const double s = N.norm();
-  const Vector3d g_s = -seen.d.dot(dB) * n_Q;
-  add(m / s, dB.cross(r), seen.d);
-  add(m / s, N, seen.a);
-  add_symmetric(2.0 * m / s, dB, seen.d.cross(seen.a), W.B);
-  add_symmetric(2.0 * m / s, J_[i].tail<3>(), g_s, W.B);
-  W.C -= (m / s) * (state.R * seen.d * dB.transpose() + seen.d.dot(dB) * (n * n_Q.transpose() - state.R));
+  const double cosine = seen.d.dot(dB);
+  add(1.0 / s, dB.cross(w + load.a), seen.d);
+  add(1.0 / s, N, load.a);
+  add_symmetric(2.0 / s, dB, seen.d.cross(load.a), W.B);
+  add_symmetric(-2.0 / s * cosine, load.turning, n_Q, W.B);
+  W.C -= (load.m / s) * (state.R * seen.d * dB.transpose() + cosine * (n * n_Q.transpose() - state.R));
 }
 
 /// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. False where it is not
@@ -507,38 +522,40 @@ bool ExactProjection::lift_turning(State& state) noexcept {
   return lift(state) || (seek_feasible(state) && lift(state));
 }
 
-/// Newton's method on the contacts at hand, with first guesses of their multipliers. Leaves the gaps of the
-/// last state. lifted: the state is admissible in the whole scene. One that is only for the contacts at hand
-/// will do to begin with, because every step that is taken is lifted, but not for an answer.
-ExactProjection::Local ExactProjection::minimise(State& state, bool lifted) noexcept {
+/// Newton's method, with first guesses of the multipliers. Leaves the gaps of the last state. asked: the
+/// scene has been asked about this state, and is about every next. A proxy begins without: the contacts that
+/// held it are taken for all there are until they have an answer, which is right in nearly every tick.
+ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexcept {
   for (;;) {
     linearise(state);
     const Vector6d g = gradient(state);
     residual_ = residual(g);
-    if (residual_ <= kSmallResidual) {
-      if (lifted) return Local::converged;
-      if (!(lifted = restore(state))) return Local::infeasible;
+    const bool converged = residual_ <= kSmallResidual;
+    if (converged || iterations_ == iteration_limit_) {
+      const Local local = converged ? Local::converged : Local::budget_spent;
+      if (asked) return local;
+      const std::size_t known = contacts_.size();
+      if (!restore(state)) return Local::infeasible;
+      if (contacts_.size() == known && known <= kCrowded) return local;
+      asked = true;
       continue;
     }
-    if (iterations_ == iteration_limit_) return lifted ? Local::budget_spent : Local::infeasible;
     ++iterations_;
     model(state);
     Vector6d dy;
-    if (!newton_step(g, dy)) return lifted ? Local::budget_spent : Local::infeasible;
-    const double promised = -g.dot(dy);  // first-order fall of T
-    const Advance moved = advance(state, dy, promised);
-    if (moved == Advance::fell) lifted = true;
-    if (moved != Advance::stuck)
-      continue;  // met contacts: the same state again, with a model that knows them
-    if (!lifted) {
+    const bool stepped = newton_step(g, dy);
+    const double promised = stepped ? -g.dot(dy) : 0.0;  // first-order fall of T
+    const Advance moved = stepped ? advance(state, dy, promised, asked) : Advance::stuck;
+    if (moved != Advance::stuck) continue;  // contacts met: the same state, with a model that knows them
+    if (!asked) {
       if (!lift_turning(state)) return Local::infeasible;
-      lifted = true;
+      asked = true;
       continue;
     }
     linearise(state);  // contacts may have made room for others
     residual_ = residual(gradient(state));
     // Rounding hides the fall of T where the promise is smaller than T's own last digits.
-    return promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
+    return stepped && promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
   }
 }
 
@@ -553,8 +570,8 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
 
 /// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails
 /// and has met contacts the model did not know ends the search: with them the next step will be a better one.
-ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy,
-                                                  double promised) noexcept {
+ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy, double promised,
+                                                  bool asked) noexcept {
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d eta = dy.tail<3>();
@@ -567,7 +584,8 @@ ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& 
     State trial = state;
     turn(trial, fraction * eta);
     const std::size_t known = contacts_.size();
-    if (restore(trial) && trial.T <= state.T + rounding - kFairShare * fraction * promised) {
+    if ((asked ? restore(trial) : translate(trial)) &&
+        trial.T <= state.T + rounding - kFairShare * fraction * promised) {
       state = trial;
       return Advance::fell;
     }

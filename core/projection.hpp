@@ -118,6 +118,13 @@ class ExactProjection {
     Matrix3d C = Matrix3d::Zero();
     Matrix3d B = Matrix3d::Zero();
   };
+  /// Sums over contacts of one normal, each weighted with its multiplier.
+  struct Load {
+    double m = 0.0;
+    Vector3d a = Vector3d::Zero();
+    Vector3d b = Vector3d::Zero();
+    Vector3d turning = Vector3d::Zero();  ///< of J
+  };
   /// Triangular root [P 0; Q S] of a positive definite matrix, with P and S inverted.
   struct Root {
     Matrix3d P_inverse, Q, S_inverse;
@@ -142,22 +149,23 @@ class ExactProjection {
   double scaled_energy(const State& state) const noexcept;
   void turn(State& state, const Vector3d& eta) const noexcept;
   bool translate(State& state) noexcept;
+  bool translate_further(State& state) noexcept;
   bool restore(State& state) noexcept;
   bool seek_feasible(State& state) noexcept;
   bool lift(State& state) noexcept;
   bool lift_turning(State& state) noexcept;
-  Local minimise(State& state, bool lifted) noexcept;
+  Local minimise(State& state, bool asked) noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
   Curvature curvature_of_metric(const State& state) const noexcept;
   Curvature curvature(const State& state) const noexcept;
-  void bend(const State& state, std::size_t i, Curvature& W) const noexcept;
+  void bend(const State& state, std::size_t i, const Load& load, Curvature& W) const noexcept;
   void linearise(const State& state) noexcept;
   bool factorise(const Curvature& W, Root& root) const noexcept;
   void factorise_convex_part(const Curvature& W, Root& root) const noexcept;
   void model(const State& state) noexcept;
   bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
-  Advance advance(State& state, const Vector6d& dy, double promised) noexcept;
+  Advance advance(State& state, const Vector6d& dy, double promised, bool asked) noexcept;
   void make_room(const State& state) noexcept;
   void report(Projection& out) noexcept;
   bool proven() noexcept;
