@@ -535,8 +535,10 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
       const Local local = converged ? Local::converged : Local::budget_spent;
       if (asked) return local;
       const std::size_t known = contacts_.size();
+      if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0 && !contacts_.full())
+        return local;
+      see_from(known);
       if (!restore(state)) return Local::infeasible;
-      if (contacts_.size() == known && known <= kCrowded) return local;
       asked = true;
       continue;
     }

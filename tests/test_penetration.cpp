@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <catch2/catch.hpp>
 
@@ -210,6 +211,40 @@ TEST_CASE("a proxy that slides over a convex body is admissible at every step an
     CHECK(worst < 1e-6);
   }
   CHECK(steps > 1000);
+}
+
+TEST_CASE("a proxy among several bodies and walls stays out of all of them", "[penetration][convex]") {
+  RandomValues random(26);
+  int touching_many = 0;
+  for (int i = 0; i < 8; ++i) {
+    std::vector<ConvexObstacle> bodies;
+    for (const Vector3d& place :
+         {Vector3d(1.2, 0.0, 0.0), Vector3d(-1.1, 0.3, 0.0), Vector3d(0.0, 1.3, 0.2)}) {
+      ConvexBody body = random_body(random, random.integer(6, 14)).hull;
+      for (Vector3d& p : body.vertices_T_m) p += place;
+      bodies.push_back(convex_obstacle("body", body));
+    }
+    const Scene scene(random_body(random, 12), {half_space(Vector3d::UnitZ(), -0.6)}, bodies);
+    PenetrationDepth follower(scene, {});
+    const Vector3d a = random.vector<3>();
+    const Vector3d b = random.vector<3>();
+    Pose X_last{random.rotation(), {0.0, 0.0, 4.0}};
+    const Quaterniond R = X_last.rotation;
+    for (int k = 0; k < 600; ++k) {
+      const double t = 0.01 * k;
+      const Pose X_WP{R * rotation_from(0.5 * Vector3d(std::sin(t), std::sin(2.0 * t), t)),
+                      Vector3d(0.0, 0.0, std::max(-0.5, 4.0 - 3.0 * t)) + 0.4 * std::sin(3.0 * t) * a +
+                          0.3 * std::sin(5.0 * t) * b};
+      const Projection q = follower.follow(X_WP, X_last).projection;
+      REQUIRE(separation_m(scene, q.X_WQ) >= -1e-12);
+      std::set<std::uint32_t> touched;
+      for (const ActiveContact& active : q.active)
+        if (active.multiplier > 0.0) touched.insert(active.contact.obstacle);
+      touching_many += touched.size() > 1 ? 1 : 0;
+      X_last = q.X_WQ;
+    }
+  }
+  CHECK(touching_many > 500);
 }
 
 TEST_CASE("the whole pipeline knows no frame: world, mesh axes, unit of length, mass",
