@@ -49,7 +49,9 @@ Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last) noexc
 Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept {
   const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
   const std::span known(known_.begin(), known_.end());
-  Penetration out = described(X_WP, settle(exact_.project(X_WP, scene_, X_last, known), solve));
+  Projection q = exact_.project(X_WP, scene_, X_last, known);
+  settle(q, solve);
+  Penetration out = described(X_WP, q);
   known_.clear();
   for (const ActiveContact& active : out.projection.active)
     if (active.multiplier > 0.0) known_.add(active);
@@ -77,17 +79,19 @@ Penetration PenetrationDepth::approximate(const Pose& X_WP, const Pose& X_start)
 
 Penetration PenetrationDepth::descend(const Pose& X_WP, const Pose& X_start) noexcept {
   const auto solve = [&](const Pose& X_from) { return descent_.project(X_WP, scene_, X_from); };
-  return described(X_WP, settle(solve(X_start), solve));
+  Projection q = solve(X_start);
+  settle(q, solve);
+  return described(X_WP, q);
 }
 
-/// Changes the planes held until no other plane that admits the answer gives a better one. solve: the answer
-/// for the planes held, sought from a pose.
+/// Changes the planes held until no other plane that admits the best answer gives a better one, which takes
+/// its place. solve: the answer for the planes held, sought from a pose.
 template <class Solve>
-Projection PenetrationDepth::settle(Projection best, const Solve& solve) noexcept {
+void PenetrationDepth::settle(Projection& best, const Solve& solve) noexcept {
   constexpr int kChanges = 12;        // typical: none or one
   constexpr std::size_t kTries = 16;  // of the planes that touch, the widest apart first
   for (int change = 0; change < kChanges; ++change) {
-    if (!in_contact(best) || scene_.settled(best)) return best;
+    if (!in_contact(best) || scene_.settled(best)) return;
     const std::size_t choices = std::min(kTries, scene_.find_near_choices(best.X_WQ));
     bool improved = false;
     saved_ = scene_.held();
@@ -100,9 +104,8 @@ Projection PenetrationDepth::settle(Projection best, const Solve& solve) noexcep
       else
         scene_.hold(saved_);
     }
-    if (!improved) return best;
+    if (!improved) return;
   }
-  return best;
 }
 
 /// The best answer from every plane worth a try, one obstacle at a time: from the rotation of p, then from
@@ -111,13 +114,15 @@ Projection PenetrationDepth::project_globally(const Pose& X_WP) noexcept {
   const std::size_t openings = scene_.survey(X_WP);
   if (openings == 0) return exact_.project_globally(X_WP, scene_);
   const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
-  Projection best = settle(solve(X_WP), solve);
+  Projection best = solve(X_WP);
+  settle(best, solve);
   best_ = scene_.held();
   const auto try_all_from = [&](const Pose& X_start) {
     bool improved = false;
     for (std::size_t i = 0; i < openings && best.status != ProjectionStatus::free; ++i) {
       scene_.open(i);
-      const Projection other = settle(solve(X_start), solve);
+      Projection other = solve(X_start);
+      settle(other, solve);
       if (other.status == ProjectionStatus::infeasible) continue;
       if (best.status != ProjectionStatus::infeasible && !(other.energy < kBetter * best.energy)) continue;
       best = other;
@@ -137,7 +142,9 @@ Projection PenetrationDepth::project_globally(const Pose& X_WP) noexcept {
 /// The nearest translation, over the planes that touch.
 Projection PenetrationDepth::translate(const Pose& X_WP) noexcept {
   const auto solve = [&](const Pose&) { return exact_.translate(X_WP, scene_, X_WP); };
-  return settle(solve(X_WP), solve);
+  Projection q = solve(X_WP);
+  settle(q, solve);
+  return q;
 }
 
 /// What every method says of its answer.
@@ -190,7 +197,9 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
     T = lifted.energy;
   }
   const auto lift = [&](const Pose&) { return exact_.translate(X_WP, scene_, X_WQ); };
-  out = described(X_WP, settle(lift(X_WQ), lift));  // lets q down onto what it stands clear of
+  Projection q = lift(X_WQ);
+  settle(q, lift);  // lets q down onto what it stands clear of
+  out = described(X_WP, q);
   out.drive = freed ? out.eps : sum;
   return out;
 }

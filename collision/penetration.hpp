@@ -51,7 +51,7 @@ class PenetrationDepth {
   Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;
   static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
   template <class Solve>
-  Projection settle(Projection best, const Solve& solve) noexcept;
+  void settle(Projection& best, const Solve& solve) noexcept;
   Projection project_globally(const Pose& X_WP) noexcept;
   Projection translate(const Pose& X_WP) noexcept;
   Penetration approximate(const Pose& X_WP, const Pose& X_start) noexcept;

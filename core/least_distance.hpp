@@ -77,6 +77,9 @@ class LeastDistance {
   /// active.
   double multiplier(std::size_t i) const noexcept { return multiplier_[i] / length_[i]; }
   std::size_t count() const noexcept { return count_; }
+  /// A constraint as it was given to add_unit().
+  const Vector& normal(std::size_t i) const noexcept { return normal_[i]; }
+  double bound(std::size_t i) const noexcept { return bound_[i]; }
 
  private:
   static constexpr std::size_t kMaxSteps =

@@ -27,26 +27,26 @@ constexpr std::size_t kCrowded = 24;
 /// How many times the budget of a tick a query without history may take for each of its starts.
 constexpr int kPatience = 5;
 
-/// Lower triangular root of a symmetric matrix, inverted. False where the matrix is not safely positive
-/// definite: a pivot that is all rounding would make the step all rounding.
+/// Lower triangular root of a symmetric matrix, inverted:  A = L D L',  (L sqrt D)^-1 = D^-1/2 L^-1.  False
+/// where the matrix is not safely positive definite: a pivot that is all rounding would make the step all
+/// rounding.
 bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
   constexpr double kLeastPivot = 1e-13;
-  const auto safe = [](double pivot, double diagonal) { return pivot > kLeastPivot * diagonal; };
-  if (!(A(0, 0) > 0.0)) return false;
-  const double l00 = std::sqrt(A(0, 0));
-  const double l10 = A(1, 0) / l00;
-  const double l20 = A(2, 0) / l00;
-  const double d1 = A(1, 1) - l10 * l10;
-  if (!safe(d1, std::abs(A(1, 1)))) return false;
-  const double l11 = std::sqrt(d1);
-  const double l21 = (A(2, 1) - l20 * l10) / l11;
-  const double d2 = A(2, 2) - l20 * l20 - l21 * l21;
-  if (!safe(d2, std::abs(A(2, 2)))) return false;
-  const double i0 = 1.0 / l00;
-  const double i1 = 1.0 / l11;
+  const auto safe = [](double pivot, double diagonal) { return pivot > kLeastPivot * std::abs(diagonal); };
+  const double d0 = A(0, 0);
+  if (!(d0 > 0.0)) return false;
+  const double l10 = A(1, 0) / d0;
+  const double l20 = A(2, 0) / d0;
+  const double d1 = A(1, 1) - l10 * A(1, 0);
+  if (!safe(d1, A(1, 1))) return false;
+  const double a21 = A(2, 1) - l20 * A(1, 0);
+  const double l21 = a21 / d1;
+  const double d2 = A(2, 2) - l20 * A(2, 0) - l21 * a21;
+  if (!safe(d2, A(2, 2))) return false;
+  const double i0 = 1.0 / std::sqrt(d0);
+  const double i1 = 1.0 / std::sqrt(d1);
   const double i2 = 1.0 / std::sqrt(d2);
-  const double i10 = -l10 * i0 * i1;
-  inverse << i0, 0.0, 0.0, i10, i1, 0.0, -(l20 * i0 + l21 * i10) * i2, -l21 * i1 * i2, i2;
+  inverse << i0, 0.0, 0.0, -l10 * i1, i1, 0.0, (l10 * l21 - l20) * i2, -l21 * i2, i2;
   return true;
 }
 
@@ -170,6 +170,7 @@ Projection ExactProjection::solve(const Quaterniond& E_start, Freedom freedom) n
   scene_->add_violated(X_WP_, tolerance_m_, contacts_);
   see_from(0);
   iterations_ = 0;
+  met_touching_ = false;
   state_ = State{};
   state_.E = E_start;
   state_.R = E_start.toRotationMatrix();
@@ -190,6 +191,7 @@ Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveCo
   }
   if (apart && scene_->admits(X_WP_, tolerance_m_)) return free();
   iterations_ = 0;
+  met_touching_ = false;
   state_.E = turned_to(X_start.rotation);
   state_.R = state_.E.toRotationMatrix();
   if (translate(state_)) return answer(minimise(state_, false));
@@ -281,6 +283,7 @@ bool ExactProjection::translate_further(State& state) noexcept {
     const Affine gap = affine(seen_[i], state.R);
     translation_.add_unit(gap.n, -gap.h);
   }
+  E_translated_ = state.E;
   if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
   state.u = translation_.z();
   state.T = scaled_energy(state);
@@ -312,9 +315,11 @@ bool ExactProjection::restore(State& state) noexcept {
 //   face_vertex   d x r                                      n_Q = d
 //   edge_edge     d x (dB_Q x r_t) / s                       r_t: r without its part along n,  s = |d x dB_Q|
 void ExactProjection::linearise(const State& state) noexcept {
+  // Most often this very rotation has just been translated.
+  const bool known = translation_.count() == contacts_.size() && E_translated_.coeffs() == state.E.coeffs();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const Seen& seen = seen_[i];
-    const Affine at = affine(seen, state.R);
+    const Affine at = known ? Affine{translation_.normal(i), -translation_.bound(i)} : affine(seen, state.R);
     const Vector3d n_Q = state.R.transpose() * at.n;
     gap_[i] = at.n.dot(state.u) + at.h;
     Vector3d turning = seen.a.cross(n_Q);
@@ -534,10 +539,7 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     if (converged || iterations_ == iteration_limit_) {
       const Local local = converged ? Local::converged : Local::budget_spent;
       if (asked) return local;
-      const std::size_t known = contacts_.size();
-      if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0 && !contacts_.full())
-        return local;
-      see_from(known);
+      if (meet_touching(state)) return local;
       if (!restore(state)) return Local::infeasible;
       asked = true;
       continue;
@@ -567,7 +569,7 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
   Vector6d rest = g;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (multiplier_[i] > 0.0 && gap_[i] <= kTouching) rest -= multiplier_[i] * J_[i];
-  return rest.norm() / std::max(g.norm(), kLeastGradient);
+  return std::sqrt(rest.squaredNorm() / std::max(g.squaredNorm(), kLeastGradient * kLeastGradient));
 }
 
 /// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails
@@ -641,15 +643,26 @@ void ExactProjection::make_room(const State& state) noexcept {
   }
 }
 
+/// Adds what touches idly. False where it is not idle: where something that was not known overlaps.
+bool ExactProjection::meet_touching(const State& state) noexcept {
+  const std::size_t known = contacts_.size();
+  scene_->add_touching(pose_of(state), kTouching * L_, contacts_);
+  see_from(known);
+  for (std::size_t i = known; i < contacts_.size(); ++i) {
+    const Affine at = affine(seen_[i], state.R);
+    gap_[i] = at.n.dot(state.u) + at.h;
+    if (gap_[i] * L_ < -tolerance_m_) return false;
+  }
+  met_touching_ = true;
+  return !contacts_.full();  // a full set cannot tell of what it has no room for
+}
+
 /// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the
 /// residual.
 void ExactProjection::report(Projection& out) noexcept {
   out.X_WQ = pose_of(state_);
   out.kkt_residual = residual_;
-  const std::size_t known = contacts_.size();
-  scene_->add_touching(out.X_WQ, kTouching * L_, contacts_);
-  see_from(known);
-  for (std::size_t i = known; i < contacts_.size(); ++i) gap_[i] = 0.0;
+  if (!met_touching_) meet_touching(state_);
   out.energy = state_.T * M_.mass_kg * L_ * L_;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (gap_[i] <= kTouching) out.active.add({contacts_[i], multiplier_[i] * M_.mass_kg * L_});

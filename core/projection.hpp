@@ -167,6 +167,7 @@ class ExactProjection {
   bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
   Advance advance(State& state, const Vector6d& dy, double promised, bool asked) noexcept;
   void make_room(const State& state) noexcept;
+  bool meet_touching(const State& state) noexcept;
   void report(Projection& out) noexcept;
   bool proven() noexcept;
   Quaterniond dual_rotation() const noexcept;
@@ -188,11 +189,13 @@ class ExactProjection {
   std::array<Vector6d, ContactSet::kCapacity> J_;  ///< gradient of gap i in (u, eta)
   std::array<double, ContactSet::kCapacity> gap_;
   LeastDistance<3, ContactSet::kCapacity> translation_;
+  Quaterniond E_translated_ = Quaterniond::Identity();  ///< of the problem in translation_
   LeastDistance<6, ContactSet::kCapacity> step_;
   LeastDistance<7, ContactSet::kCapacity> elastic_;
-  Root root_;              ///< of the model at hand
-  double residual_ = 0.0;  ///< of the state linearised last
-  State state_;            ///< the iterate, and after a query its answer
+  Root root_;                  ///< of the model at hand
+  bool met_touching_ = false;  ///< what touches at the answer has been added
+  double residual_ = 0.0;      ///< of the state linearised last
+  State state_;                ///< the iterate, and after a query its answer
   std::uint16_t iterations_ = 0;
 };
 
