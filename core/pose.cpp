@@ -68,8 +68,9 @@ Vector6d log(const Pose& X) noexcept {
   const double theta = w.norm();
   double d = 1.0 / 12.0 + theta * theta / 720.0;
   if (theta >= kSmallAngle_rad) {
-    const double half = 0.5 * theta;  // a/(2b) = (t/2) cot(t/2), which stays finite up to t = pi
-    d = (1.0 - half * std::cos(half) / std::sin(half)) / (theta * theta);
+    // a/(2b) = (t/2) cot(t/2), which stays finite up to t = pi; the quaternion holds cos and sin of t/2.
+    const double cotangent = std::abs(X.rotation.w()) / X.rotation.vec().norm();
+    d = (1.0 - 0.5 * theta * cotangent) / (theta * theta);
   }
   const Vector3d& p = X.translation_m;
   const Vector3d wp = w.cross(p);

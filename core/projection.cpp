@@ -50,13 +50,6 @@ bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
   return true;
 }
 
-/// B += weight (x y' + y x')/2
-void add_symmetric(double weight, const Vector3d& x, const Vector3d& y, Matrix3d& B) noexcept {
-  const Vector3d half = 0.5 * weight * y;
-  const Matrix3d xy = x * half.transpose();
-  B += xy + xy.transpose();
-}
-
 double positive_length(const Inertia& M) {
   const double squared = M.H_kg_m2.trace() / (2.0 * M.mass_kg);
   return squared > 0.0 ? std::sqrt(squared) : 1.0;
@@ -395,31 +388,32 @@ ExactProjection::Curvature ExactProjection::curvature(const State& state) const 
 // load: a, b and J of all contacts with this normal, and 1, each times its multiplier.
 void ExactProjection::bend(const State& state, std::size_t i, const Load& load, Curvature& W) const noexcept {
   const Seen& seen = seen_[i];
-  const auto add = [&](double weight, const Vector3d& x, const Vector3d& y) {
-    add_symmetric(-weight, x, y, W.B);
-    W.B.diagonal().array() += weight * x.dot(y);
-  };
   const Vector3d n = J_[i].head<3>();
   const auto R_T = state.R.transpose();
   const Vector3d n_Q = R_T * n;
+  // B -= M(x, y), with sym(x, y) as x y' until all are in
+  const auto bend_by = [&](const Matrix3d& xy, double trace) {
+    W.B -= 0.5 * (xy + xy.transpose());
+    W.B.diagonal().array() += trace;
+  };
   if (seen.kind == ContactKind::vertex_face) {
-    add(1.0, n_Q, load.a);
+    bend_by(n_Q * load.a.transpose(), n_Q.dot(load.a));
     return;
   }
   const Vector3d w = R_T * (load.m * state.u - load.b);
   if (seen.kind == ContactKind::face_vertex) {
-    add(1.0, seen.d, w);
+    bend_by(seen.d * w.transpose(), seen.d.dot(w));
     for (int j = 0; j < 3; ++j) W.C.col(j) += load.m * n.cross(state.R.col(j));
     return;
   }
   const Vector3d dB = R_T * seen.dB;
-  const Vector3d N = seen.d.cross(dB);
-  const double s = N.norm();
   const double cosine = seen.d.dot(dB);
-  add(1.0 / s, dB.cross(w + load.a), seen.d);
-  add(1.0 / s, N, load.a);
-  add_symmetric(2.0 / s, dB, seen.d.cross(load.a), W.B);
-  add_symmetric(-2.0 / s * cosine, load.turning, n_Q, W.B);
+  const double s = seen.d.cross(dB).norm();
+  const Vector3d lever = dB.cross(w + load.a) / s;
+  const Vector3d across = seen.d.cross(load.a) * (2.0 / s);
+  const Vector3d tilting = load.a + (2.0 / s * cosine) * load.turning;
+  bend_by(lever * seen.d.transpose() - dB * across.transpose() + n_Q * tilting.transpose(),
+          lever.dot(seen.d) + n_Q.dot(load.a));
   W.C -= (load.m / s) * (state.R * seen.d * dB.transpose() + cosine * (n * n_Q.transpose() - state.R));
 }
 
