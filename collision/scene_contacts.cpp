@@ -53,9 +53,25 @@ bool touches_along(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
   return m.dot(edge.side[0]) >= least && m.dot(edge.side[1]) >= least;
 }
 
+/// The edge of a vertex that runs along d, if there is one.
+const ConvexBody::Edge* edge_along(const ConvexBody& body, std::uint32_t vertex, const Vector3d& d) noexcept {
+  constexpr double kAlong = 1.0 - 0.5 * kParallel * kParallel;  // cosine
+  for (const std::uint32_t e : body.edges_of(vertex))
+    if (std::abs(body.edges[e].d.dot(d)) > kAlong) return &body.edges[e];
+  return nullptr;
+}
+
 /// The gap of two edges is the same at all their points: its first end stands for the second.
-std::uint32_t first_end(const ConvexBody::Edge& edge, std::uint32_t vertex) noexcept {
-  return vertex == edge.to ? edge.from : vertex;
+std::uint32_t first_end(const ConvexBody& body, std::uint32_t vertex, const Vector3d& d) noexcept {
+  const ConvexBody::Edge* edge = edge_along(body, vertex, d);
+  return edge != nullptr ? edge->from : vertex;
+}
+
+/// Does a point of the line through an edge lie between its ends?
+bool between_ends(const ConvexBody& body, const ConvexBody::Edge& edge, const Vector3d& p_m,
+                  double tolerance_m) noexcept {
+  return edge.d.dot(p_m - body.vertices_T_m[edge.from]) >= -tolerance_m &&
+         edge.d.dot(p_m - body.vertices_T_m[edge.to]) <= tolerance_m;
 }
 
 /// Fixed to the same features?
@@ -190,7 +206,7 @@ SceneContacts::Normal SceneContacts::normal_of(const HeldPlane& plane, const Fra
     case ContactKind::edge_edge: {
       const Vector3d N = (X_WT.R * plane.d_T).cross(plane.d_W);
       const double s = N.norm();
-      return s > kParallel ? Normal{N / s, false} : Normal{plane.n_W, true};
+      return s > kParallel ? Normal{N * (1.0 / s), false} : Normal{plane.n_W, true};
     }
   }
   return {plane.n_W, false};
@@ -247,8 +263,8 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
   if (contact.kind == ContactKind::edge_edge) contact.d_W = plane.d_W;
   const auto add = [&](std::uint32_t a, std::uint32_t b) {
     if (contact.kind == ContactKind::edge_edge) {
-      a = first_end(*plane.tool_edge, a);
-      b = first_end(*plane.obstacle_edge, b);
+      a = first_end(tool, a, plane.d_T);
+      b = first_end(obstacle, b, plane.d_W);
     }
     contact.p_TA_m = tool.vertices_T_m[a];
     contact.p_WB_m = obstacle.vertices_T_m[b];
@@ -291,17 +307,29 @@ bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept
   Vector3d sum_W = Vector3d::Zero();
   double pressure = 0.0;
   Pair pressing;
+  int carrying = 0;
   for (const auto& [contact, multiplier] : q.active) {
     if (contact.obstacle != number || !(multiplier > 0.0)) continue;
     pressing = {contact.vertex, contact.obstacle_vertex};
+    ++carrying;
     sum_W += multiplier * contact_point_W(contact, q.X_WQ);
     pressure += multiplier;
   }
   if (!(pressure > 0.0)) return true;
   const Frame X_WT(q.X_WQ);
   const Vector3d centre_W = sum_W / pressure;
-  const Vector3d n_W = normal_of(planes_[k], X_WT).n_W;
+  const Vector3d centre_T = X_WT.R.transpose() * (centre_W - X_WT.x_m);
   const double tolerance_m = kPressure * scene_.tool_radius_m();
+  const ConvexBody& tool = scene_.tool().hull;
+  const ConvexBody& obstacle = scene_.convex()[k].body;
+  if (carrying == 1 && planes_[k].kind == ContactKind::edge_edge) {
+    const auto* a = edge_along(tool, pressing.tool_vertex, planes_[k].d_T);
+    const auto* b = edge_along(obstacle, pressing.obstacle_vertex, planes_[k].d_W);
+    if (a != nullptr && b != nullptr)
+      return between_ends(tool, *a, centre_T, tolerance_m) &&
+             between_ends(obstacle, *b, centre_W, tolerance_m);
+  }
+  const Vector3d n_W = normal_of(planes_[k], X_WT).n_W;
   const auto below = [&](const ConvexBody::Face& face, const Vector3d& p) {
     return face.n.dot(p) <= face.offset_m + tolerance_m;
   };
@@ -317,11 +345,9 @@ bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept
   };
   // A mean of vertices lies in their body.
   const ContactKind kind = planes_[k].kind;
-  const auto R_TW = X_WT.R.transpose();
-  return (kind == ContactKind::face_vertex ||
-          within(scene_.convex()[k].body, n_W, pressing.obstacle_vertex, centre_W)) &&
+  return (kind == ContactKind::face_vertex || within(obstacle, n_W, pressing.obstacle_vertex, centre_W)) &&
          (kind == ContactKind::vertex_face ||
-          within(scene_.tool().hull, R_TW * -n_W, pressing.tool_vertex, R_TW * (centre_W - X_WT.x_m)));
+          within(tool, X_WT.R.transpose() * -n_W, pressing.tool_vertex, centre_T));
 }
 
 /// Keeps a plane as a choice if it separates well enough.
@@ -368,7 +394,7 @@ void SceneContacts::consider_edge_pair(std::uint32_t k, const Frame& X_WT, const
   for (const double sign : {1.0, -1.0}) {
     const Vector3d n_W = sign * N;
     if (!touches_along(b, n_W) || !touches_along(a, X_WT.R.transpose() * -n_W)) continue;
-    consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d, &a, &b}, X_WT, least_separation_m);
+    consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
   }
 }
 

@@ -18,8 +18,6 @@ struct HeldPlane {
   Vector3d n_W = Vector3d::UnitZ();  ///< from the obstacle to the tool; of the pose where it was taken
   Vector3d d_T = Vector3d::Zero();   ///< as in Contact
   Vector3d d_W = Vector3d::Zero();   ///< as in Contact
-  const ConvexBody::Edge* tool_edge = nullptr;
-  const ConvexBody::Edge* obstacle_edge = nullptr;  ///< both of edge_edge, null else
 };
 
 /// The contacts of a scene, for one user.

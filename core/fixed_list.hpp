@@ -40,6 +40,8 @@ class FixedList {
   }
   /// The last element takes the place of the i-th.
   void remove_unordered(std::size_t i) noexcept { elements_[i] = elements_[--size_]; }
+  /// Forgets all but the first.
+  void truncate(std::size_t size) noexcept { size_ = size < size_ ? size : size_; }
   void clear() noexcept { size_ = 0; }
 
  private:

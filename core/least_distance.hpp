@@ -32,7 +32,8 @@ class LeastDistance {
   /// Adds b . z >= c. b need not be unit length, but must not be zero.
   void add(const Vector& b, double c) noexcept {
     const double length = b.norm();
-    add_unit(b / length, c / length);
+    const double scale = 1.0 / length;
+    add_unit(b * scale, c * scale);
     length_[count_ - 1] = length;
   }
   /// The same for a b of unit length.

@@ -243,7 +243,8 @@ ExactProjection::Affine ExactProjection::affine(const Seen& seen, const Matrix3d
       return {n, seen.d.dot(seen.a) - n.dot(seen.b)};
     }
     case ContactKind::edge_edge: {
-      const Vector3d n = (R * seen.d).cross(seen.dB).normalized();
+      const Vector3d N = (R * seen.d).cross(seen.dB);
+      const Vector3d n = N * (1.0 / N.norm());
       return {n, n.dot(R * seen.a - seen.b)};
     }
   }
@@ -637,7 +638,8 @@ void ExactProjection::make_room(const State& state) noexcept {
   }
 }
 
-/// Adds what touches idly. False where it is not idle: where something that was not known overlaps.
+/// Adds what touches idly. False, and nothing is added, where it is not idle: where something that was not
+/// known overlaps.
 bool ExactProjection::meet_touching(const State& state) noexcept {
   const std::size_t known = contacts_.size();
   scene_->add_touching(pose_of(state), kTouching * L_, contacts_);
@@ -645,7 +647,9 @@ bool ExactProjection::meet_touching(const State& state) noexcept {
   for (std::size_t i = known; i < contacts_.size(); ++i) {
     const Affine at = affine(seen_[i], state.R);
     gap_[i] = at.n.dot(state.u) + at.h;
-    if (gap_[i] * L_ < -tolerance_m_) return false;
+    if (gap_[i] * L_ >= -tolerance_m_) continue;
+    contacts_.truncate(known);
+    return false;
   }
   met_touching_ = true;
   return !contacts_.full();  // a full set cannot tell of what it has no room for

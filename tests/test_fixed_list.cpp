@@ -24,6 +24,11 @@ TEST_CASE("a fixed list takes what fits, and a copy is its own", "[fixed_list]")
   list = copy;
   CHECK(list.size() == 2);
   CHECK(list[0] == 3);
+  list.truncate(5);
+  CHECK(list.size() == 2);
+  list.truncate(1);
+  CHECK(list.size() == 1);
+  CHECK(list[0] == 3);
   list.clear();
   CHECK(list.begin() == list.end());
 }

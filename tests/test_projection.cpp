@@ -26,7 +26,7 @@ double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaternion
 /// random steps.
 double brute_force(const Scene& scene, const Pose& X_WP, RandomValues& random) {
   double best = std::numeric_limits<double>::infinity();
-  Quaterniond best_E;
+  Quaterniond best_E = Quaterniond::Identity();
   const auto look = [&](const Quaterniond& E) {
     const double T = energy_of_rotation(scene, X_WP, E);
     if (T >= best) return false;

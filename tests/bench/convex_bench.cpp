@@ -35,10 +35,10 @@ class Follower {
     depth_ = std::make_unique<PenetrationDepth>(pair_.scene, options_);
     X_last_ = depth_->query(pair_.X_WP.front()).projection.X_WQ;
   }
-  Projection follow(std::size_t i) {
-    const Projection q = depth_->follow(pair_.X_WP[i], X_last_).projection;
-    X_last_ = q.X_WQ;
-    return q;
+  Penetration follow(std::size_t i) {
+    Penetration out = depth_->follow(pair_.X_WP[i], X_last_);
+    X_last_ = out.projection.X_WQ;
+    return out;
   }
 
  private:
@@ -55,7 +55,8 @@ Runner wrenchd_runner(std::string name, const ConvexPair& pair, Method method) {
   const double mass_kg = pair.scene.tool().solid.inertia.mass_kg;
   return {std::move(name), [follower] { follower->restart(); },
           [follower, mass_kg](std::size_t i) -> Answer {
-            const Projection q = follower->follow(i);
+            const Penetration out = follower->follow(i);
+            const Projection& q = out.projection;
             const bool found = q.status != ProjectionStatus::infeasible && q.status != ProjectionStatus::free;
             return {found ? std::sqrt(q.energy / mass_kg) : kNaN, q.kkt_residual, q.active.size(),
                     q.status == ProjectionStatus::converged};
@@ -119,7 +120,7 @@ Soundness examine(const ConvexPair& pair, const Result& exact) {
   Follower follower(pair, Method::exact);
   follower.restart();
   for (std::size_t i = 0; i < pair.X_WP.size(); ++i) {
-    const Pose X_WQ = follower.follow(i).X_WQ;
+    const Pose X_WQ = follower.follow(i).projection.X_WQ;
     const Overlap left = overlap(pair.tool_surface_T.moved(X_WQ), pair.obstacle_surface_W);
     found.overlapping += left.depth_m > kStillOverlapping_m ? 1 : 0;
     const Answer& answer = exact.answers[i];
