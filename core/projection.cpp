@@ -524,7 +524,7 @@ bool ExactProjection::lift_turning(State& state) noexcept {
 
 /// Newton's method, with first guesses of the multipliers. Leaves the gaps of the last state. asked: the
 /// scene has been asked about this state, and is about every next. A proxy begins without: the contacts that
-/// held it are taken for all there are until they have an answer, which is right in nearly every tick.
+/// held it are taken for all there are until they have an answer, or one of them lets go.
 ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexcept {
   for (;;) {
     linearise(state);
@@ -544,7 +544,9 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     Vector6d dy;
     const bool stepped = newton_step(g, dy);
     const double promised = stepped ? -g.dot(dy) : 0.0;  // first-order fall of T
-    const Advance moved = stepped ? advance(state, dy, promised, asked) : Advance::stuck;
+    const bool ask = asked || some_contact_idle();       // another has to take its place
+    const Advance moved = stepped ? advance(state, dy, promised, ask) : Advance::stuck;
+    if (moved == Advance::fell) asked = ask;
     if (moved != Advance::stuck) continue;  // contacts met: the same state, with a model that knows them
     if (!asked) {
       if (!lift_turning(state)) return Local::infeasible;
@@ -567,10 +569,15 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
   return std::sqrt(rest.squaredNorm() / std::max(g.squaredNorm(), kLeastGradient * kLeastGradient));
 }
 
+bool ExactProjection::some_contact_idle() const noexcept {
+  return std::any_of(multiplier_.begin(), multiplier_.begin() + contacts_.size(),
+                     [](double m) { return !(m > 0.0); });
+}
+
 /// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails
 /// and has met contacts the model did not know ends the search: with them the next step will be a better one.
 ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy, double promised,
-                                                  bool asked) noexcept {
+                                                  bool ask) noexcept {
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d eta = dy.tail<3>();
@@ -583,7 +590,7 @@ ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& 
     State trial = state;
     turn(trial, fraction * eta);
     const std::size_t known = contacts_.size();
-    if ((asked ? restore(trial) : translate(trial)) &&
+    if ((ask ? restore(trial) : translate(trial)) &&
         trial.T <= state.T + rounding - kFairShare * fraction * promised) {
       state = trial;
       return Advance::fell;

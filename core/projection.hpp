@@ -155,6 +155,7 @@ class ExactProjection {
   bool lift(State& state) noexcept;
   bool lift_turning(State& state) noexcept;
   Local minimise(State& state, bool asked) noexcept;
+  bool some_contact_idle() const noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
   Curvature curvature_of_metric(const State& state) const noexcept;
@@ -165,7 +166,7 @@ class ExactProjection {
   void factorise_convex_part(const Curvature& W, Root& root) const noexcept;
   void model(const State& state) noexcept;
   bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
-  Advance advance(State& state, const Vector6d& dy, double promised, bool asked) noexcept;
+  Advance advance(State& state, const Vector6d& dy, double promised, bool ask) noexcept;
   void make_room(const State& state) noexcept;
   bool meet_touching(const State& state) noexcept;
   void report(Projection& out) noexcept;
