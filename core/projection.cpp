@@ -649,17 +649,19 @@ void ExactProjection::make_room(const State& state) noexcept {
 /// known overlaps.
 bool ExactProjection::meet_touching(const State& state) noexcept {
   const std::size_t known = contacts_.size();
-  scene_->add_touching(pose_of(state), kTouching * L_, contacts_);
+  const Pose X_WQ = pose_of(state);
+  scene_->add_touching(X_WQ, kTouching * L_, contacts_);
   see_from(known);
-  for (std::size_t i = known; i < contacts_.size(); ++i) {
+  met_touching_ = true;
+  for (std::size_t i = known; i < contacts_.size() && met_touching_; ++i) {
     const Affine at = affine(seen_[i], state.R);
     gap_[i] = at.n.dot(state.u) + at.h;
-    if (gap_[i] * L_ >= -tolerance_m_) continue;
-    contacts_.truncate(known);
-    return false;
+    met_touching_ = gap_[i] * L_ >= -tolerance_m_;
   }
-  met_touching_ = true;
-  return !contacts_.full();  // a full set cannot tell of what it has no room for
+  // A full set cannot tell of what it has no room for.
+  if (contacts_.full() && met_touching_) met_touching_ = scene_->admits(X_WQ, tolerance_m_);
+  if (!met_touching_) contacts_.truncate(known);
+  return met_touching_;
 }
 
 /// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the

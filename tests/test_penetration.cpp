@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include <catch2/catch.hpp>
@@ -211,6 +212,28 @@ TEST_CASE("a proxy that slides over a convex body is admissible at every step an
     CHECK(worst < 1e-6);
   }
   CHECK(steps > 1000);
+}
+
+TEST_CASE("a proxy rests on a face of more vertices than a query has room for", "[penetration]") {
+  std::vector<Vector3d> corners;
+  for (int i = 0; i < 200; ++i)
+    for (const double z : {0.0, 0.3}) {
+      const double angle = 0.01 * i * std::numbers::pi;
+      corners.emplace_back(std::cos(angle), std::sin(angle), z);
+    }
+  const Scene scene(tool_of(corners), {half_space(Vector3d::UnitZ(), 0.0)});
+  PenetrationDepth follower(scene, {});
+  Pose X_last{Quaterniond::Identity(), {0.0, 0.0, 1.0}};
+  for (int k = 0; k < 300; ++k) {
+    const double t = 0.02 * k;
+    const Pose X_WP{rotation_from({0.02 * std::sin(t), 0.02 * std::cos(1.3 * t), t}), {t, 0.0, 0.1}};
+    const Penetration p = follower.follow(X_WP, X_last);
+    REQUIRE(p.projection.status == ProjectionStatus::converged);
+    REQUIRE(least_gap_m(scene, p.projection.X_WQ) >= -1e-12);
+    CHECK(p.projection.energy ==
+          Approx(depth_by(Method::exact, scene).query(X_WP).projection.energy).epsilon(1e-9));
+    X_last = p.projection.X_WQ;
+  }
 }
 
 TEST_CASE("a proxy among several bodies and walls stays out of all of them", "[penetration][convex]") {
