@@ -298,56 +298,65 @@ bool SceneContacts::settled(const Projection& q) noexcept {
   return true;
 }
 
-// The forces of one obstacle's contacts all act along n. They balance on a plane that is free to tilt where
-// their resultant passes through both bodies: where the centre of pressure c = sum m_i c_i / sum m_i lies in
-// the tool and in the obstacle. As it lies on the plane, that is where it lies in what touches the plane of
-// either, and only faces that meet there can leave it out.
-bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept {
+/// The mean of the contacts with one obstacle, each weighted with what it carries. Nothing where none does.
+std::optional<SceneContacts::Pressure> SceneContacts::pressure_of(std::uint32_t k,
+                                                                  const Projection& q) const noexcept {
   const auto number = static_cast<std::uint32_t>(scene_.half_spaces().size()) + k;
-  Vector3d sum_W = Vector3d::Zero();
-  double pressure = 0.0;
-  Pair pressing;
-  int carrying = 0;
+  Pressure out;
+  double sum = 0.0;
   for (const auto& [contact, multiplier] : q.active) {
     if (contact.obstacle != number || !(multiplier > 0.0)) continue;
-    pressing = {contact.vertex, contact.obstacle_vertex};
-    ++carrying;
-    sum_W += multiplier * contact_point_W(contact, q.X_WQ);
-    pressure += multiplier;
+    out.pair = {contact.vertex, contact.obstacle_vertex};
+    out.centre_W_m += multiplier * contact_point_W(contact, q.X_WQ);
+    ++out.contacts;
+    sum += multiplier;
   }
-  if (!(pressure > 0.0)) return true;
-  const Frame X_WT(q.X_WQ);
-  const Vector3d centre_W = sum_W / pressure;
-  const Vector3d centre_T = X_WT.R.transpose() * (centre_W - X_WT.x_m);
-  const double tolerance_m = kPressure * scene_.tool_radius_m();
+  if (out.contacts == 0) return std::nullopt;
+  out.centre_W_m /= sum;
+  return out;
+}
+
+// The forces of one obstacle's contacts all act along n. They balance on a plane that is free to tilt where
+// their resultant passes through both bodies: where the centre of pressure c = sum m_i c_i / sum m_i lies in
+// the tool and in the obstacle.
+bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept {
+  const auto pressure = pressure_of(k, q);
+  if (!pressure) return true;
+  const HeldPlane& plane = planes_[k];
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
-  if (carrying == 1 && planes_[k].kind == ContactKind::edge_edge) {
-    const auto* a = edge_along(tool, pressing.tool_vertex, planes_[k].d_T);
-    const auto* b = edge_along(obstacle, pressing.obstacle_vertex, planes_[k].d_W);
-    if (a != nullptr && b != nullptr)
-      return between_ends(tool, *a, centre_T, tolerance_m) &&
-             between_ends(obstacle, *b, centre_W, tolerance_m);
+  const Frame X_WT(q.X_WQ);
+  const Vector3d& centre_W = pressure->centre_W_m;
+  const Vector3d centre_T = X_WT.R.transpose() * (centre_W - X_WT.x_m);
+  const auto [a, b] = pressure->pair;
+  if (plane.kind == ContactKind::edge_edge && pressure->contacts == 1) {
+    const auto* tool_edge = edge_along(tool, a, plane.d_T);
+    const auto* obstacle_edge = edge_along(obstacle, b, plane.d_W);
+    const double tolerance_m = kPressure * scene_.tool_radius_m();
+    if (tool_edge != nullptr && obstacle_edge != nullptr)
+      return between_ends(tool, *tool_edge, centre_T, tolerance_m) &&
+             between_ends(obstacle, *obstacle_edge, centre_W, tolerance_m);
   }
-  const Vector3d n_W = normal_of(planes_[k], X_WT).n_W;
-  const auto below = [&](const ConvexBody::Face& face, const Vector3d& p) {
-    return face.n.dot(p) <= face.offset_m + tolerance_m;
-  };
-  const auto within = [&](const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
-                          const Vector3d& p) {
-    if (body.faces.size() <= kFewFaces)
-      return std::all_of(body.faces.begin(), body.faces.end(), [&](const auto& f) { return below(f, p); });
-    collect_touching(body, normal, farthest, touching_);
-    for (const std::uint32_t v : touching_)
-      for (const std::uint32_t f : body.faces_of(v))
-        if (!below(body.faces[f], p)) return false;
-    return true;
-  };
   // A mean of vertices lies in their body.
-  const ContactKind kind = planes_[k].kind;
-  return (kind == ContactKind::face_vertex || within(obstacle, n_W, pressing.obstacle_vertex, centre_W)) &&
-         (kind == ContactKind::vertex_face ||
-          within(tool, X_WT.R.transpose() * -n_W, pressing.tool_vertex, centre_T));
+  const Vector3d n_W = normal_of(plane, X_WT).n_W;
+  return (plane.kind == ContactKind::face_vertex || holds(obstacle, n_W, b, centre_W)) &&
+         (plane.kind == ContactKind::vertex_face || holds(tool, X_WT.R.transpose() * -n_W, a, centre_T));
+}
+
+/// Does a body hold a point of the plane that touches it, with this outward normal, at its vertex `farthest`?
+/// Only faces that meet the plane can leave the point out.
+bool SceneContacts::holds(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
+                          const Vector3d& p_m) noexcept {
+  const double tolerance_m = kPressure * scene_.tool_radius_m();
+  const auto below = [&](const ConvexBody::Face& face) {
+    return face.n.dot(p_m) <= face.offset_m + tolerance_m;
+  };
+  if (body.faces.size() <= kFewFaces) return std::all_of(body.faces.begin(), body.faces.end(), below);
+  collect_touching(body, normal, farthest, touching_);
+  for (const std::uint32_t v : touching_)
+    for (const std::uint32_t f : body.faces_of(v))
+      if (!below(body.faces[f])) return false;
+  return true;
 }
 
 /// Keeps a plane as a choice if it separates well enough.

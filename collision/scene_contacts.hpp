@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "collision/scene.hpp"
@@ -89,6 +90,12 @@ class SceneContacts final : public ContactSource {
     std::uint32_t tool_vertex = 0;
     std::uint32_t obstacle_vertex = 0;
   };
+  /// Where the contacts with one obstacle press.
+  struct Pressure {
+    Vector3d centre_W_m = Vector3d::Zero();
+    Pair pair;         ///< one of them
+    int contacts = 0;  ///< how many carry
+  };
   /// Of a plane at one pose.
   struct Normal {
     Vector3d n_W;
@@ -128,7 +135,10 @@ class SceneContacts final : public ContactSource {
   double separation_m(std::uint32_t k, const Vector3d& n_W, Pair pair, const Frame& X_WT) const noexcept;
   bool separates(std::uint32_t k, const Frame& X_WT, double tolerance_m) const noexcept;
   bool out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept;
+  std::optional<Pressure> pressure_of(std::uint32_t k, const Projection& q) const noexcept;
   bool press_settled(std::uint32_t k, const Projection& q) noexcept;
+  bool holds(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
+             const Vector3d& p_m) noexcept;
   void consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT, double least_separation_m) noexcept;
   void consider_between_centres(std::uint32_t k, const Frame& X_WT) noexcept;
   void consider_faces(std::uint32_t k, const Frame& X_WT) noexcept;
