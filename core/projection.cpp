@@ -180,7 +180,7 @@ Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveCo
   bool apart = true;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
-    apart = apart && affine(seen_[i], Matrix3d::Identity()).h * L_ >= -tolerance_m_;
+    apart = apart && !overlaps_at_p(seen_[i]);
   }
   if (apart && scene_->admits(X_WP_, tolerance_m_)) return free();
   iterations_ = 0;
@@ -249,6 +249,21 @@ ExactProjection::Affine ExactProjection::affine(const Seen& seen, const Matrix3d
     }
   }
   return {seen.n, seen.n.dot(R * seen.a) + seen.c};
+}
+
+/// Does a contact certainly overlap at p? The gap of two edges is looked at without the length of their
+/// normal, which is at most 1.
+bool ExactProjection::overlaps_at_p(const Seen& seen) const noexcept {
+  const double least = -tolerance_m_ / L_;
+  switch (seen.kind) {
+    case ContactKind::vertex_face:
+      break;
+    case ContactKind::face_vertex:
+      return seen.d.dot(seen.a - seen.b) < least;
+    case ContactKind::edge_edge:
+      return seen.d.cross(seen.dB).dot(seen.a - seen.b) < least;
+  }
+  return seen.n.dot(seen.a) + seen.c < least;
 }
 
 double ExactProjection::scaled_energy(const State& state) const noexcept {

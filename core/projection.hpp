@@ -146,6 +146,7 @@ class ExactProjection {
   Pose pose_of(const State& state) const noexcept;
   void see_from(std::size_t first) noexcept;
   Affine affine(const Seen& seen, const Matrix3d& R) const noexcept;
+  bool overlaps_at_p(const Seen& seen) const noexcept;
   double scaled_energy(const State& state) const noexcept;
   void turn(State& state, const Vector3d& eta) const noexcept;
   bool translate(State& state) noexcept;
