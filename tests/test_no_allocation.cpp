@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
 
 #include <catch2/catch.hpp>
 
+#include "collision/penetration.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/random_body.hpp"
 #include "tests/support/shipped_plan.hpp"
 
 using namespace wrenchd;
@@ -58,6 +62,37 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   CHECK(fault == Fault::device_lost);
   CHECK(in_contact > 3000);
   CHECK(saturated > 500);
+  CHECK(allocations == 0);
+  CHECK(locks == 0);
+}
+
+TEST_CASE("following a hand around a convex body neither allocates nor locks", "[realtime][convex]") {
+  const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
+  RandomValues random(31);
+  const Scene scene(random_body(random, 40), {half_space(Vector3d::UnitZ(), -1.2)},
+                    {convex_obstacle("body", random_body(random, 50).hull)});
+  PenetrationDepth depth(scene, {method});
+  const int steps = method == Method::exact ? 2000 : 100;
+  int in_contact = 0;
+  std::uint64_t allocations = 0;
+  std::uint64_t locks = 0;
+  {
+    const RealtimeGuard guard;
+    Pose X_last{Quaterniond::Identity(), {3.0, 0.0, 0.0}};
+    for (int k = 0; k < steps; ++k) {
+      const double t = 10.0 * k / steps;
+      const double away = std::max(0.9, 3.0 - t);
+      const Pose X_WP{rotation_from({t, 0.3 * std::sin(t), 0.0}),
+                      {away * std::cos(t), away * std::sin(t), 0.3 * std::sin(2.0 * t)}};
+      const Penetration p = depth.follow(X_WP, X_last);
+      in_contact += p.contacts > 0 ? 1 : 0;
+      X_last = p.projection.X_WQ;
+    }
+    depth.query({Quaterniond::Identity(), {0.8, 0.0, 0.0}});
+    allocations = guard.allocations();
+    locks = guard.locks();
+  }
+  CHECK(in_contact > steps / 4);
   CHECK(allocations == 0);
   CHECK(locks == 0);
 }
