@@ -512,7 +512,6 @@ void ExactProjection::model(const State& state) noexcept {
 ///
 /// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g. At an
 /// admissible state dy = 0 is allowed, so there always is an answer. Leaves the multipliers.
-///
 bool ExactProjection::newton_step(const Vector6d& g, Vector6d& dy) noexcept {
   step_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root_.solve(J_[i]), -std::max(gap_[i], 0.0));
@@ -548,9 +547,8 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     const bool converged = residual_ <= kSmallResidual;
     if (converged || iterations_ == iteration_limit_) {
       const Local local = converged ? Local::converged : Local::budget_spent;
-      if (asked) return local;
-      if (meet_touching(state)) return local;
-      if (!restore(state)) return Local::infeasible;
+      if (asked || meet_touching(state)) return local;
+      if (!restore(state) && !lift_turning(state)) return Local::infeasible;
       asked = true;
       continue;
     }
