@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "collision/mesh_solid.hpp"
 
-#include <cmath>
-#include <locale>
-#include <sstream>
 #include <string>
 
 #include "collision/convex_hull.hpp"
@@ -22,17 +19,9 @@ TriangleMesh load_solid(const std::filesystem::path& file) {
   throw MeshError(message);
 }
 
-void require_convex(const std::filesystem::path& file, const TriangleMesh& solid, const ConvexBody& hull) {
+bool fills_its_hull(const TriangleMesh& solid, const ConvexBody& hull) {
   constexpr double kFull = 1.0 - 1e-6;  // modelling programs round the corners of flat faces
-  const double share = solid_properties(solid, 1.0).volume_m3 / volume(hull);
-  if (share >= kFull) return;
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << file.string() << ": is not convex: it fills " << 100.0 * share
-       << " % of its convex hull; a mesh obstacle, and a tool that meets one, must be convex: give its hull, "
-          "or "
-          "build it of convex obstacles";
-  throw MeshError(text.str());
+  return solid_properties(solid, 1.0).volume_m3 >= kFull * volume(hull);
 }
 
 }  // namespace wrenchd

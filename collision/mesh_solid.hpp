@@ -12,7 +12,7 @@ namespace wrenchd {
 /// Throws MeshError that names the file, the defect, its place and the cure. Not RT safe.
 TriangleMesh load_solid(const std::filesystem::path& file);
 
-/// Throws MeshError where the solid does not fill its convex hull. Not RT safe.
-void require_convex(const std::filesystem::path& file, const TriangleMesh& solid, const ConvexBody& hull);
+/// Is a solid convex, but for what rounding of its corners takes away? Not RT safe.
+bool fills_its_hull(const TriangleMesh& solid, const ConvexBody& hull);
 
 }  // namespace wrenchd

@@ -10,26 +10,31 @@
 namespace wrenchd {
 namespace {
 
-std::vector<ConvexObstacle> load_obstacles(const SceneSettings& settings) {
-  std::vector<ConvexObstacle> obstacles;
-  for (const MeshObstacleSettings& obstacle : settings.meshes) {
-    const TriangleMesh solid = load_solid(obstacle.mesh);
-    ConvexBody body = convex_hull(solid.vertices_m);
-    require_convex(obstacle.mesh, solid, body);
-    for (Vector3d& p : body.vertices_T_m) p = obstacle.X_WM * Vector3d(p * obstacle.scale);
-    obstacles.push_back(convex_obstacle(obstacle.name, std::move(body)));
-  }
-  return obstacles;
-}
-
-/// Half-spaces feel no more of the tool than its hull; convex obstacles would.
-ToolBody load_tool_for(const SceneSettings& settings) {
+/// Reads what the settings name, and holds the obstacles in the one form or the other.
+Scene load(const SceneSettings& settings) {
   ToolBody tool = load_tool(settings.tool);
-  if (!settings.meshes.empty()) {
-    const TriangleMesh solid = load_solid(settings.tool.mesh);
-    require_convex(settings.tool.mesh, solid, convex_hull(solid.vertices_m));
+  std::vector<TriangleMesh> solids;
+  std::vector<ConvexBody> hulls;
+  bool all_convex = !settings.meshes.empty() && fills_its_hull(tool.mesh, tool.hull);
+  for (const MeshObstacleSettings& obstacle : settings.meshes) {
+    solids.push_back(load_solid(obstacle.mesh));
+    if (!all_convex) continue;
+    hulls.push_back(convex_hull(solids.back().vertices_m));
+    all_convex = fills_its_hull(solids.back(), hulls.back());
   }
-  return tool;
+  std::vector<ConvexObstacle> convex;
+  std::vector<MeshObstacle> meshes;
+  for (std::size_t k = 0; k < solids.size(); ++k) {
+    const auto& [name, file, scale, X_WM] = settings.meshes[k];
+    if (all_convex) {
+      for (Vector3d& p : hulls[k].vertices_T_m) p = X_WM * Vector3d(p * scale);
+      convex.push_back(convex_obstacle(name, std::move(hulls[k])));
+    } else {
+      for (Vector3d& p : solids[k].vertices_m) p *= scale;
+      meshes.push_back({name, TreedMesh(std::move(solids[k])), X_WM});
+    }
+  }
+  return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes));
 }
 
 double radius_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
@@ -49,13 +54,19 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
   return obstacle;
 }
 
-Scene::Scene(const SceneSettings& settings)
-    : Scene(load_tool_for(settings), settings.half_spaces, load_obstacles(settings)) {}
+TreedMesh::TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind)
+    : surface(std::move(mesh), kind), tree(surface.mesh()) {}
 
-Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex)
+Scene::Scene(const SceneSettings& settings) : Scene(load(settings)) {}
+
+Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex,
+             std::vector<MeshObstacle> meshes)
     : tool_(std::move(tool)),
       tool_radius_m_(radius_m(tool_.hull.vertices_T_m, Vector3d::Zero())),
       half_spaces_(std::move(half_spaces)),
-      convex_(std::move(convex)) {}
+      convex_(std::move(convex)),
+      meshes_(std::move(meshes)) {
+  if (!meshes_.empty()) tool_mesh_.emplace(tool_.mesh);
+}
 
 }  // namespace wrenchd

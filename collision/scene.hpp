@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "collision/mesh_surface.hpp"
 #include "collision/tool_body.hpp"
+#include "collision/triangle_tree.hpp"
 #include "core/convex_body.hpp"
 #include "core/scene_settings.hpp"
 
@@ -18,29 +21,55 @@ struct ConvexObstacle {
   double radius_m = 0.0;  ///< of a sphere about the centre that holds it
 };
 
+/// The surface of a body of any shape, and the tree over its triangles.
+struct TreedMesh {
+  explicit TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid);
+
+  MeshSurface surface;
+  TriangleTree tree;
+};
+
+/// An obstacle of any shape. O: the frame of its mesh, in metres.
+struct MeshObstacle {
+  std::string name;
+  TreedMesh mesh;
+  Pose X_WO;
+};
+
 /// An obstacle from its hull in the world.
 ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W);
 
 /// The tool and the obstacles it may touch. Built once, then only read.
 ///
-/// Obstacles are numbered: the half-spaces first, then the convex ones.
+/// Where the tool and all mesh obstacles are convex, the obstacles are held as convex(), which is quicker;
+/// otherwise as meshes().
+///
+/// Obstacles are numbered: the half-spaces first, then the convex ones, then the meshes.
 class Scene {
  public:
   /// Throws MeshError where a mesh cannot be used.
   explicit Scene(const SceneSettings& settings);
-  Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex = {});
+  Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex = {},
+        std::vector<MeshObstacle> meshes = {});
 
   const ToolBody& tool() const noexcept { return tool_; }
   double tool_radius_m() const noexcept { return tool_radius_m_; }
   const std::vector<HalfSpaceSettings>& half_spaces() const noexcept { return half_spaces_; }
   const std::vector<ConvexObstacle>& convex() const noexcept { return convex_; }
-  std::size_t obstacle_count() const noexcept { return half_spaces_.size() + convex_.size(); }
+  const std::vector<MeshObstacle>& meshes() const noexcept { return meshes_; }
+  /// The tool as the meshes meet it, in T; null where there are none.
+  const TreedMesh* tool_mesh() const noexcept { return tool_mesh_ ? &*tool_mesh_ : nullptr; }
+  std::size_t obstacle_count() const noexcept {
+    return half_spaces_.size() + convex_.size() + meshes_.size();
+  }
 
  private:
   ToolBody tool_;
   double tool_radius_m_;  ///< farthest vertex of the hull from the centre of mass
   std::vector<HalfSpaceSettings> half_spaces_;
   std::vector<ConvexObstacle> convex_;
+  std::vector<MeshObstacle> meshes_;
+  std::optional<TreedMesh> tool_mesh_;
 };
 
 }  // namespace wrenchd

@@ -157,7 +157,7 @@ Contact SceneContacts::half_space_contact(std::uint32_t k, std::uint32_t vertex)
   contact.p_WB_m = contact.offset_m * contact.n_W;
   contact.obstacle = k;
   contact.p_TA_m = scene_.tool().hull.vertices_T_m[vertex];
-  contact.vertex = vertex;
+  contact.tool_feature = vertex;
   return contact;
 }
 
@@ -181,7 +181,7 @@ void SceneContacts::add_all_of_half_space(std::uint32_t k, const Frame& X_WT, do
   const std::size_t known = contacts.size();
   const auto is_known = [&](std::uint32_t v) {
     return std::any_of(contacts.begin(), contacts.begin() + known,
-                       [&](const Contact& c) { return c.obstacle == k && c.vertex == v; });
+                       [&](const Contact& c) { return c.obstacle == k && c.tool_feature == v; });
   };
   scene_.tool().hull.visit_above(
       -seen.n_T, [&] { return -seen.below_m - within_m; },
@@ -269,8 +269,8 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
     contact.p_TA_m = tool.vertices_T_m[a];
     contact.p_WB_m = obstacle.vertices_T_m[b];
     contact.offset_m = contact.n_W.dot(contact.p_WB_m);
-    contact.vertex = a;
-    contact.obstacle_vertex = b;
+    contact.tool_feature = a;
+    contact.obstacle_feature = b;
     if (!contacts.contains(contact)) contacts.add(contact);
   };
 
@@ -306,7 +306,7 @@ std::optional<SceneContacts::Pressure> SceneContacts::pressure_of(std::uint32_t 
   double sum = 0.0;
   for (const auto& [contact, multiplier] : q.active) {
     if (contact.obstacle != number || !(multiplier > 0.0)) continue;
-    out.pair = {contact.vertex, contact.obstacle_vertex};
+    out.pair = {contact.tool_feature, contact.obstacle_feature};
     out.centre_W_m += multiplier * contact_point_W(contact, q.X_WQ);
     ++out.contacts;
     sum += multiplier;

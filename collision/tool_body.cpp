@@ -3,6 +3,7 @@
 
 #include <locale>
 #include <sstream>
+#include <utility>
 
 #include "collision/convex_hull.hpp"
 #include "collision/mesh_file.hpp"
@@ -32,6 +33,8 @@ ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
   tool.solid = solid_properties(mesh, mass_kg);
   for (Vector3d& p : tool.hull.vertices_T_m) p = p * scale - tool.solid.p_MT_m;
   tool.hull.find_faces();
+  for (Vector3d& p : mesh.vertices_m) p -= tool.solid.p_MT_m;
+  tool.mesh = std::move(mesh);
   return tool;
 }
 

@@ -4,6 +4,7 @@
 #include "core/convex_body.hpp"
 #include "core/inertia.hpp"
 #include "core/scene_settings.hpp"
+#include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
 
@@ -12,6 +13,7 @@ namespace wrenchd {
 struct ToolBody {
   SolidProperties solid;  ///< of the uniform solid, in metres and kilograms
   ConvexBody hull;        ///< what a half-space can touch, in T
+  TriangleMesh mesh;      ///< the whole surface, in T [m]
 
   /// Pose of the body frame T in the mesh frame M.
   Pose X_MT() const noexcept { return {Quaterniond::Identity(), solid.p_MT_m}; }

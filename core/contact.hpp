@@ -32,8 +32,10 @@ struct Contact {
   double offset_m = 0.0;               ///< n_W . b, known better than from b for a face [m]
   Vector3d d_T = Vector3d::Zero();     ///< see above; zero for vertex_face
   Vector3d d_W = Vector3d::Zero();     ///< see above; zero but for edge_edge
-  std::uint32_t vertex = 0;            ///< which vertex of the tool a is
-  std::uint32_t obstacle_vertex = 0;   ///< which vertex of the obstacle b is; 0 for vertex_face
+  /// Which vertex, edge or face touches. Convex bodies name the vertex that a or b is; 0 for the face of
+  /// vertex_face.
+  std::uint32_t tool_feature = 0;
+  std::uint32_t obstacle_feature = 0;
   std::uint32_t obstacle = 0;          ///< which obstacle of the scene
 };
 
@@ -75,7 +77,7 @@ inline bool same_normal(const Contact& a, const Contact& b) noexcept {
 
 /// The same pair with the same law of its normal.
 inline bool same_features(const Contact& a, const Contact& b) noexcept {
-  return a.vertex == b.vertex && a.obstacle_vertex == b.obstacle_vertex && same_normal(a, b);
+  return a.tool_feature == b.tool_feature && a.obstacle_feature == b.obstacle_feature && same_normal(a, b);
 }
 
 /// Contacts of one query. The capacity is fixed, so that a tick never allocates; an optimum of 6 unknowns has

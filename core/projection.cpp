@@ -74,11 +74,12 @@ FixedList<ActiveContact, ContactSet::kCapacity> shared_evenly(const Projection& 
 
 ExactProjection::ExactProjection(const Inertia& M) : ExactProjection(M, Budget{}) {}
 
-ExactProjection::ExactProjection(const Inertia& M, Budget budget)
+ExactProjection::ExactProjection(const Inertia& M, Budget budget, double clearance_m)
     : M_(M),
       budget_(budget),
       iteration_limit_(budget.iterations),
       L_(positive_length(M)),
+      clearance_(clearance_m / L_),
       H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
   Matrix6d metric = Matrix6d::Zero();
   metric.diagonal().head<3>().setConstant(2.0);
@@ -149,7 +150,8 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
 void ExactProjection::begin(const Pose& X_WP, const ContactSource& scene) noexcept {
   X_WP_ = X_WP;
   scene_ = &scene;
-  tolerance_m_ = gap_tolerance_m(X_WP);
+  rounding_m_ = gap_tolerance_m(X_WP);
+  tolerance_m_ = rounding_m_ - clearance_ * L_;
 }
 
 Quaterniond ExactProjection::turned_to(const Quaterniond& R_WT) const noexcept {
@@ -240,19 +242,19 @@ ExactProjection::Affine ExactProjection::affine(const Seen& seen, const Matrix3d
       break;
     case ContactKind::face_vertex: {
       const Vector3d n = R * seen.d;
-      return {n, seen.d.dot(seen.a) - n.dot(seen.b)};
+      return {n, seen.d.dot(seen.a) - n.dot(seen.b) - clearance_};
     }
     case ContactKind::edge_edge: {
       const Vector3d N = (R * seen.d).cross(seen.dB);
       const Vector3d n = N * (1.0 / N.norm());
-      return {n, n.dot(R * seen.a - seen.b)};
+      return {n, n.dot(R * seen.a - seen.b) - clearance_};
     }
   }
-  return {seen.n, seen.n.dot(R * seen.a) + seen.c};
+  return {seen.n, seen.n.dot(R * seen.a) + seen.c - clearance_};
 }
 
-/// Does a contact certainly overlap at p? The gap of two edges is looked at without the length of their
-/// normal, which is at most 1.
+/// Is a contact certainly nearer at p than it may be? Without clearance the gap of two edges is looked at
+/// without the length of their normal, whose sign is the same.
 bool ExactProjection::overlaps_at_p(const Seen& seen) const noexcept {
   const double least = -tolerance_m_ / L_;
   switch (seen.kind) {
@@ -260,8 +262,10 @@ bool ExactProjection::overlaps_at_p(const Seen& seen) const noexcept {
       break;
     case ContactKind::face_vertex:
       return seen.d.dot(seen.a - seen.b) < least;
-    case ContactKind::edge_edge:
-      return seen.d.cross(seen.dB).dot(seen.a - seen.b) < least;
+    case ContactKind::edge_edge: {
+      const Vector3d N = seen.d.cross(seen.dB);
+      return N.dot(seen.a - seen.b) < (least > 0.0 ? least * N.norm() : least);
+    }
   }
   return seen.n.dot(seen.a) + seen.c < least;
 }
@@ -338,7 +342,7 @@ void ExactProjection::linearise(const State& state) noexcept {
         turning += seen.d.cross(r);
       } else {
         const Vector3d dB = state.R.transpose() * seen.dB;
-        turning += seen.d.cross(dB.cross(r - gap_[i] * n_Q)) / seen.d.cross(dB).norm();
+        turning += seen.d.cross(dB.cross(r - (gap_[i] + clearance_) * n_Q)) / seen.d.cross(dB).norm();
       }
     }
     J_[i].head<3>() = at.n;
@@ -663,13 +667,13 @@ void ExactProjection::make_room(const State& state) noexcept {
 bool ExactProjection::meet_touching(const State& state) noexcept {
   const std::size_t known = contacts_.size();
   const Pose X_WQ = pose_of(state);
-  scene_->add_touching(X_WQ, kTouching * L_, contacts_);
+  scene_->add_touching(X_WQ, (kTouching + clearance_) * L_, contacts_);
   see_from(known);
   met_touching_ = true;
   for (std::size_t i = known; i < contacts_.size() && met_touching_; ++i) {
     const Affine at = affine(seen_[i], state.R);
     gap_[i] = at.n.dot(state.u) + at.h;
-    met_touching_ = gap_[i] * L_ >= -tolerance_m_;
+    met_touching_ = gap_[i] * L_ >= -rounding_m_;
   }
   // A full set cannot tell of what it has no room for.
   if (contacts_.full() && met_touching_) met_touching_ = scene_->admits(X_WQ, tolerance_m_);

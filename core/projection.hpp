@@ -70,7 +70,9 @@ class ExactProjection {
   };
 
   explicit ExactProjection(const Inertia& M);
-  ExactProjection(const Inertia& M, Budget budget);
+  /// clearance_m: how far from touching contacts are held open [m]. A little more than rounding keeps a proxy
+  /// clear of what it follows, for whoever checks its poses to the last digit.
+  ExactProjection(const Inertia& M, Budget budget, double clearance_m = 0.0);
 
   /// Follows a proxy: the closest admissible configuration to p, sought from X_start, last tick's q. known:
   /// the contacts that carried there, with their multipliers; X_start must be admissible then. Without them
@@ -102,7 +104,7 @@ class ExactProjection {
     Vector3d dB;  ///< d_W
     ContactKind kind;
   };
-  /// A gap at one rotation: n . u + h.
+  /// A gap at one rotation, less the clearance: n . u + h.
   struct Affine {
     Vector3d n;
     double h;
@@ -178,13 +180,15 @@ class ExactProjection {
   Budget budget_;
   std::uint16_t iteration_limit_;  ///< of the query at hand
   double L_;                       ///< [m]
+  double clearance_;                ///< in units of L
   Matrix3d H_hat_;
   Matrix6d metric_root_;  ///< Cholesky factor of diag(2 I, 2 H^)
 
   // The query at hand
   Pose X_WP_;
   const ContactSource* scene_ = nullptr;
-  double tolerance_m_ = 0.0;
+  double rounding_m_ = 0.0;   ///< of a gap
+  double tolerance_m_ = 0.0;  ///< how far below zero a gap may be: rounding, less the clearance
   ContactSet contacts_;
   std::array<Seen, ContactSet::kCapacity> seen_;
   std::array<double, ContactSet::kCapacity> multiplier_;

@@ -87,7 +87,7 @@ Pressed random_pressed(RandomValues& random) {
     const double height = c.contact.n_W.dot(c.X_WP * vertices[v]);
     if (v > 0 && height >= least) continue;
     least = height;
-    c.contact.vertex = static_cast<std::uint32_t>(v);
+    c.contact.tool_feature = static_cast<std::uint32_t>(v);
     c.contact.p_TA_m = vertices[v];
   }
   c.contact.offset_m = least + random.uniform(0.02, 0.3);
@@ -119,7 +119,7 @@ void require_section_free(const Pressed& c, const PlanarFamily::InPlane& solutio
   const auto edge = [&c](std::uint32_t neighbour) -> Vector3d {
     return c.X_WP.rotation * (c.tool.hull.vertices_T_m[neighbour] - c.contact.p_TA_m);
   };
-  const auto ring = c.tool.hull.ring_of(c.contact.vertex);
+  const auto ring = c.tool.hull.ring_of(c.contact.tool_feature);
   for (std::size_t i = 0; i < ring.size(); ++i) {
     const Vector3d one = edge(ring[i]);
     const Vector3d next = edge(ring[(i + 1) % ring.size()]);
@@ -320,8 +320,8 @@ TEST_CASE("nor at a vertex that is not the deepest, where the angles may lie on 
   for (int i = 0; i < 80; ++i) {
     Pressed c = random_pressed(random);
     const auto& vertices = c.tool.hull.vertices_T_m;
-    c.contact.vertex = static_cast<std::uint32_t>(random.integer(0, static_cast<int>(vertices.size()) - 1));
-    c.contact.p_TA_m = vertices[c.contact.vertex];
+    c.contact.tool_feature = static_cast<std::uint32_t>(random.integer(0, static_cast<int>(vertices.size()) - 1));
+    c.contact.p_TA_m = vertices[c.contact.tool_feature];
     const PlanarFamily family(c.tool.solid.inertia, c.tool.hull, 5);
     require_least_of_free(c, family);
     for (int k = 0; k < family.planes(); ++k) {

@@ -54,7 +54,7 @@ TEST_CASE("a contact tells its vertex, its face and its obstacle") {
   bool floor = false, other = false;
   for (const Contact& c : contacts) {
     const HalfSpaceSettings& obstacle = scene.half_spaces()[c.obstacle];
-    CHECK(c.p_TA_m == scene.tool().hull.vertices_T_m[c.vertex]);
+    CHECK(c.p_TA_m == scene.tool().hull.vertices_T_m[c.tool_feature]);
     CHECK(c.n_W == obstacle.normal_W);
     CHECK(c.offset_m == obstacle.offset_m);
     CHECK(gap_m(c, X_WT) < 0);

@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/mesh_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wrenchd {
+namespace {
+
+constexpr std::size_t kMostCrossings = 512;
+/// How far beyond its border a face or an edge still counts, in units of the clearance: far more than
+/// rounding, far less than what keeps neighbours apart.
+constexpr double kBeyond = 0.01;
+/// A gap this much wider than the clearance is closed, and features this far beyond their border still hold,
+/// in units of the clearance.
+constexpr double kClosed = 0.1;
+constexpr double kHolds = 1.0;
+/// How far a gap may have been below zero at the start, in units of the clearance.
+constexpr double kWasOpen = 0.5;
+/// The slope by which the features around a contact may seem to lie nearer than the contact itself: the
+/// straight way is not quite the true one.
+constexpr double kSlope = 1e-3;
+/// The list holds for ends this far away, as a share of the way, and at least so far, in units of the tool's
+/// size.
+constexpr double kReach = 0.25;
+constexpr double kLeastReach = 1e-4;
+/// Crossings of much the same direction nearer than this count as one, in units of the way.
+constexpr double kClose = 4.0;
+constexpr double kSameWay = 0.9;  // cosine
+
+Vector3d mix(const Vector3d& a, const Vector3d& b, double s) noexcept { return a + s * (b - a); }
+
+/// When on the way a gap has shrunk to the clearance.
+double closing_time(double start_m, double end_m, double clearance_m) noexcept {
+  return std::clamp((start_m - clearance_m) / (start_m - end_m), 0.0, 1.0);
+}
+
+/// Does a point lie over a triangle with this normal, or no farther beyond its sides than so much?
+bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& normal,
+          double beyond_m) noexcept {
+  const auto within = [&](const Vector3d& from, const Vector3d& to) {
+    const Vector3d along = to - from;
+    const double outside = along.cross(normal).dot(p - from);
+    return outside <= 0.0 || outside * outside <= beyond_m * beyond_m * along.squaredNorm();
+  };
+  return within(a, b) && within(b, c) && within(c, a);
+}
+
+}  // namespace
+
+MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(scene), walk_(kernel) {
+  pairs_.reserve(TreeWalk::kCapacity);
+  crossings_.reserve(kMostCrossings);
+  const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
+  for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
+    const MeshObstacle& obstacle = scene.meshes()[k];
+    Seen seen{&obstacle, first + k, {}, {}, {}};
+    seen.X_WO = {obstacle.X_WO.rotation.toRotationMatrix(), obstacle.X_WO.translation_m};
+    seen_.push_back(seen);
+  }
+}
+
+void MeshContacts::start_at(const Pose& X_WT) noexcept {
+  X_start_ = X_WT;
+  const Matrix3d R_WT = X_WT.rotation.toRotationMatrix();
+  for (Seen& seen : seen_)
+    seen.X_OT_start = {seen.X_WO.R.transpose() * R_WT, seen.X_WO.back(X_WT.translation_m)};
+}
+
+bool MeshContacts::covers(const Pose& X_WT) const noexcept {
+  const auto within = [&](const Pose& X) {
+    return (X.translation_m - X_listed_.translation_m).norm() <= reach_m_ &&
+           X.rotation.angularDistance(X_listed_.rotation) <= reach_rad_;
+  };
+  return listed_ && within(X_WT) && within(X_start_);
+}
+
+bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
+  listed_ = false;
+  pairs_.clear();
+  const double radius_m = scene_.tool_radius_m();
+  const double way_m = (X_WT.translation_m - X_start_.translation_m).norm();
+  const double way_rad = X_WT.rotation.angularDistance(X_start_.rotation);
+  // The start must be within reach of the end as well, or the next look from the end would list again.
+  reach_m_ = std::max(kReach * way_m, kLeastReach * radius_m);
+  reach_rad_ = std::max(kReach * way_rad, kLeastReach);
+  for (std::uint32_t k = 0; k < seen_.size(); ++k) {
+    const MeshObstacle& obstacle = *seen_[k].obstacle;
+    const Pose X_OW = inverse(obstacle.X_WO);
+    const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, reach_rad_};
+    const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh.tree, sweep, budget);
+    if (!complete || pairs_.size() + walk_.size() > pairs_.capacity()) return false;
+    for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, k});
+  }
+  X_listed_ = X_WT;
+  listed_ = true;
+  return true;
+}
+
+MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept {
+  Findings findings;
+  touching_.clear();
+  crossings_.clear();
+  clearance_m_ = clearance_m;
+  if (!covers(X_WT) && !list_pairs(X_WT, budget)) {
+    findings.complete = false;
+    return findings;
+  }
+  const Matrix3d R_WT = X_WT.rotation.toRotationMatrix();
+  for (Seen& seen : seen_)
+    seen.X_OT_end = {seen.X_WO.R.transpose() * R_WT, seen.X_WO.back(X_WT.translation_m)};
+  moved_.triangle = MeshSurface::kNone;
+  for (const NearPair& pair : pairs_) look_at(pair, moved(pair), findings);
+  choose_first(findings);
+  return findings;
+}
+
+const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
+  if (moved_.triangle == pair.a && moved_.obstacle == pair.obstacle) return moved_;
+  const Seen& seen = seen_[pair.obstacle];
+  moved_.triangle = pair.a;
+  moved_.obstacle = pair.obstacle;
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d& p_T = scene_.tool_mesh()->surface.corner_m(pair.a, i);
+    const auto k = static_cast<std::size_t>(i);
+    moved_.start[k] = seen.X_OT_start * p_T;
+    moved_.end[k] = seen.X_OT_end * p_T;
+  }
+  return moved_;
+}
+
+/// Most pairs are kept apart all the way by the plane of one of the two.
+void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
+  const Seen& seen = seen_[pair.obstacle];
+  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface::Plane& plane = surface.planes()[pair.b];
+  const double closed_m = (1.0 + kClosed) * clearance_m_;
+  const auto height = [&](const Vector3d& p) { return plane.normal.dot(p) - plane.offset_m; };
+  const double e0 = height(a.end[0]), e1 = height(a.end[1]), e2 = height(a.end[2]);
+  const double lowest_end = std::min({e0, e1, e2}), highest_end = std::max({e0, e1, e2});
+  if (lowest_end > closed_m || highest_end < -clearance_m_) {
+    const double s0 = height(a.start[0]), s1 = height(a.start[1]), s2 = height(a.start[2]);
+    if (lowest_end > closed_m ? std::min({s0, s1, s2}) >= 0.0 : std::max({s0, s1, s2}) <= 0.0) return;
+  }
+  const std::size_t before = crossings_.size();
+  vertices_on_face(seen, pair, a);
+  face_on_vertices(seen, pair);
+  edges_on_edges(seen, pair, a);
+  if (crossings_.size() > before || findings.overlaps) return;
+  if (lowest_end > 0.0 || highest_end < 0.0) return;
+  findings.overlaps = triangles_meet(
+      a.end, {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)});
+}
+
+/// Contacts of a vertex of the tool and a face of the obstacle. The way is straight in the obstacle's frame,
+/// so the gap is linear in time, exactly.
+void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept {
+  const MeshSurface& tool = scene_.tool_mesh()->surface;
+  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const auto& vertices = tool.features()[pair.a].vertices;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (vertices[i] == MeshSurface::kNone) continue;
+    MeshSurface::Plane plane = surface.planes()[pair.b];
+    double start_m = plane.normal.dot(a.start[i]) - plane.offset_m;
+    double end_m = plane.normal.dot(a.end[i]) - plane.offset_m;
+    if (surface.kind() == MeshSurface::Kind::surface && start_m < 0.0) {  // it has two sides
+      plane = {-plane.normal, -plane.offset_m};
+      start_m = -start_m;
+      end_m = -end_m;
+    }
+    if (end_m > (1.0 + kClosed) * clearance_m_ || start_m < -kWasOpen * clearance_m_) continue;
+    const bool closes = end_m < (1.0 - kClosed) * clearance_m_;
+    const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
+    const Vector3d p = mix(a.start[i], a.end[i], when);
+    if (!over(p, surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2),
+              surface.planes()[pair.b].normal, (closes ? kBeyond : kHolds) * clearance_m_))
+      continue;
+    const Vector3d& p_T = tool.vertices_m()[vertices[i]];
+    bool first = true;
+    for (const std::uint32_t v : tool.around(vertices[i])) {
+      const Vector3d& q_T = tool.vertices_m()[v];
+      const Vector3d q = mix(seen.X_OT_start * q_T, seen.X_OT_end * q_T, when);
+      first = first && plane.normal.dot(q - p) >= -kSlope * (q_T - p_T).norm();
+    }
+    if (!first) continue;
+    Contact contact;
+    contact.kind = ContactKind::vertex_face;
+    contact.p_TA_m = p_T;
+    contact.n_W = seen.X_WO.R * plane.normal;
+    contact.p_WB_m = seen.X_WO * (plane.offset_m * plane.normal);
+    contact.offset_m = plane.offset_m + contact.n_W.dot(seen.X_WO.x_m);
+    contact.tool_feature = vertices[i];
+    contact.obstacle_feature = surface.region(pair.b);
+    contact.obstacle = seen.number;
+    if (closes)
+      crossed(when, seen.X_WO * p, contact);
+    else if (!touching_.contains(contact))
+      touching_.add(contact);
+  }
+}
+
+/// The same the other way round: seen from the tool, the obstacle's vertex moves.
+void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noexcept {
+  const MeshSurface& tool = scene_.tool_mesh()->surface;
+  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface::Plane& plane = tool.planes()[pair.a];
+  for (const std::uint32_t vertex : surface.features()[pair.b].vertices) {
+    if (vertex == MeshSurface::kNone) continue;
+    const Vector3d& p_O = surface.vertices_m()[vertex];
+    const Vector3d p_end = seen.X_OT_end.back(p_O);
+    const double end_m = plane.normal.dot(p_end) - plane.offset_m;
+    if (end_m > (1.0 + kClosed) * clearance_m_) continue;
+    const Vector3d p_start = seen.X_OT_start.back(p_O);
+    const double start_m = plane.normal.dot(p_start) - plane.offset_m;
+    if (start_m < -kWasOpen * clearance_m_) continue;
+    const bool closes = end_m < (1.0 - kClosed) * clearance_m_;
+    const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
+    const Vector3d p = mix(p_start, p_end, when);
+    if (!over(p, tool.corner_m(pair.a, 0), tool.corner_m(pair.a, 1), tool.corner_m(pair.a, 2), plane.normal,
+              (closes ? kBeyond : kHolds) * clearance_m_))
+      continue;
+    bool first = true;
+    for (const std::uint32_t v : surface.around(vertex)) {
+      const Vector3d& q_O = surface.vertices_m()[v];
+      const Vector3d q = mix(seen.X_OT_start.back(q_O), seen.X_OT_end.back(q_O), when);
+      first = first && plane.normal.dot(q - p) >= -kSlope * (q_O - p_O).norm();
+    }
+    // The lone vertices of a surface may have anything beside them.
+    if (!first && surface.kind() == MeshSurface::Kind::solid) continue;
+    Contact contact;
+    contact.kind = ContactKind::face_vertex;
+    contact.d_T = -plane.normal;
+    contact.p_TA_m = plane.offset_m * plane.normal;
+    contact.p_WB_m = seen.X_WO * p_O;
+    contact.n_W = seen.X_WO.R * (seen.X_OT_end.R * contact.d_T);
+    contact.tool_feature = tool.region(pair.a);
+    contact.obstacle_feature = vertex;
+    contact.obstacle = seen.number;
+    if (closes)
+      crossed(when, contact.p_WB_m, contact);
+    else if (!touching_.contains(contact))
+      touching_.add(contact);
+  }
+}
+
+void MeshContacts::edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a) noexcept {
+  for (const std::uint32_t edge_a : scene_.tool_mesh()->surface.features()[pair.a].edges) {
+    if (edge_a == MeshSurface::kNone) continue;
+    for (const std::uint32_t edge_b : seen.obstacle->mesh.surface.features()[pair.b].edges)
+      if (edge_b != MeshSurface::kNone) edge_on_edge(seen, a, edge_a, edge_b);
+  }
+}
+
+void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a,
+                                std::uint32_t edge_b) noexcept {
+  constexpr double kParallel = 1e-7;  // sine: they have no common normal to rely on
+  const MeshSurface& tool = scene_.tool_mesh()->surface;
+  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface::Edge& ea = tool.edges()[edge_a];
+  const MeshSurface::Edge& eb = surface.edges()[edge_b];
+  const Vector3d& b0 = surface.vertices_m()[eb.vertices[0]];
+  const Vector3d& b1 = surface.vertices_m()[eb.vertices[1]];
+  const Vector3d db = b1 - b0;
+  // The corners of the triangle are at hand, in its own order.
+  std::size_t i = 0;
+  while (tool.triangles()[a.triangle][i] != ea.vertices[0]) ++i;
+  const std::size_t j = i == 2 ? 0 : i + 1;
+  const Vector3d da_start = a.start[j] - a.start[i], da_end = a.end[j] - a.end[i];
+  Vector3d N_start = da_start.cross(db), N_end = da_end.cross(db);
+  const double lengths = da_end.norm() * db.norm();
+  const double s_start = N_start.norm(), s_end = N_end.norm();
+  if (!(s_start > kParallel * lengths) || !(s_end > kParallel * lengths)) return;
+  // Which way is out: away from both faces of the obstacle, towards those of the tool.
+  const bool two_sided = surface.kind() == MeshSurface::Kind::surface;
+  double sign = 1.0;
+  if (two_sided) {
+    sign = N_start.dot(a.start[i] - b0) < 0.0 ? -1.0 : 1.0;
+  } else {
+    const Vector3d out = surface.planes()[eb.triangles[0]].normal + surface.planes()[eb.triangles[1]].normal;
+    sign = N_end.dot(out) < 0.0 ? -1.0 : 1.0;
+    if (N_start.dot(out) * sign <= 0.0) return;  // the edges turned past parallel
+  }
+  N_start *= sign / s_start;
+  N_end *= sign / s_end;
+  const double end_m = N_end.dot(a.end[i] - b0);
+  if (end_m > (1.0 + kClosed) * clearance_m_) return;
+  const double start_m = N_start.dot(a.start[i] - b0);
+  if (start_m < -kWasOpen * clearance_m_) return;
+  const bool closes = end_m < (1.0 - kClosed) * clearance_m_;
+  const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
+
+  // Where the two lines pass each other, then: a0 + x da and b0 + y db.
+  const Vector3d a0 = mix(a.start[i], a.end[i], when), da = mix(da_start, da_end, when);
+  const Vector3d N = da.cross(db), w = b0 - a0;
+  const double NN = N.squaredNorm();
+  if (!(NN > 0.0)) return;
+  const double x = w.cross(db).dot(N) / NN, y = w.cross(da).dot(N) / NN;
+  const double beyond_m = (closes ? kBeyond : kHolds) * clearance_m_;
+  const double beyond_a = beyond_m / da.norm(), beyond_b = beyond_m / db.norm();
+  if (x < -beyond_a || x > 1.0 + beyond_a || y < -beyond_b || y > 1.0 + beyond_b) return;
+
+  // All four faces have to fall away from the plane between the edges.
+  const Vector3d n = N * (sign / std::sqrt(NN));
+  const auto falls_away = [&](const Vector3d& height_of, double side) {
+    return side * n.dot(height_of) >= -kSlope * height_of.norm();
+  };
+  if (!two_sided)
+    for (const std::uint32_t t : eb.triangles)
+      for (int k = 0; k < 3; ++k)
+        if (!falls_away(surface.corner_m(t, k) - b0, -1.0)) return;
+  for (const std::uint32_t t : ea.triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d& p_T = tool.corner_m(t, k);
+      if (!falls_away(mix(seen.X_OT_start * p_T, seen.X_OT_end * p_T, when) - a0, 1.0)) return;
+    }
+
+  Contact contact;
+  contact.kind = ContactKind::edge_edge;
+  contact.p_TA_m = tool.vertices_m()[ea.vertices[0]];
+  contact.d_T = (tool.vertices_m()[ea.vertices[1]] - contact.p_TA_m).normalized();
+  contact.p_WB_m = seen.X_WO * b0;
+  contact.d_W = seen.X_WO.R * (db * (sign / db.norm()));
+  contact.n_W = seen.X_WO.R * N_end;
+  contact.tool_feature = edge_a;
+  contact.obstacle_feature = edge_b;
+  contact.obstacle = seen.number;
+  if (closes)
+    crossed(when, seen.X_WO * (b0 + y * db), contact);
+  else if (!touching_.contains(contact))
+    touching_.add(contact);
+}
+
+/// Where there is no room left, a later one gives way to an earlier.
+void MeshContacts::crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept {
+  if (crossings_.size() < crossings_.capacity()) {
+    crossings_.push_back({when, point_W_m, contact});
+    return;
+  }
+  const auto last = std::max_element(crossings_.begin(), crossings_.end(),
+                                     [](const Crossing& a, const Crossing& b) { return a.when < b.when; });
+  if (when < last->when) *last = {when, point_W_m, contact};
+}
+
+void MeshContacts::choose_first(Findings& findings) noexcept {
+  if (crossings_.empty()) return;
+  std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
+    if (a.when != b.when) return a.when < b.when;
+    if (a.contact.tool_feature != b.contact.tool_feature) return a.contact.tool_feature < b.contact.tool_feature;
+    return a.contact.obstacle_feature < b.contact.obstacle_feature;
+  });
+  const Seen& any = seen_.front();
+  const double way_m = (any.X_OT_end.x_m - any.X_OT_start.x_m).norm() +
+                       (any.X_OT_end.R - any.X_OT_start.R).norm() * scene_.tool_radius_m();
+  const double close_m = std::min(kClose * way_m, 0.25 * scene_.tool_radius_m());
+  FixedList<Vector3d, kMostMet> points;
+  for (const Crossing& crossing : crossings_) {
+    bool beside = false;
+    for (std::size_t i = 0; i < points.size() && !beside; ++i)
+      beside = (points[i] - crossing.point_W_m).squaredNorm() < close_m * close_m &&
+               findings.met[i].n_W.dot(crossing.contact.n_W) > kSameWay;
+    if (beside || !findings.met.add(crossing.contact)) continue;
+    points.add(crossing.point_W_m);
+  }
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "collision/scene.hpp"
+#include "collision/triangle_pair.hpp"
+#include "collision/tree_walk.hpp"
+#include "core/contact.hpp"
+#include "core/fixed_list.hpp"
+
+namespace wrenchd {
+
+/// What the tool's surface meets on the straight way from one pose to another.
+///
+/// Two surfaces that are apart at the start and move straight meet first in a vertex and a face or in two
+/// edges (mesh_surface.hpp). So it is enough to look at those pairs of features: a pair has been *crossed*
+/// where its gap is open at the start, is not at the end, and the features, and not only the plane or the
+/// lines that carry them, are opposite each other when it closes. Of pairs that are crossed close together
+/// only the first counts: once it is held open the others may never be reached.
+///
+/// The pairs of triangles near the way come from the trees. They are listed once for a way and for all ends
+/// within reach of its own, so that the many ends that a projection tries cost no walk.
+///
+/// Memory is taken at construction. One object serves one thread.
+class MeshContacts {
+ public:
+  static constexpr std::size_t kMostMet = 12;
+
+  struct Findings {
+    /// The contacts met, the first on the way first; not all, but never none where there is one.
+    FixedList<Contact, kMostMet> met;
+    bool overlaps = false;  ///< the end pose overlaps, though nothing was seen on the way: it is too long
+    bool complete = true;   ///< false: the way is too long for what may be looked at; nothing is known
+  };
+
+  /// The scene is kept by reference. kernel: as for TreeWalk.
+  explicit MeshContacts(const Scene& scene, walk::Kernel kernel = nullptr);
+
+  /// Starts from an admissible pose. RT safe.
+  void start_at(const Pose& X_WT) noexcept;
+
+  /// The way from the start to X_WT, whose contacts are held open by clearance_m. RT safe.
+  Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept;
+
+  /// The contacts that touch at the end looked at last, with their gap no wider than the clearance, and
+  /// rounding.
+  const ContactSet& touching() const noexcept { return touching_; }
+
+  std::size_t pairs() const noexcept { return pairs_.size(); }  ///< listed
+
+ private:
+  struct NearPair {
+    std::uint32_t a, b, obstacle;
+  };
+  struct Crossing {
+    double when;  ///< 0 at the start, 1 at the end
+    Vector3d point_W_m;
+    Contact contact;
+  };
+  /// A pose with its rotation as a matrix.
+  struct Frame {
+    Matrix3d R = Matrix3d::Identity();
+    Vector3d x_m = Vector3d::Zero();
+    Vector3d operator*(const Vector3d& p_m) const noexcept { return R * p_m + x_m; }
+    Vector3d back(const Vector3d& p_m) const noexcept { return R.transpose() * (p_m - x_m); }
+  };
+  /// One obstacle, seen along the way.
+  struct Seen {
+    const MeshObstacle* obstacle;
+    std::uint32_t number;       ///< in the scene
+    Frame X_WO;
+    Frame X_OT_start, X_OT_end;
+  };
+  /// A triangle of the tool as an obstacle sees it, at both ends.
+  struct Moved {
+    std::uint32_t triangle = MeshSurface::kNone;
+    std::uint32_t obstacle = MeshSurface::kNone;
+    Triangle start, end;
+  };
+
+  bool covers(const Pose& X_WT) const noexcept;
+  bool list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept;
+  const Moved& moved(const NearPair& pair) noexcept;
+  void look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
+  void vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
+  void face_on_vertices(const Seen& seen, const NearPair& pair) noexcept;
+  void edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
+  void edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a, std::uint32_t edge_b) noexcept;
+  void crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept;
+  void choose_first(Findings& findings) noexcept;
+
+  const Scene& scene_;
+  TreeWalk walk_;
+  Pose X_start_;
+  std::vector<Seen> seen_;
+  double clearance_m_ = 0.0;
+
+  bool listed_ = false;
+  Pose X_listed_;            ///< the end of the way that the list was made for
+  double reach_m_ = 0.0;     ///< and how far from it the list holds
+  double reach_rad_ = 0.0;
+  std::vector<NearPair> pairs_;
+
+  Moved moved_;
+  std::vector<Crossing> crossings_;
+  ContactSet touching_;
+};
+
+}  // namespace wrenchd

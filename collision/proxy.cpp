@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/proxy.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "core/metric.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// A step that turns farther than this is gone in parts [rad]: its points leave the straight way by
+/// angle^2 / 8 of their distance.
+constexpr double kLongestTurn_rad = 0.05;
+/// A way this short, as a share of the step, is not worth going.
+constexpr double kShortestShare = 1.0 / 1024.0;
+/// T falls by at least this share from one round to the next, or the rounds end.
+constexpr double kProgress = 1e-9;
+
+/// The contacts are all known to the projection: nothing is asked while it works.
+class Nothing final : public ContactSource {
+ public:
+  std::size_t add_violated(const Pose&, double, ContactSet&) const noexcept override { return 0; }
+  void add_touching(const Pose&, double, ContactSet&) const noexcept override {}
+  bool admits(const Pose&, double) const noexcept override { return true; }
+};
+
+Pose between(const Pose& from, const Pose& to, double share) noexcept {
+  return {from.rotation.slerp(share, to.rotation),
+          from.translation_m + share * (to.translation_m - from.translation_m)};
+}
+
+}  // namespace
+
+Proxy::Proxy(const Scene& scene, Effort effort)
+    : scene_(scene),
+      effort_(effort),
+      M_(scene.tool().solid.inertia),
+      exact_(M_, ExactProjection::Budget{}, kClearance_m),
+      planes_(scene),
+      meshes_(scene) {}
+
+Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
+  X_WQ_ = X_last;
+  looks_ = 0;
+  iterations_ = 0;
+  budget_.visits = effort_.visits;
+  meshes_.start_at(X_WQ_);
+  double share = 1.0;  // of the step that the contacts known allow
+  double T_last = energy(M_, X_WP, X_WQ_);
+  while (looks_ < effort_.looks && share >= kShortestShare) {
+    Projection q = project(X_WP);
+    if (q.status == ProjectionStatus::infeasible) break;
+    const double turn_rad = X_WQ_.rotation.angularDistance(q.X_WQ.rotation);
+    const double part = std::min(share, turn_rad > kLongestTurn_rad ? kLongestTurn_rad / turn_rad : 1.0);
+    if (part < 1.0) q = project(between(X_WQ_, q.X_WQ, part));
+    if (q.status == ProjectionStatus::infeasible) break;
+    const Way way = look_along(q.X_WQ);
+    if (way == Way::met_contacts) continue;
+    if (way == Way::too_long) {
+      share = 0.5 * part;
+      continue;
+    }
+    X_WQ_ = q.X_WQ;
+    meshes_.start_at(X_WQ_);
+    share = 1.0;
+    const bool all_hold = !let_go(q);
+    if (part < 1.0) continue;
+    if (all_hold) return described(X_WP, q);
+    const double T = energy(M_, X_WP, X_WQ_);
+    if (T > (1.0 - kProgress) * T_last) return described(X_WP, q);
+    T_last = T;
+  }
+  Projection best;
+  best.status = ProjectionStatus::budget_spent;
+  best.X_WQ = X_WQ_;
+  best.active = known_;
+  return described(X_WP, best);
+}
+
+Projection Proxy::project(const Pose& X_WP) noexcept {
+  const Projection q =
+      exact_.project(X_WP, Nothing(), X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()));
+  iterations_ = static_cast<std::uint16_t>(iterations_ + q.iterations);
+  return q;
+}
+
+/// Looks along the way from the pose at hand; what it meets there becomes known.
+Proxy::Way Proxy::look_along(const Pose& X_WT) noexcept {
+  ++looks_;
+  bool learned = false;
+  ContactSet met;
+  const double tolerance_m = exact_.gap_tolerance_m(X_WT) - kClearance_m;
+  planes_.add_violated(X_WT, tolerance_m, met);
+  for (const Contact& contact : met) learned = learn(contact) || learned;
+  if (scene_.meshes().empty()) return learned ? Way::met_contacts : Way::free;
+  const MeshContacts::Findings found = meshes_.look(X_WT, kClearance_m, budget_);
+  if (!found.complete) return Way::too_long;
+  for (const Contact& contact : found.met) learned = learn(contact) || learned;
+  if (learned) return Way::met_contacts;
+  return found.overlaps || !found.met.empty() || !met.empty() ? Way::too_long : Way::free;
+}
+
+/// False where it was known, or there is no room.
+bool Proxy::learn(const Contact& contact) noexcept {
+  for (const ActiveContact& known : known_)
+    if (same_features(known.contact, contact)) return false;
+  return known_.add({contact, 0.0});
+}
+
+/// Keeps the contacts that touch at q and whose features lie opposite each other there. True where one that
+/// carried is not among them.
+bool Proxy::let_go(const Projection& q) noexcept {
+  const std::size_t first_mesh = scene_.obstacle_count() - scene_.meshes().size();
+  bool carried = false;
+  known_.clear();
+  for (const ActiveContact& active : q.active) {
+    if (active.contact.obstacle < first_mesh || meshes_.touching().contains(active.contact))
+      known_.add(active);
+    else
+      carried = carried || active.multiplier > 0.0;
+  }
+  return carried;
+}
+
+/// q with what it is for p, whatever it was found for.
+Projection Proxy::described(const Pose& X_WP, Projection q) const noexcept {
+  q.iterations = iterations_;
+  q.energy = q.status == ProjectionStatus::free ? 0.0 : energy(M_, X_WP, q.X_WQ);
+  return q;
+}
+
+}  // namespace wrenchd

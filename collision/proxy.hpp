@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+#include "collision/mesh_contacts.hpp"
+#include "collision/scene_contacts.hpp"
+#include "core/projection.hpp"
+
+namespace wrenchd {
+
+/// The admissible proxy (section 4 of the method): a configuration q that follows the hand's p through a
+/// scene of any shape, never enters an obstacle and never passes through one.
+///
+/// Each step goes straight from an admissible pose towards the closest-point projection of p for the contacts
+/// known. What the tool meets on that way becomes a contact, and the projection is sought again; a way on
+/// which it meets nothing is gone. There, contacts whose features no longer lie opposite each other let go.
+/// It ends where p is reached, or where all contacts that carry hold: q then is a local optimum of
+/// min T(p, q), and T has only fallen on the way.
+///
+/// However deep p is and however fast it moves, q is an admissible pose at any time, and the work is bounded:
+/// when it is used up, q is as far as it came.
+///
+/// All memory is taken at construction. One object serves one thread.
+class Proxy {
+ public:
+  /// What contacts are held open by [m]: far more than rounding, far less than anybody feels. Poses are
+  /// admissible to whoever checks them.
+  static constexpr double kClearance_m = 1e-9;
+
+  struct Effort {
+    std::uint16_t looks = 64;       ///< ways looked along, a tick
+    std::uint32_t visits = 100000;  ///< nodes and leaves of the trees, a tick
+  };
+
+  /// The scene is kept by reference and must outlive this.
+  explicit Proxy(const Scene& scene) : Proxy(scene, Effort{}) {}
+  Proxy(const Scene& scene, Effort effort);
+
+  /// One tick: from X_last, last tick's q, towards p. RT safe.
+  Projection follow(const Pose& X_WP, const Pose& X_last) noexcept;
+
+  /// Forgets the contacts of the last tick. RT safe.
+  void forget() noexcept { known_.clear(); }
+
+  std::uint16_t looks() const noexcept { return looks_; }  ///< of the last tick
+
+ private:
+  using Known = FixedList<ActiveContact, ContactSet::kCapacity>;
+  enum class Way : std::uint8_t { free, met_contacts, too_long };
+
+  Projection project(const Pose& X_WP) noexcept;
+  Way look_along(const Pose& X_WT) noexcept;
+  bool learn(const Contact& contact) noexcept;
+  bool let_go(const Projection& q) noexcept;
+  Projection described(const Pose& X_WP, Projection q) const noexcept;
+
+  const Scene& scene_;
+  Effort effort_;
+  Inertia M_;
+  ExactProjection exact_;
+  SceneContacts planes_;  ///< the half-spaces
+  MeshContacts meshes_;
+  Known known_;
+  Pose X_WQ_;  ///< the admissible pose at hand
+  WalkBudget budget_;
+  std::uint16_t looks_ = 0;
+  std::uint16_t iterations_ = 0;
+};
+
+}  // namespace wrenchd

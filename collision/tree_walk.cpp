@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/tree_walk.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wrenchd {
+namespace {
+
+/// What single precision may be wrong by, as a share of the coordinates: rounding of the input, of two
+/// products of three terms each, and of a plane's offset.
+constexpr double kRounding = 1.5e-6;
+
+walk::Transform single(const Matrix3d& R, const Vector3d& t) noexcept {
+  walk::Transform out;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out.R[i][j] = static_cast<float>(R(i, j));
+    out.t[i] = static_cast<float>(t[i]);
+  }
+  return out;
+}
+
+walk::Transform single(const Pose& X) noexcept {
+  return single(X.rotation.toRotationMatrix(), X.translation_m);
+}
+
+walk::Transform travel(const Pose& from, const Pose& to) noexcept {
+  return single(to.rotation.toRotationMatrix() - from.rotation.toRotationMatrix(),
+                to.translation_m - from.translation_m);
+}
+
+/// The motion in single precision. The boxes are moved half way and grown by what is missing to both ends; a
+/// point at a distance r from A's origin leaves the straight line between its ends by no more than
+/// angle^2 r / 8, and the line's middle lies as far from where the pose half way takes it.
+walk::Motion motion_of(const Sweep& sweep, double radius_a_m, double extent_m) noexcept {
+  const auto& [start, end, reach_m, reach_rad] = sweep;
+  walk::Motion motion;
+  const Pose middle = {start.rotation.slerp(0.5, end.rotation),
+                       0.5 * (start.translation_m + end.translation_m)};
+  motion.X_BA_middle = single(middle);
+  motion.X_AB_middle = single(inverse(middle));
+  motion.X_BA_start = single(start);
+  motion.X_BA_end = single(end);
+  motion.travel_BA = travel(start, end);
+  motion.travel_AB = travel(inverse(start), inverse(end));
+  const double angle = start.rotation.angularDistance(end.rotation);
+  const double bulge_m = 0.25 * angle * angle * radius_a_m;
+  const double rounding_m =
+      kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
+                                       end.translation_m.lpNorm<Eigen::Infinity>()));
+  motion.half_turn = static_cast<float>(0.5 * angle);
+  motion.margin = static_cast<float>(reach_m + reach_rad * radius_a_m + bulge_m + rounding_m);
+  motion.margin_shift = static_cast<float>(reach_m + rounding_m);
+  motion.margin_turn = static_cast<float>(reach_rad);
+  for (int d = 0; d < 3; ++d) motion.centre_B[d] = static_cast<float>(end.translation_m[d]);
+  motion.moving = start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
+  return motion;
+}
+
+walk::Tree arrays_of(const TriangleTree& tree) noexcept {
+  return {tree.boxes().data(), tree.nodes().data(), tree.leaves().data()};
+}
+
+}  // namespace
+
+TreeWalk::TreeWalk(walk::Kernel kernel)
+    : kernel_(kernel != nullptr ? kernel : walk::has_avx2() ? walk::walk_avx2 : walk::walk_portable),
+      pairs_(kCapacity),
+      stack_(2 * walk::kStack),
+      moved_leaves_(walk::kMovedLeavesBytes / sizeof(Line)) {}
+
+bool TreeWalk::find(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep,
+                    WalkBudget& budget) noexcept {
+  count_ = 0;
+  if (a.nodes().empty() || b.nodes().empty()) return true;
+  const double radius_m = std::sqrt(3.0) * a.extent_m();
+  const walk::Job job = {arrays_of(a),
+                         arrays_of(b),
+                         motion_of(sweep, radius_m, radius_m + b.extent_m()),
+                         pairs_.data(),
+                         static_cast<std::uint32_t>(pairs_.size()),
+                         budget.visits,
+                         stack_.data(),
+                         moved_leaves_.data()};
+  const walk::Outcome outcome = kernel_(job);
+  count_ = outcome.pairs;
+  budget.visits -= std::min(budget.visits, outcome.visits);
+  return outcome.complete;
+}
+
+}  // namespace wrenchd

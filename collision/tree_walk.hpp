@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "collision/triangle_tree.hpp"
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+/// A triangle of A and one of B.
+struct TrianglePair {
+  std::uint32_t a, b;
+
+  friend bool operator==(const TrianglePair&, const TrianglePair&) = default;
+};
+
+/// A moves in B from one pose to another.
+struct Sweep {
+  Pose X_BA_start, X_BA_end;
+  /// Pairs are to be found not only for the end pose but for every one near it: no farther away than this
+  /// far, and turned by no more than this angle.
+  double reach_m = 0.0;
+  double reach_rad = 0.0;
+};
+
+/// How much work a walk may do, and did: it is counted in work and not in time, so that a replay does the
+/// same.
+struct WalkBudget {
+  std::uint32_t visits = 0;  ///< nodes and leaves looked at
+};
+
+namespace walk {
+
+/// What the kernels work on: plain arrays, so that the translation unit for AVX2 shares no inline function
+/// with the rest of the program.
+struct Transform {
+  float R[3][3];
+  float t[3];
+};
+struct Motion {
+  Transform X_BA_middle, X_AB_middle;  ///< half way
+  Transform X_BA_start, X_BA_end;
+  Transform travel_BA, travel_AB;  ///< R p + t is by how much a point of A, seen from B, moves in all
+  float half_turn;                 ///< half the angle in all [rad]
+  float margin;                    ///< by which all boxes grow [m]
+  float margin_shift;              ///< how much nearer a plane of A may come at the end: shift + turn * distance
+  float margin_turn;
+  float centre_B[3];  ///< of A at the end, from which that distance counts
+  bool moving;
+};
+struct Tree {
+  const TriangleTree::Box* boxes;
+  const TriangleTree::Node* nodes;
+  const TriangleTree::Leaf* leaves;
+};
+struct Job {
+  Tree a, b;
+  Motion motion;
+  TrianglePair* pairs;  ///< room for pairs
+  std::uint32_t capacity;
+  std::uint32_t visits_allowed;
+  std::uint32_t* stack;  ///< room for kStack pairs of box numbers
+  void* moved_leaves;    ///< room for kMovedLeavesBytes, aligned to 64
+};
+struct Outcome {
+  std::uint32_t pairs;
+  std::uint32_t visits;
+  bool complete;
+};
+constexpr std::size_t kStack = 8192;
+constexpr std::size_t kMovedLeavesBytes = std::size_t{1} << 17;
+
+using Kernel = Outcome (*)(const Job&) noexcept;
+Outcome walk_portable(const Job& job) noexcept;
+Outcome walk_avx2(const Job& job) noexcept;
+/// Does this processor run walk_avx2()?
+bool has_avx2() noexcept;
+
+}  // namespace walk
+
+/// Walks two trees together and lists the pairs of triangles that may meet.
+///
+/// No pair that comes to touch on the way is left out (points of A are taken to move straight from start to
+/// end), nor one that touches at a pose within reach of the end. Pairs that a plane of one of the two
+/// triangles keeps apart all the way are left out, most others that do not meet too; what remains must be
+/// looked at in double precision. Which pairs remain depends on the processor, whether a pair that meets is
+/// among them does not.
+///
+/// All memory is taken at construction. One object serves one thread.
+class TreeWalk {
+ public:
+  static constexpr std::size_t kCapacity = std::size_t{1} << 16;
+
+  explicit TreeWalk(walk::Kernel kernel = nullptr);  ///< null: the fastest that this processor runs
+
+  /// False where the list or the budget was too small; what was found is there. The budget falls by the work
+  /// done. RT safe.
+  bool find(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep, WalkBudget& budget) noexcept;
+
+  const TrianglePair* begin() const noexcept { return pairs_.data(); }
+  const TrianglePair* end() const noexcept { return pairs_.data() + count_; }
+  std::size_t size() const noexcept { return count_; }
+
+ private:
+  struct alignas(64) Line {
+    unsigned char bytes[64];
+  };
+
+  walk::Kernel kernel_;
+  std::vector<TrianglePair> pairs_;
+  std::size_t count_ = 0;
+  std::vector<std::uint32_t> stack_;
+  std::vector<Line> moved_leaves_;
+};
+
+}  // namespace wrenchd

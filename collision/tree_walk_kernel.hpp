@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// No #pragma once: compiled once for every kind of processor, each in a namespace of its own, and included
+// nowhere else. WRENCHD_WALK names the function.
+
+#include <cstring>
+
+#include "collision/tree_walk.hpp"
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+// Eight numbers at a time: the compiler makes of them what the processor has. Only what it would not find by
+// itself is written with intrinsics.
+
+namespace wrenchd::walk {
+namespace {
+
+constexpr int kWidth = TriangleTree::kWidth;
+using Float8 = float __attribute__((vector_size(32)));
+using Mask8 = int __attribute__((vector_size(32)));
+
+#define WRENCHD_INLINE inline __attribute__((always_inline))
+
+WRENCHD_INLINE Float8 load(const float* p) noexcept {
+  Float8 v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
+WRENCHD_INLINE void store(float* p, Float8 v) noexcept { std::memcpy(p, &v, sizeof v); }
+WRENCHD_INLINE Float8 all(float x) noexcept { return Float8{} + x; }
+#if defined(__AVX2__)
+WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept { return _mm256_min_ps(a, b); }
+WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept { return _mm256_max_ps(a, b); }
+WRENCHD_INLINE unsigned bits(Mask8 m) noexcept {
+  return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(m)));
+}
+#else
+WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept { return a < b ? a : b; }
+WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept { return a > b ? a : b; }
+WRENCHD_INLINE unsigned bits(Mask8 m) noexcept {
+  unsigned out = 0;
+  for (int i = 0; i < kWidth; ++i) out |= (m[i] != 0 ? 1U : 0U) << i;
+  return out;
+}
+#endif
+WRENCHD_INLINE Float8 magnitude(Float8 x) noexcept { return larger(x, -x); }
+
+WRENCHD_INLINE float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
+WRENCHD_INLINE float dot(const float* a, const float* b) noexcept {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+WRENCHD_INLINE void turned(const Transform& X, const float* p, float* out) noexcept {
+  for (int i = 0; i < 3; ++i) out[i] = dot(X.R[i], p);
+}
+
+/// One box, seen from the other tree, grown so that it holds what it passes through.
+struct SweptBox {
+  float centre[3], axis[3][3], half[3];
+};
+
+/// Half way it stands at `middle`. Its own points leave the straight way of its centre by half the turn times
+/// their distance from it.
+WRENCHD_INLINE SweptBox swept(const TriangleTree::Box& box, const Transform& middle, const Transform& travel,
+                              const Motion& motion) noexcept {
+  SweptBox out;
+  turned(middle, box.centre, out.centre);
+  float way[3];
+  turned(travel, box.centre, way);
+  for (int d = 0; d < 3; ++d) {
+    out.centre[d] += middle.t[d];
+    way[d] += travel.t[d];
+  }
+  turned(middle, box.axis[0], out.axis[0]);
+  turned(middle, box.axis[1], out.axis[1]);
+  for (int d = 0; d < 3; ++d) {
+    const int e = (d + 1) % 3, f = (d + 2) % 3;
+    out.axis[2][d] = out.axis[0][e] * out.axis[1][f] - out.axis[0][f] * out.axis[1][e];
+  }
+  const float more = motion.half_turn * (box.half[0] + box.half[1] + box.half[2]) + motion.margin;
+  for (int i = 0; i < 3; ++i) out.half[i] = box.half[i] + 0.5F * magnitude(dot(way, out.axis[i])) + more;
+  return out;
+}
+
+/// Which of the eight boxes of a node meet a box, by all fifteen axes that may separate two boxes: the faces'
+/// normals of both, and their edges' cross products.
+WRENCHD_INLINE unsigned meeting(const SweptBox& s, const TriangleTree::Node& node) noexcept {
+  constexpr float kParallel = 1e-6F;  // where two axes are parallel their cross product says nothing
+  Float8 between[3], half[3];
+  for (int d = 0; d < 3; ++d) {
+    between[d] = load(node.centre[d]) - s.centre[d];
+    half[d] = load(node.half[d]);
+  }
+  Float8 t[3], R[3][3], Q[3][3];
+  for (int i = 0; i < 3; ++i) {
+    t[i] = between[0] * s.axis[i][0] + between[1] * s.axis[i][1] + between[2] * s.axis[i][2];
+    for (int j = 0; j < 3; ++j) {
+      R[i][j] = load(node.axis[j][0]) * s.axis[i][0] + load(node.axis[j][1]) * s.axis[i][1] +
+                load(node.axis[j][2]) * s.axis[i][2];
+      Q[i][j] = magnitude(R[i][j]) + kParallel;
+    }
+  }
+  Float8 gap = magnitude(t[0]) - (s.half[0] + half[0] * Q[0][0] + half[1] * Q[0][1] + half[2] * Q[0][2]);
+  for (int i = 1; i < 3; ++i)
+    gap = larger(gap,
+                 magnitude(t[i]) - (s.half[i] + half[0] * Q[i][0] + half[1] * Q[i][1] + half[2] * Q[i][2]));
+  for (int j = 0; j < 3; ++j)
+    gap = larger(gap, magnitude(t[0] * R[0][j] + t[1] * R[1][j] + t[2] * R[2][j]) -
+                          (half[j] + s.half[0] * Q[0][j] + s.half[1] * Q[1][j] + s.half[2] * Q[2][j]));
+  Mask8 meet = gap <= 0.0F;
+  if (bits(meet) == 0) return 0;
+  for (int i = 0; i < 3; ++i) {
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+    for (int j = 0; j < 3; ++j) {
+      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      meet &= magnitude(t[i2] * R[i1][j] - t[i1] * R[i2][j]) <=
+              s.half[i1] * Q[i2][j] + s.half[i2] * Q[i1][j] + half[j1] * Q[i][j2] + half[j2] * Q[i][j1];
+    }
+  }
+  return bits(meet);
+}
+
+/// The triangles of a leaf of A as B sees them, at the start and at the end.
+struct alignas(64) MovedLeaf {
+  float corner[2][3][3][kWidth];  ///< [start, end][which][component]
+  float low[3][kWidth], high[3][kWidth];
+  float normal[2][3][kWidth], offset[2][kWidth];
+  std::uint32_t leaf;
+};
+constexpr std::uint32_t kMovedLeaves = kMovedLeavesBytes / sizeof(MovedLeaf);
+static_assert(kMovedLeaves >= 64);
+
+void move(const TriangleTree::Leaf& leaf, const Motion& motion, MovedLeaf& out) noexcept {
+  const Transform* ends[2] = {&motion.X_BA_start, &motion.X_BA_end};
+  Float8 low[3], high[3];
+  for (int e = 0; e < 2; ++e) {
+    const Transform& X = *ends[e];
+    for (int i = 0; i < 3; ++i)
+      for (int d = 0; d < 3; ++d) {
+        const Float8 p = load(leaf.corner[i][0]) * X.R[d][0] + load(leaf.corner[i][1]) * X.R[d][1] +
+                         load(leaf.corner[i][2]) * X.R[d][2] + X.t[d];
+        store(out.corner[e][i][d], p);
+        low[d] = e + i == 0 ? p : smaller(low[d], p);
+        high[d] = e + i == 0 ? p : larger(high[d], p);
+      }
+    Float8 offset = all(0.0F);
+    for (int d = 0; d < 3; ++d) {
+      const Float8 n = load(leaf.normal[0]) * X.R[d][0] + load(leaf.normal[1]) * X.R[d][1] +
+                       load(leaf.normal[2]) * X.R[d][2];
+      store(out.normal[e][d], n);
+      offset += n * X.t[d];
+    }
+    store(out.offset[e], offset + load(leaf.offset));
+  }
+  for (int d = 0; d < 3; ++d) {
+    store(out.low[d], low[d] - motion.margin);
+    store(out.high[d], high[d] + motion.margin);
+  }
+}
+
+/// Triangle i of a leaf of A against the eight of a leaf of B: which are kept apart neither by their bounds
+/// nor by a plane of one of the two.
+WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleTree::Leaf& b, float margin,
+                             float margin_of_plane, bool moving) noexcept {
+  Mask8 apart = load(b.low[0]) > a.high[0][i];
+  apart |= load(b.high[0]) < a.low[0][i];
+  for (int d = 1; d < 3; ++d) {
+    apart |= load(b.low[d]) > a.high[d][i];
+    apart |= load(b.high[d]) < a.low[d][i];
+  }
+  if (bits(apart) == 255) return 0;
+  const int first = moving ? 0 : 1;
+  {
+    Float8 lowest = all(3e38F), highest = all(-3e38F);
+    const Float8 nx = load(b.normal[0]), ny = load(b.normal[1]), nz = load(b.normal[2]);
+    const Float8 offset = load(b.offset);
+    for (int e = first; e < 2; ++e)
+      for (int k = 0; k < 3; ++k) {
+        const Float8 h =
+            nx * a.corner[e][k][0][i] + ny * a.corner[e][k][1][i] + nz * a.corner[e][k][2][i] - offset;
+        lowest = smaller(lowest, h);
+        highest = larger(highest, h);
+      }
+    apart |= lowest > margin;
+    apart |= highest < -margin;
+  }
+  if (bits(apart) == 255) return 0;
+  {
+    Float8 lowest = all(3e38F), highest = all(-3e38F);
+    for (int e = first; e < 2; ++e)
+      for (int k = 0; k < 3; ++k) {
+        const Float8 h = load(b.corner[k][0]) * a.normal[e][0][i] + load(b.corner[k][1]) * a.normal[e][1][i] +
+                         load(b.corner[k][2]) * a.normal[e][2][i] - a.offset[e][i];
+        lowest = smaller(lowest, h);
+        highest = larger(highest, h);
+      }
+    apart |= lowest > margin_of_plane;
+    apart |= highest < -margin_of_plane;
+  }
+  return bits(apart) ^ 255U;
+}
+
+/// How far the boxed part of B may be from the centre of A at the end.
+WRENCHD_INLINE float distance_bound(const TriangleTree::Box& box, const float* centre) noexcept {
+  float sum = box.half[0] + box.half[1] + box.half[2];
+  for (int d = 0; d < 3; ++d) sum += magnitude(box.centre[d] - centre[d]);
+  return sum;
+}
+
+class Walk {
+ public:
+  explicit Walk(const Job& job) noexcept : job_(job), moved_(static_cast<MovedLeaf*>(job.moved_leaves)) {
+    for (std::uint32_t k = 0; k < kMovedLeaves; ++k) moved_[k].leaf = ~0U;
+  }
+
+  Outcome run() noexcept {
+    for (std::uint32_t a = 0; a < kWidth; ++a)
+      if (job_.a.boxes[a].count >= 0) open_b(a, 0);
+    while (top_ > 0 && complete_) {
+      const std::uint32_t b = job_.stack[--top_];
+      const std::uint32_t a = job_.stack[--top_];
+      visit(a, b);
+    }
+    return {pairs_, visits_, complete_};
+  }
+
+ private:
+  /// Opens the larger of two boxes, or looks at the triangles of two leaves.
+  void visit(std::uint32_t a, std::uint32_t b) noexcept {
+    if (++visits_ > job_.visits_allowed) complete_ = false;
+    const TriangleTree::Box& box_a = job_.a.boxes[a];
+    const TriangleTree::Box& box_b = job_.b.boxes[b];
+    if (box_a.count > 0 && box_b.count > 0) {
+      meet_leaves(box_a, box_b);
+    } else if (box_b.count > 0 || (box_a.count == 0 && box_a.size > box_b.size)) {
+      open_a(box_a.child, b);
+    } else {
+      open_b(a, box_b.child);
+    }
+  }
+
+  void open_a(std::uint32_t node, std::uint32_t b) noexcept {
+    const Motion& m = job_.motion;
+    const SweptBox box = swept(job_.b.boxes[b], m.X_AB_middle, m.travel_AB, m);
+    for (unsigned hits = meeting(box, job_.a.nodes[node]); hits != 0; hits &= hits - 1)
+      push(kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)), b);
+  }
+
+  void open_b(std::uint32_t a, std::uint32_t node) noexcept {
+    const Motion& m = job_.motion;
+    const SweptBox box = swept(job_.a.boxes[a], m.X_BA_middle, m.travel_BA, m);
+    for (unsigned hits = meeting(box, job_.b.nodes[node]); hits != 0; hits &= hits - 1)
+      push(a, kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)));
+  }
+
+  void push(std::uint32_t a, std::uint32_t b) noexcept {
+    if (top_ + 2 > 2 * kStack) {
+      complete_ = false;
+      return;
+    }
+    job_.stack[top_++] = a;
+    job_.stack[top_++] = b;
+  }
+
+  const MovedLeaf& moved(std::uint32_t leaf) noexcept {
+    MovedLeaf& slot = moved_[leaf % kMovedLeaves];
+    if (slot.leaf != leaf) {
+      move(job_.a.leaves[leaf], job_.motion, slot);
+      slot.leaf = leaf;
+    }
+    return slot;
+  }
+
+  void meet_leaves(const TriangleTree::Box& box_a, const TriangleTree::Box& box_b) noexcept {
+    const Motion& m = job_.motion;
+    const MovedLeaf& a = moved(box_a.child);
+    const TriangleTree::Leaf& b = job_.b.leaves[box_b.child];
+    const float margin_of_plane = m.margin_shift + m.margin_turn * distance_bound(box_b, m.centre_B);
+    for (int i = 0; i < box_a.count; ++i) {
+      const std::uint32_t ta = job_.a.leaves[box_a.child].triangle[i];
+      for (unsigned hits = near(a, i, b, m.margin, margin_of_plane, m.moving); hits != 0; hits &= hits - 1) {
+        if (pairs_ == job_.capacity) {
+          complete_ = false;
+          return;
+        }
+        job_.pairs[pairs_++] = {ta, b.triangle[__builtin_ctz(hits)]};
+      }
+    }
+  }
+
+  const Job& job_;
+  MovedLeaf* moved_;
+  std::uint32_t top_ = 0;
+  std::uint32_t pairs_ = 0;
+  std::uint32_t visits_ = 0;
+  bool complete_ = true;
+};
+
+}  // namespace
+
+Outcome WRENCHD_WALK(const Job& job) noexcept { return Walk(job).run(); }
+
+}  // namespace wrenchd::walk

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "core/triangle_mesh.hpp"
+
+namespace wrenchd {
+
+/// A solid to try things with, so that no model has to be downloaded.
+struct MadeMesh {
+  std::string kind;
+  std::size_t triangles = 20000;  ///< about so many
+  std::uint32_t seed = 1;         ///< of `bumpy`: which one of the many
+};
+
+struct MeshKind {
+  std::string name;
+  std::string what;  ///< one line, with its measures
+};
+
+/// What make_mesh() can make.
+const std::vector<MeshKind>& mesh_kinds();
+
+/// A closed, outward-oriented solid in metres, its middle at the origin. The same arguments make the same
+/// mesh. Throws std::invalid_argument where the kind is not known. Not RT safe.
+TriangleMesh make_mesh(const MadeMesh& wanted);
+
+/// As an OFF file, numbers in the shortest form that reads back the same.
+void write_off(std::ostream& out, const TriangleMesh& mesh);
+
+}  // namespace wrenchd
