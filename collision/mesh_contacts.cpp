@@ -20,15 +20,21 @@ constexpr double kWasOpen = 0.5;
 /// The slope by which the features around a contact may seem to lie nearer than the contact itself: the
 /// straight way is not quite the true one.
 constexpr double kSlope = 1e-3;
+/// Where the end overlaps and nothing was seen to be crossed, crossings passed narrowly by a border: it is
+/// looked at again with borders this much wider, as a share of the way, and with no regard to slopes.
+constexpr double kWideBorder = 0.05;
+constexpr double kAnySlope = 2.0;
 /// The list holds for ends this far away, as a share of the way, and at least so far, in units of the tool's
 /// size.
-constexpr double kReach = 0.25;
+constexpr double kReach = 0.08;
 constexpr double kLeastReach = 1e-4;
 /// Crossings of much the same direction nearer than this count as one, in units of the way.
 constexpr double kClose = 4.0;
 constexpr double kSameWay = 0.9;  // cosine
 
-Vector3d mix(const Vector3d& a, const Vector3d& b, double s) noexcept { return a + s * (b - a); }
+Vector3d mix(const Vector3d& a, const Vector3d& b, double s) noexcept {
+  return a + s * (b - a);
+}
 
 /// When on the way a gap has shrunk to the clearance.
 double closing_time(double start_m, double end_m, double clearance_m) noexcept {
@@ -62,6 +68,7 @@ MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(sce
 
 void MeshContacts::start_at(const Pose& X_WT) noexcept {
   X_start_ = X_WT;
+  from_listed_start_ = false;
   const Matrix3d R_WT = X_WT.rotation.toRotationMatrix();
   for (Seen& seen : seen_)
     seen.X_OT_start = {seen.X_WO.R.transpose() * R_WT, seen.X_WO.back(X_WT.translation_m)};
@@ -72,7 +79,7 @@ bool MeshContacts::covers(const Pose& X_WT) const noexcept {
     return (X.translation_m - X_listed_.translation_m).norm() <= reach_m_ &&
            X.rotation.angularDistance(X_listed_.rotation) <= reach_rad_;
   };
-  return listed_ && within(X_WT) && within(X_start_);
+  return listed_ && within(X_WT) && (from_listed_start_ || within(X_start_));
 }
 
 bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
@@ -81,7 +88,6 @@ bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
   const double radius_m = scene_.tool_radius_m();
   const double way_m = (X_WT.translation_m - X_start_.translation_m).norm();
   const double way_rad = X_WT.rotation.angularDistance(X_start_.rotation);
-  // The start must be within reach of the end as well, or the next look from the end would list again.
   reach_m_ = std::max(kReach * way_m, kLeastReach * radius_m);
   reach_rad_ = std::max(kReach * way_rad, kLeastReach);
   for (std::uint32_t k = 0; k < seen_.size(); ++k) {
@@ -93,14 +99,13 @@ bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
     for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, k});
   }
   X_listed_ = X_WT;
-  listed_ = true;
+  listed_ = from_listed_start_ = true;
   return true;
 }
 
 MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept {
   Findings findings;
   touching_.clear();
-  crossings_.clear();
   clearance_m_ = clearance_m;
   if (!covers(X_WT) && !list_pairs(X_WT, budget)) {
     findings.complete = false;
@@ -109,10 +114,32 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   const Matrix3d R_WT = X_WT.rotation.toRotationMatrix();
   for (Seen& seen : seen_)
     seen.X_OT_end = {seen.X_WO.R.transpose() * R_WT, seen.X_WO.back(X_WT.translation_m)};
+  const double way_m = way(X_start_, X_WT);
+  const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
+  // The way of a vertex is straight as long as nothing turns.
+  border_m_ = kBeyond * clearance_m + 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
+  slope_ = kSlope;
+  look_at_all(findings);
+  if (findings.overlaps && crossings_.empty()) {
+    border_m_ = kWideBorder * way_m;
+    slope_ = kAnySlope;
+    look_at_all(findings);
+  }
+  choose_first(way_m, findings);
+  return findings;
+}
+
+/// How far a point of the tool may be moved from one pose to the other.
+double MeshContacts::way(const Pose& from, const Pose& to) const noexcept {
+  return (to.translation_m - from.translation_m).norm() +
+         scene_.tool_radius_m() * from.rotation.angularDistance(to.rotation);
+}
+
+void MeshContacts::look_at_all(Findings& findings) noexcept {
+  touching_.clear();
+  crossings_.clear();
   moved_.triangle = MeshSurface::kNone;
   for (const NearPair& pair : pairs_) look_at(pair, moved(pair), findings);
-  choose_first(findings);
-  return findings;
 }
 
 const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
@@ -173,14 +200,14 @@ void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, cons
     const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
     const Vector3d p = mix(a.start[i], a.end[i], when);
     if (!over(p, surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2),
-              surface.planes()[pair.b].normal, (closes ? kBeyond : kHolds) * clearance_m_))
+              surface.planes()[pair.b].normal, closes ? border_m_ : kHolds * clearance_m_))
       continue;
     const Vector3d& p_T = tool.vertices_m()[vertices[i]];
     bool first = true;
     for (const std::uint32_t v : tool.around(vertices[i])) {
       const Vector3d& q_T = tool.vertices_m()[v];
       const Vector3d q = mix(seen.X_OT_start * q_T, seen.X_OT_end * q_T, when);
-      first = first && plane.normal.dot(q - p) >= -kSlope * (q_T - p_T).norm();
+      first = first && plane.normal.dot(q - p) >= -slope_ * (q_T - p_T).norm();
     }
     if (!first) continue;
     Contact contact;
@@ -217,13 +244,13 @@ void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noex
     const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
     const Vector3d p = mix(p_start, p_end, when);
     if (!over(p, tool.corner_m(pair.a, 0), tool.corner_m(pair.a, 1), tool.corner_m(pair.a, 2), plane.normal,
-              (closes ? kBeyond : kHolds) * clearance_m_))
+              closes ? border_m_ : kHolds * clearance_m_))
       continue;
     bool first = true;
     for (const std::uint32_t v : surface.around(vertex)) {
       const Vector3d& q_O = surface.vertices_m()[v];
       const Vector3d q = mix(seen.X_OT_start.back(q_O), seen.X_OT_end.back(q_O), when);
-      first = first && plane.normal.dot(q - p) >= -kSlope * (q_O - p_O).norm();
+      first = first && plane.normal.dot(q - p) >= -slope_ * (q_O - p_O).norm();
     }
     // The lone vertices of a surface may have anything beside them.
     if (!first && surface.kind() == MeshSurface::Kind::solid) continue;
@@ -295,14 +322,14 @@ void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t 
   const double NN = N.squaredNorm();
   if (!(NN > 0.0)) return;
   const double x = w.cross(db).dot(N) / NN, y = w.cross(da).dot(N) / NN;
-  const double beyond_m = (closes ? kBeyond : kHolds) * clearance_m_;
+  const double beyond_m = closes ? border_m_ : kHolds * clearance_m_;
   const double beyond_a = beyond_m / da.norm(), beyond_b = beyond_m / db.norm();
   if (x < -beyond_a || x > 1.0 + beyond_a || y < -beyond_b || y > 1.0 + beyond_b) return;
 
   // All four faces have to fall away from the plane between the edges.
   const Vector3d n = N * (sign / std::sqrt(NN));
   const auto falls_away = [&](const Vector3d& height_of, double side) {
-    return side * n.dot(height_of) >= -kSlope * height_of.norm();
+    return side * n.dot(height_of) >= -slope_ * height_of.norm();
   };
   if (!two_sided)
     for (const std::uint32_t t : eb.triangles)
@@ -341,16 +368,14 @@ void MeshContacts::crossed(double when, const Vector3d& point_W_m, const Contact
   if (when < last->when) *last = {when, point_W_m, contact};
 }
 
-void MeshContacts::choose_first(Findings& findings) noexcept {
+void MeshContacts::choose_first(double way_m, Findings& findings) noexcept {
   if (crossings_.empty()) return;
   std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
     if (a.when != b.when) return a.when < b.when;
-    if (a.contact.tool_feature != b.contact.tool_feature) return a.contact.tool_feature < b.contact.tool_feature;
+    if (a.contact.tool_feature != b.contact.tool_feature)
+      return a.contact.tool_feature < b.contact.tool_feature;
     return a.contact.obstacle_feature < b.contact.obstacle_feature;
   });
-  const Seen& any = seen_.front();
-  const double way_m = (any.X_OT_end.x_m - any.X_OT_start.x_m).norm() +
-                       (any.X_OT_end.R - any.X_OT_start.R).norm() * scene_.tool_radius_m();
   const double close_m = std::min(kClose * way_m, 0.25 * scene_.tool_radius_m());
   FixedList<Vector3d, kMostMet> points;
   for (const Crossing& crossing : crossings_) {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "collision/scene.hpp"
-#include "collision/triangle_pair.hpp"
 #include "collision/tree_walk.hpp"
+#include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
 #include "core/fixed_list.hpp"
 
@@ -71,7 +71,7 @@ class MeshContacts {
   /// One obstacle, seen along the way.
   struct Seen {
     const MeshObstacle* obstacle;
-    std::uint32_t number;       ///< in the scene
+    std::uint32_t number;  ///< in the scene
     Frame X_WO;
     Frame X_OT_start, X_OT_end;
   };
@@ -82,8 +82,10 @@ class MeshContacts {
     Triangle start, end;
   };
 
+  double way(const Pose& from, const Pose& to) const noexcept;
   bool covers(const Pose& X_WT) const noexcept;
   bool list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept;
+  void look_at_all(Findings& findings) noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
   void look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
   void vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
@@ -91,17 +93,20 @@ class MeshContacts {
   void edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
   void edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a, std::uint32_t edge_b) noexcept;
   void crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept;
-  void choose_first(Findings& findings) noexcept;
+  void choose_first(double way_m, Findings& findings) noexcept;
 
   const Scene& scene_;
   TreeWalk walk_;
   Pose X_start_;
   std::vector<Seen> seen_;
   double clearance_m_ = 0.0;
+  double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
+  double slope_ = 0.0;     ///< by which their surroundings may seem to come first
 
   bool listed_ = false;
-  Pose X_listed_;            ///< the end of the way that the list was made for
-  double reach_m_ = 0.0;     ///< and how far from it the list holds
+  bool from_listed_start_ = false;  ///< the start is still that of the way that the list was made for
+  Pose X_listed_;                   ///< and this was its end
+  double reach_m_ = 0.0;            ///< the list holds for ends this near to it
   double reach_rad_ = 0.0;
   std::vector<NearPair> pairs_;
 

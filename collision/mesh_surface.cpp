@@ -18,7 +18,9 @@ constexpr double kFlat_m = 1e-10;
 /// Neighbours that fall away from a vertex by less than this [rad] do not point it.
 constexpr double kBlunt = 1e-7;
 
-constexpr int next(int i) noexcept { return i == 2 ? 0 : i + 1; }
+constexpr int next(int i) noexcept {
+  return i == 2 ? 0 : i + 1;
+}
 
 /// Is there a direction n with n . e < 0 for all of these? The one that all fall away from the most, by the
 /// least-distance problem  min |z|  s.t.  -e . z >= 1,  met a few rows at a time, for a vertex may have any

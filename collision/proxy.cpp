@@ -9,11 +9,19 @@
 namespace wrenchd {
 namespace {
 
-/// A step that turns farther than this is gone in parts [rad]: its points leave the straight way by
-/// angle^2 / 8 of their distance.
+/// No step is longer than so many times what the hand has moved since the last tick, or this share of the
+/// tool's size: where a candidate lies far away, for want of a contact that is about to be met, the long way
+/// there would be the dearest of all to look along. It is gone in parts.
+constexpr double kLongestStep = 3.0;
+constexpr double kLeastStep = 0.002;
+/// Nor does it turn farther than this [rad]: points leave the straight way by angle^2 / 8 of their distance.
 constexpr double kLongestTurn_rad = 0.05;
 /// A way this short, as a share of the step, is not worth going.
 constexpr double kShortestShare = 1.0 / 1024.0;
+/// Where a contact has let go, another is about to be met near by, most often: the first step is a short one,
+/// and every next may be longer.
+constexpr double kWary = 1.0 / 64.0;
+constexpr double kLonger = 4.0;
 /// T falls by at least this share from one round to the next, or the rounds end.
 constexpr double kProgress = 1e-9;
 
@@ -46,25 +54,33 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
   iterations_ = 0;
   budget_.visits = effort_.visits;
   meshes_.start_at(X_WQ_);
+  double longest_m =
+      std::max(kLongestStep * (X_asked_ ? way_m(*X_asked_, X_WP) : 0.0), kLeastStep * scene_.tool_radius_m());
+  X_asked_ = X_WP;
   double share = 1.0;  // of the step that the contacts known allow
   double T_last = energy(M_, X_WP, X_WQ_);
   while (looks_ < effort_.looks && share >= kShortestShare) {
     Projection q = project(X_WP);
     if (q.status == ProjectionStatus::infeasible) break;
     const double turn_rad = X_WQ_.rotation.angularDistance(q.X_WQ.rotation);
-    const double part = std::min(share, turn_rad > kLongestTurn_rad ? kLongestTurn_rad / turn_rad : 1.0);
+    const double part = std::min(
+        {share, longest_m / way_m(X_WQ_, q.X_WQ), turn_rad > 0.0 ? kLongestTurn_rad / turn_rad : 1.0, 1.0});
     if (part < 1.0) q = project(between(X_WQ_, q.X_WQ, part));
     if (q.status == ProjectionStatus::infeasible) break;
     const Way way = look_along(q.X_WQ);
-    if (way == Way::met_contacts) continue;
+    if (way == Way::met_contacts) {
+      share = 1.0;
+      continue;
+    }
     if (way == Way::too_long) {
       share = 0.5 * part;
       continue;
     }
     X_WQ_ = q.X_WQ;
     meshes_.start_at(X_WQ_);
-    share = 1.0;
+    if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
     const bool all_hold = !let_go(q);
+    share = all_hold ? std::min(1.0, kLonger * share) : kWary;
     if (part < 1.0) continue;
     if (all_hold) return described(X_WP, q);
     const double T = energy(M_, X_WP, X_WQ_);
@@ -83,6 +99,12 @@ Projection Proxy::project(const Pose& X_WP) noexcept {
       exact_.project(X_WP, Nothing(), X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()));
   iterations_ = static_cast<std::uint16_t>(iterations_ + q.iterations);
   return q;
+}
+
+/// How far a point of the tool may be moved from one pose to the other.
+double Proxy::way_m(const Pose& from, const Pose& to) const noexcept {
+  return (to.translation_m - from.translation_m).norm() +
+         scene_.tool_radius_m() * from.rotation.angularDistance(to.rotation);
 }
 
 /// Looks along the way from the pose at hand; what it meets there becomes known.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "collision/mesh_contacts.hpp"
 #include "collision/scene_contacts.hpp"
@@ -41,15 +42,20 @@ class Proxy {
   Projection follow(const Pose& X_WP, const Pose& X_last) noexcept;
 
   /// Forgets the contacts of the last tick. RT safe.
-  void forget() noexcept { known_.clear(); }
+  void forget() noexcept {
+    known_.clear();
+    X_asked_.reset();
+  }
 
   std::uint16_t looks() const noexcept { return looks_; }  ///< of the last tick
+  std::size_t pairs() const noexcept { return meshes_.pairs(); }
 
  private:
   using Known = FixedList<ActiveContact, ContactSet::kCapacity>;
   enum class Way : std::uint8_t { free, met_contacts, too_long };
 
   Projection project(const Pose& X_WP) noexcept;
+  double way_m(const Pose& from, const Pose& to) const noexcept;
   Way look_along(const Pose& X_WT) noexcept;
   bool learn(const Contact& contact) noexcept;
   bool let_go(const Projection& q) noexcept;
@@ -62,7 +68,8 @@ class Proxy {
   SceneContacts planes_;  ///< the half-spaces
   MeshContacts meshes_;
   Known known_;
-  Pose X_WQ_;  ///< the admissible pose at hand
+  std::optional<Pose> X_asked_;  ///< last tick's p
+  Pose X_WQ_;                    ///< the admissible pose at hand
   WalkBudget budget_;
   std::uint16_t looks_ = 0;
   std::uint16_t iterations_ = 0;

@@ -45,15 +45,15 @@ walk::Motion motion_of(const Sweep& sweep, double radius_a_m, double extent_m) n
   motion.travel_AB = travel(inverse(start), inverse(end));
   const double angle = start.rotation.angularDistance(end.rotation);
   const double bulge_m = 0.25 * angle * angle * radius_a_m;
-  const double rounding_m =
-      kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
-                                       end.translation_m.lpNorm<Eigen::Infinity>()));
+  const double rounding_m = kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
+                                                             end.translation_m.lpNorm<Eigen::Infinity>()));
   motion.half_turn = static_cast<float>(0.5 * angle);
   motion.margin = static_cast<float>(reach_m + reach_rad * radius_a_m + bulge_m + rounding_m);
   motion.margin_shift = static_cast<float>(reach_m + rounding_m);
   motion.margin_turn = static_cast<float>(reach_rad);
   for (int d = 0; d < 3; ++d) motion.centre_B[d] = static_cast<float>(end.translation_m[d]);
-  motion.moving = start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
+  motion.moving =
+      start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
   return motion;
 }
 
@@ -64,7 +64,9 @@ walk::Tree arrays_of(const TriangleTree& tree) noexcept {
 }  // namespace
 
 TreeWalk::TreeWalk(walk::Kernel kernel)
-    : kernel_(kernel != nullptr ? kernel : walk::has_avx2() ? walk::walk_avx2 : walk::walk_portable),
+    : kernel_(kernel != nullptr  ? kernel
+              : walk::has_avx2() ? walk::walk_avx2
+                                 : walk::walk_portable),
       pairs_(kCapacity),
       stack_(2 * walk::kStack),
       moved_leaves_(walk::kMovedLeavesBytes / sizeof(Line)) {}

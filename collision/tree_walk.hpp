@@ -46,7 +46,7 @@ struct Motion {
   Transform travel_BA, travel_AB;  ///< R p + t is by how much a point of A, seen from B, moves in all
   float half_turn;                 ///< half the angle in all [rad]
   float margin;                    ///< by which all boxes grow [m]
-  float margin_shift;              ///< how much nearer a plane of A may come at the end: shift + turn * distance
+  float margin_shift;  ///< how much nearer a plane of A may come at the end: shift + turn * distance
   float margin_turn;
   float centre_B[3];  ///< of A at the end, from which that distance counts
   bool moving;

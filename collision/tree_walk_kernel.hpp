@@ -26,26 +26,42 @@ WRENCHD_INLINE Float8 load(const float* p) noexcept {
   std::memcpy(&v, p, sizeof v);
   return v;
 }
-WRENCHD_INLINE void store(float* p, Float8 v) noexcept { std::memcpy(p, &v, sizeof v); }
-WRENCHD_INLINE Float8 all(float x) noexcept { return Float8{} + x; }
+WRENCHD_INLINE void store(float* p, Float8 v) noexcept {
+  std::memcpy(p, &v, sizeof v);
+}
+WRENCHD_INLINE Float8 all(float x) noexcept {
+  return Float8{} + x;
+}
 #if defined(__AVX2__)
-WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept { return _mm256_min_ps(a, b); }
-WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept { return _mm256_max_ps(a, b); }
+WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept {
+  return _mm256_min_ps(a, b);
+}
+WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept {
+  return _mm256_max_ps(a, b);
+}
 WRENCHD_INLINE unsigned bits(Mask8 m) noexcept {
   return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(m)));
 }
 #else
-WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept { return a < b ? a : b; }
-WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept { return a > b ? a : b; }
+WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept {
+  return a < b ? a : b;
+}
+WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept {
+  return a > b ? a : b;
+}
 WRENCHD_INLINE unsigned bits(Mask8 m) noexcept {
   unsigned out = 0;
   for (int i = 0; i < kWidth; ++i) out |= (m[i] != 0 ? 1U : 0U) << i;
   return out;
 }
 #endif
-WRENCHD_INLINE Float8 magnitude(Float8 x) noexcept { return larger(x, -x); }
+WRENCHD_INLINE Float8 magnitude(Float8 x) noexcept {
+  return larger(x, -x);
+}
 
-WRENCHD_INLINE float magnitude(float x) noexcept { return x < 0.0F ? -x : x; }
+WRENCHD_INLINE float magnitude(float x) noexcept {
+  return x < 0.0F ? -x : x;
+}
 WRENCHD_INLINE float dot(const float* a, const float* b) noexcept {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -297,6 +313,8 @@ class Walk {
 
 }  // namespace
 
-Outcome WRENCHD_WALK(const Job& job) noexcept { return Walk(job).run(); }
+Outcome WRENCHD_WALK(const Job& job) noexcept {
+  return Walk(job).run();
+}
 
 }  // namespace wrenchd::walk

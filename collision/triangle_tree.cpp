@@ -30,8 +30,8 @@ struct Fitted {
 /// A binary tree first: it is folded into nodes of eight afterwards.
 struct Branch {
   Fitted box;
-  std::uint32_t begin, end;  ///< in the order of the triangles
-  std::uint32_t left, right; ///< 0: a leaf
+  std::uint32_t begin, end;   ///< in the order of the triangles
+  std::uint32_t left, right;  ///< 0: a leaf
 };
 
 class Builder {
@@ -80,8 +80,8 @@ Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
     const Vector3d g = middle_[t] - origin;
     area += A;
     first += A * g;
-    second += A / 12.0 *
-              (9.0 * g * g.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
+    second +=
+        A / 12.0 * (9.0 * g * g.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
   }
   const Vector3d mean = first / area;
   Eigen::SelfAdjointEigenSolver<Matrix3d> eigen;
@@ -92,7 +92,8 @@ Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
   box.axes.row(0) = eigen.eigenvectors().col(2).normalized();
   // computeDirect is quick, not orthogonal to the last digit.
   const Vector3d second_axis = eigen.eigenvectors().col(1);
-  box.axes.row(1) = (second_axis - box.axes.row(0).dot(second_axis) * box.axes.row(0).transpose()).normalized();
+  box.axes.row(1) =
+      (second_axis - box.axes.row(0).dot(second_axis) * box.axes.row(0).transpose()).normalized();
   box.axes.row(2) = box.axes.row(0).cross(box.axes.row(1));
   Vector3d low = Vector3d::Constant(1e300), high = -low;
   for (std::uint32_t k = begin; k < end; ++k)
@@ -197,9 +198,8 @@ std::vector<std::uint32_t> opened(const std::vector<Branch>& branches, std::uint
     const auto area = [&](std::uint32_t i) {
       return branches[i].left == 0 ? -1.0 : branches[i].box.half_area();
     };
-    const auto largest = std::max_element(under.begin(), under.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return area(a) < area(b);
-    });
+    const auto largest = std::max_element(
+        under.begin(), under.end(), [&](std::uint32_t a, std::uint32_t b) { return area(a) < area(b); });
     if (branches[*largest].left == 0) break;
     const std::uint32_t opened = *largest;
     *largest = branches[opened].left;

@@ -36,7 +36,7 @@ struct Contact {
   /// vertex_face.
   std::uint32_t tool_feature = 0;
   std::uint32_t obstacle_feature = 0;
-  std::uint32_t obstacle = 0;          ///< which obstacle of the scene
+  std::uint32_t obstacle = 0;  ///< which obstacle of the scene
 };
 
 /// Unit normal of a contact at a pose of T, from the obstacle to the tool. RT safe.

@@ -180,7 +180,7 @@ class ExactProjection {
   Budget budget_;
   std::uint16_t iteration_limit_;  ///< of the query at hand
   double L_;                       ///< [m]
-  double clearance_;                ///< in units of L
+  double clearance_;               ///< in units of L
   Matrix3d H_hat_;
   Matrix6d metric_root_;  ///< Cholesky factor of diag(2 I, 2 H^)
 

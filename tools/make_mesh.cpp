@@ -29,7 +29,8 @@ class Welder {
   std::uint32_t operator()(const Vector3d& p) {
     const std::array<long long, 3> key = {std::llround(p.x() / grain_), std::llround(p.y() / grain_),
                                           std::llround(p.z() / grain_)};
-    const auto [found, is_new] = numbers_.try_emplace(key, static_cast<std::uint32_t>(mesh_.vertices_m.size()));
+    const auto [found, is_new] =
+        numbers_.try_emplace(key, static_cast<std::uint32_t>(mesh_.vertices_m.size()));
     if (is_new) mesh_.vertices_m.push_back(p);
     return found->second;
   }
@@ -43,9 +44,18 @@ class Welder {
 /// The unit sphere: an icosahedron whose 20 faces are cut into f^2 triangles each.
 TriangleMesh geodesic(std::uint32_t f) {
   const double g = std::numbers::phi;
-  const std::array<Vector3d, 12> corners = {{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0},
-                                             {0, -1, g}, {0, 1, g}, {0, -1, -g}, {0, 1, -g},
-                                             {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}}};
+  const std::array<Vector3d, 12> corners = {{{-1, g, 0},
+                                             {1, g, 0},
+                                             {-1, -g, 0},
+                                             {1, -g, 0},
+                                             {0, -1, g},
+                                             {0, 1, g},
+                                             {0, -1, -g},
+                                             {0, 1, -g},
+                                             {g, 0, -1},
+                                             {g, 0, 1},
+                                             {-g, 0, -1},
+                                             {-g, 0, 1}}};
   constexpr int kFaces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
                                  {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
                                  {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
@@ -76,13 +86,12 @@ TriangleMesh bumpy(const MadeMesh& wanted, double radius_m, double height) {
   std::mt19937 generator(wanted.seed);
   // The standard's distributions differ between libraries, its generators do not.
   const auto uniform = [&] { return (static_cast<double>(generator()) + 0.5) / 4294967296.0; };
-  const auto normal = [&] {
-    return std::sqrt(-2.0 * std::log(uniform())) * std::cos(kTurn * uniform());
-  };
+  const auto normal = [&] { return std::sqrt(-2.0 * std::log(uniform())) * std::cos(kTurn * uniform()); };
   std::vector<Wave> waves;
   for (int i = 0; i < 24; ++i) {
     const double x = normal(), y = normal(), z = normal();
-    waves.push_back({(3.0 + i) * Vector3d(x, y, z).normalized(), height / (1.0 + 0.25 * i), kTurn * uniform()});
+    waves.push_back(
+        {(3.0 + i) * Vector3d(x, y, z).normalized(), height / (1.0 + 0.25 * i), kTurn * uniform()});
   }
   TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(wanted.triangles) / 20.0), 1));
   for (Vector3d& p : mesh.vertices_m) {
@@ -208,7 +217,9 @@ double triangle_wave(double turns) {
 constexpr double kPitch_m = 0.0015;
 constexpr double kThread_m = 0.0008;
 
-double thread(double angle, double z) { return kThread_m * triangle_wave(z / kPitch_m - angle / kTurn); }
+double thread(double angle, double z) {
+  return kThread_m * triangle_wave(z / kPitch_m - angle / kTurn);
+}
 
 TriangleMesh bolt(const MadeMesh& wanted) {
   Turned body = cut(wanted, 0.030, 0.005, 1);
@@ -245,9 +256,18 @@ struct Maker {
 
 const std::vector<Maker>& makers() {
   static const std::vector<Maker> all = {
-      {{"cube", "side 50 mm"}, [](const MadeMesh& m) { return box(m, {0.05, 0.05, 0.05}); }},
-      {{"plate", "100 x 100 x 1 mm"}, [](const MadeMesh& m) { return box(m, {0.1, 0.1, 0.001}); }},
-      {{"table", "300 x 300 x 20 mm"}, [](const MadeMesh& m) { return box(m, {0.3, 0.3, 0.02}); }},
+      {{"cube", "side 50 mm"},
+       [](const MadeMesh& m) {
+         return box(m, {0.05, 0.05, 0.05});
+       }},
+      {{"plate", "100 x 100 x 1 mm"},
+       [](const MadeMesh& m) {
+         return box(m, {0.1, 0.1, 0.001});
+       }},
+      {{"table", "300 x 300 x 20 mm"},
+       [](const MadeMesh& m) {
+         return box(m, {0.3, 0.3, 0.02});
+       }},
       {{"sphere", "radius 30 mm"}, [](const MadeMesh& m) { return bumpy(m, 0.03, 0.0); }},
       {{"bumpy", "radius 40 mm, bumps all over"}, [](const MadeMesh& m) { return bumpy(m, 0.04, 0.008); }},
       {{"boulder", "radius 60 mm, bumps all over"}, [](const MadeMesh& m) { return bumpy(m, 0.06, 0.008); }},
