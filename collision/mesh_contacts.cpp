@@ -93,7 +93,7 @@ bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
   for (std::uint32_t k = 0; k < seen_.size(); ++k) {
     const MeshObstacle& obstacle = *seen_[k].obstacle;
     const Pose X_OW = inverse(obstacle.X_WO);
-    const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, reach_rad_};
+    const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, reach_rad_, false};
     const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh.tree, sweep, budget);
     if (!complete || pairs_.size() + walk_.size() > pairs_.capacity()) return false;
     for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, k});

@@ -55,7 +55,7 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
 }
 
 TreedMesh::TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind)
-    : surface(std::move(mesh), kind), tree(surface.mesh()) {}
+    : surface(std::move(mesh), kind), tree(surface) {}
 
 Scene::Scene(const SceneSettings& settings) : Scene(load(settings)) {}
 

@@ -33,7 +33,7 @@ walk::Transform travel(const Pose& from, const Pose& to) noexcept {
 /// point at a distance r from A's origin leaves the straight line between its ends by no more than
 /// angle^2 r / 8, and the line's middle lies as far from where the pose half way takes it.
 walk::Motion motion_of(const Sweep& sweep, double radius_a_m, double extent_m) noexcept {
-  const auto& [start, end, reach_m, reach_rad] = sweep;
+  const auto& [start, end, reach_m, reach_rad, all_pairs] = sweep;
   walk::Motion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
@@ -47,6 +47,7 @@ walk::Motion motion_of(const Sweep& sweep, double radius_a_m, double extent_m) n
   const double bulge_m = 0.25 * angle * angle * radius_a_m;
   const double rounding_m = kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
                                                              end.translation_m.lpNorm<Eigen::Infinity>()));
+  motion.all_pairs = all_pairs;
   motion.half_turn = static_cast<float>(0.5 * angle);
   motion.margin = static_cast<float>(reach_m + reach_rad * radius_a_m + bulge_m + rounding_m);
   motion.margin_shift = static_cast<float>(reach_m + rounding_m);

@@ -24,6 +24,8 @@ struct Sweep {
   /// far, and turned by no more than this angle.
   double reach_m = 0.0;
   double reach_rad = 0.0;
+  /// False: list only pairs with features that can meet first, a vertex in one of them or an edge in each.
+  bool all_pairs = true;
 };
 
 /// How much work a walk may do, and did: it is counted in work and not in time, so that a replay does the
@@ -50,6 +52,7 @@ struct Motion {
   float margin_turn;
   float centre_B[3];  ///< of A at the end, from which that distance counts
   bool moving;
+  bool all_pairs;
 };
 struct Tree {
   const TriangleTree::Box* boxes;

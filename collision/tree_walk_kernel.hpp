@@ -137,15 +137,19 @@ WRENCHD_INLINE unsigned meeting(const SweptBox& s, const TriangleTree::Node& nod
 
 /// The triangles of a leaf of A as B sees them, at the start and at the end.
 struct alignas(64) MovedLeaf {
+  SweptBox box;
   float corner[2][3][3][kWidth];  ///< [start, end][which][component]
   float low[3][kWidth], high[3][kWidth];
+  float low_of_all[3], high_of_all[3];
   float normal[2][3][kWidth], offset[2][kWidth];
   std::uint32_t leaf;
 };
 constexpr std::uint32_t kMovedLeaves = kMovedLeavesBytes / sizeof(MovedLeaf);
 static_assert(kMovedLeaves >= 64);
 
-void move(const TriangleTree::Leaf& leaf, const Motion& motion, MovedLeaf& out) noexcept {
+void move(const TriangleTree::Leaf& leaf, const TriangleTree::Box& box, const Motion& motion,
+          MovedLeaf& out) noexcept {
+  out.box = swept(box, motion.X_BA_middle, motion.travel_BA, motion);
   const Transform* ends[2] = {&motion.X_BA_start, &motion.X_BA_end};
   Float8 low[3], high[3];
   for (int e = 0; e < 2; ++e) {
@@ -170,14 +174,68 @@ void move(const TriangleTree::Leaf& leaf, const Motion& motion, MovedLeaf& out) 
   for (int d = 0; d < 3; ++d) {
     store(out.low[d], low[d] - motion.margin);
     store(out.high[d], high[d] + motion.margin);
+    out.low_of_all[d] = out.low[d][0];
+    out.high_of_all[d] = out.high[d][0];
+    for (int i = 1; i < kWidth; ++i) {
+      out.low_of_all[d] = out.low[d][i] < out.low_of_all[d] ? out.low[d][i] : out.low_of_all[d];
+      out.high_of_all[d] = out.high[d][i] > out.high_of_all[d] ? out.high[d][i] : out.high_of_all[d];
+    }
   }
+}
+
+/// Which of eight planes, normal . x = offset, have no part of a box within `margin` of them.
+WRENCHD_INLINE Mask8 miss(const float (*normal)[kWidth], const float* offset, const SweptBox& box,
+                          float margin) noexcept {
+  const Float8 nx = load(normal[0]), ny = load(normal[1]), nz = load(normal[2]);
+  const Float8 height = nx * box.centre[0] + ny * box.centre[1] + nz * box.centre[2] - load(offset);
+  Float8 half = all(margin);
+  for (int i = 0; i < 3; ++i)
+    half += magnitude(nx * box.axis[i][0] + ny * box.axis[i][1] + nz * box.axis[i][2]) * box.half[i];
+  return magnitude(height) > half;
+}
+
+/// The planes of eight triangles of A, at both ends, that leave a box of B on the same side.
+WRENCHD_INLINE Mask8 miss(const MovedLeaf& a, const SweptBox& box, float margin, bool moving) noexcept {
+  const Mask8 end = miss(a.normal[1], a.offset[1], box, margin);
+  if (!moving) return end;
+  const auto side = [&](int e) {
+    return load(a.normal[e][0]) * box.centre[0] + load(a.normal[e][1]) * box.centre[1] +
+           load(a.normal[e][2]) * box.centre[2] - load(a.offset[e]);
+  };
+  return end & miss(a.normal[0], a.offset[0], box, margin) & (side(0) * side(1) > 0.0F);
+}
+
+/// A box that stands still.
+WRENCHD_INLINE SweptBox standing(const TriangleTree::Box& box) noexcept {
+  SweptBox out;
+  for (int d = 0; d < 3; ++d) {
+    const int e = (d + 1) % 3, f = (d + 2) % 3;
+    out.centre[d] = box.centre[d];
+    out.half[d] = box.half[d];
+    out.axis[0][d] = box.axis[0][d];
+    out.axis[1][d] = box.axis[1][d];
+    out.axis[2][d] = box.axis[0][e] * box.axis[1][f] - box.axis[0][f] * box.axis[1][e];
+  }
+  return out;
+}
+
+/// Which of eight boxes lie beside another.
+WRENCHD_INLINE Mask8 beside(const float (*low)[kWidth], const float (*high)[kWidth], const float* other_low,
+                            const float* other_high) noexcept {
+  Mask8 apart = load(low[0]) > other_high[0];
+  apart |= load(high[0]) < other_low[0];
+  for (int d = 1; d < 3; ++d) {
+    apart |= load(low[d]) > other_high[d];
+    apart |= load(high[d]) < other_low[d];
+  }
+  return apart;
 }
 
 /// Triangle i of a leaf of A against the eight of a leaf of B: which are kept apart neither by their bounds
 /// nor by a plane of one of the two.
-WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleTree::Leaf& b, float margin,
-                             float margin_of_plane, bool moving) noexcept {
-  Mask8 apart = load(b.low[0]) > a.high[0][i];
+WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleTree::Leaf& b, Mask8 apart,
+                             float margin, float margin_of_plane, bool moving) noexcept {
+  apart |= load(b.low[0]) > a.high[0][i];
   apart |= load(b.high[0]) < a.low[0][i];
   for (int d = 1; d < 3; ++d) {
     apart |= load(b.low[d]) > a.high[d][i];
@@ -256,16 +314,32 @@ class Walk {
 
   void open_a(std::uint32_t node, std::uint32_t b) noexcept {
     const Motion& m = job_.motion;
-    const SweptBox box = swept(job_.b.boxes[b], m.X_AB_middle, m.travel_AB, m);
-    for (unsigned hits = meeting(box, job_.a.nodes[node]); hits != 0; hits &= hits - 1)
+    if (swept_b_ != b) {
+      box_b_ = swept(job_.b.boxes[b], m.X_AB_middle, m.travel_AB, m);
+      swept_b_ = b;
+    }
+    const TriangleTree::Node& eight = job_.a.nodes[node];
+    const unsigned worth = worth_it(job_.b.boxes[b].features, eight.has_vertices, eight.has_edges);
+    for (unsigned hits = meeting(box_b_, eight) & worth; hits != 0; hits &= hits - 1)
       push(kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)), b);
   }
 
   void open_b(std::uint32_t a, std::uint32_t node) noexcept {
     const Motion& m = job_.motion;
-    const SweptBox box = swept(job_.a.boxes[a], m.X_BA_middle, m.travel_BA, m);
-    for (unsigned hits = meeting(box, job_.b.nodes[node]); hits != 0; hits &= hits - 1)
+    if (swept_a_ != a) {
+      box_a_ = swept(job_.a.boxes[a], m.X_BA_middle, m.travel_BA, m);
+      swept_a_ = a;
+    }
+    const TriangleTree::Node& eight = job_.b.nodes[node];
+    const unsigned worth = worth_it(job_.a.boxes[a].features, eight.has_vertices, eight.has_edges);
+    for (unsigned hits = meeting(box_a_, eight) & worth; hits != 0; hits &= hits - 1)
       push(a, kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)));
+  }
+
+  /// Which of eight have features that can meet those of another first.
+  unsigned worth_it(unsigned features, unsigned has_vertices, unsigned has_edges) const noexcept {
+    if (job_.motion.all_pairs || (features & TriangleTree::kVertices) != 0) return 255;
+    return (features & TriangleTree::kEdges) != 0 ? has_vertices | has_edges : has_vertices;
   }
 
   void push(std::uint32_t a, std::uint32_t b) noexcept {
@@ -277,23 +351,35 @@ class Walk {
     job_.stack[top_++] = b;
   }
 
-  const MovedLeaf& moved(std::uint32_t leaf) noexcept {
-    MovedLeaf& slot = moved_[leaf % kMovedLeaves];
-    if (slot.leaf != leaf) {
-      move(job_.a.leaves[leaf], job_.motion, slot);
-      slot.leaf = leaf;
+  const MovedLeaf& moved(const TriangleTree::Box& box) noexcept {
+    MovedLeaf& slot = moved_[box.child % kMovedLeaves];
+    if (slot.leaf != box.child) {
+      move(job_.a.leaves[box.child], box, job_.motion, slot);
+      slot.leaf = box.child;
     }
     return slot;
   }
 
   void meet_leaves(const TriangleTree::Box& box_a, const TriangleTree::Box& box_b) noexcept {
     const Motion& m = job_.motion;
-    const MovedLeaf& a = moved(box_a.child);
+    const MovedLeaf& a = moved(box_a);
     const TriangleTree::Leaf& b = job_.b.leaves[box_b.child];
+    Mask8 apart = beside(b.low, b.high, a.low_of_all, a.high_of_all);
+    if (bits(apart) == 255) return;
+    apart |= miss(b.normal, b.offset, a.box, 0.0F);  // the box has its margin
+    if (bits(apart) == 255) return;
+    unsigned rows = (1U << box_a.count) - 1;
+    rows &= ~bits(beside(a.low, a.high, b.low_of_all, b.high_of_all));
+    if (rows == 0) return;
     const float margin_of_plane = m.margin_shift + m.margin_turn * distance_bound(box_b, m.centre_B);
-    for (int i = 0; i < box_a.count; ++i) {
-      const std::uint32_t ta = job_.a.leaves[box_a.child].triangle[i];
-      for (unsigned hits = near(a, i, b, m.margin, margin_of_plane, m.moving); hits != 0; hits &= hits - 1) {
+    for (rows &= ~bits(miss(a, standing(box_b), margin_of_plane, m.moving)); rows != 0; rows &= rows - 1) {
+      const int i = __builtin_ctz(rows);
+      const TriangleTree::Leaf& leaf_a = job_.a.leaves[box_a.child];
+      const std::uint32_t ta = leaf_a.triangle[i];
+      const unsigned features = ((leaf_a.has_vertices >> i) & 1U) | (((leaf_a.has_edges >> i) & 1U) << 1);
+      const unsigned worth = worth_it(features, b.has_vertices, b.has_edges);
+      for (unsigned hits = near(a, i, b, apart, m.margin, margin_of_plane, m.moving) & worth; hits != 0;
+           hits &= hits - 1) {
         if (pairs_ == job_.capacity) {
           complete_ = false;
           return;
@@ -305,6 +391,8 @@ class Walk {
 
   const Job& job_;
   MovedLeaf* moved_;
+  std::uint32_t swept_a_ = ~0U, swept_b_ = ~0U;  ///< often the same one again
+  SweptBox box_a_, box_b_;
   std::uint32_t top_ = 0;
   std::uint32_t pairs_ = 0;
   std::uint32_t visits_ = 0;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -34,14 +35,23 @@ struct Branch {
   std::uint32_t left, right;  ///< 0: a leaf
 };
 
+std::uint16_t features_of(const MeshSurface::Features& features) {
+  const auto some = [](const std::array<std::uint32_t, 3>& list) {
+    return std::any_of(list.begin(), list.end(), [](std::uint32_t f) { return f != MeshSurface::kNone; });
+  };
+  return static_cast<std::uint16_t>((some(features.vertices) ? TriangleTree::kVertices : 0) |
+                                    (some(features.edges) ? TriangleTree::kEdges : 0));
+}
+
 class Builder {
  public:
-  explicit Builder(const TriangleMesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
+  explicit Builder(const MeshSurface& surface)
+      : surface_(surface), mesh_(surface.mesh()), order_(mesh_.triangles.size()) {
     std::iota(order_.begin(), order_.end(), 0U);
     middle_.reserve(order_.size());
     for (std::uint32_t t = 0; t < order_.size(); ++t)
       middle_.push_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3.0);
-    for (const Vector3d& p : mesh.vertices_m) extent_m_ = std::max(extent_m_, p.lpNorm<Eigen::Infinity>());
+    for (const Vector3d& p : mesh_.vertices_m) extent_m_ = std::max(extent_m_, p.lpNorm<Eigen::Infinity>());
     branches_.reserve(order_.size() / 2 + 1);
     split();
   }
@@ -50,6 +60,8 @@ class Builder {
   const std::vector<Branch>& branches() const noexcept { return branches_; }
 
   TriangleTree::Leaf leaf(const Branch& branch) const;
+  /// Of all triangles under a branch.
+  std::uint16_t features(const Branch& branch) const;
 
  private:
   const Vector3d& corner(std::uint32_t triangle, std::size_t i) const {
@@ -58,6 +70,7 @@ class Builder {
   Fitted fit(std::uint32_t begin, std::uint32_t end) const;
   void split();
 
+  const MeshSurface& surface_;
   const TriangleMesh& mesh_;
   std::vector<std::uint32_t> order_;
   std::vector<Vector3d> middle_;
@@ -107,7 +120,7 @@ Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
   return box;
 }
 
-/// Cuts at the mean across the widest axis until eight triangles or fewer are left.
+/// Cuts near the mean across the widest axis until eight triangles or fewer are left.
 void Builder::split() {
   const auto add = [&](std::uint32_t begin, std::uint32_t end) {
     branches_.push_back({fit(begin, end), begin, end, 0, 0});
@@ -120,8 +133,14 @@ void Builder::split() {
     const Vector3d along = box.axes.row(0);
     const double cut = along.dot(box.mean_m);
     const auto first = order_.begin() + begin, last = order_.begin() + end;
-    auto middle = std::partition(first, last, [&](std::uint32_t t) { return along.dot(middle_[t]) < cut; });
-    if (middle == first || middle == last) middle = first + (last - first) / 2;
+    const auto below = [&](std::uint32_t t) { return along.dot(middle_[t]); };
+    const auto at_mean = std::count_if(first, last, [&](std::uint32_t t) { return below(t) < cut; });
+    // Leaves are to be full: whole eights go to the lower side.
+    const std::ptrdiff_t eights = std::clamp<std::ptrdiff_t>((at_mean + 4) / 8, 1, (last - first - 1) / 8);
+    const auto middle = first + 8 * eights;
+    std::nth_element(first, middle, last, [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(below(a), a) < std::pair(below(b), b);
+    });
     const auto half = static_cast<std::uint32_t>(middle - order_.begin());
     const std::uint32_t a = add(begin, half), b = add(half, end);
     branches_[at].left = a;
@@ -131,10 +150,16 @@ void Builder::split() {
 
 TriangleTree::Leaf Builder::leaf(const Branch& branch) const {
   TriangleTree::Leaf leaf;
+  leaf.has_vertices = leaf.has_edges = 0;
+  std::fill_n(leaf.low_of_all, 3, 3e38F);
+  std::fill_n(leaf.high_of_all, 3, -3e38F);
   for (std::size_t lane = 0; lane < kWidth; ++lane) {
     const bool used = lane < branch.end - branch.begin;
     const std::uint32_t t = order_[used ? branch.begin + lane : branch.begin];
     leaf.triangle[lane] = t;
+    const std::uint16_t features = used ? features_of(surface_.features()[t]) : std::uint16_t{0};
+    if ((features & TriangleTree::kVertices) != 0) leaf.has_vertices |= 1U << lane;
+    if ((features & TriangleTree::kEdges) != 0) leaf.has_edges |= 1U << lane;
     const Vector3d& a = corner(t, 0);
     const Vector3d n = (corner(t, 1) - a).cross(corner(t, 2) - a).normalized();
     for (int d = 0; d < 3; ++d) {
@@ -148,10 +173,19 @@ TriangleTree::Leaf Builder::leaf(const Branch& branch) const {
       leaf.low[d][lane] = used ? low : 3e38F;
       leaf.high[d][lane] = used ? high : -3e38F;
       leaf.normal[d][lane] = static_cast<float>(n[d]);
+      leaf.low_of_all[d] = std::min(leaf.low_of_all[d], low);
+      leaf.high_of_all[d] = std::max(leaf.high_of_all[d], high);
     }
     leaf.offset[lane] = static_cast<float>(n.dot(a));
   }
   return leaf;
+}
+
+std::uint16_t Builder::features(const Branch& branch) const {
+  std::uint16_t out = 0;
+  for (std::uint32_t k = branch.begin; k < branch.end && out != 3; ++k)
+    out = static_cast<std::uint16_t>(out | features_of(surface_.features()[order_[k]]));
+  return out;
 }
 
 TriangleTree::Box single(const Fitted& fitted, double rounding_m) {
@@ -177,8 +211,11 @@ TriangleTree::Box nothing() {
 
 TriangleTree::Node side_by_side(const TriangleTree::Box* boxes) {
   TriangleTree::Node node;
+  node.has_vertices = node.has_edges = 0;
   for (std::size_t lane = 0; lane < kWidth; ++lane) {
-    const auto& [centre, axis, half, size, child, count] = boxes[lane];
+    const auto& [centre, axis, half, size, child, count, features] = boxes[lane];
+    if ((features & TriangleTree::kVertices) != 0) node.has_vertices |= 1U << lane;
+    if ((features & TriangleTree::kEdges) != 0) node.has_edges |= 1U << lane;
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
       node.centre[d][lane] = centre[d];
@@ -191,28 +228,43 @@ TriangleTree::Node side_by_side(const TriangleTree::Box* boxes) {
   return node;
 }
 
-/// The up to eight boxes that stand under one: the largest are opened until there are enough.
+/// The up to eight boxes that stand under one. What has more than eight leaves is opened first; then what
+/// still fits is dissolved into its leaves: few nodes, and full ones.
 std::vector<std::uint32_t> opened(const std::vector<Branch>& branches, std::uint32_t top) {
+  const auto leaves = [&](std::uint32_t i) {
+    return (branches[i].end - branches[i].begin + kWidth - 1) / kWidth;
+  };
   std::vector<std::uint32_t> under = {top};
-  while (under.size() < kWidth) {
-    const auto area = [&](std::uint32_t i) {
-      return branches[i].left == 0 ? -1.0 : branches[i].box.half_area();
-    };
-    const auto largest = std::max_element(
-        under.begin(), under.end(), [&](std::uint32_t a, std::uint32_t b) { return area(a) < area(b); });
-    if (branches[*largest].left == 0) break;
-    const std::uint32_t opened = *largest;
-    *largest = branches[opened].left;
-    under.push_back(branches[opened].right);
+  const auto open = [&](std::size_t i) {
+    const Branch& branch = branches[under[i]];
+    under[i] = branch.left;
+    under.push_back(branch.right);
+  };
+  const auto most = [&] {
+    return static_cast<std::size_t>(
+        std::max_element(under.begin(), under.end(),
+                         [&](std::uint32_t a, std::uint32_t b) { return leaves(a) < leaves(b); }) -
+        under.begin());
+  };
+  while (under.size() < kWidth && (leaves(under[most()]) > kWidth || under.size() == 1)) {
+    if (branches[under[most()]].left == 0) break;
+    open(most());
+  }
+  for (std::size_t i = 0; i < under.size();) {
+    const bool fits = under.size() + leaves(under[i]) - 1 <= kWidth;
+    if (branches[under[i]].left != 0 && fits)
+      open(i);
+    else
+      ++i;
   }
   return under;
 }
 
 }  // namespace
 
-TriangleTree::TriangleTree(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) return;
-  const Builder builder(mesh);
+TriangleTree::TriangleTree(const MeshSurface& surface) {
+  if (surface.triangles().empty()) return;
+  const Builder builder(surface);
   const std::vector<Branch>& branches = builder.branches();
   extent_m_ = static_cast<float>(builder.extent_m());
   const double rounding_m = kRounding * builder.extent_m();
@@ -224,9 +276,10 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh) {
     for (std::size_t i = 0; i < under.size(); ++i) {
       const Branch& branch = branches[under[i]];
       boxes[i] = single(branch.box, rounding_m);
+      boxes[i].features = builder.features(branch);
       if (branch.left == 0) {
         boxes[i].child = static_cast<std::uint32_t>(leaves_.size());
-        boxes[i].count = static_cast<std::int32_t>(branch.end - branch.begin);
+        boxes[i].count = static_cast<std::int16_t>(branch.end - branch.begin);
         leaves_.push_back(builder.leaf(branch));
       } else {
         boxes[i].child = static_cast<std::uint32_t>(tops.size());

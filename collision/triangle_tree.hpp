@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "collision/mesh_surface.hpp"
 #include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
@@ -11,6 +12,9 @@ namespace wrenchd {
 /// A hierarchy of oriented boxes over the triangles of a mesh, eight to a node, with up to eight triangles in
 /// a leaf: one box against eight, one triangle against eight, is what the walk (collision/tree_walk.hpp) does
 /// at a time.
+///
+/// Boxes and triangles know whether there are pointed vertices and sharp edges in them (mesh_surface.hpp): two
+/// that have none between them cannot be the first to meet.
 ///
 /// Single precision, for what it leaves out is left out by a margin; what it lets through is looked at again
 /// in double precision by whoever asked. Built once, then only read.
@@ -25,25 +29,30 @@ class TriangleTree {
     float half[3];     ///< half its size along each axis
     float size;        ///< half its area: the larger of two boxes is opened first
     std::uint32_t child;
-    std::int32_t count;  ///< of triangles in the leaf `child`; 0: `child` is a node; -1: there is no box
+    std::int16_t count;  ///< of triangles in the leaf `child`; 0: `child` is a node; -1: there is no box
+    std::uint16_t features;  ///< kVertices, kEdges: what triangles in it speak for
   };
+  static constexpr std::uint16_t kVertices = 1, kEdges = 2;
   /// The same eight boxes side by side.
   struct alignas(64) Node {
     float centre[3][kWidth];
     float axis[3][3][kWidth];  ///< [which][component]
     float half[3][kWidth];
+    std::uint32_t has_vertices, has_edges;  ///< a bit for each box
   };
   /// Up to eight triangles side by side. Lanes without one hold a box that nothing meets.
   struct alignas(64) Leaf {
     float corner[3][3][kWidth];  ///< [which][component]
     float low[3][kWidth];        ///< bounds of each triangle
     float high[3][kWidth];
+    float low_of_all[3], high_of_all[3];
     float normal[3][kWidth];  ///< of its plane, outward unit
     float offset[kWidth];     ///< normal . corner
     std::uint32_t triangle[kWidth];
+    std::uint32_t has_vertices, has_edges;  ///< a bit for each triangle
   };
 
-  explicit TriangleTree(const TriangleMesh& mesh);
+  explicit TriangleTree(const MeshSurface& surface);
 
   /// Number i of node n is boxes()[8 n + i]. Node 0 is the root; there is none in a tree without triangles.
   const std::vector<Box>& boxes() const noexcept { return boxes_; }
