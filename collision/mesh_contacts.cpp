@@ -60,18 +60,14 @@ MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(sce
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
-    Seen seen{&obstacle, first + k, {}, {}, {}};
-    seen.X_WO = {obstacle.X_WO.rotation.toRotationMatrix(), obstacle.X_WO.translation_m};
-    seen_.push_back(seen);
+    seen_.push_back({&obstacle, first + k, Frame(obstacle.X_WO), {}, {}});
   }
 }
 
 void MeshContacts::start_at(const Pose& X_WT) noexcept {
   X_start_ = X_WT;
   from_listed_start_ = false;
-  const Matrix3d R_WT = X_WT.rotation.toRotationMatrix();
-  for (Seen& seen : seen_)
-    seen.X_OT_start = {seen.X_WO.R.transpose() * R_WT, seen.X_WO.back(X_WT.translation_m)};
+  for (Seen& seen : seen_) seen.X_OT_start = Frame(X_WT).seen_from(seen.X_WO);
 }
 
 bool MeshContacts::covers(const Pose& X_WT) const noexcept {
@@ -111,9 +107,7 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
     findings.complete = false;
     return findings;
   }
-  const Matrix3d R_WT = X_WT.rotation.toRotationMatrix();
-  for (Seen& seen : seen_)
-    seen.X_OT_end = {seen.X_WO.R.transpose() * R_WT, seen.X_WO.back(X_WT.translation_m)};
+  for (Seen& seen : seen_) seen.X_OT_end = Frame(X_WT).seen_from(seen.X_WO);
   const double way_m = way(X_start_, X_WT);
   const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
   // The way of a vertex is straight as long as nothing turns.

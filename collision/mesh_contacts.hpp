@@ -11,6 +11,7 @@
 #include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
 #include "core/fixed_list.hpp"
+#include "core/frame.hpp"
 
 namespace wrenchd {
 
@@ -60,13 +61,6 @@ class MeshContacts {
     double when;  ///< 0 at the start, 1 at the end
     Vector3d point_W_m;
     Contact contact;
-  };
-  /// A pose with its rotation as a matrix.
-  struct Frame {
-    Matrix3d R = Matrix3d::Identity();
-    Vector3d x_m = Vector3d::Zero();
-    Vector3d operator*(const Vector3d& p_m) const noexcept { return R * p_m + x_m; }
-    Vector3d back(const Vector3d& p_m) const noexcept { return R.transpose() * (p_m - x_m); }
   };
   /// One obstacle, seen along the way.
   struct Seen {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <span>
+#include <stdexcept>
 
 namespace wrenchd {
 namespace {
@@ -30,13 +31,24 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
     : options_(options),
       mass_kg_(scene.tool().solid.inertia.mass_kg),
       scene_(scene),
-      exact_(scene.tool().solid.inertia),
+      exact_(scene.tool().solid.inertia, ExactProjection::Budget{}, options.clearance_m),
       descent_(scene.tool().solid.inertia, exact_),
       planar_(scene.tool().solid.inertia, scene.tool().hull, options.planes),
       saved_(scene.convex().size()),
-      best_(scene.convex().size()) {}
+      best_(scene.convex().size()) {
+  if (scene.meshes().empty()) return;
+  const bool convex = !scene.convex().empty();
+  if (options.method != Method::exact && !convex)
+    throw std::invalid_argument(
+        "the tool or an obstacle ('" + scene.meshes().front().name +
+        "', ...) is not convex, which only method exact can deal with; choose it, or give "
+        "convex bodies");
+  if (options.method == Method::exact) proxy_.emplace(scene);
+  if (!convex) placement_.emplace(scene);
+}
 
 Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last) noexcept {
+  if (proxy_) return described(X_WP, proxy_->follow(X_WP, X_last));
   const bool admitted = X_answered_ && same_bits(*X_answered_, X_last);
   if (!admitted) scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
   Penetration out =
@@ -66,6 +78,10 @@ Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_las
 Penetration PenetrationDepth::query(const Pose& X_WP) noexcept {
   known_.clear();
   X_answered_.reset();
+  if (proxy_) proxy_->forget();
+  if (placement_) {
+    return described(X_WP, placement_->nearest(X_WP));
+  }
   if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP));
   scene_.survey(X_WP);
   return approximate(X_WP, X_WP);
@@ -152,7 +168,8 @@ Penetration PenetrationDepth::described(const Pose& X_WP, const Projection& proj
   Penetration out;
   out.projection = projection;
   if (!in_contact(projection)) return out;
-  out.contacts = static_cast<std::uint16_t>(projection.active.size());
+  // A proxy that ran out of time may stand on its way, held by nothing but that.
+  out.contacts = static_cast<std::uint16_t>(std::max<std::size_t>(projection.active.size(), 1));
   out.eps = displacement(X_WP, projection.X_WQ);
   out.drive = out.eps;
   return out;

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "collision/placement.hpp"
+#include "collision/proxy.hpp"
 #include "collision/scene_contacts.hpp"
 #include "core/contact.hpp"
 #include "core/descent.hpp"
@@ -34,9 +36,13 @@ class PenetrationDepth {
   struct Options {
     Method method = Method::exact;
     int planes = 47;  ///< N_delta for planar; 47 is the paper's
+    /// How far contacts are held open [m]: zero for the exact optimum, Proxy::kClearance_m for a proxy that
+    /// is to be admissible to the last digit. A scene of meshes always keeps the latter.
+    double clearance_m = 0.0;
   };
 
-  /// The scene is kept by reference and must outlive this.
+  /// The scene is kept by reference and must outlive this. Throws std::invalid_argument where the method
+  /// cannot work with the scene: only exact knows bodies that are not convex.
   PenetrationDepth(const Scene& scene, Options options);
   PenetrationDepth(const PenetrationDepth&) = delete;
   PenetrationDepth& operator=(const PenetrationDepth&) = delete;
@@ -44,7 +50,8 @@ class PenetrationDepth {
   /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
   /// the proxy stays there, and draws the hand back to where it came from. RT safe.
   Penetration follow(const Pose& X_WP, const Pose& X_last) noexcept;
-  /// Knows no history; exact seeks the global optimum. RT safe, but up to a thousand times dearer.
+  /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones. RT
+  /// safe, but up to a thousand times dearer.
   Penetration query(const Pose& X_WP) noexcept;
 
  private:
@@ -70,6 +77,8 @@ class PenetrationDepth {
   std::optional<Pose> X_answered_;                         ///< that answer: the planes held admit it
   std::vector<HeldPlane> saved_;                           ///< while other planes are tried
   std::vector<HeldPlane> best_;                            ///< of the best answer so far
+  std::optional<Proxy> proxy_;                             ///< where there are meshes
+  std::optional<Placement> placement_;                     ///< likewise
 };
 
 }  // namespace wrenchd

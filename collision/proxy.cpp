@@ -45,7 +45,7 @@ Proxy::Proxy(const Scene& scene, Effort effort)
       effort_(effort),
       M_(scene.tool().solid.inertia),
       exact_(M_, ExactProjection::Budget{}, kClearance_m),
-      planes_(scene),
+      half_spaces_(scene),
       meshes_(scene) {}
 
 Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
@@ -113,7 +113,7 @@ Proxy::Way Proxy::look_along(const Pose& X_WT) noexcept {
   bool learned = false;
   ContactSet met;
   const double tolerance_m = exact_.gap_tolerance_m(X_WT) - kClearance_m;
-  planes_.add_violated(X_WT, tolerance_m, met);
+  half_spaces_.add_violated(Frame(X_WT), tolerance_m, met);
   for (const Contact& contact : met) learned = learn(contact) || learned;
   if (scene_.meshes().empty()) return learned ? Way::met_contacts : Way::free;
   const MeshContacts::Findings found = meshes_.look(X_WT, kClearance_m, budget_);

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "collision/half_space_contacts.hpp"
 #include "collision/mesh_contacts.hpp"
-#include "collision/scene_contacts.hpp"
 #include "core/projection.hpp"
 
 namespace wrenchd {
@@ -65,7 +65,7 @@ class Proxy {
   Effort effort_;
   Inertia M_;
   ExactProjection exact_;
-  SceneContacts planes_;  ///< the half-spaces
+  HalfSpaceContacts half_spaces_;
   MeshContacts meshes_;
   Known known_;
   std::optional<Pose> X_asked_;  ///< last tick's p

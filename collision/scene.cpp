@@ -10,7 +10,7 @@
 namespace wrenchd {
 namespace {
 
-/// Reads what the settings name, and holds the obstacles in the one form or the other.
+/// Reads what the settings name.
 Scene load(const SceneSettings& settings) {
   ToolBody tool = load_tool(settings.tool);
   std::vector<TriangleMesh> solids;
@@ -26,13 +26,11 @@ Scene load(const SceneSettings& settings) {
   std::vector<MeshObstacle> meshes;
   for (std::size_t k = 0; k < solids.size(); ++k) {
     const auto& [name, file, scale, X_WM] = settings.meshes[k];
-    if (all_convex) {
-      for (Vector3d& p : hulls[k].vertices_T_m) p = X_WM * Vector3d(p * scale);
-      convex.push_back(convex_obstacle(name, std::move(hulls[k])));
-    } else {
-      for (Vector3d& p : solids[k].vertices_m) p *= scale;
-      meshes.push_back({name, TreedMesh(std::move(solids[k])), X_WM});
-    }
+    for (Vector3d& p : solids[k].vertices_m) p *= scale;
+    meshes.push_back({name, TreedMesh(std::move(solids[k])), X_WM});
+    if (!all_convex) continue;
+    for (Vector3d& p : hulls[k].vertices_T_m) p = X_WM * Vector3d(p * scale);
+    convex.push_back(convex_obstacle(name, std::move(hulls[k])));
   }
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes));
 }

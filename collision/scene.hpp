@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,10 +42,10 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W);
 
 /// The tool and the obstacles it may touch. Built once, then only read.
 ///
-/// Where the tool and all mesh obstacles are convex, the obstacles are held as convex(), which is quicker;
-/// otherwise as meshes().
+/// What was given as a mesh is one of meshes(). Where the tool and all of them are convex they are in
+/// convex() as well, in the same order: between convex bodies the global optimum can be sought.
 ///
-/// Obstacles are numbered: the half-spaces first, then the convex ones, then the meshes.
+/// Obstacles are numbered: the half-spaces first, then the others.
 class Scene {
  public:
   /// Throws MeshError where a mesh cannot be used.
@@ -60,7 +61,7 @@ class Scene {
   /// The tool as the meshes meet it, in T; null where there are none.
   const TreedMesh* tool_mesh() const noexcept { return tool_mesh_ ? &*tool_mesh_ : nullptr; }
   std::size_t obstacle_count() const noexcept {
-    return half_spaces_.size() + convex_.size() + meshes_.size();
+    return half_spaces_.size() + std::max(convex_.size(), meshes_.size());
   }
 
  private:

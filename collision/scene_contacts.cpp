@@ -21,31 +21,6 @@ constexpr std::size_t kFewFaces = 16;
 /// Normals that differ by less are the same plane.
 constexpr double kSamePlane = 1e-9;
 
-/// The few smallest of a stream of gaps, smallest first.
-template <std::size_t N>
-class Deepest {
- public:
-  /// Below this gap a vertex would be kept.
-  double threshold() const noexcept { return count_ < N ? kInfinity : gap_[N - 1]; }
-  void insert(double gap, std::uint32_t vertex) noexcept {
-    std::size_t at = std::min(count_, N - 1);
-    for (; at > 0 && gap < gap_[at - 1]; --at) {
-      gap_[at] = gap_[at - 1];
-      vertex_[at] = vertex_[at - 1];
-    }
-    gap_[at] = gap;
-    vertex_[at] = vertex;
-    count_ = std::min(count_ + 1, N);
-  }
-  std::size_t count() const noexcept { return count_; }
-  std::uint32_t vertex(std::size_t i) const noexcept { return vertex_[i]; }
-
- private:
-  std::array<double, N> gap_{};
-  std::array<std::uint32_t, N> vertex_{};
-  std::size_t count_ = 0;
-};
-
 /// Does a plane with outward normal m touch the body along this edge? One that touches along a face of the
 /// edge does, whatever rounding makes of it.
 bool touches_along(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
@@ -84,7 +59,11 @@ bool same_plane(const HeldPlane& a, const HeldPlane& b) noexcept {
 }  // namespace
 
 SceneContacts::SceneContacts(const Scene& scene)
-    : scene_(scene), planes_(scene.convex().size()), best_(planes_), last_(planes_.size()) {
+    : scene_(scene),
+      half_spaces_(scene),
+      planes_(scene.convex().size()),
+      best_(planes_),
+      last_(planes_.size()) {
   choices_.reserve(kMaxChoices);
   openings_.reserve(kMaxOpenings);
   std::size_t most = scene.tool().hull.vertices_T_m.size();
@@ -98,29 +77,22 @@ std::size_t SceneContacts::add_violated(const Pose& pose, double tolerance_m,
                                         ContactSet& contacts) const noexcept {
   const Frame X_WT(pose);
   const std::size_t before = contacts.size();
-  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k)
-    add_deepest_of_half_space(k, X_WT, tolerance_m, contacts);
+  half_spaces_.add_violated(X_WT, tolerance_m, contacts);
   for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
-    add_convex(k, X_WT, tolerance_m, kPerObstacle, contacts);
+    add_convex(k, X_WT, tolerance_m, HalfSpaceContacts::kPerObstacle, contacts);
   return contacts.size() - before;
 }
 
 void SceneContacts::add_touching(const Pose& pose, double within_m, ContactSet& contacts) const noexcept {
   const Frame X_WT(pose);
-  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k)
-    add_all_of_half_space(k, X_WT, within_m, contacts);
+  half_spaces_.add_touching(X_WT, within_m, contacts);
   for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
     add_convex(k, X_WT, -within_m, ContactSet::kCapacity, contacts);
 }
 
 bool SceneContacts::admits(const Pose& pose, double tolerance_m) const noexcept {
   const Frame X_WT(pose);
-  for (const HalfSpaceSettings& half_space : scene_.half_spaces()) {
-    const Vector3d n_T = X_WT.R.transpose() * half_space.normal_W;
-    const ConvexBody& tool = scene_.tool().hull;
-    const double lowest = n_T.dot(tool.vertices_T_m[tool.support(-n_T)]);
-    if (lowest + half_space.normal_W.dot(X_WT.x_m) - half_space.offset_m < -tolerance_m) return false;
-  }
+  if (!half_spaces_.admits(X_WT, tolerance_m)) return false;
   for (std::uint32_t k = 0; k < planes_.size(); ++k)
     if (!out_of_reach(k, X_WT) && !separates(k, X_WT, tolerance_m)) return false;
   return true;
@@ -142,52 +114,6 @@ void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
     }
     if (!choices_.empty()) take(0);
   }
-}
-
-//   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
-SceneContacts::Seen SceneContacts::see(std::uint32_t k, const Frame& X_WT) const noexcept {
-  const HalfSpaceSettings& half_space = scene_.half_spaces()[k];
-  return {X_WT.R.transpose() * half_space.normal_W, half_space.offset_m - half_space.normal_W.dot(X_WT.x_m)};
-}
-
-Contact SceneContacts::half_space_contact(std::uint32_t k, std::uint32_t vertex) const noexcept {
-  Contact contact;
-  contact.n_W = scene_.half_spaces()[k].normal_W;
-  contact.offset_m = scene_.half_spaces()[k].offset_m;
-  contact.p_WB_m = contact.offset_m * contact.n_W;
-  contact.obstacle = k;
-  contact.p_TA_m = scene_.tool().hull.vertices_T_m[vertex];
-  contact.tool_feature = vertex;
-  return contact;
-}
-
-void SceneContacts::add_deepest_of_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
-                                              ContactSet& contacts) const noexcept {
-  const Seen seen = see(k, X_WT);
-  Deepest<kPerObstacle> deepest;
-  scene_.tool().hull.visit_above(
-      -seen.n_T, [&] { return -seen.below_m - std::min(-tolerance_m, deepest.threshold()); },
-      [&](std::uint32_t v, double depth) {
-        const double gap = -depth - seen.below_m;
-        if (gap >= -tolerance_m || gap >= deepest.threshold()) return;
-        if (!contacts.contains(half_space_contact(k, v))) deepest.insert(gap, v);
-      });
-  for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(half_space_contact(k, deepest.vertex(i)));
-}
-
-void SceneContacts::add_all_of_half_space(std::uint32_t k, const Frame& X_WT, double within_m,
-                                          ContactSet& contacts) const noexcept {
-  const Seen seen = see(k, X_WT);
-  const std::size_t known = contacts.size();
-  const auto is_known = [&](std::uint32_t v) {
-    return std::any_of(contacts.begin(), contacts.begin() + known,
-                       [&](const Contact& c) { return c.obstacle == k && c.tool_feature == v; });
-  };
-  scene_.tool().hull.visit_above(
-      -seen.n_T, [&] { return -seen.below_m - within_m; },
-      [&](std::uint32_t v, double depth) {
-        if (-depth - seen.below_m < within_m && !is_known(v)) contacts.add(half_space_contact(k, v));
-      });
 }
 
 bool SceneContacts::out_of_reach(std::uint32_t k, const Frame& X_WT) const noexcept {

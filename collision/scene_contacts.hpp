@@ -5,8 +5,10 @@
 #include <optional>
 #include <vector>
 
+#include "collision/half_space_contacts.hpp"
 #include "collision/scene.hpp"
 #include "core/contact.hpp"
+#include "core/frame.hpp"
 #include "core/least_distance.hpp"
 #include "core/projection.hpp"
 
@@ -78,13 +80,6 @@ class SceneContacts final : public ContactSource {
     HeldPlane plane;
     double separation_m;
   };
-  /// A pose with its rotation as a matrix, which turns many vectors at less cost.
-  struct Frame {
-    explicit Frame(const Pose& X) noexcept : R(X.rotation.toRotationMatrix()), x_m(X.translation_m) {}
-    Vector3d operator*(const Vector3d& p_m) const noexcept { return R * p_m + x_m; }
-    Matrix3d R;
-    Vector3d x_m;
-  };
   /// Vertices of both bodies.
   struct Pair {
     std::uint32_t tool_vertex = 0;
@@ -109,24 +104,10 @@ class SceneContacts final : public ContactSource {
     bool degenerate;  ///< as in Normal
   };
 
-  /// How many new contacts one obstacle contributes to one round of constraint generation: three hold a face,
-  /// and one more tells which way it would tip.
-  static constexpr std::size_t kPerObstacle = 4;
   static constexpr std::size_t kMaxChoices = 96;        ///< for one obstacle
   static constexpr std::size_t kMaxOpenings = 288;      ///< for all
   static constexpr std::size_t kMaxEdgePairs = 200000;  ///< compared at once by survey(): some milliseconds
 
-  /// A half-space seen from the tool: gap of vertex a = n_T . a - below_m.
-  struct Seen {
-    Vector3d n_T;
-    double below_m;
-  };
-  Seen see(std::uint32_t k, const Frame& X_WT) const noexcept;
-  Contact half_space_contact(std::uint32_t k, std::uint32_t vertex) const noexcept;
-  void add_deepest_of_half_space(std::uint32_t k, const Frame& X_WT, double tolerance_m,
-                                 ContactSet& contacts) const noexcept;
-  void add_all_of_half_space(std::uint32_t k, const Frame& X_WT, double within_m,
-                             ContactSet& contacts) const noexcept;
   void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
                   ContactSet& contacts) const noexcept;
   static Normal normal_of(const HeldPlane& plane, const Frame& X_WT) noexcept;
@@ -152,6 +133,7 @@ class SceneContacts final : public ContactSource {
   void sort_choices() noexcept;
 
   const Scene& scene_;
+  HalfSpaceContacts half_spaces_;
   std::vector<HeldPlane> planes_;  ///< one for each convex obstacle
   std::vector<HeldPlane> best_;    ///< of the last survey
   std::vector<Choice> choices_;

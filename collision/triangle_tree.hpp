@@ -13,8 +13,8 @@ namespace wrenchd {
 /// a leaf: one box against eight, one triangle against eight, is what the walk (collision/tree_walk.hpp) does
 /// at a time.
 ///
-/// Boxes and triangles know whether there are pointed vertices and sharp edges in them (mesh_surface.hpp): two
-/// that have none between them cannot be the first to meet.
+/// Boxes and triangles know whether there are pointed vertices and sharp edges in them (mesh_surface.hpp):
+/// two that have none between them cannot be the first to meet.
 ///
 /// Single precision, for what it leaves out is left out by a margin; what it lets through is looked at again
 /// in double precision by whoever asked. Built once, then only read.
@@ -29,7 +29,7 @@ class TriangleTree {
     float half[3];     ///< half its size along each axis
     float size;        ///< half its area: the larger of two boxes is opened first
     std::uint32_t child;
-    std::int16_t count;  ///< of triangles in the leaf `child`; 0: `child` is a node; -1: there is no box
+    std::int16_t count;      ///< of triangles in the leaf `child`; 0: `child` is a node; -1: there is no box
     std::uint16_t features;  ///< kVertices, kEdges: what triangles in it speak for
   };
   static constexpr std::uint16_t kVertices = 1, kEdges = 2;

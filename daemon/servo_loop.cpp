@@ -158,7 +158,7 @@ void ServoLoop::obey(std::uint8_t command) noexcept {
 void ServoLoop::project(const DeviceSample& sample) noexcept {
   X_WP_ = X_WB_ * sample.X_BH * X_HT_;
   depth_ = X_WQ_ ? penetration_.follow(X_WP_, *X_WQ_) : penetration_.query(X_WP_);
-  X_WQ_ = depth_.projection.X_WQ;
+  if (depth_.projection.status != ProjectionStatus::infeasible || X_WQ_) X_WQ_ = depth_.projection.X_WQ;
 }
 
 /// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,

@@ -4,13 +4,14 @@
 #include <array>
 #include <charconv>
 #include <ostream>
+#include <string_view>
 
 #include "core/pose.hpp"
 
 namespace wrenchd {
 
-/// A row of numbers, comma between them, each in the shortest form that reads back the same. The row ends
-/// with this object.
+/// A row of numbers and words, comma between them, each in the shortest form that reads back the same. The
+/// row ends with this object.
 class CsvRow {
  public:
   explicit CsvRow(std::ostream& out) : out_(out) {}
@@ -21,9 +22,12 @@ class CsvRow {
   CsvRow& operator<<(double x) {
     std::array<char, 32> text;
     const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
+    return *this << std::string_view(text.data(), static_cast<std::size_t>(end - text.data()));
+  }
+  CsvRow& operator<<(std::string_view word) {
     if (!first_) out_ << ',';
     first_ = false;
-    out_.write(text.data(), end - text.data());
+    out_ << word;
     return *this;
   }
   CsvRow& operator<<(const Vector3d& v) { return *this << v.x() << v.y() << v.z(); }

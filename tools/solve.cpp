@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <ostream>
 
 #include "core/energy_law.hpp"
@@ -17,6 +18,20 @@ constexpr const char* kHeader =
     "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
     "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
 
+const char* name_of(ProjectionStatus status) {
+  switch (status) {
+    case ProjectionStatus::free:
+      return "free";
+    case ProjectionStatus::converged:
+      return "converged";
+    case ProjectionStatus::budget_spent:
+      return "budget_spent";
+    case ProjectionStatus::infeasible:
+      break;
+  }
+  return "infeasible";
+}
+
 }  // namespace
 
 std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
@@ -24,7 +39,10 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
   const ToolBody& tool = scene.tool();
   const Pose X_MT = tool.X_MT();
   const Pose X_TM = inverse(X_MT);
-  PenetrationDepth depth(scene, settings.depth);
+  PenetrationDepth::Options options = settings.depth;
+  if (settings.proxy) options.clearance_m = Proxy::kClearance_m;
+  PenetrationDepth depth(scene, options);
+  std::optional<Pose> X_last;  // of the proxy
   WrenchGains gains;
   gains.stiffness = WrenchGains::scalar(settings.k_P);
   WrenchLaw law(gains_for(settings.depth.method, gains));
@@ -35,8 +53,10 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
     const Pose X_WP = X_WM_p * X_MT;
     SolvedPose row;
     const auto start = std::chrono::steady_clock::now();
-    row.penetration = depth.query(X_WP);
+    row.penetration = X_last ? depth.follow(X_WP, *X_last) : depth.query(X_WP);
     row.solve_ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
+    if (settings.proxy && row.penetration.projection.status != ProjectionStatus::infeasible)
+      X_last = row.penetration.projection.X_WQ;
     const bool moved = row.penetration.projection.status != ProjectionStatus::free;
     row.X_WM = moved ? row.penetration.projection.X_WQ * X_TM : X_WM_p;
     row.F_T = settings.law == SpringLaw::pid
@@ -51,8 +71,8 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
   return rows;
 }
 
-void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows) {
-  out << kHeader << '\n';
+void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool proxy) {
+  out << kHeader << (proxy ? ",status,iterations" : "") << '\n';
   for (const SolvedPose& r : rows) {
     const Quaterniond& q = r.X_WM.rotation;
     CsvRow row(out);
@@ -60,6 +80,7 @@ void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows) {
         << q.z() << q.w();
     row << Vector3d(r.penetration.eps.head<3>()) << Vector3d(r.penetration.eps.tail<3>());
     row << r.F_T.force_N << r.F_T.torque_Nm << r.F_S.force_N << r.F_S.torque_Nm << r.solve_ns;
+    if (proxy) row << name_of(r.penetration.projection.status) << r.penetration.projection.iterations;
   }
 }
 

@@ -27,13 +27,16 @@ struct SolveSettings {
   SpringLaw law = SpringLaw::pid;
   double k_P = 1.0;  ///< pid: K_P = k_P I, no integral, no derivative
   double energy_stiffness_per_s2 = 1.0;
+  bool proxy = false;  ///< follow the poses as a trajectory, each from the answer before, as the daemon does
 };
 
-/// Projects every pose (of the mesh's own frame, in the world) on its own, without history.
+/// Projects every pose (of the mesh's own frame, in the world): on its own, without history, unless a proxy
+/// is asked for.
 std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
                               const SolveSettings& settings);
 
-/// The rows as CSV, with a header, numbers in the shortest form that reads back the same.
-void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows);
+/// The rows as CSV, with a header, numbers in the shortest form that reads back the same. proxy: with the
+/// status and the iterations of each.
+void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool proxy = false);
 
 }  // namespace wrenchd

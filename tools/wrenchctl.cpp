@@ -18,6 +18,7 @@
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "tools/check.hpp"
+#include "tools/make_mesh.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_figures.hpp"
 #include "tools/paper_tables.hpp"
@@ -47,6 +48,13 @@ struct SolveOptions {
   SolveSettings settings;
 };
 
+struct MeshOptions {
+  std::filesystem::path file;
+  double scale = 1.0;
+  MadeMesh wanted;
+  std::string output = "-";
+};
+
 std::vector<Pose> read_poses_from(const std::string& name) {
   if (name == "-") return read_poses(std::cin, "standard input");
   std::ifstream file(name);
@@ -63,7 +71,7 @@ int run_solve(const SolveOptions& options) {
   settings.law = options.law == "energy" ? SpringLaw::energy : SpringLaw::pid;
   const std::vector<SolvedPose> rows = solve(scene, poses, settings);
   std::ostringstream text;
-  write_csv(text, rows);
+  write_csv(text, rows, settings.proxy);
   write_output(options.output, text.str());
   int exit_code = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -144,6 +152,9 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   solve->add_option("--k-p", options.settings.k_P, "k_P of Eq. (16); no integral, no derivative")
       ->check(number_from(0.0, 1e9))
       ->capture_default_str();
+  solve->add_flag("--proxy", options.settings.proxy,
+                  "take the poses for a trajectory, and follow it as the daemon does: each from the\n"
+                  "answer before, never into an obstacle or through one");
   solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")
       ->check(not_empty())
       ->capture_default_str();
@@ -151,8 +162,53 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
       "One row a pose: contacts (tool vertices that touch at the projection; 0 where the pose is\n"
       "admissible), energy T [kg m^2] of Eq. (8), the projected pose of the same frame, eps of Eq. (15) in\n"
       "the body frame at the centre of mass, the wrench in that frame and about the world origin, and the\n"
-      "time of the solve [ns]. Each pose is solved without history: exact then seeks the global optimum.");
+      "time of the solve [ns]. Each pose is solved without history: exact then seeks the global optimum. "
+      "With\n"
+      "--proxy: then status (free, converged, budget_spent, infeasible) and iterations.");
   solve->callback([&] { exit_code = run_solve(options); });
+}
+
+void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
+  CLI::App* mesh =
+      app.add_subcommand("mesh",
+                         "What a mesh is: closed, volume, inertia, defects. Or makes one to try\n"
+                         "things with");
+  auto* file = mesh->add_option("file", options.file, "OFF, OBJ, STL or PLY")->check(not_empty());
+  mesh->add_option("--scale", options.scale, "metres per mesh unit")
+      ->check(number_from(1e-9, 1e6))
+      ->capture_default_str();
+  std::vector<std::string> kinds;
+  std::string list = "Kinds that can be made:\n";
+  for (const auto& [name, what] : mesh_kinds()) {
+    kinds.push_back(name);
+    list += "  " + name + std::string(10 - name.size(), ' ') + what + '\n';
+  }
+  auto* make = mesh->add_option("--make", options.wanted.kind, "make a solid of this kind, in metres")
+                   ->check(CLI::IsMember(kinds))
+                   ->excludes(file);
+  mesh->add_option("--triangles", options.wanted.triangles, "about so many")
+      ->check(CLI::Range(std::size_t{8}, std::size_t{20000000}))
+      ->needs(make)
+      ->capture_default_str();
+  mesh->add_option("--seed", options.wanted.seed, "which of the bumpy ones")
+      ->needs(make)
+      ->capture_default_str();
+  mesh->add_option("-o,--output", options.output, "OFF file to write; - writes standard output")
+      ->check(not_empty())
+      ->needs(make)
+      ->capture_default_str();
+  mesh->footer(list);
+  mesh->callback([&options, &exit_code] {
+    if (!options.wanted.kind.empty()) {
+      std::ostringstream text;
+      write_off(text, make_mesh(options.wanted));
+      write_output(options.output, text.str());
+    } else if (options.file.empty()) {
+      throw CLI::RequiredError("mesh: a file, or --make KIND,");
+    } else {
+      exit_code = run_mesh(options.file, options.scale);
+    }
+  });
 }
 
 void add_paper(CLI::App& app, std::filesystem::path& directory) {
@@ -194,14 +250,8 @@ int main(int argc, char** argv) {
       ->check(not_empty());
   check->callback([&] { std::cout << check_file(checked); });
 
-  std::filesystem::path mesh_file;
-  double scale = 1.0;
-  CLI::App* mesh = app.add_subcommand("mesh", "What a mesh is: closed, volume, inertia, defects");
-  mesh->add_option("file", mesh_file, "OFF, OBJ, STL or PLY")->required()->check(not_empty());
-  mesh->add_option("--scale", scale, "metres per mesh unit")
-      ->check(number_from(1e-9, 1e6))
-      ->capture_default_str();
-  mesh->callback([&] { exit_code = run_mesh(mesh_file, scale); });
+  MeshOptions mesh_options;
+  add_mesh(app, mesh_options, exit_code);
 
   std::filesystem::path paper_directory = "wrenchd-paper";
   add_paper(app, paper_directory);

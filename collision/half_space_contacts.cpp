@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/half_space_contacts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+namespace wrenchd {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// The few smallest of a stream of gaps, smallest first.
+template <std::size_t N>
+class Deepest {
+ public:
+  /// Below this gap a vertex would be kept.
+  double threshold() const noexcept { return count_ < N ? kInfinity : gap_[N - 1]; }
+  void insert(double gap, std::uint32_t vertex) noexcept {
+    std::size_t at = std::min(count_, N - 1);
+    for (; at > 0 && gap < gap_[at - 1]; --at) {
+      gap_[at] = gap_[at - 1];
+      vertex_[at] = vertex_[at - 1];
+    }
+    gap_[at] = gap;
+    vertex_[at] = vertex;
+    count_ = std::min(count_ + 1, N);
+  }
+  std::size_t count() const noexcept { return count_; }
+  std::uint32_t vertex(std::size_t i) const noexcept { return vertex_[i]; }
+
+ private:
+  std::array<double, N> gap_{};
+  std::array<std::uint32_t, N> vertex_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+//   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
+HalfSpaceContacts::Seen HalfSpaceContacts::see(std::uint32_t k, const Frame& X_WT) const noexcept {
+  const HalfSpaceSettings& half_space = scene_.half_spaces()[k];
+  return {X_WT.R.transpose() * half_space.normal_W, half_space.offset_m - half_space.normal_W.dot(X_WT.x_m)};
+}
+
+Contact HalfSpaceContacts::contact(std::uint32_t k, std::uint32_t vertex) const noexcept {
+  Contact contact;
+  contact.n_W = scene_.half_spaces()[k].normal_W;
+  contact.offset_m = scene_.half_spaces()[k].offset_m;
+  contact.p_WB_m = contact.offset_m * contact.n_W;
+  contact.obstacle = k;
+  contact.p_TA_m = scene_.tool().hull.vertices_T_m[vertex];
+  contact.tool_feature = vertex;
+  return contact;
+}
+
+void HalfSpaceContacts::add_violated(const Frame& X_WT, double tolerance_m,
+                                     ContactSet& contacts) const noexcept {
+  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
+    const Seen seen = see(k, X_WT);
+    Deepest<kPerObstacle> deepest;
+    scene_.tool().hull.visit_above(
+        -seen.n_T, [&] { return -seen.below_m - std::min(-tolerance_m, deepest.threshold()); },
+        [&](std::uint32_t v, double depth) {
+          const double gap = -depth - seen.below_m;
+          if (gap >= -tolerance_m || gap >= deepest.threshold()) return;
+          if (!contacts.contains(contact(k, v))) deepest.insert(gap, v);
+        });
+    for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(contact(k, deepest.vertex(i)));
+  }
+}
+
+void HalfSpaceContacts::add_touching(const Frame& X_WT, double within_m,
+                                     ContactSet& contacts) const noexcept {
+  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
+    const Seen seen = see(k, X_WT);
+    const std::size_t known = contacts.size();
+    const auto is_known = [&](std::uint32_t v) {
+      return std::any_of(contacts.begin(), contacts.begin() + known,
+                         [&](const Contact& c) { return c.obstacle == k && c.tool_feature == v; });
+    };
+    scene_.tool().hull.visit_above(
+        -seen.n_T, [&] { return -seen.below_m - within_m; },
+        [&](std::uint32_t v, double depth) {
+          if (-depth - seen.below_m < within_m && !is_known(v)) contacts.add(contact(k, v));
+        });
+  }
+}
+
+bool HalfSpaceContacts::admits(const Frame& X_WT, double tolerance_m) const noexcept {
+  const ConvexBody& tool = scene_.tool().hull;
+  for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
+    const Seen seen = see(k, X_WT);
+    if (seen.n_T.dot(tool.vertices_T_m[tool.support(-seen.n_T)]) - seen.below_m < -tolerance_m) return false;
+  }
+  return true;
+}
+
+}  // namespace wrenchd

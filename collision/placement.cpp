@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/placement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace wrenchd {
+namespace {
+
+/// How far from p the search begins and ends, in units of the tool's size and of the scene's, and by what it
+/// grows.
+constexpr double kNearest = 1e-3;
+constexpr double kGrowth = 1.5;
+/// So many poses found are tried.
+constexpr int kMostStarts = 12;
+/// Ticks that a proxy is given to come to rest, and the share of T that it must gain to go on.
+constexpr int kMostTicks = 200;
+constexpr double kGain = 1e-9;
+
+/// How often a ray from p along x crosses the surface, odd: p is inside. A ray through an edge would count
+/// twice or not at all, so it runs askew.
+bool inside(const MeshSurface& surface, const Vector3d& p) noexcept {
+  const Vector3d along(0.8626, 0.3919, 0.3199);
+  bool odd = false;
+  for (std::uint32_t t = 0; t < surface.triangles().size(); ++t) {
+    const Vector3d a = surface.corner_m(t, 0) - p, b = surface.corner_m(t, 1) - p,
+                   c = surface.corner_m(t, 2) - p;
+    const double u = along.dot(b.cross(c)), v = along.dot(c.cross(a)), w = along.dot(a.cross(b));
+    const bool through = (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
+    if (through && a.dot(b.cross(c)) / (u + v + w) > 0.0) odd = !odd;
+  }
+  return odd;
+}
+
+}  // namespace
+
+Placement::Placement(const Scene& scene) : scene_(scene), half_spaces_(scene), proxy_(scene) {}
+
+bool Placement::meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept {
+  const TreedMesh& tool = *scene_.tool_mesh();
+  WalkBudget budget = {std::numeric_limits<std::uint32_t>::max()};
+  if (!walk_.find(tool.tree, obstacle.mesh.tree, {X_OT, X_OT}, budget))
+    return true;  // far too much to be free
+  return std::any_of(walk_.begin(), walk_.end(), [&](const TrianglePair& pair) {
+    Triangle a, b;
+    for (int i = 0; i < 3; ++i) {
+      a[static_cast<std::size_t>(i)] = X_OT * tool.surface.corner_m(pair.a, i);
+      b[static_cast<std::size_t>(i)] = obstacle.mesh.surface.corner_m(pair.b, i);
+    }
+    return triangles_meet(a, b);
+  });
+}
+
+/// Two surfaces that do not meet are apart, or one body holds the other.
+bool Placement::admissible(const Pose& X_WT) noexcept {
+  if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
+  for (const MeshObstacle& obstacle : scene_.meshes()) {
+    const Pose X_OT = inverse(obstacle.X_WO) * X_WT;
+    if (meets(obstacle, X_OT)) return false;
+    const MeshSurface& tool = scene_.tool_mesh()->surface;
+    const MeshSurface& solid = obstacle.mesh.surface;
+    if (inside(tool, inverse(X_OT) * solid.corner_m(0, 0))) return false;
+    if (solid.kind() == MeshSurface::Kind::solid && inside(solid, X_OT * tool.corner_m(0, 0))) return false;
+  }
+  return true;
+}
+
+/// From an admissible pose, as near to p as a proxy comes.
+Projection Placement::settled(const Pose& X_WP, const Pose& X_start) noexcept {
+  proxy_.forget();
+  Projection q = proxy_.follow(X_WP, X_start);
+  for (int tick = 1; tick < kMostTicks; ++tick) {
+    const Projection next = proxy_.follow(X_WP, q.X_WQ);
+    const bool done = next.status != ProjectionStatus::budget_spent && next.energy > (1.0 - kGain) * q.energy;
+    q = next;
+    if (done) break;
+  }
+  return q;
+}
+
+Projection Placement::nearest(const Pose& X_WP) noexcept {
+  if (admissible(X_WP)) return settled(X_WP, X_WP);
+  Projection best;
+  best.X_WQ = X_WP;
+  best.status = ProjectionStatus::infeasible;
+  best.energy = std::numeric_limits<double>::infinity();
+  double farthest_m = 4.0 * scene_.tool_radius_m();
+  for (const MeshObstacle& obstacle : scene_.meshes())
+    farthest_m +=
+        2.0 * obstacle.mesh.surface.radius_m() + (obstacle.X_WO.translation_m - X_WP.translation_m).norm();
+  int starts = 0;
+  for (double r = kNearest * scene_.tool_radius_m(); r < farthest_m && starts < kMostStarts; r *= kGrowth)
+    for (int i = 0; i < 27 && starts < kMostStarts; ++i) {
+      const Vector3d direction(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      if (direction.isZero()) continue;
+      const Pose X_start = {X_WP.rotation, X_WP.translation_m + r * direction.normalized()};
+      if (!admissible(X_start)) continue;
+      ++starts;
+      const Projection q = settled(X_WP, X_start);
+      if (q.energy < best.energy) best = q;
+    }
+  return best;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "collision/proxy.hpp"
+#include "collision/scene.hpp"
+#include "collision/tree_walk.hpp"
+
+namespace wrenchd {
+
+/// Finds a way back where there is no history to follow: at the start, after the tool was changed or an
+/// obstacle was put where it is.
+///
+/// Looks around p, nearer first, for poses at which nothing overlaps, lets a proxy come as near to p as it
+/// can from each of them, and takes the nearest. It is admissible, and a local optimum; that no other place
+/// is nearer is likely, not proven.
+///
+/// It takes milliseconds, and is no work for the servo thread. The scene is kept by reference.
+class Placement {
+ public:
+  explicit Placement(const Scene& scene);
+
+  /// Does the tool overlap nothing at this pose, and is it outside of all that is solid?
+  bool admissible(const Pose& X_WT) noexcept;
+
+  /// Status infeasible where nothing was found. The contacts are those that hold q.
+  Projection nearest(const Pose& X_WP) noexcept;
+
+ private:
+  bool meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept;
+  Projection settled(const Pose& X_WP, const Pose& X_start) noexcept;
+
+  const Scene& scene_;
+  HalfSpaceContacts half_spaces_;
+  TreeWalk walk_;
+  Proxy proxy_;
+};
+
+}  // namespace wrenchd
