@@ -320,7 +320,8 @@ TEST_CASE("nor at a vertex that is not the deepest, where the angles may lie on 
   for (int i = 0; i < 80; ++i) {
     Pressed c = random_pressed(random);
     const auto& vertices = c.tool.hull.vertices_T_m;
-    c.contact.tool_feature = static_cast<std::uint32_t>(random.integer(0, static_cast<int>(vertices.size()) - 1));
+    c.contact.tool_feature =
+        static_cast<std::uint32_t>(random.integer(0, static_cast<int>(vertices.size()) - 1));
     c.contact.p_TA_m = vertices[c.contact.tool_feature];
     const PlanarFamily family(c.tool.solid.inertia, c.tool.hull, 5);
     require_least_of_free(c, family);

@@ -498,7 +498,12 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
       {{"paper", "-o", ""}, "--output: must not be empty"},
       {{"check"}, "file is required"},
       {{"check", ""}, "file: must not be empty; name a file"},
-      {{"mesh"}, "file is required"},
+      {{"mesh"}, "mesh: a file, or --make KIND, is required"},
+      {{"mesh", "--make", "teapot"}, "teapot not in {cube,plate,"},
+      {{"mesh", mesh, "--make", "cube"}, "excludes"},
+      {{"mesh", "--triangles", "100", mesh}, "--triangles requires --make"},
+      {{"mesh", "--make", "cube", "--triangles", "2"}, "--triangles: Value 2 not in range 8 to 20000000"},
+      {{"mesh", "--make", "cube", "-o", ""}, "--output: must not be empty"},
       {{"mesh", mesh, "--scale", "0"}, "--scale: expected a number from 1e-09 to 1e+06, found '0'"},
       {{"mesh", mesh, "--scale", "nan"}, "--scale: expected a number from"},
       {{"mesh", mesh, mesh}, mesh},
@@ -596,6 +601,90 @@ TEST_CASE("wrenchctl mesh tells what a mesh is") {
   const ProgramResult overflow = run_program("wrenchctl", {"mesh", vast.string()});
   CHECK(overflow.exit_code != 0);
   CHECK(overflow.err.find(vast.string() + ": has no usable volume at scale 1") != std::string::npos);
+}
+
+TEST_CASE("wrenchctl mesh makes what wrenchctl mesh accepts") {
+  const TemporaryDirectory dir;
+  for (const char* kind :
+       {"cube", "plate", "table", "sphere", "bumpy", "boulder", "peg", "hole", "bolt", "nut", "gear"}) {
+    INFO(kind);
+    const std::string file = (dir.path() / (std::string(kind) + ".off")).string();
+    const ProgramResult made =
+        run_program("wrenchctl", {"mesh", "--make", kind, "--triangles", "2000", "-o", file});
+    CHECK(made.exit_code == 0);
+    CHECK(made.err == "");
+    CHECK(run_program("wrenchctl", {"mesh", file}).exit_code == 0);
+  }
+  const ProgramResult one = run_program("wrenchctl", {"mesh", "--make", "bumpy", "--triangles", "320"});
+  const ProgramResult same =
+      run_program("wrenchctl", {"mesh", "--make", "bumpy", "--triangles", "320", "--seed", "1"});
+  const ProgramResult other =
+      run_program("wrenchctl", {"mesh", "--make", "bumpy", "--triangles", "320", "--seed", "2"});
+  CHECK(one.out.rfind("OFF\n162 320 0\n", 0) == 0);
+  CHECK(one.out == same.out);
+  CHECK(one.out != other.out);
+}
+
+// A cube pushed down through a plate in one step of 100 mm, and drawn aside until it is free.
+TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump through") {
+  const TemporaryDirectory dir;
+  for (const char* kind : {"cube", "plate", "gear"})
+    REQUIRE(run_program("wrenchctl", {"mesh", "--make", kind, "--triangles", "500", "-o",
+                                      (dir.path() / (std::string(kind) + ".off")).string()})
+                .exit_code == 0);
+  for (const char* tool : {"cube", "gear"}) {
+    INFO(tool);
+    const fs::path scene =
+        dir.write("scene.toml", std::string("[tool]\nmesh = \"") + tool +
+                                    ".off\"\n[[obstacle]]\nname = \"plate\"\nmesh = \"plate.off\"\n");
+    std::string poses = "px,py,pz,qx,qy,qz,qw\n0,0,0.05,0,0,0,1\n0,0,-0.05,0,0,0,1\n0,0,-0.05,0,0,0,1\n";
+    for (int i = 0; i < 60; ++i) poses += std::to_string(0.002 * i) + ",0,0.05,0,0,0,1\n";
+    const fs::path table = dir.write("poses.csv", poses);
+    const ProgramResult result =
+        run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string(), "--proxy"});
+    CHECK(result.exit_code == 0);
+    CHECK(result.err == "");
+    std::istringstream lines(result.out);
+    std::string line;
+    std::getline(lines, line);
+    CHECK(line.substr(line.rfind("solve_ns")) == "solve_ns,status,iterations");
+    std::vector<std::string> rows;
+    while (std::getline(lines, line)) rows.push_back(line);
+    REQUIRE(rows.size() == 63);
+    const auto column = [&](std::size_t row, int number) {
+      std::istringstream cells(rows[row]);
+      std::string cell;
+      for (int i = 0; i <= number; ++i) std::getline(cells, cell, ',');
+      return cell;
+    };
+    CHECK(column(0, 28) == "free");
+    CHECK(column(2, 28) == "converged");
+    CHECK(column(62, 28) == "free");
+    const double top = tool == std::string("cube") ? 0.0255 : 0.0055;
+    CHECK(std::stod(column(2, 4)) == Approx(top).margin(1e-8));
+    CHECK(std::stod(column(2, 4)) > top);
+    // Without history the other side is as near.
+    const ProgramResult alone =
+        run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string()});
+    CHECK(alone.exit_code == 0);
+    CHECK(alone.out.find("status") == std::string::npos);
+  }
+}
+
+TEST_CASE("wrenchctl solve with bodies that are not convex wants method exact") {
+  const TemporaryDirectory dir;
+  REQUIRE(run_program("wrenchctl", {"mesh", "--make", "gear", "--triangles", "500", "-o",
+                                    (dir.path() / "gear.off").string()})
+              .exit_code == 0);
+  const fs::path scene = dir.write(
+      "scene.toml", "[tool]\nmesh = \"gear.off\"\n[[obstacle]]\nname = \"rack\"\nmesh = \"gear.off\"\n");
+  const fs::path table = dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.05,0,0,0,1\n");
+  const ProgramResult result =
+      run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string(), "--method", "planar"});
+  CHECK(result.exit_code == 1);
+  CHECK(result.out == "");
+  CHECK(result.err.find("'rack'") != std::string::npos);
+  CHECK(result.err.find("only method exact") != std::string::npos);
 }
 
 TEST_CASE("wrenchctl explains itself") {

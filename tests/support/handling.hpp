@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "collision/scene.hpp"
+#include "tests/support/random_values.hpp"
+#include "tools/make_mesh.hpp"
+
+namespace wrenchd::test {
+
+/// How a hand handles a tool, at 1000 poses a second.
+enum class Motion : std::uint8_t {
+  stab,   ///< straight through the obstacle and back, at up to 5 m/s, turning a little
+  shake,  ///< at random, at up to 5 m/s and 50 rad/s
+  press,  ///< in a hole: from side to side, tilting, in and out
+  slide,  ///< over the top and beyond its edges
+};
+
+/// A tool, an obstacle, and what is done with them.
+struct Handling {
+  std::string name;
+  MadeMesh tool, obstacle;
+  Motion motion;
+  Vector3d start_m;  ///< of the tool; nothing overlaps there
+};
+
+/// Twenty of them: thin and thick, flat and round, fine and coarse, loose and tight.
+const std::vector<Handling>& rough_handling();
+
+Scene scene_of(const Handling& handling);
+
+/// A tool for the proxy: half-spaces would need the hull that tool_body() makes, meshes do not.
+ToolBody mesh_tool(TriangleMesh mesh, double mass_kg = 0.1);
+
+/// The hand's poses of the tool's body frame, one after the other.
+class Hand {
+ public:
+  explicit Hand(const Handling& handling, std::uint64_t seed = 1)
+      : handling_(handling), random_(seed), X_WP_{Quaterniond::Identity(), handling.start_m} {}
+
+  const Pose& next();
+
+ private:
+  void stab();
+  void shake();
+  void press();
+  void slide();
+
+  const Handling& handling_;
+  RandomValues random_;
+  Pose X_WP_;
+  double t_s_ = 0.0;
+  int ticks_ = 0;
+  Twist V_;
+};
+
+}  // namespace wrenchd::test

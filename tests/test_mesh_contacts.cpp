@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "collision/mesh_contacts.hpp"
+#include "tests/support/handling.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+constexpr double kClearance_m = 1e-9;
+
+Scene two(TriangleMesh tool, TriangleMesh obstacle, Pose X_WO = {}) {
+  std::vector<MeshObstacle> obstacles;
+  obstacles.push_back({"obstacle", TreedMesh(std::move(obstacle)), X_WO});
+  return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
+}
+
+MeshContacts::Findings look(const Scene& scene, const Pose& from, const Pose& to) {
+  MeshContacts contacts(scene);
+  contacts.start_at(from);
+  WalkBudget budget = {1000000};
+  return contacts.look(to, kClearance_m, budget);
+}
+
+Pose at(double x, double y, double z, const Vector3d& turn = Vector3d::Zero()) {
+  return {rotation_from(turn), {x, y, z}};
+}
+
+TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_contacts]") {
+  const Scene scene = two(make_mesh({"cube", 12}), make_mesh({"table", 12}));
+  const Vector3d on_corner(0.6, 0.5, 0.0), on_edge(0.785398163, 0.0, 0.0);
+  SECTION("a corner on a face") {
+    const auto found = look(scene, at(0, 0, 0.06, on_corner), at(0, 0, 0.04, on_corner));
+    REQUIRE(found.complete);
+    REQUIRE(found.met.size() >= 1);
+    CHECK(found.met[0].kind == ContactKind::vertex_face);
+    CHECK(found.met[0].n_W.isApprox(Vector3d::UnitZ(), 1e-12));
+    CHECK(gap_m(found.met[0], at(0, 0, 0.06, on_corner)) > 0.0);
+    CHECK(gap_m(found.met[0], at(0, 0, 0.04, on_corner)) < 0.0);
+  }
+  SECTION("an edge over the table's edge") {
+    const Vector3d across(0.785398163, 0.0, 0.0);  // its lowest edge runs along x
+    const auto found = look(scene, at(0.15, 0, 0.06, across), at(0.15, 0, 0.04, across));
+    REQUIRE(found.met.size() >= 1);
+    bool edges = false;
+    for (const Contact& c : found.met) edges = edges || c.kind == ContactKind::edge_edge;
+    CHECK(edges);
+    for (const Contact& c : found.met)
+      CHECK(normal_W(c, at(0.15, 0, 0.06, across)).isApprox(Vector3d::UnitZ(), 1e-9));
+  }
+  SECTION("the other way round, the table's corner on a face") {
+    const Scene other = two(make_mesh({"table", 12}), make_mesh({"cube", 12}), at(0, 0, 0, on_corner));
+    const auto found = look(other, at(0, 0, 0.07), at(0, 0, 0.045));
+    REQUIRE(found.met.size() >= 1);
+    CHECK(found.met[0].kind == ContactKind::face_vertex);
+    CHECK(normal_W(found.met[0], at(0, 0, 0.07)).isApprox(Vector3d::UnitZ(), 1e-9));
+  }
+  SECTION("nothing on a way that ends above") {
+    const auto found = look(scene, at(0, 0, 0.06, on_edge), at(0.02, 0, 0.0456, on_edge));
+    CHECK(found.met.empty());
+    CHECK_FALSE(found.overlaps);
+  }
+  SECTION("a way through the whole table, in one step") {
+    const auto found = look(scene, at(0, 0, 0.06), at(0.01, 0, -0.06));
+    REQUIRE(found.met.size() >= 1);
+    for (const Contact& c : found.met) CHECK(c.n_W.isApprox(Vector3d::UnitZ(), 1e-9));
+  }
+}
+
+// No ghost: a cube that slides over a table meets nothing, however finely the table is cut.
+TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
+  for (const std::size_t triangles : {12, 1000, 20000}) {
+    const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));
+    const double z = 0.035 + kClearance_m;
+    const auto found = look(scene, at(0.001, 0.002, z), at(0.03, 0.0, z));
+    INFO(triangles);
+    CHECK(found.complete);
+    CHECK(found.met.empty());
+    CHECK_FALSE(found.overlaps);
+  }
+}
+
+TEST_CASE("what touches at the end is told, by the names of its features", "[mesh_contacts]") {
+  const Scene scene = two(make_mesh({"cube", 300}), make_mesh({"table", 300}));
+  MeshContacts contacts(scene);
+  WalkBudget budget = {1000000};
+  contacts.start_at(at(0, 0, 0.036));
+  const auto found = contacts.look(at(0, 0, 0.035 + kClearance_m), kClearance_m, budget);
+  CHECK(found.met.empty());
+  CHECK(contacts.touching().size() == 4);  // the corners, and nothing of the cuts
+  for (const Contact& c : contacts.touching()) {
+    CHECK(c.kind == ContactKind::vertex_face);
+    CHECK(scene.tool_mesh()->surface.vertices_m()[c.tool_feature] == c.p_TA_m);
+    CHECK(scene.meshes()[0].mesh.surface.region(c.obstacle_feature) == c.obstacle_feature);
+    CHECK(c.obstacle == 0);
+  }
+}
+
+TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
+  TriangleMesh sheet;
+  sheet.vertices_m = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  std::vector<MeshObstacle> obstacles;
+  obstacles.push_back({"sheet", TreedMesh(sheet, MeshSurface::Kind::surface), Pose{}});
+  const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
+  for (const double side : {1.0, -1.0}) {
+    const auto found = look(scene, at(0, 0, side * 0.04), at(0, 0, side * 0.01));
+    REQUIRE(found.met.size() >= 1);
+    for (const Contact& c : found.met) CHECK(c.n_W.isApprox(side * Vector3d::UnitZ(), 1e-12));
+  }
+}
+
+TEST_CASE("ends within reach of one another need no second walk", "[mesh_contacts]") {
+  const Scene scene = scene_of(rough_handling()[7]);
+  MeshContacts contacts(scene);
+  WalkBudget budget = {1000000};
+  contacts.start_at(at(0.11, 0, 0));
+  contacts.look(at(0.10, 0, 0), kClearance_m, budget);
+  const std::uint32_t left = budget.visits;
+  CHECK(left < 1000000);
+  contacts.look(at(0.10, 0.0002, 0), kClearance_m, budget);
+  CHECK(budget.visits == left);
+  contacts.look(at(0.10, 0.01, 0), kClearance_m, budget);
+  CHECK(budget.visits < left);
+}
+
+}  // namespace
+}  // namespace wrenchd
