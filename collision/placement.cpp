@@ -11,12 +11,36 @@ namespace {
 /// How far from p the search begins and ends, in units of the tool's size and of the scene's, and by what it
 /// grows.
 constexpr double kNearest = 1e-3;
-constexpr double kGrowth = 1.5;
+constexpr double kGrowth = 1.3;
+/// So many poses are looked at before the search grows.
+constexpr int kTries = 40;
+constexpr double kMostTurn_rad = 1.0;
 /// So many poses found are tried.
 constexpr int kMostStarts = 12;
 /// Ticks that a proxy is given to come to rest, and the share of T that it must gain to go on.
 constexpr int kMostTicks = 200;
 constexpr double kGain = 1e-9;
+
+/// Points spread evenly over the unit ball, the same in every run.
+class Halton {
+ public:
+  Vector3d in_ball() noexcept {
+    for (;;) {
+      ++index_;
+      const Vector3d p = 2.0 * Vector3d(digit_sum(2), digit_sum(3), digit_sum(5)) - Vector3d::Ones();
+      if (p.squaredNorm() <= 1.0) return p;
+    }
+  }
+
+ private:
+  /// The digits of the index to a base, behind the point and in reverse order.
+  double digit_sum(int base) const noexcept {
+    double sum = 0.0, weight = 1.0;
+    for (int i = index_; i > 0; i /= base) sum += (weight /= base) * (i % base);
+    return sum;
+  }
+  int index_ = 0;
+};
 
 /// How often a ray from p along x crosses the surface, odd: p is inside. A ray through an edge would count
 /// twice or not at all, so it runs askew.
@@ -89,12 +113,15 @@ Projection Placement::nearest(const Pose& X_WP) noexcept {
   for (const MeshObstacle& obstacle : scene_.meshes())
     farthest_m +=
         2.0 * obstacle.mesh.surface.radius_m() + (obstacle.X_WO.translation_m - X_WP.translation_m).norm();
+  Halton points;
   int starts = 0;
   for (double r = kNearest * scene_.tool_radius_m(); r < farthest_m && starts < kMostStarts; r *= kGrowth)
-    for (int i = 0; i < 27 && starts < kMostStarts; ++i) {
-      const Vector3d direction(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-      if (direction.isZero()) continue;
-      const Pose X_start = {X_WP.rotation, X_WP.translation_m + r * direction.normalized()};
+    for (int i = 0; i < kTries && starts < kMostStarts; ++i) {
+      // Every other one turned, by as much as its points are moved.
+      const Vector3d shift_m = r * points.in_ball();
+      const Vector3d turn_rad = std::min(r / scene_.tool_radius_m(), kMostTurn_rad) * points.in_ball();
+      const Quaterniond turn = i % 2 == 0 ? Quaterniond::Identity() : rotation_from(turn_rad);
+      const Pose X_start = {(X_WP.rotation * turn).normalized(), X_WP.translation_m + shift_m};
       if (!admissible(X_start)) continue;
       ++starts;
       const Projection q = settled(X_WP, X_start);
