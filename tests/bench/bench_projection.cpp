@@ -23,12 +23,6 @@ struct Options {
   std::filesystem::path csv;
 };
 
-bool pinned_to_one_core() {
-  cpu_set_t cores;
-  CPU_ZERO(&cores);
-  return sched_getaffinity(0, sizeof cores, &cores) == 0 && CPU_COUNT(&cores) == 1;
-}
-
 /// What is compared with what: times mean nothing without it.
 void explain(const Effort& effort, const TickScale& scale) {
   std::cout << "Every pose is timed on its own, " << effort.poses
@@ -75,20 +69,12 @@ std::vector<Table> measure(const Options& options, const TickScale& scale) {
   }
   if (!options.half_space_only) {
     std::vector<std::string> missing;
-    const std::vector<PeerModule> peers = load_peers(missing);
+    const std::vector<PeerModule> peers = load_peers(convex_peers(), missing);
     for (const std::string& name : missing)
       std::cout << "\nno rows of " << name << ": its package was not found when this was built\n";
     for (const Table& table : bench_convex(options.effort, scale, peers)) show(table);
   }
   return tables;
-}
-
-void write_csv(const std::filesystem::path& file, const std::vector<Table>& tables) {
-  std::ofstream out(file);
-  out << "table,case,method,column,value\n";
-  for (const Table& table : tables) table.write_csv(out);
-  out.close();
-  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
 }
 
 }  // namespace

@@ -52,15 +52,30 @@ PeerPose peer_pose(const Pose& X_BA) {
   return pose;
 }
 
-std::vector<PeerModule> load_peers(std::vector<std::string>& missing) {
+int PeerModule::Pair::contacts(int q, const PeerPose& X_BA) const {
+  double ignored = 0.0;
+  return module_.ask_(peer_.get(), q, &X_BA, &ignored);
+}
+
+const std::vector<std::string>& convex_peers() {
+  static const std::vector<std::string> names = {"fcl", "ccd", "ode", "bullet"};
+  return names;
+}
+
+const std::vector<std::string>& mesh_peers() {
+  static const std::vector<std::string> names = {"fcl_mesh", "ode_mesh", "bullet_mesh", "cgal_mesh"};
+  return names;
+}
+
+std::vector<PeerModule> load_peers(const std::vector<std::string>& names, std::vector<std::string>& missing) {
   const auto directory = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   std::vector<PeerModule> peers;
-  for (const char* name : {"fcl", "ccd", "ode", "bullet"}) {
-    const auto file = directory / ("bench_peer_" + std::string(name) + ".so");
+  for (const std::string& name : names) {
+    const auto file = directory / ("bench_peer_" + name + ".so");
     if (std::filesystem::exists(file))
       peers.emplace_back(file);
     else
-      missing.emplace_back(name);
+      missing.push_back(name);
   }
   return peers;
 }

@@ -25,6 +25,8 @@ class PeerModule {
    public:
     /// Depth of query q at a pose [m]; NaN where the peer sees no overlap.
     double depth_m(int q, const PeerPose& X_BA) const;
+    /// How many contacts query q lists.
+    int contacts(int q, const PeerPose& X_BA) const;
 
    private:
     friend class PeerModule;
@@ -50,8 +52,11 @@ class PeerModule {
 
 PeerPose peer_pose(const Pose& X_BA);
 
-/// The peers whose modules were built, out of the directory of the running program. missing: the names of the
-/// others.
-std::vector<PeerModule> load_peers(std::vector<std::string>& missing);
+/// The peers of these names whose modules were built, out of the directory of the running program. missing:
+/// the names of the others.
+std::vector<PeerModule> load_peers(const std::vector<std::string>& names, std::vector<std::string>& missing);
+/// For convex bodies, and for meshes of any shape.
+const std::vector<std::string>& convex_peers();
+const std::vector<std::string>& mesh_peers();
 
 }  // namespace wrenchd::bench

@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/* A convex solid, its triangles outward-oriented. */
+/* A solid, its triangles outward-oriented; convex, for the modules that answer for convex bodies. */
 struct PeerMesh {
   const double* vertices; /* x, y, z of each */
   size_t vertex_count;
@@ -32,7 +32,7 @@ const char* peer_query_name(int query);
 void* peer_open(const struct PeerMesh* A, const struct PeerMesh* B);
 void peer_close(void* peer);
 
-/* Do they overlap? If so, how deep. */
+/* How many contacts they have, 0 where they do not overlap; and how deep, for convex bodies. */
 int peer_ask(void* peer, int query, const struct PeerPose* X_BA, double* depth);
 
 #ifdef __cplusplus

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <limits>
 
+#include <sched.h>
+
 namespace wrenchd::bench {
 
 TickScale calibrate() {
@@ -23,6 +25,12 @@ TickScale calibrate() {
     scale.empty_ticks = std::min(scale.empty_ticks, ticks() - before);
   }
   return scale;
+}
+
+bool pinned_to_one_core() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  return sched_getaffinity(0, sizeof cores, &cores) == 0 && CPU_COUNT(&cores) == 1;
 }
 
 }  // namespace wrenchd::bench

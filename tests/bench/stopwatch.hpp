@@ -39,4 +39,7 @@ struct TickScale {
 /// Takes a tenth of a second.
 TickScale calibrate();
 
+/// Is this process kept to one core? Times are calmer then.
+bool pinned_to_one_core();
+
 }  // namespace wrenchd::bench

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <iomanip>
 #include <ostream>
 #include <stdexcept>
@@ -69,6 +70,14 @@ void Table::write_csv(std::ostream& out) const {
     for (std::size_t i = 0; i < columns_.size(); ++i)
       out << std::quoted(name_) << ',' << std::quoted(row.of_case) << ',' << std::quoted(row.method) << ','
           << std::quoted(columns_[i]) << ',' << row.cells[i] << '\n';
+}
+
+void write_csv(const std::filesystem::path& file, const std::vector<Table>& tables) {
+  std::ofstream out(file);
+  out << "table,case,method,column,value\n";
+  for (const Table& table : tables) table.write_csv(out);
+  out.close();
+  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
 }
 
 }  // namespace wrenchd::bench

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -37,5 +38,8 @@ class Table {
   std::vector<std::string> columns_;
   std::vector<Row> rows_;
 };
+
+/// All of them in one file, under a header. Throws std::runtime_error where it cannot be written.
+void write_csv(const std::filesystem::path& file, const std::vector<Table>& tables);
 
 }  // namespace wrenchd::bench

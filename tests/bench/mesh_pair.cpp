@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/bench/mesh_pair.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "collision/tree_walk.hpp"
+#include "collision/triangle_pair.hpp"
+#include "core/frame.hpp"
+#include "tests/support/handling.hpp"
+
+namespace wrenchd::bench {
+namespace {
+
+Scene scene_of(const MadeMesh& tool, const MadeMesh& obstacle) {
+  std::vector<MeshObstacle> obstacles;
+  obstacles.push_back({obstacle.kind, TreedMesh(make_mesh(obstacle)), Pose{}});
+  return Scene(test::mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
+}
+
+/// Where on a line the bodies begin to overlap, between a free place and one where they do. pose(x): where.
+template <class PoseAt>
+double touching(MeetingPairs& pairs, double free, double overlapping, const PoseAt& pose) {
+  constexpr int kHalvings = 40;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (free + overlapping);
+    (pairs.count(pose(middle)) > 0 ? overlapping : free) = middle;
+  }
+  return free;
+}
+
+}  // namespace
+
+std::size_t MeetingPairs::count(const Pose& X_WT) {
+  const MeshSurface& a = scene_.tool_mesh()->surface;
+  const MeshSurface& b = scene_.meshes()[0].mesh.surface;
+  WalkBudget budget = {std::numeric_limits<std::uint32_t>::max()};
+  walk_.find(scene_.tool_mesh()->tree, scene_.meshes()[0].mesh.tree, {X_WT, X_WT}, budget);
+  const Frame X(X_WT);
+  std::size_t meeting = 0;
+  std::uint32_t moved_number = MeshSurface::kNone;
+  Triangle moved;
+  for (const TrianglePair& pair : walk_) {
+    if (pair.a != moved_number) {
+      moved = {X * a.corner_m(pair.a, 0), X * a.corner_m(pair.a, 1), X * a.corner_m(pair.a, 2)};
+      moved_number = pair.a;
+    }
+    meeting +=
+        triangles_meet(moved, {b.corner_m(pair.b, 0), b.corner_m(pair.b, 1), b.corner_m(pair.b, 2)}) ? 1 : 0;
+  }
+  return meeting;
+}
+
+MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
+  MeshPair pair{"", scene_of({"bumpy", tool_triangles, 1}, {"boulder", obstacle_triangles, 2}), {}, {}};
+  MeetingPairs pairs(pair.scene);
+  double last_m = 0.13;
+  for (std::size_t i = 0; i < poses; ++i) {
+    const double t = static_cast<double>(i) / 1000.0;
+    const Vector3d out =
+        Vector3d(std::cos(t + 0.3), std::sin(t + 0.3) * std::cos(0.7 * t), 0.4 * std::sin(1.7 * t) + 0.2)
+            .normalized();
+    const Vector3d axis = Vector3d(0.3 + 0.2 * std::sin(t), 1.0, 0.5 * std::cos(t)).normalized();
+    const Quaterniond R = rotation_from((t + 0.15 * std::sin(9.0 * t)) * axis);
+    const auto at = [&](double away_m) { return Pose{R, away_m * out}; };
+    double free_m = last_m + 0.002, overlapping_m = free_m;
+    while (pairs.count(at(overlapping_m)) == 0) {
+      free_m = overlapping_m;
+      overlapping_m -= 0.0005;
+    }
+    last_m = touching(pairs, free_m, overlapping_m, at);
+    if (i == 0) pair.X_start = at(last_m + 1e-4);
+    pair.X_WP.push_back(at(last_m - 0.00025 - 0.0002 * std::sin(25.0 * t)));
+  }
+  return pair;
+}
+
+MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
+  MeshPair pair{"", scene_of({"peg", tool_triangles}, {"hole", obstacle_triangles}), {}, {}};
+  MeetingPairs pairs(pair.scene);
+  for (std::size_t i = 0; i < poses; ++i) {
+    const double t = static_cast<double>(i) / 1000.0;
+    const Quaterniond R =
+        rotation_from(0.0015 * std::sin(6.0 * t) * Vector3d(std::cos(3.0 * t), std::sin(3.0 * t), 0.0)) *
+        rotation_from(Vector3d(0.0, 0.0, 0.8 * t));
+    const auto at = [&](double aside_m) {
+      return Pose{R, {aside_m * std::cos(4.0 * t), aside_m * std::sin(4.0 * t), 0.010 * std::sin(5.0 * t)}};
+    };
+    double free_m = 0.0, overlapping_m = 0.0;
+    while (pairs.count(at(overlapping_m)) == 0) {
+      free_m = overlapping_m;
+      overlapping_m += 2e-5;
+    }
+    if (i == 0) pair.X_start = at(0.0);
+    pair.X_WP.push_back(
+        at(touching(pairs, free_m, overlapping_m, at) + 0.00005 + 0.00003 * std::sin(25.0 * t)));
+  }
+  return pair;
+}
+
+}  // namespace wrenchd::bench

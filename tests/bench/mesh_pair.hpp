@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "collision/scene.hpp"
+#include "collision/tree_walk.hpp"
+#include "tools/make_mesh.hpp"
+
+namespace wrenchd::bench {
+
+/// A tool that moves in contact with an obstacle, a millisecond from pose to pose.
+struct MeshPair {
+  std::string name;
+  Scene scene;
+  std::vector<Pose> X_WP;  ///< overlapping by some tenths of a millimetre
+  Pose X_start;            ///< admissible, near the first of them
+};
+
+/// A bumpy body of 40 mm slides and turns on a boulder of 60 mm, about 100 mm/s and 1 rad/s, 0.05 to 0.45 mm
+/// deep.
+MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses);
+
+/// A rod of 9.8 mm radius in a tube of 10 mm: it tilts, spins, slides along and is pushed against the wall,
+/// 20 to 80 um deep. Tens of thousands of triangles are near each other all the time.
+MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses);
+
+/// All pairs of triangles that meet, found anew at each pose.
+class MeetingPairs {
+ public:
+  explicit MeetingPairs(const Scene& scene) : scene_(scene) {}
+
+  std::size_t count(const Pose& X_WT);
+
+ private:
+  const Scene& scene_;
+  TreeWalk walk_;
+};
+
+}  // namespace wrenchd::bench
