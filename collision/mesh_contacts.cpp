@@ -28,6 +28,8 @@ constexpr double kAnySlope = 2.0;
 /// size.
 constexpr double kReach = 0.08;
 constexpr double kLeastReach = 1e-4;
+/// No walk takes more than this share of the budget that is left.
+constexpr double kLongestWalk = 0.7;
 /// Crossings of much the same direction nearer than this count as one, in units of the way.
 constexpr double kClose = 4.0;
 constexpr double kSameWay = 0.9;  // cosine
@@ -82,15 +84,21 @@ bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
   listed_ = false;
   pairs_.clear();
   const double radius_m = scene_.tool_radius_m();
+  // A way that is too long for what is left may be followed by a shorter one.
+  WalkBudget share = {static_cast<std::uint32_t>(kLongestWalk * budget.visits)};
+  const std::uint32_t granted = share.visits;
   const double way_m = (X_WT.translation_m - X_start_.translation_m).norm();
   const double way_rad = X_WT.rotation.angularDistance(X_start_.rotation);
   reach_m_ = std::max(kReach * way_m, kLeastReach * radius_m);
   reach_rad_ = std::max(kReach * way_rad, kLeastReach);
+  std::uint32_t spent = 0;
   for (std::uint32_t k = 0; k < seen_.size(); ++k) {
     const MeshObstacle& obstacle = *seen_[k].obstacle;
     const Pose X_OW = inverse(obstacle.X_WO);
     const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, reach_rad_, false};
-    const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh.tree, sweep, budget);
+    const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh.tree, sweep, share);
+    budget.visits -= std::min(budget.visits, granted - share.visits - spent);
+    spent = granted - share.visits;
     if (!complete || pairs_.size() + walk_.size() > pairs_.capacity()) return false;
     for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, k});
   }
@@ -107,6 +115,7 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
     findings.complete = false;
     return findings;
   }
+  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs_.size()));
   for (Seen& seen : seen_) seen.X_OT_end = Frame(X_WT).seen_from(seen.X_WO);
   const double way_m = way(X_start_, X_WT);
   const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
