@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -54,8 +53,10 @@ constexpr std::size_t kMostIntersections = 1000;
 /// First place and number of a kind of defect.
 class Tally {
  public:
-  void found(std::string sentence) {
-    if (count_++ == 0) first_ = std::move(sentence);
+  /// sentence: makes the text, which only the first of a million needs.
+  template <class Sentence>
+  void found(const Sentence& sentence) {
+    if (count_++ == 0) first_ = sentence();
   }
   void report(std::vector<std::string>& defects, const std::string& cure) const {
     if (count_ > 0) defects.push_back(first_ + also(count_) + "; " + cure);
@@ -67,22 +68,33 @@ class Tally {
   std::string first_;
 };
 
+std::string face_name(std::size_t f) {
+  return "face " + std::to_string(f);
+}
+
+bool uses_a_vertex_twice(const std::vector<std::size_t>& face) {
+  if (face.size() == 3) return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
+  return std::set<std::size_t>(face.begin(), face.end()).size() != face.size();
+}
+
 /// Numbers, indices and faces that are no polygons. Without these right, nothing else can be asked.
 void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
   Tally not_finite, out_of_range, too_few, repeated;
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
     if (!soup.vertices[v].allFinite())
-      not_finite.found("vertex " + std::to_string(v) + " is not a number: " + place(soup.vertices[v]));
+      not_finite.found(
+          [&] { return "vertex " + std::to_string(v) + " is not a number: " + place(soup.vertices[v]); });
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     const auto& face = soup.faces[f];
-    const std::string name = "face " + std::to_string(f);
-    if (face.size() < 3) too_few.found(name + " has " + std::to_string(face.size()) + " vertices");
+    if (face.size() < 3)
+      too_few.found([&] { return face_name(f) + " has " + std::to_string(face.size()) + " vertices"; });
     for (const std::size_t v : face)
       if (v >= soup.vertices.size())
-        out_of_range.found(name + " uses vertex " + index_text(v) + ", but there are only " +
-                           std::to_string(soup.vertices.size()));
-    if (std::set<std::size_t>(face.begin(), face.end()).size() != face.size())
-      repeated.found(name + " uses a vertex twice");
+        out_of_range.found([&] {
+          return face_name(f) + " uses vertex " + index_text(v) + ", but there are only " +
+                 std::to_string(soup.vertices.size());
+        });
+    if (uses_a_vertex_twice(face)) repeated.found([&] { return face_name(f) + " uses a vertex twice"; });
   }
   not_finite.report(defects, "export the mesh again");
   out_of_range.report(defects, "vertex numbers start at 0; export the mesh again");
@@ -102,34 +114,55 @@ void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
   Tally flat;
   for (std::size_t f = 0; f < soup.faces.size(); ++f)
     if (!(area_of(soup, soup.faces[f]) > 0.0))
-      flat.found("face " + std::to_string(f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
-                 " has no area");
+      flat.found(
+          [&] { return face_name(f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area"; });
   flat.report(defects, "remove degenerate faces in the modeller");
 }
 
-/// Closed and consistently oriented: every directed edge once, and its reverse once.
-void check_edges(const PolygonSoup& soup, MeshReport& report) {
-  std::map<Edge, std::vector<std::size_t>> faces_along;
+/// A side of a face, as the face runs along it.
+struct Side {
+  Edge edge;  ///< the smaller vertex first
+  std::size_t face;
+  bool forward;  ///< from the smaller vertex to the larger
+};
+
+/// Of all faces, those of one edge next to each other, in the order of the faces.
+std::vector<Side> sides_of(const PolygonSoup& soup) {
+  std::vector<Side> sides;
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     const auto& face = soup.faces[f];
-    for (std::size_t i = 0; i < face.size(); ++i)
-      faces_along[{face[i], face[(i + 1) % face.size()]}].push_back(f);
-  }
-  Tally open, crowded, same_way;
-  for (const auto& [edge, faces] : faces_along) {
-    const auto reverse = faces_along.find({edge.second, edge.first});
-    const std::size_t reverse_count = reverse == faces_along.end() ? 0 : reverse->second.size();
-    const bool counted_once = edge.first < edge.second || reverse_count == 0;
-    if (!counted_once) continue;
-    const std::string where = "the edge from " + edge_place(soup, edge);
-    if (faces.size() + reverse_count == 1) {
-      open.found(where + " belongs to face " + std::to_string(faces[0]) + " only: the surface is open");
-    } else if (faces.size() + reverse_count > 2) {
-      crowded.found(where + " belongs to " + std::to_string(faces.size() + reverse_count) + " faces");
-    } else if (faces.size() == 2) {
-      same_way.found("faces " + std::to_string(faces[0]) + " and " + std::to_string(faces[1]) +
-                     " are oriented against each other along " + where);
+    for (std::size_t i = 0; i < face.size(); ++i) {
+      const auto [low, high] = std::minmax(face[i], face[i + 1 < face.size() ? i + 1 : 0]);
+      sides.push_back({{low, high}, f, low == face[i]});
     }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return a.edge != b.edge ? a.edge < b.edge : a.face < b.face;
+  });
+  return sides;
+}
+
+/// Closed and consistently oriented: every edge runs once in each direction.
+void check_edges(const PolygonSoup& soup, MeshReport& report) {
+  const std::vector<Side> sides = sides_of(soup);
+  Tally open, crowded, same_way;
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
+    const auto where = [&, i] {
+      const Edge& e = sides[i].edge;
+      const bool as_stored = sides[i].forward || end - i > 2;
+      return "the edge from " + edge_place(soup, as_stored ? e : Edge(e.second, e.first));
+    };
+    const auto face = [&](std::size_t k) { return std::to_string(sides[k].face); };
+    if (end - i == 1)
+      open.found([&] { return where() + " belongs to face " + face(i) + " only: the surface is open"; });
+    else if (end - i > 2)
+      crowded.found([&] { return where() + " belongs to " + std::to_string(end - i) + " faces"; });
+    else if (sides[i].forward == sides[i + 1].forward)
+      same_way.found([&] {
+        return "faces " + face(i) + " and " + face(i + 1) + " are oriented against each other along " +
+               where();
+      });
   }
   open.report(report.defects, "close the hole in the modeller");
   crowded.report(report.defects, "a solid has two faces at every edge: split or remove the extra ones");
@@ -142,20 +175,33 @@ void check_edges(const PolygonSoup& soup, MeshReport& report) {
 /// towards n is followed by the one that comes in from n. A vertex with more than one ring joins parts of the
 /// surface in a point.
 void check_vertices(const PolygonSoup& soup, MeshReport& report) {
-  std::vector<std::map<std::size_t, std::size_t>> around(soup.vertices.size());  // came from -> goes to
+  struct Turn {
+    std::size_t vertex, from, to;  ///< a face comes in from `from` and leaves towards `to`
+  };
+  std::vector<Turn> turns;
   for (const auto& face : soup.faces)
     for (std::size_t i = 0; i < face.size(); ++i)
-      around[face[i]][face[(i + face.size() - 1) % face.size()]] = face[(i + 1) % face.size()];
+      turns.push_back(
+          {face[i], face[i > 0 ? i - 1 : face.size() - 1], face[i + 1 < face.size() ? i + 1 : 0]});
+  const auto before = [](const Turn& a, const Turn& b) {
+    return a.vertex != b.vertex ? a.vertex < b.vertex : a.from < b.from;
+  };
+  std::sort(turns.begin(), turns.end(), before);
   Tally pinched;
-  for (std::size_t v = 0; v < around.size(); ++v) {
-    if (around[v].empty()) continue;
-    std::size_t ring = 0;
-    std::size_t at = around[v].begin()->first;
-    do at = around[v].at(at);
-    while (++ring < around[v].size() && at != around[v].begin()->first);
-    if (ring < around[v].size())
-      pinched.found("parts of the surface meet only in vertex " + std::to_string(v) + " at " +
-                    place(soup.vertices[v]));
+  for (auto begin = turns.begin(); begin != turns.end();) {
+    const auto end =
+        std::find_if(begin, turns.end(), [&](const Turn& t) { return t.vertex != begin->vertex; });
+    std::ptrdiff_t ring = 0;
+    auto at = begin;
+    do {
+      at = std::lower_bound(begin, end, Turn{begin->vertex, at->to, 0}, before);
+    } while (++ring < end - begin && at != begin);
+    if (ring < end - begin)
+      pinched.found([&] {
+        return "parts of the surface meet only in vertex " + std::to_string(begin->vertex) + " at " +
+               place(soup.vertices[begin->vertex]);
+      });
+    begin = end;
   }
   pinched.report(report.defects, "separate them in the modeller");
 }
@@ -179,8 +225,10 @@ std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh,
     face_of[f] = f;  // its first triangle keeps the number
     if (soup.faces[f].size() > 3 &&
         !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh))
-      uncut.found("face " + std::to_string(f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
-                  " cannot be cut into triangles");
+      uncut.found([&] {
+        return face_name(f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
+               " cannot be cut into triangles";
+      });
     face_of.resize(mesh.number_of_faces(), f);
   }
   uncut.report(report.defects, "make it flat, or cut it in the modeller");
