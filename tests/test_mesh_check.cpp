@@ -169,7 +169,7 @@ TEST_CASE("a hole is found") {
   soup.faces.erase(soup.faces.begin() + 5);  // z = 5
   check_defects(
       soup,
-      {"the edge from (0, 0, 5) to (0, 3, 5) belongs to face 0 only: the surface is open (4 in all); close "
+      {"the edge from (2, 0, 5) to (0, 0, 5) belongs to face 2 only: the surface is open (4 in all); close "
        "the hole in the modeller"});
   const MeshReport report = check_solid(soup);
   CHECK_FALSE(report.closed);
