@@ -23,7 +23,7 @@ struct HalfSpaceSettings {
   double offset_m = 0.0;
 };
 
-/// A convex solid that stands still. M is the frame its mesh file is written in.
+/// A solid of any shape that stands still. M is the frame its mesh file is written in.
 struct MeshObstacleSettings {
   std::string name;
   std::filesystem::path mesh;

@@ -36,7 +36,7 @@ std::string about(const SceneSettings& settings) {
   std::ostringstream text;
   text << "  tool " << settings.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
-       << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.convex().size()
+       << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
        << " mesh obstacle(s)\n";
   return text.str();
 }
