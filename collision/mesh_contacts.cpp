@@ -73,11 +73,8 @@ void MeshContacts::start_at(const Pose& X_WT) noexcept {
 }
 
 bool MeshContacts::covers(const Pose& X_WT) const noexcept {
-  const auto within = [&](const Pose& X) {
-    return (X.translation_m - X_listed_.translation_m).norm() <= reach_m_ &&
-           X.rotation.angularDistance(X_listed_.rotation) <= reach_rad_;
-  };
-  return listed_ && within(X_WT) && (from_listed_start_ || within(X_start_));
+  return listed_ && way(X_WT, X_listed_) <= reach_m_ &&
+         (from_listed_start_ || way(X_start_, X_listed_) <= reach_m_);
 }
 
 bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
@@ -87,15 +84,12 @@ bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
   // A way that is too long for what is left may be followed by a shorter one.
   WalkBudget share = {static_cast<std::uint32_t>(kLongestWalk * budget.visits)};
   const std::uint32_t granted = share.visits;
-  const double way_m = (X_WT.translation_m - X_start_.translation_m).norm();
-  const double way_rad = X_WT.rotation.angularDistance(X_start_.rotation);
-  reach_m_ = std::max(kReach * way_m, kLeastReach * radius_m);
-  reach_rad_ = std::max(kReach * way_rad, kLeastReach);
+  reach_m_ = std::max(kReach * way(X_start_, X_WT), kLeastReach * radius_m);
   std::uint32_t spent = 0;
   for (std::uint32_t k = 0; k < seen_.size(); ++k) {
     const MeshObstacle& obstacle = *seen_[k].obstacle;
     const Pose X_OW = inverse(obstacle.X_WO);
-    const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, reach_rad_, false};
+    const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, false};
     const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh.tree, sweep, share);
     budget.visits -= std::min(budget.visits, granted - share.visits - spent);
     spent = granted - share.visits;

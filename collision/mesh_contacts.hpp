@@ -101,7 +101,6 @@ class MeshContacts {
   bool from_listed_start_ = false;  ///< the start is still that of the way that the list was made for
   Pose X_listed_;                   ///< and this was its end
   double reach_m_ = 0.0;            ///< the list holds for ends this near to it
-  double reach_rad_ = 0.0;
   std::vector<NearPair> pairs_;
 
   Moved moved_;

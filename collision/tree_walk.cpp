@@ -32,8 +32,9 @@ walk::Transform travel(const Pose& from, const Pose& to) noexcept {
 /// The motion in single precision. The boxes are moved half way and grown by what is missing to both ends; a
 /// point at a distance r from A's origin leaves the straight line between its ends by no more than
 /// angle^2 r / 8, and the line's middle lies as far from where the pose half way takes it.
-walk::Motion motion_of(const Sweep& sweep, double radius_a_m, double extent_m) noexcept {
-  const auto& [start, end, reach_m, reach_rad, all_pairs] = sweep;
+walk::Motion motion_of(const Sweep& sweep, double least_radius_a_m, double extent_m) noexcept {
+  const double radius_a_m = std::sqrt(3.0) * least_radius_a_m;
+  const auto& [start, end, reach_m, all_pairs] = sweep;
   walk::Motion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
@@ -49,9 +50,10 @@ walk::Motion motion_of(const Sweep& sweep, double radius_a_m, double extent_m) n
                                                              end.translation_m.lpNorm<Eigen::Infinity>()));
   motion.all_pairs = all_pairs;
   motion.half_turn = static_cast<float>(0.5 * angle);
-  motion.margin = static_cast<float>(reach_m + reach_rad * radius_a_m + bulge_m + rounding_m);
-  motion.margin_shift = static_cast<float>(reach_m + rounding_m);
-  motion.margin_turn = static_cast<float>(reach_rad);
+  motion.margin = static_cast<float>(reach_m + bulge_m + rounding_m);
+  motion.reach = static_cast<float>(reach_m);
+  motion.radius = static_cast<float>(least_radius_a_m);
+  motion.rounding = static_cast<float>(rounding_m);
   for (int d = 0; d < 3; ++d) motion.centre_B[d] = static_cast<float>(end.translation_m[d]);
   motion.moving =
       start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
@@ -76,10 +78,9 @@ bool TreeWalk::find(const TriangleTree& a, const TriangleTree& b, const Sweep& s
                     WalkBudget& budget) noexcept {
   count_ = 0;
   if (a.nodes().empty() || b.nodes().empty()) return true;
-  const double radius_m = std::sqrt(3.0) * a.extent_m();
   const walk::Job job = {arrays_of(a),
                          arrays_of(b),
-                         motion_of(sweep, radius_m, radius_m + b.extent_m()),
+                         motion_of(sweep, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),
                          pairs_.data(),
                          static_cast<std::uint32_t>(pairs_.size()),
                          budget.visits,

@@ -20,10 +20,9 @@ struct TrianglePair {
 /// A moves in B from one pose to another.
 struct Sweep {
   Pose X_BA_start, X_BA_end;
-  /// Pairs are to be found not only for the end pose but for every one near it: no farther away than this
-  /// far, and turned by no more than this angle.
+  /// Pairs are to be found not only for the end pose but for every one near it: as far as this from it in
+  /// all, |shift| + angle times the farthest point of A.
   double reach_m = 0.0;
-  double reach_rad = 0.0;
   /// False: list only pairs with features that can meet first, a vertex in one of them or an edge in each.
   bool all_pairs = true;
 };
@@ -48,8 +47,8 @@ struct Motion {
   Transform travel_BA, travel_AB;  ///< R p + t is by how much a point of A, seen from B, moves in all
   float half_turn;                 ///< half the angle in all [rad]
   float margin;                    ///< by which all boxes grow [m]
-  float margin_shift;  ///< how much nearer a plane of A may come at the end: shift + turn * distance
-  float margin_turn;
+  float reach, radius;  ///< a plane of A may come nearer to a point by reach * max(1, its distance / radius)
+  float rounding;
   float centre_B[3];  ///< of A at the end, from which that distance counts
   bool moving;
   bool all_pairs;

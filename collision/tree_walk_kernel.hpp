@@ -371,7 +371,8 @@ class Walk {
     unsigned rows = (1U << box_a.count) - 1;
     rows &= ~bits(beside(a.low, a.high, b.low_of_all, b.high_of_all));
     if (rows == 0) return;
-    const float margin_of_plane = m.margin_shift + m.margin_turn * distance_bound(box_b, m.centre_B);
+    const float far = distance_bound(box_b, m.centre_B) / m.radius;
+    const float margin_of_plane = m.rounding + m.reach * (far > 1.0F ? far : 1.0F);
     for (rows &= ~bits(miss(a, standing(box_b), margin_of_plane, m.moving)); rows != 0; rows &= rows - 1) {
       const int i = __builtin_ctz(rows);
       const TriangleTree::Leaf& leaf_a = job_.a.leaves[box_a.child];

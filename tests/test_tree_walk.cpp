@@ -82,8 +82,7 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
       const double way = r * random.decades(1e-4, 0.3), turn = random.decades(1e-4, 0.05);
       sweep.X_BA_end = {(sweep.X_BA_start.rotation * random.rotation(turn)).normalized(),
                         sweep.X_BA_start.translation_m + way * random.unit<3>()};
-      sweep.reach_m = 0.3 * way;
-      sweep.reach_rad = 0.3 * turn;
+      sweep.reach_m = 0.3 * (way + turn * r);
       WalkBudget budget = {1000000000};
       std::set<std::pair<std::uint32_t, std::uint32_t>> listed, listed_portable;
       const bool complete = swept.find(a.tree, b.tree, sweep, budget);
@@ -96,9 +95,11 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
         Pose X = {sweep.X_BA_start.rotation.slerp(s, sweep.X_BA_end.rotation),
                   sweep.X_BA_start.translation_m +
                       s * (sweep.X_BA_end.translation_m - sweep.X_BA_start.translation_m)};
-        if (k % 2 == 0)
-          X = {(sweep.X_BA_end.rotation * random.rotation(sweep.reach_rad)).normalized(),
-               sweep.X_BA_end.translation_m + sweep.reach_m * random.unit<3>()};
+        if (k % 2 == 0) {
+          const double shift = random.uniform(0.0, 1.0);
+          X = {(sweep.X_BA_end.rotation * random.rotation((1.0 - shift) * sweep.reach_m / r)).normalized(),
+               sweep.X_BA_end.translation_m + shift * sweep.reach_m * random.unit<3>()};
+        }
         for (const auto& pair : meeting(still, a, b, {X, X}, X)) {
           ++all;
           // A pair that meets all along, or passes by, is not kept apart by any plane; it is always listed.
@@ -114,7 +115,7 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
 TEST_CASE("pairs without features that can meet first are left out when they are not wanted", "[tree_walk]") {
   const TreedMesh a(make_mesh({"cube", 5000})), b(make_mesh({"table", 5000}));
   const Pose X_BA = {Quaterniond::Identity(), {0, 0, 0.035}};
-  Sweep sweep = {X_BA, X_BA, 1e-5, 1e-5};
+  Sweep sweep = {X_BA, X_BA, 1e-5};
   TreeWalk walk;
   WalkBudget budget = {1000000};
   CHECK(walk.find(a.tree, b.tree, sweep, budget));
