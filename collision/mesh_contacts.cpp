@@ -59,6 +59,7 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(scene), walk_(kernel) {
   pairs_.reserve(TreeWalk::kCapacity);
   crossings_.reserve(kMostCrossings);
+  near_by_.reserve(scene.meshes().size());
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
@@ -69,7 +70,21 @@ MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(sce
 void MeshContacts::start_at(const Pose& X_WT) noexcept {
   X_start_ = X_WT;
   from_listed_start_ = false;
-  for (Seen& seen : seen_) seen.X_OT_start = Frame(X_WT).seen_from(seen.X_WO);
+}
+
+/// Of thousands of obstacles few are near, and they stay the same while the tool moves by its own size.
+void MeshContacts::find_near_by(const Pose& X_WT) noexcept {
+  const auto from_there_m = [&](const Pose& X) { return (X.translation_m - near_p_WT_m_).norm(); };
+  if (std::max(from_there_m(X_start_), from_there_m(X_WT)) + reach_m_ <= near_reach_m_) return;
+  const double tool_m = scene_.tool_radius_m();
+  near_p_WT_m_ = X_start_.translation_m;
+  near_reach_m_ = tool_m + reach_m_ + from_there_m(X_WT);
+  near_by_.clear();
+  for (std::uint32_t k = 0; k < seen_.size(); ++k) {
+    const MeshObstacle& obstacle = *seen_[k].obstacle;
+    const double together_m = obstacle.radius_m + tool_m + near_reach_m_;
+    if ((obstacle.centre_W_m - near_p_WT_m_).squaredNorm() <= together_m * together_m) near_by_.push_back(k);
+  }
 }
 
 bool MeshContacts::covers(const Pose& X_WT) const noexcept {
@@ -85,12 +100,13 @@ bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
   WalkBudget share = {static_cast<std::uint32_t>(kLongestWalk * budget.visits)};
   const std::uint32_t granted = share.visits;
   reach_m_ = std::max(kReach * way(X_start_, X_WT), kLeastReach * radius_m);
+  find_near_by(X_WT);
   std::uint32_t spent = 0;
-  for (std::uint32_t k = 0; k < seen_.size(); ++k) {
+  for (const std::uint32_t k : near_by_) {
     const MeshObstacle& obstacle = *seen_[k].obstacle;
     const Pose X_OW = inverse(obstacle.X_WO);
     const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, false};
-    const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh.tree, sweep, share);
+    const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh->tree, sweep, share);
     budget.visits -= std::min(budget.visits, granted - share.visits - spent);
     spent = granted - share.visits;
     if (!complete || pairs_.size() + walk_.size() > pairs_.capacity()) return false;
@@ -110,7 +126,11 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
     return findings;
   }
   budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs_.size()));
-  for (Seen& seen : seen_) seen.X_OT_end = Frame(X_WT).seen_from(seen.X_WO);
+  const Frame start(X_start_), end(X_WT);
+  for (const std::uint32_t k : near_by_) {
+    seen_[k].X_OT_start = start.seen_from(seen_[k].X_WO);
+    seen_[k].X_OT_end = end.seen_from(seen_[k].X_WO);
+  }
   const double way_m = way(X_start_, X_WT);
   const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
   // The way of a vertex is straight as long as nothing turns.
@@ -156,7 +176,7 @@ const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
 /// Most pairs are kept apart all the way by the plane of one of the two.
 void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
   const Seen& seen = seen_[pair.obstacle];
-  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface& surface = seen.obstacle->mesh->surface;
   const MeshSurface::Plane& plane = surface.planes()[pair.b];
   const double closed_m = (1.0 + kClosed) * clearance_m_;
   const auto height = [&](const Vector3d& p) { return plane.normal.dot(p) - plane.offset_m; };
@@ -180,7 +200,7 @@ void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findi
 /// so the gap is linear in time, exactly.
 void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept {
   const MeshSurface& tool = scene_.tool_mesh()->surface;
-  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface& surface = seen.obstacle->mesh->surface;
   const auto& vertices = tool.features()[pair.a].vertices;
   for (std::size_t i = 0; i < 3; ++i) {
     if (vertices[i] == MeshSurface::kNone) continue;
@@ -226,7 +246,7 @@ void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, cons
 /// The same the other way round: seen from the tool, the obstacle's vertex moves.
 void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noexcept {
   const MeshSurface& tool = scene_.tool_mesh()->surface;
-  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface& surface = seen.obstacle->mesh->surface;
   const MeshSurface::Plane& plane = tool.planes()[pair.a];
   for (const std::uint32_t vertex : surface.features()[pair.b].vertices) {
     if (vertex == MeshSurface::kNone) continue;
@@ -270,7 +290,7 @@ void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noex
 void MeshContacts::edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a) noexcept {
   for (const std::uint32_t edge_a : scene_.tool_mesh()->surface.features()[pair.a].edges) {
     if (edge_a == MeshSurface::kNone) continue;
-    for (const std::uint32_t edge_b : seen.obstacle->mesh.surface.features()[pair.b].edges)
+    for (const std::uint32_t edge_b : seen.obstacle->mesh->surface.features()[pair.b].edges)
       if (edge_b != MeshSurface::kNone) edge_on_edge(seen, a, edge_a, edge_b);
   }
 }
@@ -279,7 +299,7 @@ void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t 
                                 std::uint32_t edge_b) noexcept {
   constexpr double kParallel = 1e-7;  // sine: they have no common normal to rely on
   const MeshSurface& tool = scene_.tool_mesh()->surface;
-  const MeshSurface& surface = seen.obstacle->mesh.surface;
+  const MeshSurface& surface = seen.obstacle->mesh->surface;
   const MeshSurface::Edge& ea = tool.edges()[edge_a];
   const MeshSurface::Edge& eb = surface.edges()[edge_b];
   const Vector3d& b0 = surface.vertices_m()[eb.vertices[0]];

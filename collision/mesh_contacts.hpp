@@ -77,6 +77,7 @@ class MeshContacts {
   };
 
   double way(const Pose& from, const Pose& to) const noexcept;
+  void find_near_by(const Pose& X_WT) noexcept;
   bool covers(const Pose& X_WT) const noexcept;
   bool list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept;
   void look_at_all(Findings& findings) noexcept;
@@ -92,7 +93,10 @@ class MeshContacts {
   const Scene& scene_;
   TreeWalk walk_;
   Pose X_start_;
-  std::vector<Seen> seen_;
+  std::vector<Seen> seen_;                   ///< all obstacles
+  std::vector<std::uint32_t> near_by_;       ///< those that may be met while the tool stays
+  Vector3d near_p_WT_m_ = Vector3d::Zero();  ///< within
+  double near_reach_m_ = -1.0;               ///< of this place
   double clearance_m_ = 0.0;
   double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first

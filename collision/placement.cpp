@@ -64,13 +64,13 @@ Placement::Placement(const Scene& scene) : scene_(scene), half_spaces_(scene), p
 bool Placement::meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept {
   const TreedMesh& tool = *scene_.tool_mesh();
   WalkBudget budget = {std::numeric_limits<std::uint32_t>::max()};
-  if (!walk_.find(tool.tree, obstacle.mesh.tree, {X_OT, X_OT}, budget))
+  if (!walk_.find(tool.tree, obstacle.mesh->tree, {X_OT, X_OT}, budget))
     return true;  // far too much to be free
   return std::any_of(walk_.begin(), walk_.end(), [&](const TrianglePair& pair) {
     Triangle a, b;
     for (int i = 0; i < 3; ++i) {
       a[static_cast<std::size_t>(i)] = X_OT * tool.surface.corner_m(pair.a, i);
-      b[static_cast<std::size_t>(i)] = obstacle.mesh.surface.corner_m(pair.b, i);
+      b[static_cast<std::size_t>(i)] = obstacle.mesh->surface.corner_m(pair.b, i);
     }
     return triangles_meet(a, b);
   });
@@ -83,7 +83,7 @@ bool Placement::admissible(const Pose& X_WT) noexcept {
     const Pose X_OT = inverse(obstacle.X_WO) * X_WT;
     if (meets(obstacle, X_OT)) return false;
     const MeshSurface& tool = scene_.tool_mesh()->surface;
-    const MeshSurface& solid = obstacle.mesh.surface;
+    const MeshSurface& solid = obstacle.mesh->surface;
     if (inside(tool, inverse(X_OT) * solid.corner_m(0, 0))) return false;
     if (solid.kind() == MeshSurface::Kind::solid && inside(solid, X_OT * tool.corner_m(0, 0))) return false;
   }
@@ -112,7 +112,7 @@ Projection Placement::nearest(const Pose& X_WP) noexcept {
   double farthest_m = 4.0 * scene_.tool_radius_m();
   for (const MeshObstacle& obstacle : scene_.meshes())
     farthest_m +=
-        2.0 * obstacle.mesh.surface.radius_m() + (obstacle.X_WO.translation_m - X_WP.translation_m).norm();
+        2.0 * obstacle.mesh->surface.radius_m() + (obstacle.X_WO.translation_m - X_WP.translation_m).norm();
   Halton points;
   int starts = 0;
   for (double r = kNearest * scene_.tool_radius_m(); r < farthest_m && starts < kMostStarts; r *= kGrowth)

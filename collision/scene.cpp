@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <utility>
 
 #include "collision/convex_hull.hpp"
 #include "collision/mesh_solid.hpp"
@@ -24,10 +28,15 @@ Scene load(const SceneSettings& settings) {
   }
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;
+  std::map<std::pair<std::filesystem::path, double>, std::shared_ptr<const TreedMesh>> made;
   for (std::size_t k = 0; k < solids.size(); ++k) {
     const auto& [name, file, scale, X_WM] = settings.meshes[k];
-    for (Vector3d& p : solids[k].vertices_m) p *= scale;
-    meshes.push_back({name, TreedMesh(std::move(solids[k])), X_WM});
+    std::shared_ptr<const TreedMesh>& mesh = made[{file, scale}];
+    if (!mesh) {
+      for (Vector3d& p : solids[k].vertices_m) p *= scale;
+      mesh = std::make_shared<const TreedMesh>(std::move(solids[k]));
+    }
+    meshes.emplace_back(name, mesh, X_WM);
     if (!all_convex) continue;
     for (Vector3d& p : hulls[k].vertices_T_m) p = X_WM * Vector3d(p * scale);
     convex.push_back(convex_obstacle(name, std::move(hulls[k])));
@@ -35,7 +44,7 @@ Scene load(const SceneSettings& settings) {
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes));
 }
 
-double radius_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
+double farthest_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
   double squared = 0.0;
   for (const Vector3d& p : points) squared = std::max(squared, (p - centre).squaredNorm());
   return std::sqrt(squared);
@@ -48,8 +57,16 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
   obstacle.body.find_faces();
   for (const Vector3d& p : obstacle.body.vertices_T_m)
     obstacle.centre_W_m += p / static_cast<double>(obstacle.body.vertices_T_m.size());
-  obstacle.radius_m = radius_m(obstacle.body.vertices_T_m, obstacle.centre_W_m);
+  obstacle.radius_m = farthest_m(obstacle.body.vertices_T_m, obstacle.centre_W_m);
   return obstacle;
+}
+
+MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_)
+    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : mesh->surface.vertices_m()) box.extend(p);
+  centre_W_m = X_WO * box.center();
+  radius_m = farthest_m(mesh->surface.vertices_m(), box.center());
 }
 
 TreedMesh::TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind)
@@ -60,7 +77,7 @@ Scene::Scene(const SceneSettings& settings) : Scene(load(settings)) {}
 Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex,
              std::vector<MeshObstacle> meshes)
     : tool_(std::move(tool)),
-      tool_radius_m_(radius_m(tool_.hull.vertices_T_m, Vector3d::Zero())),
+      tool_radius_m_(farthest_m(tool_.hull.vertices_T_m, Vector3d::Zero())),
       half_spaces_(std::move(half_spaces)),
       convex_(std::move(convex)),
       meshes_(std::move(meshes)) {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "collision/mesh_surface.hpp"
@@ -32,9 +34,16 @@ struct TreedMesh {
 
 /// An obstacle of any shape. O: the frame of its mesh, in metres.
 struct MeshObstacle {
+  /// The same mesh may be many obstacles.
+  MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_);
+  MeshObstacle(std::string name_, TreedMesh mesh_, const Pose& X_WO_)
+      : MeshObstacle(std::move(name_), std::make_shared<const TreedMesh>(std::move(mesh_)), X_WO_) {}
+
   std::string name;
-  TreedMesh mesh;
+  std::shared_ptr<const TreedMesh> mesh;
   Pose X_WO;
+  Vector3d centre_W_m;  ///< of a sphere that holds it
+  double radius_m;
 };
 
 /// An obstacle from its hull in the world.

@@ -93,7 +93,7 @@ TEST_CASE("what touches at the end is told, by the names of its features", "[mes
   for (const Contact& c : contacts.touching()) {
     CHECK(c.kind == ContactKind::vertex_face);
     CHECK(scene.tool_mesh()->surface.vertices_m()[c.tool_feature] == c.p_TA_m);
-    CHECK(scene.meshes()[0].mesh.surface.region(c.obstacle_feature) == c.obstacle_feature);
+    CHECK(scene.meshes()[0].mesh->surface.region(c.obstacle_feature) == c.obstacle_feature);
     CHECK(c.obstacle == 0);
   }
 }

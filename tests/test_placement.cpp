@@ -38,7 +38,7 @@ TEST_CASE("from inside an obstacle a way out is found, near by and admissible", 
     const Handling& handling = rough_handling()[i];
     INFO(handling.name);
     const Scene scene = scene_of(handling);
-    const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh.surface.mesh());
+    const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
     Placement placement(scene);
     for (int n = 0; n < 4; ++n) {
       const Pose X_WP = {random.rotation(),

@@ -49,7 +49,7 @@ TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]"
   const Handling& handling = rough_handling()[i];
   INFO(handling.name);
   Followed f(handling);
-  const ExactMeeting exact(f.scene.tool_mesh()->surface.mesh(), f.scene.meshes()[0].mesh.surface.mesh());
+  const ExactMeeting exact(f.scene.tool_mesh()->surface.mesh(), f.scene.meshes()[0].mesh->surface.mesh());
   Hand hand(handling);
   REQUIRE_FALSE(exact.meet(f.X_WQ));
   int contacts = 0;
@@ -184,6 +184,33 @@ TEST_CASE("a proxy slides along a wall made of flush blocks without catching on 
   }
 }
 
+TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as those do", "[proxy]") {
+  const auto cube = std::make_shared<const TreedMesh>(make_mesh({"cube", 12}));
+  std::vector<MeshObstacle> few, many;
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 60; ++j) {
+      const Pose X_WO = {rotation_from({0.1 * i, 0.2 * j, 0.0}), {0.11 * (i - 30), 0.11 * (j - 30), 0.0}};
+      many.emplace_back("cube", cube, X_WO);
+      if (std::abs(i - 32) <= 4 && std::abs(j - 30) <= 3) few.emplace_back("cube", cube, X_WO);
+    }
+  const Scene small(mesh_tool(make_mesh({"bumpy", 500})), {}, {}, std::move(few));
+  const Scene large(mesh_tool(make_mesh({"bumpy", 500})), {}, {}, std::move(many));
+  Proxy a(small), b(large);
+  Pose X_a = {Quaterniond::Identity(), {0, 0, 0.09}}, X_b = X_a;
+  int contacts = 0;
+  for (int tick = 0; tick < 1500; ++tick) {
+    const double t = 1e-3 * tick;
+    const Pose X_WP = {rotation_from({t, 0.3 * t, 0}), {0.25 * t, 0.03 * std::sin(9.0 * t), 0.06}};
+    const Projection q_a = a.follow(X_WP, X_a), q_b = b.follow(X_WP, X_b);
+    REQUIRE(q_a.X_WQ.translation_m == q_b.X_WQ.translation_m);
+    REQUIRE(q_a.X_WQ.rotation.coeffs() == q_b.X_WQ.rotation.coeffs());
+    contacts += in_contact(q_a) ? 1 : 0;
+    X_a = q_a.X_WQ;
+    X_b = q_b.X_WQ;
+  }
+  CHECK(contacts > 300);
+}
+
 TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back(
@@ -206,7 +233,7 @@ TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
 TEST_CASE("a proxy that is given no time stays where it is admissible, and says so", "[proxy]") {
   const Handling& handling = rough_handling()[7];
   const Scene scene = scene_of(handling);
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh.surface.mesh());
+  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   Proxy::Effort little;
   little.looks = 3;
   little.visits = 60;

@@ -53,7 +53,7 @@ std::vector<Runner> peer_runners(const MeshPair& pair, const PeerModule& module)
   const auto poses = std::make_shared<std::vector<PeerPose>>();
   for (const Pose& X_WP : pair.X_WP) poses->push_back(peer_pose(X_WP));
   const auto opened = std::make_shared<PeerModule::Pair>(
-      module.open(pair.scene.tool_mesh()->surface.mesh(), pair.scene.meshes()[0].mesh.surface.mesh()));
+      module.open(pair.scene.tool_mesh()->surface.mesh(), pair.scene.meshes()[0].mesh->surface.mesh()));
   std::vector<Runner> runners;
   for (int q = 0; q < static_cast<int>(module.queries().size()); ++q)
     runners.push_back({module.queries()[static_cast<std::size_t>(q)], [] {},
@@ -108,7 +108,7 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const TickScale& sca
 
   // Accuracy before speed.
   const test::ExactMeeting exact(pair.scene.tool_mesh()->surface.mesh(),
-                                 pair.scene.meshes()[0].mesh.surface.mesh());
+                                 pair.scene.meshes()[0].mesh->surface.mesh());
   const std::size_t looked_at = std::min(kExactPoses, pair.X_WP.size());
   const std::size_t stride = pair.X_WP.size() / looked_at;
   std::vector<double> truth;
@@ -169,7 +169,7 @@ Table bench_growth(const Effort& effort, const TickScale& scale) {
     const MeshPair pair = sliding_bumps(9680, triangles, effort.poses);
     const std::vector<Result> results =
         race({pairs_runner(pair), tick_runner(pair)}, pair.X_WP.size(), effort.passes, scale);
-    const std::size_t count = pair.scene.meshes()[0].mesh.surface.triangles().size();
+    const std::size_t count = pair.scene.meshes()[0].mesh->surface.triangles().size();
     for (const Result& r : results)
       table.add(std::to_string(triangles), r.name, {whole(count), us(r.ns.p50), us(r.ns.p99), us(r.ns.max)});
   }

@@ -33,9 +33,9 @@ double touching(MeetingPairs& pairs, double free, double overlapping, const Pose
 
 std::size_t MeetingPairs::count(const Pose& X_WT) {
   const MeshSurface& a = scene_.tool_mesh()->surface;
-  const MeshSurface& b = scene_.meshes()[0].mesh.surface;
+  const MeshSurface& b = scene_.meshes()[0].mesh->surface;
   WalkBudget budget = {std::numeric_limits<std::uint32_t>::max()};
-  walk_.find(scene_.tool_mesh()->tree, scene_.meshes()[0].mesh.tree, {X_WT, X_WT}, budget);
+  walk_.find(scene_.tool_mesh()->tree, scene_.meshes()[0].mesh->tree, {X_WT, X_WT}, budget);
   const Frame X(X_WT);
   std::size_t meeting = 0;
   std::uint32_t moved_number = MeshSurface::kNone;

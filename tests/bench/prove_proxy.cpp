@@ -40,7 +40,7 @@ bool jumped(const Handling& handling, const Pose& before, const Pose& after) {
 
 Tally handle(const Handling& handling, long poses, std::uint64_t seed) {
   const Scene scene = scene_of(handling);
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh.surface.mesh());
+  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   Proxy proxy(scene);
   Hand hand(handling, seed);
   Pose X_WQ = {Quaterniond::Identity(), handling.start_m};
