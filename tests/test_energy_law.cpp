@@ -10,6 +10,7 @@
 #include "core/metric.hpp"
 #include "core/wrench_law.hpp"
 #include "tests/support/pressed.hpp"
+#include "tests/support/repeats.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -169,7 +170,7 @@ TEST_CASE("to first order it is K_P = k M", "[energy_law]") {
 
 TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
   RandomValues random(4);
-  constexpr int kLoops = 1000;
+  constexpr int kLoops = repeats(1000);
   double worst = 0.0;
   double worst_pid = 0.0;
   int jumped = 0;
@@ -185,7 +186,7 @@ TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
     worst = std::max(worst, std::abs(work.energy_law));
     worst_pid = std::max(worst_pid, std::abs(work.pid));
   }
-  WARN("work around 1000 loops, of the peak potential: energy law at most "
+  WARN("work around " << kLoops << " loops, of the peak potential: energy law at most "
        << worst << ", Eq. (16) with k_P alone at most " << worst_pid << "; " << jumped
        << " loops drawn again because q jumped");
   CHECK(worst < 1e-6);

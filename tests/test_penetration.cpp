@@ -11,6 +11,7 @@
 #include "core/metric.hpp"
 #include "core/wrench_law.hpp"
 #include "tests/support/pressed.hpp"
+#include "tests/support/repeats.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -144,7 +145,7 @@ double squared(double x) {
 TEST_CASE("convex body against convex body: admissible by every method, exact below the best translation",
           "[penetration][convex]") {
   RandomValues random(21);
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < repeats(100); ++i) {
     const Pressed c = into_body(random, random.uniform(0.01, 0.2));
     const double m = c.scene.tool().solid.inertia.mass_kg;
     const double depth_m = -separation_m(c.scene, c.X_WP);
@@ -273,7 +274,7 @@ TEST_CASE("a proxy among several bodies and walls stays out of all of them", "[p
 TEST_CASE("the whole pipeline knows no frame: world, mesh axes, unit of length, mass",
           "[penetration][convex]") {
   RandomValues random(24);
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < repeats(30); ++i) {
     const Pressed c = into_body(random, random.uniform(0.02, 0.2));
     const Penetration p = depth_by(Method::exact, c.scene).query(c.X_WP);
 
@@ -321,7 +322,7 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
                      {convex_obstacle("table", convex_hull(split(1, {2.0, 3.0, 1.0})))});
   const Scene fine(tool_of(split(7, size)), {},
                    {convex_obstacle("table", convex_hull(split(9, {2.0, 3.0, 1.0})))});
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < repeats(60); ++i) {
     const Pose X_WP{random.rotation(), 0.9 * random.unit<3>()};
     if (separation_m(coarse, X_WP) < -0.4) continue;  // so deep that answers of equal merit lie far apart
     const Penetration a = depth_by(Method::exact, coarse).query(X_WP);

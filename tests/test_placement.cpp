@@ -5,6 +5,7 @@
 #include "core/metric.hpp"
 #include "tests/support/exact_meeting.hpp"
 #include "tests/support/handling.hpp"
+#include "tests/support/repeats.hpp"
 
 namespace wrenchd {
 namespace {
@@ -40,7 +41,7 @@ TEST_CASE("from inside an obstacle a way out is found, near by and admissible", 
     const Scene scene = scene_of(handling);
     const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
     Placement placement(scene);
-    for (int n = 0; n < 4; ++n) {
+    for (int n = 0; n < repeats(4); ++n) {
       const Pose X_WP = {random.rotation(),
                          random.uniform(0.0, 0.7) * handling.start_m.norm() * random.unit<3>()};
       const Projection q = placement.nearest(X_WP);
@@ -49,7 +50,7 @@ TEST_CASE("from inside an obstacle a way out is found, near by and admissible", 
       CHECK_FALSE(exact.meet(q.X_WQ));
       CHECK(q.energy == Approx(energy(scene.tool().solid.inertia, X_WP, q.X_WQ)).margin(1e-15));
       // No farther than the nearest of a few thousand poses found at random.
-      for (int k = 0; k < 300; ++k) {
+      for (int k = 0; k < repeats(300); ++k) {
         const Pose X = {(X_WP.rotation * random.rotation(random.uniform(0.0, 0.5))).normalized(),
                         X_WP.translation_m + random.uniform(0.0, 0.1) * random.unit<3>()};
         if (energy(scene.tool().solid.inertia, X_WP, X) < 0.999 * q.energy)

@@ -12,6 +12,7 @@
 #include "tests/support/exact_meeting.hpp"
 #include "tests/support/handling.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/repeats.hpp"
 
 namespace wrenchd {
 namespace {
@@ -53,7 +54,7 @@ TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]"
   Hand hand(handling);
   REQUIRE_FALSE(exact.meet(f.X_WQ));
   int contacts = 0;
-  for (int tick = 0; tick < 300; ++tick) {
+  for (int tick = 0; tick < repeats(600); ++tick) {
     const Projection q = f.follow(hand.next());
     REQUIRE(q.status != ProjectionStatus::infeasible);
     INFO("tick " << tick << ", looks " << f.proxy.looks());
