@@ -43,6 +43,15 @@ double closing_time(double start_m, double end_m, double clearance_m) noexcept {
   return std::clamp((start_m - clearance_m) / (start_m - end_m), 0.0, 1.0);
 }
 
+/// When a (1 - t)^2 + 2 b t (1 - t) + c t^2 falls through zero; 2 where it never does.
+double falls_through_zero(double a, double b, double c) noexcept {
+  const double root2 = b * b - a * c;
+  if (root2 < 0.0) return 2.0;
+  const double root = std::sqrt(root2), fall = a - b;
+  const double t = fall > 0.0 ? a / (fall + root) : (fall - root) / (fall + c - b);
+  return std::isfinite(t) ? t : 2.0;
+}
+
 /// Does a point lie over a triangle with this normal, or no farther beyond its sides than so much?
 bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& normal,
           double beyond_m) noexcept {
@@ -173,6 +182,11 @@ const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
   return moved_;
 }
 
+/// A pair that has less room than the clearance from the start is closed by what narrows it further.
+bool MeshContacts::closes(double start_m, double end_m) const noexcept {
+  return end_m < (1.0 - kClosed) * clearance_m_ && end_m < start_m - kClosed * clearance_m_;
+}
+
 /// Most pairs are kept apart all the way by the plane of one of the two.
 void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
   const Seen& seen = seen_[pair.obstacle];
@@ -189,7 +203,7 @@ void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findi
   const std::size_t before = crossings_.size();
   vertices_on_face(seen, pair, a);
   face_on_vertices(seen, pair);
-  edges_on_edges(seen, pair, a);
+  edges_on_edges(seen, pair, a, findings);
   if (crossings_.size() > before || findings.overlaps) return;
   if (lowest_end > 0.0 || highest_end < 0.0) return;
   findings.overlaps = triangles_meet(
@@ -213,7 +227,7 @@ void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, cons
       end_m = -end_m;
     }
     if (end_m > (1.0 + kClosed) * clearance_m_ || start_m < -kWasOpen * clearance_m_) continue;
-    const bool closes = end_m < (1.0 - kClosed) * clearance_m_;
+    const bool closes = this->closes(start_m, end_m);
     const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
     const Vector3d p = mix(a.start[i], a.end[i], when);
     if (!over(p, surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2),
@@ -257,7 +271,7 @@ void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noex
     const Vector3d p_start = seen.X_OT_start.back(p_O);
     const double start_m = plane.normal.dot(p_start) - plane.offset_m;
     if (start_m < -kWasOpen * clearance_m_) continue;
-    const bool closes = end_m < (1.0 - kClosed) * clearance_m_;
+    const bool closes = this->closes(start_m, end_m);
     const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
     const Vector3d p = mix(p_start, p_end, when);
     if (!over(p, tool.corner_m(pair.a, 0), tool.corner_m(pair.a, 1), tool.corner_m(pair.a, 2), plane.normal,
@@ -287,91 +301,126 @@ void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noex
   }
 }
 
-void MeshContacts::edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a) noexcept {
+void MeshContacts::edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a,
+                                  Findings& findings) noexcept {
   for (const std::uint32_t edge_a : scene_.tool_mesh()->surface.features()[pair.a].edges) {
     if (edge_a == MeshSurface::kNone) continue;
     for (const std::uint32_t edge_b : seen.obstacle->mesh->surface.features()[pair.b].edges)
-      if (edge_b != MeshSurface::kNone) edge_on_edge(seen, a, edge_a, edge_b);
+      if (edge_b != MeshSurface::kNone) edge_on_edge(seen, a, edge_a, edge_b, findings);
   }
 }
 
-void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a,
-                                std::uint32_t edge_b) noexcept {
+/// On a straight way the gap of two edges, times the length of their cross product N, is quadratic in time.
+void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a, std::uint32_t edge_b,
+                                Findings& findings) noexcept {
   constexpr double kParallel = 1e-7;  // sine: they have no common normal to rely on
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = seen.obstacle->mesh->surface;
-  const MeshSurface::Edge& ea = tool.edges()[edge_a];
   const MeshSurface::Edge& eb = surface.edges()[edge_b];
-  const Vector3d& b0 = surface.vertices_m()[eb.vertices[0]];
-  const Vector3d& b1 = surface.vertices_m()[eb.vertices[1]];
-  const Vector3d db = b1 - b0;
   // The corners of the triangle are at hand, in its own order.
   std::size_t i = 0;
-  while (tool.triangles()[a.triangle][i] != ea.vertices[0]) ++i;
+  while (tool.triangles()[a.triangle][i] != tool.edges()[edge_a].vertices[0]) ++i;
   const std::size_t j = i == 2 ? 0 : i + 1;
-  const Vector3d da_start = a.start[j] - a.start[i], da_end = a.end[j] - a.end[i];
-  Vector3d N_start = da_start.cross(db), N_end = da_end.cross(db);
-  const double lengths = da_end.norm() * db.norm();
+  EdgesPass pass;
+  pass.edge_a = edge_a;
+  pass.edge_b = edge_b;
+  pass.b0 = surface.vertices_m()[eb.vertices[0]];
+  pass.db = surface.vertices_m()[eb.vertices[1]] - pass.b0;
+  pass.a0_start = a.start[i];
+  pass.a0_end = a.end[i];
+  pass.da_start = a.start[j] - a.start[i];
+  pass.da_end = a.end[j] - a.end[i];
+  const Vector3d N_start = pass.da_start.cross(pass.db), N_end = pass.da_end.cross(pass.db);
   const double s_start = N_start.norm(), s_end = N_end.norm();
-  if (!(s_start > kParallel * lengths) || !(s_end > kParallel * lengths)) return;
+  const double parallel = kParallel * pass.da_end.norm() * pass.db.norm();
+  if (!(s_start > parallel) || !(s_end > parallel)) return;
   // Which way is out: away from both faces of the obstacle, towards those of the tool.
-  const bool two_sided = surface.kind() == MeshSurface::Kind::surface;
-  double sign = 1.0;
-  if (two_sided) {
-    sign = N_start.dot(a.start[i] - b0) < 0.0 ? -1.0 : 1.0;
+  const Vector3d w_start = pass.a0_start - pass.b0, w_end = pass.a0_end - pass.b0;
+  bool turned_past = false;  // parallel
+  if (surface.kind() == MeshSurface::Kind::surface) {
+    pass.sign = N_start.dot(w_start) < 0.0 ? -1.0 : 1.0;
   } else {
     const Vector3d out = surface.planes()[eb.triangles[0]].normal + surface.planes()[eb.triangles[1]].normal;
-    sign = N_end.dot(out) < 0.0 ? -1.0 : 1.0;
-    if (N_start.dot(out) * sign <= 0.0) return;  // the edges turned past parallel
+    pass.sign = N_end.dot(out) < 0.0 ? -1.0 : 1.0;
+    turned_past = N_start.dot(out) * pass.sign <= 0.0;
   }
-  N_start *= sign / s_start;
-  N_end *= sign / s_end;
-  const double end_m = N_end.dot(a.end[i] - b0);
-  if (end_m > (1.0 + kClosed) * clearance_m_) return;
-  const double start_m = N_start.dot(a.start[i] - b0);
+  const double f_start = pass.sign * N_start.dot(w_start), f_end = pass.sign * N_end.dot(w_end);
+  const double f_middle = 0.5 * pass.sign * (N_start.dot(w_end) + N_end.dot(w_start));
+  if (turned_past) {
+    // The contact would hold the end pose out on one side and the start on the other: a shorter way is asked
+    // for. Before they were parallel, out was the other way.
+    const double in = falls_through_zero(f_start, f_middle, f_end);
+    const double out = falls_through_zero(-f_start, -f_middle, -f_end);
+    const double flips = s_start / (s_start + s_end);
+    findings.overlaps = findings.overlaps || (in > flips && in <= 1.0 && meet(seen, pass, in, border_m_));
+    pass.sign = -pass.sign;
+    findings.overlaps = findings.overlaps || (out < flips && out >= 0.0 && meet(seen, pass, out, border_m_));
+    return;
+  }
+  const double start_m = f_start / s_start, end_m = f_end / s_end;
   if (start_m < -kWasOpen * clearance_m_) return;
-  const bool closes = end_m < (1.0 - kClosed) * clearance_m_;
-  const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
-
-  // Where the two lines pass each other, then: a0 + x da and b0 + y db.
-  const Vector3d a0 = mix(a.start[i], a.end[i], when), da = mix(da_start, da_end, when);
-  const Vector3d N = da.cross(db), w = b0 - a0;
-  const double NN = N.squaredNorm();
-  if (!(NN > 0.0)) return;
-  const double x = w.cross(db).dot(N) / NN, y = w.cross(da).dot(N) / NN;
-  const double beyond_m = closes ? border_m_ : kHolds * clearance_m_;
-  const double beyond_a = beyond_m / da.norm(), beyond_b = beyond_m / db.norm();
-  if (x < -beyond_a || x > 1.0 + beyond_a || y < -beyond_b || y > 1.0 + beyond_b) return;
-
-  // All four faces have to fall away from the plane between the edges.
-  const Vector3d n = N * (sign / std::sqrt(NN));
-  const auto falls_away = [&](const Vector3d& height_of, double side) {
-    return side * n.dot(height_of) >= -slope_ * height_of.norm();
-  };
-  if (!two_sided)
-    for (const std::uint32_t t : eb.triangles)
-      for (int k = 0; k < 3; ++k)
-        if (!falls_away(surface.corner_m(t, k) - b0, -1.0)) return;
-  for (const std::uint32_t t : ea.triangles)
-    for (int k = 0; k < 3; ++k) {
-      const Vector3d& p_T = tool.corner_m(t, k);
-      if (!falls_away(mix(seen.X_OT_start * p_T, seen.X_OT_end * p_T, when) - a0, 1.0)) return;
-    }
-
+  const bool open = end_m > (1.0 + kClosed) * clearance_m_;
+  if (open && f_middle >= 0.0) return;
+  const double g_start = f_start - clearance_m_ * s_start, g_end = f_end - clearance_m_ * s_end;
+  const double g_middle = f_middle - 0.5 * clearance_m_ * (s_start + s_end);
+  const double crosses = std::clamp(falls_through_zero(g_start, g_middle, g_end), 0.0, 1.0);
+  const bool closes = this->closes(start_m, end_m);
+  if (closes) {
+    if (!meet(seen, pass, crosses, border_m_)) return;
+  } else if (open || !meet(seen, pass, 1.0, kHolds * clearance_m_)) {
+    // They came off each other. Where they were deep before they did, others were not seen to be met: the way
+    // is too long.
+    const double bend = g_start - 2.0 * g_middle + g_end;
+    const double lowest = bend > 0.0 ? (g_start * g_end - g_middle * g_middle) / bend : 0.0;
+    if (lowest < -border_m_ * std::max(s_start, s_end) && meet(seen, pass, crosses, border_m_))
+      findings.overlaps = true;
+    return;
+  }
+  const MeshSurface::Edge& ea = tool.edges()[edge_a];
   Contact contact;
   contact.kind = ContactKind::edge_edge;
   contact.p_TA_m = tool.vertices_m()[ea.vertices[0]];
   contact.d_T = (tool.vertices_m()[ea.vertices[1]] - contact.p_TA_m).normalized();
-  contact.p_WB_m = seen.X_WO * b0;
-  contact.d_W = seen.X_WO.R * (db * (sign / db.norm()));
-  contact.n_W = seen.X_WO.R * N_end;
+  contact.p_WB_m = seen.X_WO * pass.b0;
+  contact.d_W = seen.X_WO.R * (pass.db * (pass.sign / pass.db.norm()));
+  contact.n_W = seen.X_WO.R * (N_end * (pass.sign / s_end));
   contact.tool_feature = edge_a;
   contact.obstacle_feature = edge_b;
   contact.obstacle = seen.number;
   if (closes)
-    crossed(when, seen.X_WO * (b0 + y * db), contact);
+    crossed(crosses, seen.X_WO * pass.p, contact);
   else if (!touching_.contains(contact))
     touching_.add(contact);
+}
+
+/// Do two edges lie opposite each other at this time, with all four faces falling away from the plane between
+/// them? pass.p is where.
+bool MeshContacts::meet(const Seen& seen, EdgesPass& pass, double when, double beyond_m) const noexcept {
+  const MeshSurface& tool = scene_.tool_mesh()->surface;
+  const MeshSurface& surface = seen.obstacle->mesh->surface;
+  // Where the two lines pass each other: a0 + x da and b0 + y db.
+  const Vector3d a0 = mix(pass.a0_start, pass.a0_end, when), da = mix(pass.da_start, pass.da_end, when);
+  const Vector3d N = da.cross(pass.db), w = pass.b0 - a0;
+  const double NN = N.squaredNorm();
+  if (!(NN > 0.0)) return false;
+  const double x = w.cross(pass.db).dot(N) / NN, y = w.cross(da).dot(N) / NN;
+  const double beyond_a = beyond_m / da.norm(), beyond_b = beyond_m / pass.db.norm();
+  if (x < -beyond_a || x > 1.0 + beyond_a || y < -beyond_b || y > 1.0 + beyond_b) return false;
+  pass.p = pass.b0 + y * pass.db;
+  const Vector3d n = N * (pass.sign / std::sqrt(NN));
+  const auto falls_away = [&](const Vector3d& height_of, double side) {
+    return side * n.dot(height_of) >= -slope_ * height_of.norm();
+  };
+  if (surface.kind() == MeshSurface::Kind::solid)
+    for (const std::uint32_t t : surface.edges()[pass.edge_b].triangles)
+      for (int k = 0; k < 3; ++k)
+        if (!falls_away(surface.corner_m(t, k) - pass.b0, -1.0)) return false;
+  for (const std::uint32_t t : tool.edges()[pass.edge_a].triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d& p_T = tool.corner_m(t, k);
+      if (!falls_away(mix(seen.X_OT_start * p_T, seen.X_OT_end * p_T, when) - a0, 1.0)) return false;
+    }
+  return true;
 }
 
 /// Where there is no room left, a later one gives way to an earlier.

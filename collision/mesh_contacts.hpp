@@ -40,6 +40,8 @@ class MeshContacts {
 
   /// The scene is kept by reference. kernel: as for TreeWalk.
   explicit MeshContacts(const Scene& scene, walk::Kernel kernel = nullptr);
+  MeshContacts(const MeshContacts&) = delete;  // a copy would lose the room that is kept
+  MeshContacts& operator=(const MeshContacts&) = delete;
 
   /// Starts from an admissible pose. RT safe.
   void start_at(const Pose& X_WT) noexcept;
@@ -76,17 +78,28 @@ class MeshContacts {
     Triangle start, end;
   };
 
+  /// Two edges on the way; in the obstacle's frame.
+  struct EdgesPass {
+    std::uint32_t edge_a, edge_b;
+    Vector3d a0_start, a0_end, da_start, da_end, b0, db;
+    Vector3d p;   ///< where they meet
+    double sign;  ///< of the cross product of da and db that points out of the obstacle
+  };
+
   double way(const Pose& from, const Pose& to) const noexcept;
   void find_near_by(const Pose& X_WT) noexcept;
   bool covers(const Pose& X_WT) const noexcept;
   bool list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept;
   void look_at_all(Findings& findings) noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
+  bool closes(double start_m, double end_m) const noexcept;
   void look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
   void vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
   void face_on_vertices(const Seen& seen, const NearPair& pair) noexcept;
-  void edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
-  void edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a, std::uint32_t edge_b) noexcept;
+  void edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a, Findings& findings) noexcept;
+  void edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a, std::uint32_t edge_b,
+                    Findings& findings) noexcept;
+  bool meet(const Seen& seen, EdgesPass& pass, double when, double beyond_m) const noexcept;
   void crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept;
   void choose_first(double way_m, Findings& findings) noexcept;
 

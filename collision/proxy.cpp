@@ -22,21 +22,10 @@ constexpr double kShortestShare = 1.0 / 1024.0;
 /// and every next may be longer.
 constexpr double kWary = 1.0 / 64.0;
 constexpr double kLonger = 4.0;
+/// The least that a contact is held open by, in units of the clearance.
+constexpr double kLeastClearance = 0.2;
 /// T falls by at least this share from one round to the next, or the rounds end.
 constexpr double kProgress = 1e-9;
-
-/// The contacts are all known to the projection: nothing is asked while it works.
-class Nothing final : public ContactSource {
- public:
-  std::size_t add_violated(const Pose&, double, ContactSet&) const noexcept override { return 0; }
-  void add_touching(const Pose&, double, ContactSet&) const noexcept override {}
-  bool admits(const Pose&, double) const noexcept override { return true; }
-};
-
-Pose between(const Pose& from, const Pose& to, double share) noexcept {
-  return {from.rotation.slerp(share, to.rotation),
-          from.translation_m + share * (to.translation_m - from.translation_m)};
-}
 
 }  // namespace
 
@@ -60,20 +49,22 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
   double share = 1.0;  // of the step that the contacts known allow
   double T_last = energy(M_, X_WP, X_WQ_);
   while (looks_ < effort_.looks && share >= kShortestShare) {
-    Projection q = project(X_WP);
-    if (q.status == ProjectionStatus::infeasible) break;
-    const double turn_rad = X_WQ_.rotation.angularDistance(q.X_WQ.rotation);
-    const double part = std::min(
-        {share, longest_m / way_m(X_WQ_, q.X_WQ), turn_rad > 0.0 ? kLongestTurn_rad / turn_rad : 1.0, 1.0});
-    if (part < 1.0) q = project(between(X_WQ_, q.X_WQ, part));
-    if (q.status == ProjectionStatus::infeasible) break;
+    const Projection q = step(X_WP, share * longest_m);
+    if (q.status == ProjectionStatus::infeasible) {  // contacts that do not agree: others may
+      if (known_.empty()) break;
+      known_.clear();
+      share = kWary;
+      ++looks_;
+      continue;
+    }
+    const bool whole = q.status == ProjectionStatus::converged || q.status == ProjectionStatus::free;
     const Way way = look_along(q.X_WQ);
     if (way == Way::met_contacts) {
       share = 1.0;
       continue;
     }
     if (way == Way::too_long) {
-      share = 0.5 * part;
+      share *= 0.25;
       continue;
     }
     X_WQ_ = q.X_WQ;
@@ -81,7 +72,7 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
     if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
     const bool all_hold = !let_go(q);
     share = all_hold ? std::min(1.0, kLonger * share) : kWary;
-    if (part < 1.0) continue;
+    if (!whole) continue;
     if (all_hold) return described(X_WP, q);
     const double T = energy(M_, X_WP, X_WQ_);
     if (T > (1.0 - kProgress) * T_last) return described(X_WP, q);
@@ -94,9 +85,12 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
   return described(X_WP, best);
 }
 
-Projection Proxy::project(const Pose& X_WP) noexcept {
+/// As near to p as the contacts known allow, no farther than so much from the pose at hand.
+Projection Proxy::step(const Pose& X_WP, double longest_m) noexcept {
+  const ExactProjection::Leash leash = {longest_m,
+                                        std::min(longest_m / scene_.tool_radius_m(), kLongestTurn_rad)};
   const Projection q =
-      exact_.project(X_WP, Nothing(), X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()));
+      exact_.step(X_WP, X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()), leash);
   iterations_ = static_cast<std::uint16_t>(iterations_ + q.iterations);
   return q;
 }
@@ -123,10 +117,17 @@ Proxy::Way Proxy::look_along(const Pose& X_WT) noexcept {
   return found.overlaps || !found.met.empty() || !met.empty() ? Way::too_long : Way::free;
 }
 
-/// False where it was known, or there is no room.
-bool Proxy::learn(const Contact& contact) noexcept {
+/// False where it was known, or there is no room. A contact that has less room already is held where it is:
+/// the pose at hand must remain one of those allowed.
+bool Proxy::learn(Contact contact) noexcept {
   for (const ActiveContact& known : known_)
     if (same_features(known.contact, contact)) return false;
+  const double gap = gap_m(contact, X_WQ_);
+  if (gap < kClearance_m) {
+    const double lower_m = kClearance_m - std::max(gap, kLeastClearance * kClearance_m);
+    contact.p_WB_m -= lower_m * normal_W(contact, X_WQ_);
+    contact.offset_m -= lower_m;
+  }
   return known_.add({contact, 0.0});
 }
 

@@ -56,10 +56,10 @@ class Proxy {
   using Known = FixedList<ActiveContact, ContactSet::kCapacity>;
   enum class Way : std::uint8_t { free, met_contacts, too_long };
 
-  Projection project(const Pose& X_WP) noexcept;
+  Projection step(const Pose& X_WP, double longest_m) noexcept;
   double way_m(const Pose& from, const Pose& to) const noexcept;
   Way look_along(const Pose& X_WT) noexcept;
-  bool learn(const Contact& contact) noexcept;
+  bool learn(Contact contact) noexcept;
   bool let_go(const Projection& q) noexcept;
   Projection described(const Pose& X_WP, Projection q) const noexcept;
 

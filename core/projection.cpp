@@ -12,6 +12,9 @@ namespace {
 
 /// A gap this far below zero, in units of L, counts as closed: rounding of one rotation and one dot product.
 constexpr double kGapTolerance = 2e-15;
+/// Where contacts are held open, they may give way by this share of it: wedged between opposite contacts only
+/// one translation is left, and rounding must not make it none.
+constexpr double kSlack = 1e-3;
 /// A contact this near, in units of L, touches at q.
 constexpr double kTouching = 1e-9;
 /// Converged: the step left is this short, in units of L and rad, and the KKT residual this small before it
@@ -80,6 +83,7 @@ ExactProjection::ExactProjection(const Inertia& M, Budget budget, double clearan
       iteration_limit_(budget.iterations),
       L_(positive_length(M)),
       clearance_(clearance_m / L_),
+      slack_(std::max(kGapTolerance, kSlack * clearance_)),
       H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
   Matrix6d metric = Matrix6d::Zero();
   metric.diagonal().head<3>().setConstant(2.0);
@@ -91,6 +95,76 @@ Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene
                                     std::span<const ActiveContact> known) noexcept {
   begin(X_WP, scene);
   return known.empty() ? solve(turned_to(X_start.rotation)) : follow(X_start, known);
+}
+
+Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
+                                 const Leash& leash) noexcept {
+  /// The contacts are all known: nothing is asked.
+  class Nothing final : public ContactSource {
+   public:
+    std::size_t add_violated(const Pose&, double, ContactSet&) const noexcept override { return 0; }
+    void add_touching(const Pose&, double, ContactSet&) const noexcept override {}
+    bool admits(const Pose&, double) const noexcept override { return true; }
+  };
+  const Nothing nothing;
+  begin(X_WP, nothing);
+  contacts_.clear();
+  for (const ActiveContact& active : known) contacts_.add(active.contact);
+  see_from(0);
+  bool free_at_p = true;
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
+    free_at_p = free_at_p && !overlaps_at_p(seen_[i]);
+  }
+  iterations_ = 0;
+  met_touching_ = false;
+  start_.E = turned_to(X_start.rotation);
+  start_.R = start_.E.toRotationMatrix();
+  start_.u = X_WP.rotation.conjugate() * (X_start.translation_m - X_WP.translation_m) / L_;
+  start_.T = scaled_energy(start_);
+  leash_ = leash;
+  state_ = State{};
+  if (free_at_p && !strays(state_)) {
+    leash_ = Leash{};
+    return free();
+  }
+  state_ = start_;
+  if (contacts_.empty()) {  // straight to p
+    const double turn_rad = start_.E.angularDistance(Quaterniond::Identity());
+    const double share = std::min(leash.shift_m / std::max(start_.u.norm() * L_, leash.shift_m),
+                                  leash.turn_rad / std::max(turn_rad, leash.turn_rad));
+    state_.E = start_.E.slerp(share, Quaterniond::Identity());
+    state_.R = state_.E.toRotationMatrix();
+    state_.u = (1.0 - share) * start_.u;
+    state_.T = scaled_energy(state_);
+    residual_ = 1.0;
+    leash_ = Leash{};
+    return answer(Local::budget_spent);
+  }
+  if (!translate(state_)) {
+    leash_ = Leash{};
+    return answer(Local::infeasible);
+  }
+  Local local = Local::budget_spent;
+  if (strays(state_)) {
+    // At one rotation the gaps are affine and T is convex: the way to the nearest translation is open, and
+    // falls.
+    const Vector3d way = state_.u - start_.u;
+    state_.u = start_.u + way * (leash.shift_m / (L_ * way.norm()));
+    state_.T = scaled_energy(state_);
+    linearise(state_);
+    residual_ = residual(gradient(state_));
+  } else {
+    local = minimise(state_, false);
+  }
+  leash_ = Leash{};
+  return answer(local);
+}
+
+/// Is a state beyond the leash?
+bool ExactProjection::strays(const State& state) const noexcept {
+  return (state.u - start_.u).norm() * L_ > leash_.shift_m ||
+         state.E.angularDistance(start_.E) > leash_.turn_rad;
 }
 
 Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& scene,
@@ -150,6 +224,7 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
 void ExactProjection::begin(const Pose& X_WP, const ContactSource& scene) noexcept {
   X_WP_ = X_WP;
   scene_ = &scene;
+  at_end_of_leash_ = false;
   rounding_m_ = gap_tolerance_m(X_WP);
   tolerance_m_ = rounding_m_ - clearance_ * L_;
 }
@@ -297,7 +372,7 @@ bool ExactProjection::translate_further(State& state) noexcept {
     translation_.add_unit(gap.n, -gap.h);
   }
   E_translated_ = state.E;
-  if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible) return false;
+  if (translation_.solve(Vector3d::Zero(), slack_) == Status::infeasible) return false;
   state.u = translation_.z();
   state.T = scaled_energy(state);
   return true;
@@ -549,7 +624,7 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     const Vector6d g = gradient(state);
     residual_ = residual(g);
     const bool converged = residual_ <= kSmallResidual;
-    if (converged || iterations_ == iteration_limit_) {
+    if (converged || iterations_ == iteration_limit_ || at_end_of_leash_) {
       const Local local = converged ? Local::converged : Local::budget_spent;
       if (asked || meet_touching(state)) return local;
       if (!restore(state) && !lift_turning(state)) return Local::infeasible;
@@ -565,6 +640,7 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     const Advance moved = stepped ? advance(state, dy, promised, ask) : Advance::stuck;
     if (moved == Advance::fell) asked = ask;
     if (moved != Advance::stuck) continue;  // contacts met: the same state, with a model that knows them
+    if (at_end_of_leash_) continue;
     if (!asked) {
       if (!lift_turning(state)) return Local::infeasible;
       asked = true;
@@ -599,16 +675,19 @@ ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& 
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d eta = dy.tail<3>();
   // What T may seem to rise by: its own rounding, and that of the translation, which meets its gaps to
-  // kGapTolerance only.
-  const double rounding =
-      dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * kGapTolerance * state.u.norm() : 0.0;
-  double fraction = 1.0 / std::max(1.0, eta.norm());  // never more than one radian at a time
+  // slack_ only.
+  const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * slack_ * state.u.norm() : 0.0;
+  double fraction = 1.0 / std::max(1.0, eta.norm() / std::min(1.0, leash_.turn_rad));  // one radian at most
   for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
     State trial = state;
     turn(trial, fraction * eta);
     const std::size_t known = contacts_.size();
     if ((ask ? restore(trial) : translate(trial)) &&
         trial.T <= state.T + rounding - kFairShare * fraction * promised) {
+      if (strays(trial)) {
+        at_end_of_leash_ = true;
+        continue;
+      }
       state = trial;
       return Advance::fell;
     }

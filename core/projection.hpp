@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/contact.hpp"
@@ -69,6 +70,12 @@ class ExactProjection {
     std::uint16_t rounds = 24;      ///< of constraint generation, for each step
   };
 
+  /// How far from X_start a followed proxy may go.
+  struct Leash {
+    double shift_m = std::numeric_limits<double>::infinity();
+    double turn_rad = std::numeric_limits<double>::infinity();
+  };
+
   explicit ExactProjection(const Inertia& M);
   /// clearance_m: how far from touching contacts are held open [m]. A little more than rounding keeps a proxy
   /// clear of what it follows, for whoever checks its poses to the last digit.
@@ -79,6 +86,12 @@ class ExactProjection {
   /// the search starts from the best translation at the rotation of X_start. RT safe.
   Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start,
                      std::span<const ActiveContact> known = {}) noexcept;
+
+  /// The same with the contacts known for all there are, and on a leash: where the optimum lies farther away,
+  /// the answer is a pose on the way there, admissible for these contacts, no farther than the leash and with
+  /// a lower T; its status is budget_spent. X_start must be admissible for them. RT safe.
+  Projection step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
+                  const Leash& leash) noexcept;
 
   /// The closest admissible configuration to p, whatever came before: tries further starts until the dual
   /// bound proves that none is closer, or the starts are used up. Where the first start is proven, as almost
@@ -158,6 +171,7 @@ class ExactProjection {
   bool lift(State& state) noexcept;
   bool lift_turning(State& state) noexcept;
   Local minimise(State& state, bool asked) noexcept;
+  bool strays(const State& state) const noexcept;
   bool some_contact_idle() const noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
@@ -181,6 +195,7 @@ class ExactProjection {
   std::uint16_t iteration_limit_;  ///< of the query at hand
   double L_;                       ///< [m]
   double clearance_;               ///< in units of L
+  double slack_;                   ///< by which a gap may miss it, likewise
   Matrix3d H_hat_;
   Matrix6d metric_root_;  ///< Cholesky factor of diag(2 I, 2 H^)
 
@@ -202,6 +217,9 @@ class ExactProjection {
   bool met_touching_ = false;  ///< what touches at the answer has been added
   double residual_ = 0.0;      ///< of the state linearised last
   State state_;                ///< the iterate, and after a query its answer
+  Leash leash_;                ///< infinite but for step()
+  State start_;                ///< where it is tied
+  bool at_end_of_leash_ = false;
   std::uint16_t iterations_ = 0;
 };
 

@@ -2,7 +2,10 @@
 #include <catch2/catch.hpp>
 
 #include "collision/mesh_contacts.hpp"
+#include "collision/proxy.hpp"
+#include "tests/support/exact_meeting.hpp"
 #include "tests/support/handling.hpp"
+#include "tests/support/repeats.hpp"
 
 namespace wrenchd {
 namespace {
@@ -109,6 +112,36 @@ TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
     const auto found = look(scene, at(0, 0, side * 0.04), at(0, 0, side * 0.01));
     REQUIRE(found.met.size() >= 1);
     for (const Contact& c : found.met) CHECK(c.n_W.isApprox(side * Vector3d::UnitZ(), 1e-12));
+  }
+}
+
+// From where a hand leaves the tool, touching or not, steps in any direction.
+TEST_CASE("a step that ends in an obstacle is never seen as free", "[mesh_contacts]") {
+  RandomValues random(12);
+  for (const std::size_t i : {1, 5, 6, 8, 11, 13}) {
+    const Handling& handling = rough_handling()[i];
+    INFO(handling.name);
+    const Scene scene = scene_of(handling);
+    const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+    Proxy proxy(scene);
+    MeshContacts contacts(scene);
+    Hand hand(handling, 3);
+    Pose X_WQ = {Quaterniond::Identity(), handling.start_m};
+    int inside = 0;
+    for (int n = 0; n < repeats(300); ++n) {
+      for (int k = 0; k < 4; ++k) X_WQ = proxy.follow(hand.next(), X_WQ).X_WQ;
+      const Pose X_WT = {(X_WQ.rotation * random.rotation(random.uniform(0.0, 0.05))).normalized(),
+                         X_WQ.translation_m + random.decades(1e-5, 0.02) * random.unit<3>()};
+      contacts.start_at(X_WQ);
+      WalkBudget budget = {1000000};
+      const auto found = contacts.look(X_WT, kClearance_m, budget);
+      REQUIRE(found.complete);
+      if (!exact.meet(X_WT)) continue;
+      ++inside;
+      INFO("step " << n);
+      CHECK((found.overlaps || !found.met.empty()));
+    }
+    CHECK(inside > repeats(20));
   }
 }
 

@@ -269,6 +269,45 @@ TEST_CASE("a followed proxy is admissible at every step, and settles where the o
   }
 }
 
+// What the proxy among meshes goes by: short steps, each lower, up to where project() goes in one.
+TEST_CASE("on a leash the way to the optimum is gone in parts, and only falls", "[projection]") {
+  RandomValues random(10);
+  for (int body = 0; body < 20; ++body) {
+    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const Inertia M = c.scene.tool().solid.inertia;
+    ExactProjection exact(M);
+    const Projection whole = exact.project(c.X_WP, SceneContacts(c.scene), c.X_WP);
+    std::vector<ActiveContact> known;
+    const auto& floor = c.scene.half_spaces()[0];
+    for (std::size_t v = 0; v < c.scene.tool().hull.vertices_T_m.size(); ++v) {
+      Contact contact;
+      contact.p_TA_m = c.scene.tool().hull.vertices_T_m[v];
+      contact.n_W = floor.normal_W;
+      contact.p_WB_m = floor.offset_m * floor.normal_W;
+      contact.offset_m = floor.offset_m;
+      contact.tool_feature = static_cast<std::uint32_t>(v);
+      known.push_back({contact, 0.0});
+    }
+    const ExactProjection::Leash leash = {0.02, 0.03};
+    Pose X_WQ = {whole.X_WQ.rotation * random.rotation(0.3), whole.X_WQ.translation_m + 3.0 * floor.normal_W};
+    double T = energy(M, c.X_WP, X_WQ);
+    Projection q;
+    for (int step = 0; step < 1000; ++step) {
+      q = exact.step(c.X_WP, X_WQ, known, leash);
+      REQUIRE((q.status == ProjectionStatus::converged || q.status == ProjectionStatus::budget_spent));
+      CHECK((q.X_WQ.translation_m - X_WQ.translation_m).norm() <= leash.shift_m * (1.0 + 1e-9));
+      CHECK(q.X_WQ.rotation.angularDistance(X_WQ.rotation) <= leash.turn_rad + 1e-9);
+      CHECK(least_gap_m(c.scene, q.X_WQ) > -1e-12);
+      CHECK(energy(M, c.X_WP, q.X_WQ) <= T * (1.0 + 1e-12));
+      T = energy(M, c.X_WP, q.X_WQ);
+      X_WQ = q.X_WQ;
+      if (q.status == ProjectionStatus::converged) break;
+    }
+    CHECK(q.status == ProjectionStatus::converged);
+    CHECK(q.kkt_residual < 1e-8);
+  }
+}
+
 TEST_CASE("a spent budget still answers with an admissible pose, no worse than translation", "[projection]") {
   RandomValues random(9);
   for (int i = 0; i < 50; ++i) {

@@ -26,10 +26,11 @@ Runner pairs_runner(const MeshPair& pair) {
 /// The whole tick: contacts, projection, verification and wrench. The value is the energy.
 Runner tick_runner(const MeshPair& pair) {
   struct State {
+    explicit State(const MeshPair& pair) : proxy(pair.scene), X_WQ(pair.X_start) {}
     Proxy proxy;
     Pose X_WQ;
   };
-  const auto state = std::make_shared<State>(State{Proxy(pair.scene), pair.X_start});
+  const auto state = std::make_shared<State>(pair);
   return {"wrenchd whole tick",
           [state, &pair] {
             state->proxy.forget();
