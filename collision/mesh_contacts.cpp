@@ -28,6 +28,18 @@ constexpr double kAnySlope = 2.0;
 /// size.
 constexpr double kReach = 0.08;
 constexpr double kLeastReach = 1e-4;
+/// A list is made within so many ticks, for so many to come, for poses this near to the way expected, as a
+/// share of it. So long a way, in units of the tool's size, is not worth it: the hand is too fast.
+constexpr double kTicksToList = 5.0;
+constexpr double kTicksAhead = 12.0;
+constexpr double kReachAhead = 0.04;
+constexpr double kFarthestAhead = 0.2;
+/// The least that is done with a tick, in visits, and how much more than the last list took.
+constexpr std::uint32_t kLeastPortion = 32;
+constexpr double kMore = 1.1;
+/// How much of the motion of the last tick counts, of which the motion to come is guessed.
+constexpr double kNewest = 0.3;
+constexpr double kNewestBend = 0.1;
 /// No walk takes more than this share of the budget that is left.
 constexpr double kLongestWalk = 0.7;
 /// Crossings of much the same direction nearer than this count as one, in units of the way.
@@ -65,10 +77,9 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(scene), walk_(kernel) {
-  pairs_.reserve(TreeWalk::kCapacity);
+MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel)
+    : scene_(scene), lists_{NearPairs(scene, kernel), NearPairs(scene, kernel), NearPairs(scene, kernel)} {
   crossings_.reserve(kMostCrossings);
-  near_by_.reserve(scene.meshes().size());
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
@@ -78,69 +89,87 @@ MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(sce
 
 void MeshContacts::start_at(const Pose& X_WT) noexcept {
   X_start_ = X_WT;
-  from_listed_start_ = false;
-}
-
-/// Of thousands of obstacles few are near, and they stay the same while the tool moves by its own size.
-void MeshContacts::find_near_by(const Pose& X_WT) noexcept {
-  const auto from_there_m = [&](const Pose& X) { return (X.translation_m - near_p_WT_m_).norm(); };
-  if (std::max(from_there_m(X_start_), from_there_m(X_WT)) + reach_m_ <= near_reach_m_) return;
-  const double tool_m = scene_.tool_radius_m();
-  near_p_WT_m_ = X_start_.translation_m;
-  near_reach_m_ = tool_m + reach_m_ + from_there_m(X_WT);
-  near_by_.clear();
-  for (std::uint32_t k = 0; k < seen_.size(); ++k) {
-    const MeshObstacle& obstacle = *seen_[k].obstacle;
-    const double together_m = obstacle.radius_m + tool_m + near_reach_m_;
-    if ((obstacle.centre_W_m - near_p_WT_m_).squaredNorm() <= together_m * together_m) near_by_.push_back(k);
-  }
 }
 
 bool MeshContacts::covers(const Pose& X_WT) const noexcept {
-  return listed_ && way(X_WT, X_listed_) <= reach_m_ &&
-         (from_listed_start_ || way(X_start_, X_listed_) <= reach_m_);
+  return listed_->covers(X_WT) && listed_->covers(X_start_);
 }
 
-bool MeshContacts::list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept {
-  listed_ = false;
-  pairs_.clear();
-  const double radius_m = scene_.tool_radius_m();
+bool MeshContacts::list_now(const Pose& X_WT, WalkBudget& budget) noexcept {
+  const double reach_m =
+      std::max(kReach * spare_->way_m(X_start_, X_WT), kLeastReach * scene_.tool_radius_m());
+  spare_->set_out({X_start_, X_WT, reach_m});
   // A way that is too long for what is left may be followed by a shorter one.
   WalkBudget share = {static_cast<std::uint32_t>(kLongestWalk * budget.visits)};
-  const std::uint32_t granted = share.visits;
-  reach_m_ = std::max(kReach * way(X_start_, X_WT), kLeastReach * radius_m);
-  find_near_by(X_WT);
-  std::uint32_t spent = 0;
-  for (const std::uint32_t k : near_by_) {
-    const MeshObstacle& obstacle = *seen_[k].obstacle;
-    const Pose X_OW = inverse(obstacle.X_WO);
-    const Sweep sweep = {X_OW * X_start_, X_OW * X_WT, reach_m_, false};
-    const bool complete = walk_.find(scene_.tool_mesh()->tree, obstacle.mesh->tree, sweep, share);
-    budget.visits -= std::min(budget.visits, granted - share.visits - spent);
-    spent = granted - share.visits;
-    if (!complete || pairs_.size() + walk_.size() > pairs_.capacity()) return false;
-    for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, k});
-  }
-  X_listed_ = X_WT;
-  listed_ = from_listed_start_ = true;
+  budget.visits -= share.visits;
+  spare_->go_on(share);
+  budget.visits += share.visits;
+  if (!spare_->complete()) return false;
+  std::swap(listed_, spare_);
+  visits_of_list_ = listed_->visits();
   return true;
+}
+
+/// The motion from tick to tick and its change, smoothed.
+void MeshContacts::learn_motion(const Pose& X_WT) noexcept {
+  if (X_last_) {
+    const Quaterniond turn = X_last_->rotation.conjugate() * X_WT.rotation;
+    const Vector3d shift_more_m = kNewest * (X_WT.translation_m - X_last_->translation_m - shift_m_);
+    const Vector3d turn_more = kNewest * ((turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec() - turn_);
+    shift_m_ += shift_more_m;
+    turn_ += turn_more;
+    bend_m_ += kNewestBend * (shift_more_m - bend_m_);
+    bend_rad_ += kNewestBend * (turn_more - bend_rad_);
+  }
+  X_last_ = X_WT;
+}
+
+/// Where the tool will be if it moves on like this.
+Pose MeshContacts::after(double ticks, const Pose& X_WT) const noexcept {
+  const double late = (1.0 - kNewest) / kNewest;  // ticks by which what is smoothed lags
+  const double bends = ticks * (0.5 * ticks + late);
+  return {(X_WT.rotation * rotation_from(ticks * turn_ + bends * bend_rad_)).normalized(),
+          X_WT.translation_m + ticks * shift_m_ + bends * bend_m_};
+}
+
+void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
+  learn_motion(X_WT);
+  if (!ahead_->under_way()) {
+    if (listed_->covers(X_WT) && listed_->covers(after(kTicksToList + 1.0, X_WT))) return;
+    const double r_m = scene_.tool_radius_m();
+    const Pose X_far = after(kTicksAhead, X_WT);
+    const double way_m = ahead_->way_m(X_WT, X_far);
+    if (way_m > kFarthestAhead * r_m) return;
+    // A parabola leaves its chord by an eighth of a t^2.
+    const double bend_m = kTicksAhead * kTicksAhead / 8.0 * (bend_m_.norm() + r_m * bend_rad_.norm());
+    ahead_->set_out({X_WT, X_far, std::max(kReachAhead * way_m + bend_m, kLeastReach * r_m)});
+  }
+  const auto portion =
+      std::max(kLeastPortion, static_cast<std::uint32_t>(kMore * visits_of_list_ / kTicksToList));
+  WalkBudget part = {std::min(portion, budget.visits)};
+  budget.visits -= part.visits;
+  const bool ended = ahead_->go_on(part);
+  budget.visits += part.visits;
+  if (!ended || !ahead_->complete()) return;
+  visits_of_list_ = ahead_->visits();
+  if (ahead_->covers(X_WT)) std::swap(listed_, ahead_);
 }
 
 MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept {
   Findings findings;
   touching_.clear();
   clearance_m_ = clearance_m;
-  if (!covers(X_WT) && !list_pairs(X_WT, budget)) {
+  if (!covers(X_WT) && !list_now(X_WT, budget)) {
     findings.complete = false;
     return findings;
   }
-  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs_.size()));
+  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs()));
   const Frame start(X_start_), end(X_WT);
-  for (const std::uint32_t k : near_by_) {
+  for (const std::uint32_t k : listed_->near_by()) {
     seen_[k].X_OT_start = start.seen_from(seen_[k].X_WO);
     seen_[k].X_OT_end = end.seen_from(seen_[k].X_WO);
   }
-  const double way_m = way(X_start_, X_WT);
+  const double way_m = listed_->way_m(X_start_, X_WT);
   const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
   // The way of a vertex is straight as long as nothing turns.
   border_m_ = kBeyond * clearance_m + 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
@@ -155,17 +184,11 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   return findings;
 }
 
-/// How far a point of the tool may be moved from one pose to the other.
-double MeshContacts::way(const Pose& from, const Pose& to) const noexcept {
-  return (to.translation_m - from.translation_m).norm() +
-         scene_.tool_radius_m() * from.rotation.angularDistance(to.rotation);
-}
-
 void MeshContacts::look_at_all(Findings& findings) noexcept {
   touching_.clear();
   crossings_.clear();
   moved_.triangle = MeshSurface::kNone;
-  for (const NearPair& pair : pairs_) look_at(pair, moved(pair), findings);
+  for (const NearPair& pair : listed_->pairs()) look_at(pair, moved(pair), findings);
 }
 
 const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <optional>
 #include <vector>
 
+#include "collision/near_pairs.hpp"
 #include "collision/scene.hpp"
-#include "collision/tree_walk.hpp"
 #include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
 #include "core/fixed_list.hpp"
@@ -23,8 +24,9 @@ namespace wrenchd {
 /// lines that carry them, are opposite each other when it closes. Of pairs that are crossed close together
 /// only the first counts: once it is held open the others may never be reached.
 ///
-/// The pairs of triangles near the way come from the trees. They are listed once for a way and for all ends
-/// within reach of its own, so that the many ends that a projection tries cost no walk.
+/// The pairs of triangles near the way come from lists (near_pairs.hpp). While one serves, the next is made
+/// for where the tool will be if it moves on as it does, a little with every tick; only where it did not is a
+/// list made at once.
 ///
 /// Memory is taken at construction. One object serves one thread.
 class MeshContacts {
@@ -49,16 +51,16 @@ class MeshContacts {
   /// The way from the start to X_WT, whose contacts are held open by clearance_m. RT safe.
   Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept;
 
+  /// Once a tick, when the tool has come to X_WT: goes on with the list for where it will be. RT safe.
+  void look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept;
+
   /// The contacts that touch at the end looked at last, with their gap no wider than the clearance, and
   /// rounding.
   const ContactSet& touching() const noexcept { return touching_; }
 
-  std::size_t pairs() const noexcept { return pairs_.size(); }  ///< listed
+  std::size_t pairs() const noexcept { return listed_->pairs().size(); }  ///< listed
 
  private:
-  struct NearPair {
-    std::uint32_t a, b, obstacle;
-  };
   struct Crossing {
     double when;  ///< 0 at the start, 1 at the end
     Vector3d point_W_m;
@@ -86,10 +88,10 @@ class MeshContacts {
     double sign;  ///< of the cross product of da and db that points out of the obstacle
   };
 
-  double way(const Pose& from, const Pose& to) const noexcept;
-  void find_near_by(const Pose& X_WT) noexcept;
   bool covers(const Pose& X_WT) const noexcept;
-  bool list_pairs(const Pose& X_WT, WalkBudget& budget) noexcept;
+  bool list_now(const Pose& X_WT, WalkBudget& budget) noexcept;
+  void learn_motion(const Pose& X_WT) noexcept;
+  Pose after(double ticks, const Pose& X_WT) const noexcept;
   void look_at_all(Findings& findings) noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
   bool closes(double start_m, double end_m) const noexcept;
@@ -104,21 +106,20 @@ class MeshContacts {
   void choose_first(double way_m, Findings& findings) noexcept;
 
   const Scene& scene_;
-  TreeWalk walk_;
+  std::array<NearPairs, 3> lists_;
+  NearPairs* listed_ = &lists_[0];  ///< serves
+  NearPairs* ahead_ = &lists_[1];   ///< is being made
+  NearPairs* spare_ = &lists_[2];   ///< for what must be listed at once
+  std::uint32_t visits_of_list_ = 0;
+  std::optional<Pose> X_last_;                                        ///< of the tick before
+  Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();     ///< per tick; the turn in T
+  Vector3d bend_m_ = Vector3d::Zero(), bend_rad_ = Vector3d::Zero();  ///< by which they grow per tick
+
   Pose X_start_;
-  std::vector<Seen> seen_;                   ///< all obstacles
-  std::vector<std::uint32_t> near_by_;       ///< those that may be met while the tool stays
-  Vector3d near_p_WT_m_ = Vector3d::Zero();  ///< within
-  double near_reach_m_ = -1.0;               ///< of this place
+  std::vector<Seen> seen_;  ///< all obstacles
   double clearance_m_ = 0.0;
   double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
-
-  bool listed_ = false;
-  bool from_listed_start_ = false;  ///< the start is still that of the way that the list was made for
-  Pose X_listed_;                   ///< and this was its end
-  double reach_m_ = 0.0;            ///< the list holds for ends this near to it
-  std::vector<NearPair> pairs_;
 
   Moved moved_;
   std::vector<Crossing> crossings_;

@@ -22,6 +22,7 @@ constexpr double kShortestShare = 1.0 / 1024.0;
 /// and every next may be longer.
 constexpr double kWary = 1.0 / 64.0;
 constexpr double kLonger = 4.0;
+constexpr double kGrowth = 1.5;
 /// The least that a contact is held open by, in units of the clearance.
 constexpr double kLeastClearance = 0.2;
 /// T falls by at least this share from one round to the next, or the rounds end.
@@ -38,6 +39,12 @@ Proxy::Proxy(const Scene& scene, Effort effort)
       meshes_(scene) {}
 
 Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
+  const Projection q = find(X_WP, X_last);
+  meshes_.look_ahead(q.X_WQ, budget_);
+  return q;
+}
+
+Projection Proxy::find(const Pose& X_WP, const Pose& X_last) noexcept {
   X_WQ_ = X_last;
   looks_ = 0;
   iterations_ = 0;
@@ -72,7 +79,10 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
     if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
     const bool all_hold = !let_go(q);
     share = all_hold ? std::min(1.0, kLonger * share) : kWary;
-    if (!whole) continue;
+    if (!whole) {
+      if (all_hold && share == 1.0) longest_m *= kGrowth;  // a long way to go, and nothing on it
+      continue;
+    }
     if (all_hold) return described(X_WP, q);
     const double T = energy(M_, X_WP, X_WQ_);
     if (T > (1.0 - kProgress) * T_last) return described(X_WP, q);

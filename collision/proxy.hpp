@@ -56,6 +56,7 @@ class Proxy {
   using Known = FixedList<ActiveContact, ContactSet::kCapacity>;
   enum class Way : std::uint8_t { free, met_contacts, too_long };
 
+  Projection find(const Pose& X_WP, const Pose& X_last) noexcept;
   Projection step(const Pose& X_WP, double longest_m) noexcept;
   double way_m(const Pose& from, const Pose& to) const noexcept;
   Way look_along(const Pose& X_WT) noexcept;

@@ -55,6 +55,7 @@ walk::Motion motion_of(const Sweep& sweep, double least_radius_a_m, double exten
   motion.radius = static_cast<float>(least_radius_a_m);
   motion.rounding = static_cast<float>(rounding_m);
   for (int d = 0; d < 3; ++d) motion.centre_B[d] = static_cast<float>(end.translation_m[d]);
+  motion.centre_way = static_cast<float>((end.translation_m - start.translation_m).norm());
   motion.moving =
       start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
   return motion;
@@ -70,26 +71,28 @@ TreeWalk::TreeWalk(walk::Kernel kernel)
     : kernel_(kernel != nullptr  ? kernel
               : walk::has_avx2() ? walk::walk_avx2
                                  : walk::walk_portable),
+      job_(),
       pairs_(kCapacity),
       stack_(2 * walk::kStack),
       moved_leaves_(walk::kMovedLeavesBytes / sizeof(Line)) {}
 
-bool TreeWalk::find(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep,
-                    WalkBudget& budget) noexcept {
-  count_ = 0;
-  if (a.nodes().empty() || b.nodes().empty()) return true;
-  const walk::Job job = {arrays_of(a),
-                         arrays_of(b),
-                         motion_of(sweep, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),
-                         pairs_.data(),
-                         static_cast<std::uint32_t>(pairs_.size()),
-                         budget.visits,
-                         stack_.data(),
-                         moved_leaves_.data()};
-  const walk::Outcome outcome = kernel_(job);
-  count_ = outcome.pairs;
-  budget.visits -= std::min(budget.visits, outcome.visits);
-  return outcome.complete;
+void TreeWalk::set_out(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep) noexcept {
+  job_ = {arrays_of(a),
+          arrays_of(b),
+          motion_of(sweep, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),
+          pairs_.data(),
+          static_cast<std::uint32_t>(pairs_.size()),
+          stack_.data(),
+          moved_leaves_.data()};
+  job_.begun = a.nodes().empty() || b.nodes().empty();  // then there is nothing to begin with
+}
+
+bool TreeWalk::go_on(WalkBudget& budget) noexcept {
+  job_.visits = 0;
+  job_.visits_allowed = budget.visits;
+  kernel_(job_);
+  budget.visits -= std::min(budget.visits, job_.visits);
+  return job_.stack_top == 0 || job_.overflow;
 }
 
 }  // namespace wrenchd

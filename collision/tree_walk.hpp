@@ -20,8 +20,8 @@ struct TrianglePair {
 /// A moves in B from one pose to another.
 struct Sweep {
   Pose X_BA_start, X_BA_end;
-  /// Pairs are to be found not only for the end pose but for every one near it: as far as this from it in
-  /// all, |shift| + angle times the farthest point of A.
+  /// Pairs are to be found not only for the poses on the way but for every one near them: as far as this
+  /// from one of them in all, |shift| + angle times the farthest point of A.
   double reach_m = 0.0;
   /// False: list only pairs with features that can meet first, a vertex in one of them or an edge in each.
   bool all_pairs = true;
@@ -50,6 +50,7 @@ struct Motion {
   float reach, radius;  ///< a plane of A may come nearer to a point by reach * max(1, its distance / radius)
   float rounding;
   float centre_B[3];  ///< of A at the end, from which that distance counts
+  float centre_way;   ///< how far the centre has come [m]
   bool moving;
   bool all_pairs;
 };
@@ -58,26 +59,27 @@ struct Tree {
   const TriangleTree::Node* nodes;
   const TriangleTree::Leaf* leaves;
 };
+/// A walk under way: it may be interrupted after any visit.
 struct Job {
   Tree a, b;
   Motion motion;
   TrianglePair* pairs;  ///< room for pairs
   std::uint32_t capacity;
-  std::uint32_t visits_allowed;
   std::uint32_t* stack;  ///< room for kStack pairs of box numbers
   void* moved_leaves;    ///< room for kMovedLeavesBytes, aligned to 64
-};
-struct Outcome {
-  std::uint32_t pairs;
-  std::uint32_t visits;
-  bool complete;
+  std::uint32_t visits_allowed = 0;
+  // How far it has come:
+  std::uint32_t visits = 0, pair_count = 0, stack_top = 0;
+  bool begun = false;
+  bool overflow = false;  ///< there was no room for all
 };
 constexpr std::size_t kStack = 8192;
 constexpr std::size_t kMovedLeavesBytes = std::size_t{1} << 17;
 
-using Kernel = Outcome (*)(const Job&) noexcept;
-Outcome walk_portable(const Job& job) noexcept;
-Outcome walk_avx2(const Job& job) noexcept;
+/// Goes on until the stack is empty, there is no room, or the visits are used up.
+using Kernel = void (*)(Job&) noexcept;
+void walk_portable(Job& job) noexcept;
+void walk_avx2(Job& job) noexcept;
 /// Does this processor run walk_avx2()?
 bool has_avx2() noexcept;
 
@@ -86,7 +88,7 @@ bool has_avx2() noexcept;
 /// Walks two trees together and lists the pairs of triangles that may meet.
 ///
 /// No pair that comes to touch on the way is left out (points of A are taken to move straight from start to
-/// end), nor one that touches at a pose within reach of the end. Pairs that a plane of one of the two
+/// end), nor one that touches at a pose within reach of the way. Pairs that a plane of one of the two
 /// triangles keeps apart all the way are left out, most others that do not meet too; what remains must be
 /// looked at in double precision. Which pairs remain depends on the processor, whether a pair that meets is
 /// among them does not.
@@ -100,11 +102,21 @@ class TreeWalk {
 
   /// False where the list or the budget was too small; what was found is there. The budget falls by the work
   /// done. RT safe.
-  bool find(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep, WalkBudget& budget) noexcept;
+  bool find(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep, WalkBudget& budget) noexcept {
+    set_out(a, b, sweep);
+    return go_on(budget) && complete();
+  }
+
+  /// The same in parts: sets out, goes on until the budget is used up; true: the walk has ended. The trees
+  /// must outlive it. RT safe.
+  void set_out(const TriangleTree& a, const TriangleTree& b, const Sweep& sweep) noexcept;
+  bool go_on(WalkBudget& budget) noexcept;
+  /// Was there room for all pairs, as far as it came?
+  bool complete() const noexcept { return !job_.overflow; }
 
   const TrianglePair* begin() const noexcept { return pairs_.data(); }
-  const TrianglePair* end() const noexcept { return pairs_.data() + count_; }
-  std::size_t size() const noexcept { return count_; }
+  const TrianglePair* end() const noexcept { return pairs_.data() + job_.pair_count; }
+  std::size_t size() const noexcept { return job_.pair_count; }
 
  private:
   struct alignas(64) Line {
@@ -112,8 +124,8 @@ class TreeWalk {
   };
 
   walk::Kernel kernel_;
+  walk::Job job_;
   std::vector<TrianglePair> pairs_;
-  std::size_t count_ = 0;
   std::vector<std::uint32_t> stack_;
   std::vector<Line> moved_leaves_;
 };

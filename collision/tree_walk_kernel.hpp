@@ -273,7 +273,7 @@ WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleTree::Leaf
   return bits(apart) ^ 255U;
 }
 
-/// How far the boxed part of B may be from the centre of A at the end.
+/// How far the boxed part of B may be from this place.
 WRENCHD_INLINE float distance_bound(const TriangleTree::Box& box, const float* centre) noexcept {
   float sum = box.half[0] + box.half[1] + box.half[2];
   for (int d = 0; d < 3; ++d) sum += magnitude(box.centre[d] - centre[d]);
@@ -282,25 +282,26 @@ WRENCHD_INLINE float distance_bound(const TriangleTree::Box& box, const float* c
 
 class Walk {
  public:
-  explicit Walk(const Job& job) noexcept : job_(job), moved_(static_cast<MovedLeaf*>(job.moved_leaves)) {
-    for (std::uint32_t k = 0; k < kMovedLeaves; ++k) moved_[k].leaf = ~0U;
-  }
+  explicit Walk(Job& job) noexcept : job_(job), moved_(static_cast<MovedLeaf*>(job.moved_leaves)) {}
 
-  Outcome run() noexcept {
-    for (std::uint32_t a = 0; a < kWidth; ++a)
-      if (job_.a.boxes[a].count >= 0) open_b(a, 0);
-    while (top_ > 0 && complete_) {
-      const std::uint32_t b = job_.stack[--top_];
-      const std::uint32_t a = job_.stack[--top_];
+  void run() noexcept {
+    if (!job_.begun) {
+      for (std::uint32_t k = 0; k < kMovedLeaves; ++k) moved_[k].leaf = ~0U;
+      for (std::uint32_t a = 0; a < kWidth; ++a)
+        if (job_.a.boxes[a].count >= 0) open_b(a, 0);
+      job_.begun = true;
+    }
+    while (job_.stack_top > 0 && !job_.overflow && job_.visits < job_.visits_allowed) {
+      const std::uint32_t b = job_.stack[--job_.stack_top];
+      const std::uint32_t a = job_.stack[--job_.stack_top];
+      ++job_.visits;
       visit(a, b);
     }
-    return {pairs_, visits_, complete_};
   }
 
  private:
   /// Opens the larger of two boxes, or looks at the triangles of two leaves.
   void visit(std::uint32_t a, std::uint32_t b) noexcept {
-    if (++visits_ > job_.visits_allowed) complete_ = false;
     const TriangleTree::Box& box_a = job_.a.boxes[a];
     const TriangleTree::Box& box_b = job_.b.boxes[b];
     if (box_a.count > 0 && box_b.count > 0) {
@@ -343,12 +344,12 @@ class Walk {
   }
 
   void push(std::uint32_t a, std::uint32_t b) noexcept {
-    if (top_ + 2 > 2 * kStack) {
-      complete_ = false;
+    if (job_.stack_top + 2 > 2 * kStack) {
+      job_.overflow = true;
       return;
     }
-    job_.stack[top_++] = a;
-    job_.stack[top_++] = b;
+    job_.stack[job_.stack_top++] = a;
+    job_.stack[job_.stack_top++] = b;
   }
 
   const MovedLeaf& moved(const TriangleTree::Box& box) noexcept {
@@ -371,7 +372,7 @@ class Walk {
     unsigned rows = (1U << box_a.count) - 1;
     rows &= ~bits(beside(a.low, a.high, b.low_of_all, b.high_of_all));
     if (rows == 0) return;
-    const float far = distance_bound(box_b, m.centre_B) / m.radius;
+    const float far = (distance_bound(box_b, m.centre_B) + m.centre_way) / m.radius;
     const float margin_of_plane = m.rounding + m.reach * (far > 1.0F ? far : 1.0F);
     for (rows &= ~bits(miss(a, standing(box_b), margin_of_plane, m.moving)); rows != 0; rows &= rows - 1) {
       const int i = __builtin_ctz(rows);
@@ -381,29 +382,25 @@ class Walk {
       const unsigned worth = worth_it(features, b.has_vertices, b.has_edges);
       for (unsigned hits = near(a, i, b, apart, m.margin, margin_of_plane, m.moving) & worth; hits != 0;
            hits &= hits - 1) {
-        if (pairs_ == job_.capacity) {
-          complete_ = false;
+        if (job_.pair_count == job_.capacity) {
+          job_.overflow = true;
           return;
         }
-        job_.pairs[pairs_++] = {ta, b.triangle[__builtin_ctz(hits)]};
+        job_.pairs[job_.pair_count++] = {ta, b.triangle[__builtin_ctz(hits)]};
       }
     }
   }
 
-  const Job& job_;
+  Job& job_;
   MovedLeaf* moved_;
   std::uint32_t swept_a_ = ~0U, swept_b_ = ~0U;  ///< often the same one again
   SweptBox box_a_, box_b_;
-  std::uint32_t top_ = 0;
-  std::uint32_t pairs_ = 0;
-  std::uint32_t visits_ = 0;
-  bool complete_ = true;
 };
 
 }  // namespace
 
-Outcome WRENCHD_WALK(const Job& job) noexcept {
-  return Walk(job).run();
+void WRENCHD_WALK(Job& job) noexcept {
+  Walk(job).run();
 }
 
 }  // namespace wrenchd::walk

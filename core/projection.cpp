@@ -12,8 +12,8 @@ namespace {
 
 /// A gap this far below zero, in units of L, counts as closed: rounding of one rotation and one dot product.
 constexpr double kGapTolerance = 2e-15;
-/// Where contacts are held open, they may give way by this share of it: wedged between opposite contacts only
-/// one translation is left, and rounding must not make it none.
+/// Wedged between opposite contacts only one translation is left, and rounding must not make it none: where
+/// it does, contacts that are held open give way by this share of it.
 constexpr double kSlack = 1e-3;
 /// A contact this near, in units of L, touches at q.
 constexpr double kTouching = 1e-9;
@@ -372,7 +372,9 @@ bool ExactProjection::translate_further(State& state) noexcept {
     translation_.add_unit(gap.n, -gap.h);
   }
   E_translated_ = state.E;
-  if (translation_.solve(Vector3d::Zero(), slack_) == Status::infeasible) return false;
+  if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible &&
+      (slack_ == kGapTolerance || translation_.solve(Vector3d::Zero(), slack_) == Status::infeasible))
+    return false;
   state.u = translation_.z();
   state.T = scaled_energy(state);
   return true;

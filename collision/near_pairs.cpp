@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/near_pairs.hpp"
+
+#include <algorithm>
+
+namespace wrenchd {
+namespace {
+
+/// The rotation vector between two orientations that differ by far less than a turn, to first order.
+Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
+  const Quaterniond turn = from.conjugate() * to;
+  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
+}
+
+}  // namespace
+
+NearPairs::NearPairs(const Scene& scene, walk::Kernel kernel) : scene_(scene), walk_(kernel) {
+  pairs_.reserve(TreeWalk::kCapacity);
+  near_by_.reserve(scene.meshes().size());
+}
+
+void NearPairs::set_out(const Way& way) noexcept {
+  way_ = way;
+  turn_ = turn_between(way.X_WT_start.rotation, way.X_WT_end.rotation);
+  visits_ = 0;
+  pairs_.clear();
+  find_near_by();
+  next_ = 0;
+  state_ = near_by_.empty() ? State::complete : State::under_way;
+  set_out_for_next();
+}
+
+void NearPairs::set_out_for_next() noexcept {
+  if (next_ == near_by_.size()) return;
+  const MeshObstacle& obstacle = scene_.meshes()[near_by_[next_]];
+  const Pose X_OW = inverse(obstacle.X_WO);
+  walk_.set_out(scene_.tool_mesh()->tree, obstacle.mesh->tree,
+                {X_OW * way_.X_WT_start, X_OW * way_.X_WT_end, way_.reach_m, false});
+}
+
+bool NearPairs::go_on(WalkBudget& budget) noexcept {
+  const std::uint32_t granted = budget.visits;
+  while (under_way() && walk_.go_on(budget)) {
+    if (!walk_.complete() || pairs_.size() + walk_.size() > pairs_.capacity()) {
+      state_ = State::failed;
+      break;
+    }
+    for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, near_by_[next_]});
+    if (++next_ == near_by_.size()) state_ = State::complete;
+    set_out_for_next();
+  }
+  visits_ += granted - budget.visits;
+  return !under_way();
+}
+
+/// The nearest pose on the way is as far along it as the shift and the turn together say.
+bool NearPairs::covers(const Pose& X_WT) const noexcept {
+  if (!complete()) return false;
+  const double r_m = scene_.tool_radius_m();
+  const Vector3d shift_m = way_.X_WT_end.translation_m - way_.X_WT_start.translation_m;
+  const double length2 = shift_m.squaredNorm() + r_m * r_m * turn_.squaredNorm();
+  const double along = shift_m.dot(X_WT.translation_m - way_.X_WT_start.translation_m) +
+                       r_m * r_m * turn_.dot(turn_between(way_.X_WT_start.rotation, X_WT.rotation));
+  const double share = length2 > 0.0 ? std::clamp(along / length2, 0.0, 1.0) : 0.0;
+  const Pose nearest = {way_.X_WT_start.rotation.slerp(share, way_.X_WT_end.rotation),
+                        way_.X_WT_start.translation_m + share * shift_m};
+  return way_m(X_WT, nearest) <= way_.reach_m;
+}
+
+double NearPairs::way_m(const Pose& from, const Pose& to) const noexcept {
+  return (to.translation_m - from.translation_m).norm() +
+         scene_.tool_radius_m() * from.rotation.angularDistance(to.rotation);
+}
+
+/// Of thousands of obstacles few are near, and they stay the same while the tool moves by its own size.
+void NearPairs::find_near_by() noexcept {
+  const auto from_there_m = [&](const Pose& X) { return (X.translation_m - near_p_WT_m_).norm(); };
+  if (std::max(from_there_m(way_.X_WT_start), from_there_m(way_.X_WT_end)) + way_.reach_m <= near_reach_m_)
+    return;
+  const double tool_m = scene_.tool_radius_m();
+  near_p_WT_m_ = way_.X_WT_start.translation_m;
+  near_reach_m_ = tool_m + way_.reach_m + from_there_m(way_.X_WT_end);
+  near_by_.clear();
+  for (std::uint32_t k = 0; k < scene_.meshes().size(); ++k) {
+    const MeshObstacle& obstacle = scene_.meshes()[k];
+    const double together_m = obstacle.radius_m + tool_m + near_reach_m_;
+    if ((obstacle.centre_W_m - near_p_WT_m_).squaredNorm() <= together_m * together_m) near_by_.push_back(k);
+  }
+}
+
+}  // namespace wrenchd

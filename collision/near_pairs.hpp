@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "collision/scene.hpp"
+#include "collision/tree_walk.hpp"
+
+namespace wrenchd {
+
+/// A triangle of the tool and one of an obstacle.
+struct NearPair {
+  std::uint32_t a, b;
+  std::uint32_t obstacle;  ///< its place among scene.meshes()
+};
+
+/// The pairs of triangles that may meet while the tool is on a straight way, or near it, with features that
+/// can meet first (mesh_surface.hpp). They are listed in one go, or a few with every tick while another list
+/// serves.
+///
+/// Memory is taken at construction. One object serves one thread.
+class NearPairs {
+ public:
+  struct Way {
+    Pose X_WT_start, X_WT_end;
+    double reach_m = 0.0;  ///< the list holds for poses as near to it, as way_m() measures
+  };
+
+  /// The scene is kept by reference. kernel: as for TreeWalk.
+  explicit NearPairs(const Scene& scene, walk::Kernel kernel = nullptr);
+  NearPairs(const NearPairs&) = delete;  // a copy would lose the room that is kept
+  NearPairs& operator=(const NearPairs&) = delete;
+
+  /// Begins a list; the one before is lost. RT safe.
+  void set_out(const Way& way) noexcept;
+  /// Goes on with it until it has ended (true) or the budget is used up. RT safe.
+  bool go_on(WalkBudget& budget) noexcept;
+
+  bool under_way() const noexcept { return state_ == State::under_way; }
+  /// Are all pairs listed? Not where there was no room for them.
+  bool complete() const noexcept { return state_ == State::complete; }
+  /// Does the list hold for this pose, and for straight ways to others that it holds for?
+  bool covers(const Pose& X_WT) const noexcept;
+
+  std::span<const NearPair> pairs() const noexcept { return pairs_; }
+  /// The obstacles that may be met on the way: places among scene.meshes().
+  std::span<const std::uint32_t> near_by() const noexcept { return near_by_; }
+  std::uint32_t visits() const noexcept { return visits_; }  ///< that the list has taken so far
+
+  /// How far a point of the tool may be moved from one pose to the other [m].
+  double way_m(const Pose& from, const Pose& to) const noexcept;
+
+ private:
+  enum class State : std::uint8_t { empty, under_way, complete, failed };
+
+  void find_near_by() noexcept;
+  void set_out_for_next() noexcept;
+
+  const Scene& scene_;
+  TreeWalk walk_;
+  State state_ = State::empty;
+  Way way_;
+  Vector3d turn_ = Vector3d::Zero();  ///< of the way, in the tool's frame [rad]
+  std::uint32_t visits_ = 0;
+  std::size_t next_ = 0;  ///< of near_by_, to be walked
+  std::vector<NearPair> pairs_;
+
+  std::vector<std::uint32_t> near_by_;       ///< those that may be met while the tool stays
+  Vector3d near_p_WT_m_ = Vector3d::Zero();  ///< within
+  double near_reach_m_ = -1.0;               ///< of this place
+};
+
+}  // namespace wrenchd
