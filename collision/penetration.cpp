@@ -75,14 +75,16 @@ Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_las
   return out;
 }
 
-Penetration PenetrationDepth::query(const Pose& X_WP) noexcept {
+void PenetrationDepth::forget() noexcept {
   known_.clear();
   X_answered_.reset();
   if (proxy_) proxy_->forget();
-  if (placement_) {
-    return described(X_WP, placement_->nearest(X_WP));
-  }
-  if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP));
+}
+
+Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& stop) noexcept {
+  forget();
+  if (placement_) return described(X_WP, placement_->nearest(X_WP, stop));
+  if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP, stop));
   scene_.survey(X_WP);
   return approximate(X_WP, X_WP);
 }
@@ -126,7 +128,7 @@ void PenetrationDepth::settle(Projection& best, const Solve& solve) noexcept {
 
 /// The best answer from every plane worth a try, one obstacle at a time: from the rotation of p, then from
 /// that of the best answer so far, until a round finds nothing better. Half-spaces leave no choice.
-Projection PenetrationDepth::project_globally(const Pose& X_WP) noexcept {
+Projection PenetrationDepth::project_globally(const Pose& X_WP, const std::stop_token& stop) noexcept {
   const std::size_t openings = scene_.survey(X_WP);
   if (openings == 0) return exact_.project_globally(X_WP, scene_);
   const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_, X_start); };
@@ -136,6 +138,7 @@ Projection PenetrationDepth::project_globally(const Pose& X_WP) noexcept {
   const auto try_all_from = [&](const Pose& X_start) {
     bool improved = false;
     for (std::size_t i = 0; i < openings && best.status != ProjectionStatus::free; ++i) {
+      if (stop.stop_requested()) return false;
       scene_.open(i);
       Projection other = solve(X_start);
       settle(other, solve);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "collision/placement.hpp"
@@ -50,16 +51,21 @@ class PenetrationDepth {
   /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
   /// the proxy stays there, and draws the hand back to where it came from. RT safe.
   Penetration follow(const Pose& X_WP, const Pose& X_last) noexcept;
-  /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones. RT
-  /// safe, but up to a thousand times dearer.
-  Penetration query(const Pose& X_WP) noexcept;
+  /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones.
+  /// Neither allocates nor locks, but is up to a thousand times dearer, among meshes more: no work for the
+  /// servo thread. Once stop is asked for, it ends within a few milliseconds; its answer is worth nothing
+  /// then.
+  Penetration query(const Pose& X_WP, const std::stop_token& stop = {}) noexcept;
+
+  /// Forgets what the last answers were held by: the next pose to follow from is none of them. RT safe.
+  void forget() noexcept;
 
  private:
   Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;
   static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
   template <class Solve>
   void settle(Projection& best, const Solve& solve) noexcept;
-  Projection project_globally(const Pose& X_WP) noexcept;
+  Projection project_globally(const Pose& X_WP, const std::stop_token& stop) noexcept;
   Projection translate(const Pose& X_WP) noexcept;
   Penetration approximate(const Pose& X_WP, const Pose& X_start) noexcept;
   Penetration descend(const Pose& X_WP, const Pose& X_start) noexcept;

@@ -80,6 +80,8 @@ bool Placement::meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept {
 bool Placement::admissible(const Pose& X_WT) noexcept {
   if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
   for (const MeshObstacle& obstacle : scene_.meshes()) {
+    const double centres_m = (obstacle.centre_W_m - X_WT.translation_m).norm();
+    if (centres_m > obstacle.radius_m + scene_.tool_radius_m()) continue;
     const Pose X_OT = inverse(obstacle.X_WO) * X_WT;
     if (meets(obstacle, X_OT)) return false;
     const MeshSurface& tool = scene_.tool_mesh()->surface;
@@ -91,10 +93,10 @@ bool Placement::admissible(const Pose& X_WT) noexcept {
 }
 
 /// From an admissible pose, as near to p as a proxy comes.
-Projection Placement::settled(const Pose& X_WP, const Pose& X_start) noexcept {
+Projection Placement::settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop) noexcept {
   proxy_.forget();
   Projection q = proxy_.follow(X_WP, X_start);
-  for (int tick = 1; tick < kMostTicks; ++tick) {
+  for (int tick = 1; tick < kMostTicks && !stop.stop_requested(); ++tick) {
     const Projection next = proxy_.follow(X_WP, q.X_WQ);
     const bool done = next.status != ProjectionStatus::budget_spent && next.energy > (1.0 - kGain) * q.energy;
     q = next;
@@ -103,8 +105,8 @@ Projection Placement::settled(const Pose& X_WP, const Pose& X_start) noexcept {
   return q;
 }
 
-Projection Placement::nearest(const Pose& X_WP) noexcept {
-  if (admissible(X_WP)) return settled(X_WP, X_WP);
+Projection Placement::nearest(const Pose& X_WP, const std::stop_token& stop) noexcept {
+  if (admissible(X_WP)) return settled(X_WP, X_WP, stop);
   Projection best;
   best.X_WQ = X_WP;
   best.status = ProjectionStatus::infeasible;
@@ -116,7 +118,7 @@ Projection Placement::nearest(const Pose& X_WP) noexcept {
   Halton points;
   int starts = 0;
   for (double r = kNearest * scene_.tool_radius_m(); r < farthest_m && starts < kMostStarts; r *= kGrowth)
-    for (int i = 0; i < kTries && starts < kMostStarts; ++i) {
+    for (int i = 0; i < kTries && starts < kMostStarts && !stop.stop_requested(); ++i) {
       // Every other one turned, by as much as its points are moved.
       const Vector3d shift_m = r * points.in_ball();
       const Vector3d turn_rad = std::min(r / scene_.tool_radius_m(), kMostTurn_rad) * points.in_ball();
@@ -124,7 +126,7 @@ Projection Placement::nearest(const Pose& X_WP) noexcept {
       const Pose X_start = {(X_WP.rotation * turn).normalized(), X_WP.translation_m + shift_m};
       if (!admissible(X_start)) continue;
       ++starts;
-      const Projection q = settled(X_WP, X_start);
+      const Projection q = settled(X_WP, X_start, stop);
       if (q.energy < best.energy) best = q;
     }
   return best;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <stop_token>
+
 #include "collision/proxy.hpp"
 #include "collision/scene.hpp"
 #include "collision/tree_walk.hpp"
@@ -14,7 +16,8 @@ namespace wrenchd {
 /// can from each of them, and takes the nearest. It is admissible, and a local optimum; that no other place
 /// is nearer is likely, not proven.
 ///
-/// It takes milliseconds, and is no work for the servo thread. The scene is kept by reference.
+/// It takes milliseconds, deep inside a fine mesh seconds, and is no work for the servo thread. The scene is
+/// kept by reference.
 class Placement {
  public:
   explicit Placement(const Scene& scene);
@@ -22,12 +25,13 @@ class Placement {
   /// Does the tool overlap nothing at this pose, and is it outside of all that is solid?
   bool admissible(const Pose& X_WT) noexcept;
 
-  /// Status infeasible where nothing was found. The contacts are those that hold q.
-  Projection nearest(const Pose& X_WP) noexcept;
+  /// Status infeasible where nothing was found. The contacts are those that hold q. Once stop is asked for it
+  /// ends with what it has, after no more than one look at a pose or one tick of a proxy: a few milliseconds.
+  Projection nearest(const Pose& X_WP, const std::stop_token& stop = {}) noexcept;
 
  private:
   bool meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept;
-  Projection settled(const Pose& X_WP, const Pose& X_start) noexcept;
+  Projection settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop) noexcept;
 
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;
