@@ -19,6 +19,9 @@ struct Event {
     reports_missing,     ///< detail: how many, by sequence number
     reports_rejected,    ///< detail: how many were short, long, of another id, garbled or out of order
     no_admissible_pose,  ///< the obstacles contradict each other where the hand is; the proxy stays
+    placing,             ///< no admissible pose is known; zero wrench while one is looked for
+    placed,              ///< value: how far from the hand it was found [m]
+    nowhere,             ///< none was found; zero wrench, and it is looked for again
     released,            ///< the hand was released
   };
   Kind kind = Kind::engagement;

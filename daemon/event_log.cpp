@@ -17,6 +17,8 @@ spdlog::level::level_enum level_of(Event::Kind kind) {
     case Event::Kind::fault:
       return spdlog::level::err;
     case Event::Kind::engagement:
+    case Event::Kind::placing:
+    case Event::Kind::placed:
     case Event::Kind::released:
       return spdlog::level::info;
     default:
@@ -46,6 +48,13 @@ std::string to_text(const Event& event) {
                          event.detail);
     case Event::Kind::no_admissible_pose:
       return "no admissible pose near the hand: the obstacles leave no room; the proxy stays where it was";
+    case Event::Kind::placing:
+      return "placing: the admissible pose nearest to the hand is looked for; zero wrench until it is found";
+    case Event::Kind::placed:
+      return fmt::format("placed {:.1f} mm from the hand", 1e3 * event.value);
+    case Event::Kind::nowhere:
+      return "no admissible pose was found: the tool does not fit in where the hand is; zero wrench, and it "
+             "is looked for again";
     case Event::Kind::released:
       return "the hand is released: zero wrench, motors off";
   }

@@ -9,6 +9,7 @@
 
 #include "core/engagement.hpp"
 #include "core/fault.hpp"
+#include "daemon/placer.hpp"
 
 namespace wrenchd {
 namespace {
@@ -33,6 +34,8 @@ double angle(const std::array<double, 7>& X) {
 
 std::string state(const TickRecord& r) {
   if (r.fault != 0) return fmt::format("fault:{}", text(static_cast<Fault>(r.fault)).name);
+  if (const auto placing = static_cast<Placing>(r.placing); placing != Placing::following)
+    return name(placing);
   return name(static_cast<Engagement>(r.engagement));
 }
 

@@ -189,7 +189,7 @@ Fault run_in_virtual_time(Station& station, const Options& options, VirtualClock
 template <class TheClock>
 Fault run(Plan plan, const Options& options, TheClock& clock,
           Fault (*run_it)(Station&, const Options&, TheClock&, LiveView&)) {
-  Station station(std::move(plan), clock);
+  Station station(std::move(plan), clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread);
   loop_to_release = &station.loop();
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),

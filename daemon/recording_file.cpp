@@ -11,6 +11,9 @@ namespace wrenchd {
 namespace {
 
 constexpr const char* kTable = "/ticks";
+/// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
+/// is not the placer's; 2: `placing` and `start_over`.
+constexpr const char* kFormat = "2";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;
@@ -63,6 +66,7 @@ constexpr std::array kColumns = {
     WRENCHD_COLUMN(motors_on, "bool", u8, 1),
     WRENCHD_COLUMN(watchdog_tripped, "bool", u8, 1),
     WRENCHD_COLUMN(arm_command, "enum", u8, 1),
+    WRENCHD_COLUMN(start_over, "bool", u8, 1),
     WRENCHD_COLUMN(X_BH, "m m m, qx qy qz qw", f64, 7),
     WRENCHD_COLUMN(V_BH, "m/s x3, rad/s x3", f64, 6),
     WRENCHD_COLUMN(X_WP, "m m m, qx qy qz qw", f64, 7),
@@ -74,6 +78,7 @@ constexpr std::array kColumns = {
     WRENCHD_COLUMN(contacts, "1", u16, 1),
     WRENCHD_COLUMN(iterations, "1", u16, 1),
     WRENCHD_COLUMN(projection_status, "enum", u8, 1),
+    WRENCHD_COLUMN(placing, "enum", u8, 1),
     WRENCHD_COLUMN(engagement, "enum", u8, 1),
     WRENCHD_COLUMN(limit_causes, "bits", u8, 1),
     WRENCHD_COLUMN(fault, "enum", u8, 1),
@@ -184,6 +189,7 @@ RecordingWriter::RecordingWriter(const std::filesystem::path& file, const Record
   if (!file_->table.ok()) throw RecordingError(file.string() + ": the table of ticks cannot be created");
   write_text(file_->table, "units", units());
   write_text(file_->table, "wrenchd_version", header.version);
+  write_text(file_->table, "format", kFormat);
   write_text(file_->table, "settings", header.settings);
   write_text(file_->table, "scene", header.scene);
   write_text(file_->table, "profile", header.profile);
@@ -223,6 +229,12 @@ Recording read_recording(const std::filesystem::path& file) {
   Recording recording;
   recording.header = {read_text(table, "wrenchd_version"), read_text(table, "settings"),
                       read_text(table, "scene"), read_text(table, "profile")};
+  const std::string named = read_text(table, "format");
+  const std::string format = named.empty() ? std::string("1") : named;
+  if (format != kFormat)
+    throw RecordingError(file.string() + ": is of format " + format + ", and format " + kFormat +
+                         " is what can be read; replay it with the wrenchd that wrote it (" +
+                         recording.header.version + ")");
   recording.ticks.resize(rows);
   const Handle row(row_type(), H5Tclose);
   if (rows > 0 && H5Dread(table, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, recording.ticks.data()) < 0)

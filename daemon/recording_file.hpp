@@ -27,8 +27,9 @@ struct RecordingHeader {
   std::string profile;
 };
 
-/// An HDF5 file with one table, /ticks: one row a tick, one named column a field, units in the attribute
-/// "units" of the table. Any HDF5 reader opens it: h5dump, h5py, MATLAB. Not RT safe.
+/// An HDF5 file with one table, /ticks: one row a tick, one named column a field. Attributes of the table:
+/// "units", "format" (of the columns), and what the header says. Any HDF5 reader opens it: h5dump, h5py,
+/// MATLAB. Not RT safe.
 class RecordingWriter {
  public:
   /// Throws RecordingError. An existing file is refused: a recording is never overwritten.
@@ -49,7 +50,8 @@ struct Recording {
   std::vector<TickRecord> ticks;
 };
 
-/// Reads a recording back, bit for bit. Throws RecordingError.
+/// Reads a recording back, bit for bit. Throws RecordingError, also for a recording of another format: what
+/// it leaves out would be made up.
 Recording read_recording(const std::filesystem::path& file);
 
 }  // namespace wrenchd

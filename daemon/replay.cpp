@@ -7,6 +7,13 @@
 namespace wrenchd {
 namespace {
 
+Pose pose_of(const std::array<double, 7>& x) noexcept {
+  Pose X;
+  X.translation_m = {x[0], x[1], x[2]};
+  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
+  return X;
+}
+
 /// A device whose samples come out of a recording, one a tick.
 class RecordedDevice final : public Device {
  public:
@@ -30,11 +37,27 @@ class RecordedDevice final : public Device {
   const TickRecord* record_ = nullptr;
 };
 
+/// A placer whose answers come out of a recording, at the ticks at which they came then.
+class RecordedPlacer final : public Placer {
+ public:
+  void play(const TickRecord& record) noexcept { record_ = &record; }
+
+  void ask(const PlacementQuestion& question) noexcept override { number_ = question.number; }
+  bool answer(PlacementAnswer& answer) noexcept override {
+    const auto placing = static_cast<Placing>(record_->placing);
+    answer = {number_, placing == Placing::placed, pose_of(record_->X_WQ)};
+    return placing == Placing::placed || placing == Placing::nowhere;
+  }
+
+ private:
+  const TickRecord* record_ = nullptr;
+  std::uint32_t number_ = 0;
+};
+
 DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   const TickRecord& r = *record_;
   DeviceSample sample;
-  sample.X_BH.translation_m = {r.X_BH[0], r.X_BH[1], r.X_BH[2]};
-  sample.X_BH.rotation.coeffs() << r.X_BH[3], r.X_BH[4], r.X_BH[5], r.X_BH[6];
+  sample.X_BH = pose_of(r.X_BH);
   sample.V_BH.linear_m_per_s = {r.V_BH[0], r.V_BH[1], r.V_BH[2]};
   sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
   sample.device_time_s = r.device_time_s;
@@ -64,24 +87,26 @@ std::optional<Difference> compare(std::uint64_t tick, const char* field, std::sp
 
 std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
   const auto whole = [](const TickRecord& r) {
-    return std::array<double, 9>{r.energy,
-                                 r.authority,
-                                 static_cast<double>(r.contacts),
-                                 static_cast<double>(r.iterations),
-                                 static_cast<double>(r.projection_status),
-                                 static_cast<double>(r.engagement),
-                                 static_cast<double>(r.limit_causes),
-                                 static_cast<double>(r.fault),
-                                 static_cast<double>(r.released)};
+    return std::array<double, 10>{r.energy,
+                                  r.authority,
+                                  static_cast<double>(r.contacts),
+                                  static_cast<double>(r.iterations),
+                                  static_cast<double>(r.projection_status),
+                                  static_cast<double>(r.placing),
+                                  static_cast<double>(r.engagement),
+                                  static_cast<double>(r.limit_causes),
+                                  static_cast<double>(r.fault),
+                                  static_cast<double>(r.released)};
   };
   if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
   if (auto d = compare(then.tick, "X_WQ", then.X_WQ, now.X_WQ)) return d;
   if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
-  return compare(then.tick,
-                 "energy, authority, contacts, iterations, status, engagement, causes, fault, released",
-                 whole(then), whole(now));
+  return compare(
+      then.tick,
+      "energy, authority, contacts, iterations, status, placing, engagement, causes, fault, released",
+      whole(then), whole(now));
 }
 
 }  // namespace
@@ -90,12 +115,15 @@ std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
   const Scene scene(plan.scene);
   const VirtualClock clock;
   RecordedDevice device;
-  ServoLoop loop(plan.settings, plan.profile, device, scene, clock);
+  RecordedPlacer placer;
+  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
   for (const TickRecord& then : recording.ticks) {
     device.play(then);
+    placer.play(then);
     const TimePoint now{Duration(then.now_ns)};
     if (then.arm_command == 1) loop.arm();
     if (then.arm_command == 2) loop.disarm();
+    if (then.start_over != 0) loop.start_over();
     // The record of a stop that was asked for is the last tick's, with zero wrench and `released` set.
     if (then.released != 0 && then.fault == 0)
       loop.release(now, Fault::none);

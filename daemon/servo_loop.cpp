@@ -2,6 +2,7 @@
 #include "daemon/servo_loop.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/energy_law.hpp"
 #include "core/finite.hpp"
@@ -21,6 +22,11 @@ namespace {
 constexpr Duration kStaleAfter = std::chrono::milliseconds(3);
 /// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
 constexpr int kDevicePatience_periods = 4;
+/// Where the placer found no room it is asked again after so long: a search without end would keep a
+/// processor busy, and a hand does not go far in that time.
+constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
+
+constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
 Pose pose_of(const PlacementSettings& placement) noexcept {
   return {rotation_from(placement.rotation_vector_rad), placement.position_m};
@@ -38,8 +44,9 @@ std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
 }  // namespace
 
 ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
-                     const Scene& scene, const Clock& clock, RecordRing* records)
+                     const Scene& scene, Placer& placer, const Clock& clock, RecordRing* records)
     : device_(device),
+      placer_(placer),
       clock_(clock),
       records_(records),
       X_WB_(pose_of(settings.device.base_in_world)),
@@ -54,7 +61,9 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       M_(scene.tool().solid.inertia),
       law_(gains_for(settings.rendering.method, settings.wrench.gains)),
       limits_(settings.limits, profile.max_force_N, profile.max_torque_Nm),
-      soft_start_(settings.limits.soft_start_s) {}
+      soft_start_(settings.limits.soft_start_s) {
+  lose_place();
+}
 
 Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
   TimePoint due = clock.now();
@@ -126,8 +135,8 @@ TimePoint ServoLoop::wait_for_next(Clock& clock, TimePoint due) noexcept {
   return next;
 }
 
-/// Starts the tick's record, takes arm and disarm, and looks at the time: after a gap (a stalled machine, a
-/// debugger, a suspend) the hand gets nothing until the soft start has run again.
+/// Starts the tick's record, takes arm, disarm and start over, and looks at the time: after a gap (a stalled
+/// machine, a debugger, a suspend) the hand gets nothing until the soft start has run again.
 void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
   tick_start_ = lap_start_ = clock_.now();
   const std::uint64_t tick = record_.tick + (last_tick_ ? 1 : 0);
@@ -136,7 +145,8 @@ void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
   record_.now_ns = now.time_since_epoch().count();
   record_.wake_latency_ns = (now - due).count();
   record_.arm_command = arm_command_.exchange(0, std::memory_order_relaxed);
-  obey(record_.arm_command);
+  record_.start_over = start_over_command_.exchange(0, std::memory_order_relaxed);
+  obey_commands();
 
   const Duration since_last = last_tick_ ? now - *last_tick_ : period_;
   dt_s_ = std::min(seconds(since_last), 2.0 * seconds(period_));  // a gap must not let the slew limit leap
@@ -148,21 +158,59 @@ void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
   last_tick_ = now;
 }
 
-void ServoLoop::obey(std::uint8_t command) noexcept {
-  if (command == 1) soft_start_.arm();
-  if (command == 2) soft_start_.disarm();
+/// A hand that felt nothing may have gone through walls while the proxy stayed behind: arming starts over.
+void ServoLoop::obey_commands() noexcept {
+  const bool arms = record_.arm_command == 1 && soft_start_.state() == Engagement::disarmed;
+  if (arms || record_.start_over != 0) lose_place();
+  if (arms) soft_start_.arm();
+  if (record_.arm_command == 2) soft_start_.disarm();
 }
 
-/// Lines 2 to 6: p from the sample, and its projection q. The first sample has no history to follow, so it is
-/// projected globally; from then on q follows the hand as a proxy.
+/// Nothing is known of q: no contact, zero wrench, and the soft start waits.
+void ServoLoop::lose_place() noexcept {
+  placing_ = Placing::seeking;
+  asked_ = false;
+  said_nowhere_ = false;
+  penetration_.forget();
+  depth_ = Penetration{};
+  depth_.projection.status = ProjectionStatus::infeasible;
+  F_T_ = F_out_ = Wrench{};
+  law_.reset();
+  limits_.reset();
+  soft_start_.interrupt();
+}
+
+/// Lines 2 to 6: p from the sample, and its projection q, which follows the hand from last tick's as a proxy.
 void ServoLoop::project(const DeviceSample& sample) noexcept {
   X_WP_ = X_WB_ * sample.X_BH * X_HT_;
-  depth_ = X_WQ_ ? penetration_.follow(X_WP_, *X_WQ_) : penetration_.query(X_WP_);
-  if (depth_.projection.status != ProjectionStatus::infeasible || X_WQ_) X_WQ_ = depth_.projection.X_WQ;
+  if (!has_place()) return place();
+  depth_ = penetration_.follow(X_WP_, X_WQ_);
+  X_WQ_ = depth_.projection.X_WQ;
+  placing_ = Placing::following;
+}
+
+/// There is no q to follow from. The search for one may take seconds, so another thread does it, whatever the
+/// scene: asked at one tick, it answers at a later one, with a pose near to where the hand was then. That is
+/// this tick's q, and the next follows from it.
+void ServoLoop::place() noexcept {
+  if (!asked_) {
+    if (placing_ == Placing::nowhere && *last_tick_ < ask_again_) return;
+    placing_ = Placing::seeking;
+    placer_.ask({++question_, X_WP_});
+    asked_ = true;
+    return;
+  }
+  PlacementAnswer answer;
+  if (!placer_.answer(answer) || answer.number != question_)
+    return;  // one that was asked before we started over
+  asked_ = false;
+  placing_ = answer.found ? Placing::placed : Placing::nowhere;
+  X_WQ_ = answer.X_WQ;
+  ask_again_ = *last_tick_ + kAskAgainAfter;
 }
 
 /// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,
-/// which knows when the poses were taken.
+/// which knows when the poses were taken. Without a q there is no contact.
 void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const double dt_s = sampled_ ? sample.device_time_s - sample_time_s_ : 0.0;
   sample_time_s_ = sample.device_time_s;
@@ -170,7 +218,7 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const bool in_contact = depth_.contacts > 0;
   F_T_ = spring_ == SpringLaw::pid
              ? law_.update(depth_.drive, in_contact, dt_s)
-             : law_.update_damping(energy_wrench(M_, energy_stiffness_per_s2_, X_WP_, *X_WQ_), depth_.drive,
+             : law_.update_damping(energy_wrench(M_, energy_stiffness_per_s2_, X_WP_, X_WQ_), depth_.drive,
                                    in_contact, dt_s);
   F_out_ = outgoing(X_WB_ * sample.X_BH);
 }
@@ -192,7 +240,7 @@ Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
 }
 
 bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
-  return !stale_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
+  return has_place() && !stale_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
          sample.V_BH.angular_rad_per_s.norm() < kCalmAngularSpeed_rad_per_s &&
          F_out_.force_N.norm() < kCalmShareOfLimit * limits_.max_force_N() &&
          F_out_.torque_Nm.norm() < kCalmShareOfLimit * limits_.max_torque_Nm();
@@ -210,14 +258,20 @@ void ServoLoop::finish(TimePoint now, const DeviceSample& sample, const Limited&
 
 void ServoLoop::describe(const Limited& out) noexcept {
   record_.X_WP = numbers(X_WP_);
-  record_.X_WQ = numbers(X_WQ_.value_or(X_WP_));
-  record_.eps = numbers(depth_.eps.head<3>(), depth_.eps.tail<3>());
+  record_.X_WQ.fill(kNotSet);
+  if (has_place()) record_.X_WQ = numbers(X_WQ_);
+  record_.eps.fill(kNotSet);
+  record_.energy = record_.kkt_residual = kNotSet;
+  if (placing_ == Placing::following) {
+    record_.eps = numbers(depth_.eps.head<3>(), depth_.eps.tail<3>());
+    record_.energy = depth_.projection.energy;
+    record_.kkt_residual = depth_.projection.kkt_residual;
+  }
   record_.F_T = numbers(F_T_.force_N, F_T_.torque_Nm);
-  record_.energy = depth_.projection.energy;
-  record_.kkt_residual = depth_.projection.kkt_residual;
   record_.contacts = depth_.contacts;
   record_.iterations = depth_.projection.iterations;
   record_.projection_status = static_cast<std::uint8_t>(depth_.projection.status);
+  record_.placing = static_cast<std::uint8_t>(placing_);
   record_.engagement = static_cast<std::uint8_t>(soft_start_.state());
   record_.limit_causes = out.causes;
   record_.F_out = numbers(out.F.force_N, out.F.torque_Nm);
@@ -255,6 +309,21 @@ void ServoLoop::say_changes(TimePoint now, const DeviceSample& sample) noexcept 
   if (soft_start_.state() != said_engagement_)
     say(Event::Kind::engagement, now, static_cast<std::uint32_t>(soft_start_.state()));
   said_engagement_ = soft_start_.state();
+  say_placing(now);
+}
+
+/// Each once: that the proxy's place is looked for, that it was found, that there is none.
+void ServoLoop::say_placing(TimePoint now) noexcept {
+  if (has_place() != said_placed_) {
+    if (has_place())
+      say(Event::Kind::placed, now, 0, (X_WQ_.translation_m - X_WP_.translation_m).norm());
+    else
+      say(Event::Kind::placing, now);
+  }
+  said_placed_ = has_place();
+  if (placing_ == Placing::nowhere && !said_nowhere_) say(Event::Kind::nowhere, now);
+  said_nowhere_ = said_nowhere_ || placing_ == Placing::nowhere;
+  if (placing_ != Placing::following) return;
   const ProjectionStatus status = depth_.projection.status;
   if (status != said_status_ && status == ProjectionStatus::infeasible)
     say(Event::Kind::no_admissible_pose, now);

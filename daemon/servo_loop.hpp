@@ -17,6 +17,7 @@
 #include "core/wrench_law.hpp"
 #include "daemon/event.hpp"
 #include "daemon/loop_timing.hpp"
+#include "daemon/placer.hpp"
 #include "daemon/tick_record.hpp"
 #include "devices/device.hpp"
 
@@ -36,7 +37,7 @@ class ServoLoop {
   /// Everything is kept by reference or copied; the device is open. records may be null: then nothing is
   /// recorded.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
-            const Clock& clock, RecordRing* records = nullptr);
+            Placer& placer, const Clock& clock, RecordRing* records = nullptr);
 
   /// Ticks until stop is set or a fault ends the loop, and releases the hand on every way out. Returns the
   /// fault. clock: the same as at construction, to sleep on.
@@ -53,6 +54,12 @@ class ServoLoop {
   void arm() noexcept { arm_command_.store(1, std::memory_order_relaxed); }
   void disarm() noexcept { arm_command_.store(2, std::memory_order_relaxed); }
 
+  /// Says that last tick's q means nothing any more: the tool or the scene was changed, an obstacle was put
+  /// where the tool is. From the next tick on there is no contact force until the placer has found an
+  /// admissible pose near the hand, and then the soft start runs again. Arming does the same by itself. Any
+  /// thread.
+  void start_over() noexcept { start_over_command_.store(1, std::memory_order_relaxed); }
+
   const LoopTiming& timing() const noexcept { return timing_; }
   LatestValue<TickRecord>& latest() noexcept { return latest_; }
   EventRing& events() noexcept { return events_; }
@@ -62,6 +69,7 @@ class ServoLoop {
  private:
   void begin(TimePoint now, TimePoint due) noexcept;
   void project(const DeviceSample& sample) noexcept;
+  void place() noexcept;
   void compute_wrench(const DeviceSample& sample) noexcept;
   Limited limit(const DeviceSample& sample, TimePoint now) noexcept;
   void finish(TimePoint now, const DeviceSample& sample, const Limited& out) noexcept;
@@ -70,15 +78,19 @@ class ServoLoop {
 
   Wrench outgoing(const Pose& X_WH) const noexcept;
   bool calm(const DeviceSample& sample) const noexcept;
-  void obey(std::uint8_t command) noexcept;
+  void obey_commands() noexcept;
+  void lose_place() noexcept;
+  bool has_place() const noexcept { return placing_ == Placing::following || placing_ == Placing::placed; }
   void lap(Stage stage) noexcept;
   void say(Event::Kind kind, TimePoint at, std::uint32_t detail = 0, double value = 0.0) noexcept;
   void say_changes(TimePoint now, const DeviceSample& sample) noexcept;
+  void say_placing(TimePoint now) noexcept;
   void record_sample(const DeviceSample& sample) noexcept;
   TimePoint wait_for_next(Clock& clock, TimePoint due) noexcept;
 
   // Constant after construction
   Device& device_;
+  Placer& placer_;
   const Clock& clock_;
   RecordRing* records_;
   Pose X_WB_;
@@ -96,11 +108,15 @@ class ServoLoop {
   WrenchLaw law_;
   WrenchLimits limits_;
   SoftStart soft_start_;
-  std::optional<Pose> X_WQ_;  ///< last tick's projection: the proxy
+  Placing placing_ = Placing::seeking;
+  Pose X_WQ_;  ///< last tick's projection, the proxy; means nothing unless has_place()
   Pose X_WP_;
   Penetration depth_;
   Wrench F_T_;                  ///< of the law chosen, body frame
   Wrench F_out_;                ///< the same as the device wants it, before limits
+  std::uint32_t question_ = 0;  ///< number of the last one to the placer
+  bool asked_ = false;          ///< and it is not answered yet
+  TimePoint ask_again_{};       ///< not before then
   double sample_time_s_ = 0.0;  ///< device time of the last fresh sample
   bool sampled_ = false;
   bool stale_ = false;
@@ -114,7 +130,10 @@ class ServoLoop {
   Engagement said_engagement_ = Engagement::disarmed;
   bool said_stale_ = false;
   ProjectionStatus said_status_ = ProjectionStatus::free;
+  bool said_placed_ = true;
+  bool said_nowhere_ = false;
   std::atomic<std::uint8_t> arm_command_{0};
+  std::atomic<std::uint8_t> start_over_command_{0};
   LoopTiming timing_;
   LatestValue<TickRecord> latest_;
   EventRing events_;

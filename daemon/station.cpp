@@ -30,6 +30,11 @@ std::filesystem::path named_on_command_line(const std::filesystem::path& name, c
                     search.not_found(name) + ", and from here " + given.lexically_normal().string());
 }
 
+std::unique_ptr<Placer> make_placer(const Scene& scene, PlaceIn place_in) {
+  if (place_in == PlaceIn::step) return std::make_unique<PlacerInStep>(scene);
+  return std::make_unique<PlacerThread>(scene);
+}
+
 }  // namespace
 
 Plan read_plan(const PlanFiles& files, const SearchPath& search) {
@@ -45,14 +50,15 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
   return plan;
 }
 
-Station::Station(Plan plan, Clock& clock)
+Station::Station(Plan plan, Clock& clock, PlaceIn place_in)
     : plan_(std::move(plan)),
       scene_(plan_.scene),
       simulated_(plan_.profile, plan_.settings.simulation),
       link_(simulated_, clock, plan_.settings.simulation),
       device_(plan_.profile, link_),
+      placer_(make_placer(scene_, place_in)),
       records_(Recorder::kRingRecords),
-      loop_(plan_.settings, plan_.profile, device_, scene_, clock,
+      loop_(plan_.settings, plan_.profile, device_, scene_, *placer_, clock,
             plan_.settings.recording.file.empty() ? nullptr : &records_) {
   device_.open();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "config/settings.hpp"
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
+#include "daemon/placer.hpp"
 #include "daemon/recording_file.hpp"
 #include "daemon/servo_loop.hpp"
 #include "devices/loopback_link.hpp"
@@ -35,11 +37,17 @@ struct PlanFiles {
 /// Reads the configuration, its scene and its profile. Throws ConfigError.
 Plan read_plan(const PlanFiles& files, const SearchPath& search);
 
+/// Where the proxy's place is looked for when it is not known.
+enum class PlaceIn : std::uint8_t {
+  thread,  ///< beside the servo loop
+  step,    ///< in the tick: virtual time, every run the same
+};
+
 /// The parts of one running wrenchd, built from a plan in the order in which they need each other.
 class Station {
  public:
   /// The clock must outlive this. Throws MeshError, std::runtime_error.
-  Station(Plan plan, Clock& clock);
+  Station(Plan plan, Clock& clock, PlaceIn place_in = PlaceIn::thread);
   ~Station();
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
@@ -59,6 +67,7 @@ class Station {
   SimulatedDevice simulated_;
   LoopbackLink link_;
   ProfileDevice device_;
+  std::unique_ptr<Placer> placer_;
   RecordRing records_;
   ServoLoop loop_;
 };

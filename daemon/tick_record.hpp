@@ -27,19 +27,22 @@ struct TickRecord {
   std::uint8_t motors_on = 0;
   std::uint8_t watchdog_tripped = 0;
   std::uint8_t arm_command = 0;  ///< 1: arm was asked for since the last tick, 2: disarm
+  std::uint8_t start_over = 0;   ///< 1: start_over() was called since the last tick
   std::array<double, 7> X_BH{};  ///< handle in the device base
   std::array<double, 6> V_BH{};  ///< linear [m/s], angular [rad/s]
 
   // What was made of it
   std::array<double, 7> X_WP{};  ///< body frame at the device pose, p
-  std::array<double, 7> X_WQ{};  ///< its projection, q
-  std::array<double, 6> eps{};   ///< Eq. (15) [m, rad]
-  std::array<double, 6> F_T{};   ///< body wrench, Eq. (16), before limits
-  double energy = 0.0;           ///< T of Eq. (8) [kg m^2]
-  double kkt_residual = 0.0;
+  std::array<double, 7>
+      X_WQ{};                   ///< its projection, q; NaN while seeking or nowhere; where placed, the answer
+  std::array<double, 6> eps{};  ///< Eq. (15) [m, rad]; NaN unless following
+  std::array<double, 6> F_T{};  ///< body wrench, Eq. (16), before limits
+  double energy = 0.0;          ///< T of Eq. (8) [kg m^2]; NaN unless following
+  double kkt_residual = 0.0;    ///< likewise
   std::uint16_t contacts = 0;
   std::uint16_t iterations = 0;
-  std::uint8_t projection_status = 0;  ///< ProjectionStatus
+  std::uint8_t projection_status = 0;  ///< ProjectionStatus; infeasible unless following
+  std::uint8_t placing = 0;            ///< Placing
 
   // What went out
   std::uint8_t engagement = 0;    ///< Engagement

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
+#include <thread>
 
 #include <catch2/catch.hpp>
 
 #include "collision/penetration.hpp"
+#include "tests/support/buried.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_body.hpp"
-#include "tests/support/shipped_plan.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -62,6 +64,31 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   CHECK(fault == Fault::device_lost);
   CHECK(in_contact > 3000);
   CHECK(saturated > 500);
+  CHECK(allocations == 0);
+  CHECK(locks == 0);
+}
+
+TEST_CASE("to be placed, to start over and to be armed neither allocates nor locks in the servo thread",
+          "[realtime][placing]") {
+  const Buried buried({{0.0, {0, 0, 0.03}}, {0.5, {0, 0, 0.08}}});
+  VirtualStation s(buried.plan, PlaceIn::thread);
+  int seeking = 0;
+  int placed = 0;
+  std::uint64_t allocations = 0;
+  std::uint64_t locks = 0;
+  for (int ticks = 0; placed < 3 && ticks < 100000; ++ticks) {
+    if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    const RealtimeGuard guard;
+    if (placing(s) == Placing::following && placed == 1) s.station.loop().start_over();
+    if (placing(s) == Placing::following && placed == 2) s.station.loop().arm();
+    s.tick();
+    seeking += placing(s) == Placing::seeking ? 1 : 0;
+    placed += placing(s) == Placing::placed ? 1 : 0;
+    allocations += guard.allocations();
+    locks += guard.locks();
+  }
+  CHECK(placed == 3);
+  CHECK(seeking >= 3);
   CHECK(allocations == 0);
   CHECK(locks == 0);
 }

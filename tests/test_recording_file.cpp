@@ -4,6 +4,7 @@
 #include <limits>
 
 #include <catch2/catch.hpp>
+#include <hdf5.h>
 
 #include "daemon/recording_file.hpp"
 #include "tests/support/random_values.hpp"
@@ -23,7 +24,8 @@ TickRecord random_record(RandomValues& random) {
   any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged), any(r.skipped);
   any(r.missing), any(r.rejected), any(r.buttons), any(r.fresh), any(r.motors_on), any(r.watchdog_tripped);
   any(r.arm_command), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.engagement);
-  any(r.limit_causes), any(r.fault), any(r.released), any(r.wake_latency_ns);
+  any(r.limit_causes), any(r.fault), any(r.released), any(r.start_over), any(r.placing);
+  any(r.wake_latency_ns);
   for (auto& ns : r.stage_ns) any(ns);
   for (auto* list : {&r.X_BH, &r.X_WP, &r.X_WQ})
     for (double& x : *list) x = random.normal();
@@ -57,6 +59,31 @@ TEST_CASE("a recording reads back as it was written, bit for bit", "[recording]"
   REQUIRE(recording.ticks.size() == records.size());
   for (std::size_t i = 0; i < records.size(); ++i)
     REQUIRE(std::memcmp(&recording.ticks[i], &records[i], sizeof(TickRecord)) == 0);
+}
+
+TEST_CASE("a recording of another format is refused, with its version", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  { const RecordingWriter writer(file, {"0.0.9", "", "", ""}); }
+  const std::string named = GENERATE(std::string("1"), std::string("3"));
+  {
+    const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t table = H5Dopen2(opened, "/ticks", H5P_DEFAULT);
+    if (named == "1") {  // the first had no such attribute
+      H5Adelete(table, "format");
+    } else {
+      const hid_t attribute = H5Aopen(table, "format", H5P_DEFAULT);
+      const hid_t type = H5Aget_type(attribute);
+      H5Awrite(attribute, type, named.data());
+      H5Tclose(type);
+      H5Aclose(attribute);
+    }
+    H5Dclose(table);
+    H5Fclose(opened);
+  }
+  CHECK_THROWS_WITH(read_recording(file),
+                    Catch::Contains(file.string() + ": is of format " + named) &&
+                        Catch::Contains("replay it with the wrenchd that wrote it (0.0.9)"));
 }
 
 TEST_CASE("recordings are refused with the file and the cure", "[recording]") {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include <catch2/catch.hpp>
 
 #include "daemon/recorder.hpp"
 #include "daemon/replay.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/buried.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;
@@ -51,6 +53,54 @@ TEST_CASE("a replayed recording gives the same bits", "[replay]") {
   const auto difference = replay(recording, plan);
   if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
   CHECK_FALSE(difference.has_value());
+}
+
+TEST_CASE("a replay places the proxy at the ticks at which it was placed, where it was placed",
+          "[replay][placing]") {
+  // Inside, out, and back against the boulder; started over on the way.
+  Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
+  buried.plan.settings.recording.file = "set";
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  int seeking = 0;
+  int placed = 0;
+  {
+    VirtualStation s(buried.plan, PlaceIn::thread);  // a thread's answers come when they come
+    Recorder recorder(s.station.records(), file, s.station.recording_header());
+    for (int i = 0; i < 4000; ++i) {
+      if (i == 5) s.station.loop().arm();
+      if (i == 20 || i == 3500) s.station.loop().start_over();
+      if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      REQUIRE(s.tick() == Fault::none);
+      seeking += placing(s) == Placing::seeking ? 1 : 0;
+      placed += placing(s) == Placing::placed ? 1 : 0;
+    }
+    s.station.loop().release(s.clock.now(), Fault::none);
+  }
+  CHECK(seeking > 2);
+  CHECK(placed >= 2);
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 4001);
+  auto difference = replay(recording, buried.plan);
+  if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
+  CHECK_FALSE(difference.has_value());
+
+  // Another answer, and all that follows is another.
+  Recording changed = recording;
+  for (TickRecord& tick : changed.ticks)
+    if (static_cast<Placing>(tick.placing) == Placing::placed) tick.X_WQ[0] += 1e-4;
+  difference = replay(changed, buried.plan);
+  REQUIRE(difference.has_value());
+  CHECK(difference->field.rfind("X_WQ[", 0) == 0);
+}
+
+TEST_CASE("where there was no place, there is none in the replay", "[replay][placing]") {
+  Plan plan = recording_plan(Method::exact);
+  plan.scene.half_spaces = closed_box(0.02);
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  record_run(plan, file, 4.0);
+  CHECK_FALSE(replay(read_recording(file), plan).has_value());
 }
 
 TEST_CASE("a replay names the first tick and field that differ", "[replay]") {

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <atomic>
+#include <cstring>
+#include <memory>
 #include <thread>
 
 #include <catch2/catch.hpp>
 
+#include "collision/placement.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/event_log.hpp"
 #include "daemon/wall_clock.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/buried.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -193,6 +197,176 @@ TEST_CASE("a gap in time starts the soft start anew: no kick after a stall", "[s
   }
 }
 
+TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is out, and then no kick",
+          "[servo][placing]") {
+  // Inside, drawn out to the side, and back against the boulder.
+  const Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.075}}});
+  const PlaceIn place_in = GENERATE(PlaceIn::step, PlaceIn::thread);
+  VirtualStation s(buried.plan, place_in);
+  Placement placement(s.station.scene());
+  const double slew_N = buried.plan.settings.limits.force_slew_N_per_s * 1e-3;
+  const double most_N = buried.plan.profile.max_force_N;
+  s.station.loop().arm();
+  REQUIRE(s.tick() == Fault::none);
+  CHECK(placing(s) == Placing::seeking);
+  int seeking = 0;
+  double last_N = 0.0, last_authority = 0.0;
+  bool waited = false, ramped = false;
+  for (const TimePoint end = s.clock.now() + from_seconds(4.0); s.clock.now() < end;) {
+    // The thread's time is the machine's; it may need some while the hand stays.
+    if (place_in == PlaceIn::thread && !waited && placing(s) == Placing::seeking)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    REQUIRE(s.tick() == Fault::none);
+    if (placing(s) != Placing::following) {
+      CHECK(s.force_N() == 0.0);
+      CHECK(s.torque_Nm() == 0.0);
+      CHECK(s.last.contacts == 0);
+      CHECK(s.engagement() == Engagement::waiting);
+    }
+    if (placing(s) == Placing::seeking) {
+      CHECK(std::isnan(s.last.X_WQ[0]));
+      CHECK(std::isnan(s.last.energy));
+      ++seeking;
+      continue;
+    }
+    if (s.last.tick % 10 == 0) CHECK(placement.admissible(pose_of(s.last.X_WQ)));
+    waited = waited || s.engagement() == Engagement::waiting;
+    ramped = ramped || s.engagement() == Engagement::ramping;
+    CHECK(s.force_N() <= last_N + slew_N + 1e-9);
+    CHECK(s.force_N() <= s.last.authority * most_N + 1e-9);
+    CHECK(s.last.authority <= last_authority + 0.0011);
+    last_N = s.force_N();
+    last_authority = s.last.authority;
+  }
+  CHECK(seeking >= 1);
+  CHECK(waited);
+  CHECK(ramped);
+  CHECK(s.engagement() == Engagement::active);
+  CHECK(s.last.contacts > 0);
+  CHECK(s.last.F_out[2] > 0.5);
+}
+
+TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, and does not push",
+          "[servo][placing]") {
+  const Buried buried({{0.0, {0, 0, 0.03}}});
+  VirtualStation s(buried.plan);
+  s.station.loop().arm();
+  REQUIRE(s.run(0.5) == Fault::none);
+  CHECK(placing(s) == Placing::following);
+  CHECK(s.last.contacts > 0);
+  CHECK(Placement(s.station.scene()).admissible(pose_of(s.last.X_WQ)));
+  CHECK(s.last.energy > 0.0);
+  CHECK(s.engagement() == Engagement::waiting);
+  CHECK(s.force_N() == 0.0);
+}
+
+TEST_CASE("where the tool fits nowhere there is no force, it is said once, and tried again",
+          "[servo][placing]") {
+  Plan plan = shipped_plan();
+  plan.scene.half_spaces = closed_box(0.02);  // the cube's half edge is 25 mm
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  int answers = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Placing before = placing(s);
+    REQUIRE(s.tick() == Fault::none);
+    CHECK((placing(s) == Placing::seeking || placing(s) == Placing::nowhere));
+    CHECK(std::isnan(s.last.X_WQ[0]));
+    CHECK(s.force_N() == 0.0);
+    CHECK(s.engagement() == Engagement::waiting);
+    answers += before == Placing::seeking && placing(s) == Placing::nowhere ? 1 : 0;
+  }
+  CHECK(answers >= 9);  // ten times a second
+  CHECK(answers <= 11);
+  int said = 0;
+  for (Event event; s.station.loop().events().pop(event);) {
+    said += event.kind == Event::Kind::nowhere ? 1 : 0;
+    CHECK(event.kind != Event::Kind::placed);
+    CHECK(event.kind != Event::Kind::no_admissible_pose);
+  }
+  CHECK(said == 1);
+}
+
+TEST_CASE("starting over drops the force at once and comes back by the soft start", "[servo][placing]") {
+  VirtualStation s;
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  REQUIRE(s.force_N() > 0.5);
+  s.station.loop().start_over();
+  REQUIRE(s.tick() == Fault::none);
+  CHECK(s.last.start_over == 1);
+  CHECK(placing(s) == Placing::seeking);
+  CHECK(s.force_N() == 0.0);
+  CHECK(s.engagement() == Engagement::waiting);
+  REQUIRE(s.tick() == Fault::none);
+  CHECK(s.last.start_over == 0);
+  CHECK(placing(s) == Placing::placed);
+  CHECK_FALSE(std::isnan(s.last.X_WQ[0]));
+  CHECK(s.force_N() == 0.0);
+  REQUIRE(s.tick() == Fault::none);
+  CHECK(placing(s) == Placing::following);
+  CHECK(s.last.contacts == 4);
+  for (double last_authority = 0.0; s.engagement() != Engagement::active;) {
+    REQUIRE(s.clock.now() < TimePoint{} + std::chrono::seconds(30));
+    REQUIRE(s.tick() == Fault::none);
+    CHECK(s.force_N() <= s.last.authority * s.station.plan().profile.max_force_N);
+    CHECK(s.last.authority <= last_authority + 0.0011);
+    last_authority = s.last.authority;
+  }
+}
+
+TEST_CASE("what a hand goes through while it feels nothing does not hold it once it is armed",
+          "[servo][placing]") {
+  // From above the boulder right through it, disarmed.
+  const Buried buried({{0.0, {0, 0, 0.12}}, {1.0, {0, 0, -0.12}}});
+  VirtualStation s(buried.plan);
+  REQUIRE(s.run(1.5) == Fault::none);
+  CHECK(s.last.X_WP[2] < -0.11);
+  CHECK(s.last.X_WQ[2] > 0.05);  // it followed, and never through the boulder
+  s.station.loop().arm();
+  REQUIRE(s.run(1.5) == Fault::none);
+  CHECK(s.engagement() == Engagement::active);
+  CHECK(s.last.contacts == 0);
+  CHECK(s.last.X_WQ == s.last.X_WP);
+}
+
+TEST_CASE("a stop while the proxy is being placed ends the loop and the search", "[servo][placing]") {
+  const Buried buried({{0.0, {0, 0, 0.03}}}, 100000);
+  WallClock clock;
+  auto station = std::make_unique<Station>(buried.plan, clock);
+  std::atomic<bool> stop{false};
+  Fault fault = Fault::none;
+  std::thread servo([&] { fault = station->loop().run(clock, stop); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  stop.store(true);
+  servo.join();
+  TickRecord last;
+  REQUIRE(station->loop().latest().read(last));
+  CHECK(fault == Fault::none);
+  CHECK(last.released == 1);
+  CHECK(static_cast<Placing>(last.placing) == Placing::seeking);
+  const TimePoint stopped = clock.now();
+  station.reset();
+  CHECK(clock.now() - stopped < std::chrono::seconds(1));  // milliseconds on an idle machine
+}
+
+TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
+  const Buried buried({{0.0, {0, 0, 0.03}}});
+  VirtualStation s(buried.plan);
+  REQUIRE(s.run(0.1) == Fault::none);
+  s.station.loop().start_over();
+  s.inject(SimulatedFault::Kind::silence, 0.1, 0.008);
+  while (placing(s) == Placing::following) REQUIRE(s.tick() == Fault::none);
+  for (int i = 0; i < 5; ++i) {
+    const Placing before = placing(s);
+    REQUIRE(s.tick() == Fault::none);
+    if (s.last.fresh == 0) CHECK(placing(s) == before);
+    CHECK(s.force_N() == 0.0);
+  }
+  REQUIRE(s.run(0.05) == Fault::none);
+  CHECK(placing(s) == Placing::following);
+}
+
 TEST_CASE("release may be called at any time, and again", "[servo]") {
   VirtualStation s;
   s.station.loop().release(s.clock.now(), Fault::none);
@@ -214,7 +388,7 @@ TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
     REQUIRE(a.tick() == Fault::none);
     REQUIRE(b.tick() == Fault::none);
     REQUIRE(a.last.F_out == b.last.F_out);
-    REQUIRE(a.last.X_WQ == b.last.X_WQ);
+    REQUIRE(std::memcmp(&a.last.X_WQ, &b.last.X_WQ, sizeof a.last.X_WQ) == 0);  // NaN where there is none
   }
 }
 
@@ -256,5 +430,8 @@ TEST_CASE("what the servo thread says becomes lines that name the cure", "[servo
         "fault device_lost: the device left the bus; plug it in again; wrenchd comes back disarmed");
   CHECK(to_text({Event::Kind::engagement, {}, static_cast<std::uint32_t>(Engagement::active), 0.0}) ==
         "engagement: active");
+  CHECK(to_text({Event::Kind::placed, {}, 0, 0.0125}) == "placed 12.5 mm from the hand");
+  CHECK(to_text({Event::Kind::placing, {}, 0, 0.0}).find("zero wrench until") != std::string::npos);
+  CHECK(to_text({Event::Kind::nowhere, {}, 0, 0.0}).find("the tool does not fit") != std::string::npos);
   CHECK(to_text({Event::Kind::late_tick, {}, 0, 0.0305}).find("30.5 ms late") != std::string::npos);
 }

@@ -17,7 +17,8 @@ struct VirtualStation {
   Station station;
   TickRecord last;
 
-  explicit VirtualStation(Plan plan = shipped_plan()) : station(std::move(plan), clock) {}
+  explicit VirtualStation(Plan plan = shipped_plan(), PlaceIn place_in = PlaceIn::step)
+      : station(std::move(plan), clock, place_in) {}
 
   Fault tick() { return tick_after(from_seconds(1.0 / station.plan().settings.servo.rate_Hz)); }
   Fault tick_after(Duration pause) {
