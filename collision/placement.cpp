@@ -27,7 +27,7 @@ class Halton {
   Vector3d in_ball() noexcept {
     for (;;) {
       ++index_;
-      const Vector3d p = 2.0 * Vector3d(digit_sum(2), digit_sum(3), digit_sum(5)) - Vector3d::Ones();
+      Vector3d p = 2.0 * Vector3d(digit_sum(2), digit_sum(3), digit_sum(5)) - Vector3d::Ones();
       if (p.squaredNorm() <= 1.0) return p;
     }
   }

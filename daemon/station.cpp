@@ -22,7 +22,7 @@ std::string contents(const std::filesystem::path& file) {
 }
 
 std::filesystem::path named_on_command_line(const std::filesystem::path& name, const SearchPath& search) {
-  const auto given = std::filesystem::absolute(name);
+  auto given = std::filesystem::absolute(name);
   std::error_code error;
   if (std::filesystem::exists(given, error)) return given;
   if (const auto found = search.find(name)) return *found;
