@@ -30,7 +30,7 @@ class RunningProgram {
  public:
   RunningProgram(const std::string& name, const std::vector<std::string>& arguments,
                  const std::string& in = {}) {
-    const std::string program = std::string(WRENCHD_BINARY_DIR) + "/" + name;
+    const std::string program = WRENCHD_BINARY_DIR "/" + name;
     std::vector<std::string> words = arguments;
     words.insert(words.begin(), program);
     std::vector<char*> argv;
