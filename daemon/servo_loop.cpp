@@ -161,7 +161,7 @@ void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
 /// A hand that felt nothing may have gone through walls while the proxy stayed behind: arming starts over.
 void ServoLoop::obey_commands() noexcept {
   const bool arms = record_.arm_command == 1 && soft_start_.state() == Engagement::disarmed;
-  if (arms || record_.start_over != 0) lose_place();
+  if ((arms && has_place()) || record_.start_over != 0) lose_place();
   if (arms) soft_start_.arm();
   if (record_.arm_command == 2) soft_start_.disarm();
 }

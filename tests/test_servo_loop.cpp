@@ -315,6 +315,21 @@ TEST_CASE("starting over drops the force at once and comes back by the soft star
   }
 }
 
+TEST_CASE("to be armed while a place is looked for does not begin the search anew", "[servo][placing]") {
+  const auto ticks_until_placed = [](int armed_at) {
+    VirtualStation s;
+    int ticks = 0;
+    for (; ticks < 100 && placing(s) != Placing::placed; ++ticks) {
+      if (ticks == armed_at) s.station.loop().arm();
+      REQUIRE(s.tick() == Fault::none);
+    }
+    return ticks;
+  };
+  const int without = ticks_until_placed(-1);
+  CHECK(without < 10);
+  CHECK(ticks_until_placed(without - 1) == without);
+}
+
 TEST_CASE("what a hand goes through while it feels nothing does not hold it once it is armed",
           "[servo][placing]") {
   // From above the boulder right through it, disarmed.
