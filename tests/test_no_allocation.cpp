@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
-#include <thread>
 
 #include <catch2/catch.hpp>
 
@@ -77,7 +75,7 @@ TEST_CASE("to be placed, to start over and to be armed neither allocates nor loc
   std::uint64_t allocations = 0;
   std::uint64_t locks = 0;
   for (int ticks = 0; placed < 3 && ticks < 100000; ++ticks) {
-    if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    let_placer_work(s);
     const RealtimeGuard guard;
     if (placing(s) == Placing::following && placed == 1) s.station.loop().start_over();
     if (placing(s) == Placing::following && placed == 2) s.station.loop().arm();

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <chrono>
 #include <fstream>
-#include <thread>
 
 #include <catch2/catch.hpp>
 
@@ -70,7 +68,7 @@ TEST_CASE("a replay places the proxy at the ticks at which it was placed, where 
     for (int i = 0; i < 4000; ++i) {
       if (i == 5) s.station.loop().arm();
       if (i == 20 || i == 3500) s.station.loop().start_over();
-      if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      let_placer_work(s);
       REQUIRE(s.tick() == Fault::none);
       seeking += placing(s) == Placing::seeking ? 1 : 0;
       placed += placing(s) == Placing::placed ? 1 : 0;

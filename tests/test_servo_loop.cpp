@@ -213,9 +213,7 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
   double last_N = 0.0, last_authority = 0.0;
   bool waited = false, ramped = false;
   for (const TimePoint end = s.clock.now() + from_seconds(4.0); s.clock.now() < end;) {
-    // The thread's time is the machine's; it may need some while the hand stays.
-    if (place_in == PlaceIn::thread && !waited && placing(s) == Placing::seeking)
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    if (place_in == PlaceIn::thread) let_placer_work(s);
     REQUIRE(s.tick() == Fault::none);
     if (placing(s) != Placing::following) {
       CHECK(s.force_N() == 0.0);

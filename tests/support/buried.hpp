@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <chrono>
 #include <sstream>
+#include <thread>
 #include <vector>
 
 #include "tests/support/shipped_plan.hpp"
@@ -39,6 +41,11 @@ inline std::vector<HalfSpaceSettings> closed_box(double half_m) {
 
 inline Placing placing(const VirtualStation& s) {
   return static_cast<Placing>(s.last.placing);
+}
+
+/// Gives a placer on a thread of its own time to answer, while little passes for the hand.
+inline void let_placer_work(const VirtualStation& s) {
+  if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 
 }  // namespace wrenchd::test
