@@ -19,6 +19,9 @@
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
 #include <CGAL/Surface_mesh.h>
 
+#include "collision/soup_sides.hpp"
+#include "collision/tally.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -27,19 +30,8 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
 
-std::string place(const Vector3d& p) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << '(' << p.x() << ", " << p.y() << ", " << p.z() << ')';
-  return text.str();
-}
-
 std::string edge_place(const PolygonSoup& soup, const Edge& e) {
   return place(soup.vertices[e.first]) + " to " + place(soup.vertices[e.second]);
-}
-
-std::string also(std::size_t count) {
-  return count > 1 ? " (" + std::to_string(count) + " in all)" : "";
 }
 
 /// A negative index of the file has wrapped around; it is told as it was written.
@@ -50,26 +42,8 @@ std::string index_text(std::size_t v) {
 /// Where everything cuts through everything, pairs grow with the square of the faces.
 constexpr std::size_t kMostIntersections = 1000;
 
-/// First place and number of a kind of defect.
-class Tally {
- public:
-  /// sentence: makes the text, which only the first of a million needs.
-  template <class Sentence>
-  void found(const Sentence& sentence) {
-    if (count_++ == 0) first_ = sentence();
-  }
-  void report(std::vector<std::string>& defects, const std::string& cure) const {
-    if (count_ > 0) defects.push_back(first_ + also(count_) + "; " + cure);
-  }
-  bool any() const { return count_ > 0; }
-
- private:
-  std::size_t count_ = 0;
-  std::string first_;
-};
-
-std::string face_name(std::size_t f) {
-  return "face " + std::to_string(f);
+std::string face_name(const PolygonSoup& soup, std::size_t f) {
+  return "face " + std::to_string(soup.face_in_file(f));
 }
 
 bool uses_a_vertex_twice(const std::vector<std::size_t>& face) {
@@ -77,27 +51,38 @@ bool uses_a_vertex_twice(const std::vector<std::size_t>& face) {
   return std::set<std::size_t>(face.begin(), face.end()).size() != face.size();
 }
 
-/// Numbers, indices and faces that are no polygons. Without these right, nothing else can be asked.
-void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
-  Tally not_finite, out_of_range, too_few, repeated;
+/// Without numbers and indices right, nothing else can be asked.
+void check_numbers(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  Tally not_finite, out_of_range;
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
     if (!soup.vertices[v].allFinite())
-      not_finite.found(
-          [&] { return "vertex " + std::to_string(v) + " is not a number: " + place(soup.vertices[v]); });
+      not_finite.found([&] {
+        return "vertex " + std::to_string(soup.vertex_in_file(v)) +
+               " is not a number: " + place(soup.vertices[v]);
+      });
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
-    const auto& face = soup.faces[f];
-    if (face.size() < 3)
-      too_few.found([&] { return face_name(f) + " has " + std::to_string(face.size()) + " vertices"; });
-    for (const std::size_t v : face)
+    for (const std::size_t v : soup.faces[f])
       if (v >= soup.vertices.size())
         out_of_range.found([&] {
-          return face_name(f) + " uses vertex " + index_text(v) + ", but there are only " +
+          return face_name(soup, f) + " uses vertex " + index_text(v) + ", but there are only " +
                  std::to_string(soup.vertices.size());
         });
-    if (uses_a_vertex_twice(face)) repeated.found([&] { return face_name(f) + " uses a vertex twice"; });
   }
   not_finite.report(defects, "export the mesh again");
   out_of_range.report(defects, "vertex numbers start at 0; export the mesh again");
+}
+
+/// Faces that are no polygons.
+void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  check_numbers(soup, defects);
+  Tally too_few, repeated;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    const auto& face = soup.faces[f];
+    if (face.size() < 3)
+      too_few.found([&] { return face_name(soup, f) + " has " + std::to_string(face.size()) + " vertices"; });
+    if (uses_a_vertex_twice(face))
+      repeated.found([&] { return face_name(soup, f) + " uses a vertex twice"; });
+  }
   too_few.report(defects, "remove it");
   repeated.report(defects, "remove degenerate faces in the modeller");
 }
@@ -114,56 +99,31 @@ void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
   Tally flat;
   for (std::size_t f = 0; f < soup.faces.size(); ++f)
     if (!(area_of(soup, soup.faces[f]) > 0.0))
-      flat.found(
-          [&] { return face_name(f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area"; });
+      flat.found([&] {
+        return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area";
+      });
   flat.report(defects, "remove degenerate faces in the modeller");
-}
-
-/// A side of a face, as the face runs along it.
-struct Side {
-  Edge edge;  ///< the smaller vertex first
-  std::size_t face;
-  bool forward;  ///< from the smaller vertex to the larger
-};
-
-/// Of all faces, those of one edge next to each other, in the order of the faces.
-std::vector<Side> sides_of(const PolygonSoup& soup) {
-  std::vector<Side> sides;
-  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
-    const auto& face = soup.faces[f];
-    for (std::size_t i = 0; i < face.size(); ++i) {
-      const auto [low, high] = std::minmax(face[i], face[i + 1 < face.size() ? i + 1 : 0]);
-      sides.push_back({{low, high}, f, low == face[i]});
-    }
-  }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return a.edge != b.edge ? a.edge < b.edge : a.face < b.face;
-  });
-  return sides;
 }
 
 /// Closed and consistently oriented: every edge runs once in each direction.
 void check_edges(const PolygonSoup& soup, MeshReport& report) {
-  const std::vector<Side> sides = sides_of(soup);
   Tally open, crowded, same_way;
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
-    while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
-    const auto where = [&, i] {
-      const Edge& e = sides[i].edge;
-      const bool as_stored = sides[i].forward || end - i > 2;
+  for_each_edge(sides_of(soup), [&](std::span<const Side> sides) {
+    const auto where = [&] {
+      const Edge& e = sides[0].edge;
+      const bool as_stored = sides[0].forward || sides.size() > 2;
       return "the edge from " + edge_place(soup, as_stored ? e : Edge(e.second, e.first));
     };
-    const auto face = [&](std::size_t k) { return std::to_string(sides[k].face); };
-    if (end - i == 1)
-      open.found([&] { return where() + " belongs to face " + face(i) + " only: the surface is open"; });
-    else if (end - i > 2)
-      crowded.found([&] { return where() + " belongs to " + std::to_string(end - i) + " faces"; });
-    else if (sides[i].forward == sides[i + 1].forward)
+    const auto face = [&](std::size_t k) { return std::to_string(soup.face_in_file(sides[k].face)); };
+    if (sides.size() == 1)
+      open.found([&] { return where() + " belongs to face " + face(0) + " only: the surface is open"; });
+    else if (sides.size() > 2)
+      crowded.found([&] { return where() + " belongs to " + std::to_string(sides.size()) + " faces"; });
+    else if (sides[0].forward == sides[1].forward)
       same_way.found([&] {
-        return "faces " + face(i) + " and " + face(i + 1) + " are oriented against each other along " +
-               where();
+        return "faces " + face(0) + " and " + face(1) + " are oriented against each other along " + where();
       });
-  }
+  });
   open.report(report.defects, "close the hole in the modeller");
   crowded.report(report.defects, "a solid has two faces at every edge: split or remove the extra ones");
   same_way.report(report.defects, "make all faces counter-clockwise seen from outside");
@@ -198,7 +158,8 @@ void check_vertices(const PolygonSoup& soup, MeshReport& report) {
     } while (++ring < end - begin && at != begin);
     if (ring < end - begin)
       pinched.found([&] {
-        return "parts of the surface meet only in vertex " + std::to_string(begin->vertex) + " at " +
+        return "parts of the surface meet only in vertex " +
+               std::to_string(soup.vertex_in_file(begin->vertex)) + " at " +
                place(soup.vertices[begin->vertex]);
       });
     begin = end;
@@ -217,19 +178,20 @@ SurfaceMesh surface_mesh(const PolygonSoup& soup) {
   return mesh;
 }
 
-/// Cuts every face into triangles. Returns for each triangle its face's number in the file.
+/// Cuts every face of a mesh made of the soup into triangles. Returns for each triangle its face's number in
+/// the file.
 std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh, MeshReport& report) {
   std::vector<std::size_t> face_of(soup.faces.size());
   Tally uncut;
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
-    face_of[f] = f;  // its first triangle keeps the number
+    face_of[f] = soup.face_in_file(f);  // its first triangle keeps the index
     if (soup.faces[f].size() > 3 &&
         !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh))
       uncut.found([&] {
-        return face_name(f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
+        return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
                " cannot be cut into triangles";
       });
-    face_of.resize(mesh.number_of_faces(), f);
+    face_of.resize(mesh.number_of_faces(), soup.face_in_file(f));
   }
   uncut.report(report.defects, "make it flat, or cut it in the modeller");
   return face_of;
@@ -248,7 +210,7 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
       (a == b ? "two halves of face " + std::to_string(a)
               : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
       " near " + place({corner.x(), corner.y(), corner.z()}) + " cut through each other" +
-      (pairs.size() < kMostIntersections ? also(pairs.size()) : " (1000 or more in all)") +
+      (pairs.size() < kMostIntersections ? in_all(pairs.size()) : " (1000 or more in all)") +
       "; unite the parts in the modeller");
 }
 
@@ -261,6 +223,20 @@ void check_volume(const SurfaceMesh& mesh, MeshReport& report) {
           ? "all faces look inwards (the volume is negative); flip the faces in the modeller"
           : "its shells do not bound a volume: one looks the wrong way, or nothing is inside; "
             "make outer shells look outwards and cavities inwards");
+}
+
+/// The faces side by side, with nothing shared: what is no manifold can be cut into triangles so. The corners
+/// of the mesh are those of the faces, one after the other.
+SurfaceMesh separate_faces(const PolygonSoup& soup) {
+  PolygonSoup apart;
+  for (const auto& face : soup.faces) {
+    auto& copy = apart.faces.emplace_back();
+    for (const std::size_t v : face) {
+      copy.push_back(apart.vertices.size());
+      apart.vertices.push_back(soup.vertices[v]);
+    }
+  }
+  return surface_mesh(apart);
 }
 
 TriangleMesh triangles_of(const SurfaceMesh& mesh) {
@@ -276,14 +252,42 @@ TriangleMesh triangles_of(const SurfaceMesh& mesh) {
   return out;
 }
 
-}  // namespace
-
-MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
+MeshReport report_on(const PolygonSoup& soup) {
   MeshReport report;
   report.vertices = soup.vertices.size();
   report.faces = soup.faces.size();
   report.volume = std::numeric_limits<double>::quiet_NaN();
   check_elements(soup, report.defects);
+  return report;
+}
+
+}  // namespace
+
+std::vector<std::string> wrong_numbers(const PolygonSoup& soup) {
+  std::vector<std::string> defects;
+  check_numbers(soup, defects);
+  return defects;
+}
+
+MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles) {
+  MeshReport report = report_on(soup);
+  if (!report.defects.empty()) return report;
+  check_areas(soup, report.defects);
+  if (!report.defects.empty()) return report;
+  SurfaceMesh mesh = separate_faces(soup);
+  triangulate(soup, mesh, report);
+  if (triangles == nullptr || !report.defects.empty()) return report;
+  std::vector<std::uint32_t> vertex;  // of the soup, for each of the mesh
+  for (const auto& face : soup.faces) vertex.insert(vertex.end(), face.begin(), face.end());
+  *triangles = triangles_of(mesh);
+  triangles->vertices_m = soup.vertices;
+  for (auto& corners : triangles->triangles)
+    for (std::uint32_t& v : corners) v = vertex[v];
+  return report;
+}
+
+MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
+  MeshReport report = report_on(soup);
   if (!report.defects.empty()) return report;
   check_areas(soup, report.defects);
   check_edges(soup, report);

@@ -24,9 +24,18 @@ struct MeshReport {
   bool solid() const noexcept { return defects.empty(); }
 };
 
+/// What makes a soup nothing at all: coordinates that are no numbers, indices of vertices that are not there.
+/// One sentence each; none where all is right. Not RT safe.
+std::vector<std::string> wrong_numbers(const PolygonSoup& soup);
+
 /// Looks at everything that makes a mesh a closed, consistently oriented solid. Names faces and vertices by
 /// their number in the file, from 0. `triangles` receives the triangulated surface when there is no defect.
 /// Not RT safe.
 MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles = nullptr);
+
+/// Looks at what even a surface must be: numbers, indices, and faces that have an area. It may be open, cut
+/// through itself and have edges of any number of faces; closed, consistent and outward are not looked at.
+/// Not RT safe.
+MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles = nullptr);
 
 }  // namespace wrenchd

@@ -20,6 +20,17 @@ class MeshError : public std::runtime_error {
 struct PolygonSoup {
   std::vector<Vector3d> vertices;
   std::vector<std::vector<std::size_t>> faces;
+  /// Once something was taken out: the numbers in the file of what is left. Empty: nothing was.
+  std::vector<std::size_t> vertex_numbers = {};
+  std::vector<std::size_t> face_numbers = {};
+
+  /// Number of a vertex or face in the file, from 0.
+  std::size_t vertex_in_file(std::size_t v) const noexcept {
+    return v < vertex_numbers.size() ? vertex_numbers[v] : v;
+  }
+  std::size_t face_in_file(std::size_t f) const noexcept {
+    return f < face_numbers.size() ? face_numbers[f] : f;
+  }
 };
 
 /// Reads OFF, OBJ, STL or PLY, told apart by the extension. STL has no shared vertices: equal ones are

@@ -258,6 +258,43 @@ TEST_CASE("a face that cannot be cut into triangles is found") {
   check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be cut into triangles (6 in all); make it flat"});
 }
 
+TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must have numbers and areas") {
+  const auto triangles_of = [](const PolygonSoup& soup) {
+    TriangleMesh mesh;
+    const MeshReport report = check_surface(soup, &mesh);
+    CHECK(report.defects.empty());
+    CHECK(mesh.vertices_m == soup.vertices);
+    return mesh.triangles.size();
+  };
+  CHECK(triangles_of(kBox) == 12);
+  CHECK(triangles_of(inside_out(kBox)) == 12);
+  CHECK(triangles_of({kBox.vertices, {kBox.faces[0], kBox.faces[3]}}) == 4);
+  CHECK(triangles_of(both(kBox, box({1, 1, 1}, {3, 2, 2}))) == 24);
+  PolygonSoup fin = triangulated(kBox);
+  fin.vertices.emplace_back(1, -1, 0);
+  fin.faces.push_back({0, 1, 8});
+  fin.faces.push_back({0, 1, 8});
+  CHECK(triangles_of(fin) == 14);
+
+  const auto refused_with = [](const PolygonSoup& soup, const std::string& words) {
+    TriangleMesh mesh;
+    const MeshReport report = check_surface(soup, &mesh);
+    CHECK(mesh.triangles.empty());
+    REQUIRE(report.defects.size() == 1);
+    CHECK(report.defects[0].find(words) != std::string::npos);
+  };
+  PolygonSoup bad = kBox;
+  bad.vertices[2].x() = std::numeric_limits<double>::quiet_NaN();
+  refused_with(bad, "vertex 2 is not a number");
+  bad = kBox;
+  bad.faces[4][1] = 9;
+  refused_with(bad, "face 4 uses vertex 9");
+  bad = kBox;
+  bad.vertices.emplace_back(1, 0, 0);
+  bad.faces.push_back({0, 1, 8});
+  refused_with(bad, "face 6 near (0, 0, 0) has no area");
+}
+
 TEST_CASE("what has no inside is refused") {
   CHECK_FALSE(check_solid({}).solid());
   CHECK_FALSE(check_solid({kBox.vertices, {}}).solid());
