@@ -19,6 +19,7 @@
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
 #include <CGAL/Surface_mesh.h>
 
+#include "collision/mesh_repair.hpp"
 #include "collision/soup_sides.hpp"
 #include "collision/tally.hpp"
 
@@ -283,6 +284,20 @@ MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles) {
   triangles->vertices_m = soup.vertices;
   for (auto& corners : triangles->triangles)
     for (std::uint32_t& v : corners) v = vertex[v];
+  return report;
+}
+
+MeshReport repair_and_check_solid(PolygonSoup& soup, TriangleMesh* triangles) {
+  std::vector<std::string> changes = repair(soup);
+  MeshReport report = check_solid(soup, triangles);
+  report.changes = std::move(changes);
+  return report;
+}
+
+MeshReport repair_and_check_surface(PolygonSoup& soup, TriangleMesh* triangles) {
+  std::vector<std::string> changes = repair(soup);
+  MeshReport report = check_surface(soup, triangles);
+  report.changes = std::move(changes);
   return report;
 }
 

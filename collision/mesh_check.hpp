@@ -18,8 +18,9 @@ struct MeshReport {
   bool consistent = false;  ///< neighbouring faces run along their common edge in opposite directions
   bool outward = false;     ///< the faces bound a volume, with their outer side outside
   bool self_intersecting = false;
-  double volume = 0.0;               ///< in file units cubed; NaN while the mesh is not closed and consistent
-  std::vector<std::string> defects;  ///< one sentence each: what, where, how many, and the cure
+  double volume = 0.0;  ///< in file units cubed; NaN while the mesh is not closed and consistent
+  std::vector<std::string> changes = {};  ///< what was repaired before, a sentence each (mesh_repair.hpp)
+  std::vector<std::string> defects;       ///< one sentence each: what, where, how many, and the cure
 
   bool solid() const noexcept { return defects.empty(); }
 };
@@ -37,5 +38,9 @@ MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles = nullpt
 /// through itself and have edges of any number of faces; closed, consistent and outward are not looked at.
 /// Not RT safe.
 MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles = nullptr);
+
+/// The same of what is left to repair() first; the report tells both. Not RT safe.
+MeshReport repair_and_check_solid(PolygonSoup& soup, TriangleMesh* triangles = nullptr);
+MeshReport repair_and_check_surface(PolygonSoup& soup, TriangleMesh* triangles = nullptr);
 
 }  // namespace wrenchd

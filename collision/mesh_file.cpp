@@ -6,7 +6,6 @@
 #include <cctype>
 #include <cstdint>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <system_error>
 
@@ -26,6 +25,9 @@ using Point = Kernel::Point_3;
 constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 30;
 
 constexpr std::array<const char*, 4> kExtensions = {".off", ".obj", ".stl", ".ply"};
+
+/// What some editors put in front of a text.
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
 std::string lower_extension(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
@@ -54,19 +56,28 @@ void require_readable(const std::filesystem::path& file) {
 MeshSource read_bytes(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   MeshSource source{file, {}};
-  source.bytes.assign(std::istreambuf_iterator<char>(in), {});
-  if (in.bad() || source.bytes.empty())
-    source.refuse(0, "cannot be read; check the file and its permissions");
+  source.bytes.resize(std::filesystem::file_size(file));
+  in.read(source.bytes.data(), static_cast<std::streamsize>(source.bytes.size()));
+  if (!in || source.bytes.empty()) source.refuse(0, "cannot be read; check the file and its permissions");
+  if (source.bytes.starts_with(kByteOrderMark)) source.bytes.erase(0, kByteOrderMark.size());
   return source;
+}
+
+/// "OFF8 6 0", as a well-known collection of models has it.
+void part_off_counts(std::string& bytes) {
+  const std::size_t digit = bytes.find("OFF") + 3;
+  if (bytes.find("OFF") <= 2 && digit < bytes.size() && bytes[digit] >= '0' && bytes[digit] <= '9')
+    bytes.insert(digit, 1, ' ');
 }
 
 /// CGAL's readers are handed only what they can be trusted with (collision/mesh_source.hpp).
 bool read_soup(MeshSource source, const std::string& extension, std::vector<Point>& points,
                std::vector<std::vector<std::size_t>>& faces) {
   const auto silent = CGAL::parameters::verbose(false);
+  if (extension == ".off") part_off_counts(source.bytes);
   if (extension == ".off") guard_off(source);
-  if (extension == ".ply") guard_ply(source);
-  if (extension == ".stl") guard_stl(source);
+  if (extension == ".ply") source.bytes = guarded_ply(std::move(source));
+  if (extension == ".stl") source.bytes = guarded_stl(std::move(source));
   if (extension == ".obj") source.bytes = guarded_obj(source);
   std::istringstream in(std::move(source.bytes));
   if (extension == ".off") return CGAL::IO::read_OFF(in, points, faces, silent);
@@ -77,13 +88,22 @@ bool read_soup(MeshSource source, const std::string& extension, std::vector<Poin
 
 }  // namespace
 
-PolygonSoup read_mesh_file(const std::filesystem::path& file) {
+MeshSource read_mesh_source(const std::filesystem::path& file) {
   require_readable(file);
+  return read_bytes(file);
+}
+
+PolygonSoup read_mesh_file(const std::filesystem::path& file) {
+  return parse_mesh(read_mesh_source(file));
+}
+
+PolygonSoup parse_mesh(MeshSource source) {
+  const std::filesystem::path file = source.file;
   std::vector<Point> points;
   PolygonSoup soup;
   bool read = false;
   try {
-    read = read_soup(read_bytes(file), lower_extension(file), points, soup.faces);
+    read = read_soup(std::move(source), lower_extension(file), points, soup.faces);
   } catch (const MeshError&) {
     throw;
   } catch (const std::exception&) {

@@ -33,8 +33,16 @@ struct PolygonSoup {
   }
 };
 
-/// Reads OFF, OBJ, STL or PLY, told apart by the extension. STL has no shared vertices: equal ones are
+struct MeshSource;
+
+/// The bytes of an OFF, OBJ, STL or PLY file. Throws MeshError. Not RT safe.
+MeshSource read_mesh_source(const std::filesystem::path& file);
+
+/// What the bytes say, of a format told by the file's extension. STL has no shared vertices: equal ones are
 /// merged. Throws MeshError. Not RT safe.
+PolygonSoup parse_mesh(MeshSource source);
+
+/// Both. Throws MeshError. Not RT safe.
 PolygonSoup read_mesh_file(const std::filesystem::path& file);
 
 }  // namespace wrenchd

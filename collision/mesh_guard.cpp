@@ -141,6 +141,17 @@ std::size_t count_obj_vertices(const MeshSource& source) {
   return count;
 }
 
+/// A line of an OBJ file that ends in a backslash goes on in the next.
+MeshSource with_joined_lines(MeshSource source) {
+  std::string& text = source.bytes;
+  for (std::size_t at = 0; (at = text.find('\\', at)) != std::string::npos; ++at) {
+    const std::size_t end = at + 1 + (text.compare(at + 1, 1, "\r") == 0 ? 1 : 0);
+    if (text.compare(end, 1, "\n") == 0)
+      std::fill_n(text.begin() + static_cast<std::ptrdiff_t>(at), end - at + 1, ' ');
+  }
+  return source;
+}
+
 bool obj_statement(std::string_view word) {
   constexpr std::size_t kLongest = 12;
   return word.size() <= kLongest && std::all_of(word.begin(), word.end(), [](char c) {
@@ -172,20 +183,57 @@ void guard_binary_stl(const MeshSource& source, std::size_t triangles) {
                              " is not a finite number; export the mesh again");
 }
 
-void guard_ascii_stl(const MeshSource& source) {
+bool is_word(std::string_view word, std::string_view lower_case) {
+  return std::equal(word.begin(), word.end(), lower_case.begin(), lower_case.end(),
+                    [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
+}
+
+/// Whatever else is cut off, the last word may be, and is left to CGAL to miss.
+std::string guarded_ascii_stl(const MeshSource& source) {
+  std::string text;
+  std::size_t facet = 0;
+  int numbers = 0;  // still to come
+  int corners = 0;
+  bool normal = false;  // from "facet" to "outer": all numbers, and of no use
   Lines lines(source.bytes);
-  int expected = 0;  // coordinates still to come
   for (Words words; next_words(lines, words);) {
-    for (const std::string_view word : words) {
-      if (expected > 0 && !number_of(word))
-        source.refuse(lines.number(), "vertex: expected three finite numbers, found " + in_quotes(word) +
-                                          "; export the mesh again");
-      if (expected > 0)
-        --expected;
-      else if (word == "vertex")
-        expected = 3;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      const std::string_view word = words[i];
+      const auto is = [&](std::string_view lower_case) { return is_word(word, lower_case); };
+      if (numbers > 0) {
+        if (!number_of(word))
+          source.refuse(lines.number(), "vertex: expected three finite numbers, found " + in_quotes(word) +
+                                            "; export the mesh again");
+        (text += ' ') += word;
+        if (--numbers == 0) text += '\n';
+      } else if (is("vertex")) {
+        text += "vertex";
+        numbers = 3;
+        ++corners;
+      } else if (is("facet")) {
+        text += "facet normal 0 0 0\n";
+        normal = true;
+        corners = 0;
+      } else if (is("outer")) {
+        text += "outer loop\n";
+        normal = false;
+      } else if (is("endfacet")) {
+        if (corners != 3)
+          source.refuse(lines.number(), "facet " + std::to_string(facet) + " has " + std::to_string(corners) +
+                                            " vertices, not three; export the mesh again");
+        text += "endfacet\n";
+        ++facet;
+      } else if (is("endloop")) {
+        text += "endloop\n";
+      } else if (is("solid") || is("endsolid")) {
+        text += is("solid") ? "solid\n" : "endsolid\n";
+        break;  // a name may follow
+      } else if (!normal && !is("loop") && !(i + 1 == words.size() && lines.rest().empty())) {
+        source.refuse(lines.number(), in_quotes(word) + " is no word of an STL file; export the mesh again");
+      }
     }
   }
+  return text;
 }
 
 }  // namespace
@@ -204,7 +252,8 @@ void guard_off(const MeshSource& source) {
                                       " faces; correct the counts");
 }
 
-std::string guarded_obj(const MeshSource& source) {
+std::string guarded_obj(const MeshSource& as_it_is) {
+  const MeshSource source = with_joined_lines(as_it_is);
   const std::size_t count = count_obj_vertices(source);
   std::string text;
   std::size_t vertices = 0;
@@ -222,14 +271,16 @@ std::string guarded_obj(const MeshSource& source) {
       require_numbers(source, lines.number(), words, 1, 4, what);
       append_line(text, {words.begin(), words.begin() + 4});
     } else if (words[0] == "f") {
+      text += 'f';
       for (std::size_t i = 1; i < words.size(); ++i) {
         const auto v = obj_corner(words[i], vertices);
         if (!v || *v < 0 || static_cast<std::size_t>(*v) >= count)
           source.refuse(lines.number(), "face " + std::to_string(faces) + ": there is no vertex " +
                                             in_quotes(words[i]) + "; there are " + std::to_string(count) +
                                             ", numbered from 1: export the mesh again");
+        text += ' ' + std::to_string(*v + 1);
       }
-      append_line(text, words);
+      text += '\n';
       ++faces;
     }
   }
@@ -238,14 +289,17 @@ std::string guarded_obj(const MeshSource& source) {
 }
 
 // A binary file may begin with "solid" too, so its size decides: 84 bytes and 50 a triangle.
-void guard_stl(const MeshSource& source) {
+std::string guarded_stl(MeshSource source) {
   const std::size_t size = source.bytes.size();
   const std::size_t triangles = size < kStlHeader ? 0 : at<std::uint32_t>(source.bytes, 80);
   const std::size_t binary_size = kStlHeader + kStlTriangle * triangles;
-  if (size == binary_size) return guard_binary_stl(source, triangles);
+  if (size == binary_size) {
+    guard_binary_stl(source, triangles);
+    return std::move(source.bytes);
+  }
   const auto start = source.bytes.find_first_not_of(" \t\r\n");
-  if (start != std::string::npos && source.bytes.compare(start, 5, "solid") == 0)
-    return guard_ascii_stl(source);
+  if (start != std::string::npos && is_word(std::string_view(source.bytes).substr(start, 5), "solid"))
+    return guarded_ascii_stl(source);
   if (size < kStlHeader) source.refuse(0, "is too short for an STL; export the mesh again");
   source.refuse(0, "does not begin with 'solid', and a binary STL of " + std::to_string(triangles) +
                        " triangles has " + std::to_string(binary_size) + " bytes, not " +

@@ -46,10 +46,11 @@ std::string in_quotes(std::string_view word);
 /// they assume, numbers that they round or pass over. Each throws MeshError that names the line and the cure,
 /// and returns when the reader has nothing left to trip on. Time and memory are in proportion to the file.
 void guard_off(const MeshSource& source);
-void guard_stl(const MeshSource& source);
-void guard_ply(const MeshSource& source);
-/// The same for OBJ; returns the vertex and face lines alone, with single blanks, which is all of OBJ that
-/// CGAL reads.
+/// The same; what exporters write in other ways than CGAL expects is rewritten. Of OBJ the vertex and face
+/// lines are left, with single blanks and vertices counted from 1; of ascii STL the corners, without names,
+/// normals and capitals; of PLY the header without carriage returns.
 std::string guarded_obj(const MeshSource& source);
+std::string guarded_stl(MeshSource source);
+std::string guarded_ply(MeshSource source);
 
 }  // namespace wrenchd

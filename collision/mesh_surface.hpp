@@ -44,9 +44,9 @@ class MeshSurface {
     std::array<std::uint32_t, 3> vertices;
     std::array<std::uint32_t, 3> edges;
   };
-  /// What the mesh is the skin of.
-  enum class Kind : std::uint8_t { solid, surface };
+  using Kind = BodyKind;
 
+  MeshSurface() = default;  ///< of nothing, to be filled in by each_member()
   MeshSurface(TriangleMesh mesh, Kind kind);
 
   Kind kind() const noexcept { return kind_; }
@@ -72,6 +72,13 @@ class MeshSurface {
   double radius_m() const noexcept { return radius_m_; }
   std::size_t pointed_count() const noexcept { return pointed_count_; }
 
+  /// Calls use(member) for all that it holds: how it is kept on disk (collision/mesh_cache.hpp).
+  template <class Use>
+  void each_member(const Use& use) {
+    use(mesh_.vertices_m), use(mesh_.triangles), use(kind_), use(neighbours_), use(planes_), use(region_);
+    use(features_), use(edges_), use(ring_begin_), use(ring_), use(radius_m_), use(pointed_count_);
+  }
+
  private:
   using Corners = std::array<std::uint32_t, 3>;
 
@@ -82,7 +89,7 @@ class MeshSurface {
   bool sharp(std::uint32_t triangle, int side) const noexcept;
 
   TriangleMesh mesh_;
-  Kind kind_;
+  Kind kind_ = Kind::solid;
   std::vector<Corners> neighbours_;  ///< across the side from corner i to corner i + 1; kNone: none
   std::vector<Plane> planes_;
   std::vector<std::uint32_t> region_;  ///< the triangle whose plane it is

@@ -254,7 +254,7 @@ class Values {
 
 }  // namespace
 
-void guard_ply(const MeshSource& source) {
+std::string guarded_ply(MeshSource source) {
   Lines lines(source.bytes);
   const PlyHeader header = read_header(source, lines);
   check_elements(source, header);
@@ -271,6 +271,9 @@ void guard_ply(const MeshSource& source) {
   }
   if (!values.at_end())
     source.refuse(0, "goes on behind the elements that its header counts; correct the counts");
+  const auto header_end = source.bytes.end() - static_cast<std::ptrdiff_t>(lines.rest().size());
+  source.bytes.erase(std::remove(source.bytes.begin(), header_end, '\r'), header_end);
+  return std::move(source.bytes);
 }
 
 }  // namespace wrenchd

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 #include "collision/convex_hull.hpp"
@@ -14,34 +16,53 @@
 namespace wrenchd {
 namespace {
 
-/// Reads what the settings name.
-Scene load(const SceneSettings& settings) {
-  ToolBody tool = load_tool(settings.tool);
-  std::vector<TriangleMesh> solids;
-  std::vector<ConvexBody> hulls;
-  bool all_convex = !settings.meshes.empty() && fills_its_hull(tool.mesh, tool.hull);
-  for (const MeshObstacleSettings& obstacle : settings.meshes) {
-    solids.push_back(load_solid(obstacle.mesh));
-    if (!all_convex) continue;
-    hulls.push_back(convex_hull(solids.back().vertices_m));
-    all_convex = fills_its_hull(solids.back(), hulls.back());
+/// What is made once of each mesh file, scale and kind.
+struct Made {
+  std::shared_ptr<const LoadedMesh> loaded;
+  std::shared_ptr<const TreedMesh> treed;
+  std::optional<ConvexBody> hull;  ///< in file units, where it is convex
+};
+
+Made make(const MeshObstacleSettings& obstacle, bool all_convex, MeshLoader& loader) {
+  Made made;
+  made.loaded = loader.load(obstacle.mesh, obstacle.kind);
+  loader.look_at_size(*made.loaded, obstacle.scale, kObstacleSize);
+  require_size_for_contacts(made.loaded->mesh, obstacle.scale, obstacle.mesh);
+  TriangleMesh mesh = made.loaded->mesh;
+  if (all_convex && obstacle.kind == BodyKind::solid && may_fill_its_hull(mesh)) {
+    ConvexBody hull = loader.hull(*made.loaded);
+    if (fills_its_hull(mesh, hull)) made.hull = std::move(hull);
   }
+  for (Vector3d& p : mesh.vertices_m) p *= obstacle.scale;
+  made.treed = loader.treed(std::move(mesh), obstacle.kind, obstacle.mesh);
+  return made;
+}
+
+/// Reads what the settings name.
+Scene load(const SceneSettings& settings, MeshLoader& loader) {
+  ToolBody tool = load_tool(settings.tool, loader);
+  if (settings.meshes.empty()) return Scene(std::move(tool), settings.half_spaces);
+  require_size_for_contacts(tool.mesh, 1.0, settings.tool.mesh);
+
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;
-  std::map<std::pair<std::filesystem::path, double>, std::shared_ptr<const TreedMesh>> made;
-  for (std::size_t k = 0; k < solids.size(); ++k) {
-    const auto& [name, file, scale, X_WM] = settings.meshes[k];
-    std::shared_ptr<const TreedMesh>& mesh = made[{file, scale}];
-    if (!mesh) {
-      for (Vector3d& p : solids[k].vertices_m) p *= scale;
-      mesh = std::make_shared<const TreedMesh>(std::move(solids[k]));
-    }
-    meshes.emplace_back(name, mesh, X_WM);
+  bool all_convex = fills_its_hull(tool.mesh, tool.hull);
+  std::map<std::tuple<std::filesystem::path, double, BodyKind>, Made> all_made;
+  for (const MeshObstacleSettings& obstacle : settings.meshes) {
+    const auto [at, is_new] = all_made.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
+    Made& made = at->second;
+    if (is_new) made = make(obstacle, all_convex, loader);
+    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM);
+    all_convex = all_convex && made.hull;
     if (!all_convex) continue;
-    for (Vector3d& p : hulls[k].vertices_T_m) p = X_WM * Vector3d(p * scale);
-    convex.push_back(convex_obstacle(name, std::move(hulls[k])));
+    ConvexBody hull = *made.hull;
+    for (Vector3d& p : hull.vertices_T_m) p = obstacle.X_WM * Vector3d(p * obstacle.scale);
+    convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
-  return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes));
+  if (!all_convex) convex.clear();
+  auto tool_mesh = loader.treed(tool.mesh, BodyKind::solid, settings.tool.mesh);
+  return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
+               std::move(tool_mesh));
 }
 
 double farthest_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
@@ -69,19 +90,22 @@ MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> m
   radius_m = farthest_m(mesh->surface.vertices_m(), box.center());
 }
 
-TreedMesh::TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind)
-    : surface(std::move(mesh), kind), tree(surface) {}
+Scene::Scene(const SceneSettings& settings, MeshLoader& loader) : Scene(load(settings, loader)) {}
 
-Scene::Scene(const SceneSettings& settings) : Scene(load(settings)) {}
+Scene::Scene(const SceneSettings& settings) {
+  MeshLoader loader;
+  *this = Scene(settings, loader);
+}
 
 Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex,
-             std::vector<MeshObstacle> meshes)
+             std::vector<MeshObstacle> meshes, std::shared_ptr<const TreedMesh> tool_mesh)
     : tool_(std::move(tool)),
       tool_radius_m_(farthest_m(tool_.hull.vertices_T_m, Vector3d::Zero())),
       half_spaces_(std::move(half_spaces)),
       convex_(std::move(convex)),
-      meshes_(std::move(meshes)) {
-  if (!meshes_.empty()) tool_mesh_.emplace(tool_.mesh);
+      meshes_(std::move(meshes)),
+      tool_mesh_(std::move(tool_mesh)) {
+  if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const TreedMesh>(tool_.mesh);
 }
 
 }  // namespace wrenchd

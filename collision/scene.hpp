@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "collision/mesh_surface.hpp"
+#include "collision/mesh_loader.hpp"
 #include "collision/tool_body.hpp"
-#include "collision/triangle_tree.hpp"
+#include "collision/treed_mesh.hpp"
 #include "core/convex_body.hpp"
 #include "core/scene_settings.hpp"
 
@@ -22,14 +21,6 @@ struct ConvexObstacle {
   ConvexBody body;  ///< in the world
   Vector3d centre_W_m = Vector3d::Zero();
   double radius_m = 0.0;  ///< of a sphere about the centre that holds it
-};
-
-/// The surface of a body of any shape, and the tree over its triangles.
-struct TreedMesh {
-  explicit TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid);
-
-  MeshSurface surface;
-  TriangleTree tree;
 };
 
 /// An obstacle of any shape. O: the frame of its mesh, in metres.
@@ -57,10 +48,13 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W);
 /// Obstacles are numbered: the half-spaces first, then the others.
 class Scene {
  public:
-  /// Throws MeshError where a mesh cannot be used.
-  explicit Scene(const SceneSettings& settings);
+  /// Reads the meshes. Throws MeshError where one cannot be used; what else there is to say of them is left
+  /// with the loader.
+  Scene(const SceneSettings& settings, MeshLoader& loader);
+  explicit Scene(const SceneSettings& settings);  ///< with a loader of its own, that keeps nothing
+  /// tool_mesh: the tool's own mesh, where it is at hand already.
   Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex = {},
-        std::vector<MeshObstacle> meshes = {});
+        std::vector<MeshObstacle> meshes = {}, std::shared_ptr<const TreedMesh> tool_mesh = nullptr);
 
   const ToolBody& tool() const noexcept { return tool_; }
   double tool_radius_m() const noexcept { return tool_radius_m_; }
@@ -68,7 +62,7 @@ class Scene {
   const std::vector<ConvexObstacle>& convex() const noexcept { return convex_; }
   const std::vector<MeshObstacle>& meshes() const noexcept { return meshes_; }
   /// The tool as the meshes meet it, in T; null where there are none.
-  const TreedMesh* tool_mesh() const noexcept { return tool_mesh_ ? &*tool_mesh_ : nullptr; }
+  const TreedMesh* tool_mesh() const noexcept { return tool_mesh_.get(); }
   std::size_t obstacle_count() const noexcept {
     return half_spaces_.size() + std::max(convex_.size(), meshes_.size());
   }
@@ -79,7 +73,7 @@ class Scene {
   std::vector<HalfSpaceSettings> half_spaces_;
   std::vector<ConvexObstacle> convex_;
   std::vector<MeshObstacle> meshes_;
-  std::optional<TreedMesh> tool_mesh_;
+  std::shared_ptr<const TreedMesh> tool_mesh_;
 };
 
 }  // namespace wrenchd

@@ -7,7 +7,7 @@
 
 #include "collision/convex_hull.hpp"
 #include "collision/mesh_file.hpp"
-#include "collision/mesh_solid.hpp"
+#include "collision/mesh_size.hpp"
 #include "core/finite.hpp"
 
 namespace wrenchd {
@@ -24,11 +24,16 @@ void require_usable(const SolidProperties& solid, const std::filesystem::path& m
   throw MeshError(text.str());
 }
 
+// The hull is taken of the file's own numbers: scaled and shifted, a vertex within a flat face may come to
+// lie an ulp outside it and become a corner.
 ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
-  // The hull is taken of the file's own numbers: scaled and shifted, a vertex within a flat face may come to
-  // lie an ulp outside it and become a corner.
+  ConvexBody hull = convex_hull(mesh.vertices_m);
+  return tool_body(std::move(mesh), std::move(hull), scale, mass_kg);
+}
+
+ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, double scale, double mass_kg) {
   ToolBody tool;
-  tool.hull = convex_hull(mesh.vertices_m);
+  tool.hull = std::move(hull);
   for (Vector3d& p : mesh.vertices_m) p *= scale;
   tool.solid = solid_properties(mesh, mass_kg);
   for (Vector3d& p : tool.hull.vertices_T_m) p = p * scale - tool.solid.p_MT_m;
@@ -38,10 +43,17 @@ ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
   return tool;
 }
 
-ToolBody load_tool(const ToolSettings& settings) {
-  ToolBody tool = tool_body(load_solid(settings.mesh), settings.scale, settings.mass_kg);
+ToolBody load_tool(const ToolSettings& settings, MeshLoader& loader) {
+  const auto loaded = loader.load(settings.mesh, BodyKind::solid);
+  ToolBody tool = tool_body(loaded->mesh, loader.hull(*loaded), settings.scale, settings.mass_kg);
   require_usable(tool.solid, settings.mesh, settings.scale);
+  loader.look_at_size(*loaded, settings.scale, kToolSize);
   return tool;
+}
+
+ToolBody load_tool(const ToolSettings& settings) {
+  MeshLoader loader;
+  return load_tool(settings, loader);
 }
 
 }  // namespace wrenchd

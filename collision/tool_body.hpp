@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "collision/mesh_loader.hpp"
 #include "core/convex_body.hpp"
 #include "core/inertia.hpp"
 #include "core/scene_settings.hpp"
@@ -22,11 +23,14 @@ struct ToolBody {
 /// Throws MeshError where the scale made a solid too small or too large to compute with.
 void require_usable(const SolidProperties& solid, const std::filesystem::path& mesh, double scale);
 
-/// A closed, outward-oriented mesh as a uniform solid of this mass. scale: metres per mesh unit. Not RT safe.
+/// A closed, outward-oriented mesh as a uniform solid of this mass. scale: metres per mesh unit. hull: of the
+/// mesh, in its units. Not RT safe.
+ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, double scale, double mass_kg);
 ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg);
 
 /// Loads and checks the tool's mesh. Throws MeshError that names the file, the defect, its place and the
 /// cure. Not RT safe.
+ToolBody load_tool(const ToolSettings& settings, MeshLoader& loader);
 ToolBody load_tool(const ToolSettings& settings);
 
 }  // namespace wrenchd

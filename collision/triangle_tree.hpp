@@ -52,6 +52,7 @@ class TriangleTree {
     std::uint32_t has_vertices, has_edges;  ///< a bit for each triangle
   };
 
+  TriangleTree() = default;  ///< of nothing, to be filled in by each_member()
   explicit TriangleTree(const MeshSurface& surface);
 
   /// Number i of node n is boxes()[8 n + i]. Node 0 is the root; there is none in a tree without triangles.
@@ -61,6 +62,12 @@ class TriangleTree {
   /// Bound of the coordinates: single precision rounds them by 6e-8 of it [m].
   float extent_m() const noexcept { return extent_m_; }
   std::size_t bytes() const noexcept;
+
+  /// Calls use(member) for all that it holds: how it is kept on disk (collision/mesh_cache.hpp).
+  template <class Use>
+  void each_member(const Use& use) {
+    use(boxes_), use(nodes_), use(leaves_), use(extent_m_);
+  }
 
  private:
   std::vector<Box> boxes_;

@@ -49,7 +49,7 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
 
 /// What goes with `mesh` and means nothing to a half-space.
 struct MeshKeys {
-  TomlValue scale, position, rotation;
+  TomlValue scale, position, rotation, kind;
 };
 
 void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettings& scene,
@@ -62,6 +62,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
   Vector3d rotation_vector_rad = Vector3d::Zero();
   keys.rotation.vector(rotation_vector_rad, kTurn);
   obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
+  keys.kind.choice(obstacle.kind, {{"solid", BodyKind::solid}, {"surface", BodyKind::surface}});
   scene.meshes.push_back(obstacle);
 }
 
@@ -72,12 +73,13 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   const TomlValue mesh = table.optional("mesh");
   const TomlValue half_space = table.mandatory_unless("mesh", "half_space");
   const MeshKeys keys = {table.optional("scale", "m"), table.optional("position_m"),
-                         table.optional("rotation_vector_rad")};
+                         table.optional("rotation_vector_rad"), table.optional("kind")};
   if (mesh) {
     if (half_space)
       half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
     return read_mesh_obstacle(mesh, keys, scene, name);
   }
+  if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
     if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};

@@ -13,6 +13,11 @@ namespace {
 /// Normals that differ by less are of one plane: well above the rounding of a triangle's corners.
 constexpr double kSamePlane = 1e-9;
 
+/// The normal of a triangle flatter than this, height over length, is not to be relied on: other vertices may
+/// lie above its plane. Where there are many, only for these is the highest looked for.
+constexpr double kSliver = 1e-3;
+constexpr std::size_t kFewVertices = 4096;
+
 /// What each vertex has, one behind the other: that of vertex i from begin[i] up to begin[i + 1].
 void lay_out(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std::uint32_t>& begin,
              std::vector<std::uint32_t>& all) {
@@ -40,6 +45,7 @@ void ConvexBody::find_faces() {
   for (const Vector3d& p : vertices_T_m) middle += p / static_cast<double>(vertices_T_m.size());
   std::vector<std::vector<std::uint32_t>> at(vertices_T_m.size());
 
+  const bool few = vertices_T_m.size() <= kFewVertices;
   const auto face_like = [&](const Vector3d& n, std::uint32_t vertex) {
     for (const std::uint32_t f : at[vertex])
       if ((faces[f].n - n).norm() < kSamePlane) return static_cast<std::int64_t>(f);
@@ -49,6 +55,8 @@ void ConvexBody::find_faces() {
     const Vector3d& p = vertices_T_m[i];
     Vector3d n = (vertices_T_m[j] - p).cross(vertices_T_m[k] - p);
     if (!(n.squaredNorm() > 0.0)) return;  // a sliver without a plane of its own
+    const bool sliver = n.norm() < kSliver * (vertices_T_m[j] - vertices_T_m[k]).squaredNorm() ||
+                        n.norm() < kSliver * (vertices_T_m[j] - p).squaredNorm();
     n.normalize();
     if (n.dot(p - middle) < 0.0) n = -n;
     std::int64_t face = face_like(n, i);
@@ -56,7 +64,7 @@ void ConvexBody::find_faces() {
     if (face < 0) face = face_like(n, k);
     if (face < 0) {
       face = static_cast<std::int64_t>(faces.size());
-      faces.push_back({n, n.dot(vertices_T_m[support(n)])});
+      faces.push_back({n, n.dot(vertices_T_m[sliver || few ? support(n, i) : i])});
     }
     const auto f = static_cast<std::uint32_t>(face);
     for (const std::uint32_t v : {i, j, k})
@@ -102,12 +110,22 @@ void ConvexBody::add_edge(std::uint32_t from, std::uint32_t to, std::span<const 
   edges.push_back({from, to, d, {towards(n0, n1), towards(n1, n0)}});
 }
 
-/// Halves the vertices along the longest side of their box until few are left.
+/// Halves the vertices along the longest side of their box until few are left. Where they are many, their
+/// blocks are passed over together.
 void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
-  constexpr std::uint32_t kFew = 16;
+  constexpr std::uint32_t kFew = 16, kMany = 256;
   Eigen::AlignedBox3d extent;
   for (std::uint32_t i = begin; i < end; ++i) extent.extend(vertices_T_m[order_[i]]);
-  if (end - begin > kFew) {
+  const bool few = end - begin <= kFew;
+  const std::size_t here = blocks_.size();
+  if (few || end - begin > kMany) {
+    Block block{extent.center(), 0.0, begin, few ? end : begin, static_cast<std::uint32_t>(here + 1)};
+    for (std::uint32_t i = begin; i < end; ++i)
+      block.radius_m = std::max(block.radius_m, (vertices_T_m[order_[i]] - block.centre_m).norm());
+    block.radius_m *= 1.0 + 1e-12;  // its own rounding, and that of the dot products it stands for
+    blocks_.push_back(block);
+  }
+  if (!few) {
     Eigen::Index axis = 0;
     extent.sizes().maxCoeff(&axis);
     const std::uint32_t middle = begin + (end - begin) / 2;
@@ -117,13 +135,8 @@ void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
     std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, before);
     build_blocks(begin, middle);
     build_blocks(middle, end);
-    return;
+    if (end - begin > kMany) blocks_[here].after = static_cast<std::uint32_t>(blocks_.size());
   }
-  Block block{extent.center(), 0.0, begin, end};
-  for (std::uint32_t i = begin; i < end; ++i)
-    block.radius_m = std::max(block.radius_m, (vertices_T_m[order_[i]] - block.centre_m).norm());
-  block.radius_m *= 1.0 + 1e-12;  // its own rounding, and that of the dot products it stands for
-  blocks_.push_back(block);
 }
 
 // Climbing from neighbour to neighbour would look at fewer vertices. But where a face is split into triangles
@@ -149,8 +162,10 @@ std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
   const auto reach = [&](const Block& block) {
     return direction.dot(block.centre_m) + length * block.radius_m;
   };
-  const auto highest = std::max_element(blocks_.begin(), blocks_.end(),
-                                        [&](const Block& x, const Block& y) { return reach(x) < reach(y); });
+  const auto highest = std::max_element(blocks_.begin(), blocks_.end(), [&](const Block& x, const Block& y) {
+    const bool x_empty = x.begin == x.end, y_empty = y.begin == y.end;
+    return x_empty != y_empty ? x_empty : reach(x) < reach(y);
+  });
   return support(direction, order_[highest->begin]);
 }
 

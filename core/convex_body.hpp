@@ -62,18 +62,25 @@ struct ConvexBody {
   void visit_above(const Vector3d& direction, const Least& least, const Visit& visit) const noexcept {
     const bool one = blocks_.size() == 1;
     const double length = one ? 0.0 : direction.norm();
-    for (const Block& block : blocks_) {
-      if (!one && direction.dot(block.centre_m) + length * block.radius_m < least()) continue;
+    for (std::size_t k = 0; k < blocks_.size();) {
+      const Block& block = blocks_[k];
+      if (!one && direction.dot(block.centre_m) + length * block.radius_m < least()) {
+        k = block.after;
+        continue;
+      }
+      ++k;
       for (std::uint32_t i = block.begin; i < block.end; ++i) visit(order_[i], direction.dot(ordered_m_[i]));
     }
   }
 
  private:
-  /// Some vertices that lie close together, in a sphere.
+  /// Some vertices that lie close together, in a sphere; or, without vertices of its own, the sphere around
+  /// the blocks that follow it up to `after`.
   struct Block {
     Vector3d centre_m;
     double radius_m;
     std::uint32_t begin, end;  ///< in order_
+    std::uint32_t after;       ///< the block to look at next where none of these can be the one
   };
 
   static std::span<const std::uint32_t> of(std::size_t vertex, const std::vector<std::uint32_t>& begin,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/pose.hpp"
+#include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
 
@@ -23,12 +24,15 @@ struct HalfSpaceSettings {
   double offset_m = 0.0;
 };
 
-/// A solid of any shape that stands still. M is the frame its mesh file is written in.
+/// A body of any shape that stands still. M is the frame its mesh file is written in.
 struct MeshObstacleSettings {
   std::string name;
   std::filesystem::path mesh;
   double scale = 1.0;  ///< metres per mesh unit
   Pose X_WM;
+  /// A surface may be open or cut through itself. It has no inside: nothing pushes a tool out that starts
+  /// beyond it, or that it goes through.
+  BodyKind kind = BodyKind::solid;
 };
 
 struct SceneSettings {

@@ -189,8 +189,10 @@ Fault run_in_virtual_time(Station& station, const Options& options, VirtualClock
 template <class TheClock>
 Fault run(Plan plan, const Options& options, TheClock& clock,
           Fault (*run_it)(Station&, const Options&, TheClock&, LiveView&)) {
-  Station station(std::move(plan), clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread);
+  Station station(std::move(plan), clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread,
+                  MeshLoader(cache_directory(), [](const std::string& what) { spdlog::info("{}", what); }));
   loop_to_release = &station.loop();
+  for (const std::string& remark : station.mesh_remarks()) spdlog::warn("{}", remark);
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
                station.scene().obstacle_count(), station.plan().settings.servo.rate_Hz);

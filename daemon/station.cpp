@@ -50,9 +50,10 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
   return plan;
 }
 
-Station::Station(Plan plan, Clock& clock, PlaceIn place_in)
+Station::Station(Plan plan, Clock& clock, PlaceIn place_in, MeshLoader meshes)
     : plan_(std::move(plan)),
-      scene_(plan_.scene),
+      scene_(plan_.scene, meshes),
+      mesh_remarks_(meshes.changes()),
       simulated_(plan_.profile, plan_.settings.simulation),
       link_(simulated_, clock, plan_.settings.simulation),
       device_(plan_.profile, link_),
@@ -60,6 +61,7 @@ Station::Station(Plan plan, Clock& clock, PlaceIn place_in)
       records_(Recorder::kRingRecords),
       loop_(plan_.settings, plan_.profile, device_, scene_, *placer_, clock,
             plan_.settings.recording.file.empty() ? nullptr : &records_) {
+  mesh_remarks_.insert(mesh_remarks_.end(), meshes.remarks().begin(), meshes.remarks().end());
   device_.open();
 }
 

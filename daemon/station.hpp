@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "collision/scene.hpp"
 #include "config/search_path.hpp"
@@ -46,14 +48,17 @@ enum class PlaceIn : std::uint8_t {
 /// The parts of one running wrenchd, built from a plan in the order in which they need each other.
 class Station {
  public:
-  /// The clock must outlive this. Throws MeshError, std::runtime_error.
-  Station(Plan plan, Clock& clock, PlaceIn place_in = PlaceIn::thread);
+  /// The clock must outlive this. meshes: reads those of the scene; its changes and remarks are kept. Throws
+  /// MeshError, std::runtime_error.
+  Station(Plan plan, Clock& clock, PlaceIn place_in = PlaceIn::thread, MeshLoader meshes = {});
   ~Station();
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
 
   const Plan& plan() const noexcept { return plan_; }
   const Scene& scene() const noexcept { return scene_; }
+  /// What a person should know of the meshes of the scene, a sentence each.
+  const std::vector<std::string>& mesh_remarks() const noexcept { return mesh_remarks_; }
   SimulatedDevice& simulated() noexcept { return simulated_; }
   ServoLoop& loop() noexcept { return loop_; }
   RecordRing& records() noexcept { return records_; }
@@ -64,6 +69,7 @@ class Station {
  private:
   Plan plan_;
   Scene scene_;
+  std::vector<std::string> mesh_remarks_;
   SimulatedDevice simulated_;
   LoopbackLink link_;
   ProfileDevice device_;

@@ -30,14 +30,16 @@ Kind kind_of(const std::filesystem::path& file) {
   return Kind::settings;
 }
 
-std::string about(const SceneSettings& settings) {
-  const Scene scene(settings);
+std::string about(const SceneSettings& settings, MeshLoader& meshes) {
+  const Scene scene(settings, meshes);
   const ToolBody& tool = scene.tool();
   std::ostringstream text;
   text << "  tool " << settings.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
        << " mesh obstacle(s)\n";
+  for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';
+  for (const std::string& remark : meshes.remarks()) text << "  remark: " << remark << '\n';
   return text.str();
 }
 
@@ -50,10 +52,10 @@ std::string about(const DeviceProfile& profile) {
 
 }  // namespace
 
-std::string check_file(const std::filesystem::path& file) {
+std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
   switch (kind_of(file)) {
     case Kind::scene:
-      return file.string() + ": a good scene\n" + about(load_scene(file));
+      return file.string() + ": a good scene\n" + about(load_scene(file), meshes);
     case Kind::profile:
       return file.string() + ": a good device profile\n" + about(load_profile(file));
     case Kind::hand_script: {
@@ -66,7 +68,7 @@ std::string check_file(const std::filesystem::path& file) {
       break;
   }
   const Plan plan = read_plan({file, {}, {}}, SearchPath());
-  return file.string() + ": a good configuration\n" + about(plan.profile) + about(plan.scene);
+  return file.string() + ": a good configuration\n" + about(plan.profile) + about(plan.scene, meshes);
 }
 
 }  // namespace wrenchd

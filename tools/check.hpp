@@ -4,12 +4,15 @@
 #include <filesystem>
 #include <string>
 
+#include "collision/mesh_loader.hpp"
+
 namespace wrenchd {
 
 /// Reads a TOML file of any of our kinds, and the files it names, as the daemon would. Returns what it found,
-/// in a few lines for a person; throws what the loaders throw where something is wrong. The kind is told by
-/// the keys: [tool] makes a scene, [pose_report] or [limits] with a name a profile, [[waypoint]] a hand
-/// script, anything else a configuration.
-std::string check_file(const std::filesystem::path& file);
+/// in a few lines for a person, with what was repaired in meshes and what is unlikely about them; throws what
+/// the loaders throw where something is wrong. The kind is told by the keys: [tool] makes a scene,
+/// [pose_report] or [limits] with a name a profile, [[waypoint]] a hand script, anything else a
+/// configuration.
+std::string check_file(const std::filesystem::path& file, MeshLoader& meshes);
 
 }  // namespace wrenchd

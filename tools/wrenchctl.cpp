@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "collision/mesh_check.hpp"
+#include "collision/mesh_source.hpp"
 #include "collision/tool_body.hpp"
 #include "config/load_scene.hpp"
 #include "core/inertia.hpp"
@@ -63,8 +64,19 @@ std::vector<Pose> read_poses_from(const std::string& name) {
   return read_poses(file, name);
 }
 
+/// On standard error: what is being done, and what was changed.
+void say(const std::string& what) {
+  std::fprintf(stderr, "wrenchctl: %s\n", what.c_str());
+}
+
+MeshLoader mesh_loader() {
+  return {cache_directory(), say};
+}
+
 int run_solve(const SolveOptions& options) {
-  const Scene scene(load_scene(options.scene));
+  MeshLoader meshes = mesh_loader();
+  const Scene scene(load_scene(options.scene), meshes);
+  for (const std::string& change : meshes.changes()) say(change);
   const std::vector<Pose> poses = read_poses_from(options.poses);
   SolveSettings settings = options.settings;
   settings.depth.method = kMethods.at(options.method);
@@ -90,16 +102,24 @@ void print(const char* label, const Vector3d& v, const char* unit) {
 }
 
 int run_mesh(const std::filesystem::path& file, double scale) {
+  const std::string name = file.filename().string();
+  MeshSource source = read_mesh_source(file);
+  const std::size_t size = source.bytes.size();
+  if (size >= MeshLoader::kManyBytes) say(name + ": reading " + grouped(size / 1'000'000) + " MB");
+  PolygonSoup soup = parse_mesh(std::move(source));
+  if (soup.faces.size() >= MeshLoader::kManyTriangles)
+    say(name + ": " + grouped(soup.faces.size()) + " faces, checking");
+  std::printf("%-18s %zu\n%-18s %zu\n", "vertices", soup.vertices.size(), "faces", soup.faces.size());
   TriangleMesh mesh;
-  const MeshReport report = check_solid(read_mesh_file(file), &mesh);
-  std::printf("%-18s %zu\n%-18s %zu\n", "vertices", report.vertices, "faces", report.faces);
+  const MeshReport report = repair_and_check_solid(soup, &mesh);
+  for (const std::string& change : report.changes) std::printf("%-18s %s\n", "repaired", change.c_str());
   std::printf("%-18s %s\n%-18s %s\n", "closed", report.closed ? "yes" : "no", "consistent",
               report.consistent ? "yes" : "no");
   if (!report.solid()) {
-    std::fprintf(stderr, "wrenchctl: %s: is not a closed, consistently oriented solid:\n", file.c_str());
-    for (const std::string& defect : report.defects) std::fprintf(stderr, "  %s\n", defect.c_str());
+    std::fprintf(stderr, "wrenchctl: %s\n", refusal(file, soup, BodyKind::solid, report).c_str());
     return kExitDefects;
   }
+  const auto unlikely = unlikely_size(mesh, scale, kToolSize);
   for (Vector3d& p : mesh.vertices_m) p *= scale;
   const SolidProperties solid = solid_properties(mesh, 1.0);
   require_usable(solid, file, scale);
@@ -108,6 +128,7 @@ int run_mesh(const std::filesystem::path& file, double scale) {
   const Matrix3d& H = solid.inertia.H_kg_m2;
   std::printf("%-18s %zu\n", "triangles", mesh.triangles.size());
   print("size", box.sizes(), "m");
+  if (unlikely) std::printf("%-18s as a tool, %s\n", "remark", unlikely->c_str());
   std::printf("%-18s %.9g m^3\n", "volume", solid.volume_m3);
   print("centre of mass", solid.p_MT_m, "m");
   print("inertia xx yy zz", H.diagonal(), "m^2 (per kg, uniform solid, about the centre of mass)");
@@ -248,7 +269,10 @@ int main(int argc, char** argv) {
   check->add_option("file", checked, "TOML file; its kind is told by what it holds")
       ->required()
       ->check(not_empty());
-  check->callback([&] { std::cout << check_file(checked); });
+  check->callback([&] {
+    MeshLoader meshes = mesh_loader();
+    std::cout << check_file(checked, meshes);
+  });
 
   MeshOptions mesh_options;
   add_mesh(app, mesh_options, exit_code);
