@@ -20,9 +20,9 @@
 namespace wrenchd {
 namespace {
 
-/// A triangle that is no higher than this has no area: in units of the mesh's size. What else is told of such
-/// a triangle, its normal above all, is rounding; the same bound calls neighbours flat (mesh_surface.cpp).
-constexpr double kThin = 1e-10;
+/// A triangle that is no higher than this has no area: in units of the mesh's size. Single precision leaves such
+/// triangles where a corner was put on an edge, and makes up their normals.
+constexpr double kThin = 1e-7;
 /// A crack that single precision, or a text of seven digits, leaves between two faces is no wider: in units
 /// of the largest coordinate.
 constexpr double kCrack = 1e-6;

@@ -3,8 +3,10 @@
 
 #include <catch2/catch.hpp>
 
+#include "collision/convex_hull.hpp"
 #include "core/convex_body.hpp"
 #include "tests/support/random_body.hpp"
+#include "tools/make_mesh.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -40,6 +42,25 @@ TEST_CASE("the support is the farthest vertex", "[convex_body]") {
     CHECK(direction.dot(body.vertices_T_m[body.support(direction)]) == highest);
     const auto anywhere = static_cast<std::uint32_t>(random.integer(0, 3));
     CHECK(direction.dot(body.vertices_T_m[body.support(direction, anywhere)]) == highest);
+  }
+}
+
+TEST_CASE("so it is where there are many vertices, and their faces bound the body too", "[convex_body]") {
+  RandomValues random(4);
+  const ConvexBody body = convex_hull(make_mesh({"sphere", 20000}).vertices_m);
+  REQUIRE(body.vertices_T_m.size() > 8000);
+  const auto highest = [&](const Vector3d& direction) {
+    double height = -1e9;
+    for (const Vector3d& p : body.vertices_T_m) height = std::max(height, direction.dot(p));
+    return height;
+  };
+  for (int i = 0; i < 300; ++i) {
+    const Vector3d direction = random.unit<3>();
+    CHECK(direction.dot(body.vertices_T_m[body.support(direction)]) == highest(direction));
+    const auto anywhere = static_cast<std::uint32_t>(random.integer(0, 8000));
+    CHECK(direction.dot(body.vertices_T_m[body.support(direction, anywhere)]) == highest(direction));
+    const auto& face = body.faces[static_cast<std::size_t>(random.integer(0, 15000))];
+    CHECK(std::abs(face.offset_m - highest(face.n)) < 1e-15);
   }
 }
 

@@ -118,6 +118,50 @@ TEST_CASE("what exporters write beside the mesh does no harm") {
   check_is_the_box(dir.write("named.ply", replaced(as_binary_ply(kBox), "vertex_indices", "vertex_index")));
 }
 
+TEST_CASE("what exporters write in their own way is read") {
+  const TemporaryDirectory dir;
+  const PolygonSoup triangles = triangulated(kBox);
+  const std::string mark = "\xef\xbb\xbf";
+  check_is_the_box(dir.write("mark.off", mark + as_off(kBox)));
+  check_is_the_box(dir.write("mark.obj", mark + as_obj(kBox)));
+  check_is_the_box(dir.write("mark.stl", mark + as_ascii_stl(triangles)));
+  check_is_the_box(dir.write("glued.off", replaced(as_off(kBox), "OFF\n", "OFF")));
+  check_is_the_box(dir.write("joined.obj", replaced(as_obj(kBox), "f 1 5 7 3", "f 1 5 \\\n 7 3")));
+  check_is_the_box(
+      dir.write("joined_crlf.obj", with_crlf(replaced(as_obj(kBox), "f 1 5 7 3", "f 1 5 \\\n7 3"))));
+  check_is_the_box(dir.write("slashes.obj", replaced(as_obj(kBox), "f 1 5 7 3", "f 1// 5/ 7/2/ 3")));
+  check_is_the_box(dir.write("coloured.obj", replaced(as_obj(kBox), "v 4 2 -3", "v 4 2 -3 0.5 0.5 1")));
+
+  std::string stl = as_ascii_stl(triangles);
+  check_is_the_box(dir.write("normals.stl", replaced(stl, "normal 0 0 0", "normal nan -nan(ind) 1e99")));
+  check_is_the_box(dir.write("name.stl", replaced(stl, "solid box", "solid a facet of the vertex 1 2")));
+  check_is_the_box(dir.write("no_name.stl", replaced(stl, "solid box", "solid")));
+  std::string upper = stl;
+  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  check_is_the_box(dir.write("upper.stl", upper));
+  std::string blanks = stl;
+  std::replace(blanks.begin() + 10, blanks.end() - 13, '\n', '\t');
+  check_is_the_box(dir.write("one_line.stl", blanks));
+  const std::size_t half = stl.find(" facet", stl.size() / 2);
+  check_is_the_box(
+      dir.write("two_solids.stl", stl.substr(0, half) + "endsolid a\n\nsolid b\n" + stl.substr(half)));
+
+  const std::string binary = as_binary_ply(kBox);
+  const std::size_t body = binary.find("end_header\n") + 11;
+  check_is_the_box(dir.write("header.ply", with_crlf(binary.substr(0, body)) + binary.substr(body)));
+  std::string more =
+      replaced(as_ascii_ply(kBox), "property double z\n",
+               "property double z\nproperty float nx\nproperty uchar red\nproperty uchar green\n"
+               "property uchar blue\n");
+  for (std::size_t at = more.find("end_header\n") + 11, v = 0; v < 8; ++v) {
+    at = more.find('\n', at);
+    more.insert(at, " 0.5 1 2 3");
+    at = more.find('\n', at) + 1;
+  }
+  check_is_the_box(dir.write("more.ply", more));
+  check_is_the_box(dir.write("more_crlf.ply", with_crlf(more)));
+}
+
 TEST_CASE("STL vertices are merged where they are equal") {
   const TemporaryDirectory dir;
   const PolygonSoup soup = read_mesh_file(dir.write("a.stl", as_binary_stl(triangulated(kBox))));
@@ -265,6 +309,9 @@ TEST_CASE("bad STL files are refused") {
        "expected three finite numbers, found 'nan'"},
       {"two.stl", replaced(ascii, "vertex -1 2 -3", "vertex -1 2"), ":5",
        "expected three finite numbers, found 'vertex'"},
+      {"four.stl", replaced(ascii, "   vertex -1 2 -3\n", "   vertex -1 2 -3\n   vertex 0 0 0\n"), ":9",
+       "facet 0 has 4 vertices, not three"},
+      {"word.stl", replaced(ascii, "endloop", "endlop"), ":7", "'endlop' is no word of an STL file"},
       {"no_triangles.stl", "solid nothing\nendsolid nothing\n", "", "has no faces"},
       {"no_triangles_binary.stl", binary.substr(0, 80) + std::string(4, '\0'), "", "has no faces"},
   });

@@ -126,6 +126,88 @@ TEST_CASE("at rest a proxy is a local optimum, and most often the nearest of all
   CHECK(nearest >= 36);
 }
 
+/// A sheet of 0.2 m square in z = 0, in n x n cells, every other one of them looking down.
+TriangleMesh sheet(std::uint32_t n) {
+  TriangleMesh mesh;
+  for (std::uint32_t i = 0; i <= n; ++i)
+    for (std::uint32_t j = 0; j <= n; ++j)
+      mesh.vertices_m.emplace_back(0.2 * i / n - 0.1, 0.2 * j / n - 0.1, 0.0);
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = 0; j < n; ++j) {
+      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+      if ((i + j) % 2 == 1)
+        for (std::size_t k = 1; k < 3; ++k) {
+          auto& corners = mesh.triangles[mesh.triangles.size() - k];
+          std::swap(corners[1], corners[2]);
+        }
+    }
+  return mesh;
+}
+
+Scene against_surface(TriangleMesh tool, TriangleMesh surface) {
+  std::vector<MeshObstacle> obstacles;
+  obstacles.push_back({"surface", TreedMesh(std::move(surface), BodyKind::surface), Pose{}});
+  return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
+}
+
+TEST_CASE("an open surface stops a tool on the side where it is", "[proxy]") {
+  for (const char* kind : {"cube", "sphere"})
+    for (const std::uint32_t cells : {1, 2, 9})
+      for (const double side : {1.0, -1.0}) {
+        const Scene scene = against_surface(make_mesh({kind, 320}), sheet(cells));
+        const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+        PenetrationDepth depth(scene, {});
+        RandomValues random(cells);
+        Pose X_WQ = {Quaterniond::Identity(), {0, 0, 0.06 * side}};
+        Penetration last;
+        for (int tick = 0; tick < 150; ++tick) {  // a millimetre each, and then at rest
+          const Pose X_WP = {rotation_from(tick < 120 ? Vector3d(0.02 * random.unit<3>()) : Vector3d::Zero()),
+                             {0.01, 0.02, side * (0.06 - 1e-3 * std::min(tick, 120))}};
+          last = depth.follow(X_WP, X_WQ);
+          X_WQ = last.projection.X_WQ;
+          INFO(kind << " " << cells << " cells, side " << side << ", tick " << tick);
+          REQUIRE(last.projection.status != ProjectionStatus::infeasible);
+          REQUIRE(side * X_WQ.translation_m.z() > 0.0249);
+          REQUIRE_FALSE(exact.meet(X_WQ));
+        }
+        CHECK(last.contacts > 0);
+        CHECK(side * X_WQ.translation_m.z() < 0.0301);
+        CHECK(side * last.eps[2] > 0.08);  // drawn back
+      }
+}
+
+TEST_CASE("the border of a surface and where it cuts through itself hold, too", "[proxy]") {
+  TriangleMesh cross = sheet(2);  // and another, upright, through its middle
+  const auto first = static_cast<std::uint32_t>(cross.vertices_m.size());
+  for (const Vector3d& p : sheet(2).vertices_m) cross.vertices_m.emplace_back(p.x(), 0.003, p.y());
+  for (auto corners : sheet(2).triangles) {
+    for (std::uint32_t& v : corners) v += first;
+    cross.triangles.push_back(corners);
+  }
+  const Scene scene = against_surface(make_mesh({"cube", 12}), std::move(cross));
+  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+  RandomValues random(8);
+  for (int run = 0; run < 6; ++run) {
+    Proxy proxy(scene);
+    Pose X_WQ = {random.rotation(0.3), {0.0, 0.08, 0.08}};
+    Pose X_WP = X_WQ;
+    int contacts = 0;
+    REQUIRE_FALSE(exact.meet(X_WQ));
+    for (int tick = 0; tick < 200; ++tick) {
+      X_WP.translation_m += 4e-3 * random.unit<3>() - 0.02 * (X_WP.translation_m - Vector3d(0.05, 0, 0));
+      X_WP.rotation = (X_WP.rotation * random.rotation(0.03)).normalized();
+      const Projection q = proxy.follow(X_WP, X_WQ);
+      X_WQ = q.X_WQ;
+      contacts += in_contact(q) ? 1 : 0;
+      INFO("run " << run << ", tick " << tick);
+      REQUIRE_FALSE(exact.meet(X_WQ));
+    }
+    CHECK(contacts > 20);
+  }
+}
+
 /// A cube slides and rocks on a table, both cut into so many triangles.
 std::vector<Vector6d> wrenches(std::size_t triangles, int ticks) {
   const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));

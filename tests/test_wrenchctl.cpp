@@ -398,17 +398,99 @@ TEST_CASE("wrenchctl solve refuses bad meshes") {
       {"NaN", "body.off", with("\n25 -25 -25", "\n25 nan -25"), ":4",
        "vertex 1: expected a finite number, found 'nan'"},
       {"index", "body.off", with("4 0 4 6 2", "4 0 4 6 8"), ":11", "there is no vertex '8'"},
-      {"two corners", "body.off", with("4 0 4 6 2", "2 0 4"), "", "face 0 has 2 vertices; remove it"},
+      {"two corners", "body.off", with("4 0 4 6 2", "2 0 4"), "",
+       "(after a repair: removed 1 face with fewer than three different corners: face 0 near (-25, -25, "
+       "-25))"},
       {"repeated", "body.off", with("4 0 4 6 2", "4 0 4 6 4"), "", "face 0 uses a vertex twice"},
       {"open", "body.off", as_off({box({-25, -25, -25}, {25, 25, 25}).vertices, {{0, 4, 6, 2}}}), "",
        "belongs to face 0 only: the surface is open (4 in all); close the hole"},
-      {"flipped", "body.off", with("4 0 4 6 2", "4 2 6 4 0"), "",
-       "make all faces counter-clockwise seen from outside"},
-      {"inside out", "body.off", as_off(inside_out(box({-25, -25, -25}, {25, 25, 25}))), "",
-       "flip the faces"},
       {"self-intersecting", "body.off", as_off(both(box({0, 0, 0}, {2, 2, 2}), box({1, 1, 1}, {3, 3, 3}))),
        "", "cut through each other"},
   });
+}
+
+TEST_CASE("wrenchctl solve works with a mesh that can be repaired, and says so on standard error") {
+  const Bench bench;
+  bench.dir.write("body.off", as_off(inside_out(box({-25, -25, -25}, {25, 25, 25}))));
+  const ProgramResult result = bench.solve();
+  CHECK(result.exit_code == 0);
+  CHECK(result.err ==
+        "wrenchctl: " + bench.mesh.string() + ": turned 6 faces round, first face 0 near (-25, 25, -25)\n");
+  CHECK(std::abs(rows_of(contents(bench.out)).at(0).at("energy") - kEnergy) < 1e-9);
+}
+
+// An open plate in the way of a cube; beyond its border there is nothing.
+TEST_CASE("wrenchctl takes an open mesh as an obstacle where the scene says that it is a surface") {
+  const TemporaryDirectory dir;
+  dir.write("body.off", as_off(box({-0.025, -0.025, -0.025}, {0.025, 0.025, 0.025})));
+  dir.write("sheet.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
+  const std::string obstacle = "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"sheet.obj\"\n";
+  const fs::path solid = dir.write("solid.toml", obstacle);
+  const ProgramResult refused = run_program("wrenchctl", {"check", solid.string()});
+  CHECK(refused.exit_code == 1);
+  CHECK(refused.err.find("the surface is open") != std::string::npos);
+  CHECK(refused.err.find("kind = \"surface\"") != std::string::npos);
+
+  const fs::path scene = dir.write("scene.toml", obstacle + "kind = \"surface\"\n");
+  const ProgramResult checked = run_program("wrenchctl", {"check", scene.string()});
+  INFO(checked.err);
+  CHECK(checked.exit_code == 0);
+  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": taken as a surface") !=
+        std::string::npos);
+  const fs::path poses =
+      dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.05,0,0,0,1\n0,0,-0.1,0,0,0,1\n0,0,-0.1,0,0,0,1\n");
+  const ProgramResult solved =
+      run_program("wrenchctl", {"solve", scene.string(), "--poses", poses.string(), "--proxy"});
+  const auto last = split(split(solved.out, '\n').at(3), ',');
+  CHECK(std::stod(last.at(4)) == Approx(0.025).epsilon(1e-6));
+
+  dir.write("kind.toml", obstacle + "kind = \"sheet\"\n");
+  const ProgramResult wrong = run_program("wrenchctl", {"check", (dir.path() / "kind.toml").string()});
+  CHECK(wrong.err.find("kind.toml:5:8: key 'obstacle[0].kind': expected") != std::string::npos);
+}
+
+TEST_CASE("wrenchctl mesh and check tell what was repaired, and a size that is not likely") {
+  const TemporaryDirectory dir;
+  PolygonSoup soup = box({0, 0, 0}, {80, 80, 80});
+  std::reverse(soup.faces[2].begin(), soup.faces[2].end());
+  soup.faces.push_back(soup.faces[4]);
+  const fs::path file = dir.write("body.ply", as_ascii_ply(soup));
+  const ProgramResult mesh = run_program("wrenchctl", {"mesh", file.string()});
+  CHECK(mesh.exit_code == 0);
+  CHECK(mesh.err == "");
+  for (const char* line :
+       {"faces              7\n", "repaired           removed 1 duplicate face: face 6 near (0, 0, 0)\n",
+        "repaired           turned 1 face round: face 2 near (0, 0, 80)\n", "triangles          12\n",
+        "remark             as a tool, its largest side is 80 m at scale 1: were millimetres taken for "
+        "metres? 'scale' would be 0.001\n"})
+    CHECK(mesh.out.find(line) != std::string::npos);
+  const fs::path scene = dir.write("scene.toml", "[tool]\nmesh = \"body.ply\"\n");
+  const ProgramResult check = run_program("wrenchctl", {"check", scene.string()});
+  CHECK(check.exit_code == 0);
+  CHECK(check.out.find("  changed: " + file.string() + ": turned 1 face round") != std::string::npos);
+  CHECK(check.out.find("  remark: " + file.string() + ": its largest side is 80 m") != std::string::npos);
+  CHECK(run_program("wrenchctl", {"mesh", file.string(), "--scale", "0.001"}).out.find("remark") ==
+        std::string::npos);
+}
+
+TEST_CASE("wrenchctl says on standard error what it does with a large mesh, and keeps what it made") {
+  const TemporaryDirectory dir;
+  const std::string file = (dir.path() / "large.off").string();
+  REQUIRE(
+      run_program("wrenchctl", {"mesh", "--make", "bumpy", "--triangles", "60000", "-o", file}).exit_code ==
+      0);
+  const fs::path scene = dir.write("scene.toml", "[tool]\nmesh = \"large.off\"\n");
+  const std::string was = std::getenv("XDG_CACHE_HOME") ? std::getenv("XDG_CACHE_HOME") : "";
+  ::setenv("XDG_CACHE_HOME", (dir.path() / "cache").c_str(), 1);
+  const ProgramResult cold = run_program("wrenchctl", {"check", scene.string()});
+  const ProgramResult warm = run_program("wrenchctl", {"check", scene.string()});
+  was.empty() ? ::unsetenv("XDG_CACHE_HOME") : ::setenv("XDG_CACHE_HOME", was.c_str(), 1);
+  CHECK(cold.exit_code == 0);
+  CHECK(cold.err.find("wrenchctl: large.off: reading 3 MB\nwrenchctl: large.off: ") == 0);
+  CHECK(cold.err.find(" triangles, checking\n") != std::string::npos);
+  CHECK(warm.out == cold.out);
+  CHECK(warm.err == "wrenchctl: large.off: reading 3 MB\n");
+  CHECK(fs::is_directory(dir.path() / "cache" / "wrenchd"));
 }
 
 TEST_CASE("wrenchctl solve refuses bad poses") {

@@ -192,8 +192,8 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
 void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
   CLI::App* mesh =
       app.add_subcommand("mesh",
-                         "What a mesh is: closed, volume, inertia, defects. Or makes one to try\n"
-                         "things with");
+                         "What a mesh is: closed, volume, inertia, repairs, defects. Or makes one\n"
+                         "to try things with");
   auto* file = mesh->add_option("file", options.file, "OFF, OBJ, STL or PLY")->check(not_empty());
   mesh->add_option("--scale", options.scale, "metres per mesh unit")
       ->check(number_from(1e-9, 1e6))
