@@ -20,8 +20,8 @@
 namespace wrenchd {
 namespace {
 
-/// A triangle that is no higher than this has no area: in units of the mesh's size. Single precision leaves such
-/// triangles where a corner was put on an edge, and makes up their normals.
+/// A triangle that is no higher than this has no area: in units of the mesh's size. Single precision leaves
+/// such triangles where a corner was put on an edge, and makes up their normals.
 constexpr double kThin = 1e-7;
 /// A crack that single precision, or a text of seven digits, leaves between two faces is no wider: in units
 /// of the largest coordinate.
@@ -386,15 +386,17 @@ void Repair::close_cracks() {
     for (const std::int64_t x : c) h = (h ^ static_cast<std::uint64_t>(x)) * 0x9e3779b97f4a7c15U;
     return static_cast<std::size_t>(h ^ h >> 32);
   };
-  std::unordered_map<std::array<std::int64_t, 3>, std::size_t, decltype(hash)> grid(border.size(), hash);
+  std::unordered_multimap<std::array<std::int64_t, 3>, std::size_t, decltype(hash)> grid(border.size(), hash);
   Merged merged(soup_.vertices.size());
   for (const std::size_t v : border) {
     const Vector3d& p = soup_.vertices[v];
     const auto c = cell(p);
     bool found = false;
     for (int i = 0; i < 27 && !found; ++i) {
-      const auto near_by = grid.find({c[0] + i % 3 - 1, c[1] + i / 3 % 3 - 1, c[2] + i / 9 - 1});
-      found = near_by != grid.end() && (soup_.vertices[near_by->second] - p).norm() <= width;
+      const auto [first, last] = grid.equal_range({c[0] + i % 3 - 1, c[1] + i / 3 % 3 - 1, c[2] + i / 9 - 1});
+      const auto near_by = std::find_if(
+          first, last, [&](const auto& other) { return (soup_.vertices[other.second] - p).norm() <= width; });
+      found = near_by != last;
       if (!found) continue;
       merged.merge(v, near_by->second);
       joined_.found([&] { return place(p); });

@@ -10,7 +10,7 @@ namespace wrenchd {
 namespace {
 
 constexpr double kFull = 1.0 - 1e-6;  // modelling programs round the corners of flat faces
-constexpr std::size_t kSome = 2000;
+constexpr std::size_t kSome = 20'000;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ bool fills_its_hull(const TriangleMesh& solid, const ConvexBody& hull) {
 // The hull of some vertices lies in that of all.
 bool may_fill_its_hull(const TriangleMesh& solid) {
   const std::size_t count = solid.vertices_m.size();
-  if (count <= kSome) return true;
+  if (count <= 2 * kSome) return true;
   std::vector<Vector3d> some;
   for (std::size_t i = 0; i < kSome; ++i) some.push_back(solid.vertices_m[i * count / kSome]);
   return fills_its_hull(solid, convex_hull(some));

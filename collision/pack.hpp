@@ -67,7 +67,7 @@ class Unpacker {
     if (!has(0) || size > rest_.size() / least) return void(good_ = false);
     list.resize(size);
     if constexpr (kPlain<T>) {
-      std::memcpy(static_cast<void*>(list.data()), rest_.data(), size * sizeof(T));
+      if (size > 0) std::memcpy(static_cast<void*>(list.data()), rest_.data(), size * sizeof(T));
       rest_.remove_prefix(size * sizeof(T));
     } else {
       for (T& value : list) (*this)(value);

@@ -9,8 +9,8 @@
 
 namespace wrenchd {
 
-/// What a mesh is the skin of: a solid, which has an inside, or nothing. A surface has two sides, and whatever
-/// starts on one of them is kept there.
+/// What a mesh is the skin of: a solid, which has an inside, or nothing. A surface has two sides, and
+/// whatever starts on one of them is kept there.
 enum class BodyKind : std::uint8_t { solid, surface };
 
 /// Vertices and triangles, counter-clockwise seen from outside. Lengths in metres once loaded.
