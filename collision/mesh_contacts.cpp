@@ -20,6 +20,8 @@ constexpr double kWasOpen = 0.5;
 /// The slope by which the features around a contact may seem to lie nearer than the contact itself: the
 /// straight way is not quite the true one.
 constexpr double kSlope = 1e-3;
+/// What is kept in single precision is kept a little smaller.
+constexpr double kSurely = 0.999;
 /// Where the end overlaps and nothing was seen to be crossed, crossings passed narrowly by a border: it is
 /// looked at again with borders this much wider, as a share of the way, and with no regard to slopes.
 constexpr double kWideBorder = 0.05;
@@ -31,12 +33,12 @@ constexpr double kLeastReach = 1e-4;
 /// A list is made within so many ticks, for so many to come, for poses this near to the way expected, as a
 /// share of it. So long a way, in units of the tool's size, is not worth it: the hand is too fast.
 constexpr double kTicksToList = 5.0;
-constexpr double kTicksAhead = 12.0;
+constexpr double kTicksAhead = 10.0;
 constexpr double kReachAhead = 0.04;
 constexpr double kFarthestAhead = 0.2;
 /// The least that is done with a tick, in visits, and how much more than the last list took.
 constexpr std::uint32_t kLeastPortion = 32;
-constexpr double kMore = 1.1;
+constexpr double kMore = 1.0;
 /// How much of the motion of the last tick counts, of which the motion to come is guessed.
 constexpr double kNewest = 0.3;
 constexpr double kNewestBend = 0.1;
@@ -80,6 +82,7 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel)
     : scene_(scene), lists_{NearPairs(scene, kernel), NearPairs(scene, kernel), NearPairs(scene, kernel)} {
   crossings_.reserve(kMostCrossings);
+  room_m_.resize(TreeWalk::kCapacity);
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
@@ -106,6 +109,7 @@ bool MeshContacts::list_now(const Pose& X_WT, WalkBudget& budget) noexcept {
   budget.visits += share.visits;
   if (!spare_->complete()) return false;
   std::swap(listed_, spare_);
+  rooms_of_ = nullptr;
   visits_of_list_ = listed_->visits();
   return true;
 }
@@ -134,8 +138,9 @@ Pose MeshContacts::after(double ticks, const Pose& X_WT) const noexcept {
 
 void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
   learn_motion(X_WT);
+  rooms_of_ = nullptr;
   if (!ahead_->under_way()) {
-    if (listed_->covers(X_WT) && listed_->covers(after(kTicksToList + 1.0, X_WT))) return;
+    if (listed_->covers(X_WT) && listed_->covers(after(kTicksAhead - 2.0, X_WT))) return;
     const double r_m = scene_.tool_radius_m();
     const Pose X_far = after(kTicksAhead, X_WT);
     const double way_m = ahead_->way_m(X_WT, X_far);
@@ -172,23 +177,49 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   const double way_m = listed_->way_m(X_start_, X_WT);
   const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
   // The way of a vertex is straight as long as nothing turns.
-  border_m_ = kBeyond * clearance_m + 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
+  bulge_m_ = 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
+  border_m_ = kBeyond * clearance_m + bulge_m_;
   slope_ = kSlope;
-  look_at_all(findings);
+  if (rooms_of_ == listed_)
+    look_at_those_near(X_WT, findings);
+  else
+    look_at_all(findings, X_WT);
   if (findings.overlaps && crossings_.empty()) {
     border_m_ = kWideBorder * way_m;
     slope_ = kAnySlope;
-    look_at_all(findings);
+    look_at_all(findings, X_WT);
+    rooms_of_ = nullptr;
   }
   choose_first(way_m, findings);
   return findings;
 }
 
-void MeshContacts::look_at_all(Findings& findings) noexcept {
+/// And notes how far each pair is from touching.
+void MeshContacts::look_at_all(Findings& findings, const Pose& X_WT) noexcept {
   touching_.clear();
   crossings_.clear();
   moved_.triangle = MeshSurface::kNone;
-  for (const NearPair& pair : listed_->pairs()) look_at(pair, moved(pair), findings);
+  const auto pairs = listed_->pairs();
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    room_m_[i] = static_cast<float>(kSurely * look_at(pairs[i], moved(pairs[i]), findings));
+  rooms_of_ = listed_;
+  X_room_start_ = X_start_;
+  X_room_ = X_WT;
+}
+
+/// Those that had less room than the tool has moved since.
+void MeshContacts::look_at_those_near(const Pose& X_WT, Findings& findings) noexcept {
+  touching_.clear();
+  crossings_.clear();
+  moved_.triangle = MeshSurface::kNone;
+  const bool same_start = X_start_.translation_m == X_room_start_.translation_m &&
+                          X_start_.rotation.coeffs() == X_room_start_.rotation.coeffs();
+  const double moved_m =
+      std::max(same_start ? 0.0 : listed_->way_m(X_room_, X_start_), listed_->way_m(X_room_, X_WT));
+  const auto near_m = static_cast<float>(moved_m + 2.0 * clearance_m_);
+  const auto pairs = listed_->pairs();
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (room_m_[i] <= near_m) look_at(pairs[i], moved(pairs[i]), findings);
 }
 
 const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
@@ -202,6 +233,13 @@ const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
     moved_.start[k] = seen.X_OT_start * p_T;
     moved_.end[k] = seen.X_OT_end * p_T;
   }
+  const MeshSurface::Plane& plane = scene_.tool_mesh()->surface.planes()[pair.a];
+  const auto plane_in_O = [&](const Frame& X_OT) -> MeshSurface::Plane {
+    const Vector3d normal = X_OT.R * plane.normal;
+    return {normal, plane.offset_m + normal.dot(X_OT.x_m)};
+  };
+  moved_.plane_start = plane_in_O(seen.X_OT_start);
+  moved_.plane_end = plane_in_O(seen.X_OT_end);
   return moved_;
 }
 
@@ -210,27 +248,44 @@ bool MeshContacts::closes(double start_m, double end_m) const noexcept {
   return end_m < (1.0 - kClosed) * clearance_m_ && end_m < start_m - kClosed * clearance_m_;
 }
 
-/// Most pairs are kept apart all the way by the plane of one of the two.
-void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
+/// By how much a plane keeps a triangle on one side at both ends of the way, and so all the way; 0: it does
+/// not. By at least so much at the start.
+double MeshContacts::kept_apart_m(const Heights& start_m, const Heights& end_m,
+                                  double least_m) const noexcept {
+  const double lowest_m = std::min({end_m[0], end_m[1], end_m[2]});
+  if (lowest_m > (1.0 + kClosed) * clearance_m_ + least_m)
+    return std::min({start_m[0], start_m[1], start_m[2]}) >= least_m ? lowest_m : 0.0;
+  const double highest_m = std::max({end_m[0], end_m[1], end_m[2]});
+  if (highest_m < -clearance_m_ - least_m)
+    return std::max({start_m[0], start_m[1], start_m[2]}) <= -least_m ? -highest_m : 0.0;
+  return 0.0;
+}
+
+/// Most pairs are kept apart all the way by the plane of one of the two. Answers by how much [m].
+double MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
   const Seen& seen = seen_[pair.obstacle];
   const MeshSurface& surface = seen.obstacle->mesh->surface;
+  const Triangle b = {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)};
   const MeshSurface::Plane& plane = surface.planes()[pair.b];
-  const double closed_m = (1.0 + kClosed) * clearance_m_;
-  const auto height = [&](const Vector3d& p) { return plane.normal.dot(p) - plane.offset_m; };
-  const double e0 = height(a.end[0]), e1 = height(a.end[1]), e2 = height(a.end[2]);
-  const double lowest_end = std::min({e0, e1, e2}), highest_end = std::max({e0, e1, e2});
-  if (lowest_end > closed_m || highest_end < -clearance_m_) {
-    const double s0 = height(a.start[0]), s1 = height(a.start[1]), s2 = height(a.start[2]);
-    if (lowest_end > closed_m ? std::min({s0, s1, s2}) >= 0.0 : std::max({s0, s1, s2}) <= 0.0) return;
-  }
+  const auto heights = [](const MeshSurface::Plane& over, const Triangle& triangle) -> Heights {
+    return {over.normal.dot(triangle[0]) - over.offset_m, over.normal.dot(triangle[1]) - over.offset_m,
+            over.normal.dot(triangle[2]) - over.offset_m};
+  };
+  const Heights a_end = heights(plane, a.end);
+  if (const double apart_m = kept_apart_m(heights(plane, a.start), a_end, 0.0); apart_m > 0.0) return apart_m;
+  // Seen from the tool the obstacle's way bulges a little.
+  if (const double apart_m = kept_apart_m(heights(a.plane_start, b), heights(a.plane_end, b), bulge_m_);
+      apart_m > 0.0)
+    return apart_m - bulge_m_;
   const std::size_t before = crossings_.size();
   vertices_on_face(seen, pair, a);
   face_on_vertices(seen, pair);
   edges_on_edges(seen, pair, a, findings);
-  if (crossings_.size() > before || findings.overlaps) return;
-  if (lowest_end > 0.0 || highest_end < 0.0) return;
-  findings.overlaps = triangles_meet(
-      a.end, {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)});
+  if (crossings_.size() > before || findings.overlaps) return 0.0;
+  if (std::min({a_end[0], a_end[1], a_end[2]}) > 0.0 || std::max({a_end[0], a_end[1], a_end[2]}) < 0.0)
+    return 0.0;
+  findings.overlaps = triangles_meet(a.end, b);
+  return 0.0;
 }
 
 /// Contacts of a vertex of the tool and a face of the obstacle. The way is straight in the obstacle's frame,

@@ -78,7 +78,9 @@ class MeshContacts {
     std::uint32_t triangle = MeshSurface::kNone;
     std::uint32_t obstacle = MeshSurface::kNone;
     Triangle start, end;
+    MeshSurface::Plane plane_start, plane_end;
   };
+  using Heights = std::array<double, 3>;  ///< of a triangle's corners over a plane [m]
 
   /// Two edges on the way; in the obstacle's frame.
   struct EdgesPass {
@@ -92,10 +94,12 @@ class MeshContacts {
   bool list_now(const Pose& X_WT, WalkBudget& budget) noexcept;
   void learn_motion(const Pose& X_WT) noexcept;
   Pose after(double ticks, const Pose& X_WT) const noexcept;
-  void look_at_all(Findings& findings) noexcept;
+  void look_at_all(Findings& findings, const Pose& X_WT) noexcept;
+  void look_at_those_near(const Pose& X_WT, Findings& findings) noexcept;
+  double kept_apart_m(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
   bool closes(double start_m, double end_m) const noexcept;
-  void look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
+  double look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
   void vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
   void face_on_vertices(const Seen& seen, const NearPair& pair) noexcept;
   void edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a, Findings& findings) noexcept;
@@ -118,8 +122,14 @@ class MeshContacts {
   Pose X_start_;
   std::vector<Seen> seen_;  ///< all obstacles
   double clearance_m_ = 0.0;
+  double bulge_m_ = 0.0;   ///< by how much a way may leave the straight line as it turns
   double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
+
+  // Between the looks of a tick most pairs keep so much room that they need not be looked at again.
+  std::vector<float> room_m_;            ///< of each pair listed, at X_room_
+  const NearPairs* rooms_of_ = nullptr;  ///< the list that they are of; null: of none
+  Pose X_room_start_, X_room_;           ///< start and end of the way that they were found on
 
   Moved moved_;
   std::vector<Crossing> crossings_;

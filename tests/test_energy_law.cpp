@@ -186,9 +186,9 @@ TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
     worst = std::max(worst, std::abs(work.energy_law));
     worst_pid = std::max(worst_pid, std::abs(work.pid));
   }
-  WARN("work around " << kLoops << " loops, of the peak potential: energy law at most "
-       << worst << ", Eq. (16) with k_P alone at most " << worst_pid << "; " << jumped
-       << " loops drawn again because q jumped");
+  WARN("work around " << kLoops << " loops, of the peak potential: energy law at most " << worst
+                      << ", Eq. (16) with k_P alone at most " << worst_pid << "; " << jumped
+                      << " loops drawn again because q jumped");
   CHECK(worst < 1e-6);
   CHECK(worst_pid > 1e-3);  // or the comparison compares nothing
 }
