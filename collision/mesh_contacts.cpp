@@ -36,6 +36,8 @@ constexpr double kTicksToList = 5.0;
 constexpr double kTicksAhead = 10.0;
 constexpr double kReachAhead = 0.04;
 constexpr double kFarthestAhead = 0.2;
+/// So many pairs are looked at in the time of a visit.
+constexpr std::size_t kPairsPerVisit = 8;
 /// The least that is done with a tick, in visits, and how much more than the last list took.
 constexpr std::uint32_t kLeastPortion = 32;
 constexpr double kMore = 1.0;
@@ -98,10 +100,15 @@ bool MeshContacts::covers(const Pose& X_WT) const noexcept {
   return listed_->covers(X_WT) && listed_->covers(X_start_);
 }
 
+/// For as long as it takes to make the next one, if X_WT lies where the tool is expected; else for the way
+/// there alone.
 bool MeshContacts::list_now(const Pose& X_WT, WalkBudget& budget) noexcept {
-  const double reach_m =
-      std::max(kReach * spare_->way_m(X_start_, X_WT), kLeastReach * scene_.tool_radius_m());
-  spare_->set_out({X_start_, X_WT, reach_m});
+  NearPairs::Way way = way_ahead(X_start_, kTicksToList + 2.0);
+  if (!goes_slowly(way) || spare_->away_m(way, X_WT) > way.reach_m) {
+    const double way_m = spare_->way_m(X_start_, X_WT);
+    way = {X_start_, X_WT, std::max(kReach * way_m, kLeastReach * scene_.tool_radius_m())};
+  }
+  spare_->set_out(way);
   // A way that is too long for what is left may be followed by a shorter one.
   WalkBudget share = {static_cast<std::uint32_t>(kLongestWalk * budget.visits)};
   budget.visits -= share.visits;
@@ -136,18 +143,26 @@ Pose MeshContacts::after(double ticks, const Pose& X_WT) const noexcept {
           X_WT.translation_m + ticks * shift_m_ + bends * bend_m_};
 }
 
+NearPairs::Way MeshContacts::way_ahead(const Pose& X_WT, double ticks) const noexcept {
+  const double r_m = scene_.tool_radius_m();
+  const Pose X_far = after(ticks, X_WT);
+  // A parabola leaves its chord by an eighth of a t^2.
+  const double bend_m = ticks * ticks / 8.0 * (bend_m_.norm() + r_m * bend_rad_.norm());
+  return {X_WT, X_far, std::max(kReachAhead * listed_->way_m(X_WT, X_far) + bend_m, kLeastReach * r_m)};
+}
+
+bool MeshContacts::goes_slowly(const NearPairs::Way& way) const noexcept {
+  return listed_->way_m(way.X_WT_start, way.X_WT_end) <= kFarthestAhead * scene_.tool_radius_m();
+}
+
 void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
   learn_motion(X_WT);
   rooms_of_ = nullptr;
   if (!ahead_->under_way()) {
     if (listed_->covers(X_WT) && listed_->covers(after(kTicksAhead - 2.0, X_WT))) return;
-    const double r_m = scene_.tool_radius_m();
-    const Pose X_far = after(kTicksAhead, X_WT);
-    const double way_m = ahead_->way_m(X_WT, X_far);
-    if (way_m > kFarthestAhead * r_m) return;
-    // A parabola leaves its chord by an eighth of a t^2.
-    const double bend_m = kTicksAhead * kTicksAhead / 8.0 * (bend_m_.norm() + r_m * bend_rad_.norm());
-    ahead_->set_out({X_WT, X_far, std::max(kReachAhead * way_m + bend_m, kLeastReach * r_m)});
+    const NearPairs::Way way = way_ahead(X_WT, kTicksAhead);
+    if (!goes_slowly(way)) return;
+    ahead_->set_out(way);
   }
   const auto portion =
       std::max(kLeastPortion, static_cast<std::uint32_t>(kMore * visits_of_list_ / kTicksToList));
@@ -168,7 +183,7 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
     findings.complete = false;
     return findings;
   }
-  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs()));
+  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs() / kPairsPerVisit));
   const Frame start(X_start_), end(X_WT);
   for (const std::uint32_t k : listed_->near_by()) {
     seen_[k].X_OT_start = start.seen_from(seen_[k].X_WO);

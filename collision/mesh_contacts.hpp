@@ -93,6 +93,8 @@ class MeshContacts {
   bool covers(const Pose& X_WT) const noexcept;
   bool list_now(const Pose& X_WT, WalkBudget& budget) noexcept;
   void learn_motion(const Pose& X_WT) noexcept;
+  NearPairs::Way way_ahead(const Pose& X_WT, double ticks) const noexcept;
+  bool goes_slowly(const NearPairs::Way& way) const noexcept;
   Pose after(double ticks, const Pose& X_WT) const noexcept;
   void look_at_all(Findings& findings, const Pose& X_WT) noexcept;
   void look_at_those_near(const Pose& X_WT, Findings& findings) noexcept;

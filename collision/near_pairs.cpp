@@ -21,7 +21,6 @@ NearPairs::NearPairs(const Scene& scene, walk::Kernel kernel) : scene_(scene), w
 
 void NearPairs::set_out(const Way& way) noexcept {
   way_ = way;
-  turn_ = turn_between(way.X_WT_start.rotation, way.X_WT_end.rotation);
   visits_ = 0;
   pairs_.clear();
   find_near_by();
@@ -54,17 +53,16 @@ bool NearPairs::go_on(WalkBudget& budget) noexcept {
 }
 
 /// The nearest pose on the way is as far along it as the shift and the turn together say.
-bool NearPairs::covers(const Pose& X_WT) const noexcept {
-  if (!complete()) return false;
+double NearPairs::away_m(const Way& way, const Pose& X_WT) const noexcept {
+  const auto& [start, end, reach_m] = way;
   const double r_m = scene_.tool_radius_m();
-  const Vector3d shift_m = way_.X_WT_end.translation_m - way_.X_WT_start.translation_m;
-  const double length2 = shift_m.squaredNorm() + r_m * r_m * turn_.squaredNorm();
-  const double along = shift_m.dot(X_WT.translation_m - way_.X_WT_start.translation_m) +
-                       r_m * r_m * turn_.dot(turn_between(way_.X_WT_start.rotation, X_WT.rotation));
+  const Vector3d shift_m = end.translation_m - start.translation_m;
+  const Vector3d turn = turn_between(start.rotation, end.rotation);
+  const double length2 = shift_m.squaredNorm() + r_m * r_m * turn.squaredNorm();
+  const double along = shift_m.dot(X_WT.translation_m - start.translation_m) +
+                       r_m * r_m * turn.dot(turn_between(start.rotation, X_WT.rotation));
   const double share = length2 > 0.0 ? std::clamp(along / length2, 0.0, 1.0) : 0.0;
-  const Pose nearest = {way_.X_WT_start.rotation.slerp(share, way_.X_WT_end.rotation),
-                        way_.X_WT_start.translation_m + share * shift_m};
-  return way_m(X_WT, nearest) <= way_.reach_m;
+  return way_m(X_WT, {start.rotation.slerp(share, end.rotation), start.translation_m + share * shift_m});
 }
 
 double NearPairs::way_m(const Pose& from, const Pose& to) const noexcept {

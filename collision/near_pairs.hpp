@@ -43,13 +43,15 @@ class NearPairs {
   /// Are all pairs listed? Not where there was no room for them.
   bool complete() const noexcept { return state_ == State::complete; }
   /// Does the list hold for this pose, and for straight ways to others that it holds for?
-  bool covers(const Pose& X_WT) const noexcept;
+  bool covers(const Pose& X_WT) const noexcept { return complete() && away_m(way_, X_WT) <= way_.reach_m; }
 
   std::span<const NearPair> pairs() const noexcept { return pairs_; }
   /// The obstacles that may be met on the way: places among scene.meshes().
   std::span<const std::uint32_t> near_by() const noexcept { return near_by_; }
   std::uint32_t visits() const noexcept { return visits_; }  ///< that the list has taken so far
 
+  /// How far a pose is from a way [m].
+  double away_m(const Way& way, const Pose& X_WT) const noexcept;
   /// How far a point of the tool may be moved from one pose to the other [m].
   double way_m(const Pose& from, const Pose& to) const noexcept;
 
@@ -63,7 +65,6 @@ class NearPairs {
   TreeWalk walk_;
   State state_ = State::empty;
   Way way_;
-  Vector3d turn_ = Vector3d::Zero();  ///< of the way, in the tool's frame [rad]
   std::uint32_t visits_ = 0;
   std::size_t next_ = 0;  ///< of near_by_, to be walked
   std::vector<NearPair> pairs_;

@@ -49,7 +49,8 @@ class Proxy {
     X_asked_.reset();
   }
 
-  std::uint16_t looks() const noexcept { return looks_; }  ///< of the last tick
+  std::uint16_t looks() const noexcept { return looks_; }                            ///< of the last tick
+  std::uint32_t visits() const noexcept { return effort_.visits - budget_.visits; }  ///< likewise
   std::size_t pairs() const noexcept { return meshes_.pairs(); }
 
  private:
