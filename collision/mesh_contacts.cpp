@@ -30,17 +30,21 @@ constexpr double kAnySlope = 2.0;
 /// size.
 constexpr double kReach = 0.08;
 constexpr double kLeastReach = 1e-4;
-/// A list is made within so many ticks, for so many to come, for poses this near to the way expected, as a
-/// share of it. So long a way, in units of the tool's size, is not worth it: the hand is too fast.
-constexpr double kTicksToList = 5.0;
-constexpr double kTicksAhead = 10.0;
+/// A list is made for so many ticks to come, at most and at least, within half of them, for poses this near
+/// to the way expected, as a share of it. So long a way, in units of the tool's size, is not worth it: the
+/// hand is too fast.
+constexpr double kMostTicksAhead = 10.0;
+constexpr double kLeastTicksAhead = 3.0;
+/// A long list is dear to look at, a short one often to be made: where one costs so many times the other, the
+/// next is made for fewer ticks or for more.
+constexpr double kTooDear = 1.5;
+constexpr double kFewer = 0.7;
 constexpr double kReachAhead = 0.04;
 constexpr double kFarthestAhead = 0.2;
 /// So many pairs are looked at in the time of a visit.
 constexpr std::size_t kPairsPerVisit = 8;
-/// The least that is done with a tick, in visits, and how much more than the last list took.
+/// The least that is done with a tick, in visits.
 constexpr std::uint32_t kLeastPortion = 32;
-constexpr double kMore = 1.0;
 /// How much of the motion of the last tick counts, of which the motion to come is guessed.
 constexpr double kNewest = 0.3;
 constexpr double kNewestBend = 0.1;
@@ -103,7 +107,7 @@ bool MeshContacts::covers(const Pose& X_WT) const noexcept {
 /// For as long as it takes to make the next one, if X_WT lies where the tool is expected; else for the way
 /// there alone.
 bool MeshContacts::list_now(const Pose& X_WT, WalkBudget& budget) noexcept {
-  NearPairs::Way way = way_ahead(X_start_, kTicksToList + 2.0);
+  NearPairs::Way way = way_ahead(X_start_, 0.5 * ticks_ahead_ + 2.0);
   if (!goes_slowly(way) || spare_->away_m(way, X_WT) > way.reach_m) {
     const double way_m = spare_->way_m(X_start_, X_WT);
     way = {X_start_, X_WT, std::max(kReach * way_m, kLeastReach * scene_.tool_radius_m())};
@@ -159,19 +163,23 @@ void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
   learn_motion(X_WT);
   rooms_of_ = nullptr;
   if (!ahead_->under_way()) {
-    if (listed_->covers(X_WT) && listed_->covers(after(kTicksAhead - 2.0, X_WT))) return;
-    const NearPairs::Way way = way_ahead(X_WT, kTicksAhead);
+    if (listed_->covers(X_WT) && listed_->covers(after(0.8 * ticks_ahead_, X_WT))) return;
+    const NearPairs::Way way = way_ahead(X_WT, ticks_ahead_);
     if (!goes_slowly(way)) return;
     ahead_->set_out(way);
   }
   const auto portion =
-      std::max(kLeastPortion, static_cast<std::uint32_t>(kMore * visits_of_list_ / kTicksToList));
+      std::max(kLeastPortion, static_cast<std::uint32_t>(2.0 * visits_of_list_ / ticks_ahead_));
   WalkBudget part = {std::min(portion, budget.visits)};
   budget.visits -= part.visits;
   const bool ended = ahead_->go_on(part);
   budget.visits += part.visits;
   if (!ended || !ahead_->complete()) return;
   visits_of_list_ = ahead_->visits();
+  const double looking = static_cast<double>(ahead_->pairs().size()) / kPairsPerVisit;
+  const double making = 2.0 * visits_of_list_ / ticks_ahead_;
+  if (looking > kTooDear * making) ticks_ahead_ = std::max(kFewer * ticks_ahead_, kLeastTicksAhead);
+  if (making > kTooDear * looking) ticks_ahead_ = std::min(ticks_ahead_ / kFewer, kMostTicksAhead);
   if (ahead_->covers(X_WT)) std::swap(listed_, ahead_);
 }
 

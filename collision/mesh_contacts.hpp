@@ -117,6 +117,7 @@ class MeshContacts {
   NearPairs* ahead_ = &lists_[1];   ///< is being made
   NearPairs* spare_ = &lists_[2];   ///< for what must be listed at once
   std::uint32_t visits_of_list_ = 0;
+  double ticks_ahead_ = 10.0;                                         ///< that the next list is made for
   std::optional<Pose> X_last_;                                        ///< of the tick before
   Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();     ///< per tick; the turn in T
   Vector3d bend_m_ = Vector3d::Zero(), bend_rad_ = Vector3d::Zero();  ///< by which they grow per tick
