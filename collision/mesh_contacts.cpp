@@ -26,30 +26,6 @@ constexpr double kSurely = 0.999;
 /// looked at again with borders this much wider, as a share of the way, and with no regard to slopes.
 constexpr double kWideBorder = 0.05;
 constexpr double kAnySlope = 2.0;
-/// The list holds for ends this far away, as a share of the way, and at least so far, in units of the tool's
-/// size.
-constexpr double kReach = 0.08;
-constexpr double kLeastReach = 1e-4;
-/// A list is made for so many ticks to come, at most and at least, within half of them, for poses this near
-/// to the way expected, as a share of it. So long a way, in units of the tool's size, is not worth it: the
-/// hand is too fast.
-constexpr double kMostTicksAhead = 10.0;
-constexpr double kLeastTicksAhead = 3.0;
-/// A long list is dear to look at, a short one often to be made: where one costs so many times the other, the
-/// next is made for fewer ticks or for more.
-constexpr double kTooDear = 1.5;
-constexpr double kFewer = 0.7;
-constexpr double kReachAhead = 0.04;
-constexpr double kFarthestAhead = 0.2;
-/// So many pairs are looked at in the time of a visit.
-constexpr std::size_t kPairsPerVisit = 8;
-/// The least that is done with a tick, in visits.
-constexpr std::uint32_t kLeastPortion = 32;
-/// How much of the motion of the last tick counts, of which the motion to come is guessed.
-constexpr double kNewest = 0.3;
-constexpr double kNewestBend = 0.1;
-/// No walk takes more than this share of the budget that is left.
-constexpr double kLongestWalk = 0.7;
 /// Crossings of much the same direction nearer than this count as one, in units of the way.
 constexpr double kClose = 4.0;
 constexpr double kSameWay = 0.9;  // cosine
@@ -85,8 +61,7 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel)
-    : scene_(scene), lists_{NearPairs(scene, kernel), NearPairs(scene, kernel), NearPairs(scene, kernel)} {
+MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(scene), pairs_(scene, kernel) {
   crossings_.reserve(kMostCrossings);
   room_m_.resize(TreeWalk::kCapacity);
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
@@ -100,132 +75,54 @@ void MeshContacts::start_at(const Pose& X_WT) noexcept {
   X_start_ = X_WT;
 }
 
-bool MeshContacts::covers(const Pose& X_WT) const noexcept {
-  return listed_->covers(X_WT) && listed_->covers(X_start_);
-}
-
-/// For as long as it takes to make the next one, if X_WT lies where the tool is expected; else for the way
-/// there alone.
-bool MeshContacts::list_now(const Pose& X_WT, WalkBudget& budget) noexcept {
-  NearPairs::Way way = way_ahead(X_start_, 0.5 * ticks_ahead_ + 2.0);
-  if (!goes_slowly(way) || spare_->away_m(way, X_WT) > way.reach_m) {
-    const double way_m = spare_->way_m(X_start_, X_WT);
-    way = {X_start_, X_WT, std::max(kReach * way_m, kLeastReach * scene_.tool_radius_m())};
-  }
-  spare_->set_out(way);
-  // A way that is too long for what is left may be followed by a shorter one.
-  WalkBudget share = {static_cast<std::uint32_t>(kLongestWalk * budget.visits)};
-  budget.visits -= share.visits;
-  spare_->go_on(share);
-  budget.visits += share.visits;
-  if (!spare_->complete()) return false;
-  std::swap(listed_, spare_);
-  rooms_of_ = nullptr;
-  visits_of_list_ = listed_->visits();
-  return true;
-}
-
-/// The motion from tick to tick and its change, smoothed.
-void MeshContacts::learn_motion(const Pose& X_WT) noexcept {
-  if (X_last_) {
-    const Quaterniond turn = X_last_->rotation.conjugate() * X_WT.rotation;
-    const Vector3d shift_more_m = kNewest * (X_WT.translation_m - X_last_->translation_m - shift_m_);
-    const Vector3d turn_more = kNewest * ((turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec() - turn_);
-    shift_m_ += shift_more_m;
-    turn_ += turn_more;
-    bend_m_ += kNewestBend * (shift_more_m - bend_m_);
-    bend_rad_ += kNewestBend * (turn_more - bend_rad_);
-  }
-  X_last_ = X_WT;
-}
-
-/// Where the tool will be if it moves on like this.
-Pose MeshContacts::after(double ticks, const Pose& X_WT) const noexcept {
-  const double late = (1.0 - kNewest) / kNewest;  // ticks by which what is smoothed lags
-  const double bends = ticks * (0.5 * ticks + late);
-  return {(X_WT.rotation * rotation_from(ticks * turn_ + bends * bend_rad_)).normalized(),
-          X_WT.translation_m + ticks * shift_m_ + bends * bend_m_};
-}
-
-NearPairs::Way MeshContacts::way_ahead(const Pose& X_WT, double ticks) const noexcept {
-  const double r_m = scene_.tool_radius_m();
-  const Pose X_far = after(ticks, X_WT);
-  // A parabola leaves its chord by an eighth of a t^2.
-  const double bend_m = ticks * ticks / 8.0 * (bend_m_.norm() + r_m * bend_rad_.norm());
-  return {X_WT, X_far, std::max(kReachAhead * listed_->way_m(X_WT, X_far) + bend_m, kLeastReach * r_m)};
-}
-
-bool MeshContacts::goes_slowly(const NearPairs::Way& way) const noexcept {
-  return listed_->way_m(way.X_WT_start, way.X_WT_end) <= kFarthestAhead * scene_.tool_radius_m();
-}
-
 void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
-  learn_motion(X_WT);
-  rooms_of_ = nullptr;
-  if (!ahead_->under_way()) {
-    if (listed_->covers(X_WT) && listed_->covers(after(0.8 * ticks_ahead_, X_WT))) return;
-    const NearPairs::Way way = way_ahead(X_WT, ticks_ahead_);
-    if (!goes_slowly(way)) return;
-    ahead_->set_out(way);
-  }
-  const auto portion =
-      std::max(kLeastPortion, static_cast<std::uint32_t>(2.0 * visits_of_list_ / ticks_ahead_));
-  WalkBudget part = {std::min(portion, budget.visits)};
-  budget.visits -= part.visits;
-  const bool ended = ahead_->go_on(part);
-  budget.visits += part.visits;
-  if (!ended || !ahead_->complete()) return;
-  visits_of_list_ = ahead_->visits();
-  const double looking = static_cast<double>(ahead_->pairs().size()) / kPairsPerVisit;
-  const double making = 2.0 * visits_of_list_ / ticks_ahead_;
-  if (looking > kTooDear * making) ticks_ahead_ = std::max(kFewer * ticks_ahead_, kLeastTicksAhead);
-  if (making > kTooDear * looking) ticks_ahead_ = std::min(ticks_ahead_ / kFewer, kMostTicksAhead);
-  if (ahead_->covers(X_WT)) std::swap(listed_, ahead_);
+  pairs_.look_ahead(X_WT, budget);
+  rooms_of_.reset();
 }
 
 MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept {
   Findings findings;
   touching_.clear();
   clearance_m_ = clearance_m;
-  if (!covers(X_WT) && !list_now(X_WT, budget)) {
+  if (!pairs_.list(X_start_, X_WT, budget)) {
     findings.complete = false;
     return findings;
   }
-  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs() / kPairsPerVisit));
+  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs() / PairsAhead::kPairsPerVisit));
   const Frame start(X_start_), end(X_WT);
-  for (const std::uint32_t k : listed_->near_by()) {
+  for (const std::uint32_t k : pairs_.listed().near_by()) {
     seen_[k].X_OT_start = start.seen_from(seen_[k].X_WO);
     seen_[k].X_OT_end = end.seen_from(seen_[k].X_WO);
   }
-  const double way_m = listed_->way_m(X_start_, X_WT);
+  const double way_m = pairs_.listed().way_m(X_start_, X_WT);
   const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
   // The way of a vertex is straight as long as nothing turns.
   bulge_m_ = 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
   border_m_ = kBeyond * clearance_m + bulge_m_;
   slope_ = kSlope;
-  if (rooms_of_ == listed_)
+  if (rooms_of_ == pairs_.edition())
     look_at_those_near(X_WT, findings);
   else
-    look_at_all(findings, X_WT);
+    look_at_all(X_WT, findings);
   if (findings.overlaps && crossings_.empty()) {
     border_m_ = kWideBorder * way_m;
     slope_ = kAnySlope;
-    look_at_all(findings, X_WT);
-    rooms_of_ = nullptr;
+    look_at_all(X_WT, findings);
+    rooms_of_.reset();
   }
   choose_first(way_m, findings);
   return findings;
 }
 
 /// And notes how far each pair is from touching.
-void MeshContacts::look_at_all(Findings& findings, const Pose& X_WT) noexcept {
+void MeshContacts::look_at_all(const Pose& X_WT, Findings& findings) noexcept {
   touching_.clear();
   crossings_.clear();
   moved_.triangle = MeshSurface::kNone;
-  const auto pairs = listed_->pairs();
+  const auto pairs = pairs_.listed().pairs();
   for (std::size_t i = 0; i < pairs.size(); ++i)
     room_m_[i] = static_cast<float>(kSurely * look_at(pairs[i], moved(pairs[i]), findings));
-  rooms_of_ = listed_;
+  rooms_of_ = pairs_.edition();
   X_room_start_ = X_start_;
   X_room_ = X_WT;
 }
@@ -237,10 +134,10 @@ void MeshContacts::look_at_those_near(const Pose& X_WT, Findings& findings) noex
   moved_.triangle = MeshSurface::kNone;
   const bool same_start = X_start_.translation_m == X_room_start_.translation_m &&
                           X_start_.rotation.coeffs() == X_room_start_.rotation.coeffs();
-  const double moved_m =
-      std::max(same_start ? 0.0 : listed_->way_m(X_room_, X_start_), listed_->way_m(X_room_, X_WT));
+  const double moved_m = std::max(same_start ? 0.0 : pairs_.listed().way_m(X_room_, X_start_),
+                                  pairs_.listed().way_m(X_room_, X_WT));
   const auto near_m = static_cast<float>(moved_m + 2.0 * clearance_m_);
-  const auto pairs = listed_->pairs();
+  const auto pairs = pairs_.listed().pairs();
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (room_m_[i] <= near_m) look_at(pairs[i], moved(pairs[i]), findings);
 }

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "collision/near_pairs.hpp"
+#include "collision/pairs_ahead.hpp"
 #include "collision/scene.hpp"
 #include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
@@ -24,9 +24,7 @@ namespace wrenchd {
 /// lines that carry them, are opposite each other when it closes. Of pairs that are crossed close together
 /// only the first counts: once it is held open the others may never be reached.
 ///
-/// The pairs of triangles near the way come from lists (near_pairs.hpp). While one serves, the next is made
-/// for where the tool will be if it moves on as it does, a little with every tick; only where it did not is a
-/// list made at once.
+/// Which pairs of triangles are near the way, lists tell that are made ahead (pairs_ahead.hpp).
 ///
 /// Memory is taken at construction. One object serves one thread.
 class MeshContacts {
@@ -51,14 +49,17 @@ class MeshContacts {
   /// The way from the start to X_WT, whose contacts are held open by clearance_m. RT safe.
   Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept;
 
-  /// Once a tick, when the tool has come to X_WT: goes on with the list for where it will be. RT safe.
+  /// Once a tick, when the tool has come to X_WT: prepares for where it will be. RT safe.
   void look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept;
+
+  /// The tool is elsewhere now. RT safe.
+  void forget_motion() noexcept { pairs_.forget_motion(); }
 
   /// The contacts that touch at the end looked at last, with their gap no wider than the clearance, and
   /// rounding.
   const ContactSet& touching() const noexcept { return touching_; }
 
-  std::size_t pairs() const noexcept { return listed_->pairs().size(); }  ///< listed
+  std::size_t pairs() const noexcept { return pairs_.listed().pairs().size(); }  ///< listed
 
  private:
   struct Crossing {
@@ -90,13 +91,7 @@ class MeshContacts {
     double sign;  ///< of the cross product of da and db that points out of the obstacle
   };
 
-  bool covers(const Pose& X_WT) const noexcept;
-  bool list_now(const Pose& X_WT, WalkBudget& budget) noexcept;
-  void learn_motion(const Pose& X_WT) noexcept;
-  NearPairs::Way way_ahead(const Pose& X_WT, double ticks) const noexcept;
-  bool goes_slowly(const NearPairs::Way& way) const noexcept;
-  Pose after(double ticks, const Pose& X_WT) const noexcept;
-  void look_at_all(Findings& findings, const Pose& X_WT) noexcept;
+  void look_at_all(const Pose& X_WT, Findings& findings) noexcept;
   void look_at_those_near(const Pose& X_WT, Findings& findings) noexcept;
   double kept_apart_m(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
@@ -112,15 +107,7 @@ class MeshContacts {
   void choose_first(double way_m, Findings& findings) noexcept;
 
   const Scene& scene_;
-  std::array<NearPairs, 3> lists_;
-  NearPairs* listed_ = &lists_[0];  ///< serves
-  NearPairs* ahead_ = &lists_[1];   ///< is being made
-  NearPairs* spare_ = &lists_[2];   ///< for what must be listed at once
-  std::uint32_t visits_of_list_ = 0;
-  double ticks_ahead_ = 10.0;                                         ///< that the next list is made for
-  std::optional<Pose> X_last_;                                        ///< of the tick before
-  Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();     ///< per tick; the turn in T
-  Vector3d bend_m_ = Vector3d::Zero(), bend_rad_ = Vector3d::Zero();  ///< by which they grow per tick
+  PairsAhead pairs_;
 
   Pose X_start_;
   std::vector<Seen> seen_;  ///< all obstacles
@@ -130,9 +117,9 @@ class MeshContacts {
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
 
   // Between the looks of a tick most pairs keep so much room that they need not be looked at again.
-  std::vector<float> room_m_;            ///< of each pair listed, at X_room_
-  const NearPairs* rooms_of_ = nullptr;  ///< the list that they are of; null: of none
-  Pose X_room_start_, X_room_;           ///< start and end of the way that they were found on
+  std::vector<float> room_m_;              ///< of each pair listed, at X_room_
+  std::optional<std::uint32_t> rooms_of_;  ///< the edition of the list that they are of
+  Pose X_room_start_, X_room_;             ///< start and end of the way that they were found on
 
   Moved moved_;
   std::vector<Crossing> crossings_;

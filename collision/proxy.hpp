@@ -47,6 +47,7 @@ class Proxy {
   void forget() noexcept {
     known_.clear();
     X_asked_.reset();
+    meshes_.forget_motion();
   }
 
   std::uint16_t looks() const noexcept { return looks_; }                            ///< of the last tick
