@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/obstacle_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace wrenchd {
+
+Pose ObstacleMotion::at(const Pose& X_WO_0, double t_s) const noexcept {
+  const double s = on_the_way_s(t_s);
+  if (!(s > 0.0)) return X_WO_0;
+  Pose X_WO = X_WO_0;
+  if (!linear_m_per_s.isZero(0.0)) X_WO.translation_m += s * linear_m_per_s;
+  const double speed = angular_rad_per_s.norm();
+  if (speed == 0.0) return X_WO;
+  // Whole turns are left out before they cost the angle its digits; by twos, for a quaternion comes back to
+  // itself, and not to its negative, after two.
+  const double turned_s = std::fmod(s, 4.0 * std::numbers::pi / speed);
+  X_WO.rotation = (rotation_from(turned_s * angular_rad_per_s) * X_WO_0.rotation).normalized();
+  return X_WO;
+}
+
+/// s(t). fmod() is exact, so days later the turning points are still where they were.
+double ObstacleMotion::on_the_way_s(double t_s) const noexcept {
+  if (!(t_s > 0.0)) return 0.0;
+  const double t = std::min(t_s, kLongest_s);
+  if (!(turn_back_s > 0.0)) return t;
+  const double in_round_s = std::fmod(t, 2.0 * turn_back_s);
+  return std::min(in_round_s, 2.0 * turn_back_s - in_round_s);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <catch2/catch.hpp>
+
+#include "core/finite.hpp"
+#include "core/obstacle_motion.hpp"
+
+namespace wrenchd {
+namespace {
+
+constexpr double kDay_s = 86400.0;
+const Pose kStart = {rotation_from({0.3, -0.2, 0.5}), {0.1, 0.2, -0.3}};
+const ObstacleMotion kStraight = {{0.1, -0.2, 0.3}, {0, 0, 0}, 0.0};
+const ObstacleMotion kSpinning = {{0, 0, 0}, {1.0, -2.0, 0.5}, 0.0};
+const ObstacleMotion kToAndFro = {{0.1, -0.2, 0.3}, {1.0, -2.0, 0.5}, 0.75};
+const ObstacleMotion kFastest = {{3.0, 4.0, 0.0}, {30.0, 40.0, 0.0}, 0.0};
+
+bool same_bits(const Pose& a, const Pose& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
+}
+
+double apart(const Pose& a, const Pose& b) {
+  return log(inverse(a) * b).norm();
+}
+
+}  // namespace
+
+TEST_CASE("an obstacle without velocity stands still, to the bit", "[motion]") {
+  CHECK_FALSE(ObstacleMotion{}.moves());
+  CHECK_FALSE(ObstacleMotion{{0, 0, 0}, {0, 0, 0}, 2.0}.moves());
+  for (const double t : {-1.0, 0.0, 0.001, 1.0, kDay_s})
+    CHECK(same_bits(ObstacleMotion{}.at(kStart, t), kStart));
+}
+
+TEST_CASE("at time 0, before it, and where the time means nothing, every motion is at its start",
+          "[motion]") {
+  for (const ObstacleMotion& motion : {kStraight, kSpinning, kToAndFro, kFastest}) {
+    CHECK(motion.moves());
+    for (const double t : {0.0, -0.0, -1e-9, -kDay_s, -std::numeric_limits<double>::infinity(),
+                           std::numeric_limits<double>::quiet_NaN()})
+      CHECK(same_bits(motion.at(kStart, t), kStart));
+  }
+}
+
+TEST_CASE("the origin goes straight, and the body turns about it in the world's axes", "[motion]") {
+  const Pose X = ObstacleMotion{{0.1, -0.2, 0.3}, {1.0, -2.0, 0.5}, 0.0}.at(kStart, 0.5);
+  CHECK((X.translation_m - Vector3d(0.15, 0.1, -0.15)).norm() < 1e-15);
+  const Quaterniond turned = rotation_from({0.5, -1.0, 0.25}) * kStart.rotation;
+  CHECK(X.rotation.angularDistance(turned) < 1e-15);
+  // What only goes keeps its rotation to the bit, and what only turns its place.
+  CHECK(kStraight.at(kStart, 0.5).rotation.coeffs() == kStart.rotation.coeffs());
+  CHECK(kSpinning.at(kStart, 0.5).translation_m == kStart.translation_m);
+}
+
+TEST_CASE("to and fro: there at the turning points, back at the start, at the same speed all the time",
+          "[motion]") {
+  ObstacleMotion for_ever = kToAndFro;
+  for_ever.turn_back_s = 0.0;
+  const double back_s = kToAndFro.turn_back_s;
+  for (const int round : {0, 1, 2, 1000, 1000000}) {
+    const double start_s = 2.0 * back_s * round;  // exact in binary
+    CHECK(same_bits(kToAndFro.at(kStart, start_s), kStart));
+    CHECK(same_bits(kToAndFro.at(kStart, start_s + back_s), for_ever.at(kStart, back_s)));
+    for (const double s : {0.125, 0.25, 0.5, 0.625}) {
+      CHECK(same_bits(kToAndFro.at(kStart, start_s + s), for_ever.at(kStart, s)));
+      CHECK(same_bits(kToAndFro.at(kStart, start_s + 2.0 * back_s - s), for_ever.at(kStart, s)));
+    }
+  }
+}
+
+TEST_CASE("days later the pose is finite, of unit norm, and moves on smoothly", "[motion]") {
+  for (const ObstacleMotion& motion : {kStraight, kSpinning, kToAndFro, kFastest}) {
+    const double tick_m_rad = 0.001 * (motion.linear_m_per_s.norm() + motion.angular_rad_per_s.norm());
+    for (const double t : {1.0, kDay_s, 30 * kDay_s, 10000 * kDay_s}) {
+      const Pose X = motion.at(kStart, t);
+      CHECK(is_finite(X));
+      CHECK(std::abs(X.rotation.norm() - 1.0) < 1e-15);
+      // No faster than it is said to be, but for the digits that the time itself has left.
+      const double rounding = 100.0 * (t * 2.3e-16);
+      CHECK(apart(X, motion.at(kStart, t + 0.001)) <= tick_m_rad * (1.0 + 1e-6) + rounding);
+    }
+    for (const double t :
+         {1e12, 1e300, std::numeric_limits<double>::max(), std::numeric_limits<double>::infinity()}) {
+      CHECK(is_finite(motion.at(kStart, t)));
+      CHECK(same_bits(motion.at(kStart, t), motion.at(kStart, ObstacleMotion::kLongest_s)));
+    }
+  }
+}
+
+TEST_CASE("after whole turns it stands as at the start, and its quaternion never leaps", "[motion]") {
+  const ObstacleMotion turn = {{0, 0, 0}, {0, 0, 2.0 * std::numbers::pi}, 0.0};  // one a second
+  for (const double t : {1.0, 2.0, 3.0, 1000.0, 86401.0}) CHECK(apart(turn.at(kStart, t), kStart) < 1e-10);
+  Quaterniond last = kStart.rotation;
+  for (int i = 1; i < 5000; ++i) {
+    const Quaterniond now = turn.at(kStart, 0.001 * i).rotation;
+    CHECK(last.dot(now) > 0.9999);
+    last = now;
+  }
+}
+
+}  // namespace wrenchd
