@@ -12,6 +12,7 @@ constexpr Range kScale = {1e-9, 1e6};
 constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kTurn = {-10.0, 10.0};
+constexpr Range kTurnBack = {0.0, 86400.0};
 
 /// Shorter than this a normal is a slip of the keyboard rather than a direction.
 constexpr double kMinNormal = 1e-9;
@@ -50,7 +51,31 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
 /// What goes with `mesh` and means nothing to a half-space.
 struct MeshKeys {
   TomlValue scale, position, rotation, kind;
+  TomlValue velocity, angular_velocity, turn_back_after;
 };
+
+/// Of any direction, and no faster than that. True where it is good, or not given.
+bool read_velocity(const TomlValue& key, double fastest, Vector3d& velocity) {
+  if (!key) return true;
+  if (!key.vector(velocity, {-fastest, fastest})) return false;
+  const double speed = velocity.norm();
+  if (speed <= fastest) return true;
+  key.refuse("has the length " + key.with_unit(speed) + "; give one of no more than " +
+             key.with_unit(fastest));
+  return false;
+}
+
+void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
+  const bool linear_is_good =
+      read_velocity(keys.velocity, ObstacleMotion::kMaxSpeed_m_per_s, motion.linear_m_per_s);
+  const bool angular_is_good = read_velocity(
+      keys.angular_velocity, ObstacleMotion::kMaxAngularSpeed_rad_per_s, motion.angular_rad_per_s);
+  const bool turns_back = keys.turn_back_after.number(motion.turn_back_s, kTurnBack);
+  if (turns_back && linear_is_good && angular_is_good && !motion.moves())
+    keys.turn_back_after.refuse(
+        "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s, or leave this "
+        "out");
+}
 
 void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettings& scene,
                         const std::string& name) {
@@ -63,6 +88,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
   keys.rotation.vector(rotation_vector_rad, kTurn);
   obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
   keys.kind.choice(obstacle.kind, {{"solid", BodyKind::solid}, {"surface", BodyKind::surface}});
+  read_motion(keys, obstacle.motion);
   scene.meshes.push_back(obstacle);
 }
 
@@ -72,8 +98,10 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   table.optional("name").text(name);
   const TomlValue mesh = table.optional("mesh");
   const TomlValue half_space = table.mandatory_unless("mesh", "half_space");
-  const MeshKeys keys = {table.optional("scale", "m"), table.optional("position_m"),
-                         table.optional("rotation_vector_rad"), table.optional("kind")};
+  const MeshKeys keys = {table.optional("scale", "m"),          table.optional("position_m"),
+                         table.optional("rotation_vector_rad"), table.optional("kind"),
+                         table.optional("velocity_m_per_s"),    table.optional("angular_velocity_rad_per_s"),
+                         table.optional("turn_back_after_s")};
   if (mesh) {
     if (half_space)
       half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
@@ -82,6 +110,8 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
     if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
+  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.turn_back_after})
+    if (key) key.refuse("belongs to a mesh; a half_space stands still, so give what is to move as a mesh");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);
   if (half_space) scene.half_spaces.push_back(settings);

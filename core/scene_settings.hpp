@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/obstacle_motion.hpp"
 #include "core/pose.hpp"
 #include "core/triangle_mesh.hpp"
 
@@ -24,15 +25,16 @@ struct HalfSpaceSettings {
   double offset_m = 0.0;
 };
 
-/// A body of any shape that stands still. M is the frame its mesh file is written in.
+/// A body of any shape, that stands still or moves. M is the frame its mesh file is written in.
 struct MeshObstacleSettings {
   std::string name;
   std::filesystem::path mesh;
   double scale = 1.0;  ///< metres per mesh unit
-  Pose X_WM;
+  Pose X_WM;           ///< at scene time 0
   /// A surface may be open or cut through itself. It has no inside: nothing pushes a tool out that starts
   /// beyond it, or that it goes through.
   BodyKind kind = BodyKind::solid;
+  ObstacleMotion motion = {};  ///< of M; turns are about M's origin
 };
 
 struct SceneSettings {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <locale>
@@ -144,6 +145,49 @@ TEST_CASE("the shipped scene is a cube over a table", "[config]") {
   REQUIRE(scene.half_spaces.size() == 1);
   CHECK(scene.half_spaces[0].name == "table");
   CHECK(scene.half_spaces[0].normal_W == Vector3d::UnitZ());
+}
+
+TEST_CASE("the shipped plunger comes out of the table to and fro, within reach of the shipped hand",
+          "[config]") {
+  const SceneSettings scene = load_scene(kConfig / "scenes/cube_over_plunger.toml");
+  REQUIRE(scene.half_spaces.size() == 1);
+  REQUIRE(scene.meshes.size() == 1);
+  const MeshObstacleSettings& plunger = scene.meshes[0];
+  const double half_m = 0.025;
+  const auto top_m = [&](double t_s) {
+    return plunger.motion.at(plunger.X_WM, t_s).translation_m.z() + half_m;
+  };
+  const double back_s = plunger.motion.turn_back_s;
+  CHECK(top_m(0.0) == Approx(-0.010));
+  CHECK(top_m(back_s) == Approx(0.012));
+  CHECK(top_m(2.0 * back_s) == Approx(-0.010));
+  SimulationSettings s;
+  load_hand_script(kConfig / "hands/press_and_rock.toml", s);
+  CHECK(s.hand_path.front().position_m.z() - half_m > top_m(back_s));  // it starts free
+  double lowest_m = 1.0;
+  for (const Waypoint& w : s.hand_path) lowest_m = std::min(lowest_m, w.position_m.z() - half_m);
+  CHECK(lowest_m < top_m(back_s));
+}
+
+TEST_CASE("a mesh may move, and stands still unless it is told to", "[config]") {
+  const auto motion = [](const std::string& keys) {
+    const SceneSettings scene =
+        scene_from("[tool]\nmesh = 'cube.off'\n[[obstacle]]\nmesh = 'cube.off'\n" + keys);
+    REQUIRE(scene.meshes.size() == 1);
+    return scene.meshes[0].motion;
+  };
+  CHECK_FALSE(motion("").moves());
+  CHECK_FALSE(motion("velocity_m_per_s = [0, 0, 0]").moves());
+  const ObstacleMotion all = motion(
+      "velocity_m_per_s = [3, 0, -4]\nangular_velocity_rad_per_s = [0, 50, 0.0]\nturn_back_after_s = 1.5");
+  CHECK(all.moves());
+  CHECK(all.linear_m_per_s == Vector3d(3, 0, -4));
+  CHECK(all.angular_rad_per_s == Vector3d(0, 50, 0));
+  CHECK(all.turn_back_s == 1.5);
+  const ObstacleMotion turning = motion("kind = 'surface'\nangular_velocity_rad_per_s = [1, 0, 0]");
+  CHECK(turning.moves());
+  CHECK(turning.linear_m_per_s == Vector3d::Zero());
+  CHECK(turning.turn_back_s == 0.0);
 }
 
 TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {

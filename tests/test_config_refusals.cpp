@@ -213,6 +213,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
 
 TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
   const std::string plane = kTool + "[[obstacle]]\nhalf_space = ";
+  const std::string mesh = kTool + "[[obstacle]]\nmesh = 'cube.off'\n";
   const std::vector<Bad> table = {
       {"", "1:1", "key 'tool' is missing; it has no default, so state it here"},
       {"\n[tool]\nscale = 1.0", "2:1", "key 'tool.mesh' is missing; it has no default"},
@@ -240,6 +241,35 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {kTool + "[[obstacle]]\nscale = 2.0\nhalf_space = { normal = [0, 0, 1], offset = 0 }", "4:9",
        "belongs to a mesh; a half_space says where it is by normal and offset"},
       {kTool + "[[obstacle]]\nmesh = 'cube.off'\nposition_m = [0, 0]", "5:14", "3 numbers"},
+      {mesh + "velocity_m_per_s = [0, 1]", "5:20",
+       "key 'obstacle[0].velocity_m_per_s': expected an array of 3 numbers, found an array of 2"},
+      {mesh + "velocity_m_per_s = 1.0", "5:20", "expected an array of 3 numbers, found 1"},
+      {mesh + "velocity_m_per_s = [0, nan, 0]", "5:24",
+       "key 'obstacle[0].velocity_m_per_s[1]': expected a number from -5 to 5 m/s, found nan"},
+      {mesh + "velocity_m_per_s = [0, 0, -5.1]", "5:27", "expected a number from -5 to 5 m/s, found -5.1"},
+      {mesh + "velocity_m_per_s = [4, 0, 4]", "5:20", "m/s; give one of no more than 5 m/s"},
+      {mesh + "velocity_mm_per_s = [0, 0, 20]", "5:1", "give it in m/s as 'velocity_m_per_s'"},
+      {mesh + "angular_velocity_rad_per_s = [inf, 0, 0]", "5:31",
+       "expected a number from -50 to 50 rad/s, found inf"},
+      {mesh + "angular_velocity_rad_per_s = [0, 40, -40]", "5:30",
+       "rad/s; give one of no more than 50 rad/s"},
+      {mesh + "angular_velocity_rad_per_s = [0, 0]", "5:30", "3 numbers"},
+      {mesh + "angular_velocity_deg_per_s = [0, 0, 90]", "5:1",
+       "give it in rad/s as 'angular_velocity_rad_per_s'"},
+      {mesh + "turn_back_after_s = 2.0", "5:21",
+       "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s"},
+      {mesh + "velocity_m_per_s = [0, 0, 0]\nturn_back_after_s = 2.0", "6:21", "the obstacle does not move"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_s = -1", "6:21",
+       "expected a number from 0 to 86400 s, found -1"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_s = inf", "6:21", "s, found inf"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_ms = 500", "6:1",
+       "give it in s as 'turn_back_after_s'"},
+      {plane + "{ normal = [0, 0, 1], offset = 0 }\nvelocity_m_per_s = [0, 0, 1]", "5:20",
+       "belongs to a mesh; a half_space stands still, so give what is to move as a mesh"},
+      {plane + "{ normal = [0, 0, 1], offset = 0 }\nangular_velocity_rad_per_s = [0, 0, 1]", "5:30",
+       "a half_space stands still"},
+      {plane + "{ normal = [0, 0, 1], offset = 0 }\nturn_back_after_s = 1", "5:21",
+       "a half_space stands still"},
       {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
        "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'half_space', 'scale'"},
       {kTool + "[[obstacle]]\nname = 'x'", "3:1",
@@ -249,6 +279,17 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {kTool + "[[obstacles]]\nname = 'x'", "3:3", "did you mean 'obstacle'?"},
   };
   check_refused(as_scene, table);
+}
+
+TEST_CASE("a velocity that is refused does not have its turning back refused as well", "[config]") {
+  const TemporaryDirectory dir;
+  dir.write("cube.off", "");
+  const auto file = dir.write("s.toml", kTool +
+                                            "[[obstacle]]\nmesh = 'cube.off'\nvelocity_m_per_s = [9, 0, 0]\n"
+                                            "turn_back_after_s = 1");
+  const std::string message = refusal(as_scene, file);
+  CHECK(message.find("velocity_m_per_s[0]") != std::string::npos);
+  CHECK(message.find('\n') == std::string::npos);
 }
 
 TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") {
