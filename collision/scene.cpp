@@ -46,13 +46,16 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
 
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;
-  bool all_convex = fills_its_hull(tool.mesh, tool.hull);
+  const bool all_stand =
+      std::none_of(settings.meshes.begin(), settings.meshes.end(),
+                   [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves(); });
+  bool all_convex = all_stand && fills_its_hull(tool.mesh, tool.hull);
   std::map<std::tuple<std::filesystem::path, double, BodyKind>, Made> all_made;
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
     const auto [at, is_new] = all_made.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
     Made& made = at->second;
     if (is_new) made = make(obstacle, all_convex, loader);
-    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM);
+    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM, obstacle.motion);
     all_convex = all_convex && made.hull;
     if (!all_convex) continue;
     ConvexBody hull = *made.hull;
@@ -63,6 +66,10 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
   auto tool_mesh = loader.treed(tool.mesh, BodyKind::solid, settings.tool.mesh);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));
+}
+
+bool any_moves(const std::vector<MeshObstacle>& meshes) {
+  return std::any_of(meshes.begin(), meshes.end(), [](const MeshObstacle& m) { return m.motion.moves(); });
 }
 
 double farthest_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
@@ -82,12 +89,14 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
   return obstacle;
 }
 
-MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_)
-    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_) {
+MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_,
+                           const ObstacleMotion& motion_)
+    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_), motion(motion_) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : mesh->surface.vertices_m()) box.extend(p);
-  centre_W_m = X_WO * box.center();
-  radius_m = farthest_m(mesh->surface.vertices_m(), box.center());
+  centre_O_m = box.center();
+  centre_W_m = X_WO * centre_O_m;
+  radius_m = farthest_m(mesh->surface.vertices_m(), centre_O_m);
 }
 
 Scene::Scene(const SceneSettings& settings, MeshLoader& loader) : Scene(load(settings, loader)) {}
@@ -104,7 +113,9 @@ Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vec
       half_spaces_(std::move(half_spaces)),
       convex_(std::move(convex)),
       meshes_(std::move(meshes)),
-      tool_mesh_(std::move(tool_mesh)) {
+      tool_mesh_(std::move(tool_mesh)),
+      moves_(any_moves(meshes_)) {
+  if (moves_) convex_.clear();
   if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const TreedMesh>(tool_.mesh);
 }
 

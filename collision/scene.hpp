@@ -11,6 +11,7 @@
 #include "collision/tool_body.hpp"
 #include "collision/treed_mesh.hpp"
 #include "core/convex_body.hpp"
+#include "core/obstacle_motion.hpp"
 #include "core/scene_settings.hpp"
 
 namespace wrenchd {
@@ -26,14 +27,20 @@ struct ConvexObstacle {
 /// An obstacle of any shape. O: the frame of its mesh, in metres.
 struct MeshObstacle {
   /// The same mesh may be many obstacles.
-  MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_);
-  MeshObstacle(std::string name_, TreedMesh mesh_, const Pose& X_WO_)
-      : MeshObstacle(std::move(name_), std::make_shared<const TreedMesh>(std::move(mesh_)), X_WO_) {}
+  MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_,
+               const ObstacleMotion& motion_ = {});
+  MeshObstacle(std::string name_, TreedMesh mesh_, const Pose& X_WO_, const ObstacleMotion& motion_ = {})
+      : MeshObstacle(std::move(name_), std::make_shared<const TreedMesh>(std::move(mesh_)), X_WO_, motion_) {}
+
+  /// Where it stands at scene time t_s [s]: X_WO until time 0. RT safe.
+  Pose X_WO_at(double t_s) const noexcept { return motion.at(X_WO, t_s); }
 
   std::string name;
   std::shared_ptr<const TreedMesh> mesh;
-  Pose X_WO;
-  Vector3d centre_W_m;  ///< of a sphere that holds it
+  Pose X_WO;              ///< at scene time 0
+  ObstacleMotion motion;  ///< from there
+  Vector3d centre_O_m;    ///< of a sphere that holds it
+  Vector3d centre_W_m;    ///< the same, at scene time 0
   double radius_m;
 };
 
@@ -43,9 +50,11 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W);
 /// The tool and the obstacles it may touch. Built once, then only read.
 ///
 /// What was given as a mesh is one of meshes(). Where the tool and all of them are convex they are in
-/// convex() as well, in the same order: between convex bodies the global optimum can be sought.
+/// convex() as well, in the same order: between convex bodies the global optimum can be sought. Not so where
+/// an obstacle moves, for that search knows only bodies that stand still: then convex() is empty.
 ///
-/// Obstacles are numbered: the half-spaces first, then the others.
+/// Obstacles are numbered: the half-spaces first, then the others. Where they stand at which scene time is a
+/// law (core/obstacle_motion.hpp): a scene has no state.
 class Scene {
  public:
   /// Reads the meshes. Throws MeshError where one cannot be used; what else there is to say of them is left
@@ -63,6 +72,7 @@ class Scene {
   const std::vector<MeshObstacle>& meshes() const noexcept { return meshes_; }
   /// The tool as the meshes meet it, in T; null where there are none.
   const TreedMesh* tool_mesh() const noexcept { return tool_mesh_.get(); }
+  bool moves() const noexcept { return moves_; }  ///< does any obstacle?
   std::size_t obstacle_count() const noexcept {
     return half_spaces_.size() + std::max(convex_.size(), meshes_.size());
   }
@@ -74,6 +84,7 @@ class Scene {
   std::vector<ConvexObstacle> convex_;
   std::vector<MeshObstacle> meshes_;
   std::shared_ptr<const TreedMesh> tool_mesh_;
+  bool moves_ = false;
 };
 
 }  // namespace wrenchd

@@ -76,5 +76,40 @@ TEST_CASE("convex bodies are held as such, all others as meshes only", "[scene]"
   CHECK(forms() == std::pair<std::size_t, std::size_t>(0, 1));
 }
 
+TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodies to the proxy", "[scene]") {
+  const TemporaryDirectory dir;
+  SceneSettings settings = box_above_floor(dir);
+  MeshObstacleSettings post;
+  post.name = "post";
+  post.mesh = settings.tool.mesh;
+  post.X_WM = {rotation_from({0.1, 0.2, 0.3}), {0, 0, 3}};
+  settings.meshes = {post, post};
+  const Scene still(settings);
+  CHECK_FALSE(still.moves());
+  CHECK(still.convex().size() == 2);
+  CHECK(still.meshes()[1].X_WO_at(5.0).translation_m == post.X_WM.translation_m);
+  settings.meshes[1].motion = {{0.1, 0, 0}, {0, 0, 1.0}, 2.0};
+  const Scene scene(settings);
+  CHECK(scene.moves());
+  CHECK(scene.convex().empty());
+  REQUIRE(scene.meshes().size() == 2);
+  CHECK(scene.obstacle_count() == 3);
+  const MeshObstacle& moving = scene.meshes()[1];
+  CHECK(moving.mesh == scene.meshes()[0].mesh);  // made once
+  CHECK(moving.X_WO_at(0.0).translation_m == post.X_WM.translation_m);
+  CHECK(moving.X_WO_at(0.0).rotation.coeffs() == post.X_WM.rotation.coeffs());
+  CHECK((moving.X_WO_at(3.0).translation_m - Vector3d(0.1, 0, 3)).norm() < 1e-15);  // on its way back
+  CHECK(moving.X_WO_at(3.0).rotation.angularDistance(rotation_from({0, 0, 1}) * post.X_WM.rotation) < 1e-15);
+  CHECK((moving.centre_O_m - Vector3d(1, 1, 1)).norm() < 1e-15);
+  CHECK((moving.X_WO_at(0.0) * moving.centre_O_m - moving.centre_W_m).norm() == 0.0);
+
+  // So it is with a scene put together by hand.
+  std::vector<MeshObstacle> meshes = still.meshes();
+  meshes[0].motion.linear_m_per_s = {0, 0, 1};
+  const Scene by_hand(still.tool(), {}, still.convex(), std::move(meshes));
+  CHECK(by_hand.moves());
+  CHECK(by_hand.convex().empty());
+}
+
 }  // namespace
 }  // namespace wrenchd

@@ -37,7 +37,7 @@ std::string about(const SceneSettings& settings, MeshLoader& meshes) {
   text << "  tool " << settings.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
-       << " mesh obstacle(s)\n";
+       << " mesh obstacle(s)" << (scene.moves() ? ", moving" : "") << '\n';
   for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';
   for (const std::string& remark : meshes.remarks()) text << "  remark: " << remark << '\n';
   return text.str();
