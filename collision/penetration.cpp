@@ -5,6 +5,7 @@
 #include <limits>
 #include <span>
 #include <stdexcept>
+#include <string>
 
 namespace wrenchd {
 namespace {
@@ -25,6 +26,16 @@ Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
   return log(inverse(X_WP) * X_WQ);
 }
 
+/// Of a scene of meshes that are not held as convex bodies as well.
+std::string why_only_exact(const Scene& scene) {
+  for (const MeshObstacle& obstacle : scene.meshes())
+    if (obstacle.motion.moves())
+      return "the obstacle '" + obstacle.name +
+             "' moves, which only method exact can deal with; choose it, or let all obstacles stand still";
+  return "the tool or an obstacle ('" + scene.meshes().front().name +
+         "', ...) is not convex, which only method exact can deal with; choose it, or give convex bodies";
+}
+
 }  // namespace
 
 PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
@@ -38,16 +49,16 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
       best_(scene.convex().size()) {
   if (scene.meshes().empty()) return;
   const bool convex = !scene.convex().empty();
-  if (options.method != Method::exact && !convex)
-    throw std::invalid_argument(
-        "the tool or an obstacle ('" + scene.meshes().front().name +
-        "', ...) is not convex, which only method exact can deal with; choose it, or give "
-        "convex bodies");
+  if (options.method != Method::exact && !convex) throw std::invalid_argument(why_only_exact(scene));
   if (options.method == Method::exact) proxy_.emplace(scene);
   if (!convex) placement_.emplace(scene);
 }
 
-Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last) noexcept {
+// scene_time_s is for Proxy::follow(), Proxy::forget() and Placement::nearest(): they do not take it yet, and
+// see every obstacle where it stands at time 0.
+
+Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last,
+                                     [[maybe_unused]] double scene_time_s) noexcept {
   if (proxy_) return described(X_WP, proxy_->follow(X_WP, X_last));
   const bool admitted = X_answered_ && same_bits(*X_answered_, X_last);
   if (!admitted) scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
@@ -75,14 +86,15 @@ Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_las
   return out;
 }
 
-void PenetrationDepth::forget() noexcept {
+void PenetrationDepth::forget([[maybe_unused]] double scene_time_s) noexcept {
   known_.clear();
   X_answered_.reset();
   if (proxy_) proxy_->forget();
 }
 
-Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& stop) noexcept {
-  forget();
+Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& stop,
+                                    double scene_time_s) noexcept {
+  forget(scene_time_s);
   if (placement_) return described(X_WP, placement_->nearest(X_WP, stop));
   if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP, stop));
   scene_.survey(X_WP);

@@ -49,16 +49,19 @@ class PenetrationDepth {
   PenetrationDepth& operator=(const PenetrationDepth&) = delete;
 
   /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
-  /// the proxy stays there, and draws the hand back to where it came from. RT safe.
-  Penetration follow(const Pose& X_WP, const Pose& X_last) noexcept;
+  /// the proxy stays there, and draws the hand back to where it came from. scene_time_s: at which the
+  /// obstacles stand [s]; where they move it does not fall, and X_last was admissible at that of the last
+  /// follow(), query() or forget(). RT safe.
+  Penetration follow(const Pose& X_WP, const Pose& X_last, double scene_time_s = 0.0) noexcept;
   /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones.
   /// Neither allocates nor locks, but is up to a thousand times dearer, among meshes more: no work for the
   /// servo thread. Once stop is asked for, it ends within a few milliseconds; its answer is worth nothing
-  /// then.
-  Penetration query(const Pose& X_WP, const std::stop_token& stop = {}) noexcept;
+  /// then. scene_time_s: at which the obstacles stand [s].
+  Penetration query(const Pose& X_WP, const std::stop_token& stop = {}, double scene_time_s = 0.0) noexcept;
 
-  /// Forgets what the last answers were held by: the next pose to follow from is none of them. RT safe.
-  void forget() noexcept;
+  /// Forgets what the last answers were held by: the next pose to follow from is none of them. It is one that
+  /// was admissible when the obstacles stood as at scene_time_s [s]. RT safe.
+  void forget(double scene_time_s = 0.0) noexcept;
 
  private:
   Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <set>
+#include <stdexcept>
+#include <string>
 
 #include <catch2/catch.hpp>
 
@@ -12,6 +15,7 @@
 #include "core/wrench_law.hpp"
 #include "tests/support/pressed.hpp"
 #include "tests/support/repeats.hpp"
+#include "tools/make_mesh.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -329,5 +333,44 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
     const Penetration b = depth_by(Method::exact, fine).query(X_WP);
     INFO("case " << i << ", T " << a.projection.energy << " and " << b.projection.energy);
     CHECK((a.eps - b.eps).norm() < 1e-9);
+  }
+}
+
+TEST_CASE("where an obstacle moves only method exact will do, and the refusal says so",
+          "[penetration][moving]") {
+  const ToolBody cube = tool_body(make_mesh({"cube", 12}), 1.0, 0.1);
+  const auto mesh = std::make_shared<const TreedMesh>(make_mesh({"cube", 12}));
+  std::vector<MeshObstacle> meshes;
+  meshes.emplace_back("post", mesh, Pose{});
+  meshes.emplace_back("plunger", mesh, Pose{}, ObstacleMotion{{0, 0, 0.02}, {0, 0, 0}, 1.0});
+  const Scene scene(cube, {}, {}, std::move(meshes));
+  for (const Method method : {Method::planar, Method::descent, Method::translational}) {
+    std::string why;
+    try {
+      depth_by(method, scene);
+    } catch (const std::invalid_argument& error) {
+      why = error.what();
+    }
+    CHECK(why ==
+          "the obstacle 'plunger' moves, which only method exact can deal with; choose it, or let all "
+          "obstacles stand still");
+  }
+  PenetrationDepth depth(scene, {});
+  const Pose X_WP = {Quaterniond::Identity(), {0, 0, 0.2}};
+  const Projection q = depth.query(X_WP, {}, 0.5).projection;
+  CHECK(q.status == ProjectionStatus::free);
+  CHECK(depth.follow(X_WP, q.X_WQ, 0.501).projection.status == ProjectionStatus::free);
+}
+
+TEST_CASE("where nothing moves the scene time does not matter", "[penetration][moving]") {
+  RandomValues random(26);
+  for (int i = 0; i < 20; ++i) {
+    const Pressed c = into_half_space(random, 0.05, 0.3);
+    PenetrationDepth a(c.scene, {}), b(c.scene, {});
+    CHECK(a.query(c.X_WP).eps == b.query(c.X_WP, {}, 7.0).eps);
+    const Pose X_last = a.query(c.X_WP).projection.X_WQ;
+    a.forget();
+    b.forget(8.0);
+    CHECK(a.follow(c.X_WP, X_last).eps == b.follow(c.X_WP, X_last, 9.0).eps);
   }
 }
