@@ -16,8 +16,8 @@ constexpr PenetrationDepth::Options kNearest = {Method::exact, 47, Proxy::kClear
 
 PlacementAnswer sought(PenetrationDepth& penetration, const PlacementQuestion& question,
                        const std::stop_token& stop) noexcept {
-  const Projection q = penetration.query(question.X_WP, stop).projection;
-  return {question.number, q.status != ProjectionStatus::infeasible, q.X_WQ};
+  const Projection q = penetration.query(question.X_WP, stop, question.scene_time_s).projection;
+  return {question.number, q.status != ProjectionStatus::infeasible, q.X_WQ, question.scene_time_s};
 }
 
 }  // namespace

@@ -22,16 +22,18 @@ enum class Placing : std::uint8_t {
 /// "following", "placing", "placed", "no place".
 const char* name(Placing placing) noexcept;
 
-/// Which admissible pose is nearest to p?
+/// Which admissible pose is nearest to p, with the obstacles where they stand at that scene time?
 struct PlacementQuestion {
   std::uint32_t number = 0;  ///< comes back with the answer
   Pose X_WP;
+  double scene_time_s = 0.0;  ///< comes back as well: obstacles that move have gone on meanwhile
 };
 
 struct PlacementAnswer {
   std::uint32_t number = 0;
-  bool found = false;  ///< false: no admissible pose was found, and X_WQ is not set
-  Pose X_WQ;
+  bool found = false;         ///< false: no admissible pose was found, and X_WQ is not set
+  Pose X_WQ;                  ///< admissible
+  double scene_time_s = 0.0;  ///< at this scene time: the question's
 };
 
 /// Looks for the admissible pose from which the proxy may follow the hand, where there is no last one: at the

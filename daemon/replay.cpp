@@ -42,16 +42,16 @@ class RecordedPlacer final : public Placer {
  public:
   void play(const TickRecord& record) noexcept { record_ = &record; }
 
-  void ask(const PlacementQuestion& question) noexcept override { number_ = question.number; }
+  void ask(const PlacementQuestion& question) noexcept override { question_ = question; }
   bool answer(PlacementAnswer& answer) noexcept override {
     const auto placing = static_cast<Placing>(record_->placing);
-    answer = {number_, placing == Placing::placed, pose_of(record_->X_WQ)};
+    answer = {question_.number, placing == Placing::placed, pose_of(record_->X_WQ), question_.scene_time_s};
     return placing == Placing::placed || placing == Placing::nowhere;
   }
 
  private:
   const TickRecord* record_ = nullptr;
-  std::uint32_t number_ = 0;
+  PlacementQuestion question_;
 };
 
 DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
@@ -112,6 +112,11 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
 }  // namespace
 
 std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
+  if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
+    throw RecordingError(
+        "the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
+        ": what the loop had in mind by then, and where obstacles that move stood, is not in it; replay the "
+        "whole recording, from tick 0");
   const Scene scene(plan.scene);
   const VirtualClock clock;
   RecordedDevice device;

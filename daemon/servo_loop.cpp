@@ -155,7 +155,9 @@ void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
     limits_.reset();
     say(Event::Kind::late_tick, now, 0, seconds(since_last - period_));
   }
+  if (!last_tick_) first_tick_ = now;
   last_tick_ = now;
+  scene_time_s_ = seconds(now - first_tick_);
 }
 
 /// A hand that felt nothing may have gone through walls while the proxy stayed behind: arming starts over.
@@ -184,19 +186,19 @@ void ServoLoop::lose_place() noexcept {
 void ServoLoop::project(const DeviceSample& sample) noexcept {
   X_WP_ = X_WB_ * sample.X_BH * X_HT_;
   if (!has_place()) return place();
-  depth_ = penetration_.follow(X_WP_, X_WQ_);
+  depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
   X_WQ_ = depth_.projection.X_WQ;
   placing_ = Placing::following;
 }
 
 /// There is no q to follow from. The search for one may take seconds, so another thread does it, whatever the
 /// scene: asked at one tick, it answers at a later one, with a pose near to where the hand was then. That is
-/// this tick's q, and the next follows from it.
+/// this tick's q, and the next follows from it, and makes up for what obstacles have moved since.
 void ServoLoop::place() noexcept {
   if (!asked_) {
     if (placing_ == Placing::nowhere && *last_tick_ < ask_again_) return;
     placing_ = Placing::seeking;
-    placer_.ask({++question_, X_WP_});
+    placer_.ask({++question_, X_WP_, scene_time_s_});
     asked_ = true;
     return;
   }
@@ -206,6 +208,7 @@ void ServoLoop::place() noexcept {
   asked_ = false;
   placing_ = answer.found ? Placing::placed : Placing::nowhere;
   X_WQ_ = answer.X_WQ;
+  penetration_.forget(answer.scene_time_s);
   ask_again_ = *last_tick_ + kAskAgainAfter;
 }
 

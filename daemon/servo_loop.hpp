@@ -31,6 +31,9 @@ using RecordRing = boost::lockfree::spsc_queue<TickRecord>;
 /// Frames: W world, B device base, H handle point, M mesh of the tool, T body frame of the tool at its centre
 /// of mass. p and q are the paper's: the configuration of T that the hand asks for, and its projection.
 ///
+/// Scene time, by which obstacles move, is 0 at the first tick and goes on from there with the times of the
+/// ticks, whatever the state of the loop.
+///
 /// After construction nothing here allocates, locks, logs, throws or waits, but for the sleep in run().
 class ServoLoop {
  public:
@@ -122,7 +125,9 @@ class ServoLoop {
   bool stale_ = false;
 
   // Book-keeping
+  TimePoint first_tick_{};
   std::optional<TimePoint> last_tick_;
+  double scene_time_s_ = 0.0;  ///< of this tick
   double dt_s_ = 0.0;
   TimePoint tick_start_{};
   TimePoint lap_start_{};

@@ -43,9 +43,10 @@ TEST_CASE("the answer is admissible, and the same on a thread and in step", "[pl
   for (Placer* placer : {static_cast<Placer*>(&thread), static_cast<Placer*>(&step)}) {
     PlacementAnswer answer;
     CHECK_FALSE(placer->answer(answer));  // nothing was asked
-    placer->ask({7, kDeep});
+    placer->ask({7, kDeep, 1.25});
     answer = awaited(*placer);
     CHECK(answer.number == 7);
+    CHECK(answer.scene_time_s == 1.25);
     REQUIRE(answer.found);
     CHECK(Placement(scene).admissible(answer.X_WQ));
     CHECK((answer.X_WQ.translation_m - kDeep.translation_m).norm() > 0.01);

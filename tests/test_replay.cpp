@@ -92,6 +92,49 @@ TEST_CASE("a replay places the proxy at the ticks at which it was placed, where 
   CHECK(difference->field.rfind("X_WQ[", 0) == 0);
 }
 
+TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]") {
+  Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
+  buried.plan.settings.recording.file = "set";
+  buried.plan.scene.meshes[0].motion = {{0.0, 0.0, 0.01}, {0.0, 0.3, 0.0}, 0.7};
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  {
+    VirtualStation s(buried.plan, PlaceIn::thread);
+    s.clock.sleep_until(TimePoint{from_seconds(77777.7)});  // the loop's own time begins later
+    Recorder recorder(s.station.records(), file, s.station.recording_header());
+    for (int i = 0; i < 3000; ++i) {
+      if (i == 5) s.station.loop().arm();
+      if (i == 2500) s.station.loop().start_over();
+      let_placer_work(s);
+      REQUIRE(s.tick() == Fault::none);
+    }
+  }
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 3000);
+  const auto difference = replay(recording, buried.plan);
+  if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
+  CHECK_FALSE(difference.has_value());
+}
+
+TEST_CASE("a recording without its beginning is refused", "[replay]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const Plan plan = recording_plan(Method::exact);
+  record_run(plan, file, 0.5);
+  Recording recording = read_recording(file);
+  recording.ticks.erase(recording.ticks.begin(), recording.ticks.begin() + 100);
+  std::string why;
+  try {
+    replay(recording, plan);
+  } catch (const RecordingError& error) {
+    why = error.what();
+  }
+  CHECK(why.find("begins at tick 100") != std::string::npos);
+  CHECK(why.find("replay the whole recording") != std::string::npos);
+  recording.ticks.clear();
+  CHECK_FALSE(replay(recording, plan).has_value());
+}
+
 TEST_CASE("where there was no place, there is none in the replay", "[replay][placing]") {
   Plan plan = recording_plan(Method::exact);
   plan.scene.half_spaces = closed_box(0.02);

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "collision/placement.hpp"
+#include "config/load_scene.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/event_log.hpp"
 #include "daemon/wall_clock.hpp"
@@ -26,6 +27,40 @@ Pose pose_of(const std::array<double, 7>& x) {
   X.translation_m = {x[0], x[1], x[2]};
   return X;
 }
+
+/// A handle that lies where it is, and says so at every tick.
+class StillDevice final : public Device {
+ public:
+  void open() override {}
+  DeviceSample read_newest(TimePoint now) noexcept override {
+    DeviceSample sample;
+    sample.X_BH.translation_m = {0.0, 0.0, 0.1};
+    sample.device_time_s = seconds(now.time_since_epoch());
+    sample.sequence = ++sequence_;
+    sample.arrived = now;
+    sample.fresh = true;
+    return sample;
+  }
+  Fault write(TimePoint, const Wrench&, bool) noexcept override { return Fault::none; }
+  void release(TimePoint) noexcept override {}
+  void wait_readable(TimePoint) noexcept override {}
+  void close() noexcept override {}
+
+ private:
+  std::uint64_t sequence_ = 0;
+};
+
+/// Never finds a place, and keeps what it was asked.
+class Listener final : public Placer {
+ public:
+  std::vector<PlacementQuestion> questions;
+
+  void ask(const PlacementQuestion& question) noexcept override { questions.push_back(question); }
+  bool answer(PlacementAnswer& answer) noexcept override {
+    answer = {questions.back().number, false, Pose{}, questions.back().scene_time_s};
+    return true;
+  }
+};
 
 }  // namespace
 
@@ -390,6 +425,54 @@ TEST_CASE("release may be called at any time, and again", "[servo]") {
   CHECK(s.run(0.1) == Fault::none);
   CHECK(s.force_N() == 0.0);
   CHECK(s.engagement() == Engagement::disarmed);
+}
+
+TEST_CASE("scene time begins at the first tick and goes by the times of the ticks, whatever the loop does",
+          "[servo][moving]") {
+  const Plan plan = shipped_plan();
+  const Scene scene(plan.scene);
+  StillDevice device;
+  Listener placer;
+  VirtualClock clock;
+  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  const TimePoint first{from_seconds(123456.789)};  // a machine that has been on for days
+  std::vector<double> expected_s;
+  TimePoint now = first;
+  for (int i = 0; i < 3000; ++i) {
+    if (i == 700) loop.arm();
+    if (i == 1200) loop.disarm();
+    if (i == 1500) loop.start_over();
+    if (i == 2000) loop.release(now, Fault::none);
+    REQUIRE(loop.tick(now, now) == Fault::none);
+    if (placer.questions.size() > expected_s.size()) expected_s.push_back(seconds(now - first));
+    now += i == 1000 ? std::chrono::seconds(5) : from_seconds(0.00098 + 0.00001 * (i % 5));
+  }
+  REQUIRE(expected_s.size() > 20);
+  CHECK(expected_s.front() == 0.0);
+  CHECK(expected_s.back() == Approx(8.0).margin(0.2));
+  REQUIRE(placer.questions.size() == expected_s.size());
+  for (std::size_t i = 0; i < expected_s.size(); ++i)
+    CHECK(placer.questions[i].scene_time_s == expected_s[i]);
+}
+
+// Fails until the proxy takes the scene time; then the tag has to go.
+TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the hand",
+          "[servo][moving][!shouldfail]") {
+  Plan plan = shipped_plan();
+  plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  double most_tilt = 0.0, most_lift_m = 0.0;
+  for (int i = 0; i < 6000; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    if (placing(s) != Placing::following) continue;
+    const Pose X_WQ = pose_of(s.last.X_WQ);
+    const double down = X_WQ.translation_m.z() - 0.025;  // of a cube that lies on the table
+    if (s.last.contacts > 0) most_lift_m = std::max(most_lift_m, down);
+    most_tilt = std::max(most_tilt, std::abs(X_WQ.rotation.y()));
+  }
+  CHECK(most_lift_m > 0.003);
+  CHECK(most_tilt > 0.02);
 }
 
 TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
