@@ -769,6 +769,76 @@ TEST_CASE("wrenchctl solve with bodies that are not convex wants method exact") 
   CHECK(result.err.find("only method exact") != std::string::npos);
 }
 
+/// A cube of 50 mm on a cube of 50 mm that comes up from below by 10 mm in a second, and goes back.
+fs::path scene_with_lift(const TemporaryDirectory& dir) {
+  REQUIRE(run_program("wrenchctl", {"mesh", "--make", "cube", "--triangles", "12", "-o",
+                                    (dir.path() / "cube.off").string()})
+              .exit_code == 0);
+  return dir.write("scene.toml",
+                   "[tool]\nmesh = \"cube.off\"\n[[obstacle]]\nname = \"lift\"\nmesh = \"cube.off\"\n"
+                   "position_m = [0, 0, -0.055]\nvelocity_m_per_s = [0, 0, 0.01]\nturn_back_after_s = 1\n");
+}
+
+TEST_CASE("wrenchctl solve without --proxy leaves obstacles where they start, and says so", "[moving]") {
+  const TemporaryDirectory dir;
+  const std::string scene = scene_with_lift(dir).string();
+  const std::string table = dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,-0.01,0,0,0,1\n").string();
+  const ProgramResult alone = run_program("wrenchctl", {"solve", scene, "--poses", table});
+  CHECK(alone.exit_code == 0);
+  CHECK(alone.err ==
+        "wrenchctl: obstacles move, and every pose is solved with them where they stand at time 0; --proxy "
+        "moves them\n");
+  CHECK(std::stod(split(split(alone.out, '\n').at(1), ',').at(4)) == Approx(-0.005).margin(1e-6));
+  const ProgramResult followed = run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy"});
+  CHECK(followed.exit_code == 0);
+  CHECK(followed.err == "");
+  const ProgramResult planar =
+      run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--method", "planar"});
+  CHECK(planar.exit_code == 1);
+  CHECK(planar.err.find("the obstacle 'lift' moves, which only method exact can deal with") !=
+        std::string::npos);
+  const ProgramResult check = run_program("wrenchctl", {"check", scene});
+  CHECK(check.exit_code == 0);
+  CHECK(check.out.find("1 mesh obstacle(s), moving\n") != std::string::npos);
+}
+
+TEST_CASE("wrenchctl solve --rate is for a trajectory, and a rate that is one", "[moving]") {
+  const TemporaryDirectory dir;
+  const std::string scene = scene_with_lift(dir).string();
+  const std::string table = dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.1,0,0,0,1\n").string();
+  const ProgramResult alone = run_program("wrenchctl", {"solve", scene, "--poses", table, "--rate", "500"});
+  CHECK(alone.exit_code > 100);
+  CHECK(alone.err.find("--proxy") != std::string::npos);
+  for (const char* rate : {"0", "-1", "nan", "fast", "1e9"}) {
+    INFO(rate);
+    const ProgramResult bad =
+        run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--rate", rate});
+    CHECK(bad.exit_code > 100);
+    CHECK(bad.err.find("--rate") != std::string::npos);
+  }
+  CHECK(run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--rate", "500"}).exit_code ==
+        0);
+}
+
+// Fails until the proxy takes the scene time; then the tag has to go.
+TEST_CASE("wrenchctl solve --proxy moves obstacles at the rate it is given", "[moving][!shouldfail]") {
+  const TemporaryDirectory dir;
+  const std::string scene = scene_with_lift(dir).string();
+  std::string poses = "px,py,pz,qx,qy,qz,qw\n";
+  for (int i = 0; i <= 400; ++i) poses += "0,0,-0.01,0,0,0,1\n";
+  const std::string table = dir.write("poses.csv", poses).string();
+  const ProgramResult result =
+      run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--rate", "200"});
+  REQUIRE(result.exit_code == 0);
+  const auto rows = split(result.out, '\n');
+  const auto height_m = [&](std::size_t i) { return std::stod(split(rows.at(1 + i), ',').at(4)); };
+  CHECK(height_m(0) == Approx(-0.005).margin(1e-6));
+  CHECK(height_m(100) == Approx(0.0).margin(1e-6));
+  CHECK(height_m(200) == Approx(0.005).margin(1e-6));  // turns back
+  CHECK(height_m(300) == Approx(0.0).margin(1e-6));
+  CHECK(height_m(400) == Approx(-0.005).margin(1e-6));
+}
+
 TEST_CASE("wrenchctl explains itself") {
   const ProgramResult help = run_program("wrenchctl", {"--help"});
   CHECK(help.exit_code == 0);

@@ -51,9 +51,11 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
   rows.reserve(X_WM.size());
   for (const Pose& X_WM_p : X_WM) {
     const Pose X_WP = X_WM_p * X_MT;
+    const double scene_time_s = settings.proxy ? static_cast<double>(rows.size()) / settings.rate_Hz : 0.0;
     SolvedPose row;
     const auto start = std::chrono::steady_clock::now();
-    row.penetration = X_last ? depth.follow(X_WP, *X_last) : depth.query(X_WP);
+    row.penetration =
+        X_last ? depth.follow(X_WP, *X_last, scene_time_s) : depth.query(X_WP, {}, scene_time_s);
     row.solve_ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count();
     if (settings.proxy && row.penetration.projection.status != ProjectionStatus::infeasible)
       X_last = row.penetration.projection.X_WQ;

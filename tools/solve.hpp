@@ -28,6 +28,8 @@ struct SolveSettings {
   double k_P = 1.0;  ///< pid: K_P = k_P I, no integral, no derivative
   double energy_stiffness_per_s2 = 1.0;
   bool proxy = false;  ///< follow the poses as a trajectory, each from the answer before, as the daemon does
+  /// Of the trajectory: row i is at scene time i / rate_Hz. Without proxy all is as at scene time 0.
+  double rate_Hz = 1000.0;
 };
 
 /// Projects every pose (of the mesh's own frame, in the world): on its own, without history, unless a proxy

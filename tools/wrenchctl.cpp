@@ -79,6 +79,8 @@ int run_solve(const SolveOptions& options) {
   for (const std::string& change : meshes.changes()) say(change);
   const std::vector<Pose> poses = read_poses_from(options.poses);
   SolveSettings settings = options.settings;
+  if (scene.moves() && !settings.proxy)
+    say("obstacles move, and every pose is solved with them where they stand at time 0; --proxy moves them");
   settings.depth.method = kMethods.at(options.method);
   settings.law = options.law == "energy" ? SpringLaw::energy : SpringLaw::pid;
   const std::vector<SolvedPose> rows = solve(scene, poses, settings);
@@ -173,9 +175,16 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   solve->add_option("--k-p", options.settings.k_P, "k_P of Eq. (16); no integral, no derivative")
       ->check(number_from(0.0, 1e9))
       ->capture_default_str();
-  solve->add_flag("--proxy", options.settings.proxy,
-                  "take the poses for a trajectory, and follow it as the daemon does: each from the\n"
-                  "answer before, never into an obstacle or through one");
+  auto* proxy =
+      solve->add_flag("--proxy", options.settings.proxy,
+                      "take the poses for a trajectory, and follow it as the daemon does: each from the\n"
+                      "answer before, never into an obstacle or through one");
+  solve
+      ->add_option("--rate", options.settings.rate_Hz,
+                   "poses a second of that trajectory [Hz], by which obstacles move")
+      ->check(number_from(0.001, 1e6))
+      ->needs(proxy)
+      ->capture_default_str();
   solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")
       ->check(not_empty())
       ->capture_default_str();
@@ -185,7 +194,8 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
       "the body frame at the centre of mass, the wrench in that frame and about the world origin, and the\n"
       "time of the solve [ns]. Each pose is solved without history: exact then seeks the global optimum. "
       "With\n"
-      "--proxy: then status (free, converged, budget_spent, infeasible) and iterations.");
+      "--proxy: then status (free, converged, budget_spent, infeasible) and iterations.\n"
+      "The first pose is at scene time 0; without --proxy all are, and obstacles that move stand there.");
   solve->callback([&] { exit_code = run_solve(options); });
 }
 
