@@ -68,7 +68,9 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
 
 TEST_CASE("to be placed, to start over and to be armed neither allocates nor locks in the servo thread",
           "[realtime][placing]") {
-  const Buried buried({{0.0, {0, 0, 0.03}}, {0.5, {0, 0, 0.08}}});
+  const bool boulder_moves = GENERATE(false, true);
+  Buried buried({{0.0, {0, 0, 0.03}}, {0.5, {0, 0, 0.08}}});
+  if (boulder_moves) buried.plan.scene.meshes[0].motion = {{0.0, 0.0, 0.005}, {0.0, 0.2, 0.0}, 0.3};
   VirtualStation s(buried.plan, PlaceIn::thread);
   int seeking = 0;
   int placed = 0;
