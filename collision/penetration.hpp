@@ -50,7 +50,7 @@ class PenetrationDepth {
 
   /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
   /// the proxy stays there, and draws the hand back to where it came from. scene_time_s: at which the
-  /// obstacles stand [s]; where they move it does not fall, and X_last was admissible at that of the last
+  /// obstacles stand [s]; where they move it never runs back, and X_last was admissible at that of the last
   /// follow(), query() or forget(). RT safe.
   Penetration follow(const Pose& X_WP, const Pose& X_last, double scene_time_s = 0.0) noexcept;
   /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones.
