@@ -71,47 +71,67 @@ MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(sce
   }
 }
 
-void MeshContacts::start_at(const Pose& X_WT) noexcept {
+void MeshContacts::start_at(const Pose& X_WT, double time_s) noexcept {
   X_start_ = X_WT;
+  start_s_ = time_s;
 }
 
-void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
-  pairs_.look_ahead(X_WT, budget);
+void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s) noexcept {
+  pairs_.look_ahead(X_WT, budget, time_s);
   rooms_of_.reset();
 }
 
-MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept {
+MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget,
+                                          double time_s) noexcept {
   Findings findings;
   touching_.clear();
   clearance_m_ = clearance_m;
-  if (!pairs_.list(X_start_, X_WT, budget)) {
+  if (!pairs_.list(X_start_, X_WT, {start_s_, time_s}, budget)) {
     findings.complete = false;
     return findings;
   }
   budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs() / PairsAhead::kPairsPerVisit));
-  const Frame start(X_start_), end(X_WT);
-  for (const std::uint32_t k : pairs_.listed().near_by()) {
-    seen_[k].X_OT_start = start.seen_from(seen_[k].X_WO);
-    seen_[k].X_OT_end = end.seen_from(seen_[k].X_WO);
-  }
-  const double way_m = pairs_.listed().way_m(X_start_, X_WT);
-  const double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
-  // The way of a vertex is straight as long as nothing turns.
-  bulge_m_ = 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
+  see_way(X_WT, time_s);
   border_m_ = kBeyond * clearance_m + bulge_m_;
   slope_ = kSlope;
-  if (rooms_of_ == pairs_.edition())
+  const bool pushed = scene_.moves() && time_s != start_s_;  // rooms are of obstacles that stand still
+  if (rooms_of_ == pairs_.edition() && !pushed)
     look_at_those_near(X_WT, findings);
   else
     look_at_all(X_WT, findings);
   if (findings.overlaps && crossings_.empty()) {
-    border_m_ = kWideBorder * way_m;
+    border_m_ = kWideBorder * way_m_;
     slope_ = kAnySlope;
     look_at_all(X_WT, findings);
     rooms_of_.reset();
   }
-  choose_first(way_m, findings);
+  if (pushed) rooms_of_.reset();
+  choose_first(findings);
   return findings;
+}
+
+/// The way as each obstacle near by sees it.
+void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
+  const Frame start(X_start_), end(X_WT);
+  way_m_ = pairs_.listed().way_m(X_start_, X_WT);
+  double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
+  for (const std::uint32_t k : pairs_.listed().near_by()) {
+    Seen& seen = seen_[k];
+    if (!seen.obstacle->motion.moves()) {
+      seen.X_OT_start = start.seen_from(seen.X_WO);
+      seen.X_OT_end = end.seen_from(seen.X_WO);
+      continue;
+    }
+    const Pose X_WO_start = seen.obstacle->X_WO_at(start_s_), X_WO_end = seen.obstacle->X_WO_at(time_s);
+    const Pose X_OT_start = inverse(X_WO_start) * X_start_, X_OT_end = inverse(X_WO_end) * X_WT;
+    seen.X_WO = Frame(X_WO_end);
+    seen.X_OT_start = start.seen_from(Frame(X_WO_start));
+    seen.X_OT_end = end.seen_from(seen.X_WO);
+    way_m_ = std::max(way_m_, pairs_.listed().way_m(X_OT_start, X_OT_end));
+    turn_rad = std::max(turn_rad, X_OT_start.rotation.angularDistance(X_OT_end.rotation));
+  }
+  // The way of a vertex is straight as long as nothing turns.
+  bulge_m_ = 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
 }
 
 /// And notes how far each pair is from touching.
@@ -432,7 +452,7 @@ void MeshContacts::crossed(double when, const Vector3d& point_W_m, const Contact
   if (when < last->when) *last = {when, point_W_m, contact};
 }
 
-void MeshContacts::choose_first(double way_m, Findings& findings) noexcept {
+void MeshContacts::choose_first(Findings& findings) noexcept {
   if (crossings_.empty()) return;
   std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
     if (a.when != b.when) return a.when < b.when;
@@ -440,7 +460,7 @@ void MeshContacts::choose_first(double way_m, Findings& findings) noexcept {
       return a.contact.tool_feature < b.contact.tool_feature;
     return a.contact.obstacle_feature < b.contact.obstacle_feature;
   });
-  const double close_m = std::min(kClose * way_m, 0.25 * scene_.tool_radius_m());
+  const double close_m = std::min(kClose * way_m_, 0.25 * scene_.tool_radius_m());
   FixedList<Vector3d, kMostMet> points;
   for (const Crossing& crossing : crossings_) {
     bool beside = false;

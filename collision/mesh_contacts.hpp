@@ -43,14 +43,15 @@ class MeshContacts {
   MeshContacts(const MeshContacts&) = delete;  // a copy would lose the room that is kept
   MeshContacts& operator=(const MeshContacts&) = delete;
 
-  /// Starts from an admissible pose. RT safe.
-  void start_at(const Pose& X_WT) noexcept;
+  /// Starts from a pose that is admissible at a scene time. RT safe.
+  void start_at(const Pose& X_WT, double time_s = 0.0) noexcept;
 
-  /// The way from the start to X_WT, whose contacts are held open by clearance_m. RT safe.
-  Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget) noexcept;
+  /// The way from the start to X_WT, whose contacts are held open by clearance_m, while the obstacles move to
+  /// where they stand at time_s. The contacts are told as they stand then. RT safe.
+  Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget, double time_s = 0.0) noexcept;
 
   /// Once a tick, when the tool has come to X_WT: prepares for where it will be. RT safe.
-  void look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept;
+  void look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s = 0.0) noexcept;
 
   /// The tool is elsewhere now. RT safe.
   void forget_motion() noexcept { pairs_.forget_motion(); }
@@ -71,7 +72,7 @@ class MeshContacts {
   struct Seen {
     const MeshObstacle* obstacle;
     std::uint32_t number;  ///< in the scene
-    Frame X_WO;
+    Frame X_WO;            ///< at the end
     Frame X_OT_start, X_OT_end;
   };
   /// A triangle of the tool as an obstacle sees it, at both ends.
@@ -91,6 +92,7 @@ class MeshContacts {
     double sign;  ///< of the cross product of da and db that points out of the obstacle
   };
 
+  void see_way(const Pose& X_WT, double time_s) noexcept;
   void look_at_all(const Pose& X_WT, Findings& findings) noexcept;
   void look_at_those_near(const Pose& X_WT, Findings& findings) noexcept;
   double kept_apart_m(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
@@ -104,14 +106,16 @@ class MeshContacts {
                     Findings& findings) noexcept;
   bool meet(const Seen& seen, EdgesPass& pass, double when, double beyond_m) const noexcept;
   void crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept;
-  void choose_first(double way_m, Findings& findings) noexcept;
+  void choose_first(Findings& findings) noexcept;
 
   const Scene& scene_;
   PairsAhead pairs_;
 
   Pose X_start_;
+  double start_s_ = 0.0;
   std::vector<Seen> seen_;  ///< all obstacles
   double clearance_m_ = 0.0;
+  double way_m_ = 0.0;     ///< the longest that an obstacle sees a point of the tool go
   double bulge_m_ = 0.0;   ///< by how much a way may leave the straight line as it turns
   double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first

@@ -17,6 +17,7 @@ Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
 NearPairs::NearPairs(const Scene& scene, walk::Kernel kernel) : scene_(scene), walk_(kernel) {
   pairs_.reserve(TreeWalk::kCapacity);
   near_by_.reserve(scene.meshes().size());
+  relative_.reserve(scene.meshes().size());
 }
 
 void NearPairs::set_out(const Way& way) noexcept {
@@ -24,6 +25,7 @@ void NearPairs::set_out(const Way& way) noexcept {
   visits_ = 0;
   pairs_.clear();
   find_near_by();
+  find_moving_near_by();
   next_ = 0;
   state_ = near_by_.empty() ? State::complete : State::under_way;
   set_out_for_next();
@@ -32,9 +34,20 @@ void NearPairs::set_out(const Way& way) noexcept {
 void NearPairs::set_out_for_next() noexcept {
   if (next_ == near_by_.size()) return;
   const MeshObstacle& obstacle = scene_.meshes()[near_by_[next_]];
-  const Pose X_OW = inverse(obstacle.X_WO);
+  const Pose X_OW_start = inverse(obstacle.X_WO_at(way_.start_s));
+  const Pose X_OW_end = inverse(obstacle.X_WO_at(way_.end_s));
   walk_.set_out(scene_.tool_mesh()->tree, obstacle.mesh->tree,
-                {X_OW * way_.X_WT_start, X_OW * way_.X_WT_end, way_.reach_m, false});
+                {X_OW_start * way_.X_WT_start, X_OW_end * way_.X_WT_end, way_.reach_m, false});
+}
+
+bool NearPairs::covers(const Pose& X_WT, double time_s) const noexcept {
+  if (!complete() || away_m(way_, X_WT) > way_.reach_m) return false;
+  if (!scene_.moves()) return true;
+  return way_.start_s <= time_s && time_s <= way_.end_s &&
+         std::all_of(relative_.begin(), relative_.end(), [&](const Relative& seen) {
+           const Pose X_OW = inverse(scene_.meshes()[seen.obstacle].X_WO_at(time_s));
+           return away_m(seen.way, X_OW * X_WT) <= way_.reach_m;
+         });
 }
 
 bool NearPairs::go_on(WalkBudget& budget) noexcept {
@@ -54,7 +67,8 @@ bool NearPairs::go_on(WalkBudget& budget) noexcept {
 
 /// The nearest pose on the way is as far along it as the shift and the turn together say.
 double NearPairs::away_m(const Way& way, const Pose& X_WT) const noexcept {
-  const auto& [start, end, reach_m] = way;
+  const Pose& start = way.X_WT_start;
+  const Pose& end = way.X_WT_end;
   const double r_m = scene_.tool_radius_m();
   const Vector3d shift_m = end.translation_m - start.translation_m;
   const Vector3d turn = turn_between(start.rotation, end.rotation);
@@ -73,6 +87,7 @@ double NearPairs::way_m(const Pose& from, const Pose& to) const noexcept {
 /// Of thousands of obstacles few are near, and they stay the same while the tool moves by its own size.
 void NearPairs::find_near_by() noexcept {
   const auto from_there_m = [&](const Pose& X) { return (X.translation_m - near_p_WT_m_).norm(); };
+  near_by_.resize(near_at_rest_);
   if (std::max(from_there_m(way_.X_WT_start), from_there_m(way_.X_WT_end)) + way_.reach_m <= near_reach_m_)
     return;
   const double tool_m = scene_.tool_radius_m();
@@ -81,8 +96,33 @@ void NearPairs::find_near_by() noexcept {
   near_by_.clear();
   for (std::uint32_t k = 0; k < scene_.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene_.meshes()[k];
+    if (obstacle.motion.moves()) continue;
     const double together_m = obstacle.radius_m + tool_m + near_reach_m_;
     if ((obstacle.centre_W_m - near_p_WT_m_).squaredNorm() <= together_m * together_m) near_by_.push_back(k);
+  }
+  near_at_rest_ = near_by_.size();
+}
+
+/// Of those that move, all that may be met on the way; they are few.
+void NearPairs::find_moving_near_by() noexcept {
+  relative_.clear();
+  if (!scene_.moves()) return;
+  const double tool_m = scene_.tool_radius_m() + way_.reach_m +
+                        (way_.X_WT_end.translation_m - way_.X_WT_start.translation_m).norm();
+  for (std::uint32_t k = 0; k < scene_.meshes().size(); ++k) {
+    const MeshObstacle& obstacle = scene_.meshes()[k];
+    if (!obstacle.motion.moves()) continue;
+    const Pose X_WO = obstacle.X_WO_at(way_.start_s);
+    const double moved_m =
+        (way_.end_s - way_.start_s) * (obstacle.motion.linear_m_per_s.norm() +
+                                       obstacle.motion.angular_rad_per_s.norm() * obstacle.centre_O_m.norm());
+    const double together_m = obstacle.radius_m + tool_m + moved_m;
+    if ((X_WO * obstacle.centre_O_m - way_.X_WT_start.translation_m).squaredNorm() > together_m * together_m)
+      continue;
+    near_by_.push_back(k);
+    relative_.push_back({k,
+                         {inverse(X_WO) * way_.X_WT_start,
+                          inverse(obstacle.X_WO_at(way_.end_s)) * way_.X_WT_end, way_.reach_m}});
   }
 }
 

@@ -19,14 +19,15 @@ struct NearPair {
 
 /// The pairs of triangles that may meet while the tool is on a straight way, or near it, with features that
 /// can meet first (mesh_surface.hpp). They are listed in one go, or a few with every tick while another list
-/// serves.
+/// serves. Where an obstacle moves, what counts is the way of the tool as that obstacle sees it.
 ///
 /// Memory is taken at construction. One object serves one thread.
 class NearPairs {
  public:
   struct Way {
     Pose X_WT_start, X_WT_end;
-    double reach_m = 0.0;  ///< the list holds for poses as near to it, as way_m() measures
+    double reach_m = 0.0;               ///< the list holds for poses as near to it, as way_m() measures
+    double start_s = 0.0, end_s = 0.0;  ///< scene time at both ends; it matters where obstacles move
   };
 
   /// The scene is kept by reference. kernel: as for TreeWalk.
@@ -42,8 +43,8 @@ class NearPairs {
   bool under_way() const noexcept { return state_ == State::under_way; }
   /// Are all pairs listed? Not where there was no room for them.
   bool complete() const noexcept { return state_ == State::complete; }
-  /// Does the list hold for this pose, and for straight ways to others that it holds for?
-  bool covers(const Pose& X_WT) const noexcept { return complete() && away_m(way_, X_WT) <= way_.reach_m; }
+  /// Does the list hold for this pose at this scene time, and for straight ways to others that it holds for?
+  bool covers(const Pose& X_WT, double time_s = 0.0) const noexcept;
 
   std::span<const NearPair> pairs() const noexcept { return pairs_; }
   /// The obstacles that may be met on the way: places among scene.meshes().
@@ -58,7 +59,14 @@ class NearPairs {
  private:
   enum class State : std::uint8_t { empty, under_way, complete, failed };
 
+  /// A way as a moving obstacle sees it.
+  struct Relative {
+    std::uint32_t obstacle;
+    Way way;
+  };
+
   void find_near_by() noexcept;
+  void find_moving_near_by() noexcept;
   void set_out_for_next() noexcept;
 
   const Scene& scene_;
@@ -69,9 +77,11 @@ class NearPairs {
   std::size_t next_ = 0;  ///< of near_by_, to be walked
   std::vector<NearPair> pairs_;
 
-  std::vector<std::uint32_t> near_by_;       ///< those that may be met while the tool stays
+  std::vector<std::uint32_t> near_by_;       ///< those at rest first, that may be met while the tool stays
+  std::size_t near_at_rest_ = 0;             ///< so many
   Vector3d near_p_WT_m_ = Vector3d::Zero();  ///< within
   double near_reach_m_ = -1.0;               ///< of this place
+  std::vector<Relative> relative_;           ///< the way, for those of near_by_ that move
 };
 
 }  // namespace wrenchd

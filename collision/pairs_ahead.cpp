@@ -51,16 +51,10 @@ PairsAhead::PairsAhead(const Scene& scene, walk::Kernel kernel)
       lists_{NearPairs(scene, kernel), NearPairs(scene, kernel), NearPairs(scene, kernel)},
       ticks_ahead_(kMostTicksAhead) {}
 
-/// One made at once serves for as long as it takes to make the next, if the way leads where the tool is
-/// expected; else for this way alone.
-bool PairsAhead::list(const Pose& X_start, const Pose& X_end, WalkBudget& budget) noexcept {
-  if (listed_->covers(X_end) && listed_->covers(X_start)) return true;
-  NearPairs::Way way = way_ahead(X_start, ticks_ahead_ / kHaste + 2.0);
-  if (!goes_slowly(way) || spare_->away_m(way, X_end) > way.reach_m) {
-    const double way_m = spare_->way_m(X_start, X_end);
-    way = {X_start, X_end, std::max(kReach * way_m, kLeastReach * scene_.tool_radius_m())};
-  }
-  spare_->set_out(way);
+bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times,
+                      WalkBudget& budget) noexcept {
+  if (listed_->covers(X_end, times.end_s) && listed_->covers(X_start, times.start_s)) return true;
+  spare_->set_out(way_to_list(X_start, X_end, times));
   go_on(*spare_, static_cast<std::uint32_t>(kLongestWalk * budget.visits), budget);
   if (!spare_->complete()) return false;
   ++made_at_once_;
@@ -68,13 +62,26 @@ bool PairsAhead::list(const Pose& X_start, const Pose& X_end, WalkBudget& budget
   return true;
 }
 
-void PairsAhead::look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept {
-  learn_motion(X_WT);
+/// For as long as it takes to make the next list, if the way leads where the tool is expected; else for this
+/// way alone. Whether the way expected holds this one for obstacles that move too is not looked at.
+NearPairs::Way PairsAhead::way_to_list(const Pose& X_start, const Pose& X_end,
+                                       const Times& times) const noexcept {
+  if (!scene_.moves()) {
+    const NearPairs::Way way = way_ahead(X_start, ticks_ahead_ / kHaste + 2.0);
+    if (goes_slowly(way) && listed_->away_m(way, X_end) <= way.reach_m) return way;
+  }
+  const double reach_m =
+      std::max(kReach * listed_->way_m(X_start, X_end), kLeastReach * scene_.tool_radius_m());
+  return {X_start, X_end, reach_m, times.start_s, times.end_s};
+}
+
+void PairsAhead::look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s) noexcept {
+  learn_motion(X_WT, time_s);
   if (!ahead_->under_way() && !set_out(X_WT)) return;
   const auto portion = static_cast<std::uint32_t>(kHaste * visits_of_list_ / ticks_ahead_);
   if (!go_on(*ahead_, std::max(kLeastPortion, portion), budget) || !ahead_->complete()) return;
   weigh();
-  if (ahead_->covers(X_WT)) serve(ahead_);
+  if (ahead_->covers(X_WT, time_s)) serve(ahead_);
 }
 
 void PairsAhead::forget_motion() noexcept {
@@ -84,7 +91,9 @@ void PairsAhead::forget_motion() noexcept {
 
 /// False where the list that serves will do for a while, or the tool is too fast.
 bool PairsAhead::set_out(const Pose& X_WT) noexcept {
-  if (listed_->covers(X_WT) && listed_->covers(after(kSoon * ticks_ahead_, X_WT))) return false;
+  const double soon = kSoon * ticks_ahead_;
+  if (listed_->covers(X_WT, last_s_) && listed_->covers(after(soon, X_WT), last_s_ + soon * tick_s_))
+    return false;
   const NearPairs::Way way = way_ahead(X_WT, ticks_ahead_);
   if (!goes_slowly(way)) return false;
   ahead_->set_out(way);
@@ -107,7 +116,9 @@ void PairsAhead::serve(NearPairs*& list) noexcept {
 }
 
 /// The motion from tick to tick and its change, smoothed.
-void PairsAhead::learn_motion(const Pose& X_WT) noexcept {
+void PairsAhead::learn_motion(const Pose& X_WT, double time_s) noexcept {
+  tick_s_ = X_last_ ? time_s - last_s_ : 0.0;
+  last_s_ = time_s;
   if (X_last_) {
     const Quaterniond turn = X_last_->rotation.conjugate() * X_WT.rotation;
     const Vector3d shift_more_m = kNewest * (X_WT.translation_m - X_last_->translation_m - shift_m_);
@@ -133,7 +144,8 @@ NearPairs::Way PairsAhead::way_ahead(const Pose& X_WT, double ticks) const noexc
   const Pose X_far = after(ticks, X_WT);
   // A parabola leaves its chord by an eighth of a t^2.
   const double bend_m = ticks * ticks / 8.0 * (bend_m_.norm() + r_m * bend_rad_.norm());
-  return {X_WT, X_far, std::max(kReachAhead * listed_->way_m(X_WT, X_far) + bend_m, kLeastReach * r_m)};
+  const double reach_m = std::max(kReachAhead * listed_->way_m(X_WT, X_far) + bend_m, kLeastReach * r_m);
+  return {X_WT, X_far, reach_m, last_s_, last_s_ + ticks * tick_s_};
 }
 
 bool PairsAhead::goes_slowly(const NearPairs::Way& way) const noexcept {

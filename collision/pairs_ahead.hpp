@@ -26,12 +26,21 @@ class PairsAhead {
   PairsAhead(const PairsAhead&) = delete;  // a copy would lose the room that is kept
   PairsAhead& operator=(const PairsAhead&) = delete;
 
+  /// Scene time at the start and at the end of a way; it matters where obstacles move.
+  struct Times {
+    double start_s = 0.0, end_s = 0.0;
+  };
+
   /// Sees to it that listed() holds for the straight way from one pose to the other. False where that would
   /// take more than what there is of the budget: the way is too long. RT safe.
-  bool list(const Pose& X_start, const Pose& X_end, WalkBudget& budget) noexcept;
+  bool list(const Pose& X_start, const Pose& X_end, WalkBudget& budget) noexcept {
+    return list(X_start, X_end, Times{}, budget);
+  }
+  bool list(const Pose& X_start, const Pose& X_end, const Times& times, WalkBudget& budget) noexcept;
 
-  /// Once a tick, when the tool has come to X_WT: goes on with the list for where it will be. RT safe.
-  void look_ahead(const Pose& X_WT, WalkBudget& budget) noexcept;
+  /// Once a tick, when the tool has come to X_WT at this scene time: goes on with the list for where it will
+  /// be. RT safe.
+  void look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s = 0.0) noexcept;
 
   /// The tool is elsewhere now: how it moved says nothing about how it will. RT safe.
   void forget_motion() noexcept;
@@ -41,7 +50,8 @@ class PairsAhead {
   std::uint32_t made_at_once() const noexcept { return made_at_once_; }  ///< lists, so far
 
  private:
-  void learn_motion(const Pose& X_WT) noexcept;
+  NearPairs::Way way_to_list(const Pose& X_start, const Pose& X_end, const Times& times) const noexcept;
+  void learn_motion(const Pose& X_WT, double time_s) noexcept;
   Pose after(double ticks, const Pose& X_WT) const noexcept;
   NearPairs::Way way_ahead(const Pose& X_WT, double ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
@@ -61,6 +71,7 @@ class PairsAhead {
   double ticks_ahead_;                ///< that the next is made for
 
   std::optional<Pose> X_last_;                                        ///< of the tick before
+  double last_s_ = 0.0, tick_s_ = 0.0;                                ///< its scene time, and how long it was
   Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();     ///< per tick; the turn in T
   Vector3d bend_m_ = Vector3d::Zero(), bend_rad_ = Vector3d::Zero();  ///< by which they grow per tick
 };

@@ -54,12 +54,8 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
   if (!convex) placement_.emplace(scene);
 }
 
-// scene_time_s is for Proxy::follow(), Proxy::forget() and Placement::nearest(): they do not take it yet, and
-// see every obstacle where it stands at time 0.
-
-Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last,
-                                     [[maybe_unused]] double scene_time_s) noexcept {
-  if (proxy_) return described(X_WP, proxy_->follow(X_WP, X_last));
+Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept {
+  if (proxy_) return described(X_WP, proxy_->follow(X_WP, X_last, scene_time_s));
   const bool admitted = X_answered_ && same_bits(*X_answered_, X_last);
   if (!admitted) scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
   Penetration out =
@@ -86,16 +82,16 @@ Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_las
   return out;
 }
 
-void PenetrationDepth::forget([[maybe_unused]] double scene_time_s) noexcept {
+void PenetrationDepth::forget(double scene_time_s) noexcept {
   known_.clear();
   X_answered_.reset();
-  if (proxy_) proxy_->forget();
+  if (proxy_) proxy_->forget(scene_time_s);
 }
 
 Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& stop,
                                     double scene_time_s) noexcept {
   forget(scene_time_s);
-  if (placement_) return described(X_WP, placement_->nearest(X_WP, stop));
+  if (placement_) return described(X_WP, placement_->nearest(X_WP, stop, scene_time_s));
   if (options_.method == Method::exact) return described(X_WP, project_globally(X_WP, stop));
   scene_.survey(X_WP);
   return approximate(X_WP, X_WP);

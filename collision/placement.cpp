@@ -77,12 +77,13 @@ bool Placement::meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept {
 }
 
 /// Two surfaces that do not meet are apart, or one body holds the other.
-bool Placement::admissible(const Pose& X_WT) noexcept {
+bool Placement::admissible(const Pose& X_WT, double time_s) noexcept {
   if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
   for (const MeshObstacle& obstacle : scene_.meshes()) {
-    const double centres_m = (obstacle.centre_W_m - X_WT.translation_m).norm();
+    const Pose X_WO = obstacle.X_WO_at(time_s);
+    const double centres_m = (X_WO * obstacle.centre_O_m - X_WT.translation_m).norm();
     if (centres_m > obstacle.radius_m + scene_.tool_radius_m()) continue;
-    const Pose X_OT = inverse(obstacle.X_WO) * X_WT;
+    const Pose X_OT = inverse(X_WO) * X_WT;
     if (meets(obstacle, X_OT)) return false;
     const MeshSurface& tool = scene_.tool_mesh()->surface;
     const MeshSurface& solid = obstacle.mesh->surface;
@@ -93,11 +94,12 @@ bool Placement::admissible(const Pose& X_WT) noexcept {
 }
 
 /// From an admissible pose, as near to p as a proxy comes.
-Projection Placement::settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop) noexcept {
-  proxy_.forget();
-  Projection q = proxy_.follow(X_WP, X_start);
+Projection Placement::settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop,
+                              double time_s) noexcept {
+  proxy_.forget(time_s);
+  Projection q = proxy_.follow(X_WP, X_start, time_s);
   for (int tick = 1; tick < kMostTicks && !stop.stop_requested(); ++tick) {
-    const Projection next = proxy_.follow(X_WP, q.X_WQ);
+    const Projection next = proxy_.follow(X_WP, q.X_WQ, time_s);
     const bool done = next.status != ProjectionStatus::budget_spent && next.energy > (1.0 - kGain) * q.energy;
     q = next;
     if (done) break;
@@ -105,16 +107,16 @@ Projection Placement::settled(const Pose& X_WP, const Pose& X_start, const std::
   return q;
 }
 
-Projection Placement::nearest(const Pose& X_WP, const std::stop_token& stop) noexcept {
-  if (admissible(X_WP)) return settled(X_WP, X_WP, stop);
+Projection Placement::nearest(const Pose& X_WP, const std::stop_token& stop, double time_s) noexcept {
+  if (admissible(X_WP, time_s)) return settled(X_WP, X_WP, stop, time_s);
   Projection best;
   best.X_WQ = X_WP;
   best.status = ProjectionStatus::infeasible;
   best.energy = std::numeric_limits<double>::infinity();
   double farthest_m = 4.0 * scene_.tool_radius_m();
   for (const MeshObstacle& obstacle : scene_.meshes())
-    farthest_m +=
-        2.0 * obstacle.mesh->surface.radius_m() + (obstacle.X_WO.translation_m - X_WP.translation_m).norm();
+    farthest_m += 2.0 * obstacle.mesh->surface.radius_m() +
+                  (obstacle.X_WO_at(time_s).translation_m - X_WP.translation_m).norm();
   Halton points;
   int starts = 0;
   for (double r = kNearest * scene_.tool_radius_m(); r < farthest_m && starts < kMostStarts; r *= kGrowth)
@@ -124,9 +126,9 @@ Projection Placement::nearest(const Pose& X_WP, const std::stop_token& stop) noe
       const Vector3d turn_rad = std::min(r / scene_.tool_radius_m(), kMostTurn_rad) * points.in_ball();
       const Quaterniond turn = i % 2 == 0 ? Quaterniond::Identity() : rotation_from(turn_rad);
       const Pose X_start = {(X_WP.rotation * turn).normalized(), X_WP.translation_m + shift_m};
-      if (!admissible(X_start)) continue;
+      if (!admissible(X_start, time_s)) continue;
       ++starts;
-      const Projection q = settled(X_WP, X_start, stop);
+      const Projection q = settled(X_WP, X_start, stop, time_s);
       if (q.energy < best.energy) best = q;
     }
   return best;

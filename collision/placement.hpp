@@ -22,16 +22,19 @@ class Placement {
  public:
   explicit Placement(const Scene& scene);
 
-  /// Does the tool overlap nothing at this pose, and is it outside of all that is solid?
-  bool admissible(const Pose& X_WT) noexcept;
+  /// Does the tool overlap nothing at this pose, and is it outside of all that is solid? Obstacles stand as
+  /// they do at scene time time_s.
+  bool admissible(const Pose& X_WT, double time_s = 0.0) noexcept;
 
   /// Status infeasible where nothing was found. The contacts are those that hold q. Once stop is asked for it
   /// ends with what it has, after no more than one look at a pose or one tick of a proxy: a few milliseconds.
-  Projection nearest(const Pose& X_WP, const std::stop_token& stop = {}) noexcept;
+  /// time_s: as for admissible().
+  Projection nearest(const Pose& X_WP, const std::stop_token& stop = {}, double time_s = 0.0) noexcept;
 
  private:
   bool meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept;
-  Projection settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop) noexcept;
+  Projection settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop,
+                     double time_s) noexcept;
 
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;

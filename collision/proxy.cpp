@@ -22,11 +22,23 @@ constexpr double kShortestShare = 1.0 / 1024.0;
 /// and every next may be longer.
 constexpr double kWary = 1.0 / 64.0;
 constexpr double kLonger = 4.0;
+/// A way that is long and free is gone in steps that grow by so much.
 constexpr double kGrowth = 1.5;
 /// The least that a contact is held open by, in units of the clearance.
 constexpr double kLeastClearance = 0.2;
+/// A proxy that obstacles cannot push aside for so many ticks is caught between them.
+constexpr std::uint16_t kMostStuckTicks = 50;
+/// What is pushed goes as far as it must.
+constexpr ExactProjection::Leash kNoLeash = {};
 /// T falls by at least this share from one round to the next, or the rounds end.
 constexpr double kProgress = 1e-9;
+
+/// Are these contacts all open at a pose, as far as they are held?
+bool holds(std::span<const ActiveContact> contacts, const Pose& X_WT) noexcept {
+  return std::all_of(contacts.begin(), contacts.end(), [&](const ActiveContact& active) {
+    return gap_m(active.contact, X_WT) >= 0.5 * Proxy::kClearance_m;
+  });
+}
 
 }  // namespace
 
@@ -38,18 +50,27 @@ Proxy::Proxy(const Scene& scene, Effort effort)
       half_spaces_(scene),
       meshes_(scene) {}
 
-Projection Proxy::follow(const Pose& X_WP, const Pose& X_last) noexcept {
-  const Projection q = find(X_WP, X_last);
-  meshes_.look_ahead(q.X_WQ, budget_);
-  return q;
-}
-
-Projection Proxy::find(const Pose& X_WP, const Pose& X_last) noexcept {
+Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) noexcept {
   X_WQ_ = X_last;
   looks_ = 0;
   iterations_ = 0;
   budget_.visits = effort_.visits;
-  meshes_.start_at(X_WQ_);
+  meshes_.start_at(X_WQ_, seen_s_);
+  const Projection q = find(X_WP, time_s);
+  meshes_.look_ahead(q.X_WQ, budget_, seen_s_);
+  return q;
+}
+
+void Proxy::forget(double time_s) noexcept {
+  known_.clear();
+  X_asked_.reset();
+  meshes_.forget_motion();
+  seen_s_ = known_s_ = time_s;
+  stuck_ticks_ = 0;
+}
+
+Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
+  if (scene_.moves() && time_s != seen_s_ && !give_way(time_s)) return waiting(X_WP);
   double longest_m =
       std::max(kLongestStep * (X_asked_ ? way_m(*X_asked_, X_WP) : 0.0), kLeastStep * scene_.tool_radius_m());
   X_asked_ = X_WP;
@@ -65,7 +86,7 @@ Projection Proxy::find(const Pose& X_WP, const Pose& X_last) noexcept {
       continue;
     }
     const bool whole = q.status == ProjectionStatus::converged || q.status == ProjectionStatus::free;
-    const Way way = look_along(q.X_WQ);
+    const Way way = look_along(q.X_WQ, seen_s_);
     if (way == Way::met_contacts) {
       share = 1.0;
       continue;
@@ -75,7 +96,7 @@ Projection Proxy::find(const Pose& X_WP, const Pose& X_last) noexcept {
       continue;
     }
     X_WQ_ = q.X_WQ;
-    meshes_.start_at(X_WQ_);
+    meshes_.start_at(X_WQ_, seen_s_);
     if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
     const bool all_hold = !let_go(q);
     share = all_hold ? std::min(1.0, kLonger * share) : kWary;
@@ -88,11 +109,68 @@ Projection Proxy::find(const Pose& X_WP, const Pose& X_last) noexcept {
     if (T > (1.0 - kProgress) * T_last) return described(X_WP, q);
     T_last = T;
   }
-  Projection best;
-  best.status = ProjectionStatus::budget_spent;
-  best.X_WQ = X_WQ_;
-  best.active = known_;
-  return described(X_WP, best);
+  return waiting(X_WP);
+}
+
+/// As far as it came.
+Projection Proxy::waiting(const Pose& X_WP) const noexcept {
+  Projection q;
+  q.status = stuck_ticks_ < kMostStuckTicks ? ProjectionStatus::budget_spent : ProjectionStatus::infeasible;
+  q.X_WQ = X_WQ_;
+  q.active = known_;
+  return described(X_WP, q);
+}
+
+/// Lets the obstacles move to where they stand at time_s, in parts where it takes that. False where they are
+/// on their way still.
+bool Proxy::give_way(double time_s) noexcept {
+  const double since_s = seen_s_;
+  double share = 1.0;  // of the time that is left
+  while (seen_s_ != time_s && looks_ < effort_.looks && share >= kShortestShare) {
+    const double next_s = share < 1.0 ? seen_s_ + share * (time_s - seen_s_) : time_s;
+    see(next_s);
+    Projection q;
+    q.X_WQ = X_WQ_;
+    q.active = known_;
+    if (!holds({known_.begin(), known_.end()}, X_WQ_)) {
+      q = exact_.step(X_WQ_, X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()), kNoLeash);
+      iterations_ = static_cast<std::uint16_t>(iterations_ + q.iterations);
+    }
+    const bool agree = q.status != ProjectionStatus::infeasible;
+    const Way way = agree ? look_along(q.X_WQ, next_s) : Way::too_long;
+    if (way == Way::met_contacts) continue;
+    if (way == Way::too_long) {
+      if (!agree) known_.clear();
+      share *= 0.25;
+      continue;
+    }
+    X_WQ_ = q.X_WQ;
+    seen_s_ = next_s;
+    meshes_.start_at(X_WQ_, seen_s_);
+    let_go(q);
+    share = std::min(1.0, kLonger * share);
+  }
+  see(seen_s_);
+  stuck_ticks_ = seen_s_ != since_s ? 0 : static_cast<std::uint16_t>(stuck_ticks_ + 1);
+  return seen_s_ == time_s;
+}
+
+/// The known contacts as they stand at this time.
+void Proxy::see(double time_s) noexcept {
+  if (time_s == known_s_) return;
+  Known seen;
+  for (const auto& [contact, multiplier] : known_) seen.add({as_seen(contact, known_s_, time_s), multiplier});
+  known_ = seen;
+  known_s_ = time_s;
+}
+
+/// A contact of one time at another.
+Contact Proxy::as_seen(Contact contact, double from_s, double to_s) const noexcept {
+  const std::size_t first_mesh = scene_.obstacle_count() - scene_.meshes().size();
+  if (from_s == to_s || contact.obstacle < first_mesh) return contact;
+  const MeshObstacle& obstacle = scene_.meshes()[contact.obstacle - first_mesh];
+  if (!obstacle.motion.moves()) return contact;
+  return moved(contact, obstacle.X_WO_at(to_s) * inverse(obstacle.X_WO_at(from_s)));
 }
 
 /// As near to p as the contacts known allow, no farther than so much from the pose at hand.
@@ -112,7 +190,7 @@ double Proxy::way_m(const Pose& from, const Pose& to) const noexcept {
 }
 
 /// Looks along the way from the pose at hand; what it meets there becomes known.
-Proxy::Way Proxy::look_along(const Pose& X_WT) noexcept {
+Proxy::Way Proxy::look_along(const Pose& X_WT, double time_s) noexcept {
   ++looks_;
   bool learned = false;
   ContactSet met;
@@ -120,7 +198,7 @@ Proxy::Way Proxy::look_along(const Pose& X_WT) noexcept {
   half_spaces_.add_violated(Frame(X_WT), tolerance_m, met);
   for (const Contact& contact : met) learned = learn(contact) || learned;
   if (scene_.meshes().empty()) return learned ? Way::met_contacts : Way::free;
-  const MeshContacts::Findings found = meshes_.look(X_WT, kClearance_m, budget_);
+  const MeshContacts::Findings found = meshes_.look(X_WT, kClearance_m, budget_, time_s);
   if (!found.complete) return Way::too_long;
   for (const Contact& contact : found.met) learned = learn(contact) || learned;
   if (learned) return Way::met_contacts;
@@ -132,7 +210,7 @@ Proxy::Way Proxy::look_along(const Pose& X_WT) noexcept {
 bool Proxy::learn(Contact contact) noexcept {
   for (const ActiveContact& known : known_)
     if (same_features(known.contact, contact)) return false;
-  const double gap = gap_m(contact, X_WQ_);
+  const double gap = gap_m(as_seen(contact, known_s_, seen_s_), X_WQ_);
   if (gap < kClearance_m) {
     const double lower_m = kClearance_m - std::max(gap, kLeastClearance * kClearance_m);
     contact.p_WB_m -= lower_m * normal_W(contact, X_WQ_);

@@ -19,6 +19,10 @@ namespace wrenchd {
 /// It ends where p is reached, or where all contacts that carry hold: q then is a local optimum of
 /// min T(p, q), and T has only fallen on the way.
 ///
+/// Obstacles that move push it first: it gives way by as little as it can, to the closest-point projection of
+/// where it is itself, and follows the hand from there. Where they move too fast for the work of a tick, it
+/// sees them late: q is admissible for where they stood at seen_s().
+///
 /// However deep p is and however fast it moves, q is an admissible pose at any time, and the work is bounded:
 /// when it is used up, q is as far as it came.
 ///
@@ -40,15 +44,14 @@ class Proxy {
   explicit Proxy(const Scene& scene) : Proxy(scene, Effort{}) {}
   Proxy(const Scene& scene, Effort effort);
 
-  /// One tick: from X_last, last tick's q, towards p. RT safe.
-  Projection follow(const Pose& X_WP, const Pose& X_last) noexcept;
+  /// One tick: from X_last, last tick's q, towards p, among obstacles as they stand at time_s. The answer is
+  /// infeasible where obstacles have moved into it from all sides. RT safe.
+  Projection follow(const Pose& X_WP, const Pose& X_last, double time_s = 0.0) noexcept;
 
-  /// Forgets the contacts of the last tick. RT safe.
-  void forget() noexcept {
-    known_.clear();
-    X_asked_.reset();
-    meshes_.forget_motion();
-  }
+  /// Forgets the contacts of the last tick. The next X_last was admissible at time_s. RT safe.
+  void forget(double time_s = 0.0) noexcept;
+
+  double seen_s() const noexcept { return seen_s_; }  ///< the scene time that q is admissible at
 
   std::uint16_t looks() const noexcept { return looks_; }                            ///< of the last tick
   std::uint32_t visits() const noexcept { return effort_.visits - budget_.visits; }  ///< likewise
@@ -58,12 +61,16 @@ class Proxy {
   using Known = FixedList<ActiveContact, ContactSet::kCapacity>;
   enum class Way : std::uint8_t { free, met_contacts, too_long };
 
-  Projection find(const Pose& X_WP, const Pose& X_last) noexcept;
+  Projection find(const Pose& X_WP, double time_s) noexcept;
+  bool give_way(double time_s) noexcept;
+  void see(double time_s) noexcept;
+  Contact as_seen(Contact contact, double from_s, double to_s) const noexcept;
   Projection step(const Pose& X_WP, double longest_m) noexcept;
   double way_m(const Pose& from, const Pose& to) const noexcept;
-  Way look_along(const Pose& X_WT) noexcept;
+  Way look_along(const Pose& X_WT, double time_s) noexcept;
   bool learn(Contact contact) noexcept;
   bool let_go(const Projection& q) noexcept;
+  Projection waiting(const Pose& X_WP) const noexcept;
   Projection described(const Pose& X_WP, Projection q) const noexcept;
 
   const Scene& scene_;
@@ -75,6 +82,9 @@ class Proxy {
   Known known_;
   std::optional<Pose> X_asked_;  ///< last tick's p
   Pose X_WQ_;                    ///< the admissible pose at hand
+  double seen_s_ = 0.0;          ///< the scene time that it is admissible at
+  double known_s_ = 0.0;         ///< the scene time that the known contacts are of
+  std::uint16_t stuck_ticks_ = 0;
   WalkBudget budget_;
   std::uint16_t looks_ = 0;
   std::uint16_t iterations_ = 0;

@@ -69,10 +69,25 @@ inline Vector3d contact_point_W(const Contact& c, const Pose& X_WT) noexcept {
   return a_W + d * ((c.p_WB_m - a_W).cross(c.d_W).dot(N) / N.squaredNorm());
 }
 
-/// Do the normals of two contacts move as one?
+/// A contact whose obstacle has moved by `motion`, in the world: X_WO after it = motion * X_WO before. RT
+/// safe.
+inline Contact moved(Contact c, const Pose& motion) noexcept {
+  c.p_WB_m = motion * c.p_WB_m;
+  c.offset_m += c.n_W.dot(motion.rotation.conjugate() * motion.translation_m);
+  c.n_W = motion.rotation * c.n_W;
+  c.d_W = motion.rotation * c.d_W;
+  return c;
+}
+
+/// Do the normals of two contacts move as one? Those of an obstacle that moves are turned with it, to
+/// rounding.
 inline bool same_normal(const Contact& a, const Contact& b) noexcept {
-  return a.kind == b.kind && a.obstacle == b.obstacle && a.d_T == b.d_T && a.d_W == b.d_W &&
-         (a.kind != ContactKind::vertex_face || a.n_W == b.n_W);
+  constexpr double kRounding = 1e-10;
+  const auto same = [](const Vector3d& x, const Vector3d& y) {
+    return (x - y).squaredNorm() <= kRounding * kRounding;
+  };
+  return a.kind == b.kind && a.obstacle == b.obstacle && a.d_T == b.d_T && same(a.d_W, b.d_W) &&
+         (a.kind != ContactKind::vertex_face || same(a.n_W, b.n_W));
 }
 
 /// The same pair with the same law of its normal.

@@ -56,6 +56,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
       late_limit_(from_seconds(settings.servo.late_limit_s)),
       penetration_(scene, {settings.rendering.method, settings.rendering.planes}),
+      moves_(scene.moves()),
       spring_(settings.wrench.law),
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
       M_(scene.tool().solid.inertia),
@@ -183,10 +184,12 @@ void ServoLoop::lose_place() noexcept {
 }
 
 /// Lines 2 to 6: p from the sample, and its projection q, which follows the hand from last tick's as a proxy.
+/// One that is caught between obstacles that move has lost its place.
 void ServoLoop::project(const DeviceSample& sample) noexcept {
   X_WP_ = X_WB_ * sample.X_BH * X_HT_;
   if (!has_place()) return place();
   depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
+  if (moves_ && depth_.projection.status == ProjectionStatus::infeasible) return lose_place();
   X_WQ_ = depth_.projection.X_WQ;
   placing_ = Placing::following;
 }

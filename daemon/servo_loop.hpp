@@ -105,6 +105,7 @@ class ServoLoop {
 
   // The state of the rendering
   PenetrationDepth penetration_;
+  bool moves_;  ///< do obstacles?
   SpringLaw spring_;
   double energy_stiffness_per_s2_;
   Inertia M_;

@@ -455,9 +455,7 @@ TEST_CASE("scene time begins at the first tick and goes by the times of the tick
     CHECK(placer.questions[i].scene_time_s == expected_s[i]);
 }
 
-// Fails until the proxy takes the scene time; then the tag has to go.
-TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the hand",
-          "[servo][moving][!shouldfail]") {
+TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the hand", "[servo][moving]") {
   Plan plan = shipped_plan();
   plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
   VirtualStation s(plan);

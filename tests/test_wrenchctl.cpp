@@ -820,8 +820,7 @@ TEST_CASE("wrenchctl solve --rate is for a trajectory, and a rate that is one", 
         0);
 }
 
-// Fails until the proxy takes the scene time; then the tag has to go.
-TEST_CASE("wrenchctl solve --proxy moves obstacles at the rate it is given", "[moving][!shouldfail]") {
+TEST_CASE("wrenchctl solve --proxy moves obstacles at the rate it is given", "[moving]") {
   const TemporaryDirectory dir;
   const std::string scene = scene_with_lift(dir).string();
   std::string poses = "px,py,pz,qx,qy,qz,qw\n";
