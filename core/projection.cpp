@@ -108,14 +108,7 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   };
   const Nothing nothing;
   begin(X_WP, nothing);
-  contacts_.clear();
-  for (const ActiveContact& active : known) contacts_.add(active.contact);
-  see_from(0);
-  bool free_at_p = true;
-  for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
-    free_at_p = free_at_p && !overlaps_at_p(seen_[i]);
-  }
+  const bool free_at_p = take_over(known);
   iterations_ = 0;
   met_touching_ = false;
   start_.E = turned_to(X_start.rotation);
@@ -248,9 +241,8 @@ Projection ExactProjection::solve(const Quaterniond& E_start, Freedom freedom) n
   return answer(lift_turning(state_) ? minimise(state_, true) : Local::infeasible);
 }
 
-/// From an admissible pose and the contacts that hold it. Most often one of them tells without asking the
-/// scene that p is not admissible.
-Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept {
+/// Begins with these contacts and their multipliers. True where p violates none of them.
+bool ExactProjection::take_over(std::span<const ActiveContact> known) noexcept {
   contacts_.clear();
   for (const ActiveContact& active : known) contacts_.add(active.contact);
   see_from(0);
@@ -259,7 +251,13 @@ Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveCo
     multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
     apart = apart && !overlaps_at_p(seen_[i]);
   }
-  if (apart && scene_->admits(X_WP_, tolerance_m_)) return free();
+  return apart;
+}
+
+/// From an admissible pose and the contacts that hold it. Most often one of them tells without asking the
+/// scene that p is not admissible.
+Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept {
+  if (take_over(known) && scene_->admits(X_WP_, tolerance_m_)) return free();
   iterations_ = 0;
   met_touching_ = false;
   state_.E = turned_to(X_start.rotation);

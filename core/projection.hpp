@@ -155,6 +155,7 @@ class ExactProjection {
   Quaterniond turned_to(const Quaterniond& R_WT) const noexcept;
   Projection best_of_all_starts() noexcept;
   Projection solve(const Quaterniond& E_start, Freedom freedom = Freedom::all) noexcept;
+  bool take_over(std::span<const ActiveContact> known) noexcept;
   Projection follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept;
   Projection free() const noexcept;
   Projection answer(Local local) noexcept;
