@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -134,7 +135,9 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
     leash_ = Leash{};
     return answer(Local::budget_spent);
   }
-  if (!translate(state_)) {
+  // What is pushed from two sides may have to turn. Nothing else has to: where it starts is allowed.
+  const bool pushed = leash.turn_rad == std::numeric_limits<double>::infinity();
+  if (!translate(state_) && !(pushed && seek_feasible(state_))) {
     leash_ = Leash{};
     return answer(Local::infeasible);
   }

@@ -89,7 +89,8 @@ class ExactProjection {
 
   /// The same with the contacts known for all there are, and on a leash: where the optimum lies farther away,
   /// the answer is a pose on the way there, admissible for these contacts, no farther than the leash and with
-  /// a lower T; its status is budget_spent. X_start must be admissible for them. RT safe.
+  /// a lower T; its status is budget_spent. X_start must be admissible for them, but where the leash is
+  /// infinite: then it is pushed out first, turning if it must. RT safe.
   Projection step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
                   const Leash& leash) noexcept;
 
