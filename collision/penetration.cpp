@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/metric.hpp"
+
 namespace wrenchd {
 namespace {
 
@@ -16,10 +18,6 @@ constexpr double kBetter = 1.0 - 1e-10;
 bool in_contact(const Projection& projection) noexcept {
   return projection.status == ProjectionStatus::converged ||
          projection.status == ProjectionStatus::budget_spent;
-}
-
-bool same_bits(const Pose& a, const Pose& b) noexcept {
-  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
 }
 
 Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
@@ -40,13 +38,21 @@ std::string why_only_exact(const Scene& scene) {
 
 PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
     : options_(options),
-      mass_kg_(scene.tool().solid.inertia.mass_kg),
+      M_(scene.tool().solid.inertia),
       scene_(scene),
       exact_(scene.tool().solid.inertia, ExactProjection::Budget{}, options.clearance_m),
       descent_(scene.tool().solid.inertia, exact_),
       planar_(scene.tool().solid.inertia, scene.tool().hull, options.planes),
       saved_(scene.convex().size()),
       best_(scene.convex().size()) {
+  if (options.friction.any()) {
+    if (options.method != Method::exact)
+      throw std::invalid_argument(
+          "only method exact knows friction; choose it, or leave friction out ([rendering.friction], "
+          "--friction)");
+    friction_.emplace(scene.tool().solid.inertia, options.friction,
+                      scene.meshes().empty() ? options.clearance_m : Proxy::kClearance_m);
+  }
   if (scene.meshes().empty()) return;
   const bool convex = !scene.convex().empty();
   if (options.method != Method::exact && !convex) throw std::invalid_argument(why_only_exact(scene));
@@ -55,6 +61,34 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
 }
 
 Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept {
+  return friction_ ? rub(X_WP, X_last, scene_time_s) : follow_smoothly(X_WP, X_last, scene_time_s);
+}
+
+/// What friction does to p comes first. A tool that it holds altogether has nothing to look for.
+Penetration PenetrationDepth::rub(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept {
+  const Pose X_felt = friction_->felt(X_WP, X_last);
+  Penetration out;
+  if (friction_->holds()) {
+    if (proxy_) proxy_->stay(X_last);
+    out = described(X_WP, friction_->held());
+  } else {
+    out = follow_smoothly(X_felt, X_last, scene_time_s);
+    if (!same_bits(X_felt, X_WP)) {
+      Projection& q = out.projection;
+      // Off the edge of what it rubbed on: on its way to p, where it comes to at the next tick.
+      if (q.status == ProjectionStatus::free) q.status = ProjectionStatus::budget_spent;
+      q.energy = energy(M_, X_WP, q.X_WQ);
+      out.contacts = std::max<std::uint16_t>(out.contacts, 1);
+      out.eps = displacement(X_WP, q.X_WQ);
+      out.drive = out.eps;
+    }
+  }
+  friction_->keep(out.projection);
+  return out;
+}
+
+Penetration PenetrationDepth::follow_smoothly(const Pose& X_WP, const Pose& X_last,
+                                              double scene_time_s) noexcept {
   if (proxy_) return described(X_WP, proxy_->follow(X_WP, X_last, scene_time_s));
   const bool admitted = X_answered_ && same_bits(*X_answered_, X_last);
   if (!admitted) scene_.admit(X_last, exact_.gap_tolerance_m(X_last));
@@ -85,6 +119,7 @@ Penetration PenetrationDepth::follow_exactly(const Pose& X_WP, const Pose& X_las
 void PenetrationDepth::forget(double scene_time_s) noexcept {
   known_.clear();
   X_answered_.reset();
+  if (friction_) friction_->forget();
   if (proxy_) proxy_->forget(scene_time_s);
 }
 
@@ -243,7 +278,7 @@ Penetration PenetrationDepth::translational(const Pose& X_WP) noexcept {
     moment += multiplier * (X_WP.rotation.conjugate() * lever_W.cross(normal_W(contact, X_WQ)));
   }
   // 2 m s = sum multiplier_i n_i: contact i carries the displacement multiplier_i n_i / (2 m).
-  out.drive.tail<3>() = moment / (2.0 * mass_kg_);
+  out.drive.tail<3>() = moment / (2.0 * M_.mass_kg);
   return out;
 }
 

@@ -12,6 +12,7 @@
 #include "collision/scene_contacts.hpp"
 #include "core/contact.hpp"
 #include "core/descent.hpp"
+#include "core/friction.hpp"
 #include "core/method.hpp"
 #include "core/planar_family.hpp"
 #include "core/projection.hpp"
@@ -40,18 +41,21 @@ class PenetrationDepth {
     /// How far contacts are held open [m]: zero for the exact optimum, Proxy::kClearance_m for a proxy that
     /// is to be admissible to the last digit. A scene of meshes always keeps the latter.
     double clearance_m = 0.0;
+    FrictionSettings friction = {};  ///< of a proxy that is followed; only exact knows it
   };
 
   /// The scene is kept by reference and must outlive this. Throws std::invalid_argument where the method
-  /// cannot work with the scene: only exact knows bodies that are not convex.
+  /// cannot work with the scene, or has no friction: only exact knows bodies that are not convex, and rubs.
   PenetrationDepth(const Scene& scene, Options options);
   PenetrationDepth(const PenetrationDepth&) = delete;
   PenetrationDepth& operator=(const PenetrationDepth&) = delete;
 
   /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
-  /// the proxy stays there, and draws the hand back to where it came from. scene_time_s: at which the
-  /// obstacles stand [s]; where they move it never runs back, and X_last was admissible at that of the last
-  /// follow(), query() or forget(). RT safe.
+  /// the proxy stays there, and draws the hand back to where it came from. With friction q lags behind the
+  /// optimum for p: it is that for p moved by friction (core/friction.hpp), and so are multipliers and
+  /// kkt_residual; energy and eps are those between p and q. scene_time_s: at which the obstacles stand [s];
+  /// where they move it never runs back, and X_last was admissible at that of the last follow(), query() or
+  /// forget(). RT safe.
   Penetration follow(const Pose& X_WP, const Pose& X_last, double scene_time_s = 0.0) noexcept;
   /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones.
   /// Neither allocates nor locks, but is up to a thousand times dearer, among meshes more: no work for the
@@ -64,7 +68,9 @@ class PenetrationDepth {
   void forget(double scene_time_s = 0.0) noexcept;
 
  private:
+  Penetration follow_smoothly(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
   Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;
+  Penetration rub(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
   static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
   template <class Solve>
   void settle(Projection& best, const Solve& solve) noexcept;
@@ -76,7 +82,7 @@ class PenetrationDepth {
   Penetration translational(const Pose& X_WP) noexcept;
 
   Options options_;
-  double mass_kg_;
+  Inertia M_;
   SceneContacts scene_;
   ExactProjection exact_;
   Descent descent_;  ///< works with exact_
@@ -86,6 +92,7 @@ class PenetrationDepth {
   std::optional<Pose> X_answered_;                         ///< that answer: the planes held admit it
   std::vector<HeldPlane> saved_;                           ///< while other planes are tried
   std::vector<HeldPlane> best_;                            ///< of the best answer so far
+  std::optional<Friction> friction_;                       ///< where there is any
   std::optional<Proxy> proxy_;                             ///< where there are meshes
   std::optional<Placement> placement_;                     ///< likewise
 };

@@ -50,6 +50,12 @@ Proxy::Proxy(const Scene& scene, Effort effort)
       half_spaces_(scene),
       meshes_(scene) {}
 
+void Proxy::stay(const Pose& X_last) noexcept {
+  looks_ = 0;
+  budget_.visits = effort_.visits;
+  meshes_.look_ahead(X_last, budget_);
+}
+
 Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) noexcept {
   X_WQ_ = X_last;
   looks_ = 0;

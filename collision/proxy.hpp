@@ -48,6 +48,9 @@ class Proxy {
   /// infeasible where obstacles have moved into it from all sides. RT safe.
   Projection follow(const Pose& X_WP, const Pose& X_last, double time_s = 0.0) noexcept;
 
+  /// One tick at which the tool is held at X_last, last tick's q, in a scene where nothing moves. RT safe.
+  void stay(const Pose& X_last) noexcept;
+
   /// Forgets the contacts of the last tick. The next X_last was admissible at time_s. RT safe.
   void forget(double time_s = 0.0) noexcept;
 

@@ -32,6 +32,11 @@ Pose operator*(const Pose& X_AB, const Pose& X_BC) noexcept;
 /// X_BA from X_AB.
 Pose inverse(const Pose& X_AB) noexcept;
 
+/// Are all their numbers the same?
+inline bool same_bits(const Pose& a, const Pose& b) noexcept {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
+}
+
 /// Exponential coordinates to configuration. xi = [v; w] (linear [m] first, angular [rad] second,
 /// section 2.2).
 Pose exp(const Vector6d& xi) noexcept;

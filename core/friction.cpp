@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/friction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "core/metric.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// A gap no wider than this touches [m]: a proxy's clearance, and rounding.
+constexpr double kTouching_m = 1e-8;
+/// Levers shorter than the square root of this, in radii of gyration, hold no turn: rounding would be most of
+/// them.
+constexpr double kLeastLever = 1e-6;
+/// Shorter ways than this are none [m]: the tool stays to the bit. Nothing adds up, for the way to where it
+/// would turn to is that from where it has been left.
+constexpr double kNoWay_m = 1e-10;
+/// And it sticks where it would go so small a share of the way to q*.
+constexpr double kNoShare = 1e-9;
+/// A tool that has stuck for so many ticks is held by static friction. Not at once: a hand that moves slowly
+/// stands still between the steps of its encoder, 10 um at a time, and would be caught at each of them.
+constexpr int kTicksToSettle = 20;
+
+double way_m(const Pose& from, const Pose& to, double lever_m) noexcept {
+  return (to.translation_m - from.translation_m).norm() +
+         lever_m * from.rotation.angularDistance(to.rotation);
+}
+
+/// T = m |s|^2 + theta' H theta for a small turn theta in T: with theta = A y it is m |y|^2.
+Matrix3d unit_turns(const Inertia& M) {
+  const Eigen::LLT<Matrix3d> root(M.H_kg_m2 / M.mass_kg);
+  return root.matrixU().solve(Matrix3d::Identity());
+}
+
+}  // namespace
+
+Friction::Friction(const Inertia& M, const FrictionSettings& settings, double clearance_m)
+    : M_(M),
+      H_inverse_(M.H_kg_m2.inverse()),
+      turn_(unit_turns(M)),
+      settings_(settings),
+      exact_(M, ExactProjection::Budget{}, clearance_m) {}
+
+void Friction::forget() noexcept {
+  X_touched_.reset();
+  holds_ = false;
+  ticks_stuck_ = 0;
+}
+
+void Friction::keep(const Projection& answer) noexcept {
+  last_.clear();  // where time was up, contacts may be among them that are yet to be reached
+  for (const ActiveContact& active : answer.active)
+    if (gap_m(active.contact, answer.X_WQ) <= kTouching_m) last_.add(active);
+  X_touched_ = answer.X_WQ;
+}
+
+Pose Friction::felt(const Pose& X_WP, const Pose& X_last) noexcept {
+  const int ticks_stuck = std::exchange(ticks_stuck_, 0);
+  holds_ = false;
+  if (!X_touched_ || last_.empty() || !same_bits(*X_touched_, X_last)) return X_WP;
+  unhindered_ = exact_.step(X_WP, X_last, std::span(last_.begin(), last_.end()), {});
+  see(X_last);
+  if (std::none_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.multiplier > 0.0; }))
+    return X_WP;
+  const Pose X_stuck = stuck(X_last);
+  const double mu =
+      ticks_stuck < kTicksToSettle ? settings_.dynamic_coefficient : settings_.static_coefficient;
+  const double held = share_held(mu, X_WP, X_stuck);
+  if (held <= 0.0) return X_WP;
+  if (held < 1.0 - kNoShare) {
+    const Pose& X_WQ = unhindered_.X_WQ;
+    return pressing({X_WQ.rotation.slerp(held, X_stuck.rotation),
+                     X_WQ.translation_m + held * (X_stuck.translation_m - X_WQ.translation_m)});
+  }
+  ticks_stuck_ = std::min(ticks_stuck + 1, kTicksToSettle);
+  if (!same_bits(X_stuck, X_last)) return pressing(X_stuck);
+  holds_ = true;
+  unhindered_.X_WQ = X_last;
+  unhindered_.energy = energy(M_, X_WP, X_last);
+  return X_WP;
+}
+
+/// What touches at q*, and how it came there from X_last.
+void Friction::see(const Pose& X_last) noexcept {
+  touches_.clear();
+  const Pose& X_WQ = unhindered_.X_WQ;
+  const Matrix3d turn_W = X_WQ.rotation * turn_;
+  for (const ActiveContact& active : unhindered_.active) {
+    Touch touch;
+    touch.contact = active.contact;
+    touch.multiplier = active.multiplier;
+    const Vector3d c_W = contact_point_W(active.contact, X_WQ);
+    const Vector3d lever_W = c_W - X_WQ.translation_m;
+    touch.p_TC_m = X_WQ.rotation.conjugate() * lever_W;
+    touch.p_WC_m = X_last * touch.p_TC_m;
+    touch.n_W = normal_W(active.contact, X_WQ);
+    touch.lever << Matrix3d::Identity(), -hat(lever_W) * turn_W;
+    touch.gap_m = gap_m(active.contact, X_WQ);
+    const Vector3d way_W = c_W - touch.p_WC_m;
+    touch.slid_m = (way_W - touch.n_W * touch.n_W.dot(way_W)).norm();
+    touches_.add(touch);
+  }
+}
+
+/// What a pose has to undo, so that a point that carries is where it was at X_last, but for its way into or
+/// out of the obstacle, and the gap is that of q*. What touches idly does not rub: its gap alone counts.
+Vector3d Friction::strayed_m(const Touch& touch, const Pose& X_WT) const noexcept {
+  const Vector3d& n = touch.n_W;
+  const Vector3d opened = n * (gap_m(touch.contact, X_WT) - touch.gap_m);
+  if (touch.multiplier <= 0.0) return opened;
+  const Vector3d way = X_WT * touch.p_TC_m - touch.p_WC_m;
+  return way - n * n.dot(way) + opened;
+}
+
+/// q_0: from q* by the least displacement, as the metric measures it, that brings back the points that carry.
+/// With y that displacement in units of which M is m times one, lever_i y = strayed_i is solved for the
+/// shortest y. Newton's method with the levers of q*: what is left falls by the angle turned, each time.
+Pose Friction::stuck(const Pose& X_last) const noexcept {
+  Matrix6d N = Matrix6d::Zero();
+  double longest_m = 0.0;
+  for (const Touch& touch : touches_) {
+    const Vector6d normal = touch.lever.transpose() * touch.n_W;
+    if (touch.multiplier > 0.0)
+      N += touch.lever.transpose() * touch.lever;
+    else
+      N += normal * normal.transpose();
+    longest_m = std::max(longest_m, touch.p_TC_m.norm());
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(N);
+  const Vector6d& squares = eigen.eigenvalues();  // of levers, the shortest first
+  const double least = kLeastLever * squares[5];
+  if (squares[0] > least) return X_last;  // held in all six directions
+  Vector6d inverse;
+  for (int i = 0; i < 6; ++i) inverse[i] = squares[i] > least ? 1.0 / squares[i] : 0.0;
+  constexpr int kSteps = 8;
+  const Pose& X_WQ = unhindered_.X_WQ;
+  Pose X = X_WQ;
+  for (int step = 0; step < kSteps; ++step) {
+    Vector6d sum = Vector6d::Zero();
+    for (const Touch& touch : touches_) sum += touch.lever.transpose() * strayed_m(touch, X);
+    const Vector6d y = eigen.eigenvectors() * inverse.cwiseProduct(eigen.eigenvectors().transpose() * sum);
+    X.translation_m -= y.head<3>();
+    X.rotation = (rotation_from(-(X_WQ.rotation * (turn_ * y.tail<3>()))) * X.rotation).normalized();
+    if (y.norm() < 1e-3 * kNoWay_m) break;
+  }
+  return way_m(X_last, X, longest_m) < kNoWay_m ? X_last : X;
+}
+
+/// 1 - s.
+double Friction::share_held(double mu, const Pose& X_WP, const Pose& X_stuck) const noexcept {
+  double D = 0.0;
+  for (const Touch& touch : touches_) D += touch.multiplier * touch.slid_m;
+  const double twice = 2.0 * (energy(M_, X_WP, X_stuck) - energy(M_, X_WP, unhindered_.X_WQ));
+  return mu * D < twice ? mu * D / twice : 1.0;
+}
+
+/// p' for q = q_s, whose contacts press as they do at q*: grad T(p', q) = sum lambda_i grad gap_i(q). In the
+/// axes of T at q, with (w, v) the unit quaternion of p'^-1 q,
+///
+///   2 m R_q' (x_q - x_p') = sum lambda_i R_q' n_i
+///   4 (w H v - v x H v)   = sum lambda_i (lever_i x R_q' n_i) = g
+///
+/// the second solved for v by iterating v = H^-1 (g/4 + v x H v) / w.
+Pose Friction::pressing(const Pose& X_WQ) const noexcept {
+  Vector3d force = Vector3d::Zero();
+  Vector3d torque = Vector3d::Zero();
+  for (const Touch& touch : touches_) {
+    const Vector3d carried = touch.multiplier * normal_W(touch.contact, X_WQ);
+    force += carried;
+    torque += (contact_point_W(touch.contact, X_WQ) - X_WQ.translation_m).cross(carried);
+  }
+  const Vector3d g = X_WQ.rotation.conjugate() * torque;
+  constexpr int kSteps = 30;          // each leaves a share of the angle: two digits at 0.1 rad
+  constexpr double kFarTurned = 0.9;  // sin(theta/2) for 128 degrees: the hand has let go of it long before
+  Quaterniond E = Quaterniond::Identity();
+  for (int step = 0; step < kSteps; ++step) {
+    Vector3d v = H_inverse_ * (0.25 * g + E.vec().cross(M_.H_kg_m2 * E.vec())) / E.w();
+    if (v.norm() > kFarTurned) v *= kFarTurned / v.norm();
+    const double change = (v - E.vec()).norm();
+    E.vec() = v;
+    E.w() = std::sqrt(1.0 - v.squaredNorm());
+    if (change < 1e-15) break;
+  }
+  return {(X_WQ.rotation * E.conjugate()).normalized(), X_WQ.translation_m - force / (2.0 * M_.mass_kg)};
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "core/contact.hpp"
+#include "core/inertia.hpp"
+#include "core/pose.hpp"
+#include "core/projection.hpp"
+
+namespace wrenchd {
+
+/// [rendering.friction]: Coulomb's coefficients. 0 <= dynamic <= static; both zero: no friction.
+struct FrictionSettings {
+  static constexpr double kLargest = 5.0;  ///< far beyond rubber on rubber
+
+  double static_coefficient = 0.0;   ///< of a tool that has stuck for a while
+  double dynamic_coefficient = 0.0;  ///< of a tool that slides
+
+  bool any() const noexcept { return static_coefficient > 0.0 || dynamic_coefficient > 0.0; }
+};
+
+/// Coulomb friction as the proxy's resistance to sliding.
+///
+/// Under the contacts that touched at last tick's q, and no others, the closest configuration to p is q*; its
+/// multipliers lambda_i are what presses. Between the two lies q_0: as near to p as the tool comes while the
+/// points of it that carry at q* stay where they were. (A tool that stands on a face stays as it is; one that
+/// stands on its tip may turn about the tip.) Points slide on the way from q_0 to q* only, and along it, with
+/// s from 0 to 1,
+///
+///   T(s)     = T* + (T(q_0) - T*) (1 - s)^2       q* is a minimum under its contacts
+///   sliding  = mu D s                             D = sum lambda_i |tangential displacement of point i|
+///
+/// With U = (k/2) T the second is the work of friction, mu N_i at every contact. The least sum is at
+///
+///   1 - s = mu D / (2 (T(q_0) - T*))              at most 1: there the tool sticks
+///
+/// Where a translation is all that slides, this is Coulomb's law: the force along the surface is mu times the
+/// force into it. For q_s on that way there is a p' that q_s is the closest configuration to, with the same
+/// multipliers: p moved by friction. The proxy follows p' instead of p, without friction, in the whole scene.
+/// What it meets on the way stops it there, and rubs from the next tick on.
+///
+/// All memory is in the object. One object serves one thread.
+class Friction {
+ public:
+  /// clearance_m: what the contacts are held open by, as in ExactProjection.
+  Friction(const Inertia& M, const FrictionSettings& settings, double clearance_m);
+
+  /// p': where the proxy is to follow to. X_WP itself where nothing rubs. X_WP: p; X_last: last tick's q.
+  /// Once a tick. RT safe.
+  Pose felt(const Pose& X_WP, const Pose& X_last) noexcept;
+
+  /// Does the tool stick and cannot turn either? Then it stays at X_last to the bit, and held() says what of
+  /// it: energy, contacts and multipliers for p. RT safe.
+  bool holds() const noexcept { return holds_; }
+  const Projection& held() const noexcept { return unhindered_; }
+
+  /// The tick's answer: what touches there rubs at the next tick. A tool that comes through the air is not
+  /// held back where it came from. RT safe.
+  void keep(const Projection& answer) noexcept;
+
+  void forget() noexcept;  ///< RT safe
+
+ private:
+  /// A contact of q*, and the point of the tool that is there.
+  struct Touch {
+    Contact contact;
+    Vector3d p_TC_m;                    ///< the point
+    Vector3d p_WC_m;                    ///< where it was at X_last
+    Vector3d n_W;                       ///< at q*
+    Eigen::Matrix<double, 3, 6> lever;  ///< its displacement, by a displacement y of the body at q*
+    double gap_m;                       ///< at q*
+    double multiplier;                  ///< zero where it touches idly [kg m]
+    double slid_m;                      ///< tangential displacement of the point from X_last to q*
+  };
+
+  void see(const Pose& X_last) noexcept;
+  Pose stuck(const Pose& X_last) const noexcept;
+  Vector3d strayed_m(const Touch& touch, const Pose& X_WT) const noexcept;
+  double share_held(double mu, const Pose& X_WP, const Pose& X_stuck) const noexcept;
+  Pose pressing(const Pose& X_WQ) const noexcept;
+
+  Inertia M_;
+  Matrix3d H_inverse_;
+  Matrix3d turn_;  ///< of the last half of y: the turn in T [rad]
+  FrictionSettings settings_;
+  ExactProjection exact_;
+  FixedList<ActiveContact, ContactSet::kCapacity> last_;  ///< what touched at last tick's answer
+  std::optional<Pose> X_touched_;                         ///< that answer
+  Projection unhindered_;                                 ///< q*
+  FixedList<Touch, ContactSet::kCapacity> touches_;
+  bool holds_ = false;
+  int ticks_stuck_ = 0;
+};
+
+}  // namespace wrenchd
