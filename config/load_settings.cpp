@@ -59,12 +59,29 @@ void read_servo(TomlTable& table, ServoSettings& servo) {
   table.optional("late_limit_s").number(servo.late_limit_s, {0.002, 1});
 }
 
+/// One coefficient alone stands for both.
+void read_friction(TomlTable& table, FrictionSettings& friction) {
+  constexpr Range kCoefficient = {0, FrictionSettings::kLargest};
+  const TomlValue dynamic = table.optional("dynamic");
+  const bool has_static = table.optional("static").number(friction.static_coefficient, kCoefficient);
+  const bool has_dynamic = dynamic.number(friction.dynamic_coefficient, kCoefficient);
+  if (has_static && !dynamic) friction.dynamic_coefficient = friction.static_coefficient;
+  if (has_dynamic && !has_static) friction.static_coefficient = friction.dynamic_coefficient;
+  if (friction.dynamic_coefficient > friction.static_coefficient)
+    dynamic.refuse("expected no more than 'static', " + to_text(friction.static_coefficient) + ", found " +
+                   to_text(friction.dynamic_coefficient) + "; what slides rubs no more than what sticks");
+}
+
 void read_rendering(TomlTable& table, RenderingSettings& rendering) {
   table.optional("method").choice(rendering.method, {{"exact", Method::exact},
                                                      {"planar", Method::planar},
                                                      {"descent", Method::descent},
                                                      {"translational", Method::translational}});
   table.optional("planes").integer(rendering.planes, {1, 1000});
+  const TomlValue friction = table.optional("friction");
+  friction.table(read_friction, rendering.friction);
+  if (rendering.friction.any() && rendering.method != Method::exact)
+    friction.refuse("only method = \"exact\" knows friction; choose it, or leave friction out");
 }
 
 /// How the two halves of a gain are called in its table form.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/friction.hpp"
 #include "core/limits.hpp"
 #include "core/method.hpp"
 #include "core/pose.hpp"
@@ -30,7 +31,8 @@ struct ServoSettings {
 /// [rendering]
 struct RenderingSettings {
   Method method = Method::exact;
-  int planes = 47;  ///< N_delta of Eq. (40), for method = "planar"
+  int planes = 47;            ///< N_delta of Eq. (40), for method = "planar"
+  FrictionSettings friction;  ///< for method = "exact"
 };
 
 /// What the gains of [wrench] start from. Sampled at 1 kHz with 1.4 ms of delay, a wall is stable up to

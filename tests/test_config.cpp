@@ -53,7 +53,8 @@ std::string printed(const Settings& s) {
   print(out, s.device.tool_in_handle);
   out << s.servo.rate_Hz << ' ' << int(s.servo.pacing) << int(s.servo.realtime) << ' ' << s.servo.priority
       << ' ' << s.servo.cpu << ' ' << s.servo.late_limit_s << '\n'
-      << int(s.rendering.method) << ' ' << s.rendering.planes << '\n'
+      << int(s.rendering.method) << ' ' << s.rendering.planes << ' '
+      << s.rendering.friction.static_coefficient << ' ' << s.rendering.friction.dynamic_coefficient << '\n'
       << static_cast<int>(s.wrench.law) << ' ' << s.wrench.energy_stiffness_per_s2 << '\n'
       << s.wrench.gains.stiffness << '\n'
       << s.wrench.gains.integral << '\n'
@@ -122,7 +123,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 43);
+  CHECK(options == 45);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {
@@ -218,6 +219,17 @@ TEST_CASE("a gain is a number, two blocks, or a matrix", "[config]") {
   CHECK(K(1, 0) == -1.0);
   CHECK(K(5, 3) == 0.5);
   CHECK(K(5, 5) == 6.0);
+}
+
+TEST_CASE("one coefficient of friction stands for both", "[config]") {
+  const auto read = [](const std::string& text) {
+    return settings_from("[rendering.friction]\n" + text).rendering.friction;
+  };
+  CHECK(read("static = 0.5\ndynamic = 0.25").static_coefficient == 0.5);
+  CHECK(read("static = 0.5\ndynamic = 0.25").dynamic_coefficient == 0.25);
+  CHECK(read("static = 0.5").dynamic_coefficient == 0.5);
+  CHECK(read("dynamic = 0.25").static_coefficient == 0.25);
+  CHECK(read("static = 0.5\ndynamic = 0").dynamic_coefficient == 0.0);
 }
 
 TEST_CASE("a placement may give position or rotation only", "[config]") {

@@ -53,6 +53,26 @@ TEST_CASE("a replayed recording gives the same bits", "[replay]") {
   CHECK_FALSE(difference.has_value());
 }
 
+TEST_CASE("a replay rubs as the loop did", "[replay][friction]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  Plan plan = recording_plan(Method::exact);
+  plan.settings.rendering.friction = {0.6, 0.4};
+  record_run(plan, file, 6.0);
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() > 5900);
+  int stuck = 0;
+  for (std::size_t i = 1; i < recording.ticks.size(); ++i) {
+    const TickRecord& tick = recording.ticks[i];
+    stuck += tick.contacts > 0 && tick.X_WQ == recording.ticks[i - 1].X_WQ ? 1 : 0;
+  }
+  CHECK(stuck > 100);
+  CHECK_FALSE(replay(recording, plan).has_value());
+  // The configuration that it is replayed with says how it rubs.
+  plan.settings.rendering.friction = {0.5, 0.4};
+  CHECK(replay(recording, plan).has_value());
+}
+
 TEST_CASE("a replay places the proxy at the ticks at which it was placed, where it was placed",
           "[replay][placing]") {
   // Inside, out, and back against the boulder; started over on the way.
