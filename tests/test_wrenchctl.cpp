@@ -576,6 +576,14 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
       {{"solve", scene, "--poses", poses, "--planes", "many"}, "--planes"},
       {{"solve", scene, "--poses", poses, "--energy-stiffness", "-3"},
        "--energy-stiffness: expected a number from 0"},
+      {{"solve", scene, "--poses", poses, "--friction", "0.5,0.3"}, "--friction requires --proxy"},
+      {{"solve", scene, "--poses", poses, "--proxy", "--friction", "0.3,0.5"},
+       "--friction: expected two numbers from 0 to 5, the second no more than the first, as in 0.5,0.3; "
+       "found "
+       "'0.3,0.5'"},
+      {{"solve", scene, "--poses", poses, "--proxy", "--friction", "6"}, "found '6'"},
+      {{"solve", scene, "--poses", poses, "--proxy", "--friction", "nan"}, "found 'nan'"},
+      {{"solve", scene, "--poses", poses, "--proxy", "--friction", "0.5,"}, "found '0.5,'"},
       {{"paper", "figures"}, "not expected: figures"},
       {{"paper", "-o", ""}, "--output: must not be empty"},
       {{"check"}, "file is required"},

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <string>
 
@@ -13,6 +15,7 @@
 #include "collision/mesh_source.hpp"
 #include "collision/tool_body.hpp"
 #include "config/load_scene.hpp"
+#include "core/friction.hpp"
 #include "core/inertia.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/replay.hpp"
@@ -46,8 +49,35 @@ struct SolveOptions {
   std::string output = "-";
   std::string method = "exact";
   std::string law = "pid";
+  std::string friction = "0,0";
   SolveSettings settings;
 };
+
+/// "0.5,0.3": the static and the dynamic coefficient; one alone stands for both.
+std::optional<FrictionSettings> friction_of(const std::string& text) {
+  FrictionSettings friction;
+  const char* const end = text.data() + text.size();
+  const auto read = [end](const char* from, double& x) {
+    const auto [stop, error] = std::from_chars(from, end, x);
+    return error == std::errc() && x >= 0.0 && x <= FrictionSettings::kLargest ? stop : nullptr;
+  };
+  const char* stop = read(text.data(), friction.static_coefficient);
+  friction.dynamic_coefficient = friction.static_coefficient;
+  if (stop != nullptr && stop != end)
+    stop = *stop == ',' ? read(stop + 1, friction.dynamic_coefficient) : nullptr;
+  if (stop != end || friction.dynamic_coefficient > friction.static_coefficient) return {};
+  return friction;
+}
+
+CLI::Validator friction_pair() {
+  return {[](std::string& text) -> std::string {
+            return friction_of(text) ? ""
+                                     : "expected two numbers from 0 to 5, the second no more than the first, "
+                                       "as in 0.5,0.3; found '" +
+                                           text + "'";
+          },
+          ""};
+}
 
 struct MeshOptions {
   std::filesystem::path file;
@@ -82,6 +112,7 @@ int run_solve(const SolveOptions& options) {
   if (scene.moves() && !settings.proxy)
     say("obstacles move, and every pose is solved with them where they stand at time 0; --proxy moves them");
   settings.depth.method = kMethods.at(options.method);
+  settings.depth.friction = friction_of(options.friction).value();
   settings.law = options.law == "energy" ? SpringLaw::energy : SpringLaw::pid;
   const std::vector<SolvedPose> rows = solve(scene, poses, settings);
   std::ostringstream text;
@@ -183,6 +214,12 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
       ->add_option("--rate", options.settings.rate_Hz,
                    "poses a second of that trajectory [Hz], by which obstacles move")
       ->check(number_from(0.001, 1e6))
+      ->needs(proxy)
+      ->capture_default_str();
+  solve
+      ->add_option("--friction", options.friction,
+                   "STATIC,DYNAMIC: coefficients of Coulomb's friction on the proxy, for method exact")
+      ->check(friction_pair())
       ->needs(proxy)
       ->capture_default_str();
   solve->add_option("-o,--output", options.output, "CSV to write; - writes standard output")
