@@ -2,6 +2,7 @@
 #include "core/friction.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -38,6 +39,24 @@ Matrix3d unit_turns(const Inertia& M) {
   const Eigen::LLT<Matrix3d> root(M.H_kg_m2 / M.mass_kg);
   return root.matrixU().solve(Matrix3d::Identity());
 }
+
+/// A sum N of squares of levers, and its pseudo-inverse.
+class Levers {
+ public:
+  explicit Levers(const Matrix6d& N) noexcept : eigen_(N) {
+    const Vector6d& squares = eigen_.eigenvalues();  // the shortest first
+    for (int i = 0; i < 6; ++i) inverse_[i] = squares[i] > kLeastLever * squares[5] ? 1.0 / squares[i] : 0.0;
+  }
+
+  bool hold_all() const noexcept { return inverse_[0] > 0.0; }  ///< six directions
+  Vector6d solve(const Vector6d& sum) const noexcept {
+    return eigen_.eigenvectors() * inverse_.cwiseProduct(eigen_.eigenvectors().transpose() * sum);
+  }
+
+ private:
+  Eigen::SelfAdjointEigenSolver<Matrix6d> eigen_;
+  Vector6d inverse_;
+};
 
 }  // namespace
 
@@ -77,14 +96,25 @@ Pose Friction::felt(const Pose& X_WP, const Pose& X_last) noexcept {
   if (held < 1.0 - kNoShare) {
     const Pose& X_WQ = unhindered_.X_WQ;
     return pressing({X_WQ.rotation.slerp(held, X_stuck.rotation),
-                     X_WQ.translation_m + held * (X_stuck.translation_m - X_WQ.translation_m)});
+                     X_WQ.translation_m + held * (X_stuck.translation_m - X_WQ.translation_m)},
+                    held);
   }
   ticks_stuck_ = std::min(ticks_stuck + 1, kTicksToSettle);
-  if (!same_bits(X_stuck, X_last)) return pressing(X_stuck);
+  if (!same_bits(X_stuck, X_last)) return pressing(X_stuck, 1.0);
   holds_ = true;
   unhindered_.X_WQ = X_last;
   unhindered_.energy = energy(M_, X_WP, X_last);
+  unhindered_.active.clear();
+  for (std::size_t i = 0; i < touches_.size(); ++i)
+    unhindered_.active.add({touches_[i].contact, presses(i, 1.0)});
   return X_WP;
+}
+
+/// dT by a small turn of the body in its own axes, E = p^-1 q: 4 (w H v - v x H v).
+Vector3d Friction::turning(const Quaterniond& E) const noexcept {
+  const double sign = E.w() < 0.0 ? -1.0 : 1.0;  // the shorter way round
+  const Vector3d Hv = M_.H_kg_m2 * E.vec();
+  return 4.0 * (std::abs(E.w()) * sign * Hv - E.vec().cross(Hv));
 }
 
 /// What touches at q*, and how it came there from X_last.
@@ -104,7 +134,7 @@ void Friction::see(const Pose& X_last) noexcept {
     touch.lever << Matrix3d::Identity(), -hat(lever_W) * turn_W;
     touch.gap_m = gap_m(active.contact, X_WQ);
     const Vector3d way_W = c_W - touch.p_WC_m;
-    touch.slid_m = (way_W - touch.n_W * touch.n_W.dot(way_W)).norm();
+    touch.slid_W_m = way_W - touch.n_W * touch.n_W.dot(way_W);
     touches_.add(touch);
   }
 }
@@ -133,19 +163,15 @@ Pose Friction::stuck(const Pose& X_last) const noexcept {
       N += normal * normal.transpose();
     longest_m = std::max(longest_m, touch.p_TC_m.norm());
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(N);
-  const Vector6d& squares = eigen.eigenvalues();  // of levers, the shortest first
-  const double least = kLeastLever * squares[5];
-  if (squares[0] > least) return X_last;  // held in all six directions
-  Vector6d inverse;
-  for (int i = 0; i < 6; ++i) inverse[i] = squares[i] > least ? 1.0 / squares[i] : 0.0;
+  const Levers levers(N);
+  if (levers.hold_all()) return X_last;
   constexpr int kSteps = 8;
   const Pose& X_WQ = unhindered_.X_WQ;
   Pose X = X_WQ;
   for (int step = 0; step < kSteps; ++step) {
     Vector6d sum = Vector6d::Zero();
     for (const Touch& touch : touches_) sum += touch.lever.transpose() * strayed_m(touch, X);
-    const Vector6d y = eigen.eigenvectors() * inverse.cwiseProduct(eigen.eigenvectors().transpose() * sum);
+    const Vector6d y = levers.solve(sum);
     X.translation_m -= y.head<3>();
     X.rotation = (rotation_from(-(X_WQ.rotation * (turn_ * y.tail<3>()))) * X.rotation).normalized();
     if (y.norm() < 1e-3 * kNoWay_m) break;
@@ -153,28 +179,65 @@ Pose Friction::stuck(const Pose& X_last) const noexcept {
   return way_m(X_last, X, longest_m) < kNoWay_m ? X_last : X;
 }
 
-/// 1 - s.
-double Friction::share_held(double mu, const Pose& X_WP, const Pose& X_stuck) const noexcept {
-  double D = 0.0;
-  for (const Touch& touch : touches_) D += touch.multiplier * touch.slid_m;
-  const double twice = 2.0 * (energy(M_, X_WP, X_stuck) - energy(M_, X_WP, unhindered_.X_WQ));
-  return mu * D < twice ? mu * D / twice : 1.0;
+/// What contact i carries so far from q* to q_0.
+double Friction::presses(std::size_t i, double held) const noexcept {
+  return std::max(0.0, touches_[i].multiplier + held * more_stuck_[i]);
 }
 
-/// p' for q = q_s, whose contacts press as they do at q*: grad T(p', q) = sum lambda_i grad gap_i(q). In the
-/// axes of T at q, with (w, v) the unit quaternion of p'^-1 q,
+/// 1 - s. Also finds what each contact carries more at q_0 than at q*: all forces of the contacts together,
+/// friction's among them, keep the tool there against p. Of many sets of them, that next to those at q*.
+double Friction::share_held(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept {
+  Vector6d lacking;  // of grad T
+  lacking << 2.0 * M_.mass_kg * (X_stuck.translation_m - X_WP.translation_m),
+      turn_.transpose() * turning(X_WP.rotation.conjugate() * X_stuck.rotation);
+  const Matrix3d turn_W = X_stuck.rotation * turn_;
+  Matrix6d N = Matrix6d::Zero();
+  std::array<Vector6d, ContactSet::kCapacity> normal;   // gradients of the gaps
+  std::array<Vector6d, ContactSet::kCapacity> sliding;  // and of the ways towards q*
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    const Touch& touch = touches_[i];
+    Eigen::Matrix<double, 3, 6> lever;
+    lever << Matrix3d::Identity(),
+        -hat(contact_point_W(touch.contact, X_stuck) - X_stuck.translation_m) * turn_W;
+    normal[i] = lever.transpose() * normal_W(touch.contact, X_stuck);
+    sliding[i] = lever.transpose() * touch.slid_W_m;
+    lacking -= touch.multiplier * normal[i];
+    if (touch.multiplier > 0.0)
+      N += lever.transpose() * lever;
+    else
+      N += normal[i] * normal[i].transpose();
+  }
+  const Levers levers(N);
+  const Vector6d z = levers.solve(lacking);
+  double D = 0.0;
+  double D_stuck = 0.0;
+  double drawn = 0.0;
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    more_stuck_[i] = normal[i].dot(z);
+    const Touch& touch = touches_[i];
+    const double slid_m = touch.slid_W_m.norm();
+    D += touch.multiplier * slid_m;
+    D_stuck += (touch.multiplier + more_stuck_[i]) * slid_m;
+    if (touch.multiplier > 0.0) drawn -= sliding[i].dot(z);
+  }
+  return mu * D_stuck < drawn ? std::min(1.0, mu * D / (drawn + mu * (D - D_stuck))) : 1.0;
+}
+
+/// p' for q = q_s, whose contacts press as they do there against p: grad T(p', q) = sum lambda_i grad
+/// gap_i(q). In the axes of T at q, with (w, v) the unit quaternion of p'^-1 q,
 ///
 ///   2 m R_q' (x_q - x_p') = sum lambda_i R_q' n_i
 ///   4 (w H v - v x H v)   = sum lambda_i (lever_i x R_q' n_i) = g
 ///
 /// the second solved for v by iterating v = H^-1 (g/4 + v x H v) / w.
-Pose Friction::pressing(const Pose& X_WQ) const noexcept {
+Pose Friction::pressing(const Pose& X_WQ, double held) const noexcept {
   Vector3d force = Vector3d::Zero();
   Vector3d torque = Vector3d::Zero();
-  for (const Touch& touch : touches_) {
-    const Vector3d carried = touch.multiplier * normal_W(touch.contact, X_WQ);
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    const Contact& contact = touches_[i].contact;
+    const Vector3d carried = presses(i, held) * normal_W(contact, X_WQ);
     force += carried;
-    torque += (contact_point_W(touch.contact, X_WQ) - X_WQ.translation_m).cross(carried);
+    torque += (contact_point_W(contact, X_WQ) - X_WQ.translation_m).cross(carried);
   }
   const Vector3d g = X_WQ.rotation.conjugate() * torque;
   constexpr int kSteps = 30;          // each leaves a share of the angle: two digits at 0.1 rad

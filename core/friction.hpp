@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include "core/contact.hpp"
@@ -23,22 +25,23 @@ struct FrictionSettings {
 /// Coulomb friction as the proxy's resistance to sliding.
 ///
 /// Under the contacts that touched at last tick's q, and no others, the closest configuration to p is q*; its
-/// multipliers lambda_i are what presses. Between the two lies q_0: as near to p as the tool comes while the
-/// points of it that carry at q* stay where they were. (A tool that stands on a face stays as it is; one that
-/// stands on its tip may turn about the tip.) Points slide on the way from q_0 to q* only, and along it, with
-/// s from 0 to 1,
+/// multipliers lambda_i are what presses there. Between the two lies q_0: as near to p as the tool comes
+/// while the points of it that carry at q* stay where they were. (A tool that stands on a face stays as it
+/// is; one that stands on its tip may turn about the tip.) Points slide on the way from q_0 to q* only, and
+/// along it, with s from 0 to 1,
 ///
-///   T(s)     = T* + (T(q_0) - T*) (1 - s)^2       q* is a minimum under its contacts
-///   sliding  = mu D s                             D = sum lambda_i |tangential displacement of point i|
+///   drawn  = (1 - s) sum f_i . slid_i       f_i: what has to hold the points at q_0 against p, along the
+///   ground D      = s D* + (1 - s) D_0             D = sum N_i |slid_i|, with what presses at q* and at q_0
 ///
-/// With U = (k/2) T the second is the work of friction, mu N_i at every contact. The least sum is at
+/// since nothing draws at q*, a minimum under its contacts. In units of T: N_i = lambda_i at q*. What presses
+/// at q_0 is another load, where friction has tilted the tool. Coulomb's law is drawn = mu D, so
 ///
-///   1 - s = mu D / (2 (T(q_0) - T*))              at most 1: there the tool sticks
+///   1 - s = mu D* / (sum f_i . slid_i + mu (D* - D_0))
 ///
-/// Where a translation is all that slides, this is Coulomb's law: the force along the surface is mu times the
-/// force into it. For q_s on that way there is a p' that q_s is the closest configuration to, with the same
-/// multipliers: p moved by friction. The proxy follows p' instead of p, without friction, in the whole scene.
-/// What it meets on the way stops it there, and rubs from the next tick on.
+/// unless mu D_0 is as much as draws at q_0: then the tool sticks there. For q_s on that way there is a p'
+/// that q_s is the closest configuration to, with what presses there for multipliers: p moved by friction.
+/// The proxy follows p' instead of p, without friction, in the whole scene. What it meets on the way stops it
+/// there, and rubs from the next tick on.
 ///
 /// All memory is in the object. One object serves one thread.
 class Friction {
@@ -71,14 +74,16 @@ class Friction {
     Eigen::Matrix<double, 3, 6> lever;  ///< its displacement, by a displacement y of the body at q*
     double gap_m;                       ///< at q*
     double multiplier;                  ///< zero where it touches idly [kg m]
-    double slid_m;                      ///< tangential displacement of the point from X_last to q*
+    Vector3d slid_W_m;                  ///< tangential displacement of the point from X_last to q*
   };
 
   void see(const Pose& X_last) noexcept;
   Pose stuck(const Pose& X_last) const noexcept;
   Vector3d strayed_m(const Touch& touch, const Pose& X_WT) const noexcept;
-  double share_held(double mu, const Pose& X_WP, const Pose& X_stuck) const noexcept;
-  Pose pressing(const Pose& X_WQ) const noexcept;
+  double share_held(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept;
+  Vector3d turning(const Quaterniond& E) const noexcept;
+  double presses(std::size_t i, double held) const noexcept;
+  Pose pressing(const Pose& X_WQ, double held) const noexcept;
 
   Inertia M_;
   Matrix3d H_inverse_;
@@ -89,6 +94,7 @@ class Friction {
   std::optional<Pose> X_touched_;                         ///< that answer
   Projection unhindered_;                                 ///< q*
   FixedList<Touch, ContactSet::kCapacity> touches_;
+  std::array<double, ContactSet::kCapacity> more_stuck_;  ///< that each carries at q_0 than at q* [kg m]
   bool holds_ = false;
   int ticks_stuck_ = 0;
 };

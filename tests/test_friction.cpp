@@ -274,6 +274,31 @@ TEST_CASE("a tip holds against sliding, and neither against spinning nor against
   }
 }
 
+TEST_CASE("where friction shifts the load, it is the load that is there which rubs", "[friction]") {
+  // A tip that leans forward or back: what holds it at the tip tilts it, and that lifts it or presses it
+  // down.
+  for (const double mu : {0.2, 0.5})
+    for (const double tilt : {-0.4, 0.0, 0.4}) {
+      Rubbed s = on_tip({mu, mu});
+      const Quaterniond R = rotation_from({0, tilt, 0});
+      const Vector3d up = R * s.scene.tool().solid.p_MT_m;
+      double ratio = 0.0;
+      for (int tick = -2; tick < 400; ++tick) {
+        const Vector3d way = {4e-6 * std::max(tick, 0), 0, tick == -2 ? 1e-4 : -0.2 * kDepth_m};
+        const Pose X_WP = {R, up + way};
+        s.follow(X_WP);
+        const Vector3d f = s.wrench(X_WP).force_N;
+        INFO("mu " << mu << ", tilt " << tilt << ", tick " << tick);
+        REQUIRE(std::abs(f.y()) <= 1e-6 * f.z());
+        if (tick > 0) REQUIRE(-f.x() < 1.06 * mu * f.z());
+        ratio = -f.x() / f.z();
+      }
+      INFO("mu " << mu << ", tilt " << tilt);
+      CHECK(ratio ==
+            Approx(mu).epsilon(0.06));  // depth times height over the square of the radius of gyration: 0.04
+    }
+}
+
 TEST_CASE("a tool that comes through the air is not held back where it came from", "[friction]") {
   const Ground ground = GENERATE(Ground::half_space, Ground::convex, Ground::mesh);
   INFO("ground " << static_cast<int>(ground));
