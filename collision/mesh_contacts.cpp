@@ -26,6 +26,8 @@ constexpr double kSurely = 0.999;
 /// looked at again with borders this much wider, as a share of the way, and with no regard to slopes.
 constexpr double kWideBorder = 0.05;
 constexpr double kAnySlope = 2.0;
+/// Where a way turns no farther [rad], arc and chord differ by less than a millionth of the tool's size.
+constexpr double kSureTurn_rad = 2e-3;
 /// Crossings of much the same direction nearer than this count as one, in units of the way.
 constexpr double kClose = 4.0;
 constexpr double kSameWay = 0.9;  // cosine
@@ -61,7 +63,8 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel) : scene_(scene), pairs_(scene, kernel) {
+MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel)
+    : scene_(scene), pairs_(scene, kernel), walk_(kernel) {
   crossings_.reserve(kMostCrossings);
   room_m_.resize(TreeWalk::kCapacity);
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
@@ -78,6 +81,7 @@ void MeshContacts::start_at(const Pose& X_WT, double time_s) noexcept {
 
 void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s) noexcept {
   pairs_.look_ahead(X_WT, budget, time_s);
+  in_doubt_ = false;
   rooms_of_.reset();
 }
 
@@ -107,14 +111,37 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   }
   if (pushed) rooms_of_.reset();
   choose_first(findings);
+  if (findings.met.empty() && !findings.overlaps && (in_doubt_ || turn_rad_ > kSureTurn_rad))
+    make_sure(budget, findings);
   return findings;
+}
+
+/// Whether any two triangles meet at the end. One that said so is asked about all shorter ways as well, until
+/// the next tick.
+void MeshContacts::make_sure(WalkBudget& budget, Findings& findings) noexcept {
+  const TreedMesh& tool = *scene_.tool_mesh();
+  for (const std::uint32_t k : pairs_.listed().near_by()) {
+    const MeshSurface& surface = seen_[k].obstacle->mesh->surface;
+    const Frame& X_OT = seen_[k].X_OT_end;
+    const Pose pose = {Quaterniond(X_OT.R), X_OT.x_m};
+    findings.complete = walk_.find(tool.tree, seen_[k].obstacle->mesh->tree, {pose, pose}, budget);
+    if (!findings.complete) return;
+    findings.overlaps = std::any_of(walk_.begin(), walk_.end(), [&](const TrianglePair& pair) {
+      return triangles_meet(
+          {X_OT * tool.surface.corner_m(pair.a, 0), X_OT * tool.surface.corner_m(pair.a, 1),
+           X_OT * tool.surface.corner_m(pair.a, 2)},
+          {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)});
+    });
+    in_doubt_ = in_doubt_ || findings.overlaps;
+    if (findings.overlaps) return;
+  }
 }
 
 /// The way as each obstacle near by sees it.
 void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
   const Frame start(X_start_), end(X_WT);
   way_m_ = pairs_.listed().way_m(X_start_, X_WT);
-  double turn_rad = X_start_.rotation.angularDistance(X_WT.rotation);
+  turn_rad_ = X_start_.rotation.angularDistance(X_WT.rotation);
   for (const std::uint32_t k : pairs_.listed().near_by()) {
     Seen& seen = seen_[k];
     if (!seen.obstacle->motion.moves()) {
@@ -128,10 +155,10 @@ void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
     seen.X_OT_start = start.seen_from(Frame(X_WO_start));
     seen.X_OT_end = end.seen_from(seen.X_WO);
     way_m_ = std::max(way_m_, pairs_.listed().way_m(X_OT_start, X_OT_end));
-    turn_rad = std::max(turn_rad, X_OT_start.rotation.angularDistance(X_OT_end.rotation));
+    turn_rad_ = std::max(turn_rad_, X_OT_start.rotation.angularDistance(X_OT_end.rotation));
   }
   // The way of a vertex is straight as long as nothing turns.
-  bulge_m_ = 0.25 * turn_rad * turn_rad * scene_.tool_radius_m();
+  bulge_m_ = 0.25 * turn_rad_ * turn_rad_ * scene_.tool_radius_m();
 }
 
 /// And notes how far each pair is from touching.

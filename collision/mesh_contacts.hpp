@@ -9,6 +9,7 @@
 
 #include "collision/pairs_ahead.hpp"
 #include "collision/scene.hpp"
+#include "collision/tree_walk.hpp"
 #include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
 #include "core/fixed_list.hpp"
@@ -24,6 +25,11 @@ namespace wrenchd {
 /// lines that carry them, are opposite each other when it closes. Of pairs that are crossed close together
 /// only the first counts: once it is held open the others may never be reached.
 ///
+/// Nothing that turns moves straight. A way is taken to be straight in the obstacle's frame for the vertices
+/// of the tool, in the tool's frame for those of the obstacle, which is the same but for what a chord leaves
+/// out of an arc. Where that is more than a trifle, the end of a way on which nothing was met is looked at
+/// once more: do any two triangles meet there, whatever their features?
+///
 /// Which pairs of triangles are near the way, lists tell that are made ahead (pairs_ahead.hpp).
 ///
 /// Memory is taken at construction. One object serves one thread.
@@ -34,7 +40,8 @@ class MeshContacts {
   struct Findings {
     /// The contacts met, the first on the way first; not all, but never none where there is one.
     FixedList<Contact, kMostMet> met;
-    bool overlaps = false;  ///< the end pose overlaps, though nothing was seen on the way: it is too long
+    bool overlaps = false;  ///< the end pose overlaps, though nothing was seen on the way: it is too long.
+                            ///< Not told of all that do, but of all that are turned far on the way.
     bool complete = true;   ///< false: the way is too long for what may be looked at; nothing is known
   };
 
@@ -107,6 +114,7 @@ class MeshContacts {
   bool meet(const Seen& seen, EdgesPass& pass, double when, double beyond_m) const noexcept;
   void crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept;
   void choose_first(Findings& findings) noexcept;
+  void make_sure(WalkBudget& budget, Findings& findings) noexcept;
 
   const Scene& scene_;
   PairsAhead pairs_;
@@ -116,6 +124,7 @@ class MeshContacts {
   std::vector<Seen> seen_;  ///< all obstacles
   double clearance_m_ = 0.0;
   double way_m_ = 0.0;     ///< the longest that an obstacle sees a point of the tool go
+  double turn_rad_ = 0.0;  ///< likewise, how far it turns
   double bulge_m_ = 0.0;   ///< by how much a way may leave the straight line as it turns
   double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
@@ -127,6 +136,8 @@ class MeshContacts {
 
   Moved moved_;
   std::vector<Crossing> crossings_;
+  TreeWalk walk_;          ///< of make_sure()
+  bool in_doubt_ = false;  ///< it told of an overlap in this tick
   ContactSet touching_;
 };
 
