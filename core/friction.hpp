@@ -25,16 +25,16 @@ struct FrictionSettings {
 /// Coulomb friction as the proxy's resistance to sliding.
 ///
 /// Under the contacts that touched at last tick's q, and no others, the closest configuration to p is q*; its
-/// multipliers lambda_i are what presses there. Between the two lies q_0: as near to p as the tool comes
+/// multipliers N_i are what presses there. Between the two lies q_0: as near to p as the tool comes
 /// while the points of it that carry at q* stay where they were. (A tool that stands on a face stays as it
 /// is; one that stands on its tip may turn about the tip.) Points slide on the way from q_0 to q* only, and
 /// along it, with s from 0 to 1,
 ///
-///   drawn  = (1 - s) sum f_i . slid_i       f_i: what has to hold the points at q_0 against p, along the
-///   ground D      = s D* + (1 - s) D_0             D = sum N_i |slid_i|, with what presses at q* and at q_0
+///   drawn  = (1 - s) sum f_i . slid_i       f_i: what holds point i at q_0 against p, within the ground
+///   D      = s D* + (1 - s) D_0             D = sum N_i |slid_i|, with what presses at q* and at q_0
 ///
-/// since nothing draws at q*, a minimum under its contacts. In units of T: N_i = lambda_i at q*. What presses
-/// at q_0 is another load, where friction has tilted the tool. Coulomb's law is drawn = mu D, so
+/// since nothing draws at q*, a minimum under its contacts. Forces are in the unit of dT. What presses at q_0
+/// is another load, where friction has tilted the tool. Coulomb's law is drawn = mu D, so
 ///
 ///   1 - s = mu D* / (sum f_i . slid_i + mu (D* - D_0))
 ///
