@@ -629,7 +629,7 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     const bool converged = residual_ <= kSmallResidual;
     if (converged || iterations_ == iteration_limit_ || at_end_of_leash_) {
       const Local local = converged ? Local::converged : Local::budget_spent;
-      if (asked || meet_touching(state)) return local;
+      if (asked || (all_open() && meet_touching(state))) return local;
       if (!restore(state) && !lift_turning(state)) return Local::infeasible;
       asked = true;
       continue;
@@ -663,6 +663,12 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (multiplier_[i] > 0.0 && gap_[i] <= kTouching) rest -= multiplier_[i] * J_[i];
   return std::sqrt(rest.squaredNorm() / std::max(g.squaredNorm(), kLeastGradient * kLeastGradient));
+}
+
+/// At the state linearised last. One that was not asked about may overlap what a trial from it has met.
+bool ExactProjection::all_open() const noexcept {
+  const double least = -2.0 * (slack_ + rounding_m_ / L_);
+  return std::all_of(gap_.begin(), gap_.begin() + contacts_.size(), [=](double gap) { return gap >= least; });
 }
 
 bool ExactProjection::some_contact_idle() const noexcept {

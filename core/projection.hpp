@@ -174,6 +174,7 @@ class ExactProjection {
   bool lift_turning(State& state) noexcept;
   Local minimise(State& state, bool asked) noexcept;
   bool strays(const State& state) const noexcept;
+  bool all_open() const noexcept;
   bool some_contact_idle() const noexcept;
   double residual(const Vector6d& g) const noexcept;
   Vector6d gradient(const State& state) const noexcept;
