@@ -38,6 +38,7 @@ std::string why_only_exact(const Scene& scene) {
 
 PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
     : options_(options),
+      bodies_(scene),
       M_(scene.tool().solid.inertia),
       scene_(scene),
       exact_(scene.tool().solid.inertia, ExactProjection::Budget{}, options.clearance_m),
@@ -64,9 +65,16 @@ Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last, doubl
   return friction_ ? rub(X_WP, X_last, scene_time_s) : follow_smoothly(X_WP, X_last, scene_time_s);
 }
 
-/// What friction does to p comes first. A tool that it holds altogether has nothing to look for.
+/// What friction does to p comes first. A tool that it holds altogether has nothing to look for, unless what
+/// it stands on moves.
 Penetration PenetrationDepth::rub(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept {
-  const Pose X_felt = friction_->felt(X_WP, X_last);
+  const bool moves = proxy_ && bodies_.moves();
+  Pose X_held = X_last;
+  if (moves)
+    X_held = friction_->ride(X_last, [&](std::uint32_t obstacle) {
+      return bodies_.motion(obstacle, proxy_->seen_s(), scene_time_s);
+    });
+  const Pose X_felt = friction_->felt(X_WP, X_held, !moves);
   Penetration out;
   if (friction_->holds()) {
     if (proxy_) proxy_->stay(X_last);

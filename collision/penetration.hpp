@@ -82,6 +82,7 @@ class PenetrationDepth {
   Penetration translational(const Pose& X_WP) noexcept;
 
   Options options_;
+  const Scene& bodies_;
   Inertia M_;
   SceneContacts scene_;
   ExactProjection exact_;

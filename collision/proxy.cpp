@@ -171,12 +171,9 @@ void Proxy::see(double time_s) noexcept {
 }
 
 /// A contact of one time at another.
-Contact Proxy::as_seen(Contact contact, double from_s, double to_s) const noexcept {
-  const std::size_t first_mesh = scene_.obstacle_count() - scene_.meshes().size();
-  if (from_s == to_s || contact.obstacle < first_mesh) return contact;
-  const MeshObstacle& obstacle = scene_.meshes()[contact.obstacle - first_mesh];
-  if (!obstacle.motion.moves()) return contact;
-  return moved(contact, obstacle.X_WO_at(to_s) * inverse(obstacle.X_WO_at(from_s)));
+Contact Proxy::as_seen(const Contact& contact, double from_s, double to_s) const noexcept {
+  if (!scene_.moves() || from_s == to_s) return contact;
+  return moved(contact, scene_.motion(contact.obstacle, from_s, to_s));
 }
 
 /// As near to p as the contacts known allow, no farther than so much from the pose at hand.

@@ -67,7 +67,7 @@ class Proxy {
   Projection find(const Pose& X_WP, double time_s) noexcept;
   bool give_way(double time_s) noexcept;
   void see(double time_s) noexcept;
-  Contact as_seen(Contact contact, double from_s, double to_s) const noexcept;
+  Contact as_seen(const Contact& contact, double from_s, double to_s) const noexcept;
   Projection step(const Pose& X_WP, double longest_m) noexcept;
   double way_m(const Pose& from, const Pose& to) const noexcept;
   Way look_along(const Pose& X_WT, double time_s) noexcept;

@@ -73,6 +73,9 @@ class Scene {
   /// The tool as the meshes meet it, in T; null where there are none.
   const TreedMesh* tool_mesh() const noexcept { return tool_mesh_.get(); }
   bool moves() const noexcept { return moves_; }  ///< does any obstacle?
+  /// By how much an obstacle moves in the world from one scene time to another: X_WO then = this * X_WO
+  /// before. number: as above. RT safe.
+  Pose motion(std::uint32_t number, double from_s, double to_s) const noexcept;
   std::size_t obstacle_count() const noexcept {
     return half_spaces_.size() + std::max(convex_.size(), meshes_.size());
   }

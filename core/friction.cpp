@@ -80,7 +80,7 @@ void Friction::keep(const Projection& answer) noexcept {
   X_touched_ = answer.X_WQ;
 }
 
-Pose Friction::felt(const Pose& X_WP, const Pose& X_last) noexcept {
+Pose Friction::felt(const Pose& X_WP, const Pose& X_last, bool may_hold) noexcept {
   const int ticks_stuck = std::exchange(ticks_stuck_, 0);
   holds_ = false;
   if (!X_touched_ || last_.empty() || !same_bits(*X_touched_, X_last)) return X_WP;
@@ -100,7 +100,7 @@ Pose Friction::felt(const Pose& X_WP, const Pose& X_last) noexcept {
                     held);
   }
   ticks_stuck_ = std::min(ticks_stuck + 1, kTicksToSettle);
-  if (!same_bits(X_stuck, X_last)) return pressing(X_stuck, 1.0);
+  if (!may_hold || !same_bits(X_stuck, X_last)) return pressing(X_stuck, 1.0);
   holds_ = true;
   unhindered_.X_WQ = X_last;
   unhindered_.energy = energy(M_, X_WP, X_last);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "core/contact.hpp"
@@ -50,8 +51,14 @@ class Friction {
   Friction(const Inertia& M, const FrictionSettings& settings, double clearance_m);
 
   /// p': where the proxy is to follow to. X_WP itself where nothing rubs. X_WP: p; X_last: last tick's q.
-  /// Once a tick. RT safe.
-  Pose felt(const Pose& X_WP, const Pose& X_last) noexcept;
+  /// Once a tick. may_hold: whether it may be told to stay by holds(). RT safe.
+  Pose felt(const Pose& X_WP, const Pose& X_last, bool may_hold = true) noexcept;
+
+  /// Before that, where obstacles move: motion_of(k) is by how much obstacle number k has moved in the world
+  /// since the last tick, X_WO now = motion * X_WO then. What rubbed goes with it, and the tool with what
+  /// presses most. Answers where that takes it, the X_last for felt(). RT safe.
+  template <class MotionOf>
+  Pose ride(const Pose& X_last, const MotionOf& motion_of) noexcept;
 
   /// Does the tool stick and cannot turn either? Then it stays at X_last to the bit, and held() says what of
   /// it: energy, contacts and multipliers for p. RT safe.
@@ -98,5 +105,26 @@ class Friction {
   bool holds_ = false;
   int ticks_stuck_ = 0;
 };
+
+template <class MotionOf>
+Pose Friction::ride(const Pose& X_last, const MotionOf& motion_of) noexcept {
+  if (!X_touched_ || last_.empty() || !same_bits(*X_touched_, X_last)) return X_last;
+  const auto pressing = [&](std::uint32_t obstacle) {
+    double sum = 0.0;
+    for (const ActiveContact& touch : last_)
+      if (touch.contact.obstacle == obstacle) sum += touch.multiplier;
+    return sum;
+  };
+  std::uint32_t carrier = last_[0].contact.obstacle;
+  FixedList<ActiveContact, ContactSet::kCapacity> now;
+  for (const auto& [contact, multiplier] : last_) {
+    if (pressing(contact.obstacle) > pressing(carrier)) carrier = contact.obstacle;
+    now.add({moved(contact, motion_of(contact.obstacle)), multiplier});
+  }
+  last_ = now;
+  X_touched_ = motion_of(carrier) * X_last;
+  X_touched_->rotation.normalize();
+  return *X_touched_;
+}
 
 }  // namespace wrenchd

@@ -209,6 +209,37 @@ TEST_CASE("a place that was found for an earlier time is caught up with", "[movi
   CHECK(X_WQ.translation_m.z() == Approx(table_m + 0.035).margin(1e-6));
 }
 
+TEST_CASE("with friction a tool rides on what moves, without friction it does not", "[moving][friction]") {
+  const ObstacleMotion motion = GENERATE(to_and_fro({0.015, 0.0, 0.02}, 0.0), turning({0.0, 0.0, 0.6}));
+  const Scene scene = scene_with({"cube", 12}, {{{"table", 12}, {}, motion}});
+  const double mu = GENERATE(0.0, 0.8);
+  PenetrationDepth depth(scene, {Method::exact, 47, 0.0, {mu, mu}});
+  const Vector3d above_m(0.02, 0.01, 0.036);
+  Pose X_WQ = {Quaterniond::Identity(), above_m};
+  Pose X_ride = X_WQ;  // of the tool as it would stand on the table
+  for (int i = 1; i <= 100; ++i) {
+    const double t_s = i * kTick_s;
+    // A hand that presses by two millimetres, and would rather stay where it is: friction gives 1.6 of them.
+    const double table_m = scene.meshes()[0].X_WO_at(t_s).translation_m.z();
+    const Pose X_WP = {Quaterniond::Identity(),
+                       above_m + Vector3d(0, 0, table_m - 0.001 - 0.002 * std::min(1.0, i / 10.0))};
+    X_WQ = depth.follow(X_WP, X_WQ, t_s).projection.X_WQ;
+    if (i == 20) X_ride = X_WQ;
+    if (i > 20) X_ride = scene.motion(0, t_s - kTick_s, t_s) * X_ride;
+  }
+  CHECK(X_WQ.translation_m.z() ==
+        Approx(scene.meshes()[0].X_WO_at(0.1).translation_m.z() + 0.035).margin(1e-7));
+  const double way_m = (X_ride.translation_m - above_m).head<2>().norm() +
+                       0.03 * X_ride.rotation.angularDistance(Quaterniond::Identity());
+  const double behind_m = (X_ride.translation_m - X_WQ.translation_m).norm() +
+                          0.03 * X_ride.rotation.angularDistance(X_WQ.rotation);
+  CHECK(way_m > 1e-3);
+  if (mu > 0.0)
+    CHECK(behind_m < 0.02 * way_m);
+  else
+    CHECK(behind_m > 0.5 * way_m);
+}
+
 TEST_CASE("obstacles that move neither allocate nor lock", "[moving][realtime]") {
   const Scene scene = scene_with({"bumpy", 2000}, {{{"gear", 1000}, {}, turning({0, 0, 5.0})}});
   Proxy proxy(scene);

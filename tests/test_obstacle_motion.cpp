@@ -18,10 +18,6 @@ const ObstacleMotion kSpinning = {{0, 0, 0}, {1.0, -2.0, 0.5}, 0.0};
 const ObstacleMotion kToAndFro = {{0.1, -0.2, 0.3}, {1.0, -2.0, 0.5}, 0.75};
 const ObstacleMotion kFastest = {{3.0, 4.0, 0.0}, {30.0, 40.0, 0.0}, 0.0};
 
-bool same_bits(const Pose& a, const Pose& b) {
-  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
-}
-
 double apart(const Pose& a, const Pose& b) {
   return log(inverse(a) * b).norm();
 }
