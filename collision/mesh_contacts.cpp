@@ -26,8 +26,9 @@ constexpr double kSurely = 0.999;
 /// looked at again with borders this much wider, as a share of the way, and with no regard to slopes.
 constexpr double kWideBorder = 0.05;
 constexpr double kAnySlope = 2.0;
-/// Where a way turns no farther [rad], arc and chord differ by less than a millionth of the tool's size.
-constexpr double kSureTurn_rad = 2e-3;
+/// Where a way turns no farther [rad], arc and chord differ by less than a hundred-thousandth of the tool's
+/// size.
+constexpr double kSureTurn_rad = 5e-3;
 /// Crossings of much the same direction nearer than this count as one, in units of the way.
 constexpr double kClose = 4.0;
 constexpr double kSameWay = 0.9;  // cosine
