@@ -143,7 +143,7 @@ void Friction::see(const Pose& X_last) noexcept {
 /// out of the obstacle, and the gap is that of q*. What touches idly does not rub: its gap alone counts.
 Vector3d Friction::strayed_m(const Touch& touch, const Pose& X_WT) const noexcept {
   const Vector3d& n = touch.n_W;
-  const Vector3d opened = n * (gap_m(touch.contact, X_WT) - touch.gap_m);
+  Vector3d opened = n * (gap_m(touch.contact, X_WT) - touch.gap_m);
   if (touch.multiplier <= 0.0) return opened;
   const Vector3d way = X_WT * touch.p_TC_m - touch.p_WC_m;
   return way - n * n.dot(way) + opened;
