@@ -42,9 +42,9 @@ ToolBody mesh_tool(TriangleMesh mesh, double mass_kg) {
   return tool;
 }
 
-Scene scene_of(const Handling& handling) {
+Scene scene_of(const Handling& handling, const ObstacleMotion& motion) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({handling.obstacle.kind, TreedMesh(make_mesh(handling.obstacle)), Pose{}});
+  obstacles.push_back({handling.obstacle.kind, TreedMesh(make_mesh(handling.obstacle)), Pose{}, motion});
   return Scene(mesh_tool(make_mesh(handling.tool)), {}, {}, std::move(obstacles));
 }
 

@@ -30,7 +30,8 @@ struct Handling {
 /// Twenty of them: thin and thick, flat and round, fine and coarse, loose and tight.
 const std::vector<Handling>& rough_handling();
 
-Scene scene_of(const Handling& handling);
+/// The obstacle may move, from where it stands.
+Scene scene_of(const Handling& handling, const ObstacleMotion& motion = {});
 
 /// A tool for the proxy: half-spaces would need the hull that tool_body() makes, meshes do not.
 ToolBody mesh_tool(TriangleMesh mesh, double mass_kg = 0.1);
