@@ -399,12 +399,13 @@ TEST_CASE("a proxy that rubs overlaps nothing, whatever the hand does: exactly",
 TEST_CASE("a convex tool that rubs on convex bodies stays out of them", "[friction][convex]") {
   RandomValues random(8);  // the 18th once came out 1.3 mm deep in the half-space
   int contacts = 0;
-  for (int n = 0; n < 20; ++n) {
+  const int runs = repeats(20);
+  for (int n = 0; n < runs; ++n) {
     const Scene scene(random_body(random, 20), {half_space(Vector3d::UnitZ(), -1.0)},
                       {convex_obstacle("body", random_body(random, 20).hull)});
     Rubbed s(scene, {0.6, 0.4}, {random.rotation(), {0.0, 0.0, 3.0}});
     Vector3d w = Vector3d::Zero();
-    for (int tick = 0; tick < repeats(300); ++tick) {
+    for (int tick = 0; tick < 300; ++tick) {
       const double t = 1e-2 * tick;
       w += 0.03 * random.unit<3>();
       const Pose X_WP = {rotation_from(w), {0.6 * std::sin(t), 0.5 * std::cos(0.7 * t), 2.0 - t}};
@@ -416,7 +417,7 @@ TEST_CASE("a convex tool that rubs on convex bodies stays out of them", "[fricti
       REQUIRE(least_gap_m(s.scene, s.X_WQ) > -1e-12);
     }
   }
-  CHECK(contacts > repeats(300) * 3);
+  CHECK(contacts > 45 * runs);
 }
 
 TEST_CASE("friction neither allocates nor locks", "[realtime][friction]") {
