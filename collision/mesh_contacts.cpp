@@ -20,8 +20,6 @@ constexpr double kWasOpen = 0.5;
 /// The slope by which the features around a contact may seem to lie nearer than the contact itself: the
 /// straight way is not quite the true one.
 constexpr double kSlope = 1e-3;
-/// What is kept in single precision is kept a little smaller.
-constexpr double kSurely = 0.999;
 /// Where the end overlaps and nothing was seen to be crossed, crossings passed narrowly by a border: it is
 /// looked at again with borders this much wider, as a share of the way, and with no regard to slopes.
 constexpr double kWideBorder = 0.05;
@@ -64,10 +62,9 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene, walk::Kernel kernel)
-    : scene_(scene), pairs_(scene, kernel), walk_(kernel) {
+MeshContacts::MeshContacts(const Scene& scene) : scene_(scene), pairs_(scene) {
   crossings_.reserve(kMostCrossings);
-  room_m_.resize(TreeWalk::kCapacity);
+  left_.resize(TreeWalk::kCapacity);
   const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
@@ -83,7 +80,6 @@ void MeshContacts::start_at(const Pose& X_WT, double time_s) noexcept {
 void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s) noexcept {
   pairs_.look_ahead(X_WT, budget, time_s);
   in_doubt_ = false;
-  rooms_of_.reset();
 }
 
 MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget,
@@ -99,18 +95,12 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   see_way(X_WT, time_s);
   border_m_ = kBeyond * clearance_m + bulge_m_;
   slope_ = kSlope;
-  const bool pushed = scene_.moves() && time_s != start_s_;  // rooms are of obstacles that stand still
-  if (rooms_of_ == pairs_.edition() && !pushed)
-    look_at_those_near(X_WT, findings);
-  else
-    look_at_all(X_WT, findings);
+  look_at_pairs(findings);
   if (findings.overlaps && crossings_.empty()) {
     border_m_ = kWideBorder * way_m_;
     slope_ = kAnySlope;
-    look_at_all(X_WT, findings);
-    rooms_of_.reset();
+    look_at_pairs(findings);
   }
-  if (pushed) rooms_of_.reset();
   choose_first(findings);
   if (findings.met.empty() && !findings.overlaps && (in_doubt_ || turn_rad_ > kSureTurn_rad))
     make_sure(budget, findings);
@@ -162,32 +152,23 @@ void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
   bulge_m_ = 0.25 * turn_rad_ * turn_rad_ * scene_.tool_radius_m();
 }
 
-/// And notes how far each pair is from touching.
-void MeshContacts::look_at_all(const Pose& X_WT, Findings& findings) noexcept {
+/// Most pairs are kept apart all the way by the plane of one of the two: those are left out first.
+void MeshContacts::look_at_pairs(Findings& findings) noexcept {
   touching_.clear();
   crossings_.clear();
   moved_.triangle = MeshSurface::kNone;
-  const auto pairs = pairs_.listed().pairs();
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    room_m_[i] = static_cast<float>(kSurely * look_at(pairs[i], moved(pairs[i]), findings));
-  rooms_of_ = pairs_.edition();
-  X_room_start_ = X_start_;
-  X_room_ = X_WT;
-}
-
-/// Those that had less room than the tool has moved since.
-void MeshContacts::look_at_those_near(const Pose& X_WT, Findings& findings) noexcept {
-  touching_.clear();
-  crossings_.clear();
-  moved_.triangle = MeshSurface::kNone;
-  const bool same_start = X_start_.translation_m == X_room_start_.translation_m &&
-                          X_start_.rotation.coeffs() == X_room_start_.rotation.coeffs();
-  const double moved_m = std::max(same_start ? 0.0 : pairs_.listed().way_m(X_room_, X_start_),
-                                  pairs_.listed().way_m(X_room_, X_WT));
-  const auto near_m = static_cast<float>(moved_m + 2.0 * clearance_m_);
-  const auto pairs = pairs_.listed().pairs();
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    if (room_m_[i] <= near_m) look_at(pairs[i], moved(pairs[i]), findings);
+  const NearPairs& listed = pairs_.listed();
+  const double tool_m = scene_.tool_mesh()->tree.extent_m();
+  for (const PairSieve::Part& part : listed.sieve().parts()) {
+    const Seen& seen = seen_[part.obstacle];
+    const std::size_t left = listed.sieve().sift(part, seen.X_OT_start, seen.X_OT_end,
+                                                 tool_m + seen.obstacle->mesh->tree.extent_m(),
+                                                 bulge_m_ + 2.0 * clearance_m_, left_.data());
+    for (const std::uint32_t i : std::span(left_).first(left)) {
+      const NearPair& pair = listed.pairs()[i];
+      look_at(pair, moved(pair), findings);
+    }
+  }
 }
 
 const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
@@ -216,21 +197,17 @@ bool MeshContacts::closes(double start_m, double end_m) const noexcept {
   return end_m < (1.0 - kClosed) * clearance_m_ && end_m < start_m - kClosed * clearance_m_;
 }
 
-/// By how much a plane keeps a triangle on one side at both ends of the way, and so all the way; 0: it does
-/// not. By at least so much at the start.
-double MeshContacts::kept_apart_m(const Heights& start_m, const Heights& end_m,
-                                  double least_m) const noexcept {
-  const double lowest_m = std::min({end_m[0], end_m[1], end_m[2]});
-  if (lowest_m > (1.0 + kClosed) * clearance_m_ + least_m)
-    return std::min({start_m[0], start_m[1], start_m[2]}) >= least_m ? lowest_m : 0.0;
-  const double highest_m = std::max({end_m[0], end_m[1], end_m[2]});
-  if (highest_m < -clearance_m_ - least_m)
-    return std::max({start_m[0], start_m[1], start_m[2]}) <= -least_m ? -highest_m : 0.0;
-  return 0.0;
+/// Does a plane keep a triangle on one side at both ends of the way, and so all the way? By at least so much
+/// at the start.
+bool MeshContacts::kept_apart(const Heights& start_m, const Heights& end_m, double least_m) const noexcept {
+  if (std::min({end_m[0], end_m[1], end_m[2]}) > (1.0 + kClosed) * clearance_m_ + least_m)
+    return std::min({start_m[0], start_m[1], start_m[2]}) >= least_m;
+  if (std::max({end_m[0], end_m[1], end_m[2]}) < -clearance_m_ - least_m)
+    return std::max({start_m[0], start_m[1], start_m[2]}) <= -least_m;
+  return false;
 }
 
-/// Most pairs are kept apart all the way by the plane of one of the two. Answers by how much [m].
-double MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
+void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
   const Seen& seen = seen_[pair.obstacle];
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   const Triangle b = {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)};
@@ -240,20 +217,17 @@ double MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& fin
             over.normal.dot(triangle[2]) - over.offset_m};
   };
   const Heights a_end = heights(plane, a.end);
-  if (const double apart_m = kept_apart_m(heights(plane, a.start), a_end, 0.0); apart_m > 0.0) return apart_m;
+  if (kept_apart(heights(plane, a.start), a_end, 0.0)) return;
   // Seen from the tool the obstacle's way bulges a little.
-  if (const double apart_m = kept_apart_m(heights(a.plane_start, b), heights(a.plane_end, b), bulge_m_);
-      apart_m > 0.0)
-    return apart_m - bulge_m_;
+  if (kept_apart(heights(a.plane_start, b), heights(a.plane_end, b), bulge_m_)) return;
   const std::size_t before = crossings_.size();
   vertices_on_face(seen, pair, a);
   face_on_vertices(seen, pair);
   edges_on_edges(seen, pair, a, findings);
-  if (crossings_.size() > before || findings.overlaps) return 0.0;
+  if (crossings_.size() > before || findings.overlaps) return;
   if (std::min({a_end[0], a_end[1], a_end[2]}) > 0.0 || std::max({a_end[0], a_end[1], a_end[2]}) < 0.0)
-    return 0.0;
+    return;
   findings.overlaps = triangles_meet(a.end, b);
-  return 0.0;
 }
 
 /// Contacts of a vertex of the tool and a face of the obstacle. The way is straight in the obstacle's frame,

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "collision/pairs_ahead.hpp"
@@ -45,8 +44,8 @@ class MeshContacts {
     bool complete = true;   ///< false: the way is too long for what may be looked at; nothing is known
   };
 
-  /// The scene is kept by reference. kernel: as for TreeWalk.
-  explicit MeshContacts(const Scene& scene, walk::Kernel kernel = nullptr);
+  /// The scene is kept by reference.
+  explicit MeshContacts(const Scene& scene);
   MeshContacts(const MeshContacts&) = delete;  // a copy would lose the room that is kept
   MeshContacts& operator=(const MeshContacts&) = delete;
 
@@ -100,12 +99,11 @@ class MeshContacts {
   };
 
   void see_way(const Pose& X_WT, double time_s) noexcept;
-  void look_at_all(const Pose& X_WT, Findings& findings) noexcept;
-  void look_at_those_near(const Pose& X_WT, Findings& findings) noexcept;
-  double kept_apart_m(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
+  void look_at_pairs(Findings& findings) noexcept;
+  bool kept_apart(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
   bool closes(double start_m, double end_m) const noexcept;
-  double look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
+  void look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept;
   void vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept;
   void face_on_vertices(const Seen& seen, const NearPair& pair) noexcept;
   void edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a, Findings& findings) noexcept;
@@ -129,11 +127,7 @@ class MeshContacts {
   double border_m_ = 0.0;  ///< by how much features may miss each other as they cross
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
 
-  // Between the looks of a tick most pairs keep so much room that they need not be looked at again.
-  std::vector<float> room_m_;              ///< of each pair listed, at X_room_
-  std::optional<std::uint32_t> rooms_of_;  ///< the edition of the list that they are of
-  Pose X_room_start_, X_room_;             ///< start and end of the way that they were found on
-
+  std::vector<std::uint32_t> left_;  ///< of the pairs listed: those that may meet on the way
   Moved moved_;
   std::vector<Crossing> crossings_;
   TreeWalk walk_;          ///< of make_sure()

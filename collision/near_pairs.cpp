@@ -14,7 +14,7 @@ Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
 
 }  // namespace
 
-NearPairs::NearPairs(const Scene& scene, walk::Kernel kernel) : scene_(scene), walk_(kernel) {
+NearPairs::NearPairs(const Scene& scene) : scene_(scene), sieve_(TreeWalk::kCapacity, scene.meshes().size()) {
   pairs_.reserve(TreeWalk::kCapacity);
   near_by_.reserve(scene.meshes().size());
   relative_.reserve(scene.meshes().size());
@@ -24,6 +24,7 @@ void NearPairs::set_out(const Way& way) noexcept {
   way_ = way;
   visits_ = 0;
   pairs_.clear();
+  sieve_.clear();
   find_near_by();
   find_moving_near_by();
   next_ = 0;
@@ -32,6 +33,7 @@ void NearPairs::set_out(const Way& way) noexcept {
 }
 
 void NearPairs::set_out_for_next() noexcept {
+  taken_ = 0;
   if (next_ == near_by_.size()) return;
   const MeshObstacle& obstacle = scene_.meshes()[near_by_[next_]];
   const Pose X_OW_start = inverse(obstacle.X_WO_at(way_.start_s));
@@ -52,17 +54,33 @@ bool NearPairs::covers(const Pose& X_WT, double time_s) const noexcept {
 
 bool NearPairs::go_on(WalkBudget& budget) noexcept {
   const std::uint32_t granted = budget.visits;
-  while (under_way() && walk_.go_on(budget)) {
-    if (!walk_.complete() || pairs_.size() + walk_.size() > pairs_.capacity()) {
+  bool ended = true;
+  while (under_way() && ended) {
+    ended = walk_.go_on(budget);
+    if (!take_over()) {
       state_ = State::failed;
-      break;
+    } else if (ended) {
+      if (++next_ == near_by_.size()) state_ = State::complete;
+      set_out_for_next();
     }
-    for (const TrianglePair& pair : walk_) pairs_.push_back({pair.a, pair.b, near_by_[next_]});
-    if (++next_ == near_by_.size()) state_ = State::complete;
-    set_out_for_next();
   }
   visits_ += granted - budget.visits;
   return !under_way();
+}
+
+/// What the walk has found since. False where there is no room for it.
+bool NearPairs::take_over() noexcept {
+  const std::size_t found = walk_.size() - taken_;
+  if (!walk_.complete() || pairs_.size() + found > pairs_.capacity()) return false;
+  const std::uint32_t obstacle = near_by_[next_];
+  const MeshSurface& tool = scene_.tool_mesh()->surface;
+  const MeshSurface& surface = scene_.meshes()[obstacle].mesh->surface;
+  for (const TrianglePair& pair : std::span(walk_.begin() + taken_, found)) {
+    pairs_.push_back({pair.a, pair.b, obstacle});
+    sieve_.add(tool, pair.a, surface, pair.b, obstacle);
+  }
+  taken_ = walk_.size();
+  return true;
 }
 
 /// The nearest pose on the way is as far along it as the shift and the turn together say.

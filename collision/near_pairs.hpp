@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "collision/pair_sieve.hpp"
 #include "collision/scene.hpp"
 #include "collision/tree_walk.hpp"
 
@@ -30,8 +31,8 @@ class NearPairs {
     double start_s = 0.0, end_s = 0.0;  ///< scene time at both ends; it matters where obstacles move
   };
 
-  /// The scene is kept by reference. kernel: as for TreeWalk.
-  explicit NearPairs(const Scene& scene, walk::Kernel kernel = nullptr);
+  /// The scene is kept by reference.
+  explicit NearPairs(const Scene& scene);
   NearPairs(const NearPairs&) = delete;  // a copy would lose the room that is kept
   NearPairs& operator=(const NearPairs&) = delete;
 
@@ -47,6 +48,7 @@ class NearPairs {
   bool covers(const Pose& X_WT, double time_s = 0.0) const noexcept;
 
   std::span<const NearPair> pairs() const noexcept { return pairs_; }
+  const PairSieve& sieve() const noexcept { return sieve_; }  ///< of pairs()
   /// The obstacles that may be met on the way: places among scene.meshes().
   std::span<const std::uint32_t> near_by() const noexcept { return near_by_; }
   std::uint32_t visits() const noexcept { return visits_; }  ///< that the list has taken so far
@@ -68,14 +70,17 @@ class NearPairs {
   void find_near_by() noexcept;
   void find_moving_near_by() noexcept;
   void set_out_for_next() noexcept;
+  bool take_over() noexcept;
 
   const Scene& scene_;
   TreeWalk walk_;
   State state_ = State::empty;
   Way way_;
   std::uint32_t visits_ = 0;
-  std::size_t next_ = 0;  ///< of near_by_, to be walked
+  std::size_t next_ = 0;   ///< of near_by_, to be walked
+  std::size_t taken_ = 0;  ///< pairs of that walk
   std::vector<NearPair> pairs_;
+  PairSieve sieve_;
 
   std::vector<std::uint32_t> near_by_;       ///< those at rest first, that may be met while the tool stays
   std::size_t near_at_rest_ = 0;             ///< so many

@@ -46,9 +46,9 @@ bool go_on(NearPairs& list, std::uint32_t visits, WalkBudget& budget) noexcept {
 
 }  // namespace
 
-PairsAhead::PairsAhead(const Scene& scene, walk::Kernel kernel)
+PairsAhead::PairsAhead(const Scene& scene)
     : scene_(scene),
-      lists_{NearPairs(scene, kernel), NearPairs(scene, kernel), NearPairs(scene, kernel)},
+      lists_{NearPairs(scene), NearPairs(scene), NearPairs(scene)},
       ticks_ahead_(kMostTicksAhead) {}
 
 bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times,

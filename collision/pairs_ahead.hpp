@@ -19,10 +19,10 @@ namespace wrenchd {
 class PairsAhead {
  public:
   /// So many pairs are looked at in the time of a visit.
-  static constexpr std::size_t kPairsPerVisit = 8;
+  static constexpr std::size_t kPairsPerVisit = 32;
 
-  /// The scene is kept by reference. kernel: as for TreeWalk.
-  explicit PairsAhead(const Scene& scene, walk::Kernel kernel = nullptr);
+  /// The scene is kept by reference.
+  explicit PairsAhead(const Scene& scene);
   PairsAhead(const PairsAhead&) = delete;  // a copy would lose the room that is kept
   PairsAhead& operator=(const PairsAhead&) = delete;
 

@@ -7,26 +7,13 @@
 namespace wrenchd {
 namespace {
 
-/// What single precision may be wrong by, as a share of the coordinates: rounding of the input, of two
-/// products of three terms each, and of a plane's offset.
-constexpr double kRounding = 1.5e-6;
-
-walk::Transform single(const Matrix3d& R, const Vector3d& t) noexcept {
-  walk::Transform out;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out.R[i][j] = static_cast<float>(R(i, j));
-    out.t[i] = static_cast<float>(t[i]);
-  }
-  return out;
-}
-
 walk::Transform single(const Pose& X) noexcept {
-  return single(X.rotation.toRotationMatrix(), X.translation_m);
+  return walk::single(X.rotation.toRotationMatrix(), X.translation_m);
 }
 
 walk::Transform travel(const Pose& from, const Pose& to) noexcept {
-  return single(to.rotation.toRotationMatrix() - from.rotation.toRotationMatrix(),
-                to.translation_m - from.translation_m);
+  return walk::single(to.rotation.toRotationMatrix() - from.rotation.toRotationMatrix(),
+                      to.translation_m - from.translation_m);
 }
 
 /// The motion in single precision. The boxes are moved half way and grown by what is missing to both ends; a
@@ -46,8 +33,9 @@ walk::Motion motion_of(const Sweep& sweep, double least_radius_a_m, double exten
   motion.travel_AB = travel(inverse(start), inverse(end));
   const double angle = start.rotation.angularDistance(end.rotation);
   const double bulge_m = 0.25 * angle * angle * radius_a_m;
-  const double rounding_m = kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
-                                                             end.translation_m.lpNorm<Eigen::Infinity>()));
+  const double rounding_m =
+      walk::kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
+                                             end.translation_m.lpNorm<Eigen::Infinity>()));
   motion.all_pairs = all_pairs;
   motion.half_turn = static_cast<float>(0.5 * angle);
   motion.margin = static_cast<float>(reach_m + bulge_m + rounding_m);

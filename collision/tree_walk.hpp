@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "collision/single_precision.hpp"
 #include "collision/triangle_tree.hpp"
 #include "core/pose.hpp"
 
@@ -35,12 +36,7 @@ struct WalkBudget {
 
 namespace walk {
 
-/// What the kernels work on: plain arrays, so that the translation unit for AVX2 shares no inline function
-/// with the rest of the program.
-struct Transform {
-  float R[3][3];
-  float t[3];
-};
+/// What the kernels work on: plain arrays (single_precision.hpp).
 struct Motion {
   Transform X_BA_middle, X_AB_middle;  ///< half way
   Transform X_BA_start, X_BA_end;

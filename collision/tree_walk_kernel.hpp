@@ -2,62 +2,11 @@
 // No #pragma once: compiled once for every kind of processor, each in a namespace of its own, and included
 // nowhere else. WRENCHD_WALK names the function.
 
-#include <cstring>
-
+#include "collision/eight_wide.hpp"
 #include "collision/tree_walk.hpp"
-#if defined(__AVX2__)
-#include <immintrin.h>
-#endif
-
-// Eight numbers at a time: the compiler makes of them what the processor has. Only what it would not find by
-// itself is written with intrinsics.
 
 namespace wrenchd::walk {
 namespace {
-
-constexpr int kWidth = TriangleTree::kWidth;
-using Float8 = float __attribute__((vector_size(32)));
-using Mask8 = int __attribute__((vector_size(32)));
-
-#define WRENCHD_INLINE inline __attribute__((always_inline))
-
-WRENCHD_INLINE Float8 load(const float* p) noexcept {
-  Float8 v;
-  std::memcpy(&v, p, sizeof v);
-  return v;
-}
-WRENCHD_INLINE void store(float* p, Float8 v) noexcept {
-  std::memcpy(p, &v, sizeof v);
-}
-WRENCHD_INLINE Float8 all(float x) noexcept {
-  return Float8{} + x;
-}
-#if defined(__AVX2__)
-WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept {
-  return _mm256_min_ps(a, b);
-}
-WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept {
-  return _mm256_max_ps(a, b);
-}
-WRENCHD_INLINE unsigned bits(Mask8 m) noexcept {
-  return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(m)));
-}
-#else
-WRENCHD_INLINE Float8 smaller(Float8 a, Float8 b) noexcept {
-  return a < b ? a : b;
-}
-WRENCHD_INLINE Float8 larger(Float8 a, Float8 b) noexcept {
-  return a > b ? a : b;
-}
-WRENCHD_INLINE unsigned bits(Mask8 m) noexcept {
-  unsigned out = 0;
-  for (int i = 0; i < kWidth; ++i) out |= (m[i] != 0 ? 1U : 0U) << i;
-  return out;
-}
-#endif
-WRENCHD_INLINE Float8 magnitude(Float8 x) noexcept {
-  return larger(x, -x);
-}
 
 WRENCHD_INLINE float magnitude(float x) noexcept {
   return x < 0.0F ? -x : x;

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "collision/mesh_surface.hpp"
+#include "collision/single_precision.hpp"
+#include "core/frame.hpp"
+
+namespace wrenchd {
+
+namespace walk {
+
+/// The planes of eight triangles and the corners of eight others, side by side, each as its own body has it.
+struct SieveBlock {
+  float normal[3][8], offset[8];
+  float corner[3][3][8];  ///< [which][component]
+};
+/// How the tool T moves as the obstacle O sees it, and the other way round: at the start and at the end.
+struct SieveWay {
+  Transform X_TO[2], X_OT[2];
+  float margin;  ///< by which a plane keeps apart at least [m]
+};
+/// For each block a bit for every pair that is kept apart all the way neither by its plane of the obstacle
+/// nor by its plane of the tool.
+using SieveKernel = void (*)(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
+                             const SieveWay& way, std::uint8_t* left) noexcept;
+void sift_portable(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
+                   const SieveWay& way, std::uint8_t* left) noexcept;
+void sift_avx2(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
+               const SieveWay& way, std::uint8_t* left) noexcept;
+
+}  // namespace walk
+
+/// Pairs of a triangle of the tool and one of an obstacle, of which most are kept apart all the way by the
+/// plane of one of the two. Tells which are left: eight at a time, in single precision, and those that it
+/// leaves out by a margin.
+///
+/// Memory is taken at construction. One object serves one thread.
+class PairSieve {
+ public:
+  /// Pairs with one obstacle, added one after the other.
+  struct Part {
+    std::uint32_t obstacle;
+    std::uint32_t first_pair, first_block;
+    std::uint32_t pairs;
+  };
+
+  /// Room for so many pairs of so many obstacles. kernel: null is the fastest that this processor runs.
+  PairSieve(std::size_t pairs, std::size_t obstacles, walk::SieveKernel kernel = nullptr);
+
+  void clear() noexcept { parts_.clear(); }
+  /// Triangle a of the tool and b of an obstacle, which has this number. There must be room. RT safe.
+  void add(const MeshSurface& tool, std::uint32_t a, const MeshSurface& surface, std::uint32_t b,
+           std::uint32_t obstacle) noexcept;
+
+  std::span<const Part> parts() const noexcept { return parts_; }
+
+  /// Of the pairs of a part, those that may meet while the tool moves straight from one pose to the other, in
+  /// the order in which they were added: their numbers in that order, of all parts. extent_m bounds the
+  /// coordinates of both bodies; margin_m: by how much more a plane is to keep apart, at least. `left` has
+  /// room for all; the answer is how many they are. RT safe.
+  std::size_t sift(const Part& part, const Frame& X_OT_start, const Frame& X_OT_end, double extent_m,
+                   double margin_m, std::uint32_t* left) const noexcept;
+
+ private:
+  walk::SieveKernel kernel_;
+  std::vector<Part> parts_;
+  std::vector<walk::SieveBlock> of_obstacle_, of_tool_;
+};
+
+}  // namespace wrenchd

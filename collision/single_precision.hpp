@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/pose.hpp"
+
+namespace wrenchd::walk {
+
+/// What single precision may be wrong by, as a share of the coordinates: rounding of the input, of two
+/// products of three terms each, and of a plane's offset.
+constexpr double kRounding = 1.5e-6;
+
+/// R p + t, for the kernels: plain arrays, so that the translation units for AVX2 share no inline function
+/// with the rest of the program.
+struct Transform {
+  float R[3][3];
+  float t[3];
+};
+
+inline Transform single(const Matrix3d& R, const Vector3d& t) noexcept {
+  Transform out;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out.R[i][j] = static_cast<float>(R(i, j));
+    out.t[i] = static_cast<float>(t[i]);
+  }
+  return out;
+}
+
+}  // namespace wrenchd::walk
