@@ -77,8 +77,9 @@ void MeshContacts::start_at(const Pose& X_WT, double time_s) noexcept {
   start_s_ = time_s;
 }
 
-void MeshContacts::look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s) noexcept {
-  pairs_.look_ahead(X_WT, budget, time_s);
+void MeshContacts::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget,
+                              double time_s) noexcept {
+  pairs_.look_ahead(X_WT, X_WP, budget, time_s);
   in_doubt_ = false;
 }
 
@@ -91,7 +92,6 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
     findings.complete = false;
     return findings;
   }
-  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(pairs() / PairsAhead::kPairsPerVisit));
   see_way(X_WT, time_s);
   border_m_ = kBeyond * clearance_m + bulge_m_;
   slope_ = kSlope;
@@ -163,7 +163,7 @@ void MeshContacts::look_at_pairs(Findings& findings) noexcept {
     const Seen& seen = seen_[part.obstacle];
     const std::size_t left = listed.sieve().sift(part, seen.X_OT_start, seen.X_OT_end,
                                                  tool_m + seen.obstacle->mesh->tree.extent_m(),
-                                                 bulge_m_ + 2.0 * clearance_m_, left_.data());
+                                                 border_m_ + bulge_m_ + 2.0 * clearance_m_, left_.data());
     for (const std::uint32_t i : std::span(left_).first(left)) {
       const NearPair& pair = listed.pairs()[i];
       look_at(pair, moved(pair), findings);

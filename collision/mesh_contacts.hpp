@@ -56,8 +56,9 @@ class MeshContacts {
   /// where they stand at time_s. The contacts are told as they stand then. RT safe.
   Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget, double time_s = 0.0) noexcept;
 
-  /// Once a tick, when the tool has come to X_WT: prepares for where it will be. RT safe.
-  void look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s = 0.0) noexcept;
+  /// Once a tick, when the tool has come to X_WT, following a hand that has come to X_WP: prepares for where
+  /// it will be. RT safe.
+  void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0) noexcept;
 
   /// The tool is elsewhere now. RT safe.
   void forget_motion() noexcept { pairs_.forget_motion(); }

@@ -42,8 +42,8 @@ void NearPairs::set_out_for_next() noexcept {
                 {X_OW_start * way_.X_WT_start, X_OW_end * way_.X_WT_end, way_.reach_m, false});
 }
 
-bool NearPairs::covers(const Pose& X_WT, double time_s) const noexcept {
-  if (!complete() || away_m(way_, X_WT) > way_.reach_m) return false;
+bool NearPairs::will_cover(const Pose& X_WT, double time_s) const noexcept {
+  if (state_ == State::empty || away_m(way_, X_WT) > way_.reach_m) return false;
   if (!scene_.moves()) return true;
   return way_.start_s <= time_s && time_s <= way_.end_s &&
          std::all_of(relative_.begin(), relative_.end(), [&](const Relative& seen) {

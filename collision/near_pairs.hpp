@@ -45,7 +45,11 @@ class NearPairs {
   /// Are all pairs listed? Not where there was no room for them.
   bool complete() const noexcept { return state_ == State::complete; }
   /// Does the list hold for this pose at this scene time, and for straight ways to others that it holds for?
-  bool covers(const Pose& X_WT, double time_s = 0.0) const noexcept;
+  bool covers(const Pose& X_WT, double time_s = 0.0) const noexcept {
+    return complete() && will_cover(X_WT, time_s);
+  }
+  /// The same of a list that is under way.
+  bool will_cover(const Pose& X_WT, double time_s = 0.0) const noexcept;
 
   std::span<const NearPair> pairs() const noexcept { return pairs_; }
   const PairSieve& sieve() const noexcept { return sieve_; }  ///< of pairs()

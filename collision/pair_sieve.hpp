@@ -22,10 +22,10 @@ struct SieveBlock {
 /// How the tool T moves as the obstacle O sees it, and the other way round: at the start and at the end.
 struct SieveWay {
   Transform X_TO[2], X_OT[2];
-  float margin;  ///< by which a plane keeps apart at least [m]
+  float margin;  ///< by which they are kept apart at least [m]
 };
-/// For each block a bit for every pair that is kept apart all the way neither by its plane of the obstacle
-/// nor by its plane of the tool.
+/// For each block a bit for every pair that is kept apart all the way neither by its plane of the obstacle,
+/// nor by its plane of the tool, nor by their bounds.
 using SieveKernel = void (*)(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
                              const SieveWay& way, std::uint8_t* left) noexcept;
 void sift_portable(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
@@ -36,8 +36,8 @@ void sift_avx2(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::si
 }  // namespace walk
 
 /// Pairs of a triangle of the tool and one of an obstacle, of which most are kept apart all the way by the
-/// plane of one of the two. Tells which are left: eight at a time, in single precision, and those that it
-/// leaves out by a margin.
+/// plane of one of the two, or lie beside each other. Tells which are left: eight at a time, in single
+/// precision, and those that it leaves out by a margin.
 ///
 /// Memory is taken at construction. One object serves one thread.
 class PairSieve {
@@ -61,7 +61,7 @@ class PairSieve {
 
   /// Of the pairs of a part, those that may meet while the tool moves straight from one pose to the other, in
   /// the order in which they were added: their numbers in that order, of all parts. extent_m bounds the
-  /// coordinates of both bodies; margin_m: by how much more a plane is to keep apart, at least. `left` has
+  /// coordinates of both bodies; margin_m: by how much they are to be kept apart, at least. `left` has
   /// room for all; the answer is how many they are. RT safe.
   std::size_t sift(const Part& part, const Frame& X_OT_start, const Frame& X_OT_end, double extent_m,
                    double margin_m, std::uint32_t* left) const noexcept;

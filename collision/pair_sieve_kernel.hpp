@@ -28,6 +28,28 @@ WRENCHD_INLINE Mask8 kept_apart(const SieveBlock& block, const Transform (&X_QP)
   return (lowest > margin) | (highest < -margin);
 }
 
+/// Which of eight pairs have bounds that lie beside each other all the way, as the obstacle sees them.
+WRENCHD_INLINE Mask8 beside(const SieveBlock& tool, const SieveBlock& obstacle, const Transform (&X_OT)[2],
+                            float margin) noexcept {
+  Mask8 apart = {};
+  for (int d = 0; d < 3; ++d) {
+    Float8 low_a = all(3e38F), high_a = all(-3e38F), low_b = low_a, high_b = high_a;
+    for (int k = 0; k < 3; ++k) {
+      for (const Transform& X : X_OT) {
+        const Float8 p = load(tool.corner[k][0]) * X.R[d][0] + load(tool.corner[k][1]) * X.R[d][1] +
+                         load(tool.corner[k][2]) * X.R[d][2] + X.t[d];
+        low_a = smaller(low_a, p);
+        high_a = larger(high_a, p);
+      }
+      low_b = smaller(low_b, load(obstacle.corner[k][d]));
+      high_b = larger(high_b, load(obstacle.corner[k][d]));
+    }
+    apart |= low_a > high_b + margin;
+    apart |= low_b > high_a + margin;
+  }
+  return apart;
+}
+
 }  // namespace
 
 void WRENCHD_SIFT(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
@@ -35,6 +57,7 @@ void WRENCHD_SIFT(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std:
   for (std::size_t i = 0; i < blocks; ++i) {
     Mask8 apart = kept_apart(of_obstacle[i], way.X_TO, way.margin);
     if (bits(apart) != 255) apart |= kept_apart(of_tool[i], way.X_OT, way.margin);
+    if (bits(apart) != 255) apart |= beside(of_obstacle[i], of_tool[i], way.X_OT, way.margin);
     left[i] = static_cast<std::uint8_t>(bits(apart) ^ 255U);
   }
 }

@@ -4,21 +4,21 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
+#include "collision/expected_motion.hpp"
 #include "collision/near_pairs.hpp"
 #include "collision/scene.hpp"
 
 namespace wrenchd {
 
-/// Lists of near pairs (near_pairs.hpp) for a tool that moves much as it did before: while one serves, the
-/// next is made for where the tool will be, a little with every tick. Only where it did not go there is a
-/// list made at once.
+/// Lists of near pairs (near_pairs.hpp) for a tool that follows a hand: while one serves, the next is made
+/// for where the tool will be then, a little with every tick. Only where the tool did not go there is a list
+/// made at once.
 ///
 /// Memory is taken at construction. One object serves one thread.
 class PairsAhead {
  public:
-  /// So many pairs are looked at in the time of a visit.
+  /// So many pairs are sieved in the time of a visit.
   static constexpr std::size_t kPairsPerVisit = 32;
 
   /// The scene is kept by reference.
@@ -38,9 +38,9 @@ class PairsAhead {
   }
   bool list(const Pose& X_start, const Pose& X_end, const Times& times, WalkBudget& budget) noexcept;
 
-  /// Once a tick, when the tool has come to X_WT at this scene time: goes on with the list for where it will
-  /// be. RT safe.
-  void look_ahead(const Pose& X_WT, WalkBudget& budget, double time_s = 0.0) noexcept;
+  /// Once a tick, when the tool has come to X_WT at this scene time, following a hand that has come to X_WP:
+  /// goes on with the list for where it will be. RT safe.
+  void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0) noexcept;
 
   /// The tool is elsewhere now: how it moved says nothing about how it will. RT safe.
   void forget_motion() noexcept;
@@ -50,30 +50,27 @@ class PairsAhead {
   std::uint32_t made_at_once() const noexcept { return made_at_once_; }  ///< lists, so far
 
  private:
-  NearPairs::Way way_to_list(const Pose& X_start, const Pose& X_end, const Times& times) const noexcept;
-  void learn_motion(const Pose& X_WT, double time_s) noexcept;
-  Pose after(double ticks, const Pose& X_WT) const noexcept;
-  NearPairs::Way way_ahead(const Pose& X_WT, double ticks) const noexcept;
+  bool list_at_once(const Pose& X_start, const Pose& X_end, const Times& times, WalkBudget& budget) noexcept;
+  NearPairs::Way way_ahead(double from_ticks, double to_ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
-  bool set_out(const Pose& X_WT) noexcept;
+  double ticks_to_serve() const noexcept;
+  double ticks_to_make() const noexcept;
   void weigh() noexcept;
   void serve(NearPairs*& list) noexcept;
 
   const Scene& scene_;
   std::array<NearPairs, 3> lists_;
   NearPairs* listed_ = &lists_[0];  ///< serves
-  NearPairs* ahead_ = &lists_[1];   ///< is being made
+  NearPairs* ahead_ = &lists_[1];   ///< is being made, or waits until it is needed
   NearPairs* spare_ = &lists_[2];   ///< for what must be listed at once
+  bool astray_ = false;             ///< the tool did not go in this tick where the list ahead was to serve
   std::uint32_t edition_ = 0;
   std::uint32_t made_at_once_ = 0;
 
-  std::uint32_t visits_of_list_ = 0;  ///< that the last one took
-  double ticks_ahead_;                ///< that the next is made for
-
-  std::optional<Pose> X_last_;                                        ///< of the tick before
-  double last_s_ = 0.0, tick_s_ = 0.0;                                ///< its scene time, and how long it was
-  Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();     ///< per tick; the turn in T
-  Vector3d bend_m_ = Vector3d::Zero(), bend_rad_ = Vector3d::Zero();  ///< by which they grow per tick
+  ExpectedMotion motion_;
+  double last_s_ = 0.0, tick_s_ = 0.0;  ///< scene time of the last tick, and how long it was
+  std::uint32_t visits_of_list_ = 0;    ///< that the last one made ahead took
+  double ticks_ahead_;                  ///< that the next is to serve
 };
 
 }  // namespace wrenchd

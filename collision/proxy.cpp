@@ -53,7 +53,7 @@ Proxy::Proxy(const Scene& scene, Effort effort)
 void Proxy::stay(const Pose& X_last) noexcept {
   looks_ = 0;
   budget_.visits = effort_.visits;
-  meshes_.look_ahead(X_last, budget_);
+  meshes_.look_ahead(X_last, X_last, budget_);
 }
 
 Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) noexcept {
@@ -63,7 +63,7 @@ Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) no
   budget_.visits = effort_.visits;
   meshes_.start_at(X_WQ_, seen_s_);
   const Projection q = find(X_WP, time_s);
-  meshes_.look_ahead(q.X_WQ, budget_, seen_s_);
+  meshes_.look_ahead(q.X_WQ, X_WP, budget_, seen_s_);
   return q;
 }
 

@@ -39,7 +39,7 @@ walk::Motion motion_of(const Sweep& sweep, double least_radius_a_m, double exten
   motion.all_pairs = all_pairs;
   motion.half_turn = static_cast<float>(0.5 * angle);
   motion.margin = static_cast<float>(reach_m + bulge_m + rounding_m);
-  motion.reach = static_cast<float>(reach_m);
+  motion.reach = static_cast<float>(reach_m + bulge_m);
   motion.radius = static_cast<float>(least_radius_a_m);
   motion.rounding = static_cast<float>(rounding_m);
   for (int d = 0; d < 3; ++d) motion.centre_B[d] = static_cast<float>(end.translation_m[d]);

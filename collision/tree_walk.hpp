@@ -43,7 +43,8 @@ struct Motion {
   Transform travel_BA, travel_AB;  ///< R p + t is by how much a point of A, seen from B, moves in all
   float half_turn;                 ///< half the angle in all [rad]
   float margin;                    ///< by which all boxes grow [m]
-  float reach, radius;  ///< a plane of A may come nearer to a point by reach * max(1, its distance / radius)
+  float reach, radius;  ///< a plane of A may come nearer to a point by reach * max(1, its distance / radius),
+                        ///< what a chord leaves out of an arc included
   float rounding;
   float centre_B[3];  ///< of A at the end, from which that distance counts
   float centre_way;   ///< how far the centre has come [m]

@@ -329,6 +329,7 @@ class Walk {
       const std::uint32_t ta = leaf_a.triangle[i];
       const unsigned features = ((leaf_a.has_vertices >> i) & 1U) | (((leaf_a.has_edges >> i) & 1U) << 1);
       const unsigned worth = worth_it(features, b.has_vertices, b.has_edges);
+      if (worth == 0) continue;
       for (unsigned hits = near(a, i, b, apart, m.margin, margin_of_plane, m.moving) & worth; hits != 0;
            hits &= hits - 1) {
         if (job_.pair_count == job_.capacity) {

@@ -172,7 +172,7 @@ TEST_CASE("ends within reach of one another need no second walk", "[mesh_contact
     contacts.look(X_WT, kClearance_m, budget);
     return before - budget.visits -
            static_cast<std::uint32_t>(contacts.pairs() /
-                                      PairsAhead::kPairsPerVisit);  // those are looked at anew
+                                      PairsAhead::kPairsPerVisit);  // those are sieved anew
   };
   CHECK(cost(at(0.10, 0.0002, 0)) == 0);
   CHECK(cost(at(0.10, 0.01, 0)) > 0);

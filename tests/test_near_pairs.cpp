@@ -78,7 +78,7 @@ TEST_CASE("a list holds what meets anywhere near its way", "[near_pairs]") {
       const Pose X_start = {random.rotation(0.2), random.uniform(0.0, 1.0) * handling.start_m};
       const NearPairs::Way way = {
           X_start,
-          {(X_start.rotation * random.rotation(random.uniform(0.0, 0.05))).normalized(),
+          {(X_start.rotation * random.rotation(random.uniform(0.0, 0.2))).normalized(),
            X_start.translation_m + random.uniform(0.0, 0.003) * random.unit<3>()},
           random.decades(1e-5, 1e-3)};
       list_all(list, way);

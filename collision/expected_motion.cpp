@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/expected_motion.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// How much the last tick counts among those before it: for the hand's velocity, its acceleration, the drift.
+constexpr double kNewest = 0.3;
+constexpr double kNewestMore = 0.1;
+constexpr double kNewestDrift = 0.1;
+
+/// To first order, in the frame that is turned.
+Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
+  const Quaterniond turn = from.conjugate() * to;
+  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
+}
+
+}  // namespace
+
+void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
+  if (X_WT_) {
+    const Vector3d hand_m = X_WP.translation_m - X_WP_->translation_m;
+    const Vector3d hand_turn = turn_between(X_WP_->rotation, X_WP.rotation);
+    const Vector3d tool_m = X_WT.translation_m - X_WT_->translation_m;
+    const Vector3d tool_turn_W = X_WT.rotation * turn_between(X_WT_->rotation, X_WT.rotation);
+    const Vector3d faster_m = kNewest * (hand_m - shift_m_), faster = kNewest * (hand_turn - turn_);
+    shift_m_ += faster_m;
+    turn_ += faster;
+    shift_more_m_ += kNewestMore * (faster_m - shift_more_m_);
+    turn_more_ += kNewestMore * (faster - turn_more_);
+    drift_m_ += kNewestDrift * (tool_m - hand_m - drift_m_);
+    drift_turn_ += kNewestDrift * (tool_turn_W - X_WP.rotation * hand_turn - drift_turn_);
+  }
+  X_WT_ = X_WT;
+  X_WP_ = X_WP;
+}
+
+Pose ExpectedMotion::after(double ticks) const noexcept {
+  const double late = (1.0 - kNewest) / kNewest;  // ticks by which what is smoothed lags
+  const double more = ticks * (0.5 * ticks + late);
+  return {(rotation_from(ticks * drift_turn_) * X_WT_->rotation *
+           rotation_from(ticks * turn_ + more * turn_more_))
+              .normalized(),
+          X_WT_->translation_m + ticks * (shift_m_ + drift_m_) + more * shift_more_m_};
+}
+
+/// A parabola leaves its chord by an eighth of a t^2.
+double ExpectedMotion::bend_m(double ticks, double radius_m) const noexcept {
+  return ticks * ticks / 8.0 * (shift_more_m_.norm() + radius_m * turn_more_.norm());
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "core/pose.hpp"
+
+namespace wrenchd {
+
+/// Where a tool will be that follows a hand: as far from it as it is now, and drifting from there as it did
+/// of late. The hand moves smoothly; the tool's own way jumps about where contacts come and go.
+class ExpectedMotion {
+ public:
+  /// Once a tick: the tool has come to X_WT and the hand to X_WP. RT safe.
+  void learn(const Pose& X_WT, const Pose& X_WP) noexcept;
+  /// They are elsewhere now, and how they moved says nothing about how they will. RT safe.
+  void forget() noexcept { *this = ExpectedMotion(); }
+
+  bool known() const noexcept { return X_WT_.has_value(); }
+
+  /// The tool's pose so many ticks from now. At least one must have been learned. RT safe.
+  Pose after(double ticks) const noexcept;
+  /// By how much the way there leaves the straight one, for a point so far from the tool's origin [m].
+  double bend_m(double ticks, double radius_m) const noexcept;
+
+ private:
+  std::optional<Pose> X_WT_, X_WP_;  ///< of the last tick
+  // Per tick. The hand's turns in its own frame, those of the drift in the world's.
+  Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();
+  Vector3d shift_more_m_ = Vector3d::Zero(), turn_more_ = Vector3d::Zero();  ///< by which they grow per tick
+  Vector3d drift_m_ = Vector3d::Zero(), drift_turn_ = Vector3d::Zero();
+};
+
+}  // namespace wrenchd
