@@ -65,10 +65,9 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 MeshContacts::MeshContacts(const Scene& scene) : scene_(scene), pairs_(scene) {
   crossings_.reserve(kMostCrossings);
   left_.resize(TreeWalk::kCapacity);
-  const auto first = static_cast<std::uint32_t>(scene.obstacle_count() - scene.meshes().size());
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
-    seen_.push_back({&obstacle, first + k, Frame(obstacle.X_WO), {}, {}});
+    seen_.push_back({&obstacle, scene.first_mesh() + k, Frame(obstacle.X_WO), {}, {}});
   }
 }
 

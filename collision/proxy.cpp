@@ -157,7 +157,10 @@ bool Proxy::give_way(double time_s) noexcept {
     share = std::min(1.0, kLonger * share);
   }
   see(seen_s_);
-  stuck_ticks_ = seen_s_ != since_s ? 0 : static_cast<std::uint16_t>(stuck_ticks_ + 1);
+  if (seen_s_ != since_s)
+    stuck_ticks_ = 0;
+  else if (stuck_ticks_ < kMostStuckTicks)
+    ++stuck_ticks_;
   return seen_s_ == time_s;
 }
 
@@ -225,11 +228,10 @@ bool Proxy::learn(Contact contact) noexcept {
 /// Keeps the contacts that touch at q and whose features lie opposite each other there. True where one that
 /// carried is not among them.
 bool Proxy::let_go(const Projection& q) noexcept {
-  const std::size_t first_mesh = scene_.obstacle_count() - scene_.meshes().size();
   bool carried = false;
   known_.clear();
   for (const ActiveContact& active : q.active) {
-    if (active.contact.obstacle < first_mesh || meshes_.touching().contains(active.contact))
+    if (active.contact.obstacle < scene_.first_mesh() || meshes_.touching().contains(active.contact))
       known_.add(active);
     else
       carried = carried || active.multiplier > 0.0;

@@ -120,9 +120,8 @@ Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vec
 }
 
 Pose Scene::motion(std::uint32_t number, double from_s, double to_s) const noexcept {
-  const std::size_t first_mesh = obstacle_count() - meshes_.size();
-  if (from_s == to_s || number < first_mesh || !meshes_[number - first_mesh].motion.moves()) return {};
-  const MeshObstacle& obstacle = meshes_[number - first_mesh];
+  if (from_s == to_s || number < first_mesh() || !meshes_[number - first_mesh()].motion.moves()) return {};
+  const MeshObstacle& obstacle = meshes_[number - first_mesh()];
   return obstacle.X_WO_at(to_s) * inverse(obstacle.X_WO_at(from_s));
 }
 

@@ -79,6 +79,10 @@ class Scene {
   std::size_t obstacle_count() const noexcept {
     return half_spaces_.size() + std::max(convex_.size(), meshes_.size());
   }
+  /// The number of the first of meshes(); the others follow.
+  std::uint32_t first_mesh() const noexcept {
+    return static_cast<std::uint32_t>(obstacle_count() - meshes_.size());
+  }
 
  private:
   ToolBody tool_;
