@@ -142,5 +142,30 @@ TEST_CASE("of thousands of obstacles only those near by are listed", "[near_pair
   CHECK_FALSE(list.pairs().empty());
 }
 
+// A tool that stands still and a ball that flies by, 2 mm above it at the nearest.
+TEST_CASE("a list for what moves holds for its time, and for where the obstacle sees the tool",
+          "[near_pairs]") {
+  const ObstacleMotion flies = {{0.5, 0, 0}, {0, 0, 20.0}, 0.0};
+  std::vector<MeshObstacle> obstacles;
+  const auto ball = std::make_shared<const TreedMesh>(make_mesh({"sphere", 320}));
+  obstacles.emplace_back("ball", ball, Pose{Quaterniond::Identity(), {-0.502, 0, 0.062}}, flies);
+  const Scene scene(mesh_tool(make_mesh({"sphere", 320})), {}, {}, std::move(obstacles));
+  const Pose X_WT;
+  NearPairs list(scene);
+  const NearPairs::Way way = {X_WT, X_WT, 0.003, 1.000, 1.002};
+  list_all(list, way);
+  CHECK(list.covers(X_WT, 1.0));
+  CHECK(list.covers(X_WT, 1.001));
+  CHECK(list.covers(X_WT, 1.002));
+  CHECK_FALSE(list.covers(X_WT, 0.999));
+  CHECK_FALSE(list.covers(X_WT, 1.003));
+  CHECK_FALSE(list.covers(Pose{Quaterniond::Identity(), {0, 0, 0.004}}, 1.001));
+  // What the ball sees is a tool that turns: within the reach of the world's way is not enough.
+  const NearPairs::Way short_way = {X_WT, X_WT, 1e-5, 1.000, 1.010};
+  list_all(list, short_way);
+  CHECK(list.covers(X_WT, 1.0));
+  CHECK_FALSE(list.covers(X_WT, 1.005));  // from its arc to its chord it is farther than 10 um
+}
+
 }  // namespace
 }  // namespace wrenchd
