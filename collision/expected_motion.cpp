@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "collision/expected_motion.hpp"
 
+#include <algorithm>
+
 namespace wrenchd {
 namespace {
 
-/// How much the last tick counts among those before it: for the hand's velocity, its acceleration, the drift.
+/// How much the last tick counts among those before it: for the hand's velocity (at least), its acceleration,
+/// the drift.
 constexpr double kNewest = 0.3;
 constexpr double kNewestMore = 0.1;
 constexpr double kNewestDrift = 0.1;
@@ -23,11 +26,15 @@ void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
     const Vector3d hand_turn = turn_between(X_WP_->rotation, X_WP.rotation);
     const Vector3d tool_m = X_WT.translation_m - X_WT_->translation_m;
     const Vector3d tool_turn_W = X_WT.rotation * turn_between(X_WT_->rotation, X_WT.rotation);
-    const Vector3d faster_m = kNewest * (hand_m - shift_m_), faster = kNewest * (hand_turn - turn_);
+    ++steps_;
+    const double newest = std::max(kNewest, 1.0 / steps_);
+    const Vector3d faster_m = newest * (hand_m - shift_m_), faster = newest * (hand_turn - turn_);
     shift_m_ += faster_m;
     turn_ += faster;
-    shift_more_m_ += kNewestMore * (faster_m - shift_more_m_);
-    turn_more_ += kNewestMore * (faster - turn_more_);
+    if (steps_ > 1.0) {
+      shift_more_m_ += kNewestMore * (faster_m - shift_more_m_);
+      turn_more_ += kNewestMore * (faster - turn_more_);
+    }
     drift_m_ += kNewestDrift * (tool_m - hand_m - drift_m_);
     drift_turn_ += kNewestDrift * (tool_turn_W - X_WP.rotation * hand_turn - drift_turn_);
   }

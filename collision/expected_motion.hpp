@@ -25,6 +25,7 @@ class ExpectedMotion {
 
  private:
   std::optional<Pose> X_WT_, X_WP_;  ///< of the last tick
+  double steps_ = 0.0;               ///< so far
   // Per tick. The hand's turns in its own frame, those of the drift in the world's.
   Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();
   Vector3d shift_more_m_ = Vector3d::Zero(), turn_more_ = Vector3d::Zero();  ///< by which they grow per tick

@@ -7,8 +7,10 @@
 namespace wrenchd {
 namespace {
 
-/// No list holds for less than this beside its way, in units of the tool's size.
+/// No list holds for less than this beside its way, in units of the tool's size; the first of all, when
+/// nothing is known of the motion, for more.
 constexpr double kLeastReach = 1e-4;
+constexpr double kFirstReach = 1e-3;
 /// What a list made at once holds for beside its way, as a share of it.
 constexpr double kReach = 0.08;
 /// The same for a list made ahead, beside the way expected.
@@ -20,9 +22,11 @@ constexpr double kWidestAhead = 0.02;
 /// A list made ahead is to serve for so many ticks, at most and at least.
 constexpr double kMostTicksAhead = 10.0;
 constexpr double kLeastTicksAhead = 3.0;
-/// It is made in this share of them, and begun so much sooner than it is needed.
-constexpr double kMakeShare = 0.75;
-constexpr double kHaste = 1.15;
+/// It is made while the one before it serves, evenly, and a little sooner than it is needed; it holds from
+/// half way there on.
+constexpr double kHaste = 1.1;
+constexpr double kFrom = 0.5;
+constexpr double kTo = 2.0;
 /// A long list is dear to look at, a short one often to be made: where one costs so many times the other, the
 /// next is made for fewer ticks or for more.
 constexpr double kTooDear = 1.5;
@@ -74,11 +78,11 @@ bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times
 /// way alone. Whether the way expected holds this one for obstacles that move too is not looked at.
 bool PairsAhead::list_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
                               WalkBudget& budget) noexcept {
-  const double least_m = kLeastReach * scene_.tool_radius_m();
+  const double least_m = (motion_.known() ? kLeastReach : kFirstReach) * scene_.tool_radius_m();
   NearPairs::Way way = {X_start, X_end, std::max(kReach * listed().way_m(X_start, X_end), least_m),
                         times.start_s, times.end_s};
   if (!scene_.moves() && motion_.known()) {
-    const NearPairs::Way expected = way_ahead(0.0, ticks_to_make() + 2.0);
+    const NearPairs::Way expected = way_ahead(0.0, ticks_to_serve() + 2.0);
     const auto holds = [&](const Pose& X) { return listed().away_m(expected, X) <= expected.reach_m; };
     if (goes_slowly(expected) && holds(X_start) && holds(X_end)) way = expected;
   }
@@ -91,18 +95,19 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
   motion_.learn(X_WT, X_WP);
   tick_s_ = time_s - last_s_;
   last_s_ = time_s;
-  const double soon = ticks_to_make();
+  const double soon = ticks_to_serve();
   const Pose X_soon = motion_.after(soon);
   const double soon_s = time_s + soon * tick_s_;
   const bool astray = std::exchange(astray_, false) && !ahead_->will_cover(X_soon, soon_s);
   if (!ahead_->under_way() || astray) {
     if (listed_->covers(X_soon, soon_s) || ahead_->covers(X_soon, soon_s)) return;
-    const NearPairs::Way way = way_ahead(0.5 * soon, soon + ticks_to_serve());
+    const NearPairs::Way way = way_ahead(kFrom * soon, kTo * soon);
     if (!goes_slowly(way)) return;
+    if (ahead_->covers(X_WT, time_s)) serve(ahead_);  // it holds for longer than the one that serves
     ahead_->set_out(way);
   }
   const double expected = std::max(visits_of_list_, listed().visits());
-  const double portion = std::max(kHaste * expected / ticks_to_make(), kLeastPortion);
+  const double portion = std::max(kHaste * expected / soon, kLeastPortion);
   if (go_on(*ahead_, static_cast<std::uint32_t>(portion), budget)) weigh();
 }
 
@@ -128,12 +133,8 @@ void PairsAhead::serve(NearPairs*& list) noexcept {
 
 double PairsAhead::ticks_to_serve() const noexcept {
   const double far_m = listed().way_m(motion_.after(0.0), motion_.after(ticks_ahead_));
-  const double farthest_m = kFarthestAhead * scene_.tool_radius_m();
-  return far_m > farthest_m ? ticks_ahead_ * farthest_m / far_m : ticks_ahead_;
-}
-
-double PairsAhead::ticks_to_make() const noexcept {
-  return std::max(1.0, kMakeShare * ticks_to_serve());
+  const double farthest_m = kFarthestAhead * scene_.tool_radius_m() / (kTo - kFrom);
+  return std::max(1.0, far_m > farthest_m ? ticks_ahead_ * farthest_m / far_m : ticks_ahead_);
 }
 
 NearPairs::Way PairsAhead::way_ahead(double from_ticks, double to_ticks) const noexcept {

@@ -54,7 +54,6 @@ class PairsAhead {
   NearPairs::Way way_ahead(double from_ticks, double to_ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
   double ticks_to_serve() const noexcept;
-  double ticks_to_make() const noexcept;
   void weigh() noexcept;
   void serve(NearPairs*& list) noexcept;
 
