@@ -27,8 +27,9 @@ constexpr double kLeastTicksAhead = 3.0;
 constexpr double kHaste = 1.1;
 constexpr double kFrom = 0.5;
 constexpr double kTo = 2.0;
-/// A long list is dear to look at, a short one often to be made: where one costs so many times the other, the
-/// next is made for fewer ticks or for more.
+/// A long list is dear to sieve, more than once in a tick where contacts change; a short one is often to be
+/// made: where one costs so many times the other, the next is made for fewer ticks or for more.
+constexpr double kSieved = 2.0;
 constexpr double kTooDear = 1.5;
 constexpr double kFewer = 0.7;
 /// The least that is done with a tick, in visits.
@@ -118,7 +119,7 @@ void PairsAhead::forget_motion() noexcept {
 /// How long the next list is to serve, by what this one took to make and takes to sieve.
 void PairsAhead::weigh() noexcept {
   visits_of_list_ = ahead_->visits();
-  const double sieving = static_cast<double>(ahead_->pairs().size()) / kPairsPerVisit;
+  const double sieving = kSieved * static_cast<double>(ahead_->pairs().size()) / kPairsPerVisit;
   const double making = visits_of_list_ / ticks_ahead_;
   if (!ahead_->complete() || sieving > kTooDear * making)
     ticks_ahead_ = std::max(kFewer * ticks_ahead_, kLeastTicksAhead);
