@@ -21,23 +21,23 @@ Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
 }  // namespace
 
 void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
-  if (X_WT_) {
-    const Vector3d hand_m = X_WP.translation_m - X_WP_->translation_m;
-    const Vector3d hand_turn = turn_between(X_WP_->rotation, X_WP.rotation);
-    const Vector3d tool_m = X_WT.translation_m - X_WT_->translation_m;
-    const Vector3d tool_turn_W = X_WT.rotation * turn_between(X_WT_->rotation, X_WT.rotation);
-    ++steps_;
-    const double newest = std::max(kNewest, 1.0 / steps_);
+  if (known()) {
+    const Vector3d hand_m = X_WP.translation_m - X_WP_.translation_m;
+    const Vector3d hand_turn = turn_between(X_WP_.rotation, X_WP.rotation);
+    const Vector3d tool_m = X_WT.translation_m - X_WT_.translation_m;
+    const Vector3d tool_turn_W = X_WT.rotation * turn_between(X_WT_.rotation, X_WT.rotation);
+    const double newest = std::max(kNewest, 1.0 / learned_);
     const Vector3d faster_m = newest * (hand_m - shift_m_), faster = newest * (hand_turn - turn_);
     shift_m_ += faster_m;
     turn_ += faster;
-    if (steps_ > 1.0) {
+    if (learned_ > 1.0) {
       shift_more_m_ += kNewestMore * (faster_m - shift_more_m_);
       turn_more_ += kNewestMore * (faster - turn_more_);
     }
     drift_m_ += kNewestDrift * (tool_m - hand_m - drift_m_);
     drift_turn_ += kNewestDrift * (tool_turn_W - X_WP.rotation * hand_turn - drift_turn_);
   }
+  ++learned_;
   X_WT_ = X_WT;
   X_WP_ = X_WP;
 }
@@ -45,10 +45,10 @@ void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
 Pose ExpectedMotion::after(double ticks) const noexcept {
   const double late = (1.0 - kNewest) / kNewest;  // ticks by which what is smoothed lags
   const double more = ticks * (0.5 * ticks + late);
-  return {(rotation_from(ticks * drift_turn_) * X_WT_->rotation *
-           rotation_from(ticks * turn_ + more * turn_more_))
-              .normalized(),
-          X_WT_->translation_m + ticks * (shift_m_ + drift_m_) + more * shift_more_m_};
+  return {
+      (rotation_from(ticks * drift_turn_) * X_WT_.rotation * rotation_from(ticks * turn_ + more * turn_more_))
+          .normalized(),
+      X_WT_.translation_m + ticks * (shift_m_ + drift_m_) + more * shift_more_m_};
 }
 
 /// A parabola leaves its chord by an eighth of a t^2.

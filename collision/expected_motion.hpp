@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <optional>
-
 #include "core/pose.hpp"
 
 namespace wrenchd {
@@ -16,7 +14,7 @@ class ExpectedMotion {
   /// They are elsewhere now, and how they moved says nothing about how they will. RT safe.
   void forget() noexcept { *this = ExpectedMotion(); }
 
-  bool known() const noexcept { return X_WT_.has_value(); }
+  bool known() const noexcept { return learned_ > 0.0; }
 
   /// The tool's pose so many ticks from now. At least one must have been learned. RT safe.
   Pose after(double ticks) const noexcept;
@@ -24,8 +22,8 @@ class ExpectedMotion {
   double bend_m(double ticks, double radius_m) const noexcept;
 
  private:
-  std::optional<Pose> X_WT_, X_WP_;  ///< of the last tick
-  double steps_ = 0.0;               ///< so far
+  double learned_ = 0.0;  ///< ticks
+  Pose X_WT_, X_WP_;      ///< of the last one
   // Per tick. The hand's turns in its own frame, those of the drift in the world's.
   Vector3d shift_m_ = Vector3d::Zero(), turn_ = Vector3d::Zero();
   Vector3d shift_more_m_ = Vector3d::Zero(), turn_more_ = Vector3d::Zero();  ///< by which they grow per tick
