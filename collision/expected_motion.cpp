@@ -12,20 +12,14 @@ constexpr double kNewest = 0.3;
 constexpr double kNewestMore = 0.1;
 constexpr double kNewestDrift = 0.1;
 
-/// To first order, in the frame that is turned.
-Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
-  const Quaterniond turn = from.conjugate() * to;
-  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
-}
-
 }  // namespace
 
 void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
   if (known()) {
     const Vector3d hand_m = X_WP.translation_m - X_WP_.translation_m;
-    const Vector3d hand_turn = turn_between(X_WP_.rotation, X_WP.rotation);
+    const Vector3d hand_turn = small_rotation_vector(X_WP_.rotation.conjugate() * X_WP.rotation);
     const Vector3d tool_m = X_WT.translation_m - X_WT_.translation_m;
-    const Vector3d tool_turn_W = X_WT.rotation * turn_between(X_WT_.rotation, X_WT.rotation);
+    const Vector3d tool_turn_W = small_rotation_vector(X_WT.rotation * X_WT_.rotation.conjugate());
     const double newest = std::max(kNewest, 1.0 / learned_);
     const Vector3d faster_m = newest * (hand_m - shift_m_), faster = newest * (hand_turn - turn_);
     shift_m_ += faster_m;

@@ -94,11 +94,11 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   see_way(X_WT, time_s);
   border_m_ = kBeyond * clearance_m + bulge_m_;
   slope_ = kSlope;
-  look_at_pairs(findings);
+  look_at_pairs(budget, findings);
   if (findings.overlaps && crossings_.empty()) {
     border_m_ = kWideBorder * way_m_;
     slope_ = kAnySlope;
-    look_at_pairs(findings);
+    look_at_pairs(budget, findings);
   }
   choose_first(findings);
   if (findings.met.empty() && !findings.overlaps && (in_doubt_ || turn_rad_ > kSureTurn_rad))
@@ -152,19 +152,21 @@ void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
 }
 
 /// Most pairs are kept apart all the way by the plane of one of the two: those are left out first.
-void MeshContacts::look_at_pairs(Findings& findings) noexcept {
+void MeshContacts::look_at_pairs(WalkBudget& budget, Findings& findings) noexcept {
   touching_.clear();
   crossings_.clear();
   moved_.triangle = MeshSurface::kNone;
-  const NearPairs& listed = pairs_.listed();
+  PairSieve& sieve = pairs_.sieve();
   const double tool_m = scene_.tool_mesh()->tree.extent_m();
-  for (const PairSieve::Part& part : listed.sieve().parts()) {
-    const Seen& seen = seen_[part.obstacle];
-    const std::size_t left = listed.sieve().sift(part, seen.X_OT_start, seen.X_OT_end,
-                                                 tool_m + seen.obstacle->mesh->tree.extent_m(),
-                                                 border_m_ + bulge_m_ + 2.0 * clearance_m_, left_.data());
-    for (const std::uint32_t i : std::span(left_).first(left)) {
-      const NearPair& pair = listed.pairs()[i];
+  for (std::size_t k = 0; k < sieve.parts().size(); ++k) {
+    const Seen& seen = seen_[sieve.parts()[k].obstacle];
+    const PairSieve::Sifted sifted =
+        sieve.sift(k, seen.X_OT_start, seen.X_OT_end, tool_m + seen.obstacle->mesh->tree.extent_m(),
+                   border_m_ + bulge_m_ + 2.0 * clearance_m_, left_.data());
+    const auto sieving = static_cast<std::uint32_t>(sifted.asked / PairsAhead::kPairsPerVisit);
+    budget.visits -= std::min(budget.visits, sieving);
+    for (const std::uint32_t i : std::span(left_).first(sifted.left)) {
+      const NearPair& pair = pairs_.listed().pairs()[i];
       look_at(pair, moved(pair), findings);
     }
   }

@@ -100,7 +100,7 @@ class MeshContacts {
   };
 
   void see_way(const Pose& X_WT, double time_s) noexcept;
-  void look_at_pairs(Findings& findings) noexcept;
+  void look_at_pairs(WalkBudget& budget, Findings& findings) noexcept;
   bool kept_apart(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
   const Moved& moved(const NearPair& pair) noexcept;
   bool closes(double start_m, double end_m) const noexcept;

@@ -4,17 +4,9 @@
 #include <algorithm>
 
 namespace wrenchd {
-namespace {
 
-/// The rotation vector between two orientations that differ by far less than a turn, to first order.
-Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) noexcept {
-  const Quaterniond turn = from.conjugate() * to;
-  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
-}
-
-}  // namespace
-
-NearPairs::NearPairs(const Scene& scene) : scene_(scene), sieve_(TreeWalk::kCapacity, scene.meshes().size()) {
+NearPairs::NearPairs(const Scene& scene)
+    : scene_(scene), sieve_(TreeWalk::kCapacity, scene.meshes().size(), scene.tool_radius_m()) {
   pairs_.reserve(TreeWalk::kCapacity);
   near_by_.reserve(scene.meshes().size());
   relative_.reserve(scene.meshes().size());
@@ -43,7 +35,7 @@ void NearPairs::set_out_for_next() noexcept {
 }
 
 bool NearPairs::will_cover(const Pose& X_WT, double time_s) const noexcept {
-  if (state_ == State::empty || away_m(way_, X_WT) > way_.reach_m) return false;
+  if (state_ == State::empty || room_m(X_WT) < 0.0) return false;
   if (!scene_.moves()) return true;
   return way_.start_s <= time_s && time_s <= way_.end_s &&
          std::all_of(relative_.begin(), relative_.end(), [&](const Relative& seen) {
@@ -89,10 +81,11 @@ double NearPairs::away_m(const Way& way, const Pose& X_WT) const noexcept {
   const Pose& end = way.X_WT_end;
   const double r_m = scene_.tool_radius_m();
   const Vector3d shift_m = end.translation_m - start.translation_m;
-  const Vector3d turn = turn_between(start.rotation, end.rotation);
+  const Vector3d turn = small_rotation_vector(start.rotation.conjugate() * end.rotation);
   const double length2 = shift_m.squaredNorm() + r_m * r_m * turn.squaredNorm();
-  const double along = shift_m.dot(X_WT.translation_m - start.translation_m) +
-                       r_m * r_m * turn.dot(turn_between(start.rotation, X_WT.rotation));
+  const double along =
+      shift_m.dot(X_WT.translation_m - start.translation_m) +
+      r_m * r_m * turn.dot(small_rotation_vector(start.rotation.conjugate() * X_WT.rotation));
   const double share = length2 > 0.0 ? std::clamp(along / length2, 0.0, 1.0) : 0.0;
   return way_m(X_WT, {start.rotation.slerp(share, end.rotation), start.translation_m + share * shift_m});
 }

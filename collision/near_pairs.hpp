@@ -52,11 +52,14 @@ class NearPairs {
   bool will_cover(const Pose& X_WT, double time_s = 0.0) const noexcept;
 
   std::span<const NearPair> pairs() const noexcept { return pairs_; }
-  const PairSieve& sieve() const noexcept { return sieve_; }  ///< of pairs()
+  PairSieve& sieve() noexcept { return sieve_; }  ///< of pairs()
   /// The obstacles that may be met on the way: places among scene.meshes().
   std::span<const std::uint32_t> near_by() const noexcept { return near_by_; }
   std::uint32_t visits() const noexcept { return visits_; }  ///< that the list has taken so far
 
+  /// How much farther from the way a pose may lie for the list to hold for it, obstacles that move left
+  /// aside; less than zero: it does not [m].
+  double room_m(const Pose& X_WT) const noexcept { return way_.reach_m - away_m(way_, X_WT); }
   /// How far a pose is from a way [m].
   double away_m(const Way& way, const Pose& X_WT) const noexcept;
   /// How far a point of the tool may be moved from one pose to the other [m].

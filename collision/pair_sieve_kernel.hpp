@@ -8,9 +8,9 @@
 namespace wrenchd::walk {
 namespace {
 
-/// Which of eight planes keep their triangle on one side at both ends. X takes the plane's frame P to that of
-/// the corners Q: n_Q = R n_P, and n_Q . x = n_P . x_P + n_Q . t.
-WRENCHD_INLINE Mask8 kept_apart(const SieveBlock& block, const Transform (&X_QP)[2], float margin) noexcept {
+/// How far eight planes keep their triangles on one side at both ends, at least; less than zero: they do not.
+/// X takes the plane's frame P to that of the corners Q: n_Q = R n_P, and n_Q . x = n_P . x_P + n_Q . t.
+WRENCHD_INLINE Float8 apart_by_plane(const SieveBlock& block, const Transform (&X_QP)[2]) noexcept {
   Float8 lowest = all(3e38F), highest = all(-3e38F);
   const Float8 nx = load(block.normal[0]), ny = load(block.normal[1]), nz = load(block.normal[2]);
   for (const Transform& X : X_QP) {
@@ -25,13 +25,13 @@ WRENCHD_INLINE Mask8 kept_apart(const SieveBlock& block, const Transform (&X_QP)
       highest = larger(highest, height);
     }
   }
-  return (lowest > margin) | (highest < -margin);
+  return larger(lowest, -highest);
 }
 
-/// Which of eight pairs have bounds that lie beside each other all the way, as the obstacle sees them.
-WRENCHD_INLINE Mask8 beside(const SieveBlock& tool, const SieveBlock& obstacle, const Transform (&X_OT)[2],
-                            float margin) noexcept {
-  Mask8 apart = {};
+/// How far the bounds of eight pairs lie beside each other all the way, as the obstacle sees them.
+WRENCHD_INLINE Float8 apart_by_bounds(const SieveBlock& tool, const SieveBlock& obstacle,
+                                      const Transform (&X_OT)[2]) noexcept {
+  Float8 apart = all(-3e38F);
   for (int d = 0; d < 3; ++d) {
     Float8 low_a = all(3e38F), high_a = all(-3e38F), low_b = low_a, high_b = high_a;
     for (int k = 0; k < 3; ++k) {
@@ -44,21 +44,30 @@ WRENCHD_INLINE Mask8 beside(const SieveBlock& tool, const SieveBlock& obstacle, 
       low_b = smaller(low_b, load(obstacle.corner[k][d]));
       high_b = larger(high_b, load(obstacle.corner[k][d]));
     }
-    apart |= low_a > high_b + margin;
-    apart |= low_b > high_a + margin;
+    apart = larger(apart, larger(low_a - high_b, low_b - high_a));
   }
   return apart;
 }
 
+WRENCHD_INLINE float least_of(Float8 x) noexcept {
+  x = smaller(x, __builtin_shuffle(x, Mask8{4, 5, 6, 7, 0, 1, 2, 3}));
+  x = smaller(x, __builtin_shuffle(x, Mask8{2, 3, 0, 1, 6, 7, 4, 5}));
+  x = smaller(x, __builtin_shuffle(x, Mask8{1, 0, 3, 2, 5, 4, 7, 6}));
+  return x[0];
+}
+
 }  // namespace
 
-void WRENCHD_SIFT(const SieveBlock* of_obstacle, const SieveBlock* of_tool, std::size_t blocks,
-                  const SieveWay& way, std::uint8_t* left) noexcept {
+void WRENCHD_SIFT(const SieveBlock* of_obstacle, const SieveBlock* of_tool, const std::uint32_t* which,
+                  std::size_t blocks, const SieveWay& way, float* apart_m, std::uint8_t* left) noexcept {
   for (std::size_t i = 0; i < blocks; ++i) {
-    Mask8 apart = kept_apart(of_obstacle[i], way.X_TO, way.margin);
-    if (bits(apart) != 255) apart |= kept_apart(of_tool[i], way.X_OT, way.margin);
-    if (bits(apart) != 255) apart |= beside(of_obstacle[i], of_tool[i], way.X_OT, way.margin);
-    left[i] = static_cast<std::uint8_t>(bits(apart) ^ 255U);
+    const std::uint32_t block = which[i];
+    Float8 apart = apart_by_plane(of_obstacle[block], way.X_TO);
+    if (bits(apart > way.margin) != 255) apart = larger(apart, apart_by_plane(of_tool[block], way.X_OT));
+    if (bits(apart > way.margin) != 255)
+      apart = larger(apart, apart_by_bounds(of_obstacle[block], of_tool[block], way.X_OT));
+    apart_m[block] = least_of(apart);
+    left[i] = static_cast<std::uint8_t>(bits(apart > way.margin) ^ 255U);
   }
 }
 

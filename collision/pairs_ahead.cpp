@@ -15,6 +15,8 @@ constexpr double kFirstReach = 1e-3;
 constexpr double kReach = 0.08;
 /// The same for a list made ahead, beside the way expected.
 constexpr double kReachAhead = 0.04;
+/// One that leads where the tool is expected holds for so many ticks.
+constexpr double kTicksAtOnce = 4.0;
 /// The longest way that a list is made for ahead, and the widest reach, in units of the tool's size: it
 /// serves for fewer ticks where the hand is faster. A hand that is faster still is followed at once.
 constexpr double kFarthestAhead = 0.2;
@@ -25,6 +27,8 @@ constexpr double kLeastTicksAhead = 3.0;
 /// It is made while the one before it serves, evenly, and a little sooner than it is needed; it holds from
 /// half way there on.
 constexpr double kHaste = 1.1;
+/// It may take more than the one before: so much more is still to do where that is done, as a share of it.
+constexpr double kUnforeseen = 0.2;
 constexpr double kFrom = 0.5;
 constexpr double kTo = 2.0;
 /// A long list is dear to sieve, more than once in a tick where contacts change; a short one is often to be
@@ -37,6 +41,10 @@ constexpr double kLeastPortion = 32.0;
 /// No list made at once takes more than this share of the budget that is left: a way that is too long for it
 /// may be followed by a shorter one.
 constexpr double kLongestWalk = 0.7;
+
+std::uint32_t most_visits(const WalkBudget& budget) noexcept {
+  return static_cast<std::uint32_t>(kLongestWalk * budget.visits);
+}
 
 /// Goes on with a list for no more than so many visits of the budget.
 bool go_on(NearPairs& list, std::uint32_t visits, WalkBudget& budget) noexcept {
@@ -59,7 +67,13 @@ bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times
   const auto holds = [&](const NearPairs& list) {
     return list.covers(X_end, times.end_s) && list.covers(X_start, times.start_s);
   };
+  const auto will_hold = [&](const NearPairs& list) {
+    return list.will_cover(X_end, times.end_s) && list.will_cover(X_start, times.start_s);
+  };
   if (!holds(*listed_)) {
+    if (ahead_->under_way() && will_hold(*ahead_)) {
+      if (go_on(*ahead_, most_visits(budget), budget)) weigh();
+    }
     if (holds(*ahead_)) {
       serve(ahead_);
     } else if (list_at_once(X_start, X_end, times, budget)) {
@@ -70,8 +84,6 @@ bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times
       return false;
     }
   }
-  const auto sieving = static_cast<std::uint32_t>(listed().pairs().size() / kPairsPerVisit);
-  budget.visits -= std::min(budget.visits, sieving);
   return true;
 }
 
@@ -83,12 +95,12 @@ bool PairsAhead::list_at_once(const Pose& X_start, const Pose& X_end, const Time
   NearPairs::Way way = {X_start, X_end, std::max(kReach * listed().way_m(X_start, X_end), least_m),
                         times.start_s, times.end_s};
   if (!scene_.moves() && motion_.known()) {
-    const NearPairs::Way expected = way_ahead(0.0, ticks_to_serve() + 2.0);
+    const NearPairs::Way expected = way_ahead(0.0, kTicksAtOnce);
     const auto holds = [&](const Pose& X) { return listed().away_m(expected, X) <= expected.reach_m; };
     if (goes_slowly(expected) && holds(X_start) && holds(X_end)) way = expected;
   }
   spare_->set_out(way);
-  go_on(*spare_, static_cast<std::uint32_t>(kLongestWalk * budget.visits), budget);
+  go_on(*spare_, most_visits(budget), budget);
   return spare_->complete();
 }
 
@@ -107,9 +119,21 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
     if (ahead_->covers(X_WT, time_s)) serve(ahead_);  // it holds for longer than the one that serves
     ahead_->set_out(way);
   }
+  if (go_on(*ahead_, portion(X_soon, soon), budget)) weigh();
+}
+
+/// What is to be done of the list ahead with this tick, in visits, so that it is done when the one that
+/// serves no longer holds.
+std::uint32_t PairsAhead::portion(const Pose& X_soon, double soon) const noexcept {
+  double left = soon;  // ticks
+  if (!scene_.moves()) {
+    const double tick_m = listed().way_m(motion_.after(0.0), X_soon) / soon;
+    const double beyond_m = std::max(-listed().room_m(X_soon), 0.0);
+    left = std::max(1.0, tick_m > 0.0 ? soon - beyond_m / tick_m : soon);
+  }
   const double expected = std::max(visits_of_list_, listed().visits());
-  const double portion = std::max(kHaste * expected / soon, kLeastPortion);
-  if (go_on(*ahead_, static_cast<std::uint32_t>(portion), budget)) weigh();
+  const double to_do = std::max(expected - ahead_->visits(), kUnforeseen * expected);
+  return static_cast<std::uint32_t>(std::max(kHaste * to_do / left, kLeastPortion));
 }
 
 void PairsAhead::forget_motion() noexcept {
@@ -129,7 +153,6 @@ void PairsAhead::weigh() noexcept {
 
 void PairsAhead::serve(NearPairs*& list) noexcept {
   std::swap(listed_, list);
-  ++edition_;
 }
 
 double PairsAhead::ticks_to_serve() const noexcept {

@@ -46,7 +46,7 @@ class PairsAhead {
   void forget_motion() noexcept;
 
   const NearPairs& listed() const noexcept { return *listed_; }
-  std::uint32_t edition() const noexcept { return edition_; }            ///< another with every other list
+  PairSieve& sieve() noexcept { return listed_->sieve(); }               ///< of what is listed
   std::uint32_t made_at_once() const noexcept { return made_at_once_; }  ///< lists, so far
 
  private:
@@ -54,6 +54,7 @@ class PairsAhead {
   NearPairs::Way way_ahead(double from_ticks, double to_ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
   double ticks_to_serve() const noexcept;
+  std::uint32_t portion(const Pose& X_soon, double soon) const noexcept;
   void weigh() noexcept;
   void serve(NearPairs*& list) noexcept;
 
@@ -63,7 +64,6 @@ class PairsAhead {
   NearPairs* ahead_ = &lists_[1];   ///< is being made, or waits until it is needed
   NearPairs* spare_ = &lists_[2];   ///< for what must be listed at once
   bool astray_ = false;             ///< the tool did not go in this tick where the list ahead was to serve
-  std::uint32_t edition_ = 0;
   std::uint32_t made_at_once_ = 0;
 
   ExpectedMotion motion_;

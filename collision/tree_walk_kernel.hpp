@@ -8,6 +8,8 @@
 namespace wrenchd::walk {
 namespace {
 
+static_assert(kWidth == TriangleTree::kWidth);
+
 WRENCHD_INLINE float magnitude(float x) noexcept {
   return x < 0.0F ? -x : x;
 }

@@ -50,6 +50,12 @@ Quaterniond rotation_from(const Vector3d& w) noexcept;
 /// Axis times angle of a unit quaternion [rad], at most pi long: the rotational half of log().
 Vector3d rotation_vector(const Quaterniond& R) noexcept;
 
+/// The same for a turn that is far from half a turn, without a trigonometric function: axis times
+/// 2 sin(angle/2), short by angle^3 / 24 and less.
+inline Vector3d small_rotation_vector(const Quaterniond& R) noexcept {
+  return (R.w() < 0.0 ? -2.0 : 2.0) * R.vec();
+}
+
 /// The 6x6 adjoint transformation of section 2.4, acting on [v; w]:
 ///
 ///   Ad_p = [ R  d^R ]

@@ -141,6 +141,18 @@ TEST_CASE("log never turns by more than half a turn, whichever sign the quaterni
   }
 }
 
+TEST_CASE("of a small turn no trigonometry is needed", "[pose]") {
+  RandomValues random(12);
+  for (int n = 0; n < 1000; ++n) {
+    const double angle = random.decades(1e-9, 0.5);
+    Quaterniond turn = rotation_from(angle * random.unit<3>());
+    if (random.chance(0.5)) turn.coeffs() *= -1.0;
+    const Vector3d exact = rotation_vector(turn), small = small_rotation_vector(turn);
+    CHECK(small.norm() <= exact.norm() * (1.0 + 1e-14));
+    CHECK((small - exact).norm() <= std::pow(angle, 3) / 24.0 + 1e-14 * angle);
+  }
+}
+
 TEST_CASE("exp is the matrix exponential", "[pose]") {
   RandomValues random(8);
   for (int i = 0; i < 5'000; ++i) {
