@@ -18,7 +18,9 @@ std::string to_lines(const std::vector<Refusal>& refusals) {
 }
 
 bool earlier(const Refusal& a, const Refusal& b) {
-  return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+  const bool a_inherited = a.place.file != nullptr, b_inherited = b.place.file != nullptr;
+  return std::tie(a_inherited, a.place.line, a.place.column) <
+         std::tie(b_inherited, b.place.line, b.place.column);
 }
 
 }  // namespace
@@ -45,7 +47,8 @@ ConfigError::ConfigError(std::filesystem::path file, Place place, std::string me
     : ConfigError(std::vector<Refusal>{{std::move(file), place, std::move(message)}}) {}
 
 void RefusalList::add(Place place, std::string message) {
-  refusals_.push_back({file_, place, std::move(message)});
+  const std::filesystem::path& file = place.file ? *place.file : file_;
+  refusals_.push_back({file, std::move(place), std::move(message)});
 }
 
 void RefusalList::throw_if_any() {

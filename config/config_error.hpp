@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@ namespace wrenchd {
 struct Place {
   unsigned line = 0;
   unsigned column = 0;
+  std::shared_ptr<const std::filesystem::path> file =
+      nullptr;  ///< where it is not the one being read: a parent
 };
 
 /// One thing wrong with a file: where, what was expected, what was found, and the cure.

@@ -1,41 +1,241 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "config/load_profile.hpp"
 
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "config/inherited_toml.hpp"
+#include "config/load_kinematics.hpp"
 #include "config/load_report_layout.hpp"
+#include "config/report_bytes.hpp"
 #include "config/toml_reader.hpp"
 
 namespace wrenchd {
 namespace {
 
+/// What the rest of a profile must know before it is read.
+struct Shape {
+  bool output = true;
+  bool torque = true;
+};
+
 /// Mandatory, every one: nobody but the maker knows what a device and the hand on it can bear.
-void read_limits(TomlTable& table, DeviceProfile& p) {
-  table.mandatory("max_force_N").number(p.max_force_N, {0.01, 200});
-  table.mandatory("max_torque_Nm").number(p.max_torque_Nm, {0.001, 20});
+void read_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
+  const TomlValue force = shape.output ? table.mandatory("max_force_N") : table.optional("max_force_N");
+  const TomlValue torque = shape.torque ? table.mandatory("max_torque_Nm") : table.optional("max_torque_Nm");
+  if (shape.output)
+    force.number(p.max_force_N, {0.01, 200});
+  else if (force)
+    force.refuse("the device takes no force: there is no wrench_report; leave it out");
+  if (shape.torque)
+    torque.number(p.max_torque_Nm, {0.001, 20});
+  else if (torque)
+    torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
+  if (!shape.output) p.max_force_N = 0.0;
+  if (!shape.torque) p.max_torque_Nm = 0.0;
   table.mandatory("max_linear_speed_m_per_s").number(p.max_linear_speed_m_per_s, {0.01, 10});
   table.mandatory("max_angular_speed_rad_per_s").number(p.max_angular_speed_rad_per_s, {0.1, 100});
+}
+
+void read_closed_loop(TomlTable& table, DeviceProfile& p) {
+  table.optional("damping_N_s_per_m").number(p.damping_N_s_per_m, {0, 1000});
+  table.optional("damping_Nm_s_per_rad").number(p.damping_Nm_s_per_rad, {0, 100});
+  table.optional("max_stiffness_N_per_m").number(p.max_stiffness_N_per_m, {1, 1e6});
+  table.optional("max_stiffness_Nm_per_rad").number(p.max_stiffness_Nm_per_rad, {1e-3, 1e4});
+}
+
+// --- which device -----------------------------------------------------------------------------------------
+
+/// "046d:c626": two numbers of four hexadecimal digits.
+std::optional<UsbId> usb_id(const std::string& text) {
+  if (text.size() != 9 || text[4] != ':') return {};
+  const auto number = [&](std::size_t at, std::uint16_t& out) {
+    const char* begin = text.data() + at;
+    const auto [end, error] = std::from_chars(begin, begin + 4, out, 16);
+    return error == std::errc() && end == begin + 4;
+  };
+  UsbId id;
+  if (!number(0, id.vendor) || !number(5, id.product)) return {};
+  return id;
+}
+
+void read_usb_ids(const TomlValue& list, std::vector<UsbId>& ids) {
+  for (const TomlValue& element : list.elements("an array of ids, as in [\"046d:c626\"]")) {
+    std::string text;
+    if (!element.text(text)) continue;
+    if (const auto id = usb_id(text))
+      ids.push_back(*id);
+    else
+      element.refuse_found("vendor and product as four hexadecimal digits each, as in \"046d:c626\"");
+  }
+}
+
+void read_id16(const TomlValue& value, std::optional<std::uint16_t>& out) {
+  std::uint16_t number = 0;
+  if (value.integer(number, {0, 65535})) out = number;
+}
+
+void read_match(TomlTable& table, DeviceMatch& match) {
+  const TomlValue usb = table.optional("usb");
+  const TomlValue by_layout = table.optional("usb_by_layout");
+  read_usb_ids(usb, match.usb);
+  read_usb_ids(by_layout, match.usb_by_layout);
+  if (!usb && !by_layout) usb.refuse("is missing; name at least one device, as in usb = [\"046d:c626\"]");
+  if (usb.is_array() && match.usb.empty() && !by_layout && usb.elements("").empty())
+    usb.refuse("is empty; name at least one device, as in usb = [\"046d:c626\"]");
+  table.optional("serial").text(match.serial);
+  table.optional("only_when_named").boolean(match.only_when_named);
+  const TomlValue page = table.optional("usage_page");
+  read_id16(page, match.usage_page);
+  const TomlValue usage = table.optional("usage");
+  read_id16(usage, match.usage);
+  if (usage && !page) usage.refuse("means nothing without usage_page; state both");
+}
+
+void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
+  table.optional("interface").integer(endpoints.interface, {0, 31});
+  table.mandatory("in").integer(endpoints.in, {0x81, 0x8f});
+  table.mandatory("out").integer(endpoints.out, {0x01, 0x0f});
+  table.optional("prefix_bytes").integer(endpoints.prefix_bytes, {0, 8});
+}
+
+// --- frames -----------------------------------------------------------------------------------------------
+
+/// "x", "-y" and so on: a row of a rotation between axes that lie along each other.
+bool read_axis(const TomlValue& value, Vector3d& axis) {
+  Vector3d chosen = Vector3d::Zero();
+  struct Named {
+    std::string_view name;
+    Vector3d axis;
+  };
+  const bool good = value.choice(chosen, {{"x", Vector3d::UnitX()},
+                                          {"y", Vector3d::UnitY()},
+                                          {"z", Vector3d::UnitZ()},
+                                          {"-x", Vector3d(-Vector3d::UnitX())},
+                                          {"-y", Vector3d(-Vector3d::UnitY())},
+                                          {"-z", Vector3d(-Vector3d::UnitZ())}});
+  if (good) axis = chosen;
+  return good;
+}
+
+void read_frames(TomlTable& table, DeviceProfile& p) {
+  const TomlValue axes = table.optional("base_axes");
+  const auto rows = axes.elements("an array of three axes, as in [\"-y\", \"-x\", \"-z\"]");
+  Matrix3d R = Matrix3d::Identity();
+  bool good = rows.size() == 3;
+  if (axes.is_array() && !good) axes.refuse_found("three axes, as in [\"-y\", \"-x\", \"-z\"]");
+  for (std::size_t i = 0; i < rows.size() && i < 3; ++i) {
+    Vector3d row;
+    if (read_axis(rows[i], row))
+      R.row(static_cast<Eigen::Index>(i)) = row;
+    else
+      good = false;
+  }
+  if (good && std::abs(R.determinant() - 1.0) > 0.5)
+    axes.refuse(
+        "the axes are not right-handed, or one is used twice; x forward, y left and z up, each named by an "
+        "axis "
+        "of the device");
+  else if (good)
+    p.X_BD.rotation = Quaterniond(R);
+  table.optional("base_origin_m").vector(p.X_BD.translation_m, {-2, 2});
+  table.optional("handle_position_m").vector(p.X_EH.translation_m, {-1, 1});
+  Vector3d turn = Vector3d::Zero();
+  if (table.optional("handle_rotation_vector_rad").vector(turn, {-3.2, 3.2}))
+    p.X_EH.rotation = rotation_from(turn);
+}
+
+// --- the rest ---------------------------------------------------------------------------------------------
+
+void read_deflection(TomlTable& table, DeviceProfile& p) {
+  Deflection d;
+  table.optional("mode").choice(d.mode,
+                                {{"rate", Deflection::Mode::rate}, {"position", Deflection::Mode::position}});
+  table.mandatory("linear_gain").number(d.linear_gain, {1e-3, 1e6});
+  table.mandatory("angular_gain").number(d.angular_gain, {1e-3, 1e6});
+  table.optional("reach_m").number(d.reach_m, {1e-3, 10});
+  p.deflection = d;
+}
+
+void read_fixed_report(TomlTable& table, FixedReport& report) {
+  read_bytes(table.mandatory("bytes"), report.bytes);
+}
+
+void read_keep_alive(TomlTable& table, DeviceProfile& p) {
+  read_bytes(table.mandatory("bytes"), p.keep_alive.bytes);
+  table.mandatory("period_s").number(p.keep_alive_period_s, {0.001, 60});
+}
+
+void read_more_reports(const TomlValue& list, DeviceProfile& p) {
+  constexpr std::size_t kMost = 16;
+  const auto reports = list.elements("tables, each headed [[more_reports]]");
+  if (reports.size() > kMost) list.refuse("has more than 16 reports; name only those that matter");
+  for (const TomlValue& report : reports) {
+    PoseReportLayout& layout = p.more_reports.emplace_back();
+    report.table(read_more_report, layout, p);
+  }
 }
 
 void read_profile(TomlTable& table, DeviceProfile& p) {
   const TomlValue name = table.mandatory("name");
   if (name.text(p.name) && p.name.empty()) name.refuse("must not be empty; status and records show it");
   table.optional("description").text(p.description);
-  table.mandatory("transport").choice(p.transport, {{"loopback", std::string("loopback")}});
+  table.mandatory("transport")
+      .choice(
+          p.transport,
+          {{"loopback", Transport::loopback}, {"hidraw", Transport::hidraw}, {"libusb", Transport::libusb}});
   table.mandatory("report_rate_Hz").number(p.report_rate_Hz, {10, 8000});
-  table.mandatory("watchdog_s").number(p.watchdog_s, {0.001, 2});
+  table.optional("stream").choice(p.stream, {{"free_running", StreamStyle::free_running},
+                                             {"lock_step", StreamStyle::lock_step},
+                                             {"silent_at_rest", StreamStyle::silent_at_rest}});
+  const TomlValue wrench_report = table.mandatory("wrench_report");
+  const Shape shape = {!wrench_report.is_text("none"),
+                       !wrench_report.is_text("none") && !wrench_report.holds("efforts") &&
+                           (!wrench_report.is_table() || !wrench_report.says_none("torque"))};
+  p.has_output = shape.output;
+  const TomlValue watchdog = shape.output ? table.mandatory("watchdog_s") : table.optional("watchdog_s");
+  if (!shape.output && watchdog)
+    watchdog.refuse("the device has no motors: there is no wrench_report; leave it out");
+  else if (!watchdog.is_text("none"))
+    watchdog.number(p.watchdog_s, {0.001, 2});
   table.optional("stale_fault_s").number(p.stale_fault_s, {0.001, 1});
   table.optional("wrench_point")
       .choice(p.wrench_point, {{"handle", WrenchPoint::handle}, {"world_origin", WrenchPoint::world_origin}});
 
-  table.mandatory("limits").table(read_limits, p);
-  table.mandatory("pose_report").table(read_pose_report, p);
-  table.mandatory("wrench_report").table(read_wrench_report, p);
+  const TomlValue match =
+      p.transport == Transport::loopback ? table.optional("match") : table.mandatory("match");
+  match.table(read_match, p.match);
+  const TomlValue endpoints =
+      p.transport == Transport::libusb ? table.mandatory("endpoints") : table.optional("endpoints");
+  endpoints.table(read_endpoints, p.endpoints);
+  if (endpoints && p.transport != Transport::libusb)
+    endpoints.refuse("only transport = \"libusb\" speaks to endpoints; choose it, or leave this out");
+  table.optional("frames").table(read_frames, p);
+  table.mandatory("limits").table(read_limits, p, shape);
+  table.optional("closed_loop").table(read_closed_loop, p);
+  table.optional("deflection").table(read_deflection, p);
+  table.optional("kinematics").table(read_kinematics, p.kinematics);
+  const TomlValue pose_report = table.mandatory("pose_report");
+  pose_report.table(read_pose_report, p, pose_report);
+  const TomlValue more_reports = table.optional("more_reports");
+  read_more_reports(more_reports, p);
+  if (shape.output) wrench_report.table(read_wrench_report, p, wrench_report);
+  table.optional("shutdown").table(read_fixed_report, p.shutdown);
+  table.optional("calibration").table(read_fixed_report, p.calibration);
+  const TomlValue keep_alive = table.optional("keep_alive");
+  keep_alive.table(read_keep_alive, p);
+  if (keep_alive && p.stream == StreamStyle::lock_step)
+    keep_alive.refuse("a lock-step device is spoken to all the time; leave it out");
+  check_pose_parts(pose_report, p);
+  check_told_apart(pose_report, more_reports, p);
 }
 
 }  // namespace
 
-DeviceProfile load_profile(const std::filesystem::path& file) {
+DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search) {
   DeviceProfile profile;
-  read_toml(file, read_profile, profile);
+  read_toml_node(file, read_inherited(file, search), read_profile, profile);
   return profile;
 }
 

@@ -4,11 +4,13 @@
 #include <filesystem>
 
 #include "config/config_error.hpp"
+#include "config/search_path.hpp"
 #include "core/device_profile.hpp"
 
 namespace wrenchd {
 
-/// Reads a device profile; config/profiles/example.toml is the manual of the format. Throws ConfigError.
-DeviceProfile load_profile(const std::filesystem::path& file);
+/// Reads a device profile, and those it inherits along the search path; config/profiles/example.toml is the
+/// manual of the format. Throws ConfigError.
+DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search = SearchPath());
 
 }  // namespace wrenchd

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "config/search_path.hpp"
 
+#include <map>
 #include <utility>
 
 #include "config/config_error.hpp"
@@ -46,6 +47,21 @@ std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in
 
 fs::path profile_file(const std::string& name) {
   return name.ends_with(".toml") ? fs::path(name) : fs::path("profiles") / (name + ".toml");
+}
+
+std::vector<fs::path> profile_files(const SearchPath& search) {
+  std::map<fs::path, fs::path> by_name;
+  for (const fs::path& directory : search.directories()) {
+    std::error_code error;
+    for (fs::directory_iterator entry(directory / "profiles", error), end; !error && entry != end;
+         entry.increment(error)) {
+      if (entry->path().extension() == ".toml") by_name.emplace(entry->path().filename(), entry->path());
+    }
+  }
+  std::vector<fs::path> files;
+  files.reserve(by_name.size());
+  for (const auto& [name, file] : by_name) files.push_back(file);
+  return files;
 }
 
 }  // namespace wrenchd

@@ -24,6 +24,8 @@ class SearchPath {
   /// Every place where NAME may be, in order. named_in: the file that holds the name, if one does.
   std::vector<std::filesystem::path> candidates(const std::filesystem::path& name,
                                                 const std::filesystem::path& named_in = {}) const;
+  /// Those directories, in order.
+  const std::vector<std::filesystem::path>& directories() const noexcept { return directories_; }
   /// The first candidate that is there.
   std::optional<std::filesystem::path> find(const std::filesystem::path& name,
                                             const std::filesystem::path& named_in = {}) const;
@@ -38,5 +40,9 @@ class SearchPath {
 
 /// "loopback" is profiles/loopback.toml; a name that ends in .toml is a file as it stands.
 std::filesystem::path profile_file(const std::string& name);
+
+/// Every profile there is: profiles/*.toml of all directories. Of two with the same name the one in the
+/// earlier directory counts, as for find(). Sorted by name. What cannot be listed is passed over.
+std::vector<std::filesystem::path> profile_files(const SearchPath& search);
 
 }  // namespace wrenchd

@@ -116,7 +116,10 @@ std::string syntax_message(std::string_view description) {
 }  // namespace
 
 TomlNode read_toml_file(const fs::path& file) {
-  const std::string text = read_text(file);
+  return read_toml_text(read_text(file), file);
+}
+
+TomlNode read_toml_text(const std::string& text, const fs::path& file) {
   refuse_many_dots(file, text);
   try {
     return convert(file, toml::parse(std::string_view(text)), 0);

@@ -34,6 +34,8 @@ struct TomlEntry {
 /// Reads FILE. The root is a table at 1:1. Throws ConfigError when there is no such file, when it is not a
 /// regular file, is unreasonably large or deeply nested, or is not valid UTF-8 or TOML.
 TomlNode read_toml_file(const std::filesystem::path& file);
+/// The same of text that was read already; `file` is for messages.
+TomlNode read_toml_text(const std::string& text, const std::filesystem::path& file);
 
 /// What a node is, for messages: `the number 9000`, `a table`.
 std::string describe(const TomlNode& node);

@@ -39,6 +39,27 @@ bool TomlValue::is_array() const noexcept {
   return node_ && std::holds_alternative<TomlNode::Array>(node_->value);
 }
 
+bool TomlValue::is_text(std::string_view text) const noexcept {
+  const auto* s = node_ ? std::get_if<std::string>(&node_->value) : nullptr;
+  return s && *s == text;
+}
+
+bool TomlValue::holds(std::string_view key) const noexcept {
+  const auto* table = node_ ? std::get_if<TomlNode::Table>(&node_->value) : nullptr;
+  if (!table) return false;
+  const auto has_key = [&](const TomlEntry& entry) { return entry.key == key; };
+  return std::any_of(table->begin(), table->end(), has_key) && !says_none(key);
+}
+
+bool TomlValue::says_none(std::string_view key) const noexcept {
+  const auto* table = node_ ? std::get_if<TomlNode::Table>(&node_->value) : nullptr;
+  if (!table) return false;
+  return std::any_of(table->begin(), table->end(), [&](const TomlEntry& entry) {
+    const auto* s = std::get_if<std::string>(&entry.node.value);
+    return entry.key == key && s && *s == "none";
+  });
+}
+
 std::string TomlValue::with_unit(double x) const {
   return to_text(x) + (unit_.empty() ? "" : " " + readable_unit(unit_));
 }

@@ -31,11 +31,21 @@ struct Range {
 class TomlValue {
  public:
   TomlValue(RefusalList& refusals, const TomlNode* node, Place place, std::string name, std::string unit)
-      : refusals_(&refusals), node_(node), place_(place), name_(std::move(name)), unit_(std::move(unit)) {}
+      : refusals_(&refusals),
+        node_(node),
+        place_(std::move(place)),
+        name_(std::move(name)),
+        unit_(std::move(unit)) {}
 
   explicit operator bool() const noexcept { return node_ != nullptr; }
   bool is_table() const noexcept;
   bool is_array() const noexcept;
+  /// Is it this very text? "none" stands for something a device does not have.
+  bool is_text(std::string_view text) const noexcept;
+  /// Does the table hold this key, with anything but the text "none"?
+  bool holds(std::string_view key) const noexcept;
+  /// Does the table hold this key with the text "none"?
+  bool says_none(std::string_view key) const noexcept;
   const std::string& name() const noexcept { return name_; }  ///< dotted, as in "obstacle[0].half_space"
 
   bool number(double& out, Range range) const;  ///< an integer will do
@@ -112,15 +122,27 @@ class TomlTable {
   std::vector<MissingKey> missing_;
 };
 
-/// Reads FILE through read(TomlTable&, args...). Throws one ConfigError that tells everything wrong with it.
+/// Reads a root table, which stands in FILE, through read(TomlTable&, args...). Throws one ConfigError that
+/// tells everything wrong with it.
 template <typename Read, typename... Args>
-void read_toml(const std::filesystem::path& file, Read read, Args&&... args) {
-  const TomlNode node = read_toml_file(file);
+void read_toml_node(const std::filesystem::path& file, const TomlNode& node, Read read, Args&&... args) {
   RefusalList refusals(file);
   TomlTable root(refusals, node, "");
   read(root, args...);
   root.close();
   refusals.throw_if_any();
+}
+
+/// The same of FILE as it is.
+template <typename Read, typename... Args>
+void read_toml(const std::filesystem::path& file, Read read, Args&&... args) {
+  read_toml_node(file, read_toml_file(file), read, args...);
+}
+
+/// The same of text that was read already; `file` is for messages.
+template <typename Read, typename... Args>
+void read_toml_text(const std::string& text, const std::filesystem::path& file, Read read, Args&&... args) {
+  read_toml_node(file, read_toml_text(text, file), read, args...);
 }
 
 template <std::integral T>

@@ -39,6 +39,7 @@ ServoLoop* loop_to_release = nullptr;  ///< for std::terminate only
 
 struct Options {
   PlanFiles files;
+  std::string simulate;
   std::string realtime;
   std::string record;
   double seconds = 0.0;
@@ -66,6 +67,10 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--profile", options.files.profile,
                  "device profile, instead of the one the configuration names")
       ->check(not_empty());
+  app.add_option("--simulate", options.simulate,
+                 "a simulated device that speaks as this profile says, in place of a real one")
+      ->check(not_empty())
+      ->excludes("--profile");
   app.add_option("--realtime", options.realtime, "instead of the configuration's: required, best_effort, off")
       ->check(CLI::IsMember({"required", "best_effort", "off"}));
   app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)")
@@ -82,7 +87,14 @@ void describe(CLI::App& app, Options& options) {
 
 /// The command line on top of the configuration.
 Plan plan_of(const Options& options) {
-  Plan plan = read_plan(options.files, SearchPath());
+  PlanFiles files = options.files;
+  if (!options.simulate.empty()) files.profile = options.simulate;
+  Plan plan = read_plan(files, SearchPath());
+  if (options.simulate.empty() && plan.profile.transport != Transport::loopback)
+    throw std::runtime_error("device profile " + plan.profile.name + ": its reports travel by " +
+                             text(plan.profile.transport) +
+                             ", which wrenchd does not drive yet; try the profile with --simulate " +
+                             plan.profile.name + ", or choose one whose transport is loopback");
   if (options.realtime == "required") plan.settings.servo.realtime = Realtime::required;
   if (options.realtime == "best_effort") plan.settings.servo.realtime = Realtime::best_effort;
   if (options.realtime == "off" || options.virtual_time) plan.settings.servo.realtime = Realtime::off;

@@ -45,7 +45,7 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
     plan.settings.device.profile = files.profile;
     plan.settings.device.profile_file = named_on_command_line(profile_file(files.profile), search);
   }
-  plan.profile = load_profile(plan.settings.device.profile_file);
+  plan.profile = load_profile(plan.settings.device.profile_file, search);
   plan.scene = load_scene(plan.settings.scene);
   return plan;
 }

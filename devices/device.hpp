@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/clock.hpp"
+#include "core/device_profile.hpp"
 #include "core/fault.hpp"
 #include "core/spatial.hpp"
 
@@ -25,6 +26,10 @@ struct DeviceSample {
   bool fresh = false;         ///< a new report arrived since the last read
   bool motors_on = false;
   bool watchdog_tripped = false;
+  bool homed = true;          ///< the encoders know where they are; until then no sample is fresh
+  DofMask sensed = kAllDofs;  ///< whose motion the device reports; it stays put along the others
+  DofMask driven = kAllDofs;  ///< along which its motors push
+  DofMask dropped = kNoDof;   ///< components of the last wrench that were not 0 and have no motor
   Fault fault = Fault::none;  ///< what is wrong with it; the pose is the last good one then
 };
 

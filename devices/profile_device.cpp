@@ -29,16 +29,19 @@ constexpr double kEncoderStep_rad = 2e-3;
 /// Samples over speed before it counts: one may be a glitch.
 constexpr int kFastSamples = 2;
 
+/// The largest value of a counter.
+std::uint64_t largest(const ReportField& field) noexcept {
+  return field.bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << field.bits) - 1;
+}
+
 /// How far a counter has moved on, modulo its width; 0 where the device has none.
-std::uint64_t ahead(const ReportField& field, std::uint32_t from, std::uint32_t to) noexcept {
-  if (!field.present) return 0;
-  const std::uint64_t span = std::uint64_t{1} << field.bits;
-  return (span + to - from) % span;
+std::uint64_t ahead(const ReportField& field, std::uint64_t from, std::uint64_t to) noexcept {
+  return field.present ? (to - from) & largest(field) : 0;
 }
 
 /// The farthest move that is one forward and not one back.
 std::uint64_t half_way(const ReportField& field) noexcept {
-  return field.present ? (std::uint64_t{1} << (field.bits - 1)) - 1 : 1;
+  return field.present ? largest(field) >> 1 : 1;
 }
 
 /// Cut to a length, direction kept, with room for the rounding of three components to counts of `step`.
@@ -58,17 +61,33 @@ void check_number(const DeviceProfile& profile, const char* key, double value) {
 }
 
 void check_profile(const DeviceProfile& profile) {
-  check_number(profile, "max_force_N", profile.max_force_N);
-  check_number(profile, "max_torque_Nm", profile.max_torque_Nm);
+  if (profile.has_output) {
+    check_number(profile, "max_force_N", profile.max_force_N);
+    if (profile.wrench_report.torque.present || !(profile.max_torque_Nm == 0.0))
+      check_number(profile, "max_torque_Nm", profile.max_torque_Nm);
+  }
   check_number(profile, "max_linear_speed_m_per_s", profile.max_linear_speed_m_per_s);
   check_number(profile, "max_angular_speed_rad_per_s", profile.max_angular_speed_rad_per_s);
   check_number(profile, "stale_fault_s", profile.stale_fault_s);
   try {
-    check(profile.pose_report);
-    check(profile.wrench_report);
+    check_reports(profile);
   } catch (const std::invalid_argument& e) {
     refuse(profile, e.what());
   }
+}
+
+bool carries_pose(const PoseReportLayout& layout) noexcept {
+  return layout.position.present || layout.orientation.present || layout.joints.present;
+}
+
+/// Components of a wrench that are not zero.
+DofMask components(const Wrench& F) noexcept {
+  unsigned dofs = 0;
+  for (unsigned i = 0; i < 3; ++i) {
+    if (F.force_N[i] != 0.0) dofs |= 1u << i;
+    if (F.torque_Nm[i] != 0.0) dofs |= 8u << i;
+  }
+  return static_cast<DofMask>(dofs);
 }
 
 }  // namespace
@@ -79,12 +98,27 @@ ProfileDevice::ProfileDevice(DeviceProfile profile, ReportLink& link)
 void ProfileDevice::open() {
   check_profile(profile_);
   link_.open();
+  same_frames_ = same_bits(profile_.X_BD, {}) && same_bits(profile_.X_EH, {});
+  clock_ = acknowledging_ = nullptr;
+  pose_layouts_ = 0;
+  for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
+    const PoseReportLayout& report = *layout(i);
+    if (report.device_time.present) clock_ = &report.device_time;
+    if (report.acknowledged.present) acknowledging_ = &report.acknowledged;
+    if (carries_pose(report)) pose_layouts_ |= std::uint64_t{1} << i;
+  }
   sample_ = {};
+  state_ = {};
+  deflection_.reset();
+  if (profile_.deflection)
+    deflection_.emplace(*profile_.deflection, profile_.max_linear_speed_m_per_s,
+                        profile_.max_angular_speed_rad_per_s);
   silent_since_.reset();
   reported_.reset();
   acknowledged_.reset();
   sent_before_open_ = commands_sent_;
-  heard_ = gone_ = false;
+  heard_ = gone_ = placed_ = false;
+  heard_layouts_ = 0;
   fast_samples_ = 0;
   open_ = true;
 }
@@ -92,6 +126,10 @@ void ProfileDevice::open() {
 void ProfileDevice::close() noexcept {
   open_ = false;
   link_.close();
+}
+
+const PoseReportLayout* ProfileDevice::layout(std::size_t index) const noexcept {
+  return index == 0 ? &profile_.pose_report : &profile_.more_reports[index - 1];
 }
 
 // --- reading ----------------------------------------------------------------------------------------------
@@ -105,11 +143,13 @@ DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
   } else if (const std::optional<Arrival> newest = drain(now); newest && !gone_) {
     take(*newest);
   }
+  if (deflection_ && open_ && !gone_) follow_deflection(now);
   if (gone_ || !open_) {
     sample_.fault = Fault::device_lost;
   } else if (sample_.fault == Fault::none && silent_too_long(now)) {
     sample_.fault = Fault::sample_stale;
   }
+  kick(now);
   return sample_;
 }
 
@@ -117,37 +157,84 @@ DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
 void ProfileDevice::start(TimePoint now) noexcept {
   drain(now);
   sample_ = {};
+  sample_.sensed = sensed_dofs(profile_);
+  sample_.driven = driven_dofs(profile_);
   heard_ = false;
-  silent_since_ = now;
+  heard_layouts_ = 0;
+  state_ = {};
+  if (deflection_) deflection_->push(Vector3d::Zero(), Vector3d::Zero());
+  silent_since_ = deflected_at_ = now;
+  kicked_at_ = now - kKickAfter;  // a lock-step device is spoken to at once
 }
 
+/// Speaks to a device that needs it: a lock-step one that has lost count of the conversation, or never heard
+/// its beginning, and one that wants to be kept alive.
+void ProfileDevice::kick(TimePoint now) noexcept {
+  const bool lock_step = profile_.stream == StreamStyle::lock_step;
+  if (!open_ || gone_ || (!lock_step && profile_.keep_alive.bytes.empty())) return;
+  if (now - kicked_at_ < (lock_step ? kKickAfter : from_seconds(profile_.keep_alive_period_s))) return;
+  kicked_at_ = now;
+  if (!lock_step)
+    hand_over(now, profile_.keep_alive.bytes);
+  else if (!heard_ || now - *silent_since_ >= kKickAfter)
+    send(now, {}, false);
+}
+
+/// Silence after a report of rest is what a device does that is silent at rest.
 bool ProfileDevice::silent_too_long(TimePoint now) const noexcept {
+  if (profile_.stream == StreamStyle::silent_at_rest && (!deflection_ || deflection_->at_rest()))
+    return false;
   return silent_since_ && now - *silent_since_ > from_seconds(profile_.stale_fault_s);
 }
 
 std::optional<ProfileDevice::Arrival> ProfileDevice::drain(TimePoint now) noexcept {
   std::optional<Arrival> newest;
   std::array<std::uint8_t, kMaxReportBytes> buffer;
+  read_layouts_ = 0;
   for (int i = 0; i < kMostReportsPerRead && !gone_ && open_; ++i) {
     const LinkRead read = link_.read(now, buffer);
     gone_ = read.status == LinkStatus::gone;
     if (read.status != LinkStatus::ok) break;
     const auto bytes = std::span<const std::uint8_t>(buffer).first(std::min(read.length, buffer.size()));
-    const auto [outcome, report] = decode(profile_.pose_report, bytes);
-    if (read.length > buffer.size() || outcome != Decoding::ok || !count_in(report, read.arrived)) {
+    const PoseReportLayout* known = nullptr;
+    if (read.length <= buffer.size()) known = understand(bytes, read.arrived);
+    if (known == nullptr) {
       ++sample_.rejected;
       continue;
     }
-    if (newest) ++sample_.skipped;
-    newest = Arrival{report, read.arrived};
+    newest = Arrival{known, read.arrived};
   }
   return newest;
 }
 
+/// The layout that this report has, and its content in state_. A report of a kind that came before in this
+/// read makes the earlier one one that was skipped.
+const PoseReportLayout* ProfileDevice::understand(std::span<const std::uint8_t> bytes,
+                                                  TimePoint arrived) noexcept {
+  for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
+    const PoseReportLayout& known = *layout(i);
+    PoseReport report = state_;
+    if (decode_into(known, bytes, report) != Decoding::ok) continue;
+    if (!count_in(known, report, arrived)) return nullptr;
+    if (deflection_ && (known.translation.present || known.rotation.present)) {
+      follow_deflection(arrived);
+      const Quaterniond& R_BD = profile_.X_BD.rotation;
+      deflection_->push(R_BD * report.translation_m, R_BD * report.rotation_rad);
+    }
+    state_ = report;
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    if ((read_layouts_ & bit) != 0) ++sample_.skipped;
+    read_layouts_ |= bit;
+    heard_layouts_ |= bit;
+    return &known;
+  }
+  return nullptr;
+}
+
 /// Follows the counters. False for a repetition, or a step back: more than half way round. After a silence
 /// that is a fault by itself the counters may be anywhere, so then a step back is a new start.
-bool ProfileDevice::count_in(const PoseReport& report, TimePoint arrived) noexcept {
-  const PoseReportLayout& layout = profile_.pose_report;
+bool ProfileDevice::count_in(const PoseReportLayout& layout, const PoseReport& report,
+                             TimePoint arrived) noexcept {
   const bool after_silence = silent_too_long(arrived);
   if (heard_) {
     const std::uint64_t reports =
@@ -174,14 +261,23 @@ bool ProfileDevice::count_in(const PoseReport& report, TimePoint arrived) noexce
 }
 
 void ProfileDevice::take(const Arrival& newest) noexcept {
-  const PoseReport& report = newest.report;
-  pass_time(newest.arrived);
-  note_acknowledged(report.acknowledged);
+  pass_time(newest);
+  note_acknowledged();
+  without_button(profile_.kinematics, state_.joints, state_.buttons);
+  sample_.buttons = state_.buttons;
+  if (newest.layout->motors_on.present) sample_.motors_on = state_.motors_on;
+  sample_.watchdog_tripped = state_.watchdog_tripped;
+  if (!state_.homed) reported_.reset();  // where the encoders begin to count is about to change
+  sample_.homed = state_.homed;
+  if (deflection_ || !state_.homed || (heard_layouts_ & pose_layouts_) != pose_layouts_ ||
+      (read_layouts_ & pose_layouts_) == 0) {
+    placed_ = placed_ && state_.homed;
+    return;
+  }
   sample_.fresh = true;
-  sample_.buttons = report.buttons;
-  sample_.motors_on = report.motors_on;
-  sample_.watchdog_tripped = report.watchdog_tripped;
-  const Fault fault = judge(report);
+  PoseReport report = state_;
+  Fault fault = make_pose(report);
+  if (fault == Fault::none) fault = judge(report);
   if (fault != Fault::none) {
     sample_.fault = fault;
     return;
@@ -190,32 +286,69 @@ void ProfileDevice::take(const Arrival& newest) noexcept {
   sample_.V_BH = report.V_BH;
 }
 
-/// Moves arrival and device time on to a new sample. A device without a clock lives by the host's.
-void ProfileDevice::pass_time(TimePoint arrived) noexcept {
-  const ReportField& field = profile_.pose_report.device_time;
-  if (field.present) {
-    sample_.device_time_s = field.step * static_cast<double>(device_ticks_);
-  } else if (sample_.arrived != TimePoint{}) {
-    sample_.device_time_s += seconds(arrived - sample_.arrived);
+Fault ProfileDevice::make_pose(PoseReport& report) noexcept {
+  const Kinematics& k = profile_.kinematics;
+  if (k.kind != Kinematics::Kind::none) {
+    angles_ = joint_angles(k, without_button(k, report.joints, report.buttons));
+    const std::optional<Pose> X_DE = forward(k, angles_, X_DE_);
+    placed_ = X_DE.has_value();
+    if (!X_DE) return Fault::pose_not_finite;
+    report.X_BH = X_DE_ = *X_DE;
+    J_ = jacobian(k, angles_, X_DE_);
   }
-  sample_.arrived = arrived;
+  if (same_frames_) return Fault::none;
+  const Quaterniond& R_BD = profile_.X_BD.rotation;
+  X_DE_ = report.X_BH;
+  const double norm = X_DE_.rotation.norm();
+  if (!is_finite(X_DE_) || norm == 0.0) return Fault::pose_not_a_rotation;
+  X_DE_.rotation.coeffs() /= norm;
+  report.X_BH = profile_.X_BD * X_DE_ * profile_.X_EH;
+  report.X_BH.rotation.coeffs() *= norm;  // judge() wants it as reported
+  report.V_BH = expressed(R_BD, shifted(report.V_BH, X_DE_.rotation * profile_.X_EH.translation_m));
+  return Fault::none;
+}
+
+/// The cap's pose goes on between reports, and is as of now.
+void ProfileDevice::follow_deflection(TimePoint now) noexcept {
+  if (now <= deflected_at_) return;
+  const bool lost = silent_too_long(now);
+  if (lost) deflection_->push(Vector3d::Zero(), Vector3d::Zero());
+  const double dt_s = seconds(now - deflected_at_);
+  deflection_->advance(dt_s);
+  deflected_at_ = now;
+  sample_.device_time_s += dt_s;
+  sample_.arrived = now;
+  sample_.fresh = true;
+  sample_.X_BH = deflection_->X_BH();
+  sample_.V_BH = deflection_->V_BH();
+  if (lost) sample_.fault = Fault::sample_stale;
+}
+
+/// Moves arrival and device time on to a new sample. A device without a clock lives by the host's.
+void ProfileDevice::pass_time(const Arrival& newest) noexcept {
+  if (deflection_) return;
+  if (clock_ != nullptr) {
+    sample_.device_time_s = clock_->step * static_cast<double>(device_ticks_);
+  } else if (sample_.arrived != TimePoint{}) {
+    sample_.device_time_s += seconds(newest.arrived - sample_.arrived);
+  }
+  sample_.arrived = newest.arrived;
 }
 
 /// The most time that can have passed since the last pose that was one [s]: a coarse clock must not make
 /// motion look fast. Never more than the time after which silence is a fault anyway.
 double ProfileDevice::elapsed_s() const noexcept {
-  const ReportField& field = profile_.pose_report.device_time;
-  const double one_tick_s = field.present ? field.step : 0.0;
+  const double one_tick_s = clock_ != nullptr ? clock_->step : 0.0;
   return std::min(sample_.device_time_s - reported_at_s_ + one_tick_s, profile_.stale_fault_s);
 }
 
 /// The newest command whose low bits the device names, if it was sent since open(). What the device names
 /// until it takes one of these is somebody else's.
-void ProfileDevice::note_acknowledged(std::uint32_t raw) noexcept {
-  const ReportField& field = profile_.pose_report.acknowledged;
-  if (!field.present || raw == acknowledged_) return;
+void ProfileDevice::note_acknowledged() noexcept {
+  const std::uint64_t raw = state_.acknowledged;
+  if (acknowledging_ == nullptr || raw == acknowledged_) return;
   acknowledged_ = raw;
-  const std::uint64_t behind = (commands_sent_ - raw) & ((std::uint64_t{1} << field.bits) - 1);
+  const std::uint64_t behind = (commands_sent_ - raw) & largest(*acknowledging_);
   if (behind < commands_sent_ - sent_before_open_) sample_.acknowledged = commands_sent_ - behind;
 }
 
@@ -254,27 +387,50 @@ Fault ProfileDevice::judge_motion(const PoseReport& report) noexcept {
 
 Fault ProfileDevice::write(TimePoint now, const Wrench& F, bool motors_on) noexcept {
   if (!is_finite(F)) {
+    sample_.dropped = kNoDof;
     send(now, {}, false);
     return Fault::wrench_not_finite;
   }
-  if (!motors_on) return send(now, {}, false);
-  return send(now,
-              {within(F.force_N, profile_.max_force_N, profile_.wrench_report.force.step),
-               within(F.torque_Nm, profile_.max_torque_Nm, profile_.wrench_report.torque.step)},
-              true);
+  sample_.dropped = motors_on ? static_cast<DofMask>(components(F) & ~driven_dofs(profile_)) : kNoDof;
+  if (!profile_.has_output) return open_ && !gone_ ? Fault::none : Fault::device_lost;
+  const bool lost = profile_.kinematics.kind != Kinematics::Kind::none && !placed_;
+  if (!motors_on || lost || !sample_.homed) return send(now, {}, false);
+  const double authority = profile_.watchdog_s > 0.0 ? 1.0 : kAuthorityWithoutWatchdog;
+  const WrenchReportLayout& report = profile_.wrench_report;
+  Wrench sent;
+  sent.force_N =
+      within(F.force_N, authority * profile_.max_force_N, report.force.present ? report.force.step : 0);
+  if (report.torque.present)
+    sent.torque_Nm = within(F.torque_Nm, authority * profile_.max_torque_Nm, report.torque.step);
+  return send(now, sent, true);
+}
+
+void ProfileDevice::put_wrench(const Wrench& F_B, WrenchReport& report) const noexcept {
+  report.F = F_B;
+  if (!same_frames_)
+    report.F = shifted(expressed(profile_.X_BD.rotation.conjugate(), F_B),
+                       -(X_DE_.rotation * profile_.X_EH.translation_m));
+  if (profile_.wrench_report.efforts.present)
+    report.efforts = motor_efforts(profile_.kinematics, J_, report.F.force_N);
 }
 
 Fault ProfileDevice::send(TimePoint now, const Wrench& F, bool motors_on) noexcept {
   if (!open_) return Fault::device_lost;
+  if (!profile_.has_output) return Fault::none;
   WrenchReport report;
-  report.F = F;
+  put_wrench(F, report);
   report.hold_time_s =
       std::max(profile_.watchdog_s, profile_.wrench_report.hold_time.step);  // 0 is "default"
-  report.sequence = static_cast<std::uint32_t>(++commands_sent_);
+  report.sequence = ++commands_sent_;
   report.enable = motors_on;
+  if (!profile_.pose_report.motors_on.present) sample_.motors_on = motors_on;
   std::array<std::uint8_t, kMaxReportBytes> buffer;
   const std::size_t length = encode(profile_.wrench_report, report, buffer);
-  switch (link_.write(now, std::span(buffer).first(length))) {
+  return hand_over(now, std::span(buffer).first(length));
+}
+
+Fault ProfileDevice::hand_over(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {
+  switch (link_.write(now, bytes)) {
     case LinkStatus::ok:
       return Fault::none;
     case LinkStatus::empty:
@@ -287,6 +443,7 @@ Fault ProfileDevice::send(TimePoint now, const Wrench& F, bool motors_on) noexce
 
 void ProfileDevice::release(TimePoint now) noexcept {
   for (int i = 0; i < kReleaseReports; ++i) send(now, {}, false);
+  if (open_ && !profile_.shutdown.bytes.empty()) hand_over(now, profile_.shutdown.bytes);
 }
 
 }  // namespace wrenchd

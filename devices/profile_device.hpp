@@ -4,16 +4,26 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "core/device_profile.hpp"
+#include "devices/deflection_pose.hpp"
 #include "devices/device.hpp"
+#include "devices/kinematics.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/report_link.hpp"
 
 namespace wrenchd {
 
 /// A device that its profile describes completely: bytes come and go over a link, the codec gives them
-/// meaning, and what is left here is judgement. Everything after open() is RT safe.
+/// meaning, kinematics or a deflection makes a pose of them where the device does not, and what is left here
+/// is judgement. Everything after open() is RT safe.
+///
+/// A device may have fewer than six degrees of freedom. Along those it does not sense it stays where it is,
+/// and of a wrench only what it has motors for is sent; DeviceSample tells which, and what was dropped.
+///
+/// A lock-step device speaks only when spoken to. It is sent zeros when it is opened, and again whenever it
+/// has been silent for kKickAfter.
 ///
 /// A fault stands in the sample of the read that found it. It is not latched here: who reads decides what
 /// follows, and a later good report reads as good.
@@ -24,6 +34,11 @@ class ProfileDevice final : public Device {
   static constexpr int kMostReportsPerRead = 64;
   /// Zero commands that release() sends, so that a lost one does not matter.
   static constexpr int kReleaseReports = 5;
+  /// Share of its limits that a device gets which has no watchdog of its own: nothing but the host frees the
+  /// hand then.
+  static constexpr double kAuthorityWithoutWatchdog = 0.25;
+  /// Silence of a lock-step device after which it is spoken to again.
+  static constexpr Duration kKickAfter = std::chrono::milliseconds(10);
 
   /// The link must outlive the device.
   ProfileDevice(DeviceProfile profile, ReportLink& link);
@@ -45,39 +60,65 @@ class ProfileDevice final : public Device {
 
  private:
   struct Arrival {
-    PoseReport report;
+    const PoseReportLayout* layout;
     TimePoint arrived;
   };
 
   void start(TimePoint now) noexcept;
-  /// Oldest to newest, counting. Empty where nothing good arrived.
+  /// Oldest to newest, counting, into state_. The newest; empty where nothing good arrived.
   std::optional<Arrival> drain(TimePoint now) noexcept;
-  bool count_in(const PoseReport& report, TimePoint arrived) noexcept;
+  const PoseReportLayout* layout(std::size_t index) const noexcept;
+  /// Takes a report into state_, or says why not.
+  const PoseReportLayout* understand(std::span<const std::uint8_t> bytes, TimePoint arrived) noexcept;
+  bool count_in(const PoseReportLayout& layout, const PoseReport& report, TimePoint arrived) noexcept;
   bool silent_too_long(TimePoint now) const noexcept;
   void take(const Arrival& newest) noexcept;
-  void pass_time(TimePoint arrived) noexcept;
+  void pass_time(const Arrival& newest) noexcept;
   double elapsed_s() const noexcept;
-  void note_acknowledged(std::uint32_t raw) noexcept;
+  void note_acknowledged() noexcept;
+  /// The pose the reports make, X_BH and V_BH; a fault where they make none.
+  Fault make_pose(PoseReport& report) noexcept;
   Fault judge(PoseReport report) noexcept;
   Fault judge_motion(const PoseReport& report) noexcept;
+  void follow_deflection(TimePoint now) noexcept;
+  void kick(TimePoint now) noexcept;
 
   Fault send(TimePoint now, const Wrench& F, bool motors_on) noexcept;
+  Fault hand_over(TimePoint now, std::span<const std::uint8_t> bytes) noexcept;
+  /// What the device is told for a wrench on the hand about H in B.
+  void put_wrench(const Wrench& F_B, WrenchReport& report) const noexcept;
 
   DeviceProfile profile_;
   ReportLink& link_;
   bool open_ = false;
   bool gone_ = false;
 
+  bool same_frames_ = true;             ///< D is B and E is H
+  std::uint64_t pose_layouts_ = 0;      ///< reports that carry a part of the pose, as bits; 0 is pose_report
+  const ReportField* clock_ = nullptr;  ///< of the device, where it has one
+  const ReportField* acknowledging_ = nullptr;
+
   DeviceSample sample_;                        ///< the last one given out
+  PoseReport state_;                           ///< what the reports said last, each for its part
+  std::uint64_t heard_layouts_ = 0;            ///< that came since open(), as bits
+  std::uint64_t read_layouts_ = 0;             ///< that came in this read
   bool heard_ = false;                         ///< a good report came since open()
   std::optional<TimePoint> silent_since_;      ///< arrival of the last good report, or the first read
-  std::uint32_t sequence_ = 0;                 ///< raw, of the last good report
-  std::uint32_t device_time_ = 0;              ///< raw, likewise
+  std::uint64_t sequence_ = 0;                 ///< raw, of the last good report
+  std::uint64_t device_time_ = 0;              ///< raw, likewise
   std::uint64_t device_ticks_ = 0;             ///< the same, unwrapped
-  std::optional<std::uint32_t> acknowledged_;  ///< raw, likewise
+  std::optional<std::uint64_t> acknowledged_;  ///< raw, likewise
   std::optional<Pose> reported_;               ///< last pose that was a pose, teleported or not
   double reported_at_s_ = 0.0;                 ///< device time of that pose
   int fast_samples_ = 0;                       ///< samples in a row that were over speed
+
+  JointAngles angles_{};           ///< of the last sample, where the device has joints
+  Pose X_DE_;                      ///< likewise
+  Matrix3d J_ = Matrix3d::Zero();  ///< at that place: what the motors are told is computed by it
+  bool placed_ = false;            ///< angles_, X_DE_ and J_ are those of a good sample
+  std::optional<DeflectionPose> deflection_;
+  TimePoint deflected_at_{};  ///< time the deflection has been followed to
+  TimePoint kicked_at_{};     ///< when a lock-step device was last spoken to
 
   std::uint64_t commands_sent_ = 0;  ///< also the unwrapped sequence of the last one
   std::uint64_t sent_before_open_ = 0;

@@ -53,7 +53,7 @@ DeviceProfile reference_profile() {
   DeviceProfile profile;
   profile.name = "loopback";
   profile.description = "Simulated 6-DOF device that speaks the wrenchd reference report layout, version 1";
-  profile.transport = "loopback";
+  profile.transport = Transport::loopback;
   profile.report_rate_Hz = 1000.0;
   profile.max_force_N = 10.0;
   profile.max_torque_Nm = 0.5;

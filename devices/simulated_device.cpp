@@ -36,7 +36,14 @@ Duration substep_of(const DeviceProfile& profile) {
   return Duration{std::max(std::llround(1e9 * report_period(profile) / substeps), 1LL)};
 }
 
+/// It has a handle with six degrees of freedom, and a firmware that sends whole poses and takes wrenches.
 const PoseReportLayout& checked(const DeviceProfile& profile) {
+  if (pose_source(profile) != PoseSource::pose || sensed_dofs(profile) != kAllDofs ||
+      driven_dofs(profile) != kAllDofs)
+    throw std::invalid_argument(
+        "device profile " + profile.name +
+        ": the simulated device sends whole poses and takes wrenches, this one does not; "
+        "choose a profile that inherits loopback");
   check(profile.pose_report);
   check(profile.wrench_report);
   return profile.pose_report;

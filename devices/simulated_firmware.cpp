@@ -18,12 +18,6 @@ Vector3d quantised(const Vector3d& v, double quantum) noexcept {
           quantum * std::round(v.z() / quantum)};
 }
 
-/// Rotation vector between two neighbouring samples; exact to third order.
-Vector3d small_turn(const Quaterniond& from, const Quaterniond& to) noexcept {
-  const Quaterniond turn = to * from.conjugate();
-  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
-}
-
 double default_hold(const DeviceProfile& profile) noexcept {
   return profile.watchdog_s > 0.0 ? profile.watchdog_s : SimulatedFirmware::kMaxHold_s;
 }
@@ -54,7 +48,7 @@ void SimulatedFirmware::settle(const Pose& X_BH) noexcept {
 void SimulatedFirmware::sample(const Pose& X_BH) noexcept {
   const Encoder next = read_encoders(X_BH);
   const Vector3d v = (next.position_m - encoder_.position_m) / sample_period_s_;
-  const Vector3d w = small_turn(encoder_.rotation, next.rotation) / sample_period_s_;
+  const Vector3d w = small_rotation_vector(next.rotation * encoder_.rotation.conjugate()) / sample_period_s_;
   V_BH_.linear_m_per_s += filter_gain_ * (v - V_BH_.linear_m_per_s);
   V_BH_.angular_rad_per_s += filter_gain_ * (w - V_BH_.angular_rad_per_s);
   encoder_ = next;
@@ -66,7 +60,7 @@ PoseReport SimulatedFirmware::report(Duration since_power_on) noexcept {
   report.V_BH = V_BH_;
   report.sequence = ++sequence_;
   report.device_time =
-      static_cast<std::uint32_t>(std::llround(seconds(since_power_on) / pose_layout_.device_time.step));
+      static_cast<std::uint64_t>(std::llround(seconds(since_power_on) / pose_layout_.device_time.step));
   report.acknowledged = last_command_.value_or(0);
   report.motors_on = motors_on_;
   report.watchdog_tripped = watchdog_tripped_;
@@ -75,11 +69,12 @@ PoseReport SimulatedFirmware::report(Duration since_power_on) noexcept {
 
 /// A repetition is never taken: a host that is stuck must not keep the motors on. A step back is taken only
 /// while the motors are off: that is a host that started anew.
-bool SimulatedFirmware::in_order(std::uint32_t sequence) const noexcept {
+bool SimulatedFirmware::in_order(std::uint64_t sequence) const noexcept {
   if (!wrench_layout_.sequence.present || !last_command_) return true;
-  const std::uint64_t span = std::uint64_t{1} << wrench_layout_.sequence.bits;
-  const std::uint64_t ahead = (span + sequence - *last_command_) % span;
-  return ahead != 0 && (ahead < span / 2 || !motors_on_);
+  const unsigned bits = wrench_layout_.sequence.bits;
+  const std::uint64_t half = std::uint64_t{1} << (bits - 1);
+  const std::uint64_t ahead = (sequence - *last_command_) & (half + (half - 1));
+  return ahead != 0 && (ahead < half || !motors_on_);
 }
 
 bool SimulatedFirmware::take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {

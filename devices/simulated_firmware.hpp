@@ -53,7 +53,7 @@ class SimulatedFirmware {
     Quaterniond rotation;
   };
   Encoder read_encoders(const Pose& X_BH) const noexcept;
-  bool in_order(std::uint32_t sequence) const noexcept;
+  bool in_order(std::uint64_t sequence) const noexcept;
 
   PoseReportLayout pose_layout_;
   WrenchReportLayout wrench_layout_;
@@ -65,11 +65,11 @@ class SimulatedFirmware {
 
   Encoder encoder_{};
   Twist V_BH_;  ///< estimate
-  std::uint32_t sequence_ = 0;
+  std::uint64_t sequence_ = 0;
 
   Wrench command_;
   TimePoint hold_until_{};
-  std::optional<std::uint32_t> last_command_;  ///< its sequence
+  std::optional<std::uint64_t> last_command_;  ///< its sequence
   bool motors_on_ = false;
   bool watchdog_tripped_ = false;
   std::uint64_t commands_rejected_ = 0;

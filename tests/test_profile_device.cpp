@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
+#include <cmath>
 #include <deque>
 #include <functional>
 #include <limits>
@@ -524,4 +525,87 @@ TEST_CASE("a profile that cannot work is refused before the link is opened") {
   refuses([](DeviceProfile& p) { p.stale_fault_s = DeviceProfile::kNotStated; }, "stale_fault_s");
   refuses([](DeviceProfile& p) { p.pose_report.position.byte = 20; }, "overlaps");
   refuses([](DeviceProfile& p) { p.wrench_report.torque.present = false; }, "torque");
+}
+
+TEST_CASE("a device that wants to be kept alive is spoken to at its period, and told when it is over") {
+  DeviceProfile profile = kProfile;
+  profile.keep_alive.bytes = {0x26};
+  profile.keep_alive_period_s = 0.5;
+  profile.shutdown.bytes = {0x24, 0x00};
+  ScriptedLink link;
+  ProfileDevice device(profile, link);
+  device.open();
+  TimePoint now{};
+  for (int i = 0; i <= 2000; ++i) device.read_newest(now += 1ms);
+  CHECK(link.written.size() == 4);
+  for (const auto& written : link.written) CHECK(written.outcome == Decoding::wrong_length);
+  link.written.clear();
+  device.release(now);
+  REQUIRE(link.written.size() == 6);
+  CHECK(link.written[4].outcome == Decoding::ok);
+  CHECK(link.written[5].outcome == Decoding::wrong_length);
+}
+
+TEST_CASE(
+    "a device that only pushes drops torques, and one without a watchdog gets a quarter of its limits") {
+  DeviceProfile profile = kProfile;
+  profile.wrench_report.torque.present = false;
+  profile.max_torque_Nm = 0.0;
+  ScriptedLink link;
+  ProfileDevice device(profile, link);
+  device.open();
+  TimePoint now{};
+  device.read_newest(now);
+  CHECK(device.write(now, {{20, 0, 0}, {0, 0.1, 0}}, true) == Fault::none);
+  const DeviceSample sample = device.read_newest(now);
+  CHECK(dof_text(sample.driven) == "x y z");
+  CHECK(dof_text(sample.dropped) == "ry");
+
+  profile = kProfile;
+  profile.watchdog_s = DeviceProfile::kNotStated;
+  ScriptedLink other;
+  ProfileDevice unwatched(profile, other);
+  unwatched.open();
+  unwatched.read_newest(now);
+  unwatched.write(now, {{20, 0, 0}, {0, 9, 0}}, true);
+  CHECK(other.written.back().report.F.force_N.x() == Approx(2.5).epsilon(1e-6));
+  CHECK(other.written.back().report.F.torque_Nm.y() == Approx(0.125).epsilon(1e-4));
+}
+
+TEST_CASE("the device's own axes and its handle point are turned into ours, both ways") {
+  DeviceProfile profile = kProfile;
+  Matrix3d R;  // x right, y toward the user, z down
+  R << 0, -1, 0, -1, 0, 0, 0, 0, -1;
+  profile.X_BD = {Quaterniond(R), {0.5, 0, 0}};
+  profile.X_EH = {Quaterniond::Identity(), {0, 0, 0.1}};
+  ScriptedLink link;
+  ProfileDevice device(profile, link);
+  device.open();
+  TimePoint now{};
+  device.read_newest(now);
+  PoseReport report;
+  report.sequence = 1;
+  report.X_BH.translation_m = {0.01, 0.02, 0.03};
+  report.X_BH.rotation = Quaterniond(Eigen::AngleAxisd(std::acos(0.0), Vector3d::UnitX()));
+  report.V_BH = {{0.1, 0.2, 0.3}, {0, 0, 1}};
+  std::vector<std::uint8_t> bytes(profile.pose_report.length);
+  encode(profile.pose_report, report, bytes);
+  link.reports.emplace_back(bytes, now += 1ms);
+  const DeviceSample sample = device.read_newest(now);
+  REQUIRE(sample.fault == Fault::none);
+  // A quarter turn about the device's x takes the handle point from 0.1 m along z to 0.1 m along -y.
+  const Vector3d p_D(0.01, 0.02 - 0.1, 0.03), w_D(0, 0, 1);
+  CHECK((sample.X_BH.translation_m - (R * p_D + Vector3d(0.5, 0, 0))).norm() < 1e-6);
+  CHECK((sample.V_BH.angular_rad_per_s - R * w_D).norm() < 1e-6);
+  CHECK(
+      (sample.V_BH.linear_m_per_s - R * (Vector3d(0.1, 0.2, 0.3) + w_D.cross(Vector3d(0, -0.1, 0)))).norm() <
+      1e-6);
+
+  const Wrench F{{1, 2, 3}, {0.01, 0.02, 0.03}};
+  device.write(now, F, true);
+  const Wrench sent = link.written.back().report.F;
+  CHECK((sent.force_N - R.transpose() * F.force_N).norm() < 1e-5);
+  const Vector3d about_E =
+      R.transpose() * F.torque_Nm + Vector3d(0, -0.1, 0).cross(R.transpose() * F.force_N);
+  CHECK((sent.torque_Nm - about_E).norm() < 1e-5);
 }

@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <set>
+
 #include <catch2/catch.hpp>
 
 #include "config/load_profile.hpp"
+#include "core/finite.hpp"
+#include "devices/profile_device.hpp"
 #include "devices/reference_layout.hpp"
 #include "devices/report_codec.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;
 
@@ -25,7 +33,90 @@ void check_same(const ReportBit& a, const ReportBit& b) {
   CHECK(a.bit == b.bit);
 }
 
+const SearchPath kShipped({WRENCHD_SOURCE_DIR "/config"});
+
+std::vector<DeviceProfile> all_shipped() {
+  std::vector<DeviceProfile> profiles;
+  for (const auto& file : profile_files(kShipped)) {
+    INFO(file);
+    profiles.push_back(load_profile(file, kShipped));
+    CHECK(profiles.back().name == file.stem());
+  }
+  return profiles;
+}
+
 }  // namespace
+
+TEST_CASE("every shipped profile loads, has the name of its file, and reports that work", "[profiles]") {
+  const auto profiles = all_shipped();
+  CHECK(profiles.size() == 10);
+  for (const DeviceProfile& p : profiles) {
+    INFO(p.name);
+    CHECK_NOTHROW(check_reports(p));
+    CHECK_FALSE(p.description.empty());
+    CHECK(p.max_linear_speed_m_per_s > 0);
+    CHECK(p.max_angular_speed_rad_per_s > 0);
+    CHECK(p.has_output == (driven_dofs(p) != kNoDof));
+    if (p.has_output) CHECK(p.max_force_N > 0);
+    if (p.transport != Transport::loopback) CHECK_FALSE(p.match.usb.empty());
+    CHECK((p.X_BD.rotation.toRotationMatrix().determinant() - 1) < 1e-12);
+  }
+}
+
+TEST_CASE("no id belongs to two shipped profiles that are used unnamed", "[profiles]") {
+  std::set<std::pair<std::uint16_t, std::uint16_t>> seen;
+  for (const DeviceProfile& p : all_shipped()) {
+    if (p.match.only_when_named) continue;
+    for (const UsbId id : p.match.usb) {
+      INFO(p.name << " " << std::hex << id.vendor << ":" << id.product);
+      CHECK(seen.insert({id.vendor, id.product}).second);
+    }
+  }
+}
+
+TEST_CASE("each shipped profile senses and drives what its device does", "[profiles]") {
+  const auto dofs = [](const char* name) {
+    const DeviceProfile p =
+        load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml", kShipped);
+    return std::pair(dof_text(sensed_dofs(p)), dof_text(driven_dofs(p)));
+  };
+  using Pair = std::pair<std::string, std::string>;
+  CHECK(dofs("loopback") == Pair("x y z rx ry rz", "x y z rx ry rz"));
+  CHECK(dofs("reference_high_speed") == Pair("x y z rx ry rz", "x y z rx ry rz"));
+  CHECK(dofs("spacemouse_split") == Pair("x y z rx ry rz", "none"));
+  CHECK(dofs("spacemouse_combined") == Pair("x y z rx ry rz", "none"));
+  CHECK(dofs("polhem") == Pair("x y z rx ry rz", "x y z"));
+  CHECK(dofs("woodenhaptics") == Pair("x y z", "x y z"));
+  CHECK(dofs("falcon") == Pair("x y z", "x y z"));
+}
+
+TEST_CASE("the reference profiles speak the loopback's bytes at both speeds", "[profiles]") {
+  for (const char* name : {"reference_full_speed", "reference_high_speed"}) {
+    const DeviceProfile p =
+        load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name) + ".toml", kShipped);
+    check_same(p.pose_report.position, reference_profile().pose_report.position);
+    check_same(p.wrench_report.torque, reference_profile().wrench_report.torque);
+    CHECK(p.pose_report.checksum == Checksum::crc16_ccitt_false);
+  }
+}
+
+TEST_CASE("the example's other devices are good profiles as well", "[profiles]") {
+  std::ifstream example(WRENCHD_SOURCE_DIR "/config/profiles/example.toml");
+  std::vector<std::string> blocks;
+  for (std::string line; std::getline(example, line);) {
+    if (!line.starts_with("#| ")) continue;
+    if (line.starts_with("#| name = \"example_")) blocks.emplace_back();
+    REQUIRE_FALSE(blocks.empty());
+    blocks.back() += line.substr(3) + '\n';
+  }
+  REQUIRE(blocks.size() == 2);
+  const test::TemporaryDirectory dir;
+  for (const std::string& block : blocks) {
+    INFO(block);
+    const DeviceProfile profile = load_profile(dir.write("block.toml", block), kShipped);
+    CHECK_NOTHROW(check_reports(profile));
+  }
+}
 
 TEST_CASE("the shipped loopback profile is the reference report layout", "[profiles]") {
   const DeviceProfile file = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
@@ -59,4 +150,58 @@ TEST_CASE("the shipped loopback profile is the reference report layout", "[profi
   CHECK(file.max_torque_Nm == code.max_torque_Nm);
   CHECK(file.report_rate_Hz == code.report_rate_Hz);
   CHECK(file.watchdog_s == code.watchdog_s);
+}
+
+TEST_CASE("a million fuzzed reports are understood or dropped, and no sample is ever not finite",
+          "[profiles]") {
+  /// A link that gives out random bytes, and good reports with some bytes changed.
+  class Noise final : public ReportLink {
+   public:
+    explicit Noise(const DeviceProfile& profile) : profile_(profile) {}
+    void open() override {}
+    LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
+      if (left_ == 0) return {LinkStatus::empty, 0, now};
+      --left_;
+      for (std::uint8_t& byte : buffer) byte = static_cast<std::uint8_t>(random_() & 0xffu);
+      const PoseReportLayout& r = profile_.more_reports.empty() || random_() % 2 == 0
+                                      ? profile_.pose_report
+                                      : profile_.more_reports[random_() % profile_.more_reports.size()];
+      if (random_() % 2 == 0) encode(r, {}, buffer);
+      if (r.has_id && random_() % 8 != 0) buffer[0] = r.id;
+      for (auto n = random_() % 4; n > 0; --n)
+        buffer[random_() % r.length] = static_cast<std::uint8_t>(random_() & 0xffu);
+      return {LinkStatus::ok, random_() % 8 == 0 ? random_() % 80 : r.length, now};
+    }
+    LinkStatus write(TimePoint, std::span<const std::uint8_t>) noexcept override { return LinkStatus::ok; }
+    void wait_readable(TimePoint) noexcept override {}
+    void close() noexcept override {}
+    void refill(int reports) { left_ = reports; }
+
+   private:
+    const DeviceProfile& profile_;
+    std::mt19937 random_{12};
+    int left_ = 0;
+  };
+  constexpr int kReports = 100'000, kAtOnce = 4;
+  const auto profiles = all_shipped();
+  for (const DeviceProfile& profile : profiles) {
+    INFO(profile.name);
+    Noise noise(profile);
+    ProfileDevice device(profile, noise);
+    device.open();
+    TimePoint now{};
+    std::uint64_t rejected = 0;
+    for (int i = 0; i < kReports / kAtOnce; ++i) {
+      noise.refill(kAtOnce);
+      const DeviceSample sample = device.read_newest(now += std::chrono::milliseconds(1));
+      rejected += sample.rejected;
+      const bool sane = is_finite(sample.X_BH) && is_finite(sample.V_BH) && is_finite(sample.device_time_s) &&
+                        std::abs(sample.X_BH.rotation.norm() - 1) < 1e-9;
+      if (!sane) FAIL("report " << i);
+      device.write(now, {{1, 2, 3}, {0.1, 0.2, 0.3}}, true);
+    }
+    CHECK(rejected > 0);
+    CHECK(rejected < kReports);
+  }
+  CHECK(profiles.size() * kReports >= 1'000'000);
 }

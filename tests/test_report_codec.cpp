@@ -270,12 +270,192 @@ TEST_CASE("a layout that cannot work is refused with the fields and the byte") {
   wrench.length = 65;
   CHECK_THAT(refusal(wrench), Contains("length = 65"));
   wrench = kWrench;
-  wrench.force.bits = 24;
-  CHECK_THAT(refusal(wrench), Contains("force must be 8, 16 or 32 bits"));
+  wrench.force.bits = 65;
+  CHECK_THAT(refusal(wrench), Contains("force must be 1 to 64 bits"));
   wrench = kWrench;
   wrench.torque.count = 2;
   CHECK_THAT(refusal(wrench), Contains("torque must hold 3 integers"));
   wrench = kWrench;
   wrench.force.step = 0.0;
   CHECK_THAT(refusal(wrench), Contains("force needs a finite step"));
+}
+
+TEST_CASE("a field of any width at any bit comes back, and leaves its neighbours alone") {
+  std::mt19937_64 random(11);
+  for (unsigned bits = 1; bits <= 64; ++bits) {
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      for (const bool is_signed : {false, true}) {
+        const ReportField field = {
+            .present = true, .byte = 3, .bits = bits, .is_signed = is_signed, .count = 3, .bit = bit};
+        PoseReportLayout layout;
+        layout.has_id = false;
+        layout.length = 40;
+        layout.joints = field;
+        Buffer bytes;
+        PoseReport report;
+        std::array<std::uint64_t, 3> raw{};
+        for (std::size_t i = 0; i < 3; ++i) {
+          raw[i] = random() >> (64 - std::min(bits, 53u));  // a double holds no more than 53 bits
+          report.joints[i] = static_cast<double>(raw[i]);
+          if (!is_signed || bits < 2) continue;
+          raw[i] >>= 1;
+          report.joints[i] = i == 1 ? -static_cast<double>(raw[i]) : static_cast<double>(raw[i]);
+        }
+        if (bits == 1 && is_signed) continue;  // holds 0 and -1
+        encode(layout, report, bytes);
+        const auto back = decode(layout, std::span(bytes).first(40));
+        REQUIRE(back.outcome == Decoding::ok);
+        for (std::size_t i = 0; i < 3; ++i) REQUIRE(back.report.joints[i] == report.joints[i]);
+        const std::size_t first = 24 + bit, last = first + 3 * bits;
+        for (std::size_t i = 0; i < 320; ++i)
+          if (i < first || i >= last) REQUIRE((bytes[i / 8] >> (i % 8) & 1) == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("the bits of a field lie where HID puts them") {
+  WrenchReportLayout layout = layout_with_force(12, true, 1.0);  // 1 + 1.5 * 3 bytes
+  WrenchReport report;
+  report.F.force_N = {0x123, -1, 0x456};
+  Buffer bytes;
+  encode(layout, report, bytes);
+  CHECK(hex(std::span(bytes).subspan(1, 5)) == "23 f1 ff 56 04");
+  layout.force.bits = 16;
+  layout.force.big_endian = true;
+  report.F.force_N = {0x0123, -2, 0x4567};
+  encode(layout, report, bytes);
+  CHECK(hex(std::span(bytes).subspan(1, 6)) == "01 23 ff fe 45 67");
+  CHECK(force_there_and_back(layout, report.F.force_N) == report.F.force_N);
+}
+
+TEST_CASE("every width saturates at its ends, 64 bits as well") {
+  const double huge = 1e300;
+  for (unsigned bits = 1; bits <= 64; ++bits) {
+    PoseReportLayout layout;
+    layout.has_id = false;
+    layout.length = 24;
+    layout.joints = {.present = true, .byte = 0, .bits = bits, .is_signed = true, .count = 3};
+    Buffer bytes;
+    PoseReport report;
+    report.joints = {huge, -huge, std::numeric_limits<double>::quiet_NaN()};
+    encode(layout, report, bytes);
+    const std::uint64_t top = (bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1) >> 1;
+    CAPTURE(bits);
+    CHECK(raw_integer(layout.joints, bytes, 0) == top);
+    CHECK(raw_integer(layout.joints, bytes, 1) == ~top);
+    CHECK(raw_integer(layout.joints, bytes, 2) == 0);
+    layout.joints.is_signed = false;
+    encode(layout, report, bytes);
+    CHECK(raw_integer(layout.joints, bytes, 0) ==
+          (bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1));
+    CHECK(raw_integer(layout.joints, bytes, 1) == 0);
+  }
+}
+
+TEST_CASE("nibbles are characters from A on, the least significant first, or last") {
+  WrenchReportLayout layout = layout_with_force(16, true, 1.0);
+  layout.force.coding = Coding::nibble_ascii;
+  layout.force.base = 0x41;
+  layout.torque.present = false;
+  WrenchReport report;
+  report.F.force_N = {0x05a7, -1, 0};
+  Buffer bytes;
+  encode(layout, report, bytes);
+  CHECK(hex(std::span(bytes).subspan(1, 12)) == "48 4b 46 41 50 50 50 50 41 41 41 41");
+  CHECK(force_there_and_back(layout, {-4096, 4096, 77}) == Vector3d(-4096, 4096, 77));
+  layout.force.big_endian = true;
+  encode(layout, report, bytes);
+  CHECK(hex(std::span(bytes).subspan(1, 4)) == "41 46 4b 48");
+}
+
+TEST_CASE("a value has an offset and a sign") {
+  WrenchReportLayout layout = layout_with_force(8, false, -0.5);
+  layout.force.offset = 10.0;
+  CHECK(force_there_and_back(layout, {10.0, 9.5, -117.5}) == Vector3d(10.0, 9.5, -117.5));
+  CHECK(force_there_and_back(layout, {11.0, -200.0, 0.0}) == Vector3d(10.0, -117.5, 0.0));
+}
+
+TEST_CASE("each checksum, at the end or anywhere, finds any one wrong bit") {
+  for (const Checksum checksum : {Checksum::crc16_ccitt_false, Checksum::sum8, Checksum::xor8}) {
+    for (const bool at_end : {true, false}) {
+      WrenchReportLayout layout = layout_with_force(16, true, 1.0);
+      layout.checksum = checksum;
+      layout.checksum_from = 1;
+      if (!at_end) layout.checksum_at = 29;
+      CHECK(refusal(layout).empty());
+      WrenchReport report;
+      report.F.force_N = {1, 2, -3};
+      Buffer good;
+      encode(layout, report, good);
+      const std::size_t end = at_end ? 32 : (checksum == Checksum::crc16_ccitt_false ? 31 : 30);
+      for (std::size_t bit = 8; bit < 8 * end; ++bit) {
+        Buffer bad = good;
+        bad[bit / 8] = static_cast<std::uint8_t>(bad[bit / 8] ^ (1u << (bit % 8)));
+        REQUIRE(decode(layout, std::span(bad).first(32)).outcome == Decoding::bad_checksum);
+      }
+    }
+  }
+  WrenchReportLayout layout = layout_with_force(8, true, 1.0);
+  layout.checksum = Checksum::sum8;
+  WrenchReport report;
+  report.F.force_N = {1, 2, -1};
+  Buffer bytes;
+  encode(layout, report, bytes);
+  CHECK(bytes[31] == ((7 + 1 + 2 + 255) & 0xff));
+  layout.checksum = Checksum::xor8;
+  encode(layout, report, bytes);
+  CHECK(bytes[31] == (7 ^ 1 ^ 2 ^ 255));
+}
+
+TEST_CASE("markers must be there, a template is what stands between the fields") {
+  WrenchReportLayout layout = layout_with_force(8, true, 1.0);
+  layout.has_id = false;
+  layout.constants = {{0, 0x3c}, {31, 0x3e}};
+  layout.template_bytes.assign(32, 0x55);
+  CHECK(refusal(layout).empty());
+  Buffer bytes;
+  encode(layout, WrenchReport{}, bytes);
+  CHECK(bytes[0] == 0x3c);
+  CHECK(bytes[1] == 0);
+  CHECK(bytes[4] == 0x55);
+  CHECK(bytes[31] == 0x3e);
+  CHECK(decode(layout, std::span(bytes).first(32)).outcome == Decoding::ok);
+  bytes[31] = 0;
+  CHECK(decode(layout, std::span(bytes).first(32)).outcome == Decoding::wrong_marker);
+}
+
+TEST_CASE("a report that may be short lacks what it lacks, and no more") {
+  PoseReportLayout layout;
+  layout.id = 3;
+  layout.length = 5;
+  layout.least_length = 3;
+  layout.buttons = {.present = true, .byte = 1, .bits = 32};
+  const std::array<std::uint8_t, 6> bytes = {3, 0x81, 0x02, 0x04, 0x80, 0xff};
+  CHECK(decode(layout, std::span(bytes).first(5)).report.buttons == 0x80040281u);
+  CHECK(decode(layout, std::span(bytes).first(3)).report.buttons == 0x0281u);
+  CHECK(decode(layout, std::span(bytes).first(2)).outcome == Decoding::wrong_length);
+  CHECK(decode(layout, std::span(bytes)).outcome == Decoding::wrong_length);
+}
+
+TEST_CASE("a pose may come in pieces") {
+  PoseReportLayout position = kPose, orientation = kPose;
+  position.orientation.present = false;
+  orientation.position.present = false;
+  PoseReport sent;
+  sent.X_BH.translation_m = {0.1, 0.2, 0.3};
+  sent.X_BH.rotation = Quaterniond(0.5, 0.5, 0.5, 0.5);
+  Buffer bytes;
+  PoseReport got;
+  encode(position, sent, bytes);
+  CHECK(decode_into(position, bytes, got) == Decoding::ok);
+  CHECK(got.X_BH.rotation.isApprox(Quaterniond::Identity()));
+  encode(orientation, sent, bytes);
+  CHECK(decode_into(orientation, bytes, got) == Decoding::ok);
+  CHECK(got.X_BH.translation_m.isApprox(sent.X_BH.translation_m, 1e-7));
+  CHECK(got.X_BH.rotation.isApprox(sent.X_BH.rotation, 1e-8));
+  const PoseReport before = got;
+  bytes[20] ^= 1;
+  CHECK(decode_into(orientation, bytes, got) == Decoding::bad_checksum);
+  CHECK(got.X_BH.rotation.coeffs() == before.X_BH.rotation.coeffs());
 }

@@ -583,3 +583,14 @@ TEST_CASE("two simulated minutes with commands every millisecond stay whole and 
   CHECK(rig.simulation.X_BH().translation_m.norm() < 0.1);
   CHECK(rig.simulation.handle().energy().motors_J < 0.0);
 }
+
+TEST_CASE("a profile that the simulated device cannot follow is refused") {
+  DeviceProfile profile = reference_profile();
+  profile.wrench_report.torque.present = false;
+  CHECK_THROWS_WITH(SimulatedDevice(profile, SimulationSettings{}),
+                    Catch::Contains("choose a profile that inherits"));
+  profile = reference_profile();
+  profile.kinematics.kind = Kinematics::Kind::delta;
+  CHECK_THROWS_WITH(SimulatedDevice(profile, SimulationSettings{}),
+                    Catch::Contains("device profile loopback"));
+}

@@ -554,7 +554,8 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
     std::vector<std::string> arguments;
     std::string told;
   } const table[] = {
-      {{}, "A subcommand (solve, check, mesh, paper or replay) is required"},
+      {{},
+       "A subcommand (solve, check, decode, devices, encode, mesh, profile, paper or replay) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},
@@ -664,6 +665,48 @@ TEST_CASE("wrenchctl check refuses what the daemon would refuse, by its kind") {
   bad("hand.toml", "[[waypoint]]\n", "hand.toml:1:");
   bench.dir.write("body.off", as_off({box({0, 0, 0}, {1, 1, 1}).vertices, {{0, 4, 6, 2}}}));
   bad("open.toml", kScene, "body.off: is not a closed, consistently oriented solid:\n  the edge from (");
+}
+
+TEST_CASE("wrenchctl decode and encode read and write the bytes of shipped profiles") {
+  const ProgramResult decoded =
+      run_program("wrenchctl", {"decode", "spacemouse_split", "--hex", "01 5e 01 00 00 a2 fe"});
+  CHECK(decoded.err == "");
+  CHECK(decoded.exit_code == 0);
+  CHECK(decoded.out.find("translation          0.0014 0 -0.0014 m   counts 350 0 -350\n") !=
+        std::string::npos);
+
+  const ProgramResult encoded = run_program(
+      "wrenchctl", {"encode", "loopback", "--wrench", "1,-2.5,0,0,0.05,-0.1", "--sequence", "200"});
+  CHECK(encoded.exit_code == 0);  // the example of devices/README.md
+  CHECK(encoded.out ==
+        "02 01 c8 00 40 42 0f 00 60 da d9 ff 00 00 00 00 00 00 00 00 50 c3 00 00 60 79 fe ff 08 00 74 3b\n");
+
+  const ProgramResult cut = run_program("wrenchctl", {"encode", "polhem_lpc1768", "--wrench=-9,0,0,0,1,0"});
+  CHECK(cut.exit_code == 0);
+  CHECK(cut.err.find("the force is cut from 9 to 5 N") != std::string::npos);
+  CHECK(cut.err.find("dropped, for there are no motors: ry") != std::string::npos);
+}
+
+TEST_CASE("wrenchctl decode and encode refuse what they cannot read, with the place and the cure") {
+  const auto refuses = [](std::vector<std::string> arguments, const std::string& told) {
+    const ProgramResult result = run_program("wrenchctl", arguments);
+    INFO(told << "\n" << result.err);
+    CHECK(result.exit_code == 1);
+    CHECK(result.out == "");
+    CHECK(result.err.find(told) != std::string::npos);
+  };
+  refuses({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
+  refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
+  refuses({"decode", "loopback", "--hex", "01 02"},
+          "these 2 bytes are no report of loopback:\n  report 0x01 has 64 bytes");
+  refuses({"decode", "nobody", "--hex", "01"}, "no such file; looked for ");
+  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: number 3 of 6 is wrong, at '3'");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is wrong, at 'x'");
+  refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "number 6 of 6 is wrong, at '6,7'");
+  refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split takes no wrench");
+  refuses({"encode", "falcon", "--wrench", "1,0,0,0,0,0", "--at", "3c"},
+          "--at: these 1 bytes are no report of falcon");
 }
 
 TEST_CASE("wrenchctl mesh tells what a mesh is") {

@@ -60,6 +60,14 @@ TEST_CASE("wrenchd shows contact and a plausible force on the simulated device")
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
+TEST_CASE("wrenchd simulates the device of a profile that is for a real one") {
+  const ProgramResult result = run_virtual({"--arm", "--live", "--simulate", "reference_full_speed"});
+  CHECK(result.exit_code == 0);
+  CHECK(result.err.find("device reference_full_speed,") != std::string::npos);
+  CHECK(result.err.find("engagement: active") != std::string::npos);
+  CHECK(result.err.find(kReleased) != std::string::npos);
+}
+
 TEST_CASE("wrenchd in virtual time says the same every time") {
   const ProgramResult one = run_virtual({"--arm", "--live"}), two = run_virtual({"--arm", "--live"});
   CHECK(one.exit_code == 0);
@@ -134,6 +142,11 @@ TEST_CASE("wrenchd refuses what it cannot use, with its place, and starts nothin
       {{"--profile", file("limits.toml", std::string(profile).erase(profile.find("max_force_N"), 11))},
        "limits.toml:"},
       {{"--profile", file("empty.toml", "")}, "empty.toml:1:1: key 'limits' is missing"},
+      {{"--profile", "reference_full_speed"},
+       "device profile reference_full_speed: its reports travel by hidraw, which wrenchd does not drive yet; "
+       "try the profile with --simulate reference_full_speed"},
+      {{"--simulate", "polhem"}, "device profile polhem: the simulated device sends whole poses"},
+      {{"--simulate", "gone"}, "gone.toml: no such file"},
       {{"--record", (dir.path() / "gone/run.h5").string()},
        "run.h5: cannot be created; check that the directory exists"},
   };
@@ -164,6 +177,7 @@ TEST_CASE("wrenchd refuses a command line that it does not understand") {
       {{"--record", ""}, "--record: must not be empty"},
       {{"--bogus"}, "--bogus"},
       {{"stray"}, "stray"},
+      {{"--simulate", "loopback", "--profile", "loopback"}, "--profile excludes --simulate"},
   };
   for (const auto& [arguments, told] : table) {
     const ProgramResult result = run_program("wrenchd", arguments);
@@ -225,8 +239,8 @@ TEST_CASE("wrenchd explains itself") {
   CHECK(help.exit_code == 0);
   CHECK(help.err == "");
   for (const char* word :
-       {"--config", "--scene", "--profile", "--realtime", "--record", "--seconds", "--arm", "--live",
-        "--virtual-time", "Exit codes: 0 stopped as asked; 1 refused", "the hand is released"})
+       {"--config", "--scene", "--profile", "--simulate", "--realtime", "--record", "--seconds", "--arm",
+        "--live", "--virtual-time", "Exit codes: 0 stopped as asked; 1 refused", "the hand is released"})
     CHECK(help.out.find(word) != std::string::npos);
   CHECK(run_program("wrenchd", {"--version"}).out.find("wrenchd ") == 0);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <stdexcept>
 
 #include "collision/scene.hpp"
 #include "config/load_hand_script.hpp"
@@ -10,6 +11,7 @@
 #include "config/load_scene.hpp"
 #include "config/toml_file.hpp"
 #include "daemon/station.hpp"
+#include "devices/profile_reports.hpp"
 
 namespace wrenchd {
 namespace {
@@ -25,7 +27,8 @@ Kind kind_of(const std::filesystem::path& file) {
   const auto& table = std::get<TomlNode::Table>(root.value);
   if (has(table, "waypoint")) return Kind::hand_script;
   if (has(table, "tool") || has(table, "obstacle")) return Kind::scene;
-  if (has(table, "pose_report") || has(table, "wrench_report") || has(table, "transport"))
+  if (has(table, "pose_report") || has(table, "wrench_report") || has(table, "transport") ||
+      has(table, "inherits"))
     return Kind::profile;
   return Kind::settings;
 }
@@ -47,6 +50,9 @@ std::string about(const DeviceProfile& profile) {
   std::ostringstream text;
   text << "  device " << profile.name << ": " << profile.report_rate_Hz << " reports/s, at most "
        << profile.max_force_N << " N and " << profile.max_torque_Nm << " N.m\n";
+  if (sensed_dofs(profile) != kAllDofs || driven_dofs(profile) != kAllDofs)
+    text << "  it senses " << dof_text(sensed_dofs(profile)) << ", and drives "
+         << dof_text(driven_dofs(profile)) << '\n';
   return text.str();
 }
 
@@ -69,6 +75,16 @@ std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
   }
   const Plan plan = read_plan({file, {}, {}}, SearchPath());
   return file.string() + ": a good configuration\n" + about(plan.profile) + about(plan.scene, meshes);
+}
+
+std::string check_against(const std::filesystem::path& profile, const DescriptorSource& device) {
+  const auto expected = expected_reports(load_profile(profile));
+  const auto lines = differences(parse_descriptor(device), expected);
+  if (lines.empty()) return profile.string() + ": agrees with the report descriptor of " + device.from + '\n';
+  std::string text = profile.string() + ": disagrees with what " + device.from +
+                     " says of its reports; change the profile, or name the device it is for:";
+  for (const std::string& line : lines) text += "\n  " + line;
+  throw std::runtime_error(text);
 }
 
 }  // namespace wrenchd

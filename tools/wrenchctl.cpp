@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
@@ -14,7 +15,11 @@
 #include "collision/mesh_check.hpp"
 #include "collision/mesh_source.hpp"
 #include "collision/tool_body.hpp"
+#include "config/known_profiles.hpp"
+#include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
+#include "config/report_bytes.hpp"
+#include "core/finite.hpp"
 #include "core/friction.hpp"
 #include "core/inertia.hpp"
 #include "daemon/option_checks.hpp"
@@ -22,11 +27,15 @@
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "tools/check.hpp"
+#include "tools/descriptor_source.hpp"
+#include "tools/list_devices.hpp"
 #include "tools/make_mesh.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_figures.hpp"
 #include "tools/paper_tables.hpp"
 #include "tools/pose_table.hpp"
+#include "tools/propose_profile.hpp"
+#include "tools/report_text.hpp"
 #include "tools/solve.hpp"
 
 namespace {
@@ -279,6 +288,141 @@ void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
   });
 }
 
+struct ReportOptions {
+  std::string profile;
+  std::string hex;
+  std::string wrench;
+  std::string at;
+  std::uint64_t sequence = 1;
+  bool to_device = false;
+};
+
+/// A profile by its name, or a file.
+DeviceProfile profile_named(const std::string& name) {
+  const SearchPath search;
+  const std::filesystem::path file = profile_file(name);
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) return load_profile(file, search);
+  return load_profile(search.require(file), search);
+}
+
+std::vector<std::uint8_t> bytes_of(const char* option, const std::string& text) {
+  const ReportBytes parsed = parse_bytes(text);
+  if (parsed.problem.empty()) return parsed.bytes;
+  const std::string found =
+      parsed.wrong_at < text.size() ? "'" + text.substr(parsed.wrong_at, 1) + "'" : "the end";
+  throw std::runtime_error(std::string(option) + ": character " + std::to_string(parsed.wrong_at + 1) + ", " +
+                           found + ", " + std::string(parsed.problem) +
+                           "; write bytes in hexadecimal, as in \"01 00 ff\"");
+}
+
+/// "fx,fy,fz,tx,ty,tz"
+Wrench wrench_of(const std::string& text) {
+  std::array<double, 6> numbers{};
+  const char* from = text.data();
+  const char* const end = from + text.size();
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto [stop, error] = std::from_chars(from, end, numbers[i]);
+    const bool last = i + 1 == numbers.size();
+    if (error != std::errc() || !is_finite(numbers[i]) || (last ? stop != end : stop == end || *stop != ','))
+      throw std::runtime_error("--wrench: number " + std::to_string(i + 1) + " of 6 is wrong, at '" +
+                               std::string(from, end) +
+                               "'; give force in N and torque in N.m, as in 1,0,-2.5,0,0.05,0");
+    from = stop + (last ? 0 : 1);
+  }
+  return {{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}};
+}
+
+void run_encode(const ReportOptions& options) {
+  const DeviceProfile profile = profile_named(options.profile);
+  const EncodedWrench encoded =
+      encode_wrench(profile, wrench_of(options.wrench), bytes_of("--at", options.at), options.sequence);
+  for (const std::string& remark : encoded.remarks) say(remark);
+  std::printf("%s\n", hex_text(encoded.bytes).c_str());
+}
+
+void add_decode(CLI::App& app, ReportOptions& options) {
+  CLI::App* decode = app.add_subcommand("decode", "What the bytes of a device's report say, in SI units");
+  decode->add_option("profile", options.profile, "name or file of a device profile")
+      ->required()
+      ->check(not_empty());
+  decode->add_option("--hex", options.hex, "the bytes of one report, as in \"01 00 ff\"")
+      ->required()
+      ->check(not_empty());
+  decode->add_flag("--to-device", options.to_device,
+                   "they go to the device: where both ways have reports of the same form");
+  decode->footer(
+      "Fields stand in the device's own axes, as its bytes have them; lines that end in 'in base' are what\n"
+      "wrenchd makes of them: x forward, away from the user, y left, z up.");
+  decode->callback([&] {
+    std::cout << report_text(profile_named(options.profile), bytes_of("--hex", options.hex),
+                             options.to_device);
+  });
+}
+
+void add_encode(CLI::App& app, ReportOptions& options) {
+  CLI::App* encode = app.add_subcommand("encode", "The bytes that a wrench becomes on its way to a device");
+  encode->add_option("profile", options.profile, "name or file of a device profile")
+      ->required()
+      ->check(not_empty());
+  encode
+      ->add_option("--wrench", options.wrench,
+                   "fx,fy,fz,tx,ty,tz on the hand, about the handle point [N, N.m]")
+      ->required()
+      ->check(not_empty());
+  encode->add_option("--at", options.at,
+                     "a report of the device, in hexadecimal: where the hand is. Devices with joints need\n"
+                     "it; without it they stand at their home position");
+  encode->add_option("--sequence", options.sequence, "of the command, where the device counts them")
+      ->check(CLI::Range(1, 65535))
+      ->capture_default_str();
+  encode->footer(
+      "The wrench is in the axes of the base: x forward, away from the user, y left, z up. The limits of "
+      "the\n"
+      "profile hold. What is cut or dropped is told on standard error.");
+  encode->callback([&] { run_encode(options); });
+}
+
+void add_devices(CLI::App& app, bool& all) {
+  CLI::App* devices =
+      app.add_subcommand("devices",
+                         "What is plugged in: which profile each device has and whether it can be opened,\n"
+                         "and for every other profile why not");
+  devices->add_flag("--all", all, "every reason for devices too that are nothing for wrenchd");
+  devices->footer(
+      "Looks, and opens nothing. Profiles are those of /etc/wrenchd/profiles, /usr/share/wrenchd/profiles "
+      "and\n"
+      "config/profiles of the source tree; of two files with the same name the first counts.");
+  devices->callback([&all] {
+    const auto may_open = [](const UsbDevice& device, const std::string& node) {
+      return why_not_open(device, node);
+    };
+    std::cout << device_list(list_usb_devices(), known_profiles(SearchPath()), all, may_open);
+  });
+}
+
+struct ProfileOptions {
+  std::filesystem::path from;
+  std::string output = "-";
+};
+
+void add_profile(CLI::App& app, ProfileOptions& options) {
+  CLI::App* profile =
+      app.add_subcommand("profile",
+                         "Proposes a profile for a device, from what it says of its reports: what only\n"
+                         "a person can know, its limits first of all, is left to be filled in");
+  profile
+      ->add_option("--from", options.from,
+                   "/dev/hidrawN, or a file with a report descriptor: its bytes, or hexadecimal text")
+      ->required()
+      ->check(not_empty());
+  profile->add_option("-o,--output", options.output, "TOML file to write; - writes standard output")
+      ->check(not_empty())
+      ->capture_default_str();
+  profile->callback(
+      [&] { write_output(options.output, propose_profile(read_descriptor_source(options.from))); });
+}
+
 void add_paper(CLI::App& app, std::filesystem::path& directory) {
   CLI::App* paper =
       app.add_subcommand("paper",
@@ -316,13 +460,30 @@ int main(int argc, char** argv) {
   check->add_option("file", checked, "TOML file; its kind is told by what it holds")
       ->required()
       ->check(not_empty());
+  std::filesystem::path device;
+  check
+      ->add_option("--against", device,
+                   "for a profile: /dev/hidrawN, or a file with a report descriptor, that it has\n"
+                   "to agree with")
+      ->check(not_empty());
   check->callback([&] {
     MeshLoader meshes = mesh_loader();
     std::cout << check_file(checked, meshes);
+    if (!device.empty()) std::cout << check_against(checked, read_descriptor_source(device));
   });
+
+  ReportOptions report_options;
+  add_decode(app, report_options);
+  add_encode(app, report_options);
+
+  bool all_devices = false;
+  add_devices(app, all_devices);
 
   MeshOptions mesh_options;
   add_mesh(app, mesh_options, exit_code);
+
+  ProfileOptions profile_options;
+  add_profile(app, profile_options);
 
   std::filesystem::path paper_directory = "wrenchd-paper";
   add_paper(app, paper_directory);
@@ -344,7 +505,8 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
-      throw CLI::RequiredError("A subcommand (solve, check, mesh, paper or replay)");
+      throw CLI::RequiredError(
+          "A subcommand (solve, check, decode, devices, encode, mesh, profile, paper or replay)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/inherited_toml.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kKey = "inherits";
+
+TomlEntry* find(TomlNode::Table& table, const std::string& key) {
+  const auto found =
+      std::find_if(table.begin(), table.end(), [&](const TomlEntry& entry) { return entry.key == key; });
+  return found == table.end() ? nullptr : &*found;
+}
+
+/// Writes the file into every place of a tree.
+void sign(TomlNode& node, const std::shared_ptr<const fs::path>& file) {
+  node.place.file = file;
+  if (auto* array = std::get_if<TomlNode::Array>(&node.value))
+    for (TomlNode& element : *array) sign(element, file);
+  if (auto* table = std::get_if<TomlNode::Table>(&node.value)) {
+    for (TomlEntry& entry : *table) {
+      entry.place.file = file;
+      sign(entry.node, file);
+    }
+  }
+}
+
+void lay_over(TomlNode::Table& table, TomlNode::Table parent) {
+  for (TomlEntry& inherited : parent) {
+    TomlEntry* own = find(table, inherited.key);
+    if (!own) {
+      table.push_back(std::move(inherited));
+      continue;
+    }
+    auto* own_table = std::get_if<TomlNode::Table>(&own->node.value);
+    auto* parent_table = std::get_if<TomlNode::Table>(&inherited.node.value);
+    if (own_table && parent_table) lay_over(*own_table, std::move(*parent_table));
+  }
+}
+
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  return a == b || (fs::equivalent(a, b, error) && !error);
+}
+
+std::vector<fs::path> candidates(const std::string& name, const fs::path& named_in,
+                                 const SearchPath& search) {
+  const fs::path file = profile_file(name);
+  std::vector<fs::path> places;
+  if (!file.is_absolute())
+    places.push_back(named_in.parent_path() / (name.ends_with(".toml") ? file : file.filename()));
+  for (const fs::path& place : search.candidates(file)) places.push_back(place);
+  return places;
+}
+
+fs::path parent_of(const std::string& name, const Place& place, const std::vector<fs::path>& chain,
+                   const SearchPath& search) {
+  bool only_in_chain = false;
+  std::string looked_for;
+  for (const fs::path& candidate : candidates(name, chain.back(), search)) {
+    looked_for += (looked_for.empty() ? "" : ", ") + fs::absolute(candidate).lexically_normal().string();
+    std::error_code error;
+    if (!fs::exists(candidate, error)) continue;
+    const bool seen = std::any_of(chain.begin(), chain.end(),
+                                  [&](const fs::path& file) { return same_file(file, candidate); });
+    if (!seen) return candidate;
+    only_in_chain = true;
+  }
+  if (only_in_chain) {
+    std::string way;
+    for (const fs::path& file : chain) way += file.filename().string() + " -> ";
+    throw ConfigError(chain.back(), place,
+                      "key 'inherits': the profiles inherit each other (" + way + printable(name) +
+                          "); one of them must stand on its own");
+  }
+  throw ConfigError(chain.back(), place,
+                    "key 'inherits': no profile of this name; looked for " + looked_for +
+                        "; name one that is there, or leave the key out");
+}
+
+}  // namespace
+
+TomlNode read_inherited(const fs::path& file, const SearchPath& search) {
+  std::vector<fs::path> chain = {file};
+  TomlNode merged = read_toml_file(file);
+  for (;;) {
+    auto& table = std::get<TomlNode::Table>(merged.value);
+    TomlEntry* entry = find(table, kKey);
+    if (!entry) break;
+    const auto* name = std::get_if<std::string>(&entry->node.value);
+    Place place = entry->node.place;
+    place.file = nullptr;
+    if (!name || name->empty() || name->find('\0') != std::string::npos) {
+      throw ConfigError(chain.back(), place,
+                        "key 'inherits': expected the name of a profile between quotation marks, found " +
+                            describe(entry->node));
+    }
+    const fs::path parent = parent_of(*name, place, chain, search);
+    std::erase_if(table, [](const TomlEntry& e) { return e.key == kKey; });
+    chain.push_back(parent);
+    TomlNode inherited = read_toml_file(parent);
+    sign(inherited, std::make_shared<const fs::path>(parent));
+    lay_over(table, std::move(std::get<TomlNode::Table>(inherited.value)));
+  }
+  return merged;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/known_profiles.hpp"
+
+#include "config/load_profile.hpp"
+
+namespace wrenchd {
+
+KnownProfiles known_profiles(const SearchPath& search) {
+  KnownProfiles known;
+  for (const std::filesystem::path& file : profile_files(search)) {
+    try {
+      known.profiles.push_back(load_profile(file, search));
+    } catch (const std::exception& refused) {
+      known.refused.emplace_back(refused.what());
+    }
+  }
+  return known;
+}
+
+}  // namespace wrenchd

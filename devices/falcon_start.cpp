@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/falcon_start.hpp"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <string>
+
+namespace wrenchd {
+namespace {
+
+constexpr std::array<std::uint8_t, 3> kHello = {0x0a, 0x43, 0x0d};
+constexpr std::array<std::uint8_t, 4> kHelloBack = {0x0a, 0x44, 0x2c, 0x0d};
+constexpr std::array<std::uint8_t, 1> kReady = {0x41};
+constexpr int kMostHellos = 100;
+constexpr std::size_t kBlock = 128;
+
+/// At the loader's latency a shorter timer loses the answers to the handshake.
+constexpr std::uint16_t kLoaderLatency_ms = 16;
+constexpr std::uint16_t kPacketLatency_ms = 1;
+
+void purge(SerialChip& chip) {
+  chip.control(kFtdiReset, kFtdiPurgeIn);
+  chip.control(kFtdiReset, kFtdiPurgeOut);
+}
+
+/// Reads until so many bytes have come, or nothing more does.
+std::vector<std::uint8_t> read_all(SerialChip& chip, std::size_t wanted) {
+  std::vector<std::uint8_t> bytes;
+  while (bytes.size() < wanted) {
+    const std::vector<std::uint8_t> more = chip.read(wanted - bytes.size());
+    if (more.empty()) break;
+    bytes.insert(bytes.end(), more.begin(), more.end());
+  }
+  return bytes;
+}
+
+bool shake_hands(SerialChip& chip) {
+  for (int i = 0; i < kMostHellos; ++i) {
+    chip.write(kHello);
+    const auto answer = read_all(chip, kHelloBack.size());
+    if (std::equal(answer.begin(), answer.end(), kHelloBack.begin(), kHelloBack.end())) return true;
+  }
+  return false;
+}
+
+/// Empty where all went well.
+std::string try_to_load(SerialChip& chip, std::span<const std::uint8_t> firmware) {
+  purge(chip);
+  chip.control(kFtdiLatency, kLoaderLatency_ms);
+  chip.control(kFtdiBaudRate, kFtdi9600Baud);
+  chip.control(kFtdiDataFormat, kFtdi8N1);
+  chip.control(kFtdiFlowControl, 0);
+  chip.control(kFtdiModemControl, kFtdiRtsLow);
+  chip.control(kFtdiModemControl, kFtdiDtrLow);
+  chip.control(kFtdiModemControl, kFtdiDtrHigh);
+  if (!shake_hands(chip)) return "its loader does not answer";
+  chip.control(kFtdiModemControl, kFtdiDtrLow);
+  chip.control(kFtdiBaudRate, kFtdiLoaderSpeed);
+  chip.write(kReady);
+  const auto ready = read_all(chip, kReady.size());
+  if (!std::equal(ready.begin(), ready.end(), kReady.begin(), kReady.end()))
+    return "its loader is not ready for a firmware";
+  for (std::size_t at = 0; at < firmware.size(); at += kBlock) {
+    const auto block = firmware.subspan(at, std::min(kBlock, firmware.size() - at));
+    chip.write(block);
+    const auto echo = read_all(chip, block.size());
+    if (!std::equal(echo.begin(), echo.end(), block.begin(), block.end()))
+      return "byte " + std::to_string(at) + " and after of the firmware came back wrong";
+  }
+  return {};
+}
+
+}  // namespace
+
+void falcon_resume(SerialChip& chip) {
+  chip.control(kFtdiLatency, kPacketLatency_ms);
+  chip.control(kFtdiBaudRate, kFtdiPacketSpeed);
+  purge(chip);
+}
+
+void falcon_start(SerialChip& chip, std::span<const std::uint8_t> firmware, int tries) {
+  if (firmware.empty())
+    throw std::runtime_error("Falcon: the firmware is empty; name the file of the maker's SDK");
+  std::string problem;
+  for (int i = 0; i < tries; ++i) {
+    problem = try_to_load(chip, firmware);
+    if (problem.empty()) return falcon_resume(chip);
+  }
+  throw std::runtime_error("Falcon: the firmware could not be loaded in " + std::to_string(tries) +
+                           " tries: " + problem + "; unplug its power and the cable, and try again");
+}
+
+}  // namespace wrenchd

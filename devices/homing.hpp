@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration.hpp"
+#include "devices/device.hpp"
+
+namespace wrenchd {
+
+/// What a device's pose is off by, as a calibration keeps it: offsets of axes x y z rx ry rz.
+///
+///   p_BH = p_reported - position_m,   R_BH = R_reported exp(-rotation_rad)
+struct PoseOffset {
+  Vector3d position_m = Vector3d::Zero();    ///< in B
+  Vector3d rotation_rad = Vector3d::Zero();  ///< axis times angle, in H
+};
+
+/// The offset with which a reported pose comes out as the pose it is known to be. RT safe.
+PoseOffset offset_between(const Pose& reported, const Pose& known) noexcept;
+/// The pose a device would have reported without the offset. RT safe.
+Pose corrected(const Pose& reported, const PoseOffset& offset) noexcept;
+/// For the store, and back; nothing where an axis has another name. Not RT safe.
+std::vector<AxisOffset> axis_offsets(const PoseOffset& offset);
+std::optional<PoseOffset> pose_offset(const std::vector<AxisOffset>& offsets);
+
+/// When a device has to be shown where it is.
+enum class ReferenceUse : std::uint8_t {
+  never,       ///< it knows: absolute encoders, calibrated by its maker
+  once,        ///< absolute encoders, which nobody has aligned: the offset is stored
+  each_start,  ///< incremental encoders, which count from wherever they were switched on
+};
+
+/// What has to be seen of a device before it may be armed. Axes: x y z of the handle point, then turns about
+/// x y z, all in the base, x forward, y left, z up.
+struct HomingPlan {
+  std::array<bool, 6> sensed = {true, true, true, true, true, true};  ///< only these are asked for
+  double travel_m = 0.02;    ///< how far a person moves the handle along an axis; plain to see, soon done
+  double travel_rad = 0.25;  ///< likewise about one
+  Vector3d workspace_min_m = Vector3d::Constant(-1.0);  ///< p_BH is never outside of this box
+  Vector3d workspace_max_m = Vector3d::Constant(1.0);
+  double max_turn_rad = 3.2;  ///< nor is R_BH turned farther than this; above pi: any turn is good
+
+  ReferenceUse reference = ReferenceUse::never;
+  Pose X_BR;                          ///< the handle in its rest, the pose that is known
+  double most_offset_m = 0.1;         ///< farther off, the handle is not in its rest
+  double most_offset_rad = 0.5;       ///< likewise; encoders that start anywhere need more
+  std::uint32_t confirm_buttons = 0;  ///< any of these says "it is in its rest"; 0: only confirm() does
+};
+
+enum class HomingStep : std::uint8_t {
+  listening,  ///< no good sample has come
+  reference,  ///< the handle belongs into its rest
+  settling,   ///< hold still, before the next thing is asked for
+  moving,     ///< along or about one axis, in its positive direction
+  done,       ///< the device may be armed
+  failed,     ///< it may not, and a person has to look at it; restart() begins anew
+};
+
+enum class HomingTrouble : std::uint8_t {
+  none,
+  device_fault,         ///< the device has one; the step waits
+  not_in_rest,          ///< confirmed, and too far from where the rest is
+  not_still,            ///< confirmed, and the handle moves
+  wrong_axis,           ///< another axis moved instead
+  wrong_direction,      ///< the axis moved the other way
+  velocity_disagrees,   ///< the velocity that is reported has another sign than the motion
+  outside_workspace,    ///< the pose cannot be
+  stored_offset_wrong,  ///< the stored offset is larger than the plan believes
+};
+
+/// Where homing stands: plain data, for the servo thread to hand on.
+struct HomingState {
+  HomingStep step = HomingStep::listening;
+  HomingTrouble trouble = HomingTrouble::none;  ///< what is wrong now, or what it failed of
+  std::size_t axis = 0;                         ///< 0 to 5: what is asked for, or failed
+  std::size_t moved_axis = 0;                   ///< what moved instead
+  double progress = 0.0;                        ///< 0 to 1, of the step
+  Fault fault = Fault::none;                    ///< where the trouble is the device's
+
+  bool operator==(const HomingState&) const = default;
+};
+
+/// What a person is told: a sentence on what to do, and one before it where something is wrong. Not RT safe.
+std::string told(const HomingState& state);
+
+/// Watches a device until it is known where it is and that its axes go where they should. Motors are off all
+/// the while: nothing here commands anything, and without `done` nothing else may.
+///
+/// An axis that is moved the wrong way, or confused with another, is asked for once more, since people err;
+/// the second time it is the profile or a cable that errs, and homing fails. So it does where a velocity has
+/// another sign than its motion, or where a pose cannot be. A device that is lost begins anew.
+class Homing {
+ public:
+  /// Throws std::invalid_argument where the plan cannot work.
+  explicit Homing(const HomingPlan& plan);
+  /// The same with what the calibration store has.
+  Homing(const HomingPlan& plan, const PoseOffset& stored);
+
+  /// Begins anew. RT safe.
+  void restart() noexcept;
+  /// A person says that the handle is in its rest; counts for the next sample. RT safe.
+  void confirm() noexcept { confirmed_ = true; }
+  /// Takes one sample further, as read from the device, without the offset. RT safe.
+  const HomingState& advance(const DeviceSample& sample, TimePoint now) noexcept;
+
+  const HomingState& state() const noexcept { return state_; }
+  bool may_arm() const noexcept { return state_.step == HomingStep::done; }
+  /// What the pose is off by; known once the reference was found.
+  const PoseOffset& offset() const noexcept { return offset_; }
+
+  // How people hold still: for so long, within so much. A hand on a table trembles by less than half of it.
+  static constexpr double kStillFor_s = 0.3;
+  static constexpr double kRestFor_s = 1.0;  ///< in the rest, where the offset is averaged
+  static constexpr double kStill_m = 0.001;
+  static constexpr double kStill_rad = 0.02;
+
+ private:
+  void start() noexcept;
+  void next_axis() noexcept;
+  void take_reference(const DeviceSample& sample, TimePoint now) noexcept;
+  void settle(const Pose& X_BH, TimePoint now) noexcept;
+  void move(const DeviceSample& sample, const Pose& X_BH) noexcept;
+  void compare_velocity(const DeviceSample& sample, const Pose& X_BH) noexcept;
+  void end_of_axis(std::size_t moved, bool forward) noexcept;
+  bool within_workspace(const Pose& X_BH) noexcept;
+  void fail(HomingTrouble trouble, std::size_t axis) noexcept;
+  void anchor(const Pose& X_BH, TimePoint now) noexcept;
+  double still_for_s(const Pose& X_BH, TimePoint now) noexcept;
+
+  HomingPlan plan_;
+  bool has_stored_ = false;  // gcc 12 misreads an optional of vectors under sanitizers
+  PoseOffset stored_;
+  HomingState state_;
+  PoseOffset offset_;
+  bool confirmed_ = false;
+  bool erred_ = false;  ///< this axis was asked for twice
+
+  std::optional<Pose> anchor_;  ///< from where stillness and motion are measured
+  TimePoint anchored_{};
+  PoseOffset sum_;         ///< of poses since the anchor, as offsets from it
+  std::size_t count_ = 0;  ///< of them
+
+  std::optional<Pose> before_;  ///< pose of the last fresh sample
+  double before_s_ = 0.0;       ///< and its device time
+  int agreed_ = 0, disagreed_ = 0;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/layout_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+namespace wrenchd {
+namespace {
+
+/// One of the equal fields that an item of the descriptor declares.
+struct Cell {
+  const DescribedField* field;
+  std::size_t index;
+
+  std::size_t begin() const { return field->bit + field->bits * index; }
+  std::size_t end() const { return begin() + field->bits; }
+  /// Only the maker knows what it is.
+  bool of_maker() const {
+    const auto usage = field->usage(index);
+    return !usage || usage->page >= kFirstVendorPage;
+  }
+  /// A byte of which the device says nothing but that it is there.
+  bool opaque() const { return field->bits == 8 && !field->constant && of_maker(); }
+};
+
+std::string id_text(std::optional<std::uint8_t> id) {
+  if (!id) return "without an id";
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "0x%02x", *id);
+  return text.data();
+}
+
+std::string report_text(ReportKind kind, std::optional<std::uint8_t> id) {
+  return std::string(name(kind)) + " report " + id_text(id);
+}
+
+std::string place_text(std::size_t bit) {
+  return "byte " + std::to_string(bit / 8) + (bit % 8 == 0 ? "" : " bit " + std::to_string(bit % 8));
+}
+
+std::string shape_text(std::size_t bits, bool is_signed, std::size_t begin) {
+  return std::to_string(bits) + (bits == 1 ? " bit" : " bits") + (is_signed ? ", signed, " : ", unsigned, ") +
+         (bits == 1 ? "at " : "from ") + place_text(begin);
+}
+
+std::string text(const Cell& cell) {
+  const std::string shape = shape_text(cell.field->bits, cell.field->is_signed(), cell.begin());
+  if (cell.field->constant) return "padding, from " + place_text(cell.begin());
+  const auto usage = cell.field->usage(cell.index);
+  return (usage ? to_text(*usage) + ", " : "") + shape;
+}
+
+std::string text(const std::vector<Cell>& cells) {
+  constexpr std::size_t kEnough = 3;
+  std::string all;
+  for (std::size_t i = 0; i < std::min(cells.size(), kEnough); ++i)
+    all += (i > 0 ? "; " : "") + text(cells[i]);
+  return all + (cells.size() > kEnough ? "; and more" : "");
+}
+
+/// The device's fields that have a bit in [begin, end).
+std::vector<Cell> cells_within(const DescribedReport& report, std::size_t begin, std::size_t end) {
+  std::vector<Cell> cells;
+  for (const DescribedField& field : report.fields) {
+    const std::size_t from = std::max(begin, field.bit), to = std::min(end, field.end_bit());
+    for (std::size_t bit = from; bit < to; bit = cells.back().end())
+      cells.push_back({&field, (bit - field.bit) / field.bits});
+  }
+  return cells;
+}
+
+/// May somebody read [begin, end) as one integer, when the device has these cells there?
+bool agrees(const std::vector<Cell>& cells, std::size_t begin, std::size_t end, bool is_signed) {
+  const auto all = [&](auto holds) { return std::all_of(cells.begin(), cells.end(), holds); };
+  if (all([](const Cell& cell) { return cell.field->constant; })) return false;
+  if (all([](const Cell& cell) { return cell.opaque(); })) return true;
+  if (cells.size() == 1) {
+    const bool whole = cells[0].begin() == begin && cells[0].end() == end;
+    if (whole) return cells[0].field->bits == 1 || cells[0].field->is_signed() == is_signed;
+    return cells[0].of_maker() && !is_signed;  // some bits of a maker's own word
+  }
+  // A mask: bits put together, and padding where they do not fill it.
+  return all([](const Cell& cell) { return cell.field->bits == 1 || cell.field->constant; });
+}
+
+/// Is a report of the device shorter than expected, and good nevertheless?
+bool good_but_short(const DescribedReport& device, const ExpectedReport& wanted) {
+  return wanted.least_length != 0 && device.length >= wanted.least_length && device.length < wanted.length;
+}
+
+/// What is wrong with one field, once, however many of its numbers are affected.
+std::optional<std::string> difference(const DescribedReport& device, const ExpectedField& field,
+                                      bool may_end_early) {
+  for (std::size_t i = 0; i < field.count; ++i) {
+    const std::size_t begin = field.bit + i * field.bits;
+    const std::size_t whole_end = begin + field.bits;
+    const std::size_t end = may_end_early ? std::min(whole_end, 8 * device.length) : whole_end;
+    if (begin >= end) return {};  // what the report lacks is 0
+    const std::string which = field.name + (field.count > 1 ? "[" + std::to_string(i) + "]" : "") +
+                              ": the profile says " + shape_text(field.bits, field.is_signed, begin) + "; ";
+    if (end > 8 * device.length)
+      return which + "the device's report ends with byte " + std::to_string(device.length - 1);
+    const std::vector<Cell> cells = cells_within(device, begin, end);
+    if (cells.empty()) return which + "there the device declares nothing";
+    if (!agrees(cells, begin, end, field.is_signed)) return which + "there the device has " + text(cells);
+  }
+  return {};
+}
+
+std::string ids_of(const ReportDescriptor& device, ReportKind kind) {
+  std::string ids;
+  for (const DescribedReport& report : device.reports)
+    if (report.kind == kind) ids += (ids.empty() ? "" : ", ") + id_text(report.id);
+  return ids.empty() ? "it has no " + std::string(name(kind)) + " report"
+                     : "its " + std::string(name(kind)) + " reports: " + ids;
+}
+
+}  // namespace
+
+std::vector<std::string> differences(const ReportDescriptor& device,
+                                     const std::vector<ExpectedReport>& expected) {
+  std::vector<std::string> lines;
+  for (const ExpectedReport& wanted : expected) {
+    const std::string which = report_text(wanted.kind, wanted.id);
+    const DescribedReport* report = device.find(wanted.kind, wanted.id);
+    if (report == nullptr) {
+      if (wanted.may_be_absent) continue;
+      lines.push_back(which + ": the device has none such; " + ids_of(device, wanted.kind));
+      continue;
+    }
+    const bool short_one = good_but_short(*report, wanted);
+    if (report->length != wanted.length && !short_one)
+      lines.push_back(which + ": the profile says " + std::to_string(wanted.length) + " bytes, the device " +
+                      std::to_string(report->length));
+    for (const ExpectedField& field : wanted.fields)
+      if (const auto line = difference(*report, field, short_one)) lines.push_back(which + ", " + *line);
+  }
+  return lines;
+}
+
+}  // namespace wrenchd

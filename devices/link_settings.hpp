@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+
+#include "core/clock.hpp"
+
+namespace wrenchd {
+
+/// What a USB link is told beside the device.
+struct LinkSettings {
+  /// A write that makes no progress for this long is told to the servo thread as a failed one. Writes end
+  /// within a frame or two of 1 ms on a device that works; one that is longer than a few is stuck.
+  Duration write_deadline = std::chrono::milliseconds(4);
+  /// How long close() waits at most for the last report to be written.
+  Duration close_within = std::chrono::milliseconds(500);
+  /// SCHED_FIFO priority of the link's own thread; 0: an ordinary thread. That of the servo thread is best:
+  /// the command goes out as soon as the servo thread sleeps, and neither cuts the other short.
+  int priority = 0;
+  /// Bytes of the longest input report, where it is longer than one packet. Only libusb must know it.
+  std::size_t longest_report = 0;
+};
+
+}  // namespace wrenchd

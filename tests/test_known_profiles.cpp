@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "config/known_profiles.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+const std::filesystem::path kConfig = WRENCHD_SOURCE_DIR "/config";
+
+TEST_CASE("every shipped profile is known, by the names of their files", "[known_profiles]") {
+  const SearchPath shipped({kConfig});
+  const KnownProfiles known = known_profiles(shipped);
+  CHECK(known.refused.empty());
+  CHECK(known.profiles.size() == profile_files(shipped).size());
+  REQUIRE(known.profiles.size() > 2);
+  CHECK(known.profiles[0].name == "example");
+  CHECK(known.profiles[1].name == "falcon");
+}
+
+TEST_CASE("profiles that are refused are told, and hide no other", "[known_profiles]") {
+  const TemporaryDirectory dir;
+  dir.write("profiles/aaa.toml", "inherits = \"falcon\"\nname = \"mine\"\n");
+  dir.write("profiles/bbb.toml", "name = \"no end\n");
+  dir.write("profiles/ccc.toml", "inherits = \"falcon\"\nname = \"typo\"\nreport_rate_hz = 1000.0\n");
+  const KnownProfiles known = known_profiles(SearchPath({dir.path(), kConfig}));
+  CHECK(known.profiles.size() == profile_files(SearchPath({kConfig})).size() + 1);
+  CHECK(known.profiles[0].name == "mine");
+  REQUIRE(known.refused.size() == 2);
+  CHECK_THAT(known.refused[0], Catch::Contains("profiles/bbb.toml:1:"));
+  CHECK_THAT(known.refused[1],
+             Catch::Contains("profiles/ccc.toml:3:1: ") && Catch::Contains("did you mean 'report_rate_Hz'"));
+}
+
+TEST_CASE("the administrator's profile hides the shipped one of its name, even where it is refused",
+          "[known_profiles]") {
+  const TemporaryDirectory dir;
+  dir.write("profiles/falcon.toml", "name = 3\n");
+  const KnownProfiles known = known_profiles(SearchPath({dir.path(), kConfig}));
+  CHECK(known.refused.size() == 1);
+  for (const DeviceProfile& profile : known.profiles) CHECK(profile.name != "falcon");
+}
+
+TEST_CASE("where there are no profiles none are known", "[known_profiles]") {
+  const TemporaryDirectory dir;
+  const KnownProfiles known = known_profiles(SearchPath({dir.path(), "/nowhere"}));
+  CHECK(known.profiles.empty());
+  CHECK(known.refused.empty());
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <cstdlib>
+#include <numbers>
+
+#include <catch2/catch.hpp>
+
+#include "config/load_profile.hpp"
+#include "config/toml_file.hpp"
+#include "devices/layout_check.hpp"
+#include "devices/profile_reports.hpp"
+#include "devices/six_axes.hpp"
+#include "tests/support/random_values.hpp"
+#include "tests/support/repeats.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/sample_descriptors.hpp"
+#include "tools/propose_profile.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+std::string proposal(const Bytes& bytes) {
+  return propose_profile({bytes, "a test", "usb 046d:c626, \"SpaceNavigator\"", UsbId{0x046d, 0xc626}});
+}
+
+bool holds(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// What loading it as a profile is refused with.
+std::string refusal(const std::string& text) {
+  const TemporaryDirectory dir;
+  const auto file = dir.write("proposed.toml", text);
+  CHECK_NOTHROW(read_toml_file(file));  // good TOML it is
+  try {
+    load_profile(file);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+/// As a person would who has read the lines marked FILL IN, and can only know what no descriptor tells.
+std::string completed(std::string text) {
+  const std::array<std::array<std::string, 2>, 8> known = {{{"report_rate_Hz", "62.5"},
+                                                            {"stale_fault_s", "0.2"},
+                                                            {"watchdog_s", "0.008"},
+                                                            {"usb", "[\"1209:0003\"]"},
+                                                            {"max_force_N", "5.0"},
+                                                            {"max_torque_Nm", "0.3"},
+                                                            {"max_linear_speed_m_per_s", "0.5"},
+                                                            {"max_angular_speed_rad_per_s", "5.0"}}};
+  for (const auto& [key, value] : known) {
+    const std::size_t at = text.find("# FILL IN: " + key + " =");
+    if (at == std::string::npos) continue;
+    text.replace(at, text.find('\n', at) - at, key + " = " + value);
+  }
+  const std::size_t name = text.find("name = \"unnamed\"");
+  if (name != std::string::npos) text.replace(name, text.find('\n', name) - name, "name = \"mine\"");
+  return text;
+}
+
+DeviceProfile loaded(const std::string& text) {
+  const TemporaryDirectory dir;
+  return load_profile(dir.write("proposed.toml", text));
+}
+
+/// Six bytes that go from 0 to 255, and rest in the middle.
+Bytes unsigned_axes() {
+  return from_hex(
+      "05 01 09 08 a1 01 85 07 15 00 26 ff 00 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 c0");
+}
+
+std::string text_of(const Bytes& bytes) {
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
+  const std::string text = proposal(space_navigator());
+  CHECK(holds(text, "# Made from a test\n# Device: usb 046d:c626, \"SpaceNavigator\"\n"));
+  CHECK(holds(text,
+              "#   input report 0x01, 7 bytes\n#     byte 1: 3 x 16 bits, -350 to 350, 01:30 (X) to 01:32 "
+              "(Z), relative\n"));
+  CHECK(holds(text, "#     byte 1 bit 2: 14 bits of padding\n"));
+  CHECK(holds(text, "[match]\nusb = [\"046d:c626\"]\nusage_page = 0x01\nusage = 0x08\n"));
+  CHECK(holds(text, "\nbase_axes = [\"-y\", \"-x\", \"-z\"]\n"));
+  CHECK(holds(text, "\nwrench_report = \"none\" "));
+  CHECK(holds(text, "[pose_report]\nid = 0x01\nlength = 7\n"));
+  CHECK(holds(text, "\ntranslation = { byte = 1, type = \"i16\", step_m = 4e-06 }\n"));
+  CHECK(holds(text, "# Rx 16 bits from byte 1, -350 to 350; Ry 16 bits from byte 3, -350 to 350;"));
+  CHECK(holds(text, "# GUESSED: the step. The descriptor gives no angle for a count;"));
+  CHECK(holds(text, "\nid = 0x03\nlength = 3\n# Buttons: 2 bits from byte 1.\n"));
+  CHECK(holds(text, "# LED: byte 1 of output report 0x04;"));
+}
+
+TEST_CASE("limits are never guessed, and no proposal loads as it is", "[propose_profile]") {
+  for (const Bytes& bytes : {space_navigator(), space_mouse_wireless(), home_made_combined(), ten_bit_axes(),
+                             teensy_rawhid(), effects_joystick()}) {
+    const std::string text = proposal(bytes);
+    INFO(text);
+    const std::string why = refusal(text);
+    for (const char* key :
+         {"report_rate_Hz", "limits.max_linear_speed_m_per_s", "limits.max_angular_speed_rad_per_s"})
+      CHECK(holds(why, "key '" + std::string(key) + "' is missing"));
+    for (const char* key : {"watchdog_s", "limits.max_force_N", "limits.max_torque_Nm"})
+      CHECK(holds(why, "key '" + std::string(key) + "' is missing") !=
+            holds(text, "\nwrench_report = \"none\" "));
+    CHECK_FALSE(holds(why, "not known"));  // what is there already, the format knows
+  }
+}
+
+TEST_CASE("a completed proposal of a multi-axis controller loads, and agrees with its device",
+          "[propose_profile]") {
+  for (const Bytes& bytes : {space_navigator(), space_mouse_wireless(), home_made_combined(),
+                             home_made_split(), ten_bit_axes(), unsigned_axes()}) {
+    const std::string text = completed(proposal(bytes));
+    INFO(text);
+    CHECK_FALSE(holds(text, "# FILL IN"));
+    const DeviceProfile profile = loaded(text);
+    CHECK(differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
+    CHECK(profile.transport == Transport::hidraw);
+    CHECK(profile.stream == StreamStyle::silent_at_rest);
+    CHECK_FALSE(profile.has_output);
+    CHECK(profile.match.usb == std::vector<UsbId>{{0x046d, 0xc626}});
+    CHECK(profile.X_BD.rotation.isApprox(
+        Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Vector3d(1, -1, 0).normalized()))));
+    CHECK(sensed_dofs(profile) == kAllDofs);
+    CHECK(driven_dofs(profile) == kNoDof);
+    REQUIRE(profile.deflection);
+    CHECK(profile.deflection->mode == Deflection::Mode::rate);
+  }
+}
+
+TEST_CASE("the end of a cap's way means the same speed whatever the device counts", "[propose_profile]") {
+  struct Expected {
+    Bytes bytes;
+    double counts;
+  };
+  for (const Expected& expected : {Expected{space_navigator(), 350.0},
+                                   {home_made_split(), 350.0},
+                                   {ten_bit_axes(), 512.0},
+                                   {unsigned_axes(), 128.0}}) {
+    const DeviceProfile profile = loaded(completed(proposal(expected.bytes)));
+    const PoseReportLayout& pose = profile.pose_report;
+    const ReportField& rotation = pose.rotation.present ? pose.rotation : profile.more_reports.at(0).rotation;
+    REQUIRE(rotation.present);
+    CHECK(profile.deflection->linear_gain * pose.translation.step * expected.counts ==
+          Approx(0.1).epsilon(0.01));
+    CHECK(profile.deflection->angular_gain * rotation.step * expected.counts == Approx(1.0).epsilon(0.01));
+  }
+}
+
+TEST_CASE("fields of any width at any bit, and the middle of unsigned axes", "[propose_profile]") {
+  const std::string text = proposal(ten_bit_axes());
+  CHECK(holds(text, "What the device says of its reports, which have no id:\n"));
+  CHECK(holds(text, "id = \"none\"\nlength = 8\n"));
+  CHECK(holds(text, "\ntranslation = { byte = 0, bit = 3, bits = 10, step_m = "));
+  CHECK(holds(text, "\nrotation = { byte = 4, bit = 1, bits = 10, step_rad = "));
+  CHECK(holds(text, "\nbuttons = { byte = 0, bits = 3 }\n"));
+  const std::string middle = proposal(unsigned_axes());
+  CHECK(holds(middle, "# GUESSED: the offset, which makes the count 128 the one at which the cap rests."));
+  const PoseReportLayout pose = loaded(completed(middle)).pose_report;
+  CHECK_FALSE(pose.translation.is_signed);
+  CHECK(pose.translation.step * 128 + pose.translation.offset == Approx(0.0).margin(1e-12));
+  CHECK(pose.rotation.step * 128 + pose.rotation.offset == Approx(0.0).margin(1e-12));
+}
+
+TEST_CASE("axes that no field can hold are told, not bent", "[propose_profile]") {
+  // Z before Y.
+  const std::string text = proposal(
+      from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 32 09 31 09 33 09 34 09 35 81 02 c0"));
+  CHECK(holds(text, "# FILL IN: translation. X 8 bits from byte 0, -127 to 127; Y 8 bits from byte 2"));
+  CHECK(holds(text, "# FILL IN: linear_gain =\n"));
+  CHECK_FALSE(holds(text, "\ntranslation ="));
+  CHECK(holds(text, "\nrotation = { byte = 3, type = \"i8\""));
+}
+
+TEST_CASE("three numbers are one field only with one width, sign, step and middle", "[propose_profile]") {
+  const auto three = [](const std::string& x, const std::string& y_and_z) {
+    return proposal(from_hex("05 01 09 08 a1 01 75 08 95 01" + x + "09 30 81 02" + y_and_z +
+                             "09 31 81 02 09 32 81 02 15 81 25 7f 09 33 81 02 09 34 81 02 09 35 81 02 c0"));
+  };
+  const auto told = [](const std::string& text) { return holds(text, "# FILL IN: translation. X "); };
+  const std::string whole_byte = "15 00 26 ff 00", half_of_it = "15 00 25 64", with_sign = "15 81 25 7f";
+  CHECK_FALSE(told(three(whole_byte, whole_byte)));
+  CHECK_FALSE(told(three(with_sign, with_sign)));
+  CHECK_FALSE(told(three(with_sign, "15 9c 25 64")));  // a shorter way, but the same middle
+  CHECK(told(three(whole_byte, half_of_it)));
+  CHECK(told(three(with_sign, whole_byte)));
+  CHECK(told(three(with_sign, "75 10")));
+  CHECK(told(three(with_sign + "55 0e 65 11", "35 00 45 01")));  // another step
+  CHECK(told(three(with_sign + "55 0e 65 11", "65 00")));        // none
+}
+
+TEST_CASE("steps of the widest axes are steps that a profile may have", "[propose_profile]") {
+  const Bytes bytes = from_hex(
+      "05 01 09 08 a1 01 17 00 00 00 80 27 ff ff ff 7f 75 20 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 "
+      "c0");
+  const DeviceProfile profile = loaded(completed(proposal(bytes)));
+  CHECK(profile.pose_report.translation.bits == 32);
+  CHECK(differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
+}
+
+TEST_CASE("buttons become a mask of 32, or are told where other things lie between them",
+          "[propose_profile]") {
+  const std::string axes =
+      "05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02";
+  const std::string bit = "05 09 15 00 25 01 75 01";
+  const Bytes many = from_hex(axes + bit + "19 01 29 28 95 28 81 02 c0");
+  CHECK(holds(proposal(many), "# Buttons: 40 bits from byte 6. The first 32 of them"));
+  CHECK(loaded(completed(proposal(many))).pose_report.buttons.bits == 32);
+  // A button, seven bits of a dial, a button, padding.
+  const std::string apart = proposal(from_hex(axes + bit + "09 01 95 01 81 02 05 01 09 37 75 07 81 02" + bit +
+                                              "09 02 81 02 95 07 81 03 c0"));
+  CHECK(holds(apart,
+              "# Buttons: 9 bits from byte 6. There are other things between them:\n# FILL IN: button_list"));
+  CHECK_FALSE(holds(apart, "\nbuttons ="));
+}
+
+TEST_CASE("a report longer than a profile's may be is told", "[propose_profile]") {
+  const std::string text =
+      proposal(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 41 09 01 81 02 c0"));
+  CHECK(holds(text, "# FILL IN: length. The device says 65 bytes; a profile's report has 64 at most.\n"));
+  CHECK_FALSE(holds(text, "\nlength ="));
+  CHECK(holds(text, "\nwrench_report = \"none\" "));
+}
+
+TEST_CASE("a multi-axis controller with an output of its maker's own may have motors", "[propose_profile]") {
+  const std::string text =
+      proposal(from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02"
+                        "06 00 ff 09 01 95 0c 91 02 c0"));
+  CHECK_FALSE(holds(text, "\nwrench_report = \"none\" "));
+  CHECK(holds(text, "\n[wrench_report]\nid = \"none\""));
+  for (const char* key : {"watchdog_s", "max_force_N", "max_torque_Nm"})
+    CHECK(holds(text, "# FILL IN: " + std::string(key) + " ="));
+}
+
+TEST_CASE("a device that does not say its ids leaves them open", "[propose_profile]") {
+  const std::string text = propose_profile({space_navigator(), "a test", {}, {}});
+  CHECK(holds(text, "[match]\n# FILL IN: usb ="));
+  CHECK(loaded(completed(text)).match.usb == std::vector<UsbId>{{0x1209, 0x0003}});
+}
+
+TEST_CASE("reports of a maker's own are given with what is known: ids and lengths", "[propose_profile]") {
+  const std::string text = proposal(teensy_rawhid());
+  CHECK(holds(text, "\n[pose_report]\nid = \"none\""));
+  CHECK(holds(text, "\nlength = 64\n"));
+  CHECK_FALSE(holds(text, "reference report layout"));
+  const std::string reference = proposal(from_hex(
+      "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0"));
+  CHECK(holds(reference, "take both tables below from profiles/loopback.toml"));
+  CHECK(holds(reference, "\n[wrench_report]\nid = 0x02"));
+}
+
+TEST_CASE("a completed proposal of the reference layout loads", "[propose_profile]") {
+  // As the text asks: the limits and timing filled in, the report tables taken from profiles/loopback.toml.
+  std::string text = proposal(from_hex(
+      "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0"));
+  text = completed(text);
+  std::ifstream stream(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
+  const std::string loopback{std::istreambuf_iterator<char>(stream), {}};
+  text = text.substr(0, text.find("[pose_report]")) + loopback.substr(loopback.find("[pose_report]"));
+  CHECK(refusal(text).empty());
+}
+
+TEST_CASE("a hostile name cannot leave its comment", "[propose_profile]") {
+  const std::string text =
+      propose_profile({space_navigator(), "a\nmax_force_N = 100", "\xff\xfe\n[limits]\r"});
+  CHECK(holds(text, "# Made from a?max_force_N = 100\n# Device: ???[limits]?\n"));
+  CHECK(holds(refusal(text), "key 'limits.max_linear_speed_m_per_s' is missing"));
+}
+
+TEST_CASE("whatever a device says of itself, a proposal is good TOML without limits", "[propose_profile]") {
+  RandomValues random(21);
+  const int cases = repeats(20'000);
+  int proposed = 0;
+  for (int i = 0; i < cases; ++i) {
+    try {
+      const std::string text = proposal(strange_descriptor(random));
+      const TomlNode root = read_toml_text(text, "proposed.toml");
+      for (const TomlEntry& entry : std::get<TomlNode::Table>(root.value))
+        if (entry.key == "limits") CHECK(std::get<TomlNode::Table>(entry.node.value).empty());
+      ++proposed;
+    } catch (const ConfigError& error) {
+      FAIL(error.what());
+    } catch (const std::runtime_error& refused) {
+      if (!holds(refused.what(), "a test: ")) FAIL(refused.what());
+    }
+  }
+  CHECK(proposed > cases / 20);
+}
+
+TEST_CASE("whatever six axes a device has, a proposal with nothing left open loads and agrees with it",
+          "[propose_profile]") {
+  RandomValues random(22);
+  const int cases = repeats(20'000);
+  int complete = 0;
+  for (int i = 0; i < cases; ++i) {
+    const Bytes bytes = strange_descriptor(random);
+    std::string text;
+    try {
+      if (!find_six_axes(parse_report_descriptor(bytes)).device) continue;
+      text = completed(proposal(bytes));
+    } catch (const DescriptorError&) {
+      continue;
+    }
+    if (holds(text, "# FILL IN")) continue;
+    INFO(text);
+    CHECK(differences(parse_report_descriptor(bytes), expected_reports(loaded(text))) ==
+          std::vector<std::string>{});
+    ++complete;
+  }
+  CHECK(complete > cases / 50);
+}
+
+TEST_CASE("what is no device for wrenchd gets no proposal", "[propose_profile]") {
+  CHECK_THROWS_WITH(
+      proposal(boot_keyboard()),
+      "a test: nothing to propose: it is no multi-axis controller (01:08); it wants to be 01:06 "
+      "(keyboard), and has no report of its maker's own; name another device");
+  CHECK_THROWS_WITH(proposal(from_hex("05 01 c0")),
+                    "a test: report descriptor, byte 2: ends a collection, and none is open");
+}
+
+TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") {
+  const Bytes expected = {0x05, 0x01, 0x09, 0x08};
+  for (const char* text :
+       {"05 01 09 08", "0x05, 0x01,\n0X09, 0x08,\n", "05010908", "\t05 01 # usage page\r\n09 08",
+        "0x05, 0x01,  // Usage Page (Generic Desktop)\n0x09, 0x08", "\n\n0501\n0908\n"})
+    CHECK(bytes_of_hex_text(text) == expected);
+  CHECK(bytes_of_hex_text("# nothing").empty());
+  CHECK_THROWS_WITH(bytes_of_hex_text("05 01\n 5 01"),
+                    Catch::Contains("2:2: expected bytes of two") && Catch::Contains("found '5'"));
+  CHECK_THROWS_WITH(bytes_of_hex_text("0x"), Catch::Contains("1:1: "));
+  CHECK_THROWS_WITH(bytes_of_hex_text("05 0g"), Catch::Contains("1:4: "));
+  CHECK_THROWS_WITH(bytes_of_hex_text("05 01 / 09"), Catch::Contains("1:7: "));
+}
+
+TEST_CASE("wrenchctl profile reads bytes and hexadecimal text alike", "[propose_profile]") {
+  const TemporaryDirectory dir;
+  const Bytes bytes = space_mouse_wireless();
+  const auto raw = dir.write("report_descriptor", text_of(bytes));
+  std::string hex;
+  for (const std::uint8_t byte : bytes)
+    hex += "0x" + std::string(1, "0123456789abcdef"[byte >> 4U]) + "0123456789abcdef"[byte & 15U] + ",\n";
+  const auto text = dir.write("descriptor.txt", hex);
+
+  const ProgramResult a = run_program("wrenchctl", {"profile", "--from", raw.string()});
+  CHECK(a.exit_code == 0);
+  CHECK(a.err.empty());
+  CHECK(holds(a.out, "length = 13\n"));
+  const ProgramResult b =
+      run_program("wrenchctl", {"profile", "--from", text.string(), "-o", (dir.path() / "p").string()});
+  CHECK(b.exit_code == 0);
+  CHECK(b.out.empty());
+  std::ifstream written(dir.path() / "p");
+  const std::string proposed{std::istreambuf_iterator<char>(written), {}};
+  CHECK(proposed.substr(proposed.find("# What the device")) == a.out.substr(a.out.find("# What the device")));
+}
+
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // umockdev must be loaded first, and so must they
+std::string hex_of(const Bytes& bytes) {
+  std::string text;
+  for (const std::uint8_t byte : bytes)
+    text += {"0123456789ABCDEF"[byte >> 4U], "0123456789ABCDEF"[byte & 15U]};
+  return text;
+}
+
+/// A number as it lies in the memory of this machine.
+Bytes four_bytes(std::size_t x) {
+  return {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(x >> 8U), 0, 0};
+}
+
+TEST_CASE("wrenchctl profile asks the kernel for what a hidraw device says", "[propose_profile]") {
+  const TemporaryDirectory dir;
+  const auto device = dir.write("device",
+                                "P: /devices/virtual/hidraw/hidraw0\nN: hidraw0\nE: DEVNAME=/dev/hidraw0\n"
+                                "E: MAJOR=243\nE: MINOR=0\nE: SUBSYSTEM=hidraw\n");
+  const Bytes descriptor = space_navigator();
+  Bytes answer = four_bytes(descriptor.size());  // struct hidraw_report_descriptor
+  answer.insert(answer.end(), descriptor.begin(), descriptor.end());
+  answer.resize(4 + 4096);
+  std::string name = "3Dconnexion SpaceNavigator";
+  name.resize(255);
+  const auto answers = dir.write(
+      "answers", "@DEV /dev/hidraw0\nHIDIOCGRDESCSIZE 0 " + hex_of(four_bytes(descriptor.size())) +
+                     "\nHIDIOCGRDESC 0 " + hex_of(answer) + "\nHIDIOCGRAWINFO 0 030000006D0426C6\n" +
+                     "HIDIOCGRAWNAME 27 " + hex_of({name.begin(), name.end()}) + "\n");
+  const std::string out = (dir.path() / "out").string();
+  const std::string command = "umockdev-run -d " + device.string() + " -i /dev/hidraw0=" + answers.string() +
+                              " -- " WRENCHD_BINARY_DIR "/wrenchctl profile --from /dev/hidraw0 -o " + out;
+  REQUIRE(std::system(command.c_str()) == 0);
+  std::ifstream stream(out);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  CHECK(holds(text, "# Made from /dev/hidraw0\n# Device: usb 046d:c626, \"3Dconnexion SpaceNavigator\"\n"));
+  CHECK(text.substr(text.find("# What the device")) ==
+        proposal(descriptor).substr(proposal(descriptor).find("# What the device")));
+}
+#endif
+
+TEST_CASE("wrenchctl profile refuses bad sources with their place and the cure", "[propose_profile]") {
+  const TemporaryDirectory dir;
+  const auto says = [&](const std::string& from, const std::string& why) {
+    const ProgramResult result = run_program("wrenchctl", {"profile", "--from", from});
+    INFO(result.err);
+    CHECK(result.exit_code == 1);
+    CHECK(result.out.empty());
+    CHECK(result.err.find("wrenchctl: " + from + why) == 0);
+  };
+  says((dir.path() / "none").string(), ": no such file; name a /dev/hidrawN");
+  says(dir.path().string(), ": is neither a hidraw device nor a regular file");
+  says("/dev/null", ": is no hidraw device; name a /dev/hidrawN");
+  says(dir.write("empty", "").string(), ": is empty; the device may have been unplugged");
+  says(dir.write("words", "05 01 oh").string(), ":1:7: expected bytes of two hexadecimal digits");
+  says(dir.write("comments", "# no bytes\n").string(),
+       ": report descriptor, byte 0: the descriptor is empty");
+  Bytes cut = space_navigator();
+  cut.pop_back();
+  says(dir.write("cut", text_of(cut)).string(),
+       ": report descriptor, byte 216: 1 collection(s) are still open");
+  says(dir.write("large", std::string((1 << 20) + 1, '0')).string(), ": is larger than 1 MiB");
+  says(dir.write("keyboard", text_of(boot_keyboard())).string(), ": nothing to propose: it is no multi-axis");
+
+  const ProgramResult bare = run_program("wrenchctl", {"profile"});
+  CHECK(bare.exit_code > 100);
+  CHECK(holds(bare.err, "--from is required"));
+}
+
+}  // namespace
+}  // namespace wrenchd

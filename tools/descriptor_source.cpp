@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/descriptor_source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+
+#include <fcntl.h>
+#include <linux/hidraw.h>
+#include <linux/input.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "config/config_error.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A descriptor in hexadecimal with a comment on every byte stays far below this.
+constexpr std::size_t kMostText = 1 << 20;
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& why) {
+  throw std::runtime_error(file.string() + ": " + why);
+}
+
+constexpr std::string_view kBlanks = " \t\r\n,";
+
+/// Every descriptor has a byte below the blank: its first item gives a usage page, or a usage, or begins a
+/// collection. Text has none but for tabs and ends of lines.
+bool is_text(std::string_view content) {
+  return std::all_of(content.begin(), content.end(),
+                     [](char c) { return kBlanks.find(c) != kBlanks.npos || (c > ' ' && c <= '~'); });
+}
+
+/// Closes what it holds.
+class OpenFile {
+ public:
+  explicit OpenFile(const fs::path& file) : fd_(open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
+  ~OpenFile() {
+    if (fd_ >= 0) close(fd_);
+  }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  int fd() const noexcept { return fd_; }
+
+ private:
+  int fd_;
+};
+
+void take_device(int fd, DescriptorSource& source) {
+  hidraw_devinfo info{};
+  std::array<char, 256> name{};
+  if (ioctl(fd, HIDIOCGRAWINFO, &info) < 0) return;
+  if (ioctl(fd, HIDIOCGRAWNAME(name.size() - 1), name.data()) < 0) name[0] = '\0';
+  std::array<char, 32> ids{};
+  const char* bus = info.bustype == BUS_USB ? "usb" : info.bustype == BUS_BLUETOOTH ? "bluetooth" : "bus";
+  const UsbId id = {static_cast<std::uint16_t>(info.vendor), static_cast<std::uint16_t>(info.product)};
+  std::snprintf(ids.data(), ids.size(), "%s %04x:%04x", bus, unsigned{id.vendor}, unsigned{id.product});
+  source.id = id;
+  source.device = std::string(ids.data()) + (name[0] == '\0' ? "" : ", \"" + printable(name.data()) + '"');
+}
+
+DescriptorSource ask_kernel(const fs::path& file) {
+  const OpenFile node(file);
+  if (node.fd() < 0 && (errno == EACCES || errno == EPERM))
+    refuse(file, "may not be opened by this user; be root, or let a udev rule give access");
+  if (node.fd() < 0) refuse(file, std::string("cannot be opened: ") + std::strerror(errno));
+  int size = 0;
+  if (ioctl(node.fd(), HIDIOCGRDESCSIZE, &size) < 0)
+    refuse(file, "is no hidraw device; name a /dev/hidrawN, or a file with a report descriptor");
+  hidraw_report_descriptor descriptor{};
+  descriptor.size = static_cast<unsigned>(std::clamp(size, 0, HID_MAX_DESCRIPTOR_SIZE));
+  if (ioctl(node.fd(), HIDIOCGRDESC, &descriptor) < 0)
+    refuse(file, std::string("the kernel does not give its report descriptor: ") + std::strerror(errno));
+  DescriptorSource source{{descriptor.value, descriptor.value + descriptor.size}, file.string(), {}, {}};
+  take_device(node.fd(), source);
+  return source;
+}
+
+/// Files of /sys do not know their size, so this one reads until the end.
+std::string content_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) refuse(file, "cannot be opened; check that this user may read it");
+  std::string content(kMostText + 1, '\0');
+  stream.read(content.data(), static_cast<std::streamsize>(content.size()));
+  content.resize(static_cast<std::size_t>(stream.gcount()));
+  if (content.size() > kMostText)
+    refuse(file, "is larger than 1 MiB; is this really a report descriptor? Those have 4096 bytes at most");
+  if (content.empty()) refuse(file, "is empty; the device may have been unplugged");
+  return content;
+}
+
+/// "05", "0x05" or "05010908".
+void add_bytes_of_word(std::string_view word, const std::string& place, std::vector<std::uint8_t>& bytes) {
+  std::string_view digits = word;
+  if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
+  const bool good = !digits.empty() && digits.size() % 2 == 0 &&
+                    digits.find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
+  if (!good)
+    throw std::runtime_error(place +
+                             ": expected bytes of two hexadecimal digits, as in 05 01 or 0x05, 0x01; " +
+                             "found '" + printable(std::string(word), 20) + "'");
+  for (std::size_t k = 0; k < digits.size(); k += 2) {
+    std::uint8_t byte = 0;
+    std::from_chars(digits.data() + k, digits.data() + k + 2, byte, 16);
+    bytes.push_back(byte);
+  }
+}
+
+void add_bytes_of_line(std::string_view text, std::size_t line, std::vector<std::uint8_t>& bytes) {
+  text = text.substr(0, std::min(text.find('#'), text.find("//")));
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks, i), text.size());
+    const std::string place = std::to_string(line) + ":" + std::to_string(i + 1);
+    if (end > i) add_bytes_of_word(text.substr(i, end - i), place, bytes);
+    i = end + 1;
+  }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> bytes_of_hex_text(std::string_view text) {
+  std::vector<std::uint8_t> bytes;
+  for (std::size_t line = 1; !text.empty(); ++line) {
+    const std::size_t length = std::min(text.find('\n'), text.size());
+    add_bytes_of_line(text.substr(0, length), line, bytes);
+    text.remove_prefix(std::min(length + 1, text.size()));
+  }
+  return bytes;
+}
+
+DescriptorSource read_descriptor_source(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found)
+    refuse(file, "no such file; name a /dev/hidrawN, or a file with a report descriptor");
+  if (error) refuse(file, "cannot be read: " + error.message());
+  if (fs::is_character_file(status)) return ask_kernel(file);
+  if (!fs::is_regular_file(status))
+    refuse(file,
+           "is neither a hidraw device nor a regular file; name a /dev/hidrawN, or a file with a report "
+           "descriptor");
+  const std::string content = content_of(file);
+  if (!is_text(content)) return {{content.begin(), content.end()}, file.string(), {}, {}};
+  try {
+    return {bytes_of_hex_text(content), file.string(), {}, {}};
+  } catch (const std::runtime_error& wrong) {
+    throw std::runtime_error(file.string() + ":" + wrong.what());
+  }
+}
+
+ReportDescriptor parse_descriptor(const DescriptorSource& source) {
+  try {
+    return parse_report_descriptor(source.bytes);
+  } catch (const DescriptorError& error) {
+    throw std::runtime_error(source.from + ": report descriptor, " + error.what());
+  }
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/list_devices.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "config/config_error.hpp"
+#include "devices/known_devices.hpp"
+#include "devices/plugged_device.hpp"
+#include "devices/profile_reports.hpp"
+
+namespace wrenchd {
+namespace {
+
+constexpr Usage kMultiAxis = {0x01, 0x08};
+
+/// One interface, and what came of holding the profiles against it.
+struct Entry {
+  UsbDevice shown;  ///< its strings made plain
+  PluggedFacts facts;
+  MatchResult match;
+  bool ours = false;  ///< it has to do with us, whether or not it can be used
+};
+
+/// A device, by its interfaces.
+using Interfaces = std::span<const Entry>;
+
+// --- what there is ----------------------------------------------------------------------------------------
+
+/// What somebody else chose, fit for a terminal: no character that moves its cursor.
+std::string plain(std::string text, std::size_t longest = 60) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
+  return printable(text, longest);
+}
+
+UsbDevice plain(UsbDevice device) {
+  for (std::string* text : {&device.serial, &device.manufacturer, &device.product_name}) *text = plain(*text);
+  return device;
+}
+
+bool claims(const DeviceProfile& profile, UsbId id) {
+  const auto holds = [id](const std::vector<UsbId>& ids) {
+    return std::find(ids.begin(), ids.end(), id) != ids.end();
+  };
+  return holds(profile.match.usb) || holds(profile.match.usb_by_layout);
+}
+
+Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profiles) {
+  Entry entry{plain(device), plugged_facts(device), {}, false};
+  entry.match = match_profile(entry.facts.device, profiles);
+  const bool multi_axis = Usage{device.usage_page, device.usage} == kMultiAxis;
+  entry.ours = entry.match.profile || !entry.match.refused.empty() || multi_axis ||
+               std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
+                 return claims(profile, entry.facts.device.id);
+               });
+  return entry;
+}
+
+bool same_socket(const UsbDevice& a, const UsbDevice& b) {
+  return !a.place.empty() && a.place == b.place && a.vendor == b.vendor && a.product == b.product;
+}
+
+/// The interfaces of one device follow each other in the list.
+std::vector<Interfaces> by_device(const std::vector<Entry>& entries) {
+  std::vector<Interfaces> devices;
+  for (std::size_t i = 0; i < entries.size();) {
+    std::size_t end = i + 1;
+    while (end < entries.size() && same_socket(entries[i].shown, entries[end].shown)) ++end;
+    devices.push_back(Interfaces(entries).subspan(i, end - i));
+    i = end;
+  }
+  return devices;
+}
+
+/// The interfaces that tell what there is to tell of a device: those with a profile, else the first that has
+/// to do with us, for the others are of the same id and would say the same.
+std::vector<const Entry*> telling(Interfaces device, bool all) {
+  std::vector<const Entry*> found;
+  for (const Entry& entry : device)
+    if (all || entry.match.profile) found.push_back(&entry);
+  if (!found.empty()) return found;
+  const auto with_usage = std::find_if(device.begin(), device.end(), [](const Entry& entry) {
+    return entry.ours && Usage{entry.shown.usage_page, entry.shown.usage} == kMultiAxis;
+  });
+  if (with_usage != device.end()) return {&*with_usage};
+  const auto first =
+      std::find_if(device.begin(), device.end(), [](const Entry& entry) { return entry.ours; });
+  if (first != device.end()) found.push_back(&*first);
+  return found;
+}
+
+// --- a device in words ------------------------------------------------------------------------------------
+
+std::string indented(const std::string& text) {
+  std::string lines = "  ";
+  for (const char c : text) lines += c == '\n' ? "\n  " : std::string(1, c);
+  return lines + '\n';
+}
+
+std::string where(const UsbDevice& device) {
+  if (!device.place.empty()) return device.place;
+  return device.hidraw_node.empty() ? "not on USB" : device.hidraw_node + " (not on USB)";
+}
+
+std::string who(const UsbDevice& device) {
+  std::string text = wrenchd::text(UsbId{device.vendor, device.product});
+  if (!device.product_name.empty()) text += " \"" + device.product_name + "\"";
+  if (!device.manufacturer.empty()) text += " of " + device.manufacturer;
+  return text;
+}
+
+std::string head(const UsbDevice& device) {
+  return where(device) + (device.interface < 0 ? "" : ", interface " + std::to_string(device.interface)) +
+         ": " + who(device) +
+         (device.serial.empty() ? ", no serial number" : ", serial number " + device.serial) + '\n';
+}
+
+std::string in_one_line(Interfaces device) {
+  const UsbDevice& first = device.front().shown;
+  std::vector<std::string> kinds;
+  for (const Entry& entry : device) {
+    if (entry.shown.report_descriptor.empty()) continue;
+    const std::string kind = to_text(Usage{entry.shown.usage_page, entry.shown.usage});
+    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) kinds.push_back(kind);
+  }
+  std::string text = where(first) + ": " + who(first);
+  for (const std::string& kind : kinds) text += ", " + kind;
+  return text + (kinds.empty() ? ", not HID" : "") + "; no profile is for it\n";
+}
+
+/// Whether we may open what the transport opens.
+std::string access(const UsbDevice& device, Transport transport, const OpenCheck& why_not_open) {
+  const bool hidraw = transport == Transport::hidraw;
+  const std::string& node = hidraw ? device.hidraw_node : device.usb_node;
+  if (node.empty())
+    return indented(hidraw
+                        ? "it has no hidraw node: no HID driver has it; unplug it and plug it in again, and "
+                          "look at what the kernel says (dmesg)"
+                        : "it has no USB node: the profile wants libusb, and it is not on USB; plug in its "
+                          "cable");
+  const std::string why = why_not_open(device, node);
+  return indented(why.empty() ? node + " can be opened" : why);
+}
+
+/// Of an unmatched device, the node that would be opened first.
+std::string access(const UsbDevice& device, const OpenCheck& why_not_open) {
+  return access(device, device.hidraw_node.empty() ? Transport::libusb : Transport::hidraw, why_not_open);
+}
+
+std::string degrees_of_freedom(const DeviceProfile& profile) {
+  const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
+  const auto others = [](DofMask dofs) { return dof_text(static_cast<DofMask>(kAllDofs & ~dofs)); };
+  std::string text = "senses " + dof_text(sensed) + "; drives " + dof_text(driven);
+  if (sensed != kAllDofs) text += "; along " + others(sensed) + " the handle stays where it is";
+  if (driven == kNoDof)
+    text += ": it moves a tool, and every wrench is dropped";
+  else if (driven != kAllDofs)
+    text += "; of a wrench " + others(driven) + " is dropped";
+  return indented(text);
+}
+
+/// The profile held against what the device says of its reports.
+std::string agreement(const PluggedFacts& facts, const DeviceProfile& profile) {
+  if (!facts.unreadable.empty())
+    return indented("its report descriptor is refused, so the profile could not be held against it: " +
+                    facts.unreadable);
+  if (!facts.descriptor)
+    return indented("it is not HID: there is no report descriptor to hold the profile against");
+  const auto lines = differences(*facts.descriptor, expected_reports(profile));
+  if (lines.empty()) return indented("its report descriptor agrees with the profile");
+  std::string text =
+      "its report descriptor disagrees with the profile; change the profile, or it is for another device:";
+  for (const std::string& line : lines) text += "\n  " + line;
+  return indented(text);
+}
+
+/// Profiles with the same reason share a line.
+std::string why_not(const Entry& entry, const std::vector<DeviceProfile>& profiles) {
+  std::vector<std::pair<std::string, std::string>> names_by_reason;
+  for (std::size_t i = 0; i < profiles.size(); ++i) {
+    if (entry.match.profile == i) continue;
+    std::string reason = plain(entry.match.why_not[i], 400);
+    if (reason.empty())
+      reason = entry.match.profile ? "it fits as well, and the other is nearer" : "it fits, and is not alone";
+    const auto same = std::find_if(names_by_reason.begin(), names_by_reason.end(),
+                                   [&](const auto& pair) { return pair.first == reason; });
+    if (same == names_by_reason.end())
+      names_by_reason.emplace_back(reason, profiles[i].name);
+    else
+      same->second += ", " + profiles[i].name;
+  }
+  std::string text;
+  for (const auto& [reason, names] : names_by_reason)
+    text.append("    ").append(names).append(": ").append(reason).append("\n");
+  return text;
+}
+
+std::string paragraph_of_matched(const Entry& entry, const DeviceProfile& profile) {
+  return indented("profile " + profile.name +
+                  (profile.description.empty() ? "" : ": " + profile.description)) +
+         degrees_of_freedom(profile) + agreement(entry.facts, profile);
+}
+
+std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& profiles,
+                      const OpenCheck& why_not_open) {
+  const UsbDevice& device = entry.shown;
+  const std::string begin = head(device);
+  if (entry.match.profile) {
+    const DeviceProfile& profile = profiles[*entry.match.profile];
+    const std::string others = why_not(entry, profiles);
+    return begin + access(device, profile.transport, why_not_open) + paragraph_of_matched(entry, profile) +
+           (others.empty() ? "" : "  the other profiles:\n" + others);
+  }
+  if (known_unusable(entry.facts.device.id) != nullptr)
+    return begin + indented(entry.match.refused) +
+           indented("wrenchd does not open it, whatever a profile says");
+  std::string text = begin + access(device, why_not_open);
+  if (!entry.facts.unreadable.empty())
+    text += indented("its report descriptor is refused: " + entry.facts.unreadable);
+  text += indented(entry.match.refused.empty() ? "no profile is for it:" : entry.match.refused);
+  text += why_not(entry, profiles);
+  if (entry.match.refused.empty() && entry.facts.descriptor && !device.hidraw_node.empty())
+    text += indented("wrenchctl profile --from " + device.hidraw_node + " proposes one");
+  return text;
+}
+
+// --- below the list ---------------------------------------------------------------------------------------
+
+/// Devices that have the same profile, and what tells them apart.
+std::string equal_devices(const std::vector<Entry>& entries, const std::vector<DeviceProfile>& profiles) {
+  std::string text;
+  for (std::size_t i = 0; i < profiles.size(); ++i) {
+    std::vector<std::string> serials;
+    for (const Entry& entry : entries)
+      if (entry.match.profile == i) serials.push_back(entry.shown.serial);
+    if (serials.size() < 2) continue;
+    const std::set<std::string> different(serials.begin(), serials.end());
+    text += std::to_string(serials.size()) + " devices have the profile " + profiles[i].name;
+    if (different.size() < serials.size() || different.count("") != 0) {
+      text += ", and no serial numbers that tell them apart: leave in the one you mean\n";
+      continue;
+    }
+    text += ": for one of them alone write a profile with inherits = \"" + profiles[i].name +
+            "\" and its serial in [match]:";
+    for (const std::string& serial : different) text += " \"" + serial + '"';
+    text += '\n';
+  }
+  return text;
+}
+
+std::string about_profiles(const KnownProfiles& known) {
+  std::string text;
+  if (known.profiles.empty()) text += "There is no profile to hold a device against.\n";
+  if (known.refused.empty()) return text;
+  text += "Profiles that were refused, and not asked:\n";
+  for (const std::string& why : known.refused) text += indented(why);
+  return text;
+}
+
+}  // namespace
+
+std::string device_list(std::span<const UsbDevice> devices, const KnownProfiles& known, bool all,
+                        const OpenCheck& why_not_open) {
+  std::vector<Entry> entries;
+  for (const UsbDevice& device : devices) entries.push_back(entry_of(device, known.profiles));
+
+  std::string paragraphs, lines;
+  for (const Interfaces device : by_device(entries)) {
+    const auto tell = telling(device, all);
+    for (const Entry* entry : tell) paragraphs += paragraph(*entry, known.profiles, why_not_open) + '\n';
+    if (tell.empty()) lines += in_one_line(device);
+  }
+  std::string text = paragraphs;
+  if (entries.empty()) text += "Nothing is plugged in: no USB device but hubs, and no HID device.\n";
+  if (!lines.empty() && paragraphs.empty()) text += "Nothing is plugged in that wrenchd knows.\n";
+  if (!lines.empty())
+    text += "Other devices (--all says of each why no profile is for it):\n" +
+            indented(lines.substr(0, lines.size() - 1));
+  for (const std::string& part : {equal_devices(entries, known.profiles), about_profiles(known)})
+    if (!part.empty()) text += (text.ends_with("\n\n") ? "" : "\n") + part;
+  while (text.ends_with("\n\n")) text.pop_back();
+  return text;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,423 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/propose_profile.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include "config/config_error.hpp"
+#include "config/toml_file.hpp"
+#include "devices/six_axes.hpp"
+
+namespace wrenchd {
+namespace {
+
+// What a profile may say; config/load_report_layout.cpp and load_profile.cpp refuse what is beyond.
+constexpr std::size_t kMostReportBytes = 64;
+constexpr std::size_t kMostButtons = 32;
+constexpr double kLeastStep = 1e-12, kLargestStep = 1e3;
+constexpr double kLargestOffset = 1e6;
+constexpr double kLeastGain = 1e-3, kLargestGain = 1e6;
+
+constexpr std::size_t kCommentColumn = 34;
+constexpr std::uint16_t kLedPage = 0x08;
+
+std::string id_text(std::optional<std::uint8_t> id) {
+  if (!id) return "\"none\"";
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "0x%02x", *id);
+  return text.data();
+}
+
+std::string place_text(std::size_t bit) {
+  return "byte " + std::to_string(bit / 8) + (bit % 8 == 0 ? "" : " bit " + std::to_string(bit % 8));
+}
+
+/// A name that somebody else chose, fit for a comment: TOML wants one line of good UTF-8.
+std::string plain(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
+  return printable(text, 200);
+}
+
+// What the descriptor says, as comments
+
+std::string field_text(const DescribedField& field) {
+  const std::string where = "#     " + place_text(field.bit) + ": ";
+  if (field.constant) return where + std::to_string(field.bits * field.count) + " bits of padding\n";
+  const auto first = field.usage(0), last = field.usage(field.count - 1);
+  std::string what = first ? to_text(*first) : "unnamed";
+  if (first && *first != *last) what += " to " + to_text(*last);
+  return where + std::to_string(field.count) + " x " + std::to_string(field.bits) + " bits, " +
+         std::to_string(field.logical_min) + " to " + std::to_string(field.logical_max) + ", " + what +
+         (field.relative ? ", relative" : "") + (field.variable ? "" : ", an array") + "\n";
+}
+
+std::string report_text(const DescribedReport& report) {
+  std::string text = std::string("#   ") + name(report.kind) + " report " + id_text(report.id) + ", " +
+                     std::to_string(report.length) + " bytes\n";
+  for (const DescribedField& field : report.fields) text += field_text(field);
+  return text;
+}
+
+std::string head(const DescriptorSource& source, const ReportDescriptor& descriptor) {
+  std::string text =
+      "# wrenchd device profile: a PROPOSAL, made from a report descriptor by `wrenchctl profile`.\n"
+      "#\n"
+      "# A descriptor tells where numbers lie in reports, and little of what they mean. Lines marked "
+      "GUESSED\n"
+      "# want to be looked at; lines marked FILL IN are things that nobody but you can know, and until they\n"
+      "# are filled in the profile does not load. profiles/example.toml explains every key.\n"
+      "#\n";
+  text += "# Made from " + plain(source.from) + "\n";
+  if (!source.device.empty()) text += "# Device: " + plain(source.device) + "\n";
+  text += "# What the device says of its reports";
+  if (!descriptor.has_ids()) text += ", which have no id";
+  text += ":\n";
+  for (const DescribedReport& report : descriptor.reports) text += report_text(report);
+  return text;
+}
+
+bool of_maker(const DescribedReport& report) {
+  return std::any_of(report.fields.begin(), report.fields.end(), [](const DescribedField& field) {
+    const auto usage = field.usage(0);
+    return !field.constant && usage && usage->page >= kFirstVendorPage;
+  });
+}
+
+/// What drives motors, as far as bytes can tell: the longest output report that does more than light lamps,
+/// one of the maker's own before any other.
+const DescribedReport* driving_report(const ReportDescriptor& descriptor) {
+  const DescribedReport* found = nullptr;
+  const auto drives = [](const DescribedField& field) {
+    const auto usage = field.usage(0);
+    return !field.constant && !(usage && usage->page == kLedPage);
+  };
+  for (const DescribedReport& report : descriptor.reports) {
+    if (report.kind != ReportKind::output || std::none_of(report.fields.begin(), report.fields.end(), drives))
+      continue;
+    if (found == nullptr ||
+        std::pair(of_maker(report), report.length) > std::pair(of_maker(*found), found->length))
+      found = &report;
+  }
+  return found;
+}
+
+// What every profile has
+
+std::string match_table(const DescriptorSource& source, const ReportDescriptor& descriptor) {
+  std::array<char, 80> line{};
+  std::string text =
+      "\n[match]\n# FILL IN: usb =                   vendor and product, as in [\"1209:0003\"]\n";
+  if (source.id) {
+    std::snprintf(line.data(), line.size(), "\n[match]\nusb = [\"%04x:%04x\"]\n", unsigned{source.id->vendor},
+                  unsigned{source.id->product});
+    text = line.data();
+  }
+  // The kernel's lists know a device by the first thing it wants to be.
+  const Usage usage = descriptor.collections.empty() ? Usage{} : descriptor.collections.front().usage;
+  if (usage == Usage{}) return text;
+  std::snprintf(line.data(), line.size(), "usage_page = 0x%02x\nusage = 0x%02x\n", unsigned{usage.page},
+                unsigned{usage.id});
+  return text + line.data();
+}
+
+/// All that stands above the reports.
+std::string general_keys(const DescriptorSource& source, const ReportDescriptor& descriptor,
+                         const std::string& description, const char* stream) {
+  const bool driven = driving_report(descriptor) != nullptr;
+  std::string text =
+      "\nname = \"unnamed\"                  # FILL IN: what status and recordings should show\n"
+      "description = \"" +
+      description +
+      "\"\n"
+      "transport = \"hidraw\"              # GUESSED: \"libusb\" goes past the kernel\n"
+      "# FILL IN: report_rate_Hz =        measured, not hoped for: count its reports over ten "
+      "seconds\n" +
+      stream + "# FILL IN: stale_fault_s =         how long it may be silent when it should speak\n";
+  text += driven
+              ? "# FILL IN: watchdog_s =            the firmware's own; ask its maker, or read its source\n"
+              : "wrench_report = \"none\"            # it has no output report that could drive a motor\n";
+  text += match_table(source, descriptor);
+  text +=
+      "\n# What the device and the hand on it can bear. No descriptor says this and nothing guesses it: a "
+      "number\n"
+      "# too large here can hurt somebody.\n"
+      "[limits]\n";
+  if (driven) text += "# FILL IN: max_force_N =\n# FILL IN: max_torque_Nm =\n";
+  return text + "# FILL IN: max_linear_speed_m_per_s =\n# FILL IN: max_angular_speed_rad_per_s =\n";
+}
+
+/// Id and length. `guess`: what was guessed of the report.
+std::string frame_keys(const DescribedReport& report, const std::string& guess = {}) {
+  const std::string length = std::to_string(report.length);
+  std::string text = "id = " + id_text(report.id) + guess + "\n";
+  if (report.length <= kMostReportBytes) return text + "length = " + length + "\n";
+  return text + "# FILL IN: length. The device says " + length + " bytes; a profile's report has " +
+         std::to_string(kMostReportBytes) + " at most.\n";
+}
+
+std::string makers_table(const char* table, const DescribedReport* report, const char* fields) {
+  if (report == nullptr) return std::string("\n# FILL IN: [") + table + "]. The device has no such report.\n";
+  return std::string("\n[") + table + "]\n" +
+         frame_keys(*report, "                          # GUESSED: the longest report of its kind") +
+         "# FILL IN: " + fields + "\n" +
+         "#   What its fields mean is known to the maker only. \"none\" stands for what it has not; joints, "
+         "parts of a\n"
+         "#   pose and motor currents are in profiles/example.toml.\n";
+}
+
+std::string wrench_table(const ReportDescriptor& descriptor) {
+  const DescribedReport* report = driving_report(descriptor);
+  if (report == nullptr) return {};
+  return makers_table("wrench_report", report, "enable, sequence, force, torque, hold_time, checksum") +
+         "#   If it drives no motor, leave this table, force, torque and watchdog out, and say wrench_report "
+         "= "
+         "\"none\"\n#   above [match].\n";
+}
+
+// Multi-axis controllers
+
+/// The six axes are two fields of a profile.
+struct Half {
+  const char* key;       ///< of the field
+  const char* step_key;  ///< [m] or [rad] of one count
+  const char* offset_key;
+  const char* gain_key;
+  const char* what;  ///< the step is
+  const char* full_text;
+  double full;   ///< taken as the end of the cap's way where the device gives no unit
+  double speed;  ///< that the end of the cap's way shall mean
+  const char* speed_text;
+  std::size_t first;  ///< of its three axes
+};
+
+// A guess each, and marked as one. Where a device gives no unit only the product of step and gain moves
+// anything, so the ends may be any; the speeds are slow enough to follow with the eye.
+constexpr Half kTranslation = {"translation", "step_m", "offset_m", "linear_gain", "length",
+                               "10 mm",       0.01,     0.1,        "0.1 m/s",     0};
+constexpr Half kRotation = {"rotation", "step_rad", "offset_rad", "angular_gain", "angle",
+                            "0.1 rad",  0.1,        1.0,          "1 rad/s",      3};
+
+/// The count at which the cap rests: 0, or the middle where there is no 0 between its ends.
+double rest_count(const DescribedNumber& axis) {
+  if (axis.logical_min < 0 && axis.logical_max > 0) return 0.0;
+  return std::ceil(0.5 * (static_cast<double>(axis.logical_min) + static_cast<double>(axis.logical_max)));
+}
+
+/// Counts from rest to the farther end, of the widest of the three.
+double counts_to_end(const SixAxes& device, const Half& half) {
+  double most = 0.0;
+  for (std::size_t i = half.first; i < half.first + 3; ++i) {
+    const DescribedNumber& axis = device.axes[i];
+    const double rest = rest_count(axis);
+    most = std::max(
+        {most, static_cast<double>(axis.logical_max) - rest, rest - static_cast<double>(axis.logical_min)});
+  }
+  return most;
+}
+
+/// Three equal numbers that follow each other: what a field is. The step is one for all three.
+bool is_row(const SixAxes& device, const Half& half) {
+  const DescribedNumber& a = device.axes[half.first];
+  for (std::size_t i = 1; i < 3; ++i) {
+    const DescribedNumber& b = device.axes[half.first + i];
+    const bool same_step = a.step == b.step || (!std::isfinite(a.step) && !std::isfinite(b.step));
+    if (b.bit != a.bit + i * a.bits || b.bits != a.bits || b.is_signed() != a.is_signed() || !same_step ||
+        rest_count(a) != rest_count(b))
+      return false;
+  }
+  return counts_to_end(device, half) > 0.0;
+}
+
+/// [m] or [rad] of a count: the device's own, or a guess where it gives none that a profile may have.
+struct Step {
+  double si = 0.0;
+  bool guessed = false;
+};
+
+Step step_of(const SixAxes& device, const Half& half) {
+  const double own = device.axes[half.first].step;
+  const double offset = std::abs(rest_count(device.axes[half.first]) * own);
+  if (own >= kLeastStep && own <= kLargestStep && offset <= kLargestOffset) return {own, false};
+  return {half.full / counts_to_end(device, half), true};
+}
+
+std::string number_text(double x, int digits) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.*g", digits, x);
+  return text.data();
+}
+
+std::string axes_places(const SixAxes& device, std::size_t first) {
+  static constexpr std::array<const char*, 6> kNames = {"X", "Y", "Z", "Rx", "Ry", "Rz"};
+  std::string text;
+  for (std::size_t i = first; i < first + 3; ++i) {
+    const DescribedNumber& axis = device.axes[i];
+    text += std::string(i > first ? "; " : "") + kNames[i] + " " + std::to_string(axis.bits) + " bits from " +
+            place_text(axis.bit) + ", " + std::to_string(axis.logical_min) + " to " +
+            std::to_string(axis.logical_max);
+  }
+  return text;
+}
+
+/// Where a field lies and how wide it is: `byte = 1, type = "i16"`, or `byte = 0, bit = 3, bits = 10`.
+std::string place_keys(std::size_t bit, unsigned bits, bool is_signed, bool signed_by_itself) {
+  std::string text = "byte = " + std::to_string(bit / 8);
+  const bool plain_width = bits == 8 || bits == 16 || bits == 32;
+  if (bit % 8 == 0 && plain_width && is_signed == signed_by_itself)
+    return text + ", type = \"" + (is_signed ? "i" : "u") + std::to_string(bits) + '"';
+  if (bit % 8 != 0) text += ", bit = " + std::to_string(bit % 8);
+  text += ", bits = " + std::to_string(bits);
+  return is_signed == signed_by_itself ? text : text + ", signed = " + (is_signed ? "true" : "false");
+}
+
+std::string axes_field(const SixAxes& device, const Half& half) {
+  const DescribedNumber& axis = device.axes[half.first];
+  if (!is_row(device, half))
+    return std::string("# FILL IN: ") + half.key + ". " + axes_places(device, half.first) +
+           ":\n#   not three equal numbers in a row with one step, as a field is\n";
+  const Step step = step_of(device, half);
+  const double rest = rest_count(axis);
+  std::string text = "# " + axes_places(device, half.first) + ".\n";
+  if (step.guessed)
+    text += std::string("# GUESSED: the step. The descriptor gives no ") + half.what +
+            " for a count; the end of the cap's way is taken as " + half.full_text + ".\n";
+  else
+    text += "# The step is what the descriptor says of a count.\n";
+  if (rest != 0.0)
+    text += "# GUESSED: the offset, which makes the count " + number_text(rest, 12) +
+            " the one at which the cap rests.\n";
+  text += std::string(half.key) + " = { " + place_keys(axis.bit, axis.bits, axis.is_signed(), true) + ", " +
+          half.step_key + " = " + number_text(step.si, 9);
+  if (rest != 0.0) text += std::string(", ") + half.offset_key + " = " + number_text(-rest * step.si, 12);
+  return text + " }\n";
+}
+
+/// As much a metre, or a radian, as makes the end of the cap's way the speed that is wanted there.
+std::string gain(const SixAxes& device, const Half& half) {
+  const double value =
+      is_row(device, half) ? half.speed / (step_of(device, half).si * counts_to_end(device, half)) : 0.0;
+  if (!(value >= kLeastGain && value <= kLargestGain))
+    return std::string("# FILL IN: ") + half.gain_key + " =\n";
+  std::string key = std::string(half.gain_key) + " = " + number_text(value, 3) + ' ';
+  key.resize(std::max(key.size(), kCommentColumn), ' ');
+  return key + "# GUESSED: " + half.speed_text + " at the end of the cap's way\n";
+}
+
+std::string deflection_table(const SixAxes& device) {
+  return "\n# GUESSED: that the axes say how far a cap is pushed and twisted, which springs back. If they "
+         "say "
+         "where a\n"
+         "# handle is, mode = \"position\" with gains of 1.\n"
+         "[deflection]\nmode = \"rate\"\n" +
+         gain(device, kTranslation) + gain(device, kRotation);
+}
+
+/// Nothing but buttons from its first to its last, and padding: what a mask can hold.
+bool is_mask(const DescribedReport& report, const DescribedBits& bits) {
+  return std::all_of(report.fields.begin(), report.fields.end(), [&](const DescribedField& field) {
+    const bool apart = field.end_bit() <= bits.bit || field.bit >= bits.bit + bits.count;
+    return apart || field.constant || field.bits == 1;
+  });
+}
+
+std::string buttons_field(const SixAxes& device, const DescribedReport& report) {
+  const DescribedBits& bits = *device.buttons;
+  const std::string which =
+      "# Buttons: " + std::to_string(bits.count) + " bits from " + place_text(bits.bit) + ".";
+  if (!is_mask(report, bits))
+    return which + " There are other things between them:\n# FILL IN: button_list\n";
+  const auto count = static_cast<unsigned>(std::min(bits.count, kMostButtons));
+  return which + (count < bits.count ? " The first 32 of them, which is all that a mask holds." : "") +
+         "\nbuttons = { " + place_keys(bits.bit, count, false, false) + " }\n";
+}
+
+/// What a report of the device carries of axes and buttons.
+std::string report_fields(const SixAxes& device, const DescribedReport& report) {
+  std::string text;
+  for (const Half& half : {kTranslation, kRotation})
+    if (device.axes[half.first].report_id == report.id) text += axes_field(device, half);
+  if (device.buttons && device.buttons->report_id == report.id) text += buttons_field(device, report);
+  return text;
+}
+
+std::string more_report(const SixAxes& device, const DescribedReport& report, const char* name) {
+  return std::string("\n[[more_reports]]\nname = \"") + name + "\"\n" + frame_keys(report) +
+         report_fields(device, report);
+}
+
+std::string multi_axis(const DescriptorSource& source, const SixAxes& device,
+                       const ReportDescriptor& descriptor) {
+  const auto input = [&](std::optional<std::uint8_t> id) -> const DescribedReport& {
+    return *descriptor.find(ReportKind::input, id);
+  };
+  const DescribedReport &first = input(device.axes[0].report_id), &second = input(device.axes[3].report_id);
+  const bool split = device.layout == AxesLayout::split;
+  std::string text =
+      general_keys(source, descriptor,
+                   split ? "Multi-axis controller, X Y Z and Rx Ry Rz in two reports"
+                         : "Multi-axis controller, six axes in one report",
+                   "stream = \"silent_at_rest\"         # GUESSED: such devices are silent while "
+                   "nobody touches them\n");
+  text +=
+      "\n# GUESSED: that the device keeps to HID's axes, x right, y towards the user, z down; ours are x "
+      "forward,\n"
+      "# y left, z up.\n"
+      "[frames]\nbase_axes = [\"-y\", \"-x\", \"-z\"]\n" +
+      deflection_table(device) + "\n[pose_report]\n" + frame_keys(first) + report_fields(device, first);
+  if (split) text += more_report(device, second, "rotation");
+  if (device.buttons && device.buttons->report_id != first.id && device.buttons->report_id != second.id)
+    text += more_report(device, input(device.buttons->report_id), "buttons");
+  text += wrench_table(descriptor);
+  if (device.led)
+    text += "\n# LED: " + place_text(device.led->bit) + " of output report " +
+            id_text(device.led->report_id) + "; [shutdown] may switch it off.\n";
+  return text;
+}
+
+// Devices with reports of their maker's own
+
+/// The longest of its kind: what carries poses or wrenches is seldom the shortest.
+const DescribedReport* longest(const ReportDescriptor& descriptor, ReportKind kind) {
+  const DescribedReport* found = nullptr;
+  for (const DescribedReport& report : descriptor.reports)
+    if (report.kind == kind && of_maker(report) && (found == nullptr || report.length > found->length))
+      found = &report;
+  return found;
+}
+
+std::string makers_own(const DescriptorSource& source, const ReportDescriptor& descriptor) {
+  const DescribedReport* pose = longest(descriptor, ReportKind::input);
+  const DescribedReport* wrench = driving_report(descriptor);
+  std::string text = general_keys(source, descriptor, "Reports of its maker's own",
+                                  "stream = \"free_running\"           # GUESSED\n");
+  const bool reference = pose != nullptr && wrench != nullptr && pose->id == 1 && pose->length == 64 &&
+                         wrench->id == 2 && wrench->length == 32;
+  if (reference)
+    text +=
+        "\n# GUESSED: ids and lengths are those of the wrenchd reference report layout. If the device speaks "
+        "it,\n"
+        "# take both tables below from profiles/loopback.toml as they stand.\n";
+  return text +
+         makers_table("pose_report", pose,
+                      "motors_on, watchdog_tripped, sequence, device_time, position, orientation, checksum") +
+         wrench_table(descriptor);
+}
+
+}  // namespace
+
+std::string propose_profile(const DescriptorSource& source) {
+  const ReportDescriptor descriptor = parse_descriptor(source);
+  const SixAxesFound axes = find_six_axes(descriptor);
+  if (axes.device) return head(source, descriptor) + multi_axis(source, *axes.device, descriptor);
+  if (std::none_of(descriptor.reports.begin(), descriptor.reports.end(), of_maker))
+    throw std::runtime_error(source.from + ": nothing to propose: " + axes.why_not +
+                             ", and has no report of its maker's own; name another device");
+  return head(source, descriptor) + makers_own(source, descriptor);
+}
+
+}  // namespace wrenchd
