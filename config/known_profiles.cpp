@@ -10,6 +10,7 @@ KnownProfiles known_profiles(const SearchPath& search) {
   for (const std::filesystem::path& file : profile_files(search)) {
     try {
       known.profiles.push_back(load_profile(file, search));
+      known.files.push_back(file);
     } catch (const std::exception& refused) {
       known.refused.emplace_back(refused.what());
     }

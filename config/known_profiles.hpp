@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,9 @@ namespace wrenchd {
 
 /// Every profile along a search path, as far as it is good.
 struct KnownProfiles {
-  std::vector<DeviceProfile> profiles;  ///< by the names of their files
-  std::vector<std::string> refused;     ///< what is wrong with each of the other files: place and cure
+  std::vector<DeviceProfile> profiles;       ///< by the names of their files
+  std::vector<std::filesystem::path> files;  ///< of each of them
+  std::vector<std::string> refused;          ///< what is wrong with each of the other files: place and cure
 };
 
 /// Loads them all. One that is refused is told and hides none of the others. Not RT safe.

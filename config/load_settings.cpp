@@ -41,8 +41,11 @@ void read_placement(TomlTable& table, PlacementSettings& placement) {
 void read_device(TomlTable& table, const Lookup& lookup, DeviceSettings& device) {
   const TomlValue profile = table.optional("profile");
   profile.text(device.profile);
-  device.profile_file = profile_file(device.profile);
-  find_file(profile, lookup, device.profile_file);
+  if (device.profile != kAnyProfile) {
+    device.profile_file = profile_file(device.profile);
+    find_file(profile, lookup, device.profile_file);
+  }
+  table.optional("serial").text(device.serial);
   table.optional("base_in_world").table(read_placement, device.base_in_world);
   table.optional("tool_in_handle").table(read_placement, device.tool_in_handle);
 }

@@ -58,10 +58,14 @@ struct PlacementSettings {
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
 };
 
+/// In the place of a profile's name: that of whatever device is plugged in.
+inline constexpr const char* kAnyProfile = "auto";
+
 /// [device]
 struct DeviceSettings {
   std::string profile = "loopback";    ///< name of a profile file, without .toml; or a file, with it
-  std::filesystem::path profile_file;  ///< where the profile was found
+  std::filesystem::path profile_file;  ///< where the profile was found; empty for kAnyProfile
+  std::string serial;                  ///< of the device, where there are several equal ones; empty: any
   PlacementSettings base_in_world;     ///< X_WB
   PlacementSettings tool_in_handle;    ///< X_HM: mesh frame of the tool in the handle frame
 };

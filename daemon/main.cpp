@@ -3,8 +3,10 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +14,8 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "config/known_profiles.hpp"
+#include "daemon/device_wait.hpp"
 #include "daemon/event_log.hpp"
 #include "daemon/live_line.hpp"
 #include "daemon/option_checks.hpp"
@@ -20,8 +24,10 @@
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
+#include "devices/plugged_link.hpp"
 
-// Arguments -> plan -> station -> run -> exit code.
+// Arguments -> plan -> station -> device -> run -> exit code. A device that is unplugged leads back to the
+// device; every other fault out.
 
 namespace {
 
@@ -89,12 +95,15 @@ void describe(CLI::App& app, Options& options) {
 Plan plan_of(const Options& options) {
   PlanFiles files = options.files;
   if (!options.simulate.empty()) files.profile = options.simulate;
+  files.simulate = !options.simulate.empty();
   Plan plan = read_plan(files, SearchPath());
-  if (options.simulate.empty() && plan.profile.transport != Transport::loopback)
-    throw std::runtime_error("device profile " + plan.profile.name + ": its reports travel by " +
-                             text(plan.profile.transport) +
-                             ", which wrenchd does not drive yet; try the profile with --simulate " +
-                             plan.profile.name + ", or choose one whose transport is loopback");
+  const std::string& name = plan.profile.name;
+  if (files.simulate && name.empty())
+    throw std::runtime_error("--simulate auto: name the profile to simulate, as in --simulate loopback");
+  if (options.virtual_time && !plan.simulated)
+    throw std::runtime_error(
+        "--virtual-time: a real device lives in real time; simulate one, as with --simulate " +
+        (name.empty() ? "loopback" : name));
   if (options.realtime == "required") plan.settings.servo.realtime = Realtime::required;
   if (options.realtime == "best_effort") plan.settings.servo.realtime = Realtime::best_effort;
   if (options.realtime == "off" || options.virtual_time) plan.settings.servo.realtime = Realtime::off;
@@ -142,9 +151,8 @@ class LiveView {
 };
 
 /// Wall time: the servo thread ticks, this one looks on.
-Fault run_in_wall_time(Station& station, const Options& options, WallClock& clock, LiveView& view) {
+Fault run_in_wall_time(Station& station, TimePoint end, WallClock& clock, LiveView& view) {
   const ServoSettings& servo = station.plan().settings.servo;
-  log_grants(lock_memory(servo.realtime));
   std::promise<std::vector<RealtimeGrant>> prepared;
   auto grants = prepared.get_future();
   std::atomic<bool> stop_loop{false};
@@ -165,14 +173,11 @@ Fault run_in_wall_time(Station& station, const Options& options, WallClock& cloc
   };
   try {
     log_grants(grants.get());
-    const TimePoint start = clock.now();
-    while (!stop_requested.load() && !over.load()) {
-      if (options.seconds > 0.0 && seconds(clock.now() - start) >= options.seconds) break;
+    while (!stop_requested.load() && !over.load() && clock.now() < end) {
       std::this_thread::sleep_for(kLook);
       view.look_at(station.loop());
     }
     joined();
-    view.close(station.loop(), seconds(clock.now() - start));
   } catch (...) {
     joined();
     throw;
@@ -181,9 +186,8 @@ Fault run_in_wall_time(Station& station, const Options& options, WallClock& cloc
 }
 
 /// Virtual time: the same ticks one after the other, on this thread.
-Fault run_in_virtual_time(Station& station, const Options& options, VirtualClock& clock, LiveView& view) {
+Fault run_in_virtual_time(Station& station, TimePoint end, VirtualClock& clock, LiveView& view) {
   const Duration period = from_seconds(1.0 / station.plan().settings.servo.rate_Hz);
-  const TimePoint end = clock.now() + from_seconds(options.seconds);
   TimePoint next_look = clock.now() + kLook;
   Fault fault = Fault::none;
   while (fault == Fault::none && clock.now() < end && !stop_requested.load()) {
@@ -194,36 +198,155 @@ Fault run_in_virtual_time(Station& station, const Options& options, VirtualClock
     view.look_at(station.loop());
   }
   if (fault == Fault::none) station.loop().release(clock.now(), Fault::none);
-  view.close(station.loop(), seconds(clock.now() - TimePoint{}));
   return fault;
 }
 
-template <class TheClock>
-Fault run(Plan plan, const Options& options, TheClock& clock,
-          Fault (*run_it)(Station&, const Options&, TheClock&, LiveView&)) {
-  Station station(std::move(plan), clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread,
+/// When to stop for another reason than a fault.
+using Stop = std::function<bool()>;
+
+/// Opens the station's device, and waits for it where it is not plugged in. False: it is time to stop. What
+/// is wrong with a device that is there at the start is thrown; later it is logged, and waited for its cure.
+bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop) {
+  bool first_attempt = at_start, said = false;
+  return wait.until(
+      [&] {
+        try {
+          station.open();
+          return true;
+        } catch (const DeviceNotFound& missing) {
+          if (!said) spdlog::info("{}; waiting for it", missing.what());
+          said = true;
+          wait.tell(missing.seen());
+        } catch (const std::runtime_error& error) {
+          if (first_attempt) throw;
+          spdlog::error("{}", error.what());
+        }
+        first_attempt = false;
+        return false;
+      },
+      stop);
+}
+
+/// What the device can do, said once: what it has no motors for is not felt.
+void tell_device(const DeviceProfile& profile, const UsbDevice& device) {
+  const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
+  spdlog::info("device {} ({}): senses {}, drives {}", describe(device), text(profile.transport),
+               dof_text(sensed), dof_text(driven));
+  if (driven != kAllDofs)
+    spdlog::info("what the wrench has along {} is dropped: no motor pushes there",
+                 dof_text(static_cast<DofMask>(kAllDofs & ~driven)));
+  if (profile.has_output && !(profile.watchdog_s > 0.0))
+    spdlog::warn("the device has no watchdog of its own, so it gets {:.0f} % of its limits",
+                 100.0 * ProfileDevice::kAuthorityWithoutWatchdog);
+}
+
+/// A real device, and the loop for as long as it is there. One that was unplugged is waited for, and comes
+/// back disarmed.
+Fault run_with_device(Station& station, const PluggedLink& link, const Options& options, TimePoint end,
+                      WallClock& clock, LiveView& view) {
+  DeviceWait wait;
+  const Stop stop = [&] { return stop_requested.load() || clock.now() >= end; };
+  for (bool at_start = true;; at_start = false) {
+    if (!open_device(station, wait, at_start, stop)) return Fault::none;
+    if (at_start) tell_device(station.plan().profile, link.device().value());
+    if (!at_start) spdlog::info("the device is back, disarmed: {}", describe(link.device().value()));
+    if (options.arm && at_start) station.loop().arm();
+    const Fault fault = run_in_wall_time(station, end, clock, view);
+    station.close();
+    if (fault != Fault::device_lost) return fault;
+  }
+}
+
+/// Where the configuration leaves the profile to the device: that of the one device that has one, which is
+/// waited for. False: it is time to stop.
+bool settle_profile(Plan& plan, const Stop& stop) {
+  DeviceWait wait;
+  const KnownProfiles known = known_profiles(SearchPath());
+  for (const std::string& refused : known.refused) spdlog::warn("profile refused: {}", refused);
+  bool said = false;
+  return wait.until(
+      [&] {
+        const std::vector<UsbDevice> plugged = list_usb_devices();
+        const DeviceChoice choice =
+            choose_device(plugged, known.profiles, {{}, plan.settings.device.serial, {}});
+        if (choice.pick) {
+          plan.profile = known.profiles[choice.pick->profile];
+          plan.settings.device.profile_file = known.files[choice.pick->profile];
+          return true;
+        }
+        if (!said) spdlog::info("no device that has a profile is plugged in; waiting for one");
+        said = true;
+        wait.tell(seen_instead(plugged, choice));
+        return false;
+      },
+      stop);
+}
+
+/// Builds the station around its link, and runs it.
+Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
+          const std::function<Fault(Station&, LiveView&)>& run_it) {
+  Station station(std::move(plan), link, clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread,
                   MeshLoader(cache_directory(), [](const std::string& what) { spdlog::info("{}", what); }));
+  const Settings& settings = station.plan().settings;
   loop_to_release = &station.loop();
   for (const std::string& remark : station.mesh_remarks()) spdlog::warn("{}", remark);
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
-               station.scene().obstacle_count(), station.plan().settings.servo.rate_Hz);
+               station.scene().obstacle_count(), settings.servo.rate_Hz);
   std::unique_ptr<Recorder> recorder;
-  if (const auto& file = station.plan().settings.recording.file; !file.empty())
-    recorder = std::make_unique<Recorder>(station.records(), file, station.recording_header());
+  if (!settings.recording.file.empty())
+    recorder =
+        std::make_unique<Recorder>(station.records(), settings.recording.file, station.recording_header());
   LiveView view(options.live);
+  const TimePoint start = clock.now();
   Fault fault = Fault::none;
   {
     const EventLog log(station.loop());
-    if (options.arm) station.loop().arm();
-    fault = run_it(station, options, clock, view);
+    fault = run_it(station, view);
   }
+  view.close(station.loop(), seconds(clock.now() - start));
   loop_to_release = nullptr;
   if (recorder && !recorder->error().empty()) spdlog::error("{}", recorder->error());
   if (station.loop().dropped_records() > 0)
     spdlog::warn("{} ticks are missing in the recording: the disk fell behind",
                  station.loop().dropped_records());
   return fault;
+}
+
+TimePoint end_of(const Options& options, const Clock& clock) {
+  return options.seconds > 0.0 ? clock.now() + from_seconds(options.seconds) : TimePoint::max();
+}
+
+Fault run_simulated(Plan plan, const Options& options) {
+  const auto run_it = [&options](auto& clock, auto run_in_time) {
+    return [&clock, &options, run_in_time](Station& station, LiveView& view) {
+      station.open();
+      if (options.arm) station.loop().arm();
+      return run_in_time(station, end_of(options, clock), clock, view);
+    };
+  };
+  if (options.virtual_time) {
+    VirtualClock clock;
+    const auto link = make_simulated_link(plan, clock);
+    return run(std::move(plan), options, *link, clock, run_it(clock, run_in_virtual_time));
+  }
+  WallClock clock;
+  const auto link = make_simulated_link(plan, clock);
+  log_grants(lock_memory(plan.settings.servo.realtime));
+  return run(std::move(plan), options, *link, clock, run_it(clock, run_in_wall_time));
+}
+
+Fault run_real(Plan plan, const Options& options) {
+  WallClock clock;
+  const TimePoint end = end_of(options, clock);
+  if (plan.profile.name.empty() &&
+      !settle_profile(plan, [&] { return stop_requested.load() || clock.now() >= end; }))
+    return Fault::none;
+  const auto link = make_plugged_link(plan);
+  log_grants(lock_memory(plan.settings.servo.realtime));
+  return run(std::move(plan), options, *link, clock, [&](Station& station, LiveView& view) {
+    return run_with_device(station, *link, options, end, clock, view);
+  });
 }
 
 void catch_signals() {
@@ -250,14 +373,9 @@ int main(int argc, char** argv) {
   catch_signals();
   try {
     Plan plan = plan_of(options);
-    Fault fault = Fault::none;
-    if (options.virtual_time) {
-      VirtualClock clock;
-      fault = run<VirtualClock>(std::move(plan), options, clock, run_in_virtual_time);
-    } else {
-      WallClock clock;
-      fault = run<WallClock>(std::move(plan), options, clock, run_in_wall_time);
-    }
+    const bool simulated = plan.simulated;
+    const Fault fault =
+        simulated ? run_simulated(std::move(plan), options) : run_real(std::move(plan), options);
     return fault == Fault::none ? 0 : kExitFault;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "wrenchd: %s\n", error.what());

@@ -10,6 +10,8 @@
 #include "config/load_settings.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/version.hpp"
+#include "devices/loopback_link.hpp"
+#include "devices/simulated_device.hpp"
 
 namespace wrenchd {
 namespace {
@@ -35,6 +37,27 @@ std::unique_ptr<Placer> make_placer(const Scene& scene, PlaceIn place_in) {
   return std::make_unique<PlacerThread>(scene);
 }
 
+/// The simulated device with the wire to it.
+class SimulatedWire final : public ReportLink {
+ public:
+  SimulatedWire(const Plan& plan, Clock& clock)
+      : device_(plan.profile, plan.settings.simulation), link_(device_, clock, plan.settings.simulation) {}
+
+  void open() override { link_.open(); }
+  LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
+    return link_.read(now, buffer);
+  }
+  LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override {
+    return link_.write(now, report);
+  }
+  void wait_readable(TimePoint deadline) noexcept override { link_.wait_readable(deadline); }
+  void close() noexcept override { link_.close(); }
+
+ private:
+  SimulatedDevice device_;
+  LoopbackLink link_;
+};
+
 }  // namespace
 
 Plan read_plan(const PlanFiles& files, const SearchPath& search) {
@@ -43,26 +66,39 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
   if (!files.scene.empty()) plan.settings.scene = named_on_command_line(files.scene, search);
   if (!files.profile.empty()) {
     plan.settings.device.profile = files.profile;
-    plan.settings.device.profile_file = named_on_command_line(profile_file(files.profile), search);
+    plan.settings.device.profile_file = files.profile == kAnyProfile
+                                            ? std::filesystem::path()
+                                            : named_on_command_line(profile_file(files.profile), search);
   }
-  plan.profile = load_profile(plan.settings.device.profile_file, search);
+  if (const auto& file = plan.settings.device.profile_file; !file.empty())
+    plan.profile = load_profile(file, search);
+  plan.simulated =
+      files.simulate || (!plan.profile.name.empty() && plan.profile.transport == Transport::loopback);
   plan.scene = load_scene(plan.settings.scene);
   return plan;
 }
 
-Station::Station(Plan plan, Clock& clock, PlaceIn place_in, MeshLoader meshes)
+std::unique_ptr<ReportLink> make_simulated_link(const Plan& plan, Clock& clock) {
+  return std::make_unique<SimulatedWire>(plan, clock);
+}
+
+std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
+  const ServoSettings& servo = plan.settings.servo;
+  LinkSettings settings;
+  settings.priority = servo.realtime == Realtime::off ? 0 : servo.priority;
+  return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, settings);
+}
+
+Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, MeshLoader meshes)
     : plan_(std::move(plan)),
       scene_(plan_.scene, meshes),
       mesh_remarks_(meshes.changes()),
-      simulated_(plan_.profile, plan_.settings.simulation),
-      link_(simulated_, clock, plan_.settings.simulation),
-      device_(plan_.profile, link_),
+      device_(plan_.profile, link),
       placer_(make_placer(scene_, place_in)),
       records_(Recorder::kRingRecords),
       loop_(plan_.settings, plan_.profile, device_, scene_, *placer_, clock,
             plan_.settings.recording.file.empty() ? nullptr : &records_) {
   mesh_remarks_.insert(mesh_remarks_.end(), meshes.remarks().begin(), meshes.remarks().end());
-  device_.open();
 }
 
 Station::~Station() {

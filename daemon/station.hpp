@@ -15,17 +15,18 @@
 #include "daemon/placer.hpp"
 #include "daemon/recording_file.hpp"
 #include "daemon/servo_loop.hpp"
-#include "devices/loopback_link.hpp"
+#include "devices/plugged_link.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/simulated_device.hpp"
+#include "devices/report_link.hpp"
 
 namespace wrenchd {
 
 /// What the files say, read and checked, before anything is built from it.
 struct Plan {
   Settings settings;
-  DeviceProfile profile;
+  DeviceProfile profile;  ///< without a name where the settings leave it to the device that is plugged in
   SceneSettings scene;
+  bool simulated = true;  ///< a simulated device speaks as the profile says; no other is opened
 };
 
 /// What a command line names: the configuration, and what stands in place of what the configuration names. A
@@ -34,6 +35,7 @@ struct PlanFiles {
   std::filesystem::path config = "wrenchd.toml";
   std::filesystem::path scene;  ///< empty: the configuration's
   std::string profile;          ///< name or file; empty: the configuration's
+  bool simulate = false;        ///< whatever the profile's transport is
 };
 
 /// Reads the configuration, its scene and its profile. Throws ConfigError.
@@ -45,12 +47,20 @@ enum class PlaceIn : std::uint8_t {
   step,    ///< in the tick: virtual time, every run the same
 };
 
+/// The wire to a simulated device that speaks as the plan's profile says. The clock must outlive it. Throws
+/// std::runtime_error where the profile cannot be simulated.
+std::unique_ptr<ReportLink> make_simulated_link(const Plan& plan, Clock& clock);
+
+/// The link to the plugged-in device that the plan wants, not opened.
+std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan);
+
 /// The parts of one running wrenchd, built from a plan in the order in which they need each other.
 class Station {
  public:
-  /// The clock must outlive this. meshes: reads those of the scene; its changes and remarks are kept. Throws
-  /// MeshError, std::runtime_error.
-  Station(Plan plan, Clock& clock, PlaceIn place_in = PlaceIn::thread, MeshLoader meshes = {});
+  /// Link and clock must outlive this. meshes: reads those of the scene; its changes and remarks are kept.
+  /// Throws MeshError, std::runtime_error.
+  Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in = PlaceIn::thread,
+          MeshLoader meshes = {});
   ~Station();
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
@@ -59,7 +69,10 @@ class Station {
   const Scene& scene() const noexcept { return scene_; }
   /// What a person should know of the meshes of the scene, a sentence each.
   const std::vector<std::string>& mesh_remarks() const noexcept { return mesh_remarks_; }
-  SimulatedDevice& simulated() noexcept { return simulated_; }
+  /// Opens the device, closing it first where it was open: before the loop runs, and after each fault. The
+  /// loop is disarmed then, as release() leaves it. Throws as the link does. No servo thread may run.
+  void open() { device_.open(); }
+  void close() noexcept { device_.close(); }
   ServoLoop& loop() noexcept { return loop_; }
   RecordRing& records() noexcept { return records_; }
 
@@ -70,8 +83,6 @@ class Station {
   Plan plan_;
   Scene scene_;
   std::vector<std::string> mesh_remarks_;
-  SimulatedDevice simulated_;
-  LoopbackLink link_;
   ProfileDevice device_;
   std::unique_ptr<Placer> placer_;
   RecordRing records_;

@@ -19,6 +19,7 @@ TEST_CASE("every shipped profile is known, by the names of their files", "[known
   REQUIRE(known.profiles.size() > 2);
   CHECK(known.profiles[0].name == "example");
   CHECK(known.profiles[1].name == "falcon");
+  CHECK(known.files[1].filename() == "falcon.toml");
 }
 
 TEST_CASE("profiles that are refused are told, and hide no other", "[known_profiles]") {

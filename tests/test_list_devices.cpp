@@ -17,12 +17,6 @@ using Catch::Contains;
 
 const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
 
-/// The descriptor that devices/README.md gives to makers.
-Bytes reference_descriptor() {
-  return from_hex(
-      "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0");
-}
-
 struct Ids {
   std::uint16_t vendor, product, page, usage;
 };

@@ -77,7 +77,7 @@ TEST_CASE("after every start the loop is disarmed: it measures and projects, and
   }
   CHECK(touched);
   CHECK(most_N == 0.0);
-  CHECK(s.station.simulated().motor_wrench().force_N.norm() == 0.0);
+  CHECK(s.simulated.motor_wrench().force_N.norm() == 0.0);
 }
 
 TEST_CASE("armed, the simulated hand presses the cube into the table and the table holds it", "[servo]") {
@@ -91,7 +91,7 @@ TEST_CASE("armed, the simulated hand presses the cube into the table and the tab
   CHECK(depth_m > 0.0005);
   CHECK(s.last.F_out[2] == Approx(600.0 * depth_m).epsilon(0.02));
   CHECK(std::hypot(s.last.F_out[0], s.last.F_out[1]) < 1e-3);
-  CHECK(s.station.simulated().handle().hand_wrench().force_N.z() == Approx(-s.last.F_out[2]).epsilon(0.05));
+  CHECK(s.simulated.handle().hand_wrench().force_N.z() == Approx(-s.last.F_out[2]).epsilon(0.05));
   CHECK(pose_of(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
 }
 
@@ -380,22 +380,22 @@ TEST_CASE("what a hand goes through while it feels nothing does not hold it once
 
 TEST_CASE("a stop while the proxy is being placed ends the loop and the search", "[servo][placing]") {
   const Buried buried({{0.0, {0, 0, 0.03}}}, 100000);
-  WallClock clock;
-  auto station = std::make_unique<Station>(buried.plan, clock);
+  auto s = std::make_unique<SimulatedStation<WallClock>>(buried.plan);
+  WallClock& clock = s->clock;
   std::atomic<bool> stop{false};
   Fault fault = Fault::none;
-  std::thread servo([&] { fault = station->loop().run(clock, stop); });
+  std::thread servo([&] { fault = s->station.loop().run(clock, stop); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   stop.store(true);
   servo.join();
   TickRecord last;
-  REQUIRE(station->loop().latest().read(last));
+  REQUIRE(s->station.loop().latest().read(last));
   CHECK(fault == Fault::none);
   CHECK(last.released == 1);
   CHECK(static_cast<Placing>(last.placing) == Placing::seeking);
   const TimePoint stopped = clock.now();
-  station.reset();
-  CHECK(clock.now() - stopped < std::chrono::seconds(1));  // milliseconds on an idle machine
+  s.reset();
+  CHECK(WallClock().now() - stopped < std::chrono::seconds(1));  // milliseconds on an idle machine
 }
 
 TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
@@ -502,8 +502,9 @@ TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device
   const Pacing pacing = GENERATE(Pacing::clock, Pacing::device);
   Plan plan = shipped_plan();
   plan.settings.servo.pacing = pacing;
-  WallClock clock;
-  Station station(plan, clock);
+  SimulatedStation<WallClock> s(plan);
+  WallClock& clock = s.clock;
+  Station& station = s.station;
   station.loop().arm();
   std::atomic<bool> stop{false};
   Fault fault = Fault::none;

@@ -143,10 +143,12 @@ TEST_CASE("wrenchd refuses what it cannot use, with its place, and starts nothin
        "limits.toml:"},
       {{"--profile", file("empty.toml", "")}, "empty.toml:1:1: key 'limits' is missing"},
       {{"--profile", "reference_full_speed"},
-       "device profile reference_full_speed: its reports travel by hidraw, which wrenchd does not drive yet; "
-       "try the profile with --simulate reference_full_speed"},
+       "--virtual-time: a real device lives in real time; simulate one, as with --simulate "
+       "reference_full_speed"},
+      {{"--profile", "auto"}, "simulate one, as with --simulate loopback"},
       {{"--simulate", "polhem"}, "device profile polhem: the simulated device sends whole poses"},
       {{"--simulate", "gone"}, "gone.toml: no such file"},
+      {{"--simulate", "auto"}, "--simulate auto: name the profile to simulate, as in --simulate loopback"},
       {{"--record", (dir.path() / "gone/run.h5").string()},
        "run.h5: cannot be created; check that the directory exists"},
   };

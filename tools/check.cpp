@@ -73,8 +73,11 @@ std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
     case Kind::settings:
       break;
   }
-  const Plan plan = read_plan({file, {}, {}}, SearchPath());
-  return file.string() + ": a good configuration\n" + about(plan.profile) + about(plan.scene, meshes);
+  const Plan plan = read_plan({file, {}, {}, false}, SearchPath());
+  return file.string() + ": a good configuration\n" +
+         (plan.profile.name.empty() ? "profile: that of the device that is plugged in\n"
+                                    : about(plan.profile)) +
+         about(plan.scene, meshes);
 }
 
 std::string check_against(const std::filesystem::path& profile, const DescriptorSource& device) {

@@ -180,7 +180,13 @@ int run_mesh(const std::filesystem::path& file, double scale) {
 
 int run_replay(const std::filesystem::path& file, const PlanFiles& files) {
   const Recording recording = read_recording(file);
-  const auto difference = replay(recording, read_plan(files, SearchPath()));
+  const Plan plan = read_plan(files, SearchPath());
+  if (plan.profile.name.empty())
+    throw std::runtime_error(
+        "the configuration leaves the profile to the device that is plugged in; name the one of the "
+        "recording "
+        "with --profile");
+  const auto difference = replay(recording, plan);
   if (!difference) {
     std::printf("%zu ticks, all the same, bit for bit\n", recording.ticks.size());
     return 0;

@@ -26,6 +26,12 @@ inline Bytes from_hex(std::string_view text) {
   return bytes;
 }
 
+/// The descriptor that devices/README.md gives to makers.
+inline Bytes reference_descriptor() {
+  return from_hex(
+      "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0");
+}
+
 // What real devices send, as people have captured and published it.
 
 /// The axes of 3Dconnexion's devices, X Y Z in report 1 and Rx Ry Rz in report 2.

@@ -2,23 +2,39 @@
 #pragma once
 
 #include "daemon/station.hpp"
+#include "devices/loopback_link.hpp"
+#include "devices/simulated_device.hpp"
 
 namespace wrenchd::test {
 
 /// The configuration as it is shipped: simulated device, cube on table.
 inline Plan shipped_plan() {
-  return read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}},
+  return read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
                    SearchPath({WRENCHD_SOURCE_DIR "/config"}));
 }
 
-/// A station in virtual time, ticked by hand.
-struct VirtualStation {
-  VirtualClock clock;
+/// A station with its simulated device within reach, opened.
+template <class TheClock>
+struct SimulatedStation {
+  TheClock clock;
+  SimulatedDevice simulated;
+  LoopbackLink link;
   Station station;
+
+  explicit SimulatedStation(Plan plan, PlaceIn place_in = PlaceIn::thread)
+      : simulated(plan.profile, plan.settings.simulation),
+        link(simulated, clock, plan.settings.simulation),
+        station(std::move(plan), link, clock, place_in) {
+    station.open();
+  }
+};
+
+/// The same in virtual time, ticked by hand.
+struct VirtualStation : SimulatedStation<VirtualClock> {
   TickRecord last;
 
   explicit VirtualStation(Plan plan = shipped_plan(), PlaceIn place_in = PlaceIn::step)
-      : station(std::move(plan), clock, place_in) {}
+      : SimulatedStation(std::move(plan), place_in) {}
 
   Fault tick() { return tick_after(from_seconds(1.0 / station.plan().settings.servo.rate_Hz)); }
   Fault tick_after(Duration pause) {
@@ -38,7 +54,7 @@ struct VirtualStation {
   double torque_Nm() const { return Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm(); }
   Engagement engagement() const { return static_cast<Engagement>(last.engagement); }
   void inject(SimulatedFault::Kind kind, double start_s, double duration_s) {
-    station.simulated().inject({kind, from_seconds(start_s), from_seconds(duration_s)});
+    simulated.inject({kind, from_seconds(start_s), from_seconds(duration_s)});
   }
 };
 

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/device_wait.hpp"
+
+#include <algorithm>
+
+#include <spdlog/spdlog.h>
+
+#include "core/clock.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// How often it is looked whether to stop, and whether anything was plugged in where nobody tells.
+constexpr auto kLook = std::chrono::milliseconds(100);
+constexpr int kLooksWithoutMonitor = 5;
+
+/// What a device says of itself, fit for a log: no character that moves a cursor or begins a line.
+std::string plain(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
+
+}  // namespace
+
+DeviceWait::DeviceWait() {
+  try {
+    monitor_ = std::make_unique<PlugMonitor>([this](const PlugEvent&) {
+      const std::lock_guard lock(mutex_);
+      news_ = true;
+      changed_.notify_all();
+    });
+  } catch (const std::runtime_error& error) {
+    spdlog::warn("{}; looking twice a second what is plugged in", error.what());
+  }
+}
+
+bool DeviceWait::until(const std::function<bool()>& attempt, const std::function<bool()>& stop) {
+  while (!stop()) {
+    if (attempt()) return true;
+    std::unique_lock lock(mutex_);
+    for (int looks = 0; !news_ && !stop(); ++looks) {
+      if (!monitor_ && looks == kLooksWithoutMonitor) break;
+      changed_.wait_for(lock, kLook);
+    }
+    news_ = false;
+  }
+  return false;
+}
+
+void DeviceWait::tell(const std::vector<std::string>& seen) {
+  std::set<std::string> now;
+  for (const std::string& line : seen) {
+    if (told_.count(line) == 0) spdlog::info("{}", plain(line));
+    now.insert(line);
+  }
+  told_ = std::move(now);
+}
+
+}  // namespace wrenchd
