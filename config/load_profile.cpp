@@ -158,6 +158,42 @@ void read_deflection(TomlTable& table, DeviceProfile& p) {
   p.deflection = d;
 }
 
+void read_homing(TomlTable& table, DeviceProfile& p) {
+  HomingPlan& plan = p.homing;
+  table.optional("reference")
+      .choice(plan.reference, {{"never", ReferenceUse::never},
+                               {"once", ReferenceUse::once},
+                               {"each_start", ReferenceUse::each_start}});
+  table.optional("check_axes").boolean(p.check_axes);
+  const TomlValue position = table.optional("rest_position_m");
+  const TomlValue rotation = table.optional("rest_rotation_vector_rad");
+  p.has_rest_pose = position || rotation;
+  position.vector(plan.X_BR.translation_m, {-2, 2});
+  Vector3d turn = Vector3d::Zero();
+  if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);
+  table.optional("most_offset_m").number(plan.most_offset_m, {0, 2});
+  table.optional("most_offset_rad").number(plan.most_offset_rad, {0, 4});
+  table.optional("confirm_buttons").integer(plan.confirm_buttons, {0, 4294967295.0});
+  table.optional("travel_m").number(plan.travel_m, {0.001, 0.5});
+  table.optional("travel_rad").number(plan.travel_rad, {0.01, 1.5});
+  table.optional("workspace_min_m").vector(plan.workspace_min_m, {-2, 2});
+  const TomlValue most = table.optional("workspace_max_m");
+  most.vector(plan.workspace_max_m, {-2, 2});
+  const double least = (plan.workspace_max_m - plan.workspace_min_m).minCoeff();
+  if (least < plan.travel_m)
+    most.refuse("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
+                ", along each axis; along one it is " + to_text(least));
+  const TomlValue turns = table.optional("max_turn_rad");
+  turns.number(plan.max_turn_rad, {0.01, 4});
+  if (plan.max_turn_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
+}
+
+void read_masses(TomlTable& table, MovingMasses& masses) {
+  table.optional("handle_kg").number(masses.handle_kg, {0, 20});
+  table.optional("handle_centre_m").vector(masses.p_HC_m, {-0.5, 0.5});
+  table.optional("carried_kg").number(masses.carried_kg, {0, 20});
+}
+
 void read_fixed_report(TomlTable& table, FixedReport& report) {
   read_bytes(table.mandatory("bytes"), report.bytes);
 }
@@ -214,6 +250,14 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   table.optional("frames").table(read_frames, p);
   table.mandatory("limits").table(read_limits, p, shape);
   table.optional("closed_loop").table(read_closed_loop, p);
+  table.optional("homing").table(read_homing, p);
+  const TomlValue masses = table.optional("masses");
+  masses.table(read_masses, p.masses);
+  if (masses && !shape.output)
+    masses.refuse(
+        "nothing holds them: the device has no motors, for there is no wrench_report; leave it out");
+  if (masses && p.wrench_point == WrenchPoint::world_origin)
+    masses.refuse("they are held about the handle point; leave out wrench_point = \"world_origin\", or this");
   table.optional("deflection").table(read_deflection, p);
   table.optional("kinematics").table(read_kinematics, p.kinematics);
   const TomlValue pose_report = table.mandatory("pose_report");

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "core/gravity_compensation.hpp"
+#include "core/homing_plan.hpp"
 #include "core/pose.hpp"
 
 namespace wrenchd {
@@ -266,6 +268,12 @@ struct DeviceProfile {
 
   Pose X_BD;  ///< the device's own base axes in ours: x forward, y left, z up
   Pose X_EH;  ///< the handle point in the frame whose pose the device sends
+
+  // What has to be seen of a device before it is armed, and what its handle weighs.
+  HomingPlan homing;
+  bool has_rest_pose = false;  ///< homing.X_BR is stated; a device with joints has its home position else
+  bool check_axes = false;     ///< each device has to be calibrated once, with all axes moved
+  MovingMasses masses;
 
   PoseReportLayout pose_report;
   std::vector<PoseReportLayout> more_reports;  ///< the other kinds it sends

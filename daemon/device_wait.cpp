@@ -10,9 +10,9 @@
 namespace wrenchd {
 namespace {
 
-/// How often it is looked whether to stop, and whether anything was plugged in where nobody tells.
+/// How often it is looked whether to stop, and how many such looks pass without an attempt.
 constexpr auto kLook = std::chrono::milliseconds(100);
-constexpr int kLooksWithoutMonitor = 5;
+constexpr int kLooksBetween = 10;
 
 /// What a device says of itself, fit for a log: no character that moves a cursor or begins a line.
 std::string plain(std::string text) {
@@ -31,7 +31,7 @@ DeviceWait::DeviceWait() {
       changed_.notify_all();
     });
   } catch (const std::runtime_error& error) {
-    spdlog::warn("{}; looking twice a second what is plugged in", error.what());
+    spdlog::warn("{}; looking once a second what is plugged in", error.what());
   }
 }
 
@@ -39,10 +39,7 @@ bool DeviceWait::until(const std::function<bool()>& attempt, const std::function
   while (!stop()) {
     if (attempt()) return true;
     std::unique_lock lock(mutex_);
-    for (int looks = 0; !news_ && !stop(); ++looks) {
-      if (!monitor_ && looks == kLooksWithoutMonitor) break;
-      changed_.wait_for(lock, kLook);
-    }
+    for (int looks = 0; looks < kLooksBetween && !news_ && !stop(); ++looks) changed_.wait_for(lock, kLook);
     news_ = false;
   }
   return false;

@@ -16,11 +16,11 @@ namespace wrenchd {
 /// Waits for a device to be plugged in. Not RT safe: no servo loop runs meanwhile.
 class DeviceWait {
  public:
-  /// Hears of devices that are plugged in from now on. Where the system has no monitor to give it looks twice
-  /// a second instead, and logs why.
+  /// Hears of devices that are plugged in from now on. Where the system has no monitor to give it logs why.
   DeviceWait();
 
-  /// Calls `attempt` at once, and then each time something was plugged in or taken out, until it returns true
+  /// Calls `attempt` at once, each time something was plugged in or taken out, and once a second, for a node
+  /// may get its name or its permissions a little after the device is told of; until it returns true
   /// (true) or `stop` does (false), which is asked ten times a second. What attempt throws ends the waiting.
   bool until(const std::function<bool()>& attempt, const std::function<bool()>& stop);
 

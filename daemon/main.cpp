@@ -14,8 +14,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "config/known_profiles.hpp"
-#include "daemon/device_wait.hpp"
+#include "daemon/device_start.hpp"
 #include "daemon/event_log.hpp"
 #include "daemon/live_line.hpp"
 #include "daemon/option_checks.hpp"
@@ -201,45 +200,6 @@ Fault run_in_virtual_time(Station& station, TimePoint end, VirtualClock& clock, 
   return fault;
 }
 
-/// When to stop for another reason than a fault.
-using Stop = std::function<bool()>;
-
-/// Opens the station's device, and waits for it where it is not plugged in. False: it is time to stop. What
-/// is wrong with a device that is there at the start is thrown; later it is logged, and waited for its cure.
-bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop) {
-  bool first_attempt = at_start, said = false;
-  return wait.until(
-      [&] {
-        try {
-          station.open();
-          return true;
-        } catch (const DeviceNotFound& missing) {
-          if (!said) spdlog::info("{}; waiting for it", missing.what());
-          said = true;
-          wait.tell(missing.seen());
-        } catch (const std::runtime_error& error) {
-          if (first_attempt) throw;
-          spdlog::error("{}", error.what());
-        }
-        first_attempt = false;
-        return false;
-      },
-      stop);
-}
-
-/// What the device can do, said once: what it has no motors for is not felt.
-void tell_device(const DeviceProfile& profile, const UsbDevice& device) {
-  const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
-  spdlog::info("device {} ({}): senses {}, drives {}", describe(device), text(profile.transport),
-               dof_text(sensed), dof_text(driven));
-  if (driven != kAllDofs)
-    spdlog::info("what the wrench has along {} is dropped: no motor pushes there",
-                 dof_text(static_cast<DofMask>(kAllDofs & ~driven)));
-  if (profile.has_output && !(profile.watchdog_s > 0.0))
-    spdlog::warn("the device has no watchdog of its own, so it gets {:.0f} % of its limits",
-                 100.0 * ProfileDevice::kAuthorityWithoutWatchdog);
-}
-
 /// A real device, and the loop for as long as it is there. One that was unplugged is waited for, and comes
 /// back disarmed.
 Fault run_with_device(Station& station, const PluggedLink& link, const Options& options, TimePoint end,
@@ -248,38 +208,21 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
   const Stop stop = [&] { return stop_requested.load() || clock.now() >= end; };
   for (bool at_start = true;; at_start = false) {
     if (!open_device(station, wait, at_start, stop)) return Fault::none;
-    if (at_start) tell_device(station.plan().profile, link.device().value());
-    if (!at_start) spdlog::info("the device is back, disarmed: {}", describe(link.device().value()));
-    if (options.arm && at_start) station.loop().arm();
+    const UsbDevice& device = link.device().value();
+    if (at_start) tell_device(station.plan().profile, device);
+    if (!at_start) spdlog::info("the device is back, disarmed: {}", describe(device));
+    const std::string not_armed = calibrate(station, device, CalibrationStore());
+    if (!not_armed.empty()) spdlog::warn("the device may not be armed: {}", not_armed);
+    if (!find_rest(station, clock, stop)) {
+      station.close();
+      if (stop()) return Fault::none;
+      continue;
+    }
+    if (options.arm && at_start && not_armed.empty()) station.loop().arm();
     const Fault fault = run_in_wall_time(station, end, clock, view);
     station.close();
     if (fault != Fault::device_lost) return fault;
   }
-}
-
-/// Where the configuration leaves the profile to the device: that of the one device that has one, which is
-/// waited for. False: it is time to stop.
-bool settle_profile(Plan& plan, const Stop& stop) {
-  DeviceWait wait;
-  const KnownProfiles known = known_profiles(SearchPath());
-  for (const std::string& refused : known.refused) spdlog::warn("profile refused: {}", refused);
-  bool said = false;
-  return wait.until(
-      [&] {
-        const std::vector<UsbDevice> plugged = list_usb_devices();
-        const DeviceChoice choice =
-            choose_device(plugged, known.profiles, {{}, plan.settings.device.serial, {}});
-        if (choice.pick) {
-          plan.profile = known.profiles[choice.pick->profile];
-          plan.settings.device.profile_file = known.files[choice.pick->profile];
-          return true;
-        }
-        if (!said) spdlog::info("no device that has a profile is plugged in; waiting for one");
-        said = true;
-        wait.tell(seen_instead(plugged, choice));
-        return false;
-      },
-      stop);
 }
 
 /// Builds the station around its link, and runs it.

@@ -20,11 +20,10 @@ inline CLI::Validator number_from(double min, double max) {
           range};
 }
 
-/// An empty name comes from an unset variable in somebody's script; it must not stand for anything.
-inline CLI::Validator not_empty() {
-  return {
-      [](std::string& text) -> std::string { return text.empty() ? "must not be empty; name a file" : ""; },
-      ""};
+/// An empty text comes from an unset variable in somebody's script; it must not stand for anything.
+inline CLI::Validator not_empty(const std::string& cure = "name a file") {
+  return {[=](std::string& text) -> std::string { return text.empty() ? "must not be empty; " + cure : ""; },
+          ""};
 }
 
 }  // namespace wrenchd

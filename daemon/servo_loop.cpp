@@ -62,6 +62,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
       M_(scene.tool().solid.inertia),
       law_(gains_for(settings.rendering.method, settings.wrench.gains)),
+      gravity_(profile.masses, X_WB_.rotation),
       limits_(settings.limits, profile.max_force_N, profile.max_torque_Nm),
       soft_start_(settings.limits.soft_start_s) {
   lose_place();
@@ -109,6 +110,7 @@ Fault ServoLoop::release(TimePoint now, Fault why) noexcept {
   soft_start_.disarm();
   limits_.reset();
   law_.reset();
+  sampled_ = false;  // what comes next may be a device that was plugged in anew, with another clock
   if (why != Fault::none) say(Event::Kind::fault, now, static_cast<std::uint32_t>(why));
   say(Event::Kind::released, now);
   record_.fault = static_cast<std::uint8_t>(why);
@@ -228,6 +230,7 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
              : law_.update_damping(energy_wrench(M_, energy_stiffness_per_s2_, X_WP_, X_WQ_), depth_.drive,
                                    in_contact, dt_s);
   F_out_ = outgoing(X_WB_ * sample.X_BH);
+  F_weight_ = gravity_.wrench(sample.X_BH);
 }
 
 /// About the handle point in the axes of the device base, or the paper's spatial wrench W_S: as the profile
@@ -238,12 +241,13 @@ Wrench ServoLoop::outgoing(const Pose& X_WH) const noexcept {
   return expressed(X_WB_.rotation.conjugate(), F_H_W);
 }
 
-/// Line 8, before it goes out: what the hand may feel of the wrench now.
+/// Line 8, before it goes out: what the hand may feel of the wrench now, with the handle's weight held. The
+/// weight is no push, so it does not make the hand wait for calm.
 Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
   stale_ = !sampled_ || now - sample.arrived > kStaleAfter;
   const double authority = soft_start_.advance(calm(sample), dt_s_);
   record_.authority = stale_ ? 0.0 : authority;
-  return limits_.apply(F_out_, record_.authority, dt_s_);
+  return limits_.apply(F_out_ + F_weight_, record_.authority, dt_s_);
 }
 
 bool ServoLoop::calm(const DeviceSample& sample) const noexcept {

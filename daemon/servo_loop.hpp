@@ -12,6 +12,7 @@
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "core/engagement.hpp"
+#include "core/gravity_compensation.hpp"
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
 #include "core/wrench_law.hpp"
@@ -110,6 +111,7 @@ class ServoLoop {
   double energy_stiffness_per_s2_;
   Inertia M_;
   WrenchLaw law_;
+  GravityCompensation gravity_;
   WrenchLimits limits_;
   SoftStart soft_start_;
   Placing placing_ = Placing::seeking;
@@ -118,6 +120,7 @@ class ServoLoop {
   Penetration depth_;
   Wrench F_T_;                  ///< of the law chosen, body frame
   Wrench F_out_;                ///< the same as the device wants it, before limits
+  Wrench F_weight_;             ///< that holds the handle's weight, likewise
   std::uint32_t question_ = 0;  ///< number of the last one to the placer
   bool asked_ = false;          ///< and it is not answered yet
   TimePoint ask_again_{};       ///< not before then

@@ -85,6 +85,7 @@ std::unique_ptr<ReportLink> make_simulated_link(const Plan& plan, Clock& clock) 
 std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
   const ServoSettings& servo = plan.settings.servo;
   LinkSettings settings;
+  settings.write_deadline = from_seconds(plan.profile.stale_fault_s);
   settings.priority = servo.realtime == Realtime::off ? 0 : servo.priority;
   return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, settings);
 }

@@ -73,6 +73,8 @@ class Station {
   /// loop is disarmed then, as release() leaves it. Throws as the link does. No servo thread may run.
   void open() { device_.open(); }
   void close() noexcept { device_.close(); }
+  /// The device, for its homing; only while no servo thread runs.
+  ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
   RecordRing& records() noexcept { return records_; }
 

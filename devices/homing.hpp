@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/calibration.hpp"
+#include "core/homing_plan.hpp"
 #include "devices/device.hpp"
 
 namespace wrenchd {
@@ -26,30 +27,6 @@ Pose corrected(const Pose& reported, const PoseOffset& offset) noexcept;
 /// For the store, and back; nothing where an axis has another name. Not RT safe.
 std::vector<AxisOffset> axis_offsets(const PoseOffset& offset);
 std::optional<PoseOffset> pose_offset(const std::vector<AxisOffset>& offsets);
-
-/// When a device has to be shown where it is.
-enum class ReferenceUse : std::uint8_t {
-  never,       ///< it knows: absolute encoders, calibrated by its maker
-  once,        ///< absolute encoders, which nobody has aligned: the offset is stored
-  each_start,  ///< incremental encoders, which count from wherever they were switched on
-};
-
-/// What has to be seen of a device before it may be armed. Axes: x y z of the handle point, then turns about
-/// x y z, all in the base, x forward, y left, z up.
-struct HomingPlan {
-  std::array<bool, 6> sensed = {true, true, true, true, true, true};  ///< only these are asked for
-  double travel_m = 0.02;    ///< how far a person moves the handle along an axis; plain to see, soon done
-  double travel_rad = 0.25;  ///< likewise about one
-  Vector3d workspace_min_m = Vector3d::Constant(-1.0);  ///< p_BH is never outside of this box
-  Vector3d workspace_max_m = Vector3d::Constant(1.0);
-  double max_turn_rad = 3.2;  ///< nor is R_BH turned farther than this; above pi: any turn is good
-
-  ReferenceUse reference = ReferenceUse::never;
-  Pose X_BR;                          ///< the handle in its rest, the pose that is known
-  double most_offset_m = 0.1;         ///< farther off, the handle is not in its rest
-  double most_offset_rad = 0.5;       ///< likewise; encoders that start anywhere need more
-  std::uint32_t confirm_buttons = 0;  ///< any of these says "it is in its rest"; 0: only confirm() does
-};
 
 enum class HomingStep : std::uint8_t {
   listening,  ///< no good sample has come

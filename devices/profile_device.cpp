@@ -98,7 +98,7 @@ ProfileDevice::ProfileDevice(DeviceProfile profile, ReportLink& link)
 void ProfileDevice::open() {
   check_profile(profile_);
   link_.open();
-  same_frames_ = same_bits(profile_.X_BD, {}) && same_bits(profile_.X_EH, {});
+  recalibrate(profile_);
   clock_ = acknowledging_ = nullptr;
   pose_layouts_ = 0;
   for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
@@ -121,6 +121,15 @@ void ProfileDevice::open() {
   heard_layouts_ = 0;
   fast_samples_ = 0;
   open_ = true;
+}
+
+void ProfileDevice::recalibrate(const DeviceProfile& calibrated) noexcept {
+  profile_.X_BD = calibrated.X_BD;
+  profile_.X_EH = calibrated.X_EH;
+  profile_.kinematics.zero_rad = calibrated.kinematics.zero_rad;
+  same_frames_ = same_bits(profile_.X_BD, {}) && same_bits(profile_.X_EH, {});
+  reported_.reset();
+  placed_ = false;
 }
 
 void ProfileDevice::close() noexcept {
@@ -289,7 +298,7 @@ void ProfileDevice::take(const Arrival& newest) noexcept {
 Fault ProfileDevice::make_pose(PoseReport& report) noexcept {
   const Kinematics& k = profile_.kinematics;
   if (k.kind != Kinematics::Kind::none) {
-    angles_ = joint_angles(k, without_button(k, report.joints, report.buttons));
+    angles_ = wrenchd::joint_angles(k, without_button(k, report.joints, report.buttons));
     const std::optional<Pose> X_DE = forward(k, angles_, X_DE_);
     placed_ = X_DE.has_value();
     if (!X_DE) return Fault::pose_not_finite;

@@ -58,6 +58,12 @@ class ProfileDevice final : public Device {
   const DeviceProfile& profile() const noexcept { return profile_; }
   std::uint64_t commands_sent() const noexcept { return commands_sent_; }
 
+  /// Joint angles of the last good sample, where the device has joints. RT safe.
+  const JointAngles& joint_angles() const noexcept { return angles_; }
+  /// Takes over what a calibration has changed of the profile: the frames and the zeros of the joints. The
+  /// next pose is not held against the one before. For between the ticks; RT safe.
+  void recalibrate(const DeviceProfile& calibrated) noexcept;
+
  private:
   struct Arrival {
     const PoseReportLayout* layout;

@@ -124,6 +124,27 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   CHECK(compared > 1000);
 }
 
+TEST_CASE("armed, the motors hold the weight of the handle, however the base stands", "[servo]") {
+  const double tilt_rad = GENERATE(0.0, 0.7);
+  Plan plan = shipped_plan();
+  plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.06}, {0, 0.4, 0}}};  // far from the table
+  plan.settings.device.base_in_world = {{0, 0, 0.05}, {tilt_rad, 0, 0}};
+  plan.profile.masses = {0.2, {0.03, 0, 0}, 0.1};
+  const GravityCompensation gravity(plan.profile.masses, rotation_from({tilt_rad, 0, 0}));
+  VirtualStation s(plan);
+  REQUIRE(s.run(0.2) == Fault::none);
+  CHECK(s.force_N() == 0.0);  // disarmed
+  s.station.loop().arm();
+  REQUIRE(s.run(3.0) == Fault::none);
+  REQUIRE(s.engagement() == Engagement::active);
+  CHECK(s.last.contacts == 0);
+  const Wrench weight = gravity.wrench(pose_of(s.last.X_BH));
+  CHECK(weight.force_N.norm() == Approx(0.3 * kGravity_m_per_s2));
+  CHECK((weight.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-12);
+  CHECK((weight.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-12);
+  CHECK(weight.torque_Nm.norm() > 0.01);
+}
+
 TEST_CASE("a profile may ask for the paper's spatial wrench about the world origin", "[servo]") {
   Plan plan = shipped_plan();
   plan.profile.wrench_point = WrenchPoint::world_origin;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -26,6 +27,7 @@
 #include "daemon/replay.hpp"
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
+#include "tools/calibrate.hpp"
 #include "tools/check.hpp"
 #include "tools/descriptor_source.hpp"
 #include "tools/list_devices.hpp"
@@ -325,6 +327,9 @@ std::vector<std::uint8_t> bytes_of(const char* option, const std::string& text) 
 /// "fx,fy,fz,tx,ty,tz"
 Wrench wrench_of(const std::string& text) {
   std::array<double, 6> numbers{};
+  if (const auto commas = static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')); commas != 5)
+    throw std::runtime_error("--wrench: six numbers are wanted, and " + std::to_string(commas + 1) +
+                             " given; give force in N and torque in N.m, as in 1,0,-2.5,0,0.05,0");
   const char* from = text.data();
   const char* const end = from + text.size();
   for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -354,7 +359,7 @@ void add_decode(CLI::App& app, ReportOptions& options) {
       ->check(not_empty());
   decode->add_option("--hex", options.hex, "the bytes of one report, as in \"01 00 ff\"")
       ->required()
-      ->check(not_empty());
+      ->check(not_empty("give bytes in hexadecimal, as in \"01 00 ff\""));
   decode->add_flag("--to-device", options.to_device,
                    "they go to the device: where both ways have reports of the same form");
   decode->footer(
@@ -375,7 +380,7 @@ void add_encode(CLI::App& app, ReportOptions& options) {
       ->add_option("--wrench", options.wrench,
                    "fx,fy,fz,tx,ty,tz on the hand, about the handle point [N, N.m]")
       ->required()
-      ->check(not_empty());
+      ->check(not_empty("give force in N and torque in N.m, as in 1,0,-2.5,0,0.05,0"));
   encode->add_option("--at", options.at,
                      "a report of the device, in hexadecimal: where the hand is. Devices with joints need\n"
                      "it; without it they stand at their home position");
@@ -405,6 +410,25 @@ void add_devices(CLI::App& app, bool& all) {
     };
     std::cout << device_list(list_usb_devices(), known_profiles(SearchPath()), all, may_open);
   });
+}
+
+void add_calibrate(CLI::App& app, CalibrateOptions& options, int& exit_code) {
+  CLI::App* calibrate =
+      app.add_subcommand("calibrate",
+                         "Has a person show a plugged-in device its rest and its axes, motors off, and\n"
+                         "keeps what it found for its serial number");
+  calibrate
+      ->add_option("profile", options.profile,
+                   "name or file of its profile; auto: that of whatever device is plugged in")
+      ->check(not_empty("name a profile, or leave it out"))
+      ->capture_default_str();
+  calibrate->add_option("--serial", options.serial, "which of several equal devices")
+      ->check(not_empty("give the serial number; wrenchctl devices lists it"));
+  calibrate->footer(
+      "Says what to do, a step at a time. Enter, or a button that the profile names, confirms that the "
+      "handle\n"
+      "is in its rest. Calibrations are in calibration/ of $STATE_DIRECTORY, or of /var/lib/wrenchd.");
+  calibrate->callback([&] { exit_code = run_calibrate(options); });
 }
 
 struct ProfileOptions {
@@ -484,6 +508,9 @@ int main(int argc, char** argv) {
 
   bool all_devices = false;
   add_devices(app, all_devices);
+
+  CalibrateOptions calibrate_options;
+  add_calibrate(app, calibrate_options, exit_code);
 
   MeshOptions mesh_options;
   add_mesh(app, mesh_options, exit_code);

@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/calibration_store.hpp"
 #include "devices/reference_layout.hpp"
 #include "devices/simulated_device.hpp"
 #include "tests/support/run_program.hpp"
@@ -48,13 +49,20 @@ class LiveHandle : ReportSink {
   void live() {
     while (!stop_.load()) {
       device_.advance_to(std::chrono::steady_clock::now(), *this);
-      if (!newest_.empty()) mock_.send(newest_);
+      send();
       while (mock_.anything_received()) {
         device_.take_command(mock_.receive(32));
         ++commands_;
       }
       if (device_.firmware().motors_on()) pushed_.store(true);
       std::this_thread::sleep_for(2ms);
+    }
+  }
+  /// What a host does not read in time is lost.
+  void send() {
+    try {
+      if (!newest_.empty()) mock_.send(newest_);
+    } catch (const std::runtime_error&) {
     }
   }
   void stop() {
@@ -128,4 +136,45 @@ TEST_CASE("without a profile's name wrenchd takes the one that the device has", 
   CHECK(soon([&] { return handle.commands() > 10; }));
   wrenchd.signal(SIGTERM);
   CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
+}
+
+TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]") {
+  MockMachine machine;
+  const TemporaryDirectory files;
+  const std::string profile =
+      files.write("patient.toml", std::string(kPatient) + "[homing]\ncheck_axes = true\n").string();
+  const CalibrationStore store(files.path() / "calibration");
+  const bool calibrated = GENERATE(false, true);
+  if (calibrated) store.write({"patient", "A1", {}});
+  setenv("STATE_DIRECTORY", files.path().c_str(), 1);
+  const LiveHandle handle(machine, {});
+  RunningProgram wrenchd("wrenchd", {"--profile", profile, "--realtime", "best_effort", "--arm"});
+  unsetenv("STATE_DIRECTORY");
+  if (calibrated) {
+    CHECK(soon([&] { return handle.was_pushed(); }));
+  } else {
+    CHECK(wrenchd.says("may not be armed: it was never calibrated; run wrenchctl calibrate patient"));
+    CHECK(soon([&] { return handle.commands() > 300; }));
+    CHECK_FALSE(handle.was_pushed());
+  }
+  wrenchd.signal(SIGTERM);
+  CHECK(wrenchd.wait().exit_code == 0);
+}
+
+TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing", "[usb]") {
+  MockMachine machine;
+  const TemporaryDirectory files;
+  const std::string profile = files.write("patient.toml", kPatient).string();
+  setenv("STATE_DIRECTORY", files.path().c_str(), 1);
+  const LiveHandle handle(machine, {});
+  RunningProgram wrenchctl("wrenchctl", {"calibrate", profile});
+  unsetenv("STATE_DIRECTORY");
+  CHECK(soon(
+      [&] { return wrenchctl.out().find("Push the handle straight away from you.") != std::string::npos; }));
+  wrenchctl.signal(SIGINT);
+  const ProgramResult result = wrenchctl.wait();
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.err, Contains("stopped; nothing was stored"));
+  CHECK_FALSE(std::filesystem::exists(files.path() / "calibration"));
+  CHECK_FALSE(handle.was_pushed());
 }

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "config/calibration_store.hpp"
+#include "daemon/device_wait.hpp"
+#include "daemon/station.hpp"
+
+namespace wrenchd {
+
+// The way of a real device from plugged in to ready, before its servo loop runs. Not RT safe.
+
+/// When to stop for another reason than a fault.
+using Stop = std::function<bool()>;
+
+/// Where the configuration leaves the profile to the device: that of the one device that has one, which is
+/// waited for. False: it is time to stop.
+bool settle_profile(Plan& plan, const Stop& stop);
+
+/// Opens the station's device, and waits for it where it is not plugged in. False: it is time to stop. What
+/// is wrong with a device that is there at the start is thrown; later it is logged, and waited for its cure.
+bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop);
+
+/// What the device can do, said once: what it has no motors for is not felt.
+void tell_device(const DeviceProfile& profile, const UsbDevice& device);
+
+/// Lets the opened device take over its stored calibration, where its profile asks for one. Returns why it
+/// may not be armed, with the cure; empty: it may.
+std::string calibrate(Station& station, const UsbDevice& device, const CalibrationStore& store);
+
+/// Where the device counts from wherever it was switched on: has the person put the handle into its rest, and
+/// says so in the log. False: the device was lost, or it is time to stop.
+bool find_rest(Station& station, Clock& clock, const Stop& stop);
+
+}  // namespace wrenchd

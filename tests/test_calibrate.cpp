@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "tests/support/polhem_in_hand.hpp"
+#include "tests/support/run_program.hpp"
+#include "tools/calibrate.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+using Catch::Contains;
+
+/// A person who does as told, by the sentences alone.
+struct Obedient {
+  PolhemInHand polhem;
+  std::vector<std::string> heard;
+  int ms_left = 60000;
+  bool unplugs = false;
+
+  Bystander person() {
+    return {[this](const std::string& words) {
+              heard.push_back(words);
+              const std::array<std::string, 6> asks = {
+                  "away from you.",       "straight to the left",   "straight up",
+                  "top of the handle to", "top of the handle away", "Turn"};
+              HomingState asked;
+              asked.step = words.find("into its rest") != std::string::npos ? HomingStep::reference
+                                                                            : HomingStep::settling;
+              for (std::size_t axis = 0; axis < 6; ++axis) {
+                if (words.find(asks[axis]) == std::string::npos) continue;
+                asked.step = HomingStep::moving;
+                asked.axis = axis;
+              }
+              polhem.obey(asked);
+            },
+            [this] { return (polhem.X_BH.translation_m - polhem.target.translation_m).norm() < 1e-9; },
+            [this] {
+              polhem.live();
+              if (unplugs && heard.size() == 3) polhem.link.unplug();
+              return --ms_left <= 0;
+            }};
+  }
+  Calibration calibrated() {
+    polhem.device.open();
+    return calibrate(polhem.device, polhem.profile, "A1", polhem.clock, person());
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a calibration tells a person what to do, and ends with the offsets", "[calibrate]") {
+  Obedient bench;
+  const Calibration found = bench.calibrated();
+  CHECK(found.profile == "polhem");
+  CHECK(found.serial == "A1");
+  REQUIRE(found.offsets.size() == 6);
+  // What the joints counted of too little when the device was switched on.
+  const Kinematics& k = bench.polhem.profile.kinematics;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double missing = bench.polhem.at_power_on[k.slot[i]] * k.rad_per_count[i];
+    CHECK(found.offsets[i].offset == Approx(-missing).margin(0.01));
+  }
+  CHECK(bench.heard.back() == "Homed: the device may be armed.");
+}
+
+TEST_CASE("a calibration that fails says of what, and gives nothing", "[calibrate]") {
+  Obedient bench;
+  bench.polhem.mixed_up = 1;
+  CHECK_THROWS_WITH(bench.calibrated(), Contains("Homing failed. That moved z, not y.") &&
+                                            Contains("look at their order in the profile"));
+}
+
+TEST_CASE("a calibration may be stopped, or lose its device", "[calibrate]") {
+  Obedient stopping;
+  stopping.ms_left = 2000;
+  CHECK_THROWS_WITH(stopping.calibrated(), Contains("nothing was stored"));
+  Obedient losing;
+  losing.unplugs = true;
+  CHECK_THROWS_WITH(losing.calibrated(), Contains("was unplugged"));
+}
+
+TEST_CASE("wrenchctl calibrate refuses what it cannot calibrate") {
+  struct {
+    std::vector<std::string> arguments;
+    std::string told;
+  } const table[] = {
+      {{"calibrate", "gone"}, "gone.toml: no such file"},
+      {{"calibrate", "polhem"}, "no such device is plugged in; wrenchctl devices lists what is"},
+      {{"calibrate", ""}, "must not be empty; name a profile, or leave it out"},
+      {{"calibrate", "polhem", "--serial", ""}, "--serial: must not be empty; give the serial number"},
+  };
+  for (const auto& [arguments, told] : table) {
+    const ProgramResult result = run_program("wrenchctl", arguments);
+    INFO(told << "\ngot " << result.err);
+    CHECK(result.exit_code != 0);
+    CHECK(result.err.find(told) != std::string::npos);
+  }
+}
+
+}  // namespace wrenchd

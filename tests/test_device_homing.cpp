@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "devices/device_homing.hpp"
+#include "tests/support/polhem_in_hand.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+/// Steps until it has ended, and half a minute at most.
+HomingState home(PolhemInHand& polhem, DeviceHoming& homing, bool confirming = true) {
+  for (int ms = 0; ms < 30000; ++ms) {
+    polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
+    const HomingState before = homing.state();
+    const HomingState& state = homing.step(polhem.clock.now());
+    if (state.step != before.step || state.axis != before.axis) polhem.obey(state);
+    if (confirming && state.step == HomingStep::reference && state.progress == 1.0) homing.confirm();
+    polhem.live();
+    if (state.step == HomingStep::done || state.step == HomingStep::failed || homing.lost()) break;
+  }
+  return homing.state();
+}
+
+/// How far the device's pose is from the true one: [m] and [rad].
+Eigen::Vector2d error(PolhemInHand& polhem) {
+  DeviceSample sample;
+  for (int ms = 0; ms < 50; ++ms) {
+    polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
+    sample = polhem.device.read_newest(polhem.clock.now());
+    polhem.device.write(polhem.clock.now(), {}, false);
+  }
+  REQUIRE(sample.fault == Fault::none);
+  return {(sample.X_BH.translation_m - polhem.X_BH.translation_m).norm(),
+          sample.X_BH.rotation.angularDistance(polhem.X_BH.rotation)};
+}
+
+/// A count of the coarsest encoder is 2 pi / 1024 rad, one of the arm 0.02 mm or so; the rest and the pose
+/// each are off by half of it, in several joints.
+constexpr double kResolution_m = 2e-4;
+constexpr double kResolution_rad = 0.02;
+
+}  // namespace
+
+TEST_CASE("encoders that count from anywhere are told where they are by the rest", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.device.open();
+  CHECK(error(polhem)[0] > 0.01);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  REQUIRE(home(polhem, homing).step == HomingStep::done);
+  CHECK(homing.offsets().size() == 6);
+  polhem.target.translation_m += Vector3d(-0.05, 0.03, 0.02);
+  for (int ms = 0; ms < 1000; ++ms) polhem.live();
+  polhem.device.recalibrate(calibrated(polhem.profile, homing.offsets()));  // the way was no motion
+  CHECK(error(polhem)[0] < kResolution_m);
+  CHECK(error(polhem)[1] < kResolution_rad);
+  CHECK(polhem.board.currents_mA() == std::array<int, 3>{});
+}
+
+TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.device.open();
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::all);
+  REQUIRE(home(polhem, homing).step == HomingStep::done);
+  CHECK(error(polhem)[0] < kResolution_m);
+}
+
+TEST_CASE("an axis that goes another way ends a calibration", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.mixed_up = 1;
+  polhem.device.open();
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::all);
+  const HomingState state = home(polhem, homing);
+  CHECK(state.step == HomingStep::failed);
+  CHECK(state.trouble == HomingTrouble::wrong_axis);
+}
+
+TEST_CASE("without a confirmation there is no rest", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.device.open();
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  CHECK(home(polhem, homing, false).step == HomingStep::reference);
+  CHECK(homing.offsets().empty());
+}
+
+TEST_CASE("the button of the profile confirms the rest", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.device.open();
+  polhem.board.press(true);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  CHECK(home(polhem, homing, false).step == HomingStep::done);
+}
+
+TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.device.open();
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  for (int i = 0; i < 10; ++i) homing.step(polhem.clock.now());
+  CHECK_FALSE(homing.lost());
+  polhem.link.unplug();
+  homing.step(polhem.clock.now());
+  CHECK(homing.lost());
+}
+
+TEST_CASE("a device that knows where it is has nothing to be shown at a start", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.profile.homing.reference = ReferenceUse::never;
+  polhem.device.open();
+  const DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  CHECK(homing.state().step == HomingStep::done);
+}
+
+}  // namespace wrenchd
