@@ -393,7 +393,7 @@ const std::vector<Bad> kTable = {
     {kWhole, "[closed_loop]", "[homing]\nmax_turn_rad = 0.1\n[closed_loop]", "0.1\n[closed",
      "must be no less than travel_rad"},
     {kWhole, "[closed_loop]", "[homing]\nrest_m = [0, 0, 0]\n[closed_loop]", "rest_m",
-     "unknown key 'homing.rest_m'"},
+     "known keys here: 'reference'"},
     {kWhole, "[closed_loop]", "[masses]\nhandle_kg = 250.0\n[closed_loop]", "250.0", "from 0 to 20 kg"},
     {kWhole, "[closed_loop]", "[masses]\nhandle_g = 250.0\n[closed_loop]", "handle_g",
      "give it in kg as 'handle_kg'"},

@@ -48,7 +48,7 @@ std::string printed(const Settings& s) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
   out.precision(17);
-  out << s.scene << s.device.profile << s.device.profile_file << '\n';
+  out << s.scene << s.device.profile << s.device.profile_file << s.device.serial << '\n';
   print(out, s.device.base_in_world);
   print(out, s.device.tool_in_handle);
   out << s.servo.rate_Hz << ' ' << int(s.servo.pacing) << int(s.servo.realtime) << ' ' << s.servo.priority
@@ -123,7 +123,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 45);
+  CHECK(options == 46);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {

@@ -687,6 +687,13 @@ TEST_CASE("wrenchctl decode and encode read and write the bytes of shipped profi
   CHECK(cut.err.find("dropped, for there are no motors: ry") != std::string::npos);
 }
 
+TEST_CASE("wrenchctl decode and encode say what an empty text should be") {
+  CHECK(run_program("wrenchctl", {"decode", "loopback", "--hex", ""})
+            .err.find("--hex: must not be empty; give bytes in hexadecimal") != std::string::npos);
+  CHECK(run_program("wrenchctl", {"encode", "loopback", "--wrench", ""})
+            .err.find("--wrench: must not be empty; give force in N") != std::string::npos);
+}
+
 TEST_CASE("wrenchctl decode and encode refuse what they cannot read, with the place and the cure") {
   const auto refuses = [](std::vector<std::string> arguments, const std::string& told) {
     const ProgramResult result = run_program("wrenchctl", arguments);
@@ -700,10 +707,10 @@ TEST_CASE("wrenchctl decode and encode refuse what they cannot read, with the pl
   refuses({"decode", "loopback", "--hex", "01 02"},
           "these 2 bytes are no report of loopback:\n  report 0x01 has 64 bytes");
   refuses({"decode", "nobody", "--hex", "01"}, "no such file; looked for ");
-  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: number 3 of 6 is wrong, at '3'");
+  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: six numbers are wanted, and 3 given");
   refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is wrong, at 'x'");
   refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "number 6 of 6 is wrong, at '6,7'");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "six numbers are wanted, and 7 given");
   refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split takes no wrench");
   refuses({"encode", "falcon", "--wrench", "1,0,0,0,0,0", "--at", "3c"},
           "--at: these 1 bytes are no report of falcon");
