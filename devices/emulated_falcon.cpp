@@ -2,10 +2,12 @@
 #include "devices/emulated_falcon.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace wrenchd {
 namespace {
 
+constexpr Duration kFrame = std::chrono::milliseconds(1);
 constexpr std::size_t kPacket = 16;
 constexpr std::size_t kShortPacket = 14;
 constexpr std::uint8_t kBegin = '<', kEnd = '>', kNibble = 'A';
@@ -93,8 +95,21 @@ void EmulatedFalcon::pull_out_and_push_in() noexcept {
   if (homing_) homed_ = true;
 }
 
-bool EmulatedFalcon::take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {
-  now_ = now;
+void EmulatedFalcon::set_counts(const JointCounts& counts) noexcept {
+  for (std::size_t i = 0; i < turned_.size(); ++i) turned_[i] = static_cast<int>(std::lround(counts[i]));
+}
+
+MotorEfforts EmulatedFalcon::motors() const noexcept {
+  return {static_cast<double>(efforts_[0]), static_cast<double>(efforts_[1]),
+          static_cast<double>(efforts_[2])};
+}
+
+void EmulatedFalcon::start() {
+  constexpr std::array<std::uint8_t, 256> kStandIn{};
+  if (state_ != State::running) falcon_start(*this, kStandIn);
+}
+
+bool EmulatedFalcon::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
   if (state_ != State::running || bytes.size() != kPacket || bytes.front() != kBegin || bytes.back() != kEnd)
     return false;
   for (std::size_t i = 0; i < 3; ++i)
@@ -108,8 +123,16 @@ bool EmulatedFalcon::take_command(TimePoint now, std::span<const std::uint8_t> b
 }
 
 void EmulatedFalcon::advance_to(TimePoint t, ReportSink& host) noexcept {
-  now_ = std::max(now_, t);
-  if (!reply_due_) return;
+  if (!powered_) {
+    powered_ = true;
+    next_frame_ = t;
+    faults_.power_on(t);
+  }
+  for (; next_frame_ <= t; next_frame_ += kFrame)
+    if (reply_due_) send(host);
+}
+
+void EmulatedFalcon::send(ReportSink& host) noexcept {
   reply_due_ = false;
   std::array<std::uint8_t, kPacket> packet;
   packet.fill(kNibble);
@@ -120,7 +143,7 @@ void EmulatedFalcon::advance_to(TimePoint t, ReportSink& host) noexcept {
   packet[13] = static_cast<std::uint8_t>(kNibble + buttons_ + (homed_ ? 0x70u : 0u));
   const bool cut = short_ > 0;
   if (cut) --short_;
-  host.take_report(now_, std::span(packet).first(cut ? kShortPacket : kPacket));
+  host.take_report(next_frame_, std::span(packet).first(cut ? kShortPacket : kPacket));
 }
 
 }  // namespace wrenchd

@@ -5,16 +5,17 @@
 #include <cstdint>
 #include <vector>
 
-#include "devices/emulated_link.hpp"
+#include "devices/emulated_arm.hpp"
 #include "devices/falcon_start.hpp"
 
 namespace wrenchd {
 
 /// A Novint Falcon: an FTDI serial chip with a loader behind it, which answers a handshake, echoes a firmware
-/// as it takes it, and then runs it. Running, it sends 16 bytes for every 16 it takes: encoders, buttons and
-/// homing as nibbles from 'A' on. Its encoders count from wherever the handle was, until homing mode is asked
-/// for and the handle is pulled out and pushed in. Packets are RT safe; starting is not.
-class EmulatedFalcon final : public EmulatedDevice, public SerialChip {
+/// as it takes it, and then runs it. Running, it sends 16 bytes at the next USB frame for every 16 it takes:
+/// encoders, buttons and homing as nibbles from 'A' on. Its encoders count from wherever the handle was,
+/// until homing mode is asked for and the handle is pulled out and pushed in. Packets are RT safe; starting
+/// is not.
+class EmulatedFalcon final : public EmulatedArm, public SerialChip {
  public:
   enum class State : std::uint8_t { off, listening, loading, running };
   /// What a motor takes at most, in its own counts.
@@ -42,7 +43,15 @@ class EmulatedFalcon final : public EmulatedDevice, public SerialChip {
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept override;
-  TimePoint next_event() const noexcept override { return now_ + std::chrono::milliseconds(1); }
+  TimePoint next_event() const noexcept override { return next_frame_; }
+
+  void set_counts(const JointCounts& counts) noexcept override;
+  MotorEfforts motors() const noexcept override;  ///< [motor counts]
+  /// Handshake and loading, with something in place of the firmware, which is its maker's. Nothing where one
+  /// runs already.
+  void start() override;
+  bool wants_homing() const noexcept override { return homing_ && !homed_; }
+  void home() noexcept override { pull_out_and_push_in(); }
 
   State state() const noexcept { return state_; }
   bool homed() const noexcept { return homed_; }
@@ -52,6 +61,7 @@ class EmulatedFalcon final : public EmulatedDevice, public SerialChip {
 
  private:
   void take_serial(std::uint8_t byte);
+  void send(ReportSink& host) noexcept;
 
   State state_ = State::off;
   std::uint16_t divisor_ = 0;
@@ -61,7 +71,8 @@ class EmulatedFalcon final : public EmulatedDevice, public SerialChip {
   std::vector<std::uint8_t> answer_;  ///< waiting to be read
   int spoilt_ = 0, ignored_ = 0, short_ = 0;
 
-  TimePoint now_{};
+  bool powered_ = false;
+  TimePoint next_frame_{};
   bool reply_due_ = false;
   std::array<int, 3> turned_{}, began_at_{}, efforts_{};
   bool homing_ = false, homed_ = false;

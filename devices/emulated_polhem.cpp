@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/emulated_polhem.hpp"
 
+#include <cmath>
+
 namespace wrenchd {
 namespace {
 
@@ -17,6 +19,7 @@ int word(std::span<const std::uint8_t> bytes, std::size_t i) noexcept {
 void EmulatedPolhem::advance_to(TimePoint t, ReportSink& host) noexcept {
   if (!powered_) {
     powered_ = may_send_ = true;
+    faults_.power_on(t);
     next_frame_ = t;
   }
   for (; next_frame_ <= t; next_frame_ += kFrame) {
@@ -26,6 +29,14 @@ void EmulatedPolhem::advance_to(TimePoint t, ReportSink& host) noexcept {
     }
     if (may_send_) send(host);
   }
+}
+
+void EmulatedPolhem::set_counts(const JointCounts& counts) noexcept {
+  for (std::size_t i = 0; i < turned_.size(); ++i) turned_[i] = static_cast<int>(std::lround(counts[i]));
+}
+
+MotorEfforts EmulatedPolhem::motors() const noexcept {
+  return {1e-3 * currents_mA_[0], 1e-3 * currents_mA_[1], 1e-3 * currents_mA_[2]};
 }
 
 void EmulatedPolhem::send(ReportSink& host) noexcept {

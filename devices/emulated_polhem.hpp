@@ -4,7 +4,8 @@
 #include <array>
 #include <cstdint>
 
-#include "devices/emulated_link.hpp"
+#include "devices/emulated_arm.hpp"
+#include "devices/report_codec.hpp"
 
 namespace wrenchd {
 
@@ -12,7 +13,7 @@ namespace wrenchd {
 /// three currents in, nothing of what they move. It sends one report when it is switched on, and then one for
 /// each that it takes, at the next USB frame. Half a second after the last one its amplifiers are disabled.
 /// RT safe.
-class EmulatedPolhem final : public EmulatedDevice {
+class EmulatedPolhem final : public EmulatedArm {
  public:
   static constexpr Duration kWatchdog = std::chrono::milliseconds(500);
 
@@ -28,6 +29,9 @@ class EmulatedPolhem final : public EmulatedDevice {
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept override;
   TimePoint next_event() const noexcept override { return next_frame_; }
+
+  void set_counts(const JointCounts& counts) noexcept override;
+  MotorEfforts motors() const noexcept override;  ///< [A]
 
   bool amplifiers_on() const noexcept { return amplifiers_on_; }
   const std::array<int, 3>& currents_mA() const noexcept { return currents_mA_; }  ///< 0 while they are off

@@ -29,6 +29,7 @@ void EmulatedSpaceMouse::advance_to(TimePoint t, ReportSink& host) noexcept {
   const Duration period = format_ == Format::split ? kSplitPeriod : kCombinedPeriod;
   if (!powered_) {
     powered_ = true;
+    faults_.power_on(t);
     next_ = t + period;
   }
   for (; next_ <= t; next_ += period) send(host);

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "devices/emulated_link.hpp"
+#include "devices/emulated_device.hpp"
 
 namespace wrenchd {
 

@@ -8,7 +8,7 @@ namespace wrenchd {
 
 using Kind = SimulatedFault::Kind;
 
-LoopbackLink::LoopbackLink(SimulatedDevice& device, Clock& clock, const SimulationSettings& settings)
+LoopbackLink::LoopbackLink(EmulatedDevice& device, Clock& clock, const SimulationSettings& settings)
     : device_(device),
       clock_(clock),
       report_delay_(from_seconds(settings.report_delay_s)),
@@ -20,7 +20,7 @@ void LoopbackLink::open() {
   advance_to(now);
   if (device_.shows(Kind::unplug, now, now))
     throw std::runtime_error(
-        "loopback device: unplugged by its fault plan; wait until it is plugged in again");
+        "simulated device: unplugged by its fault plan; wait until it is plugged in again");
   reports_.clear();
   passed_ = now;
   state_ = State::open;
@@ -42,14 +42,16 @@ LinkStatus LoopbackLink::write(TimePoint now, std::span<const std::uint8_t> repo
   advance_to(now);
   if (state_ != State::open) return LinkStatus::gone;
   if (device_.shows(Kind::deaf, now, now)) return LinkStatus::empty;
-  return commands_.push(now + command_delay_, report) ? LinkStatus::ok : LinkStatus::empty;
+  if (!commands_.push(now + command_delay_, report)) return LinkStatus::empty;
+  advance_to(now);
+  return LinkStatus::ok;
 }
 
 void LoopbackLink::wait_readable(TimePoint deadline) noexcept {
   for (TimePoint now = clock_.now(); now < deadline; now = clock_.now()) {
     advance_to(now);
     if (state_ != State::open || reports_.arrived(now) != nullptr) return;
-    clock_.sleep_until(std::min(deadline, next_arrival()));
+    clock_.sleep_until(std::min(deadline, next_arrival(now)));
   }
 }
 
@@ -62,7 +64,7 @@ void LoopbackLink::advance_to(TimePoint now) noexcept {
   while (const Packet* command = commands_.arrived(now)) {
     device_.advance_to(command->arrives, *this);
     if (!device_.shows(Kind::unplug, command->arrives, command->arrives))
-      device_.take_command(command->report());
+      device_.take_command(command->arrives, command->report());
     commands_.pop();
   }
   device_.advance_to(now, *this);
@@ -71,12 +73,24 @@ void LoopbackLink::advance_to(TimePoint now) noexcept {
 }
 
 void LoopbackLink::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
-  if (state_ == State::open && !reports_.push(sent + report_delay_, report)) ++dropped_;
+  if (report.size() > kMaxReportBytes) return;
+  if (!device_.shows(Kind::freeze, sent, sent) || last_.length == 0) {
+    std::copy(report.begin(), report.end(), last_.bytes.begin());
+    last_.length = report.size();
+  }
+  if (state_ != State::open || device_.shows(Kind::silence, sent, sent) ||
+      device_.shows(Kind::unplug, sent, sent))
+    return;
+  Packet packet = last_;
+  if (device_.shows(Kind::garble, sent, sent)) packet.bytes[packet.length / 2] ^= 0x10;
+  if (device_.shows(Kind::short_report, sent, sent)) packet.length /= 2;
+  if (!reports_.push(sent + report_delay_, packet.report())) ++dropped_;
 }
 
 /// When the next report can be read. Later than now wherever none is waiting.
-TimePoint LoopbackLink::next_arrival() const noexcept {
-  return reports_.empty() ? device_.next_report() + report_delay_ : reports_.next_arrival();
+TimePoint LoopbackLink::next_arrival(TimePoint now) const noexcept {
+  if (!reports_.empty()) return reports_.next_arrival();
+  return std::max(device_.next_event() + report_delay_, now + Duration{1});
 }
 
 }  // namespace wrenchd

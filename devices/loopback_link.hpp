@@ -5,23 +5,25 @@
 
 #include "core/clock.hpp"
 #include "core/simulation_settings.hpp"
+#include "devices/emulated_device.hpp"
 #include "devices/packet_queue.hpp"
 #include "devices/report_link.hpp"
-#include "devices/simulated_device.hpp"
 
 namespace wrenchd {
 
-/// The wire to the simulated device: a delay and a queue in each direction. Reports wait in a ring like that
-/// of hidraw: 64 of them, and a newer one is dropped when it is full.
+/// The wire to an emulated device: a delay and a queue in each direction, and the faults that a wire has.
+/// Reports wait in a ring like that of hidraw: 64 of them, and a newer one is dropped when it is full.
 ///
-/// Time passes for the simulated device only in these calls, up to the `now` they are given; nothing runs in
-/// between and there is no thread.
+/// Time passes for the device only in these calls, up to the `now` they are given; nothing runs in between
+/// and there is no thread.
 class LoopbackLink final : public ReportLink, private ReportSink {
  public:
   /// The delays are those of the settings. Device and clock must outlive the link.
-  LoopbackLink(SimulatedDevice& device, Clock& clock, const SimulationSettings& settings);
+  LoopbackLink(EmulatedDevice& device, Clock& clock, const SimulationSettings& settings);
+  /// No delay: what is written has arrived when write() returns.
+  LoopbackLink(EmulatedDevice& device, Clock& clock) : device_(device), clock_(clock) {}
 
-  /// Throws std::runtime_error while the simulated device is unplugged.
+  /// Throws std::runtime_error while the device is unplugged.
   void open() override;
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
@@ -37,16 +39,17 @@ class LoopbackLink final : public ReportLink, private ReportSink {
   enum class State : std::uint8_t { closed, open, gone };
 
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override;
-  TimePoint next_arrival() const noexcept;
+  TimePoint next_arrival(TimePoint now) const noexcept;
 
-  SimulatedDevice& device_;
+  EmulatedDevice& device_;
   Clock& clock_;
-  Duration report_delay_;
-  Duration command_delay_;
+  Duration report_delay_{};
+  Duration command_delay_{};
   State state_ = State::closed;
   TimePoint passed_{};    ///< time up to which unplugging has been looked for
   PacketQueue reports_;   ///< device to host
   PacketQueue commands_;  ///< host to device
+  Packet last_;           ///< that left the device and was not frozen
   std::uint64_t dropped_ = 0;
 };
 

@@ -2,6 +2,7 @@
 #include "devices/simulated_device.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -67,6 +68,7 @@ void SimulatedDevice::advance_to(TimePoint t, ReportSink& host) noexcept {
   if (!powered_) {
     powered_ = true;
     power_on_ = now_ = t;
+    faults_.power_on(t);
   }
   if (t - now_ > kMaxCatchUp) skip_to(t);
   while (now_ + substep_ <= t) substep(host);
@@ -99,31 +101,19 @@ Wrench SimulatedDevice::motor_demand() noexcept {
 void SimulatedDevice::send_report(ReportSink& host) noexcept {
   using Kind = SimulatedFault::Kind;
   PoseReport report = firmware_.report(now_ - power_on_);
-  if (shows(Kind::teleport)) report.X_BH.translation_m.x() += kTeleport_m;
-  if (shows(Kind::bad_quaternion)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
-  if (!shows(Kind::freeze)) encode(pose_layout_, report, report_);
-  if (shows(Kind::silence) || shows(Kind::unplug)) return;
-
-  auto bytes = report_;
-  if (shows(Kind::garble)) bytes[pose_layout_.length / 2] ^= 0x10;
-  const std::size_t length = shows(Kind::short_report) ? pose_layout_.length / 2 : pose_layout_.length;
-  host.take_report(now_, std::span(bytes).first(length));
+  if (shows(Kind::teleport, now_, now_)) report.X_BH.translation_m.x() += kTeleport_m;
+  if (shows(Kind::bad_quaternion, now_, now_)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
+  std::array<std::uint8_t, kMaxReportBytes> bytes;
+  host.take_report(now_, std::span(bytes).first(encode(pose_layout_, report, bytes)));
 }
 
-bool SimulatedDevice::take_command(std::span<const std::uint8_t> bytes) noexcept {
+bool SimulatedDevice::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
   return firmware_.take_command(now_, bytes);
 }
 
-TimePoint SimulatedDevice::next_report() const noexcept {
+TimePoint SimulatedDevice::next_event() const noexcept {
   const std::uint64_t left = substeps_per_report_ - substeps_ % substeps_per_report_;
   return now_ + substep_ * static_cast<std::int64_t>(left);
-}
-
-bool SimulatedDevice::shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
-  return std::any_of(faults_.begin(), faults_.end(), [&](const SimulatedFault& fault) {
-    const TimePoint start = power_on_ + fault.start;
-    return fault.kind == kind && start <= to && from < start + fault.duration;
-  });
 }
 
 }  // namespace wrenchd

@@ -36,6 +36,11 @@ class SimulatedHandle {
   void step(const HandTarget& target, const Wrench& F_motors) noexcept;
   /// Stops the handle where it is. RT safe.
   void rest() noexcept { V_BH_ = {}; }
+  /// Puts the handle there, at rest: an end stop. What it takes is in no sum of energy. RT safe.
+  void stop_at(const Pose& X_BH) noexcept {
+    X_BH_ = X_BH;
+    rest();
+  }
 
   const Pose& X_BH() const noexcept { return X_BH_; }
   const Twist& V_BH() const noexcept { return V_BH_; }

@@ -11,6 +11,7 @@
 #include "devices/emulated_falcon.hpp"
 #include "devices/emulated_polhem.hpp"
 #include "devices/emulated_spacemouse.hpp"
+#include "devices/loopback_link.hpp"
 #include "devices/profile_device.hpp"
 
 using namespace wrenchd;
@@ -47,7 +48,7 @@ struct Bench {
   DeviceProfile profile;
   VirtualClock clock;
   Emulator emulator;
-  EmulatedLink link{emulator, clock};
+  LoopbackLink link{emulator, clock};
   ProfileDevice device{profile, link};
   DeviceSample sample;
   Fault last_write = Fault::none;
@@ -457,14 +458,14 @@ TEST_CASE(
 TEST_CASE("a device that is unplugged is lost, and is heard again after it was opened anew", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
   bench.emulator.turn({0, 0, -5000, 0, 0, 0});
+  bench.emulator.inject({SimulatedFault::Kind::unplug, 10500us, 100ms});
   bench.open();
   bench.steps(10);
-  bench.link.unplug();
+  CHECK(bench.sample.fault == Fault::none);
   bench.step();
   CHECK(bench.sample.fault == Fault::device_lost);
   CHECK(bench.last_write == Fault::device_lost);
-  CHECK_THROWS(bench.device.open());
-  bench.link.plug();
+  CHECK_THROWS_WITH(bench.device.open(), Catch::Contains("unplugged"));
   bench.pass(1s);
   bench.open();
   bench.steps(10);

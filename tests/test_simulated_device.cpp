@@ -216,7 +216,7 @@ TEST_CASE("the same run gives the same bits, however time is cut") {
     for (Duration t = 5ms; t <= 3s; t += 5ms) {
       while (simulation.now() + cut < TimePoint{} + t) simulation.advance_to(simulation.now() + cut, host);
       simulation.advance_to(TimePoint{} + t, host);
-      simulation.take_command(command(++sequence, kPush));
+      simulation.take_command(simulation.now(), command(++sequence, kPush));
     }
     return host.bytes;
   };
@@ -259,7 +259,7 @@ TEST_CASE("a free body gains the speed that its mass and friction allow") {
   Listener host;
   simulation.advance_to({}, host);
   for (std::uint32_t i = 1; i <= 100; ++i) {
-    simulation.take_command(command(i, {{1.0, 0.0, 0.0}, {0.0, 0.002, 0.0}}));
+    simulation.take_command(simulation.now(), command(i, {{1.0, 0.0, 0.0}, {0.0, 0.002, 0.0}}));
     simulation.advance_to(TimePoint{} + i * 1ms, host);
   }
   //   v(t) = F/b (1 - exp(-b t/m))
@@ -279,7 +279,7 @@ TEST_CASE("Coulomb friction holds what is weaker and takes its part of what is s
   std::uint32_t sequence = 0;
   const auto push_for_100_ms = [&](double force_N) {
     for (int i = 0; i < 100; ++i) {
-      simulation.take_command(command(++sequence, {{force_N, 0, 0}, {0, 0, 0}}));
+      simulation.take_command(simulation.now(), command(++sequence, {{force_N, 0, 0}, {0, 0, 0}}));
       simulation.advance_to(simulation.now() + 1ms, host);
     }
     return simulation.V_BH().linear_m_per_s.x();
@@ -378,7 +378,7 @@ TEST_CASE("the watchdog frees the hand within the hold time of the last command"
     SimulatedDevice simulation(profile, s);
     Listener host;
     simulation.advance_to({}, host);
-    simulation.take_command(command(1, kPush, hold_s));
+    simulation.take_command(simulation.now(), command(1, kPush, hold_s));
     const double expected_s = hold_s == 0.0 ? profile.watchdog_s : std::min(hold_s, 0.032);
     const TimePoint end = TimePoint{} + from_seconds(expected_s);
     CAPTURE(hold_s);
@@ -438,17 +438,17 @@ TEST_CASE("the firmware refuses what is not a new and whole command") {
   SimulatedDevice simulation(reference_profile(), still_hand());
   Listener host;
   simulation.advance_to({}, host);
-  CHECK(simulation.take_command(command(65'535, kPush)));
-  CHECK(simulation.take_command(command(0, kPush)));             // the sequence wraps
-  CHECK_FALSE(simulation.take_command(command(0, kPush)));       // repeated
-  CHECK_FALSE(simulation.take_command(command(65'535, kPush)));  // backward
+  CHECK(simulation.take_command(simulation.now(), command(65'535, kPush)));
+  CHECK(simulation.take_command(simulation.now(), command(0, kPush)));             // the sequence wraps
+  CHECK_FALSE(simulation.take_command(simulation.now(), command(0, kPush)));       // repeated
+  CHECK_FALSE(simulation.take_command(simulation.now(), command(65'535, kPush)));  // backward
   auto bad = command(1, kPush);
   bad[5] ^= 1;
-  CHECK_FALSE(simulation.take_command(bad));
+  CHECK_FALSE(simulation.take_command(simulation.now(), bad));
   bad = command(1, kPush);
   bad.pop_back();
-  CHECK_FALSE(simulation.take_command(bad));
-  CHECK_FALSE(simulation.take_command({}));
+  CHECK_FALSE(simulation.take_command(simulation.now(), bad));
+  CHECK_FALSE(simulation.take_command(simulation.now(), {}));
   CHECK(simulation.firmware().commands_rejected() == 5);
 }
 
@@ -456,13 +456,13 @@ TEST_CASE("a host that repeats itself does not feed the watchdog, one that start
   SimulatedDevice simulation(reference_profile(), still_hand());
   Listener host;
   simulation.advance_to({}, host);
-  simulation.take_command(command(500, kPush));
+  simulation.take_command(simulation.now(), command(500, kPush));
   for (int i = 0; i < 100; ++i) {
     simulation.advance_to(simulation.now() + 1ms, host);
-    CHECK_FALSE(simulation.take_command(command(500, kPush)));
+    CHECK_FALSE(simulation.take_command(simulation.now(), command(500, kPush)));
   }
   CHECK(simulation.firmware().watchdog_tripped());
-  CHECK(simulation.take_command(command(1, kPush)));
+  CHECK(simulation.take_command(simulation.now(), command(1, kPush)));
   CHECK(simulation.firmware().motors_on());
 }
 
