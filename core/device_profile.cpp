@@ -31,6 +31,23 @@ DofMask driven_dofs(const DeviceProfile& profile) noexcept {
   return dofs;
 }
 
+DofMask components(const Wrench& F) noexcept {
+  unsigned dofs = 0;
+  for (unsigned i = 0; i < 3; ++i) {
+    if (F.force_N[i] != 0.0) dofs |= 1u << i;
+    if (F.torque_Nm[i] != 0.0) dofs |= 8u << i;
+  }
+  return static_cast<DofMask>(dofs);
+}
+
+Wrench along(Wrench F, DofMask dofs) noexcept {
+  for (unsigned i = 0; i < 3; ++i) {
+    if ((dofs >> i & 1u) == 0) F.force_N[i] = 0.0;
+    if ((dofs >> i & 8u) == 0) F.torque_Nm[i] = 0.0;
+  }
+  return F;
+}
+
 const char* text(Transport transport) noexcept {
   switch (transport) {
     case Transport::loopback:

@@ -300,6 +300,12 @@ DofMask sensed_dofs(const DeviceProfile& profile) noexcept;
 /// The degrees of freedom its motors can push along. A wrench along the others is dropped, and told.
 DofMask driven_dofs(const DeviceProfile& profile) noexcept;
 
+/// The components of a wrench that are not 0. RT safe.
+DofMask components(const Wrench& F) noexcept;
+
+/// The wrench without its components along other degrees of freedom. RT safe.
+Wrench along(Wrench F, DofMask dofs) noexcept;
+
 /// "loopback", "hidraw", "libusb"
 const char* text(Transport transport) noexcept;
 

@@ -38,7 +38,7 @@ struct Limited {
 /// Whatever came before, legal or not, what goes out is finite and within the magnitudes.
 class WrenchLimits {
  public:
-  /// The tighter of the two applies. Both maxima must be finite and positive.
+  /// The tighter of the two applies. Both maxima must be finite; 0: the device has no motors for it.
   WrenchLimits(const LimitSettings& settings, double profile_max_force_N, double profile_max_torque_Nm);
 
   /// authority: 0 to 1, scales what is asked for. dt_s: time since the last call. RT safe.

@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "core/device_profile.hpp"
 #include "core/engagement.hpp"
 #include "core/fault.hpp"
 #include "daemon/placer.hpp"
@@ -42,12 +43,13 @@ std::string state(const TickRecord& r) {
 }  // namespace
 
 std::string live_line(const TickRecord& r, const LoopTiming& timing) {
+  const std::string dropped = r.dropped == 0 ? "" : " (no motor: " + dof_text(r.dropped) + ")";
   return fmt::format(
       "{:7.2f} s {:<8} | tool {:+6.1f} {:+6.1f} {:+6.1f} mm {:4.1f} deg | {} contacts | "
-      "F {:+5.2f} {:+5.2f} {:+5.2f} N | T {:+6.1f} {:+6.1f} {:+6.1f} mN.m | tick {} us",
+      "F {:+5.2f} {:+5.2f} {:+5.2f} N | T {:+6.1f} {:+6.1f} {:+6.1f} mN.m{} | tick {} us",
       r.device_time_s, state(r), 1e3 * r.X_WP[0], 1e3 * r.X_WP[1], 1e3 * r.X_WP[2],
       angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts, r.F_out[0], r.F_out[1], r.F_out[2],
-      1e3 * r.F_out[3], 1e3 * r.F_out[4], 1e3 * r.F_out[5], times(timing.tick));
+      1e3 * r.F_out[3], 1e3 * r.F_out[4], 1e3 * r.F_out[5], dropped, times(timing.tick));
 }
 
 void look(RunTotals& totals, const TickRecord& r) {

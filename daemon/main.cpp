@@ -24,6 +24,7 @@
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
 #include "devices/plugged_link.hpp"
+#include "devices/simulated_link.hpp"
 
 // Arguments -> plan -> station -> device -> run -> exit code. A device that is unplugged leads back to the
 // device; every other fault out.
@@ -270,11 +271,11 @@ Fault run_simulated(Plan plan, const Options& options) {
   };
   if (options.virtual_time) {
     VirtualClock clock;
-    const auto link = make_simulated_link(plan, clock);
+    const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
     return run(std::move(plan), options, *link, clock, run_it(clock, run_in_virtual_time));
   }
   WallClock clock;
-  const auto link = make_simulated_link(plan, clock);
+  const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
   log_grants(lock_memory(plan.settings.servo.realtime));
   return run(std::move(plan), options, *link, clock, run_it(clock, run_in_wall_time));
 }

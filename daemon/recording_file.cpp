@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kTable = "/ticks";
 /// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
 /// is not the placer's; 2: `placing` and `start_over`.
-constexpr const char* kFormat = "2";
+constexpr const char* kFormat = "3";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;
@@ -81,6 +81,7 @@ constexpr std::array kColumns = {
     WRENCHD_COLUMN(placing, "enum", u8, 1),
     WRENCHD_COLUMN(engagement, "enum", u8, 1),
     WRENCHD_COLUMN(limit_causes, "bits", u8, 1),
+    WRENCHD_COLUMN(dropped, "bits", u8, 1),
     WRENCHD_COLUMN(fault, "enum", u8, 1),
     WRENCHD_COLUMN(released, "bool", u8, 1),
     WRENCHD_COLUMN(authority, "1", f64, 1),

@@ -87,7 +87,7 @@ std::optional<Difference> compare(std::uint64_t tick, const char* field, std::sp
 
 std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
   const auto whole = [](const TickRecord& r) {
-    return std::array<double, 10>{r.energy,
+    return std::array<double, 11>{r.energy,
                                   r.authority,
                                   static_cast<double>(r.contacts),
                                   static_cast<double>(r.iterations),
@@ -95,6 +95,7 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
                                   static_cast<double>(r.placing),
                                   static_cast<double>(r.engagement),
                                   static_cast<double>(r.limit_causes),
+                                  static_cast<double>(r.dropped),
                                   static_cast<double>(r.fault),
                                   static_cast<double>(r.released)};
   };
@@ -103,10 +104,10 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
   if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
-  return compare(
-      then.tick,
-      "energy, authority, contacts, iterations, status, placing, engagement, causes, fault, released",
-      whole(then), whole(now));
+  return compare(then.tick,
+                 "energy, authority, contacts, iterations, status, placing, engagement, causes, dropped, "
+                 "fault, released",
+                 whole(then), whole(now));
 }
 
 }  // namespace

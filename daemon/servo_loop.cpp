@@ -52,6 +52,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       X_WB_(pose_of(settings.device.base_in_world)),
       X_HT_(pose_of(settings.device.tool_in_handle) * scene.tool().X_MT()),
       wrench_point_(profile.wrench_point),
+      driven_(driven_dofs(profile)),
       pacing_(settings.servo.pacing),
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
       late_limit_(from_seconds(settings.servo.late_limit_s)),
@@ -180,7 +181,8 @@ void ServoLoop::lose_place() noexcept {
   penetration_.forget();
   depth_ = Penetration{};
   depth_.projection.status = ProjectionStatus::infeasible;
-  F_T_ = F_out_ = Wrench{};
+  F_T_ = F_out_ = F_weight_ = Wrench{};
+  dropped_ = kNoDof;
   law_.reset();
   limits_.reset();
   soft_start_.interrupt();
@@ -219,7 +221,8 @@ void ServoLoop::place() noexcept {
 }
 
 /// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,
-/// which knows when the poses were taken. Without a q there is no contact.
+/// which knows when the poses were taken. Without a q there is no contact. What the device has no motors for
+/// is dropped here, and told.
 void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const double dt_s = sampled_ ? sample.device_time_s - sample_time_s_ : 0.0;
   sample_time_s_ = sample.device_time_s;
@@ -229,8 +232,10 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
              ? law_.update(depth_.drive, in_contact, dt_s)
              : law_.update_damping(energy_wrench(M_, energy_stiffness_per_s2_, X_WP_, X_WQ_), depth_.drive,
                                    in_contact, dt_s);
-  F_out_ = outgoing(X_WB_ * sample.X_BH);
-  F_weight_ = gravity_.wrench(sample.X_BH);
+  const Wrench F = outgoing(X_WB_ * sample.X_BH), F_weight = gravity_.wrench(sample.X_BH);
+  dropped_ = static_cast<DofMask>(components(F + F_weight) & ~driven_);
+  F_out_ = along(F, driven_);
+  F_weight_ = along(F_weight, driven_);
 }
 
 /// About the handle point in the axes of the device base, or the paper's spatial wrench W_S: as the profile
@@ -253,8 +258,8 @@ Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
 bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
   return has_place() && !stale_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
          sample.V_BH.angular_rad_per_s.norm() < kCalmAngularSpeed_rad_per_s &&
-         F_out_.force_N.norm() < kCalmShareOfLimit * limits_.max_force_N() &&
-         F_out_.torque_Nm.norm() < kCalmShareOfLimit * limits_.max_torque_Nm();
+         F_out_.force_N.norm() <= kCalmShareOfLimit * limits_.max_force_N() &&
+         F_out_.torque_Nm.norm() <= kCalmShareOfLimit * limits_.max_torque_Nm();
 }
 
 /// The tick's record goes to whoever looks, its times into the histograms, its news to the log.
@@ -285,6 +290,7 @@ void ServoLoop::describe(const Limited& out) noexcept {
   record_.placing = static_cast<std::uint8_t>(placing_);
   record_.engagement = static_cast<std::uint8_t>(soft_start_.state());
   record_.limit_causes = out.causes;
+  record_.dropped = dropped_;
   record_.F_out = numbers(out.F.force_N, out.F.torque_Nm);
 }
 

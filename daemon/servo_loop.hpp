@@ -100,6 +100,7 @@ class ServoLoop {
   Pose X_WB_;
   Pose X_HT_;
   WrenchPoint wrench_point_;
+  DofMask driven_;
   Pacing pacing_;
   Duration period_;
   Duration late_limit_;
@@ -121,6 +122,7 @@ class ServoLoop {
   Wrench F_T_;                  ///< of the law chosen, body frame
   Wrench F_out_;                ///< the same as the device wants it, before limits
   Wrench F_weight_;             ///< that holds the handle's weight, likewise
+  DofMask dropped_ = kNoDof;    ///< what of them the device has no motors for; it is not in them
   std::uint32_t question_ = 0;  ///< number of the last one to the placer
   bool asked_ = false;          ///< and it is not answered yet
   TimePoint ask_again_{};       ///< not before then

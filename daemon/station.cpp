@@ -10,8 +10,6 @@
 #include "config/load_settings.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/version.hpp"
-#include "devices/loopback_link.hpp"
-#include "devices/simulated_device.hpp"
 
 namespace wrenchd {
 namespace {
@@ -37,27 +35,6 @@ std::unique_ptr<Placer> make_placer(const Scene& scene, PlaceIn place_in) {
   return std::make_unique<PlacerThread>(scene);
 }
 
-/// The simulated device with the wire to it.
-class SimulatedWire final : public ReportLink {
- public:
-  SimulatedWire(const Plan& plan, Clock& clock)
-      : device_(plan.profile, plan.settings.simulation), link_(device_, clock, plan.settings.simulation) {}
-
-  void open() override { link_.open(); }
-  LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
-    return link_.read(now, buffer);
-  }
-  LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override {
-    return link_.write(now, report);
-  }
-  void wait_readable(TimePoint deadline) noexcept override { link_.wait_readable(deadline); }
-  void close() noexcept override { link_.close(); }
-
- private:
-  SimulatedDevice device_;
-  LoopbackLink link_;
-};
-
 }  // namespace
 
 Plan read_plan(const PlanFiles& files, const SearchPath& search) {
@@ -76,10 +53,6 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
       files.simulate || (!plan.profile.name.empty() && plan.profile.transport == Transport::loopback);
   plan.scene = load_scene(plan.settings.scene);
   return plan;
-}
-
-std::unique_ptr<ReportLink> make_simulated_link(const Plan& plan, Clock& clock) {
-  return std::make_unique<SimulatedWire>(plan, clock);
 }
 
 std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {

@@ -47,10 +47,6 @@ enum class PlaceIn : std::uint8_t {
   step,    ///< in the tick: virtual time, every run the same
 };
 
-/// The wire to a simulated device that speaks as the plan's profile says. The clock must outlive it. Throws
-/// std::runtime_error where the profile cannot be simulated.
-std::unique_ptr<ReportLink> make_simulated_link(const Plan& plan, Clock& clock);
-
 /// The link to the plugged-in device that the plan wants, not opened.
 std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan);
 

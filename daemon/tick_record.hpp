@@ -47,6 +47,7 @@ struct TickRecord {
   // What went out
   std::uint8_t engagement = 0;    ///< Engagement
   std::uint8_t limit_causes = 0;  ///< LimitCause bits
+  std::uint8_t dropped = 0;       ///< components of the wrench that the device has no motors for, as DofMask
   std::uint8_t fault = 0;         ///< Fault
   std::uint8_t released = 0;      ///< 1: the hand was released in this record; F_out is zero
   double authority = 0.0;

@@ -80,16 +80,6 @@ bool carries_pose(const PoseReportLayout& layout) noexcept {
   return layout.position.present || layout.orientation.present || layout.joints.present;
 }
 
-/// Components of a wrench that are not zero.
-DofMask components(const Wrench& F) noexcept {
-  unsigned dofs = 0;
-  for (unsigned i = 0; i < 3; ++i) {
-    if (F.force_N[i] != 0.0) dofs |= 1u << i;
-    if (F.torque_Nm[i] != 0.0) dofs |= 8u << i;
-  }
-  return static_cast<DofMask>(dofs);
-}
-
 }  // namespace
 
 ProfileDevice::ProfileDevice(DeviceProfile profile, ReportLink& link)

@@ -37,7 +37,7 @@ struct Obedient {
             [this] { return (polhem.X_BH.translation_m - polhem.target.translation_m).norm() < 1e-9; },
             [this] {
               polhem.live();
-              if (unplugs && heard.size() == 3) polhem.link.unplug();
+              if (unplugs && heard.size() == 3) polhem.unplug();
               return --ms_left <= 0;
             }};
   }

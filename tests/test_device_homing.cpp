@@ -98,7 +98,8 @@ TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
   for (int i = 0; i < 10; ++i) homing.step(polhem.clock.now());
   CHECK_FALSE(homing.lost());
-  polhem.link.unplug();
+  polhem.unplug();
+  polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
   homing.step(polhem.clock.now());
   CHECK(homing.lost());
 }

@@ -24,7 +24,7 @@ TickRecord random_record(RandomValues& random) {
   any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged), any(r.skipped);
   any(r.missing), any(r.rejected), any(r.buttons), any(r.fresh), any(r.motors_on), any(r.watchdog_tripped);
   any(r.arm_command), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.engagement);
-  any(r.limit_causes), any(r.fault), any(r.released), any(r.start_over), any(r.placing);
+  any(r.limit_causes), any(r.dropped), any(r.fault), any(r.released), any(r.start_over), any(r.placing);
   any(r.wake_latency_ns);
   for (auto& ns : r.stage_ns) any(ns);
   for (auto* list : {&r.X_BH, &r.X_WP, &r.X_WQ})

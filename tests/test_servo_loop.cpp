@@ -10,6 +10,7 @@
 #include "config/load_scene.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/event_log.hpp"
+#include "daemon/live_line.hpp"
 #include "daemon/wall_clock.hpp"
 #include "tests/support/buried.hpp"
 
@@ -122,6 +123,29 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
     ++compared;
   }
   CHECK(compared > 1000);
+}
+
+TEST_CASE("a device that cannot turn the hand is armed and pushes, and the torque is dropped and told",
+          "[servo]") {
+  Plan plan = shipped_plan();
+  plan.profile.max_torque_Nm = 0.0;
+  plan.profile.wrench_report.torque = {};
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  REQUIRE(s.engagement() == Engagement::active);
+  CHECK(s.force_N() > 0.5);
+  bool told = false;
+  for (int i = 0; i < 3000; ++i) {  // it rocks
+    REQUIRE(s.tick() == Fault::none);
+    CHECK(s.torque_Nm() == 0.0);
+    CHECK((s.last.limit_causes & kTorqueMagnitude) == 0);
+    CHECK((s.last.dropped & ~kAngularDofs) == 0);
+    told = told ||
+           (s.last.dropped == kAngularDofs &&
+            live_line(s.last, s.station.loop().timing()).find("(no motor: rx ry rz)") != std::string::npos);
+  }
+  CHECK(told);
 }
 
 TEST_CASE("armed, the motors hold the weight of the handle, however the base stands", "[servo]") {

@@ -7,9 +7,9 @@
 
 #include "config/load_profile.hpp"
 #include "devices/calibrated_profile.hpp"
-#include "devices/emulated_link.hpp"
 #include "devices/emulated_polhem.hpp"
 #include "devices/homing.hpp"
+#include "devices/loopback_link.hpp"
 #include "devices/profile_device.hpp"
 
 namespace wrenchd::test {
@@ -25,7 +25,7 @@ struct PolhemInHand {
   VirtualClock clock;
   DeviceProfile profile = polhem_profile();
   EmulatedPolhem board{64};
-  EmulatedLink link{board, clock};
+  LoopbackLink link{board, clock};
   ProfileDevice device{profile, link};
   Pose X_BH;    ///< where the handle truly is
   Pose target;  ///< where the person moves it
@@ -37,6 +37,11 @@ struct PolhemInHand {
     X_BH = target = homing_plan(profile).X_BR * X_home_start;
     at_power_on = counts();
     turn();
+  }
+
+  /// For good, from now on.
+  void unplug() {
+    board.inject({SimulatedFault::Kind::unplug, clock.now() - TimePoint{}, std::chrono::hours(1)});
   }
 
   JointCounts counts() const {

@@ -51,7 +51,7 @@ class LiveHandle : ReportSink {
       device_.advance_to(std::chrono::steady_clock::now(), *this);
       send();
       while (mock_.anything_received()) {
-        device_.take_command(mock_.receive(32));
+        device_.take_command(std::chrono::steady_clock::now(), mock_.receive(32));
         ++commands_;
       }
       if (device_.firmware().motors_on()) pushed_.store(true);
