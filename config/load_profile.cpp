@@ -98,6 +98,11 @@ void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
   table.mandatory("in").integer(endpoints.in, {0x81, 0x8f});
   table.mandatory("out").integer(endpoints.out, {0x01, 0x0f});
   table.optional("prefix_bytes").integer(endpoints.prefix_bytes, {0, 8});
+  table.optional("serial_chip").choice(endpoints.serial_chip, {{"none", false}, {"ftdi", true}});
+  const TomlValue firmware = table.optional("firmware");
+  firmware.text(endpoints.firmware);
+  if (firmware && !endpoints.serial_chip)
+    firmware.refuse("is loaded through a serial chip; state serial_chip = \"ftdi\", or leave it out");
 }
 
 // --- frames -----------------------------------------------------------------------------------------------

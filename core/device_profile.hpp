@@ -226,7 +226,9 @@ struct UsbEndpoints {
   std::uint8_t in = 0x81;
   std::uint8_t out = 0x01;
   std::size_t prefix_bytes =
-      0;  ///< at the start of each packet in, not part of the report: FTDI modem status
+      0;                     ///< at the start of each packet in, not part of the report: FTDI modem status
+  bool serial_chip = false;  ///< an FTDI serial chip with a Falcon behind it: reports are a stream of bytes
+  std::string firmware;      ///< file that is loaded into it where it runs none; empty: none is known
 };
 
 /// Degrees of freedom as bits: 0 to 2 along x, y, z; 3 to 5 about them.

@@ -57,7 +57,7 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
 
 std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
   const ServoSettings& servo = plan.settings.servo;
-  LinkSettings settings;
+  LinkSettings settings = link_settings(plan.profile);
   settings.write_deadline = from_seconds(plan.profile.stale_fault_s);
   settings.priority = servo.realtime == Realtime::off ? 0 : servo.priority;
   return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, settings);

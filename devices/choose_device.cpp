@@ -27,13 +27,6 @@ std::string why_not_by_device(const UsbDevice& device, const WantedDevice& wante
   return {};
 }
 
-std::string why_not_by_interface(const UsbDevice& device, const DeviceProfile& profile) {
-  const auto interface = static_cast<int>(profile.endpoints.interface);
-  if (profile.transport != Transport::libusb || device.interface == interface) return {};
-  return "the profile " + profile.name + " speaks to its interface " + std::to_string(interface) +
-         ", this is interface " + std::to_string(device.interface);
-}
-
 std::string why_not_by_descriptor(const PluggedFacts& facts, const DeviceProfile& profile) {
   if (!facts.unreadable.empty())
     return "its report descriptor is refused, so the profile " + profile.name +
@@ -58,8 +51,7 @@ Candidate look_at(const UsbDevice& device, std::span<const DeviceProfile> profil
     return {{}, "no profile is for it; wrenchctl devices tells why of each"};
   }
   const DeviceProfile& profile = profiles[*match.profile];
-  std::string why = why_not_by_interface(device, profile);
-  if (why.empty()) why = why_not_by_device(device, wanted);
+  std::string why = why_not_by_device(device, wanted);
   if (why.empty()) why = why_not_by_descriptor(facts, profile);
   return {match.profile, why};
 }

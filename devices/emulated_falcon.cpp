@@ -49,6 +49,13 @@ void EmulatedFalcon::control(std::uint8_t request, std::uint16_t value) {
 }
 
 void EmulatedFalcon::write(std::span<const std::uint8_t> bytes) {
+  if (state_ == State::running) {
+    if (!take_command({}, bytes)) return;
+    const std::array<std::uint8_t, kPacket> answer = packet();
+    answer_.assign(answer.begin(), answer.end());
+    reply_due_ = false;
+    return;
+  }
   if (state_ == State::loading && spoilt_ > 0) {
     --spoilt_;
     answer_.assign(bytes.begin(), bytes.end());
@@ -132,8 +139,7 @@ void EmulatedFalcon::advance_to(TimePoint t, ReportSink& host) noexcept {
     if (reply_due_) send(host);
 }
 
-void EmulatedFalcon::send(ReportSink& host) noexcept {
-  reply_due_ = false;
+std::array<std::uint8_t, 16> EmulatedFalcon::packet() const noexcept {
   std::array<std::uint8_t, kPacket> packet;
   packet.fill(kNibble);
   packet.front() = kBegin;
@@ -141,9 +147,15 @@ void EmulatedFalcon::send(ReportSink& host) noexcept {
   for (std::size_t i = 0; i < 3; ++i)
     put_word(std::span(packet).subspan(1 + 4 * i, 4), turned_[i] - (homed_ ? 0 : began_at_[i]));
   packet[13] = static_cast<std::uint8_t>(kNibble + buttons_ + (homed_ ? 0x70u : 0u));
+  return packet;
+}
+
+void EmulatedFalcon::send(ReportSink& host) noexcept {
+  reply_due_ = false;
   const bool cut = short_ > 0;
   if (cut) --short_;
-  host.take_report(next_frame_, std::span(packet).first(cut ? kShortPacket : kPacket));
+  const std::array<std::uint8_t, kPacket> whole = packet();
+  host.take_report(next_frame_, std::span(whole).first(cut ? kShortPacket : kPacket));
 }
 
 }  // namespace wrenchd

@@ -61,6 +61,7 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
 
  private:
   void take_serial(std::uint8_t byte);
+  std::array<std::uint8_t, 16> packet() const noexcept;
   void send(ReportSink& host) noexcept;
 
   State state_ = State::off;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -89,6 +91,31 @@ void falcon_start(SerialChip& chip, std::span<const std::uint8_t> firmware, int 
   }
   throw std::runtime_error("Falcon: the firmware could not be loaded in " + std::to_string(tries) +
                            " tries: " + problem + "; unplug its power and the cable, and try again");
+}
+
+bool falcon_answers(SerialChip& chip) {
+  // Zeros, with homing mode on: without it a Falcon forgets where it is.
+  constexpr std::array<std::uint8_t, 16> kZeros = {'<', 'A', 'A', 'A', 'A', 'A', 'A', 'A',
+                                                   'A', 'A', 'A', 'A', 'A', 'B', 'A', '>'};
+  falcon_resume(chip);
+  chip.write(kZeros);
+  const auto answer = read_all(chip, kZeros.size());
+  return answer.size() == kZeros.size() && answer.front() == '<' && answer.back() == '>';
+}
+
+void falcon_open(SerialChip& chip, const std::string& firmware_file) {
+  if (falcon_answers(chip)) return;
+  if (firmware_file.empty())
+    throw std::runtime_error(
+        "Falcon: it runs no firmware, and none is named; write a profile that inherits falcon, with the file "
+        "of "
+        "the maker's SDK as firmware in [endpoints]");
+  std::ifstream file(firmware_file, std::ios::binary);
+  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file || bytes.empty())
+    throw std::runtime_error("Falcon: cannot read the firmware " + firmware_file +
+                             "; name the file of the maker's SDK");
+  falcon_start(chip, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace wrenchd

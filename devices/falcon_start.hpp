@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace wrenchd {
@@ -30,6 +31,14 @@ void falcon_start(SerialChip& chip, std::span<const std::uint8_t> firmware, int 
 
 /// Only the speed: for a Falcon whose firmware is loaded already.
 void falcon_resume(SerialChip& chip);
+
+/// Whether a firmware runs and answers: a packet of zeros brings one back. Motors stay at zero.
+bool falcon_answers(SerialChip& chip);
+
+/// Brings a Falcon to where it exchanges packets, whatever state it is in: one that answers at the firmware's
+/// speed is left as it is, any other is started with the firmware in that file. Throws std::runtime_error,
+/// also where a firmware is needed and no file is named.
+void falcon_open(SerialChip& chip, const std::string& firmware_file);
 
 // What the FTDI chip is asked for, and with which values. For it and for what stands in for it.
 inline constexpr std::uint8_t kFtdiReset = 0;

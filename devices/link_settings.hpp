@@ -3,8 +3,13 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 
 #include "core/clock.hpp"
+#include "core/device_profile.hpp"
+#include "devices/falcon_start.hpp"
+#include "devices/stream_framer.hpp"
 
 namespace wrenchd {
 
@@ -20,6 +25,21 @@ struct LinkSettings {
   int priority = 0;
   /// Bytes of the longest input report, where it is longer than one packet. Only libusb must know it.
   std::size_t longest_report = 0;
+
+  // What follows only libusb must know.
+
+  /// Endpoints; 0: the first of the interface.
+  std::uint8_t in = 0, out = 0;
+  /// At the start of each packet in, not part of a report: a serial chip's modem status.
+  std::size_t prefix_bytes = 0;
+  /// Where the device is a serial chip: what is done with it when it is opened, before reports flow. It may
+  /// wait and throw.
+  std::function<void(SerialChip&)> start_serial = {};
+  /// How reports are found in what a serial chip sends.
+  StreamFramer::Frame frame = {};
 };
+
+/// What the profile says of a link; the rest as above. Not RT safe.
+LinkSettings link_settings(const DeviceProfile& profile);
 
 }  // namespace wrenchd

@@ -58,6 +58,10 @@ std::string why_not(const PluggedDevice& device, const DeviceProfile& profile, s
   if (!match.serial.empty() && match.serial != device.serial)
     return "it is for serial number " + match.serial + ", not " +
            (device.serial.empty() ? "a device without one" : device.serial);
+  if (profile.transport == Transport::libusb && device.interface &&
+      *device.interface != profile.endpoints.interface)
+    return "it speaks over interface " + std::to_string(profile.endpoints.interface) +
+           " of the device, this is " + std::to_string(*device.interface);
   std::string why = why_not_by_usage("the usage page", match.usage_page, device.usage_page);
   if (why.empty()) why = why_not_by_usage("the usage", match.usage, device.usage);
   if (!why.empty()) return why;

@@ -25,6 +25,7 @@ struct PluggedDevice {
   std::string product;  ///< as it calls itself; for people only
   std::optional<std::uint16_t> usage_page;
   std::optional<std::uint16_t> usage;
+  std::optional<unsigned> interface;   ///< of the device, which this is; where it is known
   std::vector<ReportFact> in_reports;  ///< empty: the descriptor has not been read
 };
 

@@ -8,6 +8,7 @@ PluggedFacts plugged_facts(const UsbDevice& device) {
   facts.device.id = {device.vendor, device.product};
   facts.device.serial = device.serial;
   facts.device.product = device.product_name;
+  if (device.interface >= 0) facts.device.interface = static_cast<unsigned>(device.interface);
   if (device.report_descriptor.empty()) return facts;
   facts.device.usage_page = device.usage_page;
   facts.device.usage = device.usage;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/plugged_link.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "devices/hidraw_link.hpp"
@@ -10,9 +9,9 @@
 namespace wrenchd {
 
 PluggedLink::PluggedLink(DeviceProfile profile, std::string serial, LinkSettings settings)
-    : profile_(std::move(profile)), wanted_{profile_.name, std::move(serial), {}}, settings_(settings) {
-  settings_.longest_report = std::max(settings_.longest_report, longest_report(profile_));
-}
+    : profile_(std::move(profile)),
+      wanted_{profile_.name, std::move(serial), {}},
+      settings_(std::move(settings)) {}
 
 void PluggedLink::open() {
   close();
@@ -48,12 +47,6 @@ void PluggedLink::wait_readable(TimePoint deadline) noexcept {
 
 void PluggedLink::close() noexcept {
   link_.reset();
-}
-
-std::size_t longest_report(const DeviceProfile& profile) noexcept {
-  std::size_t longest = profile.pose_report.length;
-  for (const PoseReportLayout& report : profile.more_reports) longest = std::max(longest, report.length);
-  return longest + profile.endpoints.prefix_bytes;
 }
 
 std::vector<std::string> seen_instead(std::span<const UsbDevice> plugged, const DeviceChoice& choice) {

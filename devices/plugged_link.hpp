@@ -30,8 +30,9 @@ class DeviceNotFound : public std::runtime_error {
 /// serial number, interface and report descriptor, and no other is ever written to.
 class PluggedLink final : public ReportLink {
  public:
-  /// serial: empty for any. The profile has to be one for a device: not transport loopback.
-  PluggedLink(DeviceProfile profile, std::string serial, LinkSettings settings = {});
+  /// serial: empty for any. The profile has to be one for a device: not transport loopback. settings: those
+  /// of link_settings(), and what the caller wants else.
+  PluggedLink(DeviceProfile profile, std::string serial, LinkSettings settings);
 
   /// Throws DeviceNotFound where it is not plugged in, and as HidrawLink and UsbLink do where it cannot be
   /// opened.
@@ -50,9 +51,6 @@ class PluggedLink final : public ReportLink {
   LinkSettings settings_;
   std::unique_ptr<ReportLink> link_;  ///< none while closed
 };
-
-/// Bytes of the longest report that a device of this profile sends, prefix included.
-std::size_t longest_report(const DeviceProfile& profile) noexcept;
 
 /// What is plugged in, a line each: the device, and why it was not picked. The one that was has none.
 std::vector<std::string> seen_instead(std::span<const UsbDevice> plugged, const DeviceChoice& choice);

@@ -55,6 +55,9 @@ const PoseReportLayout& checked(const DeviceProfile& profile) {
 SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationSettings& settings)
     : pose_layout_(checked(profile)),
       wrench_point_(profile.wrench_point),
+      X_BD_(profile.X_BD),
+      X_HE_(inverse(profile.X_EH)),
+      same_frames_(same_bits(profile.X_BD, {}) && same_bits(profile.X_EH, {})),
       substeps_per_sample_(substeps_per_sample(profile)),
       substeps_per_report_(kSamplesPerReport * substeps_per_sample_),
       substep_(substep_of(profile)),
@@ -94,13 +97,23 @@ void SimulatedDevice::substep(ReportSink& host) noexcept {
 
 /// What the firmware tells the motors, about the handle point.
 Wrench SimulatedDevice::motor_demand() noexcept {
-  const Wrench F = firmware_.motors(now_);
-  return wrench_point_ == WrenchPoint::handle ? F : shifted(F, handle_.X_BH().translation_m);
+  Wrench F = firmware_.motors(now_);
+  const Pose& X_BH = handle_.X_BH();
+  if (!same_frames_) F = shifted(expressed(X_BD_.rotation, F), -(X_BH.rotation * X_HE_.translation_m));
+  return wrench_point_ == WrenchPoint::handle ? F : shifted(F, X_BH.translation_m);
+}
+
+/// From the handle in the base to the device's end in its own axes.
+void SimulatedDevice::into_own_frames(PoseReport& report) const noexcept {
+  const Twist V_BE = shifted(report.V_BH, report.X_BH.rotation * X_HE_.translation_m);
+  report.V_BH = expressed(X_BD_.rotation.conjugate(), V_BE);
+  report.X_BH = inverse(X_BD_) * report.X_BH * X_HE_;
 }
 
 void SimulatedDevice::send_report(ReportSink& host) noexcept {
   using Kind = SimulatedFault::Kind;
   PoseReport report = firmware_.report(now_ - power_on_);
+  if (!same_frames_) into_own_frames(report);
   if (shows(Kind::teleport, now_, now_)) report.X_BH.translation_m.x() += kTeleport_m;
   if (shows(Kind::bad_quaternion, now_, now_)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
   std::array<std::uint8_t, kMaxReportBytes> bytes;

@@ -17,8 +17,9 @@ namespace wrenchd {
 
 /// The far side of a transport: a handle in a hand, motors, encoders and firmware. A pure function of
 /// profile, settings, faults and the commands with their times: the same in, the same bits out, however the
-/// time in between was cut into calls. It starts at rest at the first waypoint of the hand path. Where the
-/// profile's wrench point is the world origin, the simulated device stands in it.
+/// time in between was cut into calls. Where the profile has [frames], it says where its own end is in its
+/// own axes, and takes wrenches about that in those. It starts at rest at the first waypoint of the hand
+/// path. Where the profile's wrench point is the world origin, the simulated device stands in it.
 class SimulatedDevice final : public HeldDevice {
  public:
   /// How far advance_to() catches up in one call, see there.
@@ -50,9 +51,12 @@ class SimulatedDevice final : public HeldDevice {
   void substep(ReportSink& host) noexcept;
   void send_report(ReportSink& host) noexcept;
   Wrench motor_demand() noexcept;
+  void into_own_frames(PoseReport& report) const noexcept;
 
   PoseReportLayout pose_layout_;
   WrenchPoint wrench_point_;
+  Pose X_BD_, X_HE_;
+  bool same_frames_;                   ///< D is B and E is H
   std::uint64_t substeps_per_sample_;  ///< of the encoders
   std::uint64_t substeps_per_report_;
   Duration substep_;

@@ -16,6 +16,7 @@
 #include <libusb-1.0/libusb.h>
 #include <poll.h>
 
+#include "devices/ftdi_serial.hpp"
 #include "devices/latest_writer.hpp"
 #include "devices/packet_queue.hpp"
 #include "devices/wake_up.hpp"
@@ -64,13 +65,15 @@ struct Endpoint {
   std::size_t packet_bytes = 0;
 };
 
-/// The first interrupt endpoint of that direction, else the first bulk one.
-std::optional<Endpoint> find_endpoint(const libusb_interface_descriptor& setting, std::uint8_t direction) {
+/// The first interrupt endpoint of that direction, else the first bulk one. `address`: only that one; 0: any.
+std::optional<Endpoint> find_endpoint(const libusb_interface_descriptor& setting, std::uint8_t direction,
+                                      std::uint8_t address) {
   for (const std::uint8_t type : {LIBUSB_TRANSFER_TYPE_INTERRUPT, LIBUSB_TRANSFER_TYPE_BULK})
     for (int i = 0; i < setting.bNumEndpoints; ++i) {
       const libusb_endpoint_descriptor& e = setting.endpoint[i];
       if ((e.bmAttributes & LIBUSB_TRANSFER_TYPE_MASK) == type &&
-          (e.bEndpointAddress & LIBUSB_ENDPOINT_DIR_MASK) == direction)
+          (e.bEndpointAddress & LIBUSB_ENDPOINT_DIR_MASK) == direction &&
+          (address == 0 || e.bEndpointAddress == address))
         return Endpoint{e.bEndpointAddress, type, static_cast<std::size_t>(e.wMaxPacketSize & 0x7FFU)};
     }
   return std::nullopt;
@@ -95,9 +98,11 @@ struct UsbLink::Engine {
 
   void find_and_open(const UsbDevice& device);
   void check_identity(const UsbDevice& device) const;
-  void find_endpoints(const UsbDevice& device);
+  void find_endpoints(const UsbDevice& device, const LinkSettings& settings);
   void claim(const UsbDevice& device);
-  void prepare_transfers(const LinkSettings& settings);
+  void start_serial(const UsbDevice& device, const LinkSettings& settings);
+  void prepare_in(const LinkSettings& settings);
+  void prepare_out();
   void release() noexcept;
 
   void run() noexcept;
@@ -105,9 +110,11 @@ struct UsbLink::Engine {
   void sleep() noexcept;
   bool flying() const noexcept;
   void submit(In& in) noexcept;
-  void take_report(const libusb_transfer& transfer) noexcept;
+  void take_packet(const libusb_transfer& transfer) noexcept;
+  void take_report(std::span<const std::uint8_t> bytes) noexcept;
   void retry_failed() noexcept;
   void write_newest() noexcept;
+  void write_request() noexcept;
   void cancel_overdue() noexcept;
   bool finish() noexcept;
   void lose() noexcept;
@@ -118,6 +125,8 @@ struct UsbLink::Engine {
   libusb_context* context = nullptr;
   libusb_device_handle* handle = nullptr;
   int interface = 0;
+  bool numbered_reports;
+  bool is_hid = false;
   bool claimed = false;
   bool priority_granted = true;
   Endpoint in_endpoint;
@@ -134,8 +143,12 @@ struct UsbLink::Engine {
 
   // The link's thread only.
   std::array<In, kTransfersInFlight> ins;
+  std::size_t prefix_bytes;
+  bool cut;  ///< packets are a stream of bytes, out of which reports are cut
+  StreamFramer framer;
   libusb_transfer* out = nullptr;
   Packet out_packet;
+  std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE + kMaxReportBytes> out_request{};
   bool out_flying = false, out_cancelled = false;
   TimePoint out_until{};  ///< when a command that is not taken is called back
   bool in_halted = false, out_halted = false;
@@ -154,16 +167,22 @@ struct UsbLink::Engine {
 
 UsbLink::Engine::Engine(const UsbDevice& device, const LinkSettings& settings)
     : interface(std::max(device.interface, 0)),
+      numbered_reports(device.numbered_reports),
       slot(settings.write_deadline),
+      prefix_bytes(settings.prefix_bytes),
+      cut(settings.frame.length > 0),
+      framer(settings.frame),
       write_deadline(settings.write_deadline),
       close_within(settings.close_within) {
   try {
     if (const int error = libusb_init(&context); error != 0) throw refusal(device, "libusb", error);
     find_and_open(device);
     check_identity(device);
-    find_endpoints(device);
+    find_endpoints(device, settings);
     claim(device);
-    prepare_transfers(settings);
+    start_serial(device, settings);
+    prepare_in(settings);
+    prepare_out();
     gather_files();
     thread = std::thread([this] { run(); });
     priority_granted = raise_priority(thread, settings.priority);
@@ -201,7 +220,7 @@ void UsbLink::Engine::check_identity(const UsbDevice& device) const {
                              ": nothing was written to it; look for the device anew");
 }
 
-void UsbLink::Engine::find_endpoints(const UsbDevice& device) {
+void UsbLink::Engine::find_endpoints(const UsbDevice& device, const LinkSettings& settings) {
   libusb_config_descriptor* configuration = nullptr;
   if (const int error = libusb_get_active_config_descriptor(libusb_get_device(handle), &configuration);
       error != 0)
@@ -210,8 +229,9 @@ void UsbLink::Engine::find_endpoints(const UsbDevice& device) {
   for (int i = 0; i < configuration->bNumInterfaces; ++i) {
     const libusb_interface& candidate = configuration->interface[i];
     if (candidate.num_altsetting < 1 || candidate.altsetting[0].bInterfaceNumber != interface) continue;
-    in = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_IN);
-    out_endpoint = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_OUT);
+    is_hid = candidate.altsetting[0].bInterfaceClass == LIBUSB_CLASS_HID;
+    in = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_IN, settings.in);
+    out_endpoint = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_OUT, settings.out);
   }
   libusb_free_config_descriptor(configuration);
   if (!in || in->packet_bytes == 0)
@@ -227,9 +247,17 @@ void UsbLink::Engine::claim(const UsbDevice& device) {
   claimed = true;
 }
 
+void UsbLink::Engine::start_serial(const UsbDevice& device, const LinkSettings& settings) {
+  if (!settings.start_serial) return;
+  if (!out_endpoint)
+    throw std::runtime_error(describe(device) + " has no OUT endpoint, so it is no serial chip");
+  FtdiSerial chip(handle, in_endpoint.address, out_endpoint->address, in_endpoint.packet_bytes);
+  settings.start_serial(chip);
+}
+
 /// A transfer is as long as the longest report, in whole packets: a shorter packet ends it, a longer one
 /// could not be told from the next report.
-void UsbLink::Engine::prepare_transfers(const LinkSettings& settings) {
+void UsbLink::Engine::prepare_in(const LinkSettings& settings) {
   const std::size_t packet = in_endpoint.packet_bytes;
   const std::size_t longest = std::max(settings.longest_report, packet);
   const std::size_t bytes = (longest + packet - 1) / packet * packet;
@@ -242,12 +270,32 @@ void UsbLink::Engine::prepare_transfers(const LinkSettings& settings) {
                                    static_cast<int>(bytes), on_in, &in, 0);
     in.transfer->type = in_endpoint.type;
   }
-  if (!out_endpoint) return;
+}
+
+/// A HID device without an OUT endpoint takes its reports as SET_REPORT requests (HID 1.11 section 7.2.2):
+/// slower, and as good for what comes once in a while.
+void UsbLink::Engine::prepare_out() {
+  if (!out_endpoint && !is_hid) return;
   out = libusb_alloc_transfer(0);
   if (out == nullptr) throw std::bad_alloc();
-  libusb_fill_interrupt_transfer(out, handle, out_endpoint->address, out_packet.bytes.data(), 0, on_out, this,
-                                 0);
-  out->type = out_endpoint->type;
+  if (out_endpoint) {
+    libusb_fill_interrupt_transfer(out, handle, out_endpoint->address, out_packet.bytes.data(), 0, on_out,
+                                   this, 0);
+    out->type = out_endpoint->type;
+  } else {
+    libusb_fill_control_transfer(out, handle, out_request.data(), on_out, this, 0);
+  }
+}
+
+/// The request that carries the report in out_packet.
+void UsbLink::Engine::write_request() noexcept {
+  constexpr std::uint8_t kToInterface = 0x21, kSetReport = 9;
+  constexpr unsigned kOutput = 2;
+  const unsigned id = numbered_reports ? out_packet.bytes[0] : 0;
+  libusb_fill_control_setup(
+      out_request.data(), kToInterface, kSetReport, static_cast<std::uint16_t>(kOutput << 8U | id),
+      static_cast<std::uint16_t>(interface), static_cast<std::uint16_t>(out_packet.length));
+  std::copy_n(out_packet.bytes.begin(), out_packet.length, out_request.begin() + LIBUSB_CONTROL_SETUP_SIZE);
 }
 
 UsbLink::Engine::~Engine() {
@@ -329,7 +377,7 @@ void UsbLink::Engine::on_in(libusb_transfer* transfer) {
   in.flying = false;
   switch (transfer->status) {
     case LIBUSB_TRANSFER_COMPLETED:
-      engine.take_report(*transfer);
+      engine.take_packet(*transfer);
       engine.submit(in);
       return;
     case LIBUSB_TRANSFER_CANCELLED:
@@ -346,11 +394,21 @@ void UsbLink::Engine::on_in(libusb_transfer* transfer) {
   engine.in_failed = true;
 }
 
-void UsbLink::Engine::take_report(const libusb_transfer& transfer) noexcept {
-  if (transfer.actual_length <= 0) return;
+void UsbLink::Engine::take_packet(const libusb_transfer& transfer) noexcept {
+  if (transfer.actual_length <= static_cast<int>(prefix_bytes)) return;
+  const auto bytes =
+      std::span<const std::uint8_t>(transfer.buffer, static_cast<std::size_t>(transfer.actual_length))
+          .subspan(prefix_bytes);
+  if (cut)
+    framer.take(bytes, [this](auto report) { take_report(report); });
+  else
+    take_report(bytes);
+}
+
+void UsbLink::Engine::take_report(std::span<const std::uint8_t> bytes) noexcept {
   Packet packet;
-  packet.length = static_cast<std::size_t>(transfer.actual_length);
-  std::copy_n(transfer.buffer, std::min(packet.length, packet.bytes.size()), packet.bytes.begin());
+  packet.length = bytes.size();
+  std::copy_n(bytes.begin(), std::min(packet.length, packet.bytes.size()), packet.bytes.begin());
   packet.arrives = std::chrono::steady_clock::now();
   if (!ring.push(packet)) dropped.fetch_add(1, std::memory_order_relaxed);
   readable.wake();
@@ -378,6 +436,10 @@ void UsbLink::Engine::write_newest() noexcept {
   if (out == nullptr || out_flying || out_halted || ending || gone.load(std::memory_order_relaxed)) return;
   if (!slot.take(out_packet)) return;
   out->length = static_cast<int>(out_packet.length);
+  if (!out_endpoint) {
+    write_request();
+    out->length += LIBUSB_CONTROL_SETUP_SIZE;
+  }
   const int error = libusb_submit_transfer(out);
   out_flying = error == 0;
   out_cancelled = false;
@@ -397,12 +459,11 @@ void UsbLink::Engine::cancel_overdue() noexcept {
 void UsbLink::Engine::on_out(libusb_transfer* transfer) {
   Engine& engine = *static_cast<Engine*>(transfer->user_data);
   engine.out_flying = false;
-  const bool whole =
-      transfer->status == LIBUSB_TRANSFER_COMPLETED && transfer->actual_length == transfer->length;
+  const bool whole = transfer->status == LIBUSB_TRANSFER_COMPLETED &&
+                     transfer->actual_length == static_cast<int>(engine.out_packet.length);
   if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) engine.lose();
-  if (transfer->status == LIBUSB_TRANSFER_STALL) {
-    engine.out_halted = true;
-  }
+  if (transfer->status == LIBUSB_TRANSFER_STALL)
+    engine.out_halted = engine.out_endpoint.has_value();  // a request that is refused halts nothing
   engine.slot.end(whole                                           ? LinkStatus::ok
                   : transfer->status == LIBUSB_TRANSFER_NO_DEVICE ? LinkStatus::gone
                                                                   : LinkStatus::empty);

@@ -25,7 +25,9 @@ struct UsbLinkCounts {
 /// the host unprepared. The kernel's driver, if there is one, is detached while the link is open.
 ///
 /// The first interrupt IN endpoint of the interface is read and the first interrupt OUT endpoint written;
-/// where there is none of that kind, the first bulk one. Reports stand as they do on the wire.
+/// where there is none of that kind, the first bulk one; or those that the settings name. A serial chip is
+/// started as they say, and reports are cut out of what it sends. To a HID interface without an OUT endpoint
+/// reports go as SET_REPORT requests. Reports stand as they do on the wire.
 ///
 /// A thread of the link's own speaks with libusb. Between it and the servo thread there are a lock-free ring
 /// of reports and a slot for the newest command: nothing the servo thread calls waits, locks or allocates.
@@ -41,7 +43,7 @@ class UsbLink final : public ReportLink {
   /// cannot be opened, or has no endpoint to read from.
   void open() override;
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
-  /// `empty` where the device has no OUT endpoint, or as WriteSlot::hand_over().
+  /// `empty` where the device has no OUT endpoint and is not HID, or as WriteSlot::hand_over().
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
   /// Writes the last report handed over, in the time the settings give, then gives the interface back to the

@@ -11,10 +11,14 @@
 #include "devices/emulated_falcon.hpp"
 #include "devices/emulated_polhem.hpp"
 #include "devices/emulated_spacemouse.hpp"
+#include "devices/link_settings.hpp"
 #include "devices/loopback_link.hpp"
 #include "devices/profile_device.hpp"
+#include "tests/support/polhem_place.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;
+using namespace wrenchd::test;
 using namespace std::chrono_literals;
 
 namespace {
@@ -55,40 +59,6 @@ struct Bench {
 };
 
 using Mouse = EmulatedSpaceMouse;
-
-Matrix3d about_y(double angle) {
-  return Eigen::AngleAxisd(angle, Vector3d::UnitY()).toRotationMatrix();
-}
-Matrix3d about_x(double angle) {
-  return Eigen::AngleAxisd(angle, Vector3d::UnitX()).toRotationMatrix();
-}
-Matrix3d about_z(double angle) {
-  return Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
-}
-
-/// haptikfabrikenapi's own formulas for polhem_v1, from encoder counts to position and orientation of its
-/// end.
-struct PolhemPlace {
-  Vector3d p;
-  Matrix3d R;
-  double tA, tB, tC;
-};
-PolhemPlace polhem_place(const std::array<int, 6>& counts) {
-  const double turn = 2 * std::numbers::pi;
-  const double tA = -turn * counts[0] / 2000 * 0.010 / 0.180, tB = -turn * counts[1] / 2000 * 0.010 / 0.100,
-               tC = -turn * counts[2] / 2000 * 0.010 / 0.100;
-  const double tD = -turn * counts[5] / 1024, tE = turn * counts[4] / 1024, tF = -turn * counts[3] / 1024;
-  const double r = 0.174 * std::sin(tB) + 0.133 * std::sin(tC);
-  return {{std::cos(tA) * r - 0.140, std::sin(tA) * r,
-           0.058 + 0.174 * std::cos(tB) - 0.133 * std::cos(tC) - 0.100},
-          about_z(tA) * about_y(std::numbers::pi / 2 - tC) * about_x(tD) * about_y(tE) * about_x(tF),
-          tA,
-          tB,
-          tC};
-}
-
-/// Turned by half a turn about z: x and y the other way.
-const Matrix3d kHalfTurn = Vector3d(-1, -1, 1).asDiagonal();
 
 }  // namespace
 
@@ -239,21 +209,13 @@ TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas",
   bench.emulator.turn(counts);
   bench.open();
   bench.steps(5);
-  const auto [p, R, tA, tB, tC] = polhem_place(counts);
+  const PolhemPlace place = polhem_place(counts);
   for (int i = 0; i < 500; ++i) {
     const Vector3d F(2 * unit(random), 2 * unit(random), 2 * unit(random));
     bench.step({F, {0, 0, 0}}, true);
-    const Vector3d f = kHalfTurn * F;
-    const double r = 0.174 * std::sin(tB) + 0.133 * std::sin(tC);
-    const std::array<double, 3> torque = {
-        -std::sin(tA) * r * f.x() + std::cos(tA) * r * f.y(),
-        0.174 * (std::cos(tA) * std::cos(tB) * f.x() + std::sin(tA) * std::cos(tB) * f.y() -
-                 std::sin(tB) * f.z()),
-        0.133 * (std::cos(tA) * std::cos(tC) * f.x() + std::sin(tA) * std::cos(tC) * f.y() +
-                 std::sin(tC) * f.z())};
-    const std::array<double, 3> gear = {-0.010 / 0.180, -0.010 / 0.100, -0.010 / 0.100};
+    const std::array<double, 3> expected_mA = polhem_currents_mA(place, F);
     for (std::size_t j = 0; j < 3; ++j)
-      REQUIRE(std::abs(bench.emulator.currents_mA()[j] - 1000 * torque[j] * gear[j] / 0.0538) <= 0.5 + 1e-6);
+      REQUIRE(std::abs(bench.emulator.currents_mA()[j] - expected_mA[j]) <= 0.5 + 1e-6);
   }
   bench.step({{1, 0, 0}, {0, 0.2, 0}}, true);
   CHECK(dof_text(bench.device.read_newest(bench.clock.now()).dropped) == "ry");
@@ -355,6 +317,42 @@ TEST_CASE("a Falcon that cannot be started is given up with a reason", "[emulato
   CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("came back wrong"));
   CHECK_THROWS_WITH(falcon_start(deaf, {}), Contains("the firmware is empty"));
   CHECK(deaf.state() != EmulatedFalcon::State::running);
+}
+
+TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it has to be", "[emulators]") {
+  using Catch::Contains;
+  const TemporaryDirectory dir;
+  const std::string file = dir.write("firmware.bin", std::string(700, 'x')).string();
+  EmulatedFalcon falcon;
+  CHECK_THROWS_WITH(falcon_open(falcon, ""), Contains("none is named") && Contains("inherits falcon"));
+  CHECK_THROWS_WITH(falcon_open(falcon, file + "x"), Contains("cannot read the firmware " + file + "x"));
+  CHECK(falcon.state() != EmulatedFalcon::State::running);
+  falcon_open(falcon, file);
+  CHECK(falcon.state() == EmulatedFalcon::State::running);
+  CHECK(falcon.firmware() == std::vector<std::uint8_t>(700, 'x'));
+  falcon.write(std::vector<std::uint8_t>{'<', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'B',
+                                         'A', '>'});
+  falcon.home();
+  falcon_open(falcon, "");  // it runs one, and knows where it is
+  CHECK(falcon.homed());
+  CHECK(falcon.firmware().size() == 700);
+  CHECK(falcon.efforts() == std::array<int, 3>{});
+}
+
+TEST_CASE("what the Falcon's profile says of its link", "[emulators]") {
+  const LinkSettings settings = link_settings(shipped("falcon"));
+  CHECK(settings.in == 0x81);
+  CHECK(settings.out == 0x02);
+  CHECK(settings.prefix_bytes == 2);
+  CHECK(settings.longest_report == 18);
+  CHECK(settings.frame.length == 16);
+  CHECK(settings.frame.first == '<');
+  CHECK(settings.frame.last == '>');
+  CHECK(settings.start_serial);
+  const LinkSettings polhem = link_settings(shipped("polhem"));
+  CHECK(polhem.longest_report == 64);
+  CHECK(polhem.in == 0);
+  CHECK_FALSE(polhem.start_serial);
 }
 
 TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulators]") {

@@ -113,6 +113,18 @@ TEST_CASE("a profile that shares its ids is used only where the configuration na
   CHECK(matched(board, "falcon").empty());
 }
 
+TEST_CASE("over libusb a profile is for one interface of a device", "[match_profile]") {
+  PluggedDevice falcon = plugged(0x0403, 0xcb48);
+  CHECK(matched(falcon) == "falcon");  // as far as is known
+  falcon.interface = 0;
+  CHECK(matched(falcon) == "falcon");
+  falcon.interface = 1;
+  CHECK_THAT(why_not(falcon, "falcon"), Contains("speaks over interface 0") && Contains("this is 1"));
+  PluggedDevice polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are told apart by usage
+  polhem.interface = 3;
+  CHECK(matched(polhem) == "polhem");
+}
+
 TEST_CASE("closed devices, and those that only share a vendor, are refused by name", "[match_profile]") {
   CHECK_THAT(matched(plugged(0x2988, 0x0304)),
              Contains("3D Systems Touch (HID) (2988:0304)") && Contains("protocol is not public"));

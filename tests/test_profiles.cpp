@@ -205,3 +205,19 @@ TEST_CASE("a million fuzzed reports are understood or dropped, and no sample is 
   }
   CHECK(profiles.size() * kReports >= 1'000'000);
 }
+
+TEST_CASE("a firmware is for what has a serial chip to load it through", "[profiles]") {
+  const test::TemporaryDirectory dir;
+  const auto load = [&](const std::string& endpoints) {
+    return load_profile(
+        dir.write("mine.toml", "inherits = \"falcon\"\nname = \"mine\"\n[endpoints]\n" + endpoints),
+        kShipped);
+  };
+  const DeviceProfile mine = load("firmware = \"/somewhere/falcon.bin\"\n");
+  CHECK(mine.endpoints.serial_chip);
+  CHECK(mine.endpoints.firmware == "/somewhere/falcon.bin");
+  CHECK(mine.endpoints.prefix_bytes == 2);
+  CHECK_THROWS_WITH(load("serial_chip = \"none\"\nfirmware = \"/somewhere/falcon.bin\"\n"),
+                    Catch::Contains("mine.toml:5") && Catch::Contains("serial_chip = \"ftdi\""));
+  CHECK_THROWS_WITH(load("serial_chip = \"prolific\"\n"), Catch::Contains("ftdi"));
+}

@@ -396,6 +396,24 @@ TEST_CASE("a simulated run is the same however time is cut", "[simulation]") {
   }
 }
 
+TEST_CASE("a device that sends whole poses in frames of its own is simulated in them", "[simulation]") {
+  DeviceProfile profile = shipped("reference_full_speed");
+  profile.X_BD = {rotation_from({0.3, -0.5, 1.1}), {0.02, -0.01, 0.05}};
+  profile.X_EH = {rotation_from({-0.2, 0.4, 0.1}), {0.03, 0.04, -0.02}};
+  Session s(profile, moving());
+  s.open();
+  s.run(5s, [&] {
+    REQUIRE(s.sample.fault == Fault::none);
+    REQUIRE(apart_m(s.sample.X_BH, s.link->device().X_BH()) < 1e-6);
+    REQUIRE(apart_rad(s.sample.X_BH, s.link->device().X_BH()) < 1e-6);
+  });
+  const Wrench F{{1.0, -0.5, 0.8}, {0.01, 0.02, -0.03}};
+  for (int i = 0; i < 1000; ++i) s.step(F, true);
+  const Wrench felt = s.link->device().motor_wrench();
+  CHECK((felt.force_N - F.force_N).norm() < 1e-5);
+  CHECK((felt.torque_Nm - F.torque_Nm).norm() < 1e-5);
+}
+
 TEST_CASE("a cap at rest is silent, and the tool stays where the hand has left it", "[simulation]") {
   for (const char* name : {"spacemouse_split", "spacemouse_combined"}) {
     INFO(name);

@@ -92,7 +92,7 @@ Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const
 int run_calibrate(const CalibrateOptions& options) {
   const Target target = find_target(options);
   const CalibrationStore store;
-  PluggedLink link(target.profile, target.serial);
+  PluggedLink link(target.profile, target.serial, link_settings(target.profile));
   ProfileDevice device(target.profile, link);
   WallClock clock;
   device.open();

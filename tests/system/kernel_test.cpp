@@ -11,7 +11,6 @@
 #include <cinttypes>
 #include <cmath>
 #include <condition_variable>
-#include <cstdarg>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
@@ -24,18 +23,16 @@
 #include <utility>
 #include <vector>
 
-#include <pthread.h>
-#include <sched.h>
 #include <sys/mman.h>
 
 #include "core/fault.hpp"
-#include "devices/hidraw_link.hpp"
 #include "devices/plug_monitor.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/reference_layout.hpp"
 #include "devices/usb_devices.hpp"
-#include "devices/usb_link.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/system/emulated_devices.hpp"
+#include "tests/system/row.hpp"
 #include "tests/system/usbip_device.hpp"
 
 using namespace wrenchd;
@@ -50,62 +47,6 @@ using SteadyClock = std::chrono::steady_clock;
 /// above another, on one processor it would run into a lock that the one who woke it still holds, and back.
 constexpr int kPriority = 60;
 constexpr int kPort = 0;
-
-enum class Backend : std::uint8_t { hidraw, libusb };
-
-const char* name_of(Backend backend) {
-  return backend == Backend::hidraw ? "hidraw" : "libusb";
-}
-
-// --- the table --------------------------------------------------------------------------------------------
-
-int rows = 0;
-int rows_failed = 0;
-
-[[gnu::format(printf, 1, 2)]] std::string format(const char* format, ...) {
-  std::array<char, 512> buffer{};
-  std::va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer.data(), buffer.size(), format, arguments);
-  va_end(arguments);
-  return buffer.data();
-}
-
-double us(Duration d) {
-  return static_cast<double>(d.count()) / 1e3;
-}
-double ms(Duration d) {
-  return static_cast<double>(d.count()) / 1e6;
-}
-
-/// One line of the table: what is done, what must come of it, what was seen, and whether that is the same.
-class Row {
- public:
-  Row(Backend backend, std::string done, std::string specified)
-      : backend_(backend), done_(std::move(done)), specified_(std::move(specified)) {}
-  ~Row() {
-    if (std::uncaught_exceptions() > 0) failures_.emplace_back("it came to its end");
-    ++rows;
-    rows_failed += failures_.empty() ? 0 : 1;
-    std::printf("%-6s | %-28s | %s | %s | %s\n", name_of(backend_), done_.c_str(), specified_.c_str(),
-                seen_.c_str(), failures_.empty() ? "as specified" : "NOT AS SPECIFIED");
-    for (const std::string& failure : failures_) std::printf("         not so: %s\n", failure.c_str());
-  }
-  Row(const Row&) = delete;
-  Row& operator=(const Row&) = delete;
-
-  void saw(const std::string& what) { seen_ += (seen_.empty() ? "" : "; ") + what; }
-  void check(bool holds, const char* what) {
-    if (!holds) failures_.emplace_back(what);
-  }
-
- private:
-  Backend backend_;
-  std::string done_, specified_, seen_;
-  std::vector<std::string> failures_;
-};
-
-#define CHECK_THAT(row, condition) (row).check(condition, #condition)
 
 // --- plugging ---------------------------------------------------------------------------------------------
 
@@ -135,19 +76,6 @@ class Told {
   std::condition_variable changed_;
   std::vector<PlugEvent> events_;
 };
-
-/// The device in the list of what is plugged in, with its hidraw node.
-UsbDevice await_listed(const UsbipDevice::Identity& identity) {
-  for (int i = 0; i < 500; ++i) {
-    for (const UsbDevice& device : list_usb_devices())
-      if (device.vendor == identity.vendor && device.product == identity.product &&
-          device.serial == identity.serial && !device.hidraw_node.empty() &&
-          why_not_open(device, device.hidraw_node).empty() && why_not_open(device, device.usb_node).empty())
-        return device;
-    std::this_thread::sleep_for(10ms);
-  }
-  throw std::runtime_error("the device was plugged in and is not listed");
-}
 
 // --- the servo loop ---------------------------------------------------------------------------------------
 
@@ -189,7 +117,7 @@ class Servo {
   Seen run(int most, TimePoint until, int lead_in, const std::function<void()>& begin) {
     Seen seen;
     seen.work.swap(work_);
-    set_priority(SCHED_FIFO, kPriority);
+    set_own_priority(kPriority);
     TimePoint began = SteadyClock::now();
     if (last_fresh_ == TimePoint{}) last_fresh_ = began;
     TimePoint gap_began = began;
@@ -244,15 +172,9 @@ class Servo {
       seen.allocations = guard.allocations() - allocations_before;
       seen.locks = guard.locks() - locks_before;
     }
-    set_priority(SCHED_OTHER, 0);
+    set_own_priority(0);
     work_.reserve(65536);
     return seen;
-  }
-
-  static void set_priority(int policy, int priority) {
-    sched_param parameters{};
-    parameters.sched_priority = priority;
-    pthread_setschedparam(pthread_self(), policy, &parameters);
   }
 
   Device& device_;
@@ -284,18 +206,11 @@ struct Session {
   Session(Backend backend, double rate_Hz)
       : far(identity, rate_Hz, kPriority),
         listed((far.plug(kPort), await_listed(identity))),
-        link(make_link(backend, listed)),
+        link(make_link(backend, listed, kPriority)),
         device(reference_profile(), *link),
         servo(device, rate_Hz) {
     device.open();
     servo.run_for(20ms);
-  }
-
-  static std::unique_ptr<ReportLink> make_link(Backend backend, const UsbDevice& device) {
-    LinkSettings settings;
-    settings.priority = kPriority;
-    if (backend == Backend::hidraw) return std::make_unique<HidrawLink>(device, settings);
-    return std::make_unique<UsbLink>(device, settings);
   }
 
   /// Armed, and the motors are on.
@@ -563,7 +478,7 @@ void unplugged(Backend backend, Told& told) {
   const UsbDevice found = await_listed(s.identity);
   CHECK_THAT(row, found.same_device(s.listed) && found.place == s.listed.place);
   CHECK_THAT(row, back.record().out_reports == 0);
-  const auto link = Session::make_link(backend, found);
+  const auto link = make_link(backend, found, kPriority);
   ProfileDevice device(reference_profile(), *link);
   device.open();
   Servo servo(device, 1000.0);
@@ -652,10 +567,10 @@ int main() {
     Told told;
     const PlugMonitor monitor([&told](const PlugEvent& event) { told.hear(event); });
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, told);
+    for (const Backend backend : {Backend::hidraw, Backend::libusb}) emulated_devices(backend);
   } catch (const std::exception& e) {
     std::printf("kernel test: %s\n", e.what());
     return 1;
   }
-  std::printf("kernel test: %d of %d as specified\n", rows - rows_failed, rows);
-  return rows_failed == 0 ? 0 : 1;
+  return Row::all_as_specified() ? 0 : 1;
 }

@@ -2,20 +2,16 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <deque>
-#include <mutex>
-#include <optional>
 #include <span>
-#include <string>
-#include <thread>
 #include <vector>
 
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/simulated_firmware.hpp"
+#include "tests/system/usbip_port.hpp"
 
 namespace wrenchd::test {
 
@@ -48,30 +44,19 @@ struct DeviceRecord {
   std::size_t answers = 0;  ///< commands with the motors on: turn_arounds() so far
 };
 
-/// A device that follows devices/README.md, plugged into this machine: its firmware is the simulated one, and
-/// it speaks USB/IP with the kernel's own virtual host controller (vhci_hcd), over a socket pair. Everything
-/// above that controller is what a real device meets. High speed, bInterval 1.
+/// A device that follows devices/README.md, plugged into this machine: its firmware is the simulated one.
+/// High speed, bInterval 1.
 ///
 /// The handle moves along x: position_m() of each sequence number. A command tells by its force in x which
 /// pose it answers: one micronewton for each count of its sequence.
-class UsbipDevice {
+class UsbipDevice final : public UsbipPort {
  public:
-  struct Identity {
-    std::uint16_t vendor = 0x1209;
-    std::uint16_t product = 0x6d0f;
-    std::string serial = "A1";
-  };
+  using Identity = UsbIdentity;
 
   /// `priority`: SCHED_FIFO, of the device's own thread.
   UsbipDevice(Identity identity, double rate_Hz, int priority);
   ~UsbipDevice();
-  UsbipDevice(const UsbipDevice&) = delete;
-  UsbipDevice& operator=(const UsbipDevice&) = delete;
 
-  /// Into that port of the virtual controller. Throws std::runtime_error where the port is taken or there is
-  /// no controller.
-  void plug(int port);
-  void unplug();
   void set(Trouble trouble);
   DeviceRecord record() const;
   /// From each pose on the wire to the command that answers it.
@@ -81,61 +66,38 @@ class UsbipDevice {
   static Wrench answer_to(std::uint64_t sequence) noexcept;
 
  private:
-  using Bytes = std::vector<std::uint8_t>;
-  /// A transfer of the host's that waits for an answer.
-  struct Transfer {
-    std::uint32_t number = 0;
-    std::uint32_t length = 0;
-    Bytes data;  ///< what the host sends, where it does
-  };
   /// What is to be sent to the host.
   struct Outgoing {
     Bytes bytes;
     std::uint32_t sequence = 0;
   };
 
-  void run();
-  void serve_host(bool& connected);
-  std::size_t serve(std::span<const std::uint8_t> bytes);
-  void submitted(std::uint32_t number, std::uint32_t direction, std::uint32_t endpoint, std::uint32_t length,
-                 std::span<const std::uint8_t> setup, std::span<const std::uint8_t> data);
-  void unlinked(std::uint32_t number, std::uint32_t unlink);
-  void control(std::uint32_t number, std::span<const std::uint8_t> setup, std::span<const std::uint8_t> data);
-  std::optional<Bytes> answer_control(std::span<const std::uint8_t> setup,
-                                      std::span<const std::uint8_t> data);
-  std::optional<Bytes> descriptor(unsigned type, unsigned index) const;
+  TimePoint begin(TimePoint now) override;
+  TimePoint on_time(TimePoint now) override;
+  void on_in() override { flush(); }
+  void on_out(Transfer transfer) override;
+  void on_set_report(std::span<const std::uint8_t> data) override { take_command(data); }
+  void on_clear_halt() override;
 
   void tick(std::uint64_t ticks, TimePoint now);
   void flush();
   void take_command(std::span<const std::uint8_t> data);
   void take_held_commands();
 
-  void reply(std::uint32_t number, std::int32_t status, std::uint32_t length,
-             std::span<const std::uint8_t> in);
-  void send(std::span<const std::uint8_t> bytes) const;
-
-  Identity identity_;
-  double rate_Hz_;
-  int priority_;
+  Duration period_;
   DeviceProfile profile_;
   SimulatedFirmware firmware_;
-  int port_ = -1;
-  int socket_ = -1;
-  std::thread thread_;
-  std::array<std::uint8_t, 8192> received_{};  ///< from the host, and not yet understood
-  std::size_t received_bytes_ = 0;
-  std::atomic<bool> pulled_{false};
 
-  mutable std::mutex mutex_;  ///< over all below
+  // Under mutex_.
   Trouble trouble_ = Trouble::none;
   DeviceRecord record_;
   std::vector<Duration> turn_arounds_;
   bool halted_ = false;
-  std::deque<Transfer> in_, held_out_;
   std::deque<Outgoing> outbox_;
   Outgoing newest_;
   std::array<TimePoint, 1024> sent_at_{};
   TimePoint powered_{};
+  TimePoint next_{};  ///< report
 };
 
 }  // namespace wrenchd::test

@@ -357,7 +357,10 @@ struct MockUsb::Ioctls final : IoctlHandler {
                     : umockdev_ioctl_data_resolve(urb, offsetof(usbdevfs_urb, buffer), length, nullptr);
     const Urb taken{umockdev_ioctl_data_ref(urb),
                     buffer == nullptr ? nullptr : umockdev_ioctl_data_ref(buffer), address};
-    if (head.type == USBDEVFS_URB_TYPE_CONTROL) {
+    if (head.type == USBDEVFS_URB_TYPE_CONTROL && taken.buffer->data[0] == 0x21) {
+      out.push_back(taken);
+      drain();
+    } else if (head.type == USBDEVFS_URB_TYPE_CONTROL) {
       const int n = control(taken.buffer->data);
       finish(taken, n < 0 ? n : 0, std::max(n, 0));
     } else if (head.endpoint == 0x81) {
@@ -399,8 +402,14 @@ struct MockUsb::Ioctls final : IoctlHandler {
 
   void drain() {
     for (; !deaf && !out.empty(); out.pop_front()) {
-      const std::uint8_t* const data = out.front().buffer->data;
-      const int length = out.front().head().buffer_length;
+      const std::uint8_t* data = out.front().buffer->data;
+      int length = out.front().head().buffer_length;
+      if (out.front().head().type == USBDEVFS_URB_TYPE_CONTROL) {
+        if (data[1] != 9) throw std::runtime_error("a request that is not SET_REPORT");
+        set_report = {data[2] + 256 * data[3], data[4] + 256 * data[5]};
+        data += 8;
+        length -= 8;
+      }
       received.emplace_back(data, data + length);
       finish(out.front(), 0, length);
       changed.notify_all();
@@ -452,6 +461,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
   std::string serial;
   std::deque<Urb> in, out, finished;
   std::deque<Bytes> reports, received;
+  std::pair<int, int> set_report{-1, -1};
   bool halted = false, deaf = false, gone = false, claimed = false, kernel_driver = true;
   int halts_cleared = 0;
 };
@@ -469,12 +479,15 @@ MockUsb::MockUsb(MockMachine& machine, MockIdentity identity)
   Bytes descriptors{18, 1, 0x00, 0x02, 0, 0, 0, 64, low(v), high(v), low(p), high(p), 0, 1, 1, 2, 3, 1};
   const Bytes hid{9, 0x21, 0x11, 1, 0, 1, 0x22, 31, 0};
   const std::uint8_t type = identity_.hid ? 3 : 2;  // interrupt, bulk
-  const Bytes endpoints{7, 5, 0x81, type, 64, 0, 1, 7, 5, 0x01, type, 32, 0, 1};
-  Bytes configuration{
-      9, 2, static_cast<std::uint8_t>(identity_.hid ? 41 : 32),  0, 1, 1, 0, 0x80, 50, 9, 4, 0,
-      0, 2, static_cast<std::uint8_t>(identity_.hid ? 3 : 0xFF), 0, 0, 0};
+  Bytes endpoints{7, 5, 0x81, type, 64, 0, 1};
+  if (identity_.out_endpoint) endpoints.insert(endpoints.end(), {7, 5, 0x01, type, 32, 0, 1});
+  Bytes configuration{9, 2, 0, 0, 1, 1, 0, 0x80, 50};
+  const std::uint8_t number = identity_.out_endpoint ? 2 : 1;
+  const std::uint8_t kind = identity_.hid ? 3 : 0xFF;
+  configuration.insert(configuration.end(), {9, 4, 0, 0, number, kind, 0, 0, 0});
   if (identity_.hid) configuration.insert(configuration.end(), hid.begin(), hid.end());
   configuration.insert(configuration.end(), endpoints.begin(), endpoints.end());
+  configuration[2] = static_cast<std::uint8_t>(configuration.size());
   descriptors.insert(descriptors.end(), configuration.begin(), configuration.end());
   umockdev_testbed_set_attribute_binary(testbed, usb_path_.c_str(), "descriptors", descriptors.data(),
                                         static_cast<int>(descriptors.size()));
@@ -533,6 +546,11 @@ void MockUsb::unplug() {
   }
   umockdev_testbed_uevent(machine_.testbed(), usb_path_.c_str(), "remove");
   remove(machine_.testbed(), usb_path_, {usb_node_of(identity_)});
+}
+
+std::pair<int, int> MockUsb::set_report() const {
+  const std::lock_guard lock(ioctls_->mutex);
+  return ioctls_->set_report;
 }
 
 int MockUsb::halts_cleared() const {

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 // GLib's and umockdev's, whose headers stay out of the tests.
@@ -40,6 +41,7 @@ struct MockIdentity {
   std::string product = "6d0f";
   bool numbered_reports = true;
   bool hid = true;  ///< otherwise a vendor's own interface with bulk endpoints
+  bool out_endpoint = true;
 };
 
 /// 64 bytes in, 32 out, on a vendor page; with report ids as in devices/README.md, or without.
@@ -93,6 +95,8 @@ class MockUsb {
   void set_deaf(bool deaf);
   void unplug();
 
+  /// wValue and wIndex of the last SET_REPORT; what it carried is received like any report.
+  std::pair<int, int> set_report() const;
   int halts_cleared() const;
   int in_flight() const;  ///< IN transfers that wait
   bool claimed() const;

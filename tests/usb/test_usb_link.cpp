@@ -106,6 +106,71 @@ TEST_CASE("libusb: reports are written as they are", "[usb]") {
   }
 }
 
+TEST_CASE("libusb: to a HID interface without an OUT endpoint reports go as SET_REPORT", "[usb]") {
+  const bool has_ids = GENERATE(true, false);
+  MockMachine machine;
+  MockUsb mock(machine, {.out_endpoint = false});
+  UsbDevice device = list_usb_devices().at(0);
+  device.numbered_reports = has_ids;
+  UsbLink link(device, patient());
+  link.open();
+  for (std::uint8_t id = 2; id < 9; ++id) {
+    CHECK(link.write(now(), numbered(32, id)) == LinkStatus::ok);
+    CHECK(mock.receive() == numbered(32, id));
+    CHECK(mock.set_report() == std::pair(0x200 + (has_ids ? id : 0), 0));  // output report, interface 0
+  }
+  mock.set_deaf(true);
+  link.write(now(), Bytes(32, 1));
+  link.write(now(), Bytes(32, 0));
+  std::thread closing([&] { link.close(); });
+  std::this_thread::sleep_for(20ms);
+  mock.set_deaf(false);
+  Bytes last;
+  do last = mock.receive();
+  while (last != Bytes(32, 0));
+  closing.join();
+}
+
+TEST_CASE("libusb: a device that is not HID and has no OUT endpoint takes nothing", "[usb]") {
+  Bench bench({.hid = false, .out_endpoint = false});
+  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::empty);
+}
+
+TEST_CASE("libusb: what stands before each packet is taken off, and packets of nothing else are none",
+          "[usb]") {
+  LinkSettings settings = patient();
+  settings.prefix_bytes = 2;
+  Bench bench({.hid = false}, settings);
+  bench.mock.send({0x31, 0x60});
+  bench.mock.send({0x31, 0x60, 7, 8, 9});
+  CHECK(read_one(bench.link).second == Bytes{7, 8, 9});
+}
+
+TEST_CASE("libusb: reports are cut out of what a serial chip sends, whole, in two, two in one", "[usb]") {
+  LinkSettings settings = patient();
+  settings.prefix_bytes = 2;
+  settings.frame = {4, '<', '>'};
+  Bench bench({.hid = false}, settings);
+  bench.mock.send({0x31, 0x60, '<', 1, 2, '>'});
+  CHECK(read_one(bench.link).second == Bytes{'<', 1, 2, '>'});
+  bench.mock.send({0x31, 0x60, '<', 3});
+  bench.mock.send({0x31, 0x60});
+  bench.mock.send({0x31, 0x60, 4, '>', '<', 5, 6, '>'});
+  CHECK(read_one(bench.link).second == Bytes{'<', 3, 4, '>'});
+  CHECK(read_one(bench.link).second == Bytes{'<', 5, 6, '>'});
+  bench.mock.send({0x31, 0x60, '<', 7, '>', '<', 8, 9, '>'});  // one that is too short
+  CHECK(read_one(bench.link).second == Bytes{'<', 8, 9, '>'});
+}
+
+TEST_CASE("libusb: the endpoints that the settings name are taken, or the link is refused", "[usb]") {
+  MockMachine machine;
+  MockUsb mock(machine, {});
+  LinkSettings settings = patient();
+  settings.in = 0x82;
+  UsbLink link(list_usb_devices().at(0), settings);
+  CHECK_THROWS_WITH(link.open(), Contains("no interrupt or bulk IN endpoint"));
+}
+
 TEST_CASE("libusb: while the device takes nothing the newest report waits", "[usb]") {
   Bench bench;
   bench.mock.set_deaf(true);

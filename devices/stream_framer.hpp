@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "devices/report_codec.hpp"
+
+namespace wrenchd {
+
+/// Reports cut out of a stream of bytes, as a serial chip hands them over: two in one packet, or one in two.
+/// What does not begin and end as a report does is skipped, byte by byte. RT safe.
+class StreamFramer {
+ public:
+  /// How a report is found: by its length, at most kMaxReportBytes, and its first and last byte.
+  struct Frame {
+    std::size_t length = 0;  ///< 0: packets are reports, nothing is to be cut
+    std::uint8_t first = 0;
+    std::uint8_t last = 0;
+  };
+
+  explicit StreamFramer(const Frame& frame) : frame_(frame) {}
+
+  /// Takes bytes, and calls `report` with each that is whole now.
+  template <class Report>
+  void take(std::span<const std::uint8_t> bytes, Report&& report) noexcept {
+    for (const std::uint8_t byte : bytes) {
+      held_[count_++] = byte;
+      while (count_ > 0 && held_[0] != frame_.first) drop(1);
+      if (count_ < frame_.length) continue;
+      if (held_[frame_.length - 1] != frame_.last) {
+        do drop(1);
+        while (count_ > 0 && held_[0] != frame_.first);
+        continue;
+      }
+      report(std::span<const std::uint8_t>(held_).first(frame_.length));
+      count_ = 0;
+    }
+  }
+
+ private:
+  void drop(std::size_t n) noexcept {
+    std::copy(held_.begin() + static_cast<std::ptrdiff_t>(n),
+              held_.begin() + static_cast<std::ptrdiff_t>(count_), held_.begin());
+    count_ -= n;
+  }
+
+  Frame frame_;
+  std::array<std::uint8_t, kMaxReportBytes> held_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace wrenchd

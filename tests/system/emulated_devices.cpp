@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/system/emulated_devices.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "config/load_profile.hpp"
+#include "devices/emulated_falcon.hpp"
+#include "devices/emulated_polhem.hpp"
+#include "devices/emulated_spacemouse.hpp"
+#include "devices/link_settings.hpp"
+#include "devices/match_profile.hpp"
+#include "devices/plugged_device.hpp"
+#include "devices/profile_device.hpp"
+#include "devices/profile_reports.hpp"
+#include "tests/support/polhem_place.hpp"
+#include "tests/support/sample_descriptors.hpp"
+#include "tests/system/usbip_emulator.hpp"
+
+namespace wrenchd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr int kPriority = 60;  ///< as in kernel_test.cpp
+constexpr int kPort = 0;
+
+const std::vector<DeviceProfile>& shipped() {
+  static const std::vector<DeviceProfile> profiles = [] {
+    const SearchPath search({"/usr/share/wrenchd"});
+    std::vector<DeviceProfile> all;
+    for (const auto& file : profile_files(search)) all.push_back(load_profile(file, search));
+    return all;
+  }();
+  return profiles;
+}
+
+/// The profile that wrenchd would give the device. Throws where it has none.
+const DeviceProfile& profile_of(const UsbDevice& device) {
+  const MatchResult match = match_profile(plugged_facts(device).device, shipped());
+  if (!match.profile) throw std::runtime_error("no profile matches " + describe(device));
+  return shipped()[*match.profile];
+}
+
+/// A device opened over a link, and a host that reads and writes.
+struct Driven {
+  std::unique_ptr<ReportLink> link;
+  ProfileDevice device;
+  DeviceSample sample;
+  Fault fault = Fault::none;  ///< the first one
+
+  Driven(const DeviceProfile& profile, std::unique_ptr<ReportLink> over)
+      : link(std::move(over)), device(profile, *link) {
+    device.open();
+    ticks(20);
+  }
+
+  /// By the device's reports, or where none comes, every 1.5 ms.
+  void ticks(int n, const Wrench& F = {}, bool motors_on = false) {
+    set_own_priority(kPriority);
+    for (int i = 0; i < n; ++i) {
+      device.wait_readable(SteadyClock::now() + 1500us);
+      sample = device.read_newest(SteadyClock::now());
+      const Fault written = device.write(SteadyClock::now(), F, motors_on);
+      if (fault == Fault::none) fault = sample.fault != Fault::none ? sample.fault : written;
+    }
+    set_own_priority(0);
+  }
+};
+
+/// An emulated HID device plugged in, found, matched, opened and heard.
+struct Plugged {
+  UsbipEmulator far;
+  UsbDevice listed;
+  Driven host;
+
+  Plugged(Backend backend, EmulatedDevice& emulator, const UsbIdentity& identity, const UsbShape& shape)
+      : far(emulator, identity, shape, kPriority),
+        listed((far.plug(kPort), await_listed(identity))),
+        host(profile_of(listed), make_link(backend, listed, kPriority)) {}
+
+  /// What the profile and the device's own descriptor disagree about.
+  std::size_t disagreements() const {
+    const PluggedFacts facts = plugged_facts(listed);
+    return facts.descriptor ? differences(*facts.descriptor, expected_reports(host.device.profile())).size()
+                            : 1;
+  }
+};
+
+// --- Polhem -----------------------------------------------------------------------------------------------
+
+using Counts = std::array<int, 6>;
+
+/// Encoders of a hand that wanders about, slowly enough for one.
+Counts wandering(int i) {
+  const auto wave = [i](double amplitude, double period) {
+    return static_cast<int>(std::lround(amplitude * std::sin(6.283185307179586 * i / period)));
+  };
+  return {wave(900, 400), wave(700, 300), -5000 + wave(900, 350),
+          wave(150, 270), wave(120, 310), wave(140, 330)};
+}
+
+void polhem(Backend backend) {
+  Row row(
+      backend, "Polhem emulator",
+      "found by its profile; 400 places of the encoders come out by the maker's formulas to 1e-6, 100 "
+      "forces arrive as the maker's currents; amplifiers off 0.5 s after the last report, zeros at release");
+  EmulatedPolhem board(64);
+  board.turn(wandering(0));
+  UsbShape shape;
+  shape.report_descriptor = teensy_rawhid();
+  shape.out_bytes = 64;
+  shape.product = "Teensyduino RawHID";
+  shape.high_speed = false;
+  Plugged p(backend, board, {0x16c0, 0x0486, "P1"}, shape);
+  CHECK_THAT(row, p.host.device.profile().name == "polhem");
+  CHECK_THAT(row, p.disagreements() == 0);
+
+  double worst_m = 0.0, worst_R = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    p.far.with([&] { board.turn(wandering(i)); });
+    p.host.ticks(3);
+    const PolhemPlace place = polhem_place(wandering(i));
+    worst_m = std::max(worst_m, (p.host.sample.X_BH.translation_m - kHalfTurn * place.p).norm());
+    const Matrix3d R = kHalfTurn * place.R * kHalfTurn;
+    worst_R = std::max(worst_R, (p.host.sample.X_BH.rotation.toRotationMatrix() - R).cwiseAbs().maxCoeff());
+  }
+  double worst_mA = 0.0;
+  const PolhemPlace place = polhem_place(wandering(399));
+  for (int i = 0; i < 100; ++i) {
+    const Vector3d F(2 * std::sin(i), 2 * std::sin(2 * i), 2 * std::cos(3 * i));
+    p.host.ticks(2, {F, Vector3d::Zero()}, true);
+    std::this_thread::sleep_for(1ms);
+    const auto currents_mA = p.far.with([&] { return board.currents_mA(); });
+    const auto expected_mA = polhem_currents_mA(place, F);
+    for (std::size_t j = 0; j < 3; ++j)
+      worst_mA = std::max(worst_mA, std::abs(currents_mA[j] - expected_mA[j]));
+  }
+  const std::vector<std::uint8_t> last = p.far.last_taken();
+  row.saw(format("places to %s, rotations to %s, currents to %.1f mA", worst_m < 1e-6 ? "1e-6 m" : "more",
+                 worst_R < 1e-6 ? "1e-6" : "more", std::ceil(10 * worst_mA) / 10));
+  CHECK_THAT(row, p.host.fault == Fault::none);
+  CHECK_THAT(row, worst_m < 1e-6 && worst_R < 1e-6);
+  CHECK_THAT(row, worst_mA <= 0.5 + 1e-6);
+  CHECK_THAT(row,
+             last.size() == 64 && std::all_of(last.begin() + 6, last.end(), [](auto b) { return b == 0; }));
+
+  p.host.ticks(5, {{0, 0, 1}, {0, 0, 0}}, true);
+  const auto on = [&] { return p.far.with([&] { return board.amplifiers_on(); }); };
+  std::this_thread::sleep_for(450ms);
+  CHECK_THAT(row, on());
+  std::this_thread::sleep_for(100ms);
+  CHECK_THAT(row, !on());
+  p.host.ticks(5, {{0, 0, 1}, {0, 0, 0}}, true);
+  CHECK_THAT(row, on() && p.far.with([&] { return board.currents_mA()[2]; }) != 0);
+  p.host.device.release(SteadyClock::now());
+  p.host.device.close();
+  CHECK_THAT(row, p.far.with([&] { return board.currents_mA(); }) == (std::array<int, 3>{}));
+  row.saw(format("%llu reports taken", static_cast<unsigned long long>(p.far.taken())));
+}
+
+// --- SpaceMouse -------------------------------------------------------------------------------------------
+
+void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const char* profile) {
+  const bool split = format_of == EmulatedSpaceMouse::Format::split;
+  Row row(backend, format("SpaceMouse emulator, %s", split ? "split" : "combined"),
+          "found by its profile; silent at rest without a fault; pushed for 0.5 s the tool's way is velocity "
+          "times time to 1e-6; let go it stops; the LED goes off at release, by SET_REPORT");
+  EmulatedSpaceMouse mouse(format_of);
+  UsbShape shape;
+  shape.report_descriptor = split ? space_navigator() : space_mouse_wireless();
+  shape.out = 0;
+  shape.in_bytes = split ? 8 : 32;
+  shape.product = split ? "SpaceNavigator" : "SpaceMouse Wireless";
+  shape.high_speed = false;
+  const UsbIdentity identity = split ? UsbIdentity{0x046d, 0xc626, ""} : UsbIdentity{0x256f, 0xc62e, ""};
+  Plugged p(backend, mouse, identity, shape);
+  CHECK_THAT(row, p.host.device.profile().name == profile);
+  CHECK_THAT(row, p.disagreements() == 0);
+
+  p.host.ticks(300);
+  CHECK_THAT(row,
+             p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, {}) && p.host.sample.sequence == 0);
+  p.far.with([&] { mouse.push({320, 160, 80, 0, 0, -200}); });
+  p.host.ticks(50);
+  const DeviceSample before = p.host.sample;
+  while (p.host.sample.arrived < before.arrived + 500ms && p.host.fault == Fault::none) p.host.ticks(1);
+  const double time_s = seconds(p.host.sample.arrived - before.arrived);
+  const Vector3d way = p.host.sample.X_BH.translation_m - before.X_BH.translation_m;
+  const Vector3d turn = rotation_vector(p.host.sample.X_BH.rotation * before.X_BH.rotation.conjugate());
+  const Vector3d expected_way = time_s * 71.0 * 4e-6 * Vector3d(-160, -320, -80);
+  const Vector3d expected_turn = time_s * 11.4 * 2.5e-4 * Vector3d(0, 0, 200);
+  row.saw(format("way to %s, turn to %s", (way - expected_way).norm() < 1e-6 ? "1e-6 m" : "more",
+                 (turn - expected_turn).norm() < 1e-6 ? "1e-6 rad" : "more"));
+  CHECK_THAT(row, p.host.fault == Fault::none && time_s > 0.49);
+  CHECK_THAT(row, (way - expected_way).norm() < 1e-6 && (turn - expected_turn).norm() < 1e-6);
+
+  p.far.with([&] {
+    mouse.push({});
+    mouse.take_command({}, std::array<std::uint8_t, 2>{4, 1});
+  });
+  p.host.ticks(60);
+  const DeviceSample left = p.host.sample;
+  p.host.ticks(300);
+  CHECK_THAT(row, p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, left.X_BH));
+  CHECK_THAT(row, p.host.sample.sequence == left.sequence);
+  CHECK_THAT(row, p.far.with([&] { return mouse.led(); }) && p.far.taken() == 0);
+  p.host.device.release(SteadyClock::now());
+  p.host.device.close();
+  const std::vector<std::uint8_t> last = p.far.last_taken();
+  CHECK_THAT(row, !p.far.with([&] { return mouse.led(); }));
+  CHECK_THAT(row, (last == std::vector<std::uint8_t>{4, 0}));
+  row.saw(format("%llu reports", static_cast<unsigned long long>(left.sequence)));
+}
+
+// --- Falcon -----------------------------------------------------------------------------------------------
+
+/// Where the equation of the maker's geometry puts a leg's shin, from where it should end: 0 at the right
+/// place. Letters are those of devices/kinematics.hpp.
+double leg_error_m(const Vector3d& p_B, const std::array<int, 3>& counts, int leg) {
+  constexpr double kTurn = 6.283185307179586;
+  const Vector3d p(-p_B.y(), p_B.z(), 0.1346 - p_B.x());  // the device's own axes
+  const double phi = kTurn * (105.0 - 120.0 * leg) / 360;
+  const double t = kTurn * (35.0 / 360 + counts[static_cast<std::size_t>(leg)] / 1280.0 * 14.25 / 110);
+  const double u = p.x() * std::cos(phi) + p.y() * std::sin(phi) - 0.040;
+  const double v = p.y() * std::cos(phi) - p.x() * std::sin(phi) + 0.02309;
+  const double rho = 0.0225 + std::sqrt(0.1025 * 0.1025 - (v - 0.025) * (v - 0.025));
+  return std::hypot(u + 0.01443 - 0.060 * std::cos(t), p.z() - 0.060 * std::sin(t)) - rho;
+}
+
+void falcon() {
+  Row row(
+      Backend::libusb, "Falcon emulator",
+      "found by its profile; handshake and firmware through its serial chip; homed; 200 places come out by "
+      "the legs' equation to 1e-6, forces arrive as efforts; opened again it is not loaded again");
+  EmulatedFalcon falcon;
+  falcon.spoil_loading(1);
+  UsbShape shape;
+  shape.out = 0x02;
+  shape.out_bytes = 64;
+  shape.product = "FALCON HAPTIC";
+  shape.high_speed = false;
+  const UsbIdentity identity{0x0403, 0xcb48, "F1"};
+  UsbipEmulator far(falcon, falcon, identity, shape, kPriority);
+  far.plug(kPort);
+  const UsbDevice listed = await_listed(identity, false);
+  DeviceProfile profile = profile_of(listed);
+  CHECK_THAT(row, profile.name == "falcon");
+  std::string refusal;
+  try {
+    make_link(Backend::libusb, listed, kPriority, link_settings(profile))->open();
+  } catch (const std::runtime_error& e) {
+    refusal = e.what();
+  }
+  CHECK_THAT(row, refusal.find("it runs no firmware, and none is named") != std::string::npos);
+
+  profile.endpoints.firmware = "/tmp/firmware";
+  std::vector<std::uint8_t> firmware(1000);
+  for (std::size_t i = 0; i < firmware.size(); ++i) firmware[i] = static_cast<std::uint8_t>(i * i + 7 * i);
+  std::ofstream(profile.endpoints.firmware, std::ios::binary)
+      .write(reinterpret_cast<const char*>(firmware.data()), static_cast<std::streamsize>(firmware.size()));
+  Driven p(profile, make_link(Backend::libusb, listed, kPriority, link_settings(profile)));
+  CHECK_THAT(row, far.with([&] { return falcon.state() == EmulatedFalcon::State::running; }));
+  CHECK_THAT(row, far.with([&] { return falcon.firmware() == firmware; }));
+  p.ticks(20);
+  CHECK_THAT(row, !p.sample.homed && far.with([&] { return falcon.wants_homing(); }));
+  far.with([&] { falcon.home(); });
+  p.ticks(20);
+  CHECK_THAT(row, p.sample.homed && p.fault == Fault::none);
+
+  double worst_m = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const std::array<int, 3> counts = {wandering(2 * i)[3], wandering(2 * i)[4], wandering(2 * i)[5]};
+    far.with([&] { falcon.turn(counts); });
+    p.ticks(3);
+    for (int leg = 0; leg < 3; ++leg)
+      worst_m = std::max(worst_m, std::abs(leg_error_m(p.sample.X_BH.translation_m, counts, leg)));
+  }
+  p.ticks(3, {{1.0, 0.0, 0.0}, Vector3d::Zero()}, true);
+  std::this_thread::sleep_for(2ms);
+  const auto efforts = far.with([&] { return falcon.efforts(); });
+  row.saw(format("firmware of 1000 bytes loaded, places to %s, efforts %d %d %d for 1 N forward",
+                 worst_m < 1e-6 ? "1e-6 m" : "more", efforts[0], efforts[1], efforts[2]));
+  CHECK_THAT(row, p.fault == Fault::none && worst_m < 1e-6);
+  CHECK_THAT(row, efforts[0] > 0 && efforts[1] > 0 && efforts[2] > 0);
+  p.device.release(SteadyClock::now());
+  p.device.close();
+  CHECK_THAT(row, far.with([&] { return falcon.efforts(); }) == (std::array<int, 3>{}));
+  p.device.open();
+  p.ticks(20);
+  CHECK_THAT(row, p.fault == Fault::none && p.sample.homed);
+  CHECK_THAT(row, far.with([&] { return falcon.firmware().size(); }) == firmware.size());
+  p.device.close();
+}
+
+}  // namespace
+
+void emulated_devices(Backend backend) {
+  polhem(backend);
+  space_mouse(backend, EmulatedSpaceMouse::Format::split, "spacemouse_split");
+  space_mouse(backend, EmulatedSpaceMouse::Format::combined, "spacemouse_combined");
+  if (backend == Backend::libusb) falcon();
+}
+
+}  // namespace wrenchd::test
