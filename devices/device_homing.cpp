@@ -18,6 +18,7 @@ DeviceHoming::DeviceHoming(ProfileDevice& device, DeviceProfile profile, Extent 
       extent_(extent),
       resting_(profile_.homing.reference != ReferenceUse::never),
       homing_(with_rest(profile_)) {
+  device_.recalibrate(profile_);
   if (!resting_ && extent_ == Extent::rest) state_.step = HomingStep::done;
 }
 

@@ -19,8 +19,8 @@ class DeviceHoming {
     all,   ///< a calibration: the rest and the axes
   };
 
-  /// The device has to be open, and as its profile says: without offsets. Throws std::invalid_argument where
-  /// the profile's plan cannot work.
+  /// The device has to be open; offsets that it took over before are forgotten. Throws std::invalid_argument
+  /// where the profile's plan cannot work.
   DeviceHoming(ProfileDevice& device, DeviceProfile profile, Extent extent);
 
   /// Reads the device once, and sends it zeros. About once a millisecond; not RT safe.

@@ -14,6 +14,7 @@
 #include <fcntl.h>
 #include <hidapi/hidapi.h>
 #include <poll.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 
 #include "devices/wake_up.hpp"
@@ -104,6 +105,13 @@ void HidrawLink::open() {
   if (file_ < 0) {
     reading_.reset();
     throw std::runtime_error("cannot find the file that hidapi opened for " + node + "; is /proc mounted?");
+  }
+  // The kernel lets any number of programs write to a HID device; two hosts on one hand must not be.
+  if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
+    const int error = errno == EWOULDBLOCK ? EBUSY : errno;
+    reading_.reset();
+    file_ = -1;
+    throw std::runtime_error(why_not_open(device_, node, error));
   }
   try {
     check_identity(device_);

@@ -34,7 +34,8 @@ class HidrawLink final : public ReportLink {
   HidrawLink& operator=(const HidrawLink&) = delete;
 
   /// Throws where the node cannot be opened, or is another device by now: ids, serial number, interface and
-  /// report descriptor are compared, and nothing is ever written to one that differs.
+  /// report descriptor are compared, and nothing is ever written to one that differs. Throws where another
+  /// HidrawLink has it, in this process or another: the node is locked while this is open.
   void open() override;
   /// hidraw does not say when a report arrived, so that is taken to be now; a report is never older than one
   /// tick but in one case: the kernel's ring was full and dropped what came later. Then it is said to have

@@ -58,6 +58,16 @@ TEST_CASE("encoders that count from anywhere are told where they are by the rest
   CHECK(polhem.board.currents_mA() == std::array<int, 3>{});
 }
 
+TEST_CASE("a device that was homed before is homed anew, and not on top of that", "[device_homing]") {
+  PolhemInHand polhem;
+  polhem.device.open();
+  for (int time = 0; time < 2; ++time) {
+    DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+    REQUIRE(home(polhem, homing).step == HomingStep::done);
+    CHECK(error(polhem)[0] < kResolution_m);
+  }
+}
+
 TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();

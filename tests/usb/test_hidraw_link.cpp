@@ -230,3 +230,11 @@ TEST_CASE("hidraw: a profile device reads the pose and the device hears the wren
   CHECK(wrench.enable);
   CHECK((wrench.F.force_N - Vector3d(1.0, -2.0, 0.5)).norm() < 1e-5);
 }
+
+TEST_CASE("hidraw: a device that another link has open is not opened", "[usb]") {
+  Bench bench;
+  HidrawLink second(bench.link.device());
+  CHECK_THROWS_WITH(second.open(), Contains("another program holds it: end that one"));
+  bench.link.close();
+  CHECK_NOTHROW(second.open());
+}
