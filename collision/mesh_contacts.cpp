@@ -221,6 +221,7 @@ void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findi
   const Seen& seen = seen_[pair.obstacle];
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   const Triangle b = {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)};
+  if (axes_.apart(a.start, a.end, b, border_m_ + bulge_m_ + 2.0 * clearance_m_)) return;
   const MeshSurface::Plane& plane = surface.planes()[pair.b];
   const auto heights = [](const MeshSurface::Plane& over, const Triangle& triangle) -> Heights {
     return {over.normal.dot(triangle[0]) - over.offset_m, over.normal.dot(triangle[1]) - over.offset_m,

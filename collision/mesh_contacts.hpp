@@ -8,6 +8,7 @@
 
 #include "collision/pairs_ahead.hpp"
 #include "collision/scene.hpp"
+#include "collision/separating_axes.hpp"
 #include "collision/tree_walk.hpp"
 #include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
@@ -139,6 +140,7 @@ class MeshContacts {
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
 
   std::vector<std::uint32_t> left_;  ///< of the pairs listed: those that may meet on the way
+  SeparatingAxes axes_;
   Moved moved_;
   std::uint32_t looked_at_ = 0;  ///< pairs that no plane keeps apart
   std::vector<Crossing> crossings_;
