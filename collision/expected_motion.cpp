@@ -14,6 +14,14 @@ constexpr double kNewestDrift = 0.1;
 
 }  // namespace
 
+void ExpectedMotion::learn_late(const Pose& X_WP) noexcept {
+  if (!known()) return;
+  const Vector3d hand_turn = small_rotation_vector(X_WP_.rotation.conjugate() * X_WP.rotation);
+  const Pose X_WT = {(rotation_from(drift_turn_) * X_WT_.rotation * rotation_from(hand_turn)).normalized(),
+                     X_WT_.translation_m + X_WP.translation_m - X_WP_.translation_m + drift_m_};
+  learn(X_WT, X_WP);
+}
+
 void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
   if (known()) {
     const Vector3d hand_m = X_WP.translation_m - X_WP_.translation_m;

@@ -11,6 +11,9 @@ class ExpectedMotion {
  public:
   /// Once a tick: the tool has come to X_WT and the hand to X_WP. RT safe.
   void learn(const Pose& X_WT, const Pose& X_WP) noexcept;
+  /// The same where the tool is late: it is where it is for no reason of its own, and expected where it would
+  /// have come to. RT safe.
+  void learn_late(const Pose& X_WP) noexcept;
   /// They are elsewhere now, and how they moved says nothing about how they will. RT safe.
   void forget() noexcept { *this = ExpectedMotion(); }
 

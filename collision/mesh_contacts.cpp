@@ -8,6 +8,9 @@ namespace wrenchd {
 namespace {
 
 constexpr std::size_t kMostCrossings = 512;
+/// A pair is looked at in the time of so many visits; so many that the sieve left are found to be apart.
+constexpr std::uint32_t kVisitsPerPair = 1;
+constexpr std::size_t kPairsPerVisit = 2;
 /// How far beyond its border a face or an edge still counts, in units of the clearance: far more than
 /// rounding, far less than what keeps neighbours apart.
 constexpr double kBeyond = 0.01;
@@ -80,6 +83,7 @@ void MeshContacts::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& bu
                               double time_s) noexcept {
   pairs_.look_ahead(X_WT, X_WP, budget, time_s);
   in_doubt_ = false;
+  looking_ = 0;
 }
 
 MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget,
@@ -89,6 +93,7 @@ MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, 
   clearance_m_ = clearance_m;
   if (!pairs_.list(X_start_, X_WT, {start_s_, time_s}, budget)) {
     findings.complete = false;
+    findings.late = pairs_.waits();
     return findings;
   }
   see_way(X_WT, time_s);
@@ -164,11 +169,15 @@ void MeshContacts::look_at_pairs(WalkBudget& budget, Findings& findings) noexcep
         sieve.sift(k, seen.X_OT_start, seen.X_OT_end, tool_m + seen.obstacle->mesh->tree.extent_m(),
                    border_m_ + bulge_m_ + 2.0 * clearance_m_, left_.data());
     const auto sieving = static_cast<std::uint32_t>(sifted.asked / PairsAhead::kPairsPerVisit);
-    budget.visits -= std::min(budget.visits, sieving);
+    looked_at_ = 0;
     for (const std::uint32_t i : std::span(left_).first(sifted.left)) {
       const NearPair& pair = pairs_.listed().pairs()[i];
       look_at(pair, moved(pair), findings);
     }
+    const auto looking =
+        static_cast<std::uint32_t>(sifted.left / kPairsPerVisit) + kVisitsPerPair * looked_at_;
+    budget.visits -= std::min(budget.visits, sieving + looking);
+    looking_ += sieving + looking;
   }
 }
 
@@ -212,6 +221,7 @@ void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findi
   const Seen& seen = seen_[pair.obstacle];
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   const Triangle b = {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)};
+  if (axes_.apart(a.start, a.end, b, border_m_ + bulge_m_ + 2.0 * clearance_m_)) return;
   const MeshSurface::Plane& plane = surface.planes()[pair.b];
   const auto heights = [](const MeshSurface::Plane& over, const Triangle& triangle) -> Heights {
     return {over.normal.dot(triangle[0]) - over.offset_m, over.normal.dot(triangle[1]) - over.offset_m,
@@ -221,6 +231,7 @@ void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findi
   if (kept_apart(heights(plane, a.start), a_end, 0.0)) return;
   // Seen from the tool the obstacle's way bulges a little.
   if (kept_apart(heights(a.plane_start, b), heights(a.plane_end, b), bulge_m_)) return;
+  ++looked_at_;
   const std::size_t before = crossings_.size();
   vertices_on_face(seen, pair, a);
   face_on_vertices(seen, pair);

@@ -8,6 +8,7 @@
 
 #include "collision/pairs_ahead.hpp"
 #include "collision/scene.hpp"
+#include "collision/separating_axes.hpp"
 #include "collision/tree_walk.hpp"
 #include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
@@ -42,6 +43,7 @@ class MeshContacts {
     bool overlaps = false;  ///< the end pose overlaps, though nothing was seen on the way: it is too long.
                             ///< Not told of all that do, but of all that are turned far on the way.
     bool complete = true;   ///< false: the way is too long for what may be looked at; nothing is known
+    bool late = false;      ///< then: but not for long, what is needed to look at it is being made
   };
 
   /// The scene is kept by reference.
@@ -60,8 +62,17 @@ class MeshContacts {
   /// it will be. RT safe.
   void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0) noexcept;
 
+  /// The share of the way from the start to X_WT that can be looked at now, in a scene where nothing moves.
+  /// RT safe.
+  double share_listed(const Pose& X_WT) const noexcept { return pairs_.share_listed(X_start_, X_WT); }
+  /// What it takes to list pairs, for every tick that a list serves; in visits.
+  double visits_per_tick() const noexcept { return pairs_.visits_per_tick(); }
+
+  /// What the looks of this tick took beside the lists, in visits.
+  std::uint32_t looking() const noexcept { return looking_; }
+
   /// The tool is elsewhere now. RT safe.
-  void forget_motion() noexcept { pairs_.forget_motion(); }
+  void forget() noexcept { pairs_.forget(); }
 
   /// The contacts that touch at the end looked at last, with their gap no wider than the clearance, and
   /// rounding.
@@ -129,9 +140,12 @@ class MeshContacts {
   double slope_ = 0.0;     ///< by which their surroundings may seem to come first
 
   std::vector<std::uint32_t> left_;  ///< of the pairs listed: those that may meet on the way
+  SeparatingAxes axes_;
   Moved moved_;
+  std::uint32_t looked_at_ = 0;  ///< pairs that no plane keeps apart
   std::vector<Crossing> crossings_;
-  TreeWalk walk_;          ///< of make_sure()
+  TreeWalk walk_;  ///< of make_sure()
+  std::uint32_t looking_ = 0;
   bool in_doubt_ = false;  ///< it told of an overlap in this tick
   ContactSet touching_;
 };

@@ -24,6 +24,13 @@ void NearPairs::set_out(const Way& way) noexcept {
   set_out_for_next();
 }
 
+void NearPairs::clear() noexcept {
+  state_ = State::empty;
+  visits_ = 0;
+  pairs_.clear();
+  sieve_.clear();
+}
+
 void NearPairs::set_out_for_next() noexcept {
   taken_ = 0;
   if (next_ == near_by_.size()) return;

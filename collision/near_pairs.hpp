@@ -41,6 +41,9 @@ class NearPairs {
   /// Goes on with it until it has ended (true) or the budget is used up. RT safe.
   bool go_on(WalkBudget& budget) noexcept;
 
+  /// There is no list any more. RT safe.
+  void clear() noexcept;
+
   bool under_way() const noexcept { return state_ == State::under_way; }
   /// Are all pairs listed? Not where there was no room for them.
   bool complete() const noexcept { return state_ == State::complete; }

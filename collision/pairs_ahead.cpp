@@ -2,6 +2,7 @@
 #include "collision/pairs_ahead.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace wrenchd {
@@ -36,13 +37,24 @@ constexpr double kTo = 2.0;
 constexpr double kSieved = 2.0;
 constexpr double kTooDear = 1.5;
 constexpr double kFewer = 0.7;
+/// One with so many times the pairs of the one that serves, where these are not few, is given up for one that
+/// is to serve for fewer ticks: the motion was not known well enough for it.
+constexpr double kFarMore = 1.7;
+constexpr double kFew = 500.0;
+constexpr double kFarFewer = 0.5;
+/// A list that is late is gone on with where it holds for so much more of the way than what serves. It holds
+/// for the way that was asked for first, with some room beside it.
+constexpr double kLeadsOn = 0.01;
+constexpr double kBesideWay = 1.2;
 /// The least that is done with a tick, in visits.
 constexpr double kLeastPortion = 32.0;
 /// No list made at once takes more than this share of the budget that is left: a way that is too long for it
 /// may be followed by a shorter one.
 constexpr double kLongestWalk = 0.7;
 
+/// What can wait takes what there is for it.
 std::uint32_t most_visits(const WalkBudget& budget) noexcept {
+  if (budget.kept > 0) return budget.visits - std::min(budget.visits, budget.kept);
   return static_cast<std::uint32_t>(kLongestWalk * budget.visits);
 }
 
@@ -70,42 +82,88 @@ bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times
   const auto will_hold = [&](const NearPairs& list) {
     return list.will_cover(X_end, times.end_s) && list.will_cover(X_start, times.start_s);
   };
-  if (!holds(*listed_)) {
-    if (ahead_->under_way() && will_hold(*ahead_)) {
-      if (go_on(*ahead_, most_visits(budget), budget)) weigh();
-    }
-    if (holds(*ahead_)) {
-      serve(ahead_);
-    } else if (list_at_once(X_start, X_end, times, budget)) {
-      ++made_at_once_;
-      serve(spare_);
-      astray_ = true;
-    } else {
-      return false;
-    }
+  late_ = false;
+  if (holds(*listed_)) return true;
+  if (ahead_->under_way() && will_hold(*ahead_)) {
+    if (go_on(*ahead_, most_visits(budget), budget)) weigh();
+    if (ahead_->under_way() && budget.kept > 0) return late();
   }
-  return true;
+  if (holds(*ahead_)) {
+    serve(ahead_);
+    return true;
+  }
+  if (!list_at_once(X_start, X_end, times, budget)) return false;
+  ++made_at_once_;
+  serve(spare_);
+  astray_ = true;
+  return holds(*listed_);  // one that was late was made for where the tool was to go then
 }
 
-/// For as long as it takes to make the next list, if the way leads where the tool is expected; else for this
-/// way alone. Whether the way expected holds this one for obstacles that move too is not looked at.
+bool PairsAhead::late() noexcept {
+  late_ = late_tick_ = true;
+  return false;
+}
+
+/// One that was late already is gone on with, if it leads on.
 bool PairsAhead::list_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
                               WalkBudget& budget) noexcept {
-  const double least_m = (motion_.known() ? kLeastReach : kFirstReach) * scene_.tool_radius_m();
-  NearPairs::Way way = {X_start, X_end, std::max(kReach * listed().way_m(X_start, X_end), least_m),
-                        times.start_s, times.end_s};
-  if (!scene_.moves() && motion_.known()) {
-    const NearPairs::Way expected = way_ahead(0.0, kTicksAtOnce);
-    const auto holds = [&](const Pose& X) { return listed().away_m(expected, X) <= expected.reach_m; };
-    if (goes_slowly(expected) && holds(X_start) && holds(X_end)) way = expected;
+  const std::uint32_t most = most_visits(budget);
+  const bool waits = budget.kept > 0;
+  if (waits && most < kLeastPortion) return late();
+  const bool begun = waits && spare_->under_way() &&
+                     share_of(*spare_, X_start, X_end) > share_of(*listed_, X_start, X_end) + kLeadsOn;
+  if (!begun) {
+    const double ticks =
+        waits && listed().visits() > most ? static_cast<double>(listed().visits()) / most : 0.0;
+    spare_->set_out(way_at_once(X_start, X_end, times, std::log2(1.0 + ticks)));
   }
-  spare_->set_out(way);
-  go_on(*spare_, most_visits(budget), budget);
+  go_on(*spare_, most, budget);
+  if (waits && spare_->under_way()) return late();
   return spare_->complete();
 }
 
+/// For as long as it takes to make the next list, if the way leads where the tool is expected; else for this
+/// way alone. One that will be late is made for as much longer as the hand will have gone on by then. Whether
+/// the way expected holds this one for obstacles that move too is not looked at.
+NearPairs::Way PairsAhead::way_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
+                                       double wait_ticks) const noexcept {
+  const double least_m = (motion_.known() ? kLeastReach : kFirstReach) * scene_.tool_radius_m();
+  NearPairs::Way way = {X_start, X_end, std::max(kReach * listed().way_m(X_start, X_end), least_m),
+                        times.start_s, times.end_s};
+  if (scene_.moves() || !motion_.known()) return way;
+  if (wait_ticks > 0.0) {
+    const Pose X_now = motion_.after(0.0), X_then = motion_.after(wait_ticks + kTicksAtOnce);
+    way.X_WT_end = {(X_then.rotation * X_now.rotation.conjugate() * X_end.rotation).normalized(),
+                    X_end.translation_m + X_then.translation_m - X_now.translation_m};
+    way.reach_m = std::max(
+        {kReach * listed().way_m(X_start, way.X_WT_end), least_m, kBesideWay * listed().away_m(way, X_end)});
+    return way;
+  }
+  const NearPairs::Way expected = way_ahead(0.0, kTicksAtOnce);
+  const auto holds = [&](const Pose& X) { return listed().away_m(expected, X) <= expected.reach_m; };
+  return goes_slowly(expected) && holds(X_start) && holds(X_end) ? expected : way;
+}
+
+/// The start must be among what the list holds for. A list holds for the whole of a way if for its ends.
+double PairsAhead::share_of(const NearPairs& list, const Pose& X_start, const Pose& X_end) const noexcept {
+  constexpr int kHalvings = 7;
+  if (!list.will_cover(X_start)) return 0.0;
+  if (list.will_cover(X_end)) return 1.0;
+  double share = 0.0, beyond = 1.0;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (share + beyond);
+    const Pose X = {X_start.rotation.slerp(middle, X_end.rotation),
+                    X_start.translation_m + middle * (X_end.translation_m - X_start.translation_m)};
+    (list.will_cover(X) ? share : beyond) = middle;
+  }
+  return share;
+}
+
 void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s) noexcept {
-  motion_.learn(X_WT, X_WP);
+  if (std::exchange(late_tick_, false))
+    motion_.learn_late(X_WP);
+  else
+    motion_.learn(X_WT, X_WP);
   tick_s_ = time_s - last_s_;
   last_s_ = time_s;
   const double soon = ticks_to_serve();
@@ -119,7 +177,13 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
     if (ahead_->covers(X_WT, time_s)) serve(ahead_);  // it holds for longer than the one that serves
     ahead_->set_out(way);
   }
-  if (go_on(*ahead_, portion(X_soon, soon), budget)) weigh();
+  const std::uint32_t visits = portion(X_soon, soon);
+  if (go_on(*ahead_, budget.kept > 0 ? std::min(visits, most_visits(budget)) : visits, budget)) weigh();
+  if (ticks_ahead_ > kLeastTicksAhead && static_cast<double>(ahead_->pairs().size()) >
+                                             kFarMore * static_cast<double>(listed().pairs().size()) + kFew) {
+    ticks_ahead_ = std::max(kFarFewer * ticks_ahead_, kLeastTicksAhead);
+    ahead_->clear();
+  }
 }
 
 /// What is to be done of the list ahead with this tick, in visits, so that it is done when the one that
@@ -136,8 +200,12 @@ std::uint32_t PairsAhead::portion(const Pose& X_soon, double soon) const noexcep
   return static_cast<std::uint32_t>(std::max(kHaste * to_do / left, kLeastPortion));
 }
 
-void PairsAhead::forget_motion() noexcept {
+void PairsAhead::forget() noexcept {
   motion_.forget();
+  for (NearPairs& list : lists_) list.clear();
+  astray_ = late_ = late_tick_ = false;
+  visits_of_list_ = 0;
+  ticks_ahead_ = kMostTicksAhead;
 }
 
 /// How long the next list is to serve, by what this one took to make and takes to sieve.

@@ -32,25 +32,38 @@ class PairsAhead {
   };
 
   /// Sees to it that listed() holds for the straight way from one pose to the other. False where that would
-  /// take more than what there is of the budget: the way is too long. RT safe.
+  /// take more than what there is of the budget: the way is too long, or the list waits(). RT safe.
   bool list(const Pose& X_start, const Pose& X_end, WalkBudget& budget) noexcept {
     return list(X_start, X_end, Times{}, budget);
   }
   bool list(const Pose& X_start, const Pose& X_end, const Times& times, WalkBudget& budget) noexcept;
 
+  /// Is the list that was asked for last being made, to be gone on with when it is asked for again?
+  bool waits() const noexcept { return late_; }
+  /// The share of this way that listed() holds for, in a scene where nothing moves. RT safe.
+  double share_listed(const Pose& X_start, const Pose& X_end) const noexcept {
+    return share_of(*listed_, X_start, X_end);
+  }
+  /// What a list takes for every tick that it serves, in visits; 0: none was made yet.
+  double visits_per_tick() const noexcept { return listed().visits() / ticks_ahead_; }
+
   /// Once a tick, when the tool has come to X_WT at this scene time, following a hand that has come to X_WP:
   /// goes on with the list for where it will be. RT safe.
   void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0) noexcept;
 
-  /// The tool is elsewhere now: how it moved says nothing about how it will. RT safe.
-  void forget_motion() noexcept;
+  /// The tool is elsewhere now: what was, says nothing about what will be. RT safe.
+  void forget() noexcept;
 
   const NearPairs& listed() const noexcept { return *listed_; }
   PairSieve& sieve() noexcept { return listed_->sieve(); }               ///< of what is listed
   std::uint32_t made_at_once() const noexcept { return made_at_once_; }  ///< lists, so far
 
  private:
+  bool late() noexcept;
   bool list_at_once(const Pose& X_start, const Pose& X_end, const Times& times, WalkBudget& budget) noexcept;
+  NearPairs::Way way_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
+                             double wait_ticks) const noexcept;
+  double share_of(const NearPairs& list, const Pose& X_start, const Pose& X_end) const noexcept;
   NearPairs::Way way_ahead(double from_ticks, double to_ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
   double ticks_to_serve() const noexcept;
@@ -64,6 +77,7 @@ class PairsAhead {
   NearPairs* ahead_ = &lists_[1];   ///< is being made, or waits until it is needed
   NearPairs* spare_ = &lists_[2];   ///< for what must be listed at once
   bool astray_ = false;             ///< the tool did not go in this tick where the list ahead was to serve
+  bool late_ = false, late_tick_ = false;  ///< the list asked for last, one asked for in this tick
   std::uint32_t made_at_once_ = 0;
 
   ExpectedMotion motion_;

@@ -57,9 +57,16 @@ bool inside(const MeshSurface& surface, const Vector3d& p) noexcept {
   return odd;
 }
 
+/// Nobody waits for one of its ticks.
+Proxy::Effort all_at_once() noexcept {
+  Proxy::Effort effort;
+  effort.evenly = false;
+  return effort;
+}
+
 }  // namespace
 
-Placement::Placement(const Scene& scene) : scene_(scene), half_spaces_(scene), proxy_(scene) {}
+Placement::Placement(const Scene& scene) : scene_(scene), half_spaces_(scene), proxy_(scene, all_at_once()) {}
 
 bool Placement::meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept {
   const TreedMesh& tool = *scene_.tool_mesh();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "core/metric.hpp"
 
@@ -18,12 +19,26 @@ constexpr double kLeastStep = 0.002;
 constexpr double kLongestTurn_rad = 0.05;
 /// A way this short, as a share of the step, is not worth going.
 constexpr double kShortestShare = 1.0 / 1024.0;
+/// Where a way was too long and a shorter one waits for its list, the next tick begins with the shorter one,
+/// but not with less than this.
+constexpr double kLeastFirstShare = 1.0 / 64.0;
 /// Where a contact has let go, another is about to be met near by, most often: the first step is a short one,
 /// and every next may be longer.
 constexpr double kWary = 1.0 / 64.0;
 constexpr double kLonger = 4.0;
 /// A way that is long and free is gone in steps that grow by so much.
 constexpr double kGrowth = 1.5;
+/// A hand that moves by no more than this in a tick, in units of the tool's size, can wait for a tool that is
+/// some ticks late.
+constexpr double kPatientWay = 0.005;
+/// What is made ahead may fill a tick up to so many times what ticks usually take.
+constexpr double kAheadUpTo = 1.5;
+/// A look, the step before it included, takes the time of so many visits beside those that it counts.
+constexpr std::uint32_t kVisitsPerLook = 18;
+/// So many looks are always taken.
+constexpr int kFewLooks = 3;
+/// Of the share of a way that can be looked at, this much is gone.
+constexpr double kSafely = 0.9;
 /// The least that a contact is held open by, in units of the clearance.
 constexpr double kLeastClearance = 0.2;
 /// A proxy that obstacles cannot push aside for so many ticks is caught between them.
@@ -52,25 +67,58 @@ Proxy::Proxy(const Scene& scene, Effort effort)
 
 void Proxy::stay(const Pose& X_last) noexcept {
   looks_ = 0;
-  budget_.visits = effort_.visits;
-  meshes_.look_ahead(X_last, X_last, budget_);
+  set_budget(0.0);
+  look_ahead(X_last, X_last);
 }
 
 Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) noexcept {
   X_WQ_ = X_last;
   looks_ = 0;
   iterations_ = 0;
-  budget_.visits = effort_.visits;
+  set_budget(X_asked_ ? way_m(*X_asked_, X_WP) : 0.0);
   meshes_.start_at(X_WQ_, seen_s_);
   const Projection q = find(X_WP, time_s);
-  meshes_.look_ahead(q.X_WQ, X_WP, budget_, seen_s_);
+  if (!late_) first_share_ = 1.0;
+  look_ahead(q.X_WQ, X_WP);
   return q;
+}
+
+/// hand_m: how far the hand has come with this tick. Where obstacles move nothing can wait: what is late
+/// would let them come nearer unseen.
+void Proxy::set_budget(double hand_m) noexcept {
+  late_ = false;
+  least_left_ = 0;
+  budget_ = {effort_.visits};
+  if (!effort_.evenly || scene_.moves()) return;
+  const double haste = std::max(1.0, hand_m / (kPatientWay * scene_.tool_radius_m()));
+  const std::uint32_t most = even_.most(haste);
+  least_left_ = effort_.visits - std::min(effort_.visits, most);
+  const auto for_lists = static_cast<std::uint32_t>(std::max<double>(most - even_.usual_of_looks(), 0.0));
+  budget_.kept = effort_.visits - std::min(effort_.visits, for_lists);
+}
+
+/// A tick that had much to do leaves more of what is made ahead to others.
+void Proxy::look_ahead(const Pose& X_WT, const Pose& X_WP) noexcept {
+  if (budget_.kept > 0) {
+    const double most = kAheadUpTo * even_.usual();
+    const auto for_all = static_cast<std::uint32_t>(std::min<double>(most, effort_.visits));
+    budget_.kept = std::max(budget_.kept, effort_.visits - for_all);
+  }
+  const std::uint32_t looking = meshes_.looking() + looks_ * kVisitsPerLook;
+  meshes_.look_ahead(X_WT, X_WP, budget_, seen_s_);
+  even_.learn(looking, meshes_.visits_per_tick(), late_);
+}
+
+bool Proxy::worked_enough() const noexcept {
+  return budget_.visits <= least_left_;
 }
 
 void Proxy::forget(double time_s) noexcept {
   known_.clear();
   X_asked_.reset();
-  meshes_.forget_motion();
+  meshes_.forget();
+  even_.forget();
+  first_share_ = 1.0;
   seen_s_ = known_s_ = time_s;
   stuck_ticks_ = 0;
 }
@@ -80,7 +128,7 @@ Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
   double longest_m =
       std::max(kLongestStep * (X_asked_ ? way_m(*X_asked_, X_WP) : 0.0), kLeastStep * scene_.tool_radius_m());
   X_asked_ = X_WP;
-  double share = 1.0;  // of the step that the contacts known allow
+  double share = first_share_;  // of the step that the contacts known allow
   double T_last = energy(M_, X_WP, X_WQ_);
   while (looks_ < effort_.looks && share >= kShortestShare) {
     const Projection q = step(X_WP, share * longest_m);
@@ -99,13 +147,27 @@ Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
     }
     if (way == Way::too_long) {
       share *= 0.25;
+      first_share_ = std::max(share, kLeastFirstShare);
       continue;
     }
+    if (way == Way::late) {  // as far as is known; the rest waits
+      if (std::exchange(late_, true)) break;
+      const double far_m = std::max((q.X_WQ.translation_m - X_WQ_.translation_m).norm(),
+                                    scene_.tool_radius_m() * q.X_WQ.rotation.angularDistance(X_WQ_.rotation));
+      share = std::min(share, kSafely * meshes_.share_listed(q.X_WQ) * far_m / longest_m);
+      continue;
+    }
+    first_share_ = 1.0;
     X_WQ_ = q.X_WQ;
     meshes_.start_at(X_WQ_, seen_s_);
+    if (late_) break;
     if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
     const bool all_hold = !let_go(q);
     share = all_hold ? std::min(1.0, kLonger * share) : kWary;
+    if (!all_hold && looks_ >= kFewLooks && worked_enough()) {
+      late_ = true;
+      break;
+    }
     if (!whole) {
       if (all_hold && share == 1.0) longest_m *= kGrowth;  // a long way to go, and nothing on it
       continue;
@@ -145,7 +207,7 @@ bool Proxy::give_way(double time_s) noexcept {
     const bool agree = q.status != ProjectionStatus::infeasible;
     const Way way = agree ? look_along(q.X_WQ, next_s) : Way::too_long;
     if (way == Way::met_contacts) continue;
-    if (way == Way::too_long) {
+    if (way != Way::free) {
       if (!agree) known_.clear();
       share *= 0.25;
       continue;
@@ -198,6 +260,7 @@ double Proxy::way_m(const Pose& from, const Pose& to) const noexcept {
 /// Looks along the way from the pose at hand; what it meets there becomes known.
 Proxy::Way Proxy::look_along(const Pose& X_WT, double time_s) noexcept {
   ++looks_;
+  budget_.visits -= std::min(budget_.visits, kVisitsPerLook);
   bool learned = false;
   ContactSet met;
   const double tolerance_m = exact_.gap_tolerance_m(X_WT) - kClearance_m;
@@ -205,7 +268,7 @@ Proxy::Way Proxy::look_along(const Pose& X_WT, double time_s) noexcept {
   for (const Contact& contact : met) learned = learn(contact) || learned;
   if (scene_.meshes().empty()) return learned ? Way::met_contacts : Way::free;
   const MeshContacts::Findings found = meshes_.look(X_WT, kClearance_m, budget_, time_s);
-  if (!found.complete) return Way::too_long;
+  if (!found.complete) return found.late ? Way::late : Way::too_long;
   for (const Contact& contact : found.met) learned = learn(contact) || learned;
   if (learned) return Way::met_contacts;
   return found.overlaps || !found.met.empty() || !met.empty() ? Way::too_long : Way::free;

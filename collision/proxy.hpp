@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "collision/even_work.hpp"
 #include "collision/half_space_contacts.hpp"
 #include "collision/mesh_contacts.hpp"
 #include "core/projection.hpp"
@@ -24,7 +25,9 @@ namespace wrenchd {
 /// sees them late: q is admissible for where they stood at seen_s().
 ///
 /// However deep p is and however fast it moves, q is an admissible pose at any time, and the work is bounded:
-/// when it is used up, q is as far as it came.
+/// when it is used up, q is as far as it came. Ticks are kept much alike: what would make one take several
+/// times what most take, a list of pairs that has to be made at once above all, is spread over two or three,
+/// which go as far as what is known to be free allows (even_work.hpp). Where obstacles move nothing waits.
 ///
 /// All memory is taken at construction. One object serves one thread.
 class Proxy {
@@ -38,6 +41,7 @@ class Proxy {
   struct Effort {
     std::uint16_t looks = 24;      ///< ways looked along
     std::uint32_t visits = 40000;  ///< nodes and leaves of the trees, and what is found in them
+    bool evenly = true;  ///< where a tick would take far more than most, leaves what can wait to the next
   };
 
   /// The scene is kept by reference and must outlive this.
@@ -62,8 +66,11 @@ class Proxy {
 
  private:
   using Known = FixedList<ActiveContact, ContactSet::kCapacity>;
-  enum class Way : std::uint8_t { free, met_contacts, too_long };
+  enum class Way : std::uint8_t { free, met_contacts, too_long, late };
 
+  void set_budget(double hand_m) noexcept;
+  void look_ahead(const Pose& X_WT, const Pose& X_WP) noexcept;
+  bool worked_enough() const noexcept;
   Projection find(const Pose& X_WP, double time_s) noexcept;
   bool give_way(double time_s) noexcept;
   void see(double time_s) noexcept;
@@ -89,6 +96,10 @@ class Proxy {
   double known_s_ = 0.0;         ///< the scene time that the known contacts are of
   std::uint16_t stuck_ticks_ = 0;
   WalkBudget budget_;
+  EvenWork even_;
+  std::uint32_t least_left_ = 0;  ///< of the budget of an even tick
+  bool late_ = false;             ///< this tick was to do more
+  double first_share_ = 1.0;      ///< of the longest step, for the first of the next tick
   std::uint16_t looks_ = 0;
   std::uint16_t iterations_ = 0;
 };

@@ -32,6 +32,7 @@ struct Sweep {
 /// same.
 struct WalkBudget {
   std::uint32_t visits = 0;  ///< nodes and leaves looked at
+  std::uint32_t kept = 0;    ///< of these, so many are not for what can wait until the next tick
 };
 
 namespace walk {

@@ -68,5 +68,16 @@ TEST_CASE("what was forgotten is not expected to go on", "[expected_motion]") {
   CHECK(apart_m(motion.after(20), hand(0)) < 1e-15);
 }
 
+TEST_CASE("a tool that is late is expected where it would have come to", "[expected_motion]") {
+  ExpectedMotion motion;
+  motion.learn_late(hand(0));
+  CHECK_FALSE(motion.known());
+  for (int i = 0; i <= 100; ++i) motion.learn(hand(i), hand(i));
+  for (int i = 101; i <= 104; ++i) motion.learn_late(hand(i));
+  const double way_m = apart_m(hand(100), hand(104));
+  CHECK(apart_m(motion.after(0), hand(104)) < 0.02 * way_m);
+  CHECK(apart_m(motion.after(20), hand(124)) < 0.02 * apart_m(hand(104), hand(124)));
+}
+
 }  // namespace
 }  // namespace wrenchd

@@ -112,7 +112,7 @@ TEST_CASE("a way that is too long for the budget is not listed, and what was lis
 TEST_CASE("a tool that was put elsewhere is not expected to fly on", "[pairs_ahead]") {
   PairsAhead pairs(bumpy_bodies());
   for (int i = 1; i < 40; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
-  pairs.forget_motion();
+  pairs.forget();
   const Pose put = {Quaterniond::Identity(), {0, 0.105, 0}};
   const auto near = [&](double s) {
     return Pose{put.rotation, put.translation_m + s * Vector3d(0, 0, 1e-6)};
@@ -122,6 +122,46 @@ TEST_CASE("a tool that was put elsewhere is not expected to fly on", "[pairs_ahe
   const std::uint32_t before = pairs.made_at_once();
   for (int i = 20; i < 40; ++i) REQUIRE(tick(pairs, near(i - 1), near(i)));
   CHECK(pairs.made_at_once() == before);  // one list holds: it hardly moves
+}
+
+// What can wait takes no more of a tick than there is for it; the list that serves goes on to serve.
+TEST_CASE("a list that may wait is made over several ticks, and serves then", "[pairs_ahead]") {
+  PairsAhead pairs(bumpy_bodies());
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
+  const std::uint32_t before = pairs.made_at_once();
+  const Pose aside = {along(59).rotation, along(59).translation_m + Vector3d(0, 0, 2e-3)};
+  constexpr std::uint32_t kPart = 50;
+  int late = 0;
+  for (bool listed = false; !listed; ++late) {
+    REQUIRE(late < 100);
+    WalkBudget budget = {kPlenty, kPlenty - kPart};
+    listed = pairs.list(along(59), aside, budget);
+    CHECK(pairs.waits() == !listed);
+    CHECK(kPlenty - budget.visits <= kPart + 1);
+    CHECK(pairs.listed().covers(along(59)));
+    CHECK(pairs.share_listed(along(59), aside) >= 0.0);
+    if (!listed) CHECK(pairs.share_listed(along(59), aside) < 1.0);
+  }
+  CHECK(late > 2);
+  CHECK(pairs.made_at_once() == before + 1);
+  CHECK(pairs.listed().covers(aside));
+  CHECK(pairs.share_listed(along(59), aside) == 1.0);
+}
+
+TEST_CASE("a list that waits is given up where the way leads elsewhere", "[pairs_ahead]") {
+  PairsAhead pairs(bumpy_bodies());
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
+  const auto aside = [&](double s) {
+    return Pose{along(59).rotation, along(59).translation_m + s * Vector3d(0, 0, 2e-3)};
+  };
+  for (const double side : {1.0, -1.0, 1.0, -1.0}) {
+    WalkBudget budget = {kPlenty, kPlenty - 50};
+    CHECK_FALSE(pairs.list(along(59), aside(side), budget));
+  }
+  WalkBudget budget = {kPlenty};
+  REQUIRE(pairs.list(along(59), aside(1.0), budget));
+  CHECK(pairs.listed().covers(aside(1.0)));
+  CHECK_FALSE(pairs.waits());
 }
 
 }  // namespace

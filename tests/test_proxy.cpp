@@ -337,6 +337,59 @@ TEST_CASE("a proxy that is given no time stays where it is admissible, and says 
   CHECK(spent > 5);
 }
 
+// In visits, not in time. Among fine bodies that the hand has just begun to move, or turns back, a list of
+// pairs is missing: ticks that make it at once take tens of times what the others take.
+TEST_CASE("no tick takes far more work than most, and what is late is caught up with", "[proxy]") {
+  const Scene scene = scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, Motion::slide, {}});
+  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+  // To and fro along the boulder, pressed into it, with stops of 20 ticks: each sets out anew.
+  const auto hand = [](int tick) -> Pose {
+    const int phase = tick / 60, within = std::min(tick % 60, 40);
+    const double s = 1e-4 * (phase % 2 == 0 ? within : 40 - within);
+    return {rotation_from({0.0, 3.0 * s, 2.0 * s}), {0.0915, s, -0.5 * s}};
+  };
+  struct Ticks {
+    std::uint32_t most = 0;
+    std::vector<std::uint32_t> visits;
+    std::vector<Projection> q;
+  };
+  const auto follow = [&](bool evenly) {
+    Proxy::Effort effort;
+    effort.evenly = evenly;
+    Proxy proxy(scene, effort);
+    Ticks out;
+    Pose X_WQ = {Quaterniond::Identity(), {0.12, 0, 0}};
+    for (int tick = -40; tick < 600; ++tick) {
+      Pose X_WP = hand(std::max(tick, 0));
+      X_WP.translation_m.x() += 5e-4 * std::max(-tick - 20, 0);  // down onto it
+      const Projection q = proxy.follow(X_WP, X_WQ);
+      X_WQ = q.X_WQ;
+      REQUIRE(q.status != ProjectionStatus::infeasible);
+      if (tick < 0) continue;
+      if (tick % 20 == 0) REQUIRE_FALSE(exact.meet(X_WQ));
+      out.visits.push_back(proxy.visits());
+      out.most = std::max(out.most, proxy.visits());
+      out.q.push_back(q);
+    }
+    return out;
+  };
+  const Ticks even = follow(true), at_once = follow(false);
+  CHECK(even.most < 0.75 * at_once.most);
+  int cut = 0, run = 0;
+  for (std::size_t i = 0; i < even.q.size(); ++i) {
+    const bool late = even.q[i].status == ProjectionStatus::budget_spent;
+    cut += late;
+    run = late ? run + 1 : 0;
+    CHECK(run <= 4);
+    if (i % 60 == 59) {  // it has rested
+      CHECK(even.q[i].status == ProjectionStatus::converged);
+      CHECK(even.q[i].kkt_residual < 1e-6);
+    }
+  }
+  CHECK(cut > 0);
+  CHECK(cut < 40);
+}
+
 TEST_CASE("following a hand through meshes neither allocates nor locks", "[realtime][proxy]") {
   for (const std::size_t i : {3, 7, 12, 15}) {
     const Handling& handling = rough_handling()[i];

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+
+namespace wrenchd {
+
+/// How much work one tick may take for all to take much the same: what looks took of late, and what the lists
+/// of pairs take that they live on. What is left over waits for the next tick, which may take more then.
+/// Counted in visits (tree_walk.hpp), so that a replay does the same.
+class EvenWork {
+ public:
+  /// Once a tick: what its looks took and, for every tick that it serves, the list they looked through. late:
+  /// it left something over that it needed. RT safe.
+  void learn(std::uint32_t looks, double list, bool late) noexcept;
+  /// The tool is elsewhere now. RT safe.
+  void forget() noexcept { *this = EvenWork(); }
+
+  /// What looks take in most ticks, and all work. RT safe.
+  double usual_of_looks() const noexcept { return looks_; }
+  double usual() const noexcept { return looks_ + list_; }
+  /// What the next tick may take. haste: how many times faster the hand moves than one that can wait; at
+  /// least 1. RT safe.
+  std::uint32_t most(double haste) const noexcept;
+
+ private:
+  double learned_ = 0.0;             ///< ticks
+  double looks_ = 0.0, list_ = 0.0;  ///< visits
+  bool late_ = false;                ///< the last tick
+};
+
+}  // namespace wrenchd

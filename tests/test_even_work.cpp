@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "collision/even_work.hpp"
+
+namespace wrenchd {
+namespace {
+
+EvenWork after(int ticks, std::uint32_t looks, double list) {
+  EvenWork work;
+  for (int i = 0; i < ticks; ++i) work.learn(looks, list, false);
+  return work;
+}
+
+TEST_CASE("a tick may take a few times what ticks usually take, and no more", "[even_work]") {
+  const EvenWork work = after(200, 300, 700.0);
+  CHECK(work.usual() == Approx(1000.0));
+  CHECK(work.usual_of_looks() == Approx(300.0));
+  CHECK(work.most(1.0) > 1500);
+  CHECK(work.most(1.0) <= 4000);
+}
+
+TEST_CASE("one tick that takes far more changes little", "[even_work]") {
+  EvenWork work = after(200, 300, 700.0);
+  const std::uint32_t before = work.most(1.0);
+  work.learn(3000, 700.0, false);
+  CHECK(work.most(1.0) < before * 1.2);
+}
+
+TEST_CASE("what becomes dearer for good is the usual soon", "[even_work]") {
+  EvenWork work = after(200, 100, 100.0);
+  for (int i = 0; i < 200; ++i) work.learn(500, 1000.0, false);
+  CHECK(work.usual() > 1400.0);
+}
+
+TEST_CASE("a tool that rested may move as soon as it is moved: lists count, not what rest took",
+          "[even_work]") {
+  CHECK(after(10000, 1, 1700.0).most(1.0) > 3400);
+}
+
+TEST_CASE("small work is never cut, and nor is a fast hand", "[even_work]") {
+  CHECK(after(200, 5, 2.0).most(1.0) >= 100);
+  const EvenWork work = after(200, 300, 700.0);
+  CHECK(work.most(10.0) == 10 * work.most(1.0));
+  CHECK(work.most(1e30) > 1'000'000);
+}
+
+TEST_CASE("after a tick that was late the next may take more, the one after it less again", "[even_work]") {
+  EvenWork work = after(200, 300, 700.0);
+  const std::uint32_t before = work.most(1.0);
+  work.learn(300, 700.0, true);
+  CHECK(work.most(1.0) > 1.5 * before);
+  work.learn(300, 700.0, false);
+  CHECK(work.most(1.0) == before);
+}
+
+TEST_CASE("a tool that is elsewhere begins anew", "[even_work]") {
+  EvenWork work = after(200, 3000, 7000.0);
+  work.forget();
+  CHECK(work.most(1.0) == EvenWork().most(1.0));
+  // The first list is not begun before it is late: it says nothing yet.
+  work.learn(0, 0.0, true);
+  CHECK(work.most(1.0) >= EvenWork().most(1.0));
+}
+
+}  // namespace
+}  // namespace wrenchd
