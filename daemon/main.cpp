@@ -37,6 +37,8 @@ constexpr int kExitRefused = 1;  ///< a file, a device or the kernel said no; no
 constexpr int kExitFault = 3;    ///< the loop ended with a fault; the hand was released
 
 constexpr auto kLook = std::chrono::milliseconds(100);  ///< how often the live line looks
+/// The zeros of a release are written by a thread of the link's, which a dying process leaves this long.
+constexpr auto kLastWords = std::chrono::milliseconds(50);
 
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
@@ -299,7 +301,10 @@ void catch_signals() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   std::set_terminate([] {
-    if (loop_to_release != nullptr) loop_to_release->release(std::chrono::steady_clock::now(), Fault::none);
+    if (loop_to_release != nullptr) {
+      loop_to_release->release(std::chrono::steady_clock::now(), Fault::none);
+      std::this_thread::sleep_for(kLastWords);
+    }
     std::abort();
   });
 }
