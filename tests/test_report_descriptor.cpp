@@ -3,7 +3,6 @@
 
 #include "devices/report_descriptor.hpp"
 #include "tests/support/random_values.hpp"
-#include "tests/support/repeats.hpp"
 #include "tests/support/sample_descriptors.hpp"
 
 namespace wrenchd {
@@ -308,7 +307,7 @@ void check_sound(const ReportDescriptor& descriptor) {
 
 TEST_CASE("a million mutated and random descriptors are accepted whole or refused", "[report_descriptor]") {
   RandomValues random(20);
-  const int cases = repeats(1'000'000);
+  constexpr int cases = 1'000'000;  // under sanitizers too: it is memory that such bytes are after
   int accepted = 0;
   for (int i = 0; i < cases; ++i) {
     const Bytes bytes = strange_descriptor(random);
