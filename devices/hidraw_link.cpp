@@ -70,7 +70,7 @@ void HidrawLink::CloseHid::operator()(hid_device_* device) const noexcept {
 }
 
 HidrawLink::HidrawLink(UsbDevice device, LinkSettings settings)
-    : device_(std::move(device)), settings_(settings) {}
+    : device_(std::move(device)), settings_(std::move(settings)) {}
 
 void HidrawLink::open() {
   close();
