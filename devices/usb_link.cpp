@@ -494,7 +494,8 @@ void UsbLink::Engine::lose() noexcept {
 
 // --- the servo thread -------------------------------------------------------------------------------------
 
-UsbLink::UsbLink(UsbDevice device, LinkSettings settings) : device_(std::move(device)), settings_(settings) {}
+UsbLink::UsbLink(UsbDevice device, LinkSettings settings)
+    : device_(std::move(device)), settings_(std::move(settings)) {}
 
 UsbLink::~UsbLink() {
   close();
