@@ -288,4 +288,10 @@ DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& 
   return profile;
 }
 
+DeviceProfile load_profile_named(const std::string& name, const SearchPath& search) {
+  const std::filesystem::path file = profile_file(name);
+  std::error_code error;
+  return load_profile(std::filesystem::exists(file, error) ? file : search.require(file), search);
+}
+
 }  // namespace wrenchd

@@ -13,4 +13,8 @@ namespace wrenchd {
 /// manual of the format. Throws ConfigError.
 DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search = SearchPath());
 
+/// The profile that a person names on a command line: a file where there is one of that name, from here, and
+/// otherwise the one of that name along the search path. Throws as load_profile().
+DeviceProfile load_profile_named(const std::string& name, const SearchPath& search = SearchPath());
+
 }  // namespace wrenchd

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/device_wait.hpp"
 
-#include <algorithm>
-
 #include <spdlog/spdlog.h>
 
 #include "core/clock.hpp"
+#include "devices/usb_devices.hpp"
 
 namespace wrenchd {
 namespace {
@@ -13,13 +12,6 @@ namespace {
 /// How often it is looked whether to stop, and how many such looks pass without an attempt.
 constexpr auto kLook = std::chrono::milliseconds(100);
 constexpr int kLooksBetween = 10;
-
-/// What a device says of itself, fit for a log: no character that moves a cursor or begins a line.
-std::string plain(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
-}
 
 }  // namespace
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kTable = "/ticks";
 /// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
-/// is not the placer's; 2: `placing` and `start_over`.
+/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`.
 constexpr const char* kFormat = "3";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress

@@ -214,9 +214,15 @@ std::vector<UsbDevice> list_usb_devices() {
   return found;
 }
 
+std::string plain(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
+
 std::string describe(const UsbDevice& device) {
   std::string s = hex4(device.vendor) + ":" + hex4(device.product);
-  if (!device.serial.empty()) s += " serial " + device.serial;
+  if (!device.serial.empty()) s += " serial " + plain(device.serial);
   if (!device.place.empty()) s += " in " + device.place;
   if (device.interface >= 0) s += ", interface " + std::to_string(device.interface);
   return s;

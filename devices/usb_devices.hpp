@@ -34,7 +34,11 @@ struct UsbDevice {
 /// std::runtime_error where udev cannot be asked. Not RT safe; takes milliseconds.
 std::vector<UsbDevice> list_usb_devices();
 
-/// "1209:6d0f serial 42 in 3-1.2, interface 0", for messages.
+/// What a device says of itself, fit for a terminal and a log: no character that moves a cursor or begins a
+/// line.
+std::string plain(std::string text);
+
+/// "1209:6d0f serial 42 in 3-1.2, interface 0", for messages; its serial number made plain.
 std::string describe(const UsbDevice& device);
 
 /// Why a node cannot be opened for reading and writing, and the cure; empty where it can. Asks the system,

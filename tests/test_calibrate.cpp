@@ -86,6 +86,7 @@ TEST_CASE("wrenchctl calibrate refuses what it cannot calibrate") {
     std::string told;
   } const table[] = {
       {{"calibrate", "gone"}, "gone.toml: no such file"},
+      {{"calibrate", "loopback"}, "profile loopback: it is for the simulated device"},
       {{"calibrate", "polhem"}, "no such device is plugged in; wrenchctl devices lists what is"},
       {{"calibrate", ""}, "must not be empty; name a profile, or leave it out"},
       {{"calibrate", "polhem", "--serial", ""}, "--serial: must not be empty; give the serial number"},

@@ -25,11 +25,12 @@ constexpr Duration kPeriod = std::chrono::milliseconds(1);
 std::atomic<bool> interrupted{false};
 
 std::vector<DeviceProfile> profiles_named(const std::string& name) {
-  const SearchPath search;
-  if (name == kAnyProfile) return known_profiles(search).profiles;
-  const std::filesystem::path file = profile_file(name);
-  std::error_code error;
-  return {load_profile(std::filesystem::exists(file, error) ? file : search.require(file), search)};
+  if (name == kAnyProfile) return known_profiles(SearchPath()).profiles;
+  const DeviceProfile profile = load_profile_named(name);
+  if (profile.transport == Transport::loopback)
+    throw std::runtime_error("profile " + profile.name +
+                             ": it is for the simulated device, which needs no calibration");
+  return {profile};
 }
 
 /// The profile of the plugged-in device that is meant, and its serial number.
@@ -59,7 +60,7 @@ Target find_target(const CalibrateOptions& options) {
   return {profiles[choice.pick->profile], device.serial};
 }
 
-/// Whether a line was typed since; whether nothing more can be is of no matter.
+/// Whether a line was typed since it was asked last.
 bool line_typed() {
   pollfd input = {STDIN_FILENO, POLLIN, 0};
   if (poll(&input, 1, 0) <= 0 || (input.revents & POLLIN) == 0) return false;

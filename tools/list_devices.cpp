@@ -29,15 +29,15 @@ using Interfaces = std::span<const Entry>;
 
 // --- what there is ----------------------------------------------------------------------------------------
 
-/// What somebody else chose, fit for a terminal: no character that moves its cursor.
-std::string plain(std::string text, std::size_t longest = 60) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
-  return printable(text, longest);
+constexpr std::size_t kLongestName = 60, kLongestReason = 400;
+
+std::string plain(const std::string& text, std::size_t longest) {
+  return printable(wrenchd::plain(text), longest);
 }
 
 UsbDevice plain(UsbDevice device) {
-  for (std::string* text : {&device.serial, &device.manufacturer, &device.product_name}) *text = plain(*text);
+  for (std::string* text : {&device.serial, &device.manufacturer, &device.product_name})
+    *text = plain(*text, kLongestName);
   return device;
 }
 
@@ -182,7 +182,7 @@ std::string why_not(const Entry& entry, const std::vector<DeviceProfile>& profil
   std::vector<std::pair<std::string, std::string>> names_by_reason;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     if (entry.match.profile == i) continue;
-    std::string reason = plain(entry.match.why_not[i], 400);
+    std::string reason = plain(entry.match.why_not[i], kLongestReason);
     if (reason.empty())
       reason = entry.match.profile ? "it fits as well, and the other is nearer" : "it fits, and is not alone";
     const auto same = std::find_if(names_by_reason.begin(), names_by_reason.end(),

@@ -305,15 +305,6 @@ struct ReportOptions {
   bool to_device = false;
 };
 
-/// A profile by its name, or a file.
-DeviceProfile profile_named(const std::string& name) {
-  const SearchPath search;
-  const std::filesystem::path file = profile_file(name);
-  std::error_code error;
-  if (std::filesystem::exists(file, error)) return load_profile(file, search);
-  return load_profile(search.require(file), search);
-}
-
 std::vector<std::uint8_t> bytes_of(const char* option, const std::string& text) {
   const ReportBytes parsed = parse_bytes(text);
   if (parsed.problem.empty()) return parsed.bytes;
@@ -345,7 +336,7 @@ Wrench wrench_of(const std::string& text) {
 }
 
 void run_encode(const ReportOptions& options) {
-  const DeviceProfile profile = profile_named(options.profile);
+  const DeviceProfile profile = load_profile_named(options.profile);
   const EncodedWrench encoded =
       encode_wrench(profile, wrench_of(options.wrench), bytes_of("--at", options.at), options.sequence);
   for (const std::string& remark : encoded.remarks) say(remark);
@@ -366,7 +357,7 @@ void add_decode(CLI::App& app, ReportOptions& options) {
       "Fields stand in the device's own axes, as its bytes have them; lines that end in 'in base' are what\n"
       "wrenchd makes of them: x forward, away from the user, y left, z up.");
   decode->callback([&] {
-    std::cout << report_text(profile_named(options.profile), bytes_of("--hex", options.hex),
+    std::cout << report_text(load_profile_named(options.profile), bytes_of("--hex", options.hex),
                              options.to_device);
   });
 }
