@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "config/load_profile.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <iterator>
+#include <vector>
 
 #include "config/inherited_toml.hpp"
 #include "config/load_kinematics.hpp"
 #include "config/load_report_layout.hpp"
 #include "config/report_bytes.hpp"
 #include "config/toml_reader.hpp"
+#include "core/limits.hpp"
 
 namespace wrenchd {
 namespace {
@@ -20,27 +24,148 @@ struct Shape {
   bool torque = true;
 };
 
+/// A key that a profile may take back from the one it inherits.
+bool is_stated(const TomlValue& value) {
+  return value && !value.is_text("none");
+}
+
+void read_workspace(TomlTable& table, DeviceProfile& p) {
+  const TomlValue radius = table.optional("workspace_radius_m");
+  const TomlValue centre = table.optional("workspace_centre_m");
+  if (is_stated(radius)) radius.number(p.workspace_radius_m, {0.01, 2});
+  centre.vector(p.workspace_centre_m, {-2, 2});
+  if (centre && !centre.is_inherited() && !is_stated(radius))
+    centre.refuse("means nothing without workspace_radius_m; state both");
+}
+
+/// A rating above the maximum is a mistake where somebody wrote both. An inherited one under a maximum that
+/// was lowered says only that the motors bear the maximum for ever.
+void read_rating(const TomlValue& value, double& rating, Range range, double maximum) {
+  if (!value.number(rating, range) || !(rating > maximum)) return;
+  if (value.is_inherited())
+    rating = maximum;
+  else
+    value.refuse("is more than the maximum, " + value.with_unit(maximum) +
+                 "; lower it, or leave all three out");
+}
+
+/// What motors bear for ever, and how long they take to warm up: together, or not at all.
+void read_motor_heat(TomlTable& table, DeviceProfile& p, const Shape& shape) {
+  const TomlValue force = table.optional("continuous_force_N");
+  const TomlValue torque = table.optional("continuous_torque_Nm");
+  const TomlValue time = table.optional("thermal_time_s");
+  if (is_stated(torque) && !shape.torque)
+    return torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
+  std::vector<const TomlValue*> stated, all = {&force, &time};
+  if (shape.torque) all.push_back(&torque);
+  std::copy_if(all.begin(), all.end(), std::back_inserter(stated),
+               [](const auto* v) { return is_stated(*v); });
+  if (stated.empty()) return;
+  if (stated.size() < all.size())
+    return stated.front()->refuse(shape.torque
+                                      ? "needs continuous_force_N, continuous_torque_Nm and "
+                                        "thermal_time_s; state all three, or none"
+                                      : "needs continuous_force_N and thermal_time_s; state both, or none");
+  read_rating(force, p.continuous_force_N, {0.01, kHighestForce_N}, p.max_force_N);
+  if (shape.torque) read_rating(torque, p.continuous_torque_Nm, {0.001, kHighestTorque_Nm}, p.max_torque_Nm);
+  time.number(p.thermal_time_s, {0.1, 10000});
+}
+
+/// Optional, and only of a device that has motors.
+void read_more_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
+  const TomlValue power = table.optional("max_power_W");
+  if (shape.output) {
+    if (is_stated(power)) power.number(p.max_power_W, {0.01, 10000});
+    read_workspace(table, p);
+    return read_motor_heat(table, p, shape);
+  }
+  const auto refuse = [](const TomlValue& value) {
+    if (value) value.refuse("the device has no motors: there is no wrench_report; leave it out");
+  };
+  refuse(power);
+  for (const char* key : {"workspace_radius_m", "workspace_centre_m", "continuous_force_N",
+                          "continuous_torque_Nm", "thermal_time_s"})
+    refuse(table.optional(key));
+}
+
 /// Mandatory, every one: nobody but the maker knows what a device and the hand on it can bear.
 void read_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
   const TomlValue force = shape.output ? table.mandatory("max_force_N") : table.optional("max_force_N");
   const TomlValue torque = shape.torque ? table.mandatory("max_torque_Nm") : table.optional("max_torque_Nm");
   if (shape.output)
-    force.number(p.max_force_N, {0.01, 200});
+    force.number(p.max_force_N, {0.01, kHighestForce_N});
   else if (force)
     force.refuse("the device takes no force: there is no wrench_report; leave it out");
   if (shape.torque)
-    torque.number(p.max_torque_Nm, {0.001, 20});
+    torque.number(p.max_torque_Nm, {0.001, kHighestTorque_Nm});
   else if (torque)
     torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
   if (!shape.output) p.max_force_N = 0.0;
   if (!shape.torque) p.max_torque_Nm = 0.0;
   table.mandatory("max_linear_speed_m_per_s").number(p.max_linear_speed_m_per_s, {0.01, 10});
   table.mandatory("max_angular_speed_rad_per_s").number(p.max_angular_speed_rad_per_s, {0.1, 100});
+  read_more_limits(table, p, shape);
 }
 
+// --- buttons ----------------------------------------------------------------------------------------------
+
+std::size_t buttons_in(const PoseReportLayout& layout) {
+  return layout.buttons.present ? layout.buttons.bits : layout.button_bits.size();
+}
+
+/// Does any report carry the button of this number?
+bool has_button(const DeviceProfile& p, int button) {
+  const Kinematics::CountButton& hidden = p.kinematics.count_button;
+  if (hidden.present && static_cast<int>(hidden.button) == button) return true;
+  std::size_t most = buttons_in(p.pose_report);
+  for (const PoseReportLayout& layout : p.more_reports) most = std::max(most, buttons_in(layout));
+  return button >= 0 && static_cast<std::size_t>(button) < most;
+}
+
+/// "0 to 7", "0"; empty: none.
+std::string buttons_text(const DeviceProfile& p) {
+  std::string text;
+  for (int first = 0; first < 32; ++first) {
+    if (!has_button(p, first)) continue;
+    int last = first;
+    while (last < 31 && has_button(p, last + 1)) ++last;
+    text += (text.empty() ? "" : ", ") + std::to_string(first);
+    if (last > first) text += " to " + std::to_string(last);
+    first = last;
+  }
+  return text;
+}
+
+void read_button(const TomlValue& value, int& button, const DeviceProfile& p) {
+  int number = -1;
+  if (!is_stated(value) || !value.integer(number, {0, 31})) return;
+  if (has_button(p, number)) {
+    button = number;
+    return;
+  }
+  const std::string known = buttons_text(p);
+  value.refuse(known.empty() ? "no report carries buttons; give pose_report its 'buttons', or leave this out"
+                             : "no report carries a button of this number; they carry " + known);
+}
+
+/// What buttons mean. The reports must have been read before.
+void read_buttons(TomlTable& table, DeviceProfile& p) {
+  const TomlValue deadman = table.optional("deadman");
+  const TomlValue stop = table.optional("stop");
+  read_button(deadman, p.deadman_button, p);
+  read_button(stop, p.stop_button, p);
+  if (p.stop_button >= 0 && p.stop_button == p.deadman_button)
+    stop.refuse(
+        "is the deadman button as well; a button cannot be held and be let go at a time, so name another");
+}
+
+// ----------------------------------------------------------------------------------------------------------
+
 void read_closed_loop(TomlTable& table, DeviceProfile& p) {
-  table.optional("damping_N_s_per_m").number(p.damping_N_s_per_m, {0, 1000});
-  table.optional("damping_Nm_s_per_rad").number(p.damping_Nm_s_per_rad, {0, 100});
+  const TomlValue linear = table.optional("damping_N_s_per_m");
+  const TomlValue angular = table.optional("damping_Nm_s_per_rad");
+  if (is_stated(linear)) linear.number(p.damping_N_s_per_m, {0, 1000});
+  if (is_stated(angular)) angular.number(p.damping_Nm_s_per_rad, {0, 100});
   table.optional("max_stiffness_N_per_m").number(p.max_stiffness_N_per_m, {1, 1e6});
   table.optional("max_stiffness_Nm_per_rad").number(p.max_stiffness_Nm_per_rad, {1e-3, 1e4});
 }
@@ -276,6 +401,11 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   keep_alive.table(read_keep_alive, p);
   if (keep_alive && p.stream == StreamStyle::lock_step)
     keep_alive.refuse("a lock-step device is spoken to all the time; leave it out");
+  const TomlValue buttons = table.optional("buttons");
+  if (buttons && !shape.output)
+    buttons.refuse("the device has no motors: there is no wrench_report; leave it out");
+  else
+    buttons.table(read_buttons, p);
   check_pose_parts(pose_report, p);
   check_told_apart(pose_report, more_reports, p);
 }

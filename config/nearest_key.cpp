@@ -10,11 +10,11 @@ namespace wrenchd {
 namespace {
 
 /// Units a user may have in mind; key names join them with "_" and "per".
-constexpr std::array<std::string_view, 47> kUnits = {
-    "per", "m",   "dm", "cm",  "mm",  "um",  "nm",    "km",   "in",   "s",   "ms", "us",
-    "ns",  "min", "Hz", "kHz", "MHz", "rad", "mrad",  "deg",  "rpm",  "rps", "N",  "mN",
-    "uN",  "kN",  "cN", "lbf", "kgf", "Nm",  "mNm",   "Nmm",  "kNm",  "kg",  "g",  "mg",
-    "t",   "lb",  "m2", "mm2", "cm2", "s2",  "count", "deg2", "rad2", "A",   "mA"};
+constexpr std::array<std::string_view, 50> kUnits = {
+    "per", "m",   "dm",  "cm",    "mm",   "um",   "nm",  "km",  "in",  "s",  "ms", "us", "ns",
+    "min", "Hz",  "kHz", "MHz",   "rad",  "mrad", "deg", "rpm", "rps", "N",  "mN", "uN", "kN",
+    "cN",  "lbf", "kgf", "Nm",    "mNm",  "Nmm",  "kNm", "kg",  "g",   "mg", "t",  "lb", "m2",
+    "mm2", "cm2", "s2",  "count", "deg2", "rad2", "A",   "mA",  "W",   "mW", "kW"};
 
 bool is_unit(std::string_view word) {
   return std::find(kUnits.begin(), kUnits.end(), word) != kUnits.end();

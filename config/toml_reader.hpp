@@ -46,6 +46,8 @@ class TomlValue {
   bool holds(std::string_view key) const noexcept;
   /// Does the table hold this key with the text "none"?
   bool says_none(std::string_view key) const noexcept;
+  /// Does it come from a profile that the file inherits?
+  bool is_inherited() const noexcept { return place_.file != nullptr; }
   const std::string& name() const noexcept { return name_; }  ///< dotted, as in "obstacle[0].half_space"
 
   bool number(double& out, Range range) const;  ///< an integer will do

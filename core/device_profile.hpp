@@ -257,6 +257,18 @@ struct DeviceProfile {
   double max_linear_speed_m_per_s = kNotStated;
   double max_angular_speed_rad_per_s = kNotStated;
 
+  // More limits, each optional. NaN: not stated, and then there is none.
+  double workspace_radius_m = kNotStated;  ///< of the handle point about the centre: no wrench far outside
+  Vector3d workspace_centre_m = Vector3d::Zero();  ///< in B
+  double max_power_W = kNotStated;                 ///< mechanical, into the hand; what brakes it is free
+  double continuous_force_N = kNotStated;          ///< what the motors bear for ever, in any direction
+  double continuous_torque_Nm = kNotStated;        ///< likewise; NaN also where the device takes no torque
+  double thermal_time_s = kNotStated;              ///< time constant of their windings
+
+  // Buttons that have a meaning here, by their number in the reports. -1: the device has none.
+  int deadman_button = -1;  ///< held, or there is no force
+  int stop_button = -1;     ///< pressed: emergency stop
+
   // What the device is, closed loop: bounds for stiffness. NaN: not stated.
   double damping_N_s_per_m = kNotStated;
   double damping_Nm_s_per_rad = kNotStated;

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <set>
 
 #include <catch2/catch.hpp>
 
+#include "config/load_hand_script.hpp"
 #include "config/load_profile.hpp"
 #include "core/finite.hpp"
 #include "devices/profile_device.hpp"
@@ -150,6 +152,93 @@ TEST_CASE("the shipped loopback profile is the reference report layout", "[profi
   CHECK(file.max_torque_Nm == code.max_torque_Nm);
   CHECK(file.report_rate_Hz == code.report_rate_Hz);
   CHECK(file.watchdog_s == code.watchdog_s);
+}
+
+TEST_CASE("a profile may state more limits, and what its buttons mean", "[profiles]") {
+  const auto load = [](const std::string& name) {
+    return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml", kShipped);
+  };
+  const DeviceProfile example = load("example");
+  CHECK(example.workspace_radius_m == 0.3);
+  CHECK(example.workspace_centre_m == Vector3d::Zero());
+  CHECK(example.max_power_W == 5.0);
+  CHECK(example.continuous_force_N == 2.7);
+  CHECK(example.continuous_torque_Nm == 0.1);
+  CHECK(example.thermal_time_s == 20.0);
+  CHECK(example.deadman_button == 0);
+  CHECK(example.stop_button == 1);
+  for (const char* name : {"loopback", "reference_full_speed", "reference_high_speed"}) {
+    const DeviceProfile p = load(name);
+    INFO(name);
+    CHECK(p.workspace_radius_m == 0.25);
+    CHECK(p.max_power_W == 10.0);
+    CHECK(p.continuous_force_N == 4.0);
+    CHECK(p.continuous_torque_Nm == 0.2);
+    CHECK(p.thermal_time_s == 20.0);
+    CHECK(p.deadman_button == -1);
+    CHECK(p.stop_button == -1);
+  }
+  for (const char* name : {"polhem", "polhem_lpc1768", "falcon", "woodenhaptics", "spacemouse_split"}) {
+    const DeviceProfile p = load(name);
+    INFO(name);
+    for (const double limit : {p.workspace_radius_m, p.max_power_W, p.continuous_force_N,
+                               p.continuous_torque_Nm, p.thermal_time_s})
+      CHECK(std::isnan(limit));
+    CHECK(p.deadman_button == -1);
+    CHECK(p.stop_button == -1);
+  }
+}
+
+TEST_CASE("the shipped hands stay inside the loopback's workspace", "[profiles]") {
+  const DeviceProfile p = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml", kShipped);
+  int hands = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(WRENCHD_SOURCE_DIR "/config/hands")) {
+    SimulationSettings hand;
+    load_hand_script(entry.path(), hand);
+    INFO(entry.path());
+    for (const Waypoint& waypoint : hand.hand_path)
+      CHECK((waypoint.position_m - p.workspace_centre_m).norm() < p.workspace_radius_m);
+    ++hands;
+  }
+  CHECK(hands > 0);
+}
+
+TEST_CASE("an inherited limit may be taken back, and a lower maximum lowers the rating", "[profiles]") {
+  const test::TemporaryDirectory dir;
+  const auto load = [&](const std::string& parent, const std::string& text) {
+    return load_profile(dir.write("mine.toml", "inherits = \"" + parent + "\"\nname = \"mine\"\n" + text),
+                        kShipped);
+  };
+  const DeviceProfile none = load("example",
+                                  "[limits]\nworkspace_radius_m = \"none\"\nmax_power_W = \"none\"\n"
+                                  "continuous_force_N = \"none\"\ncontinuous_torque_Nm = \"none\"\n"
+                                  "thermal_time_s = \"none\"\n[buttons]\ndeadman = \"none\"\n");
+  for (const double limit : {none.workspace_radius_m, none.max_power_W, none.continuous_force_N,
+                             none.continuous_torque_Nm, none.thermal_time_s})
+    CHECK(std::isnan(limit));
+  CHECK(none.deadman_button == -1);
+  CHECK(none.stop_button == 1);
+  const DeviceProfile weak = load("loopback", "[limits]\nmax_force_N = 3.0\n");
+  CHECK(weak.continuous_force_N == 3.0);
+  CHECK(weak.continuous_torque_Nm == 0.2);
+  CHECK_THROWS_WITH(load("loopback", "[limits]\nmax_force_N = 3.0\ncontinuous_force_N = 3.5\n"),
+                    Catch::Contains("mine.toml:5:22") && Catch::Contains("is more than the maximum, 3 N"));
+}
+
+TEST_CASE("a deadman or stop button may come in any report, as a bit, from a list or out of a count",
+          "[profiles]") {
+  const test::TemporaryDirectory dir;
+  const auto load = [&](const std::string& text) {
+    return load_profile(dir.write("mine.toml", text), kShipped);
+  };
+  const DeviceProfile arm = load("inherits = \"polhem\"\nname = \"mine\"\n[buttons]\ndeadman = 0\n");
+  CHECK(arm.deadman_button == 0);
+  const DeviceProfile delta =
+      load("inherits = \"falcon\"\nname = \"mine\"\n[buttons]\ndeadman = 2\nstop = 3\n");
+  CHECK(delta.deadman_button == 2);
+  CHECK(delta.stop_button == 3);
+  const DeviceProfile highest = load("inherits = \"loopback\"\nname = \"mine\"\n[buttons]\nstop = 7\n");
+  CHECK(highest.stop_button == 7);
 }
 
 TEST_CASE("a million fuzzed reports are understood or dropped, and no sample is ever not finite",
