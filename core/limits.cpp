@@ -2,22 +2,34 @@
 #include "core/limits.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
+#include "core/device_profile.hpp"
 #include "core/finite.hpp"
 
 namespace wrenchd {
 namespace {
 
-double tighter(double setting, double profile) {
-  return setting > 0.0 ? std::min(setting, profile) : profile;
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double kBelow = 1.0 - 4.0 * kEpsilon;  ///< keeps a product below its limit when it is rounded up
+
+/// x where it is a number from 0 to `most`; 0 where it is none, or below.
+double within(double x, double most) noexcept {
+  return is_finite(x) ? std::clamp(x, 0.0, most) : 0.0;
+}
+
+/// A setting of 0, or one that is no number, leaves the profile's. A profile that states nothing allows
+/// nothing.
+double tighter(double setting, double profile, double highest) noexcept {
+  const double own = within(profile, highest);
+  return is_finite(setting) && setting > 0.0 ? std::min(setting, own) : own;
 }
 
 /// Shortens v to the limit, direction kept, and stays below it by what rounding may add. Taken apart into its
 /// largest component and the rest, because the length of a finite vector may be infinite.
 bool saturate(Vector3d& v, double limit) noexcept {
-  constexpr double kBelow = 1.0 - 4.0 * std::numeric_limits<double>::epsilon();
   const double largest = v.cwiseAbs().maxCoeff();
   if (!(largest > 0.0)) return false;
   const Vector3d shape = v / largest;
@@ -34,47 +46,147 @@ bool saturate(Vector3d& v, double limit) noexcept {
 bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
   const double last_length = last.norm();
   Vector3d keep = Vector3d::Zero();
-  if (last_length > 0.0)
-    keep = last * (std::clamp(v.dot(last) / last_length, 0.0, last_length) / last_length);
+  if (last_length > 0.0) {
+    const Vector3d along = last / last_length;
+    keep = along * std::clamp(v.dot(along), 0.0, last_length);
+  }
   const Vector3d rest = v - keep;
-  const double length = rest.norm();
-  if (!(length > growth)) return false;
-  v = keep + rest * (growth / length);
+  const double rest_length = rest.norm();
+  if (!(rest_length > growth)) return false;
+  v = keep + rest * (growth / rest_length);
   return true;
+}
+
+/// What went out last, as far as it could have: a vector that is none was nothing, a longer one was the
+/// limit.
+Vector3d legal(const Vector3d& last, double limit) noexcept {
+  if (!is_finite(last)) return Vector3d::Zero();
+  Vector3d v = last;
+  saturate(v, limit);
+  return v;
+}
+
+bool all_finite(const LimitInput& in) noexcept {
+  return is_finite(in.asked) && is_finite(in.authority) && is_finite(in.dt_s) && is_finite(in.V_BH) &&
+         is_finite(in.p_BH_m);
 }
 
 }  // namespace
 
-WrenchLimits::WrenchLimits(const LimitSettings& settings, double profile_max_force_N,
-                           double profile_max_torque_Nm)
-    : max_force_N_(tighter(settings.max_force_N, profile_max_force_N)),
-      max_torque_Nm_(tighter(settings.max_torque_Nm, profile_max_torque_Nm)),
-      force_slew_N_per_s_(settings.force_slew_N_per_s),
-      torque_slew_Nm_per_s_(settings.torque_slew_Nm_per_s) {}
+const char* text(LimitCause cause) noexcept {
+  switch (cause) {
+    case kNotLimited:
+      return "none";
+    case kForceMagnitude:
+      return "force magnitude";
+    case kTorqueMagnitude:
+      return "torque magnitude";
+    case kForceSlew:
+      return "force slew";
+    case kTorqueSlew:
+      return "torque slew";
+    case kAuthority:
+      return "authority";
+    case kNotFinite:
+      return "not finite";
+    case kForceThermal:
+      return "force thermal";
+    case kTorqueThermal:
+      return "torque thermal";
+    case kWorkspaceEdge:
+      return "workspace edge";
+    case kPower:
+      return "power";
+    case kPassivity:
+      return "passivity";
+  }
+  return "unknown";
+}
 
-Limited WrenchLimits::apply(const Wrench& asked, double authority, double dt_s) noexcept {
-  if (!is_finite(asked) || !is_finite(authority) || !is_finite(dt_s)) {
+std::string limit_causes_text(std::uint16_t causes) {
+  std::string all;
+  for (unsigned bit = 0; bit < 16; ++bit) {
+    const auto cause = static_cast<std::uint16_t>(1u << bit);
+    if ((causes & cause) != 0)
+      all += (all.empty() ? "" : ", ") + std::string(text(static_cast<LimitCause>(cause)));
+  }
+  return all.empty() ? text(kNotLimited) : all;
+}
+
+WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile)
+    : max_force_N_(tighter(settings.max_force_N, profile.max_force_N, kHighestForce_N)),
+      max_torque_Nm_(tighter(settings.max_torque_Nm, profile.max_torque_Nm, kHighestTorque_Nm)),
+      force_ceiling_N_(max_force_N_),
+      torque_ceiling_Nm_(max_torque_Nm_),
+      force_slew_N_per_s_(within(settings.force_slew_N_per_s, std::numeric_limits<double>::max())),
+      torque_slew_Nm_per_s_(within(settings.torque_slew_Nm_per_s, std::numeric_limits<double>::max())),
+      workspace_radius_m_(profile.workspace_radius_m),
+      workspace_centre_m_(profile.workspace_centre_m),
+      max_power_W_(profile.max_power_W) {}
+
+void WrenchLimits::set_ceiling(double force_N, double torque_Nm) noexcept {
+  force_ceiling_N_ = within(force_N, max_force_N_);
+  torque_ceiling_Nm_ = within(torque_Nm, max_torque_Nm_);
+}
+
+/// 1 within the radius, then along a straight line down to 0 at kEdgeEnd of it.
+double WrenchLimits::edge_share(const Vector3d& p_BH_m) const noexcept {
+  if (!is_finite(workspace_radius_m_)) return 1.0;
+  const double distance_m = (p_BH_m - workspace_centre_m_).norm();
+  if (distance_m <= workspace_radius_m_) return 1.0;
+  const double end_m = kEdgeEnd * workspace_radius_m_;
+  if (!(distance_m < end_m)) return 0.0;
+  return (end_m - distance_m) / (end_m - workspace_radius_m_);
+}
+
+/// By how much the wrench has to shrink so that no more than max_power_W goes into the hand.
+///
+///   P = f . v + tau . w,  and what its rounding may hide
+///
+/// The twist is taken apart into its largest component and the rest, as P may be infinite otherwise.
+double WrenchLimits::power_share(const Wrench& F, const Twist& V) const noexcept {
+  if (!is_finite(max_power_W_)) return 1.0;
+  const double largest =
+      std::max(V.linear_m_per_s.cwiseAbs().maxCoeff(), V.angular_rad_per_s.cwiseAbs().maxCoeff());
+  if (!(largest > 0.0)) return 1.0;
+  const Vector3d linear = F.force_N.cwiseProduct(V.linear_m_per_s / largest);
+  const Vector3d angular = F.torque_Nm.cwiseProduct(V.angular_rad_per_s / largest);
+  const double hidden = 8.0 * kEpsilon * (linear.lpNorm<1>() + angular.lpNorm<1>());
+  const double power = linear.sum() + angular.sum() + hidden;
+  if (!(power > 0.0)) return 1.0;
+  const double most = std::max(max_power_W_, 0.0) / power;
+  return largest > most ? kBelow * (most / largest) : 1.0;
+}
+
+Limited WrenchLimits::apply(const LimitInput& in) noexcept {
+  if (!all_finite(in)) {
     reset();
     return {Wrench{}, kNotFinite};
   }
-  Limited out{asked, kNotLimited};
+  Limited out{in.asked, kNotLimited};
+  Vector3d &force_N = out.F.force_N, &torque_Nm = out.F.torque_Nm;
   const auto mark = [&out](bool cut, LimitCause cause) noexcept {
-    if (cut) out.causes = static_cast<std::uint8_t>(out.causes | cause);
+    if (cut) out.causes = static_cast<std::uint16_t>(out.causes | cause);
   };
-  mark(saturate(out.F.force_N, max_force_N_), kForceMagnitude);
-  mark(saturate(out.F.torque_Nm, max_torque_Nm_), kTorqueMagnitude);
+  const auto scale = [&](double share, LimitCause cause) noexcept {
+    mark(share < 1.0, cause);
+    force_N *= share;
+    torque_Nm *= share;
+  };
+  mark(saturate(force_N, max_force_N_), kForceMagnitude);
+  mark(saturate(torque_Nm, max_torque_Nm_), kTorqueMagnitude);
+  mark(saturate(force_N, force_ceiling_N_), kForceThermal);
+  mark(saturate(torque_Nm, torque_ceiling_Nm_), kTorqueThermal);
+  scale(edge_share(in.p_BH_m), kWorkspaceEdge);
+  scale(std::clamp(in.authority, 0.0, 1.0), kAuthority);
 
-  const double share = std::clamp(authority, 0.0, 1.0);
-  mark(share < 1.0, kAuthority);
-  out.F.force_N *= share;
-  out.F.torque_Nm *= share;
-
-  const double dt = std::max(dt_s, 0.0);
-  mark(slew(out.F.force_N, last_.force_N, force_slew_N_per_s_ * dt), kForceSlew);
-  mark(slew(out.F.torque_Nm, last_.torque_Nm, torque_slew_Nm_per_s_ * dt), kTorqueSlew);
+  const double dt_s = std::clamp(in.dt_s, 0.0, kLongestStep_s);
+  mark(slew(force_N, legal(last_.force_N, max_force_N_), force_slew_N_per_s_ * dt_s), kForceSlew);
+  mark(slew(torque_Nm, legal(last_.torque_Nm, max_torque_Nm_), torque_slew_Nm_per_s_ * dt_s), kTorqueSlew);
   // Between two vectors within the limit lies no longer one, but for rounding.
-  saturate(out.F.force_N, max_force_N_);
-  saturate(out.F.torque_Nm, max_torque_Nm_);
+  saturate(force_N, force_ceiling_N_);
+  saturate(torque_Nm, torque_ceiling_Nm_);
+  scale(power_share(out.F, in.V_BH), kPower);
   last_ = out.F;
   return out;
 }

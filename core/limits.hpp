@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "core/spatial.hpp"
 
 namespace wrenchd {
+
+struct DeviceProfile;
 
 /// What the daemon's configuration says of limits. It may tighten a profile's limits, never loosen them.
 struct LimitSettings {
@@ -16,45 +19,100 @@ struct LimitSettings {
   double soft_start_s = 1.0;  ///< from armed to full authority
 };
 
+/// No profile and no setting reaches further, whatever they say.
+inline constexpr double kHighestForce_N = 200.0;
+inline constexpr double kHighestTorque_Nm = 20.0;
+
+/// Growth is never made up for: a longer step counts as this one. Five periods of the slowest loop.
+inline constexpr double kLongestStep_s = 0.010;
+
+/// Outside the workspace the wrench fades; at this many radii it is zero.
+inline constexpr double kEdgeEnd = 1.1;
+
 /// Why a wrench that goes out is not the one the law asked for. A bit mask.
-enum LimitCause : std::uint8_t {
+enum LimitCause : std::uint16_t {
   kNotLimited = 0,
   kForceMagnitude = 1,
   kTorqueMagnitude = 2,
   kForceSlew = 4,
   kTorqueSlew = 8,
-  kAuthority = 16,  ///< soft start or a stale sample: less than full authority
-  kNotFinite = 32,  ///< NaN or infinity: zero goes out
+  kAuthority = 16,     ///< soft start or a stale sample: less than full authority
+  kNotFinite = 32,     ///< NaN or infinity: zero goes out
+  kForceThermal = 64,  ///< the motors are warm: less than the maximum
+  kTorqueThermal = 128,
+  kWorkspaceEdge = 256,  ///< the handle is outside of its workspace
+  kPower = 512,          ///< more power would go into the hand than may
+  kPassivity = 1024,     ///< the passivity guard took from it before any of these
+};
+
+/// "force magnitude", "power"; of one bit.
+const char* text(LimitCause cause) noexcept;
+
+/// The causes of a mask, as in "force magnitude, power"; "none". Not RT safe.
+std::string limit_causes_text(std::uint16_t causes);
+
+/// What a tick asks for, and where the hand is; all in axes of the base B, about the handle point H.
+struct LimitInput {
+  Wrench asked;
+  double authority = 0.0;              ///< scales what is asked for: 0 to 1
+  double dt_s = 0.0;                   ///< since the last call
+  Twist V_BH;                          ///< of the handle
+  Vector3d p_BH_m = Vector3d::Zero();  ///< the handle point
 };
 
 struct Limited {
   Wrench F;
-  std::uint8_t causes = kNotLimited;
+  std::uint16_t causes = kNotLimited;  ///< LimitCause bits
 };
 
-/// The last thing between the rendering and the device, in this order: not finite -> zero; magnitude, force
-/// and torque each as a group, direction kept; authority; slew of what grows, from what went out last.
+/// The last thing between the rendering and the device, in this order:
 ///
-/// Whatever came before, legal or not, what goes out is finite and within the magnitudes.
+///   not finite, any number of the input: zero goes out
+///   magnitude, force and torque each as a group, direction kept
+///   thermal ceiling, likewise: below the magnitude while motors are warm
+///   workspace edge: the wrench fades outside
+///   authority
+///   slew: what grows, from what went out last; towards zero is free
+///   power: the whole wrench by one factor; what brakes the hand is free
+///
+/// Power comes after the slew, which holds back force and torque each on its own: one of them may have been
+/// what kept the power of the other down. A scale for both keeps all that was promised before it.
+///
+/// Whatever came before, legal or not, what goes out is finite and within every limit.
 class WrenchLimits {
  public:
-  /// The tighter of the two applies. Both maxima must be finite; 0: the device has no motors for it.
-  WrenchLimits(const LimitSettings& settings, double profile_max_force_N, double profile_max_torque_Nm);
+  /// The tighter of settings and profile applies. A maximum that is not stated is 0: no force. Edge and power
+  /// that are not stated are no limits. Slew rates that are no positive numbers let nothing grow.
+  WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile);
 
-  /// authority: 0 to 1, scales what is asked for. dt_s: time since the last call. RT safe.
-  Limited apply(const Wrench& asked, double authority, double dt_s) noexcept;
+  /// RT safe.
+  Limited apply(const LimitInput& input) noexcept;
+
+  /// What the motors bear now, of each group; never above the maxima. What is not finite is 0. RT safe.
+  void set_ceiling(double force_N, double torque_Nm) noexcept;
 
   /// Nothing goes out any more: the next wrench grows from zero. RT safe.
   void reset() noexcept { last_ = Wrench{}; }
+
+  /// What went out last is this, though it did not come from here: the next wrench grows from it. RT safe.
+  void follow(const Wrench& last) noexcept { last_ = last; }
 
   double max_force_N() const noexcept { return max_force_N_; }
   double max_torque_Nm() const noexcept { return max_torque_Nm_; }
 
  private:
+  double edge_share(const Vector3d& p_BH_m) const noexcept;
+  double power_share(const Wrench& F, const Twist& V_BH) const noexcept;
+
   double max_force_N_;
   double max_torque_Nm_;
+  double force_ceiling_N_;
+  double torque_ceiling_Nm_;
   double force_slew_N_per_s_;
   double torque_slew_Nm_per_s_;
+  double workspace_radius_m_;  ///< NaN: no edge
+  Vector3d workspace_centre_m_;
+  double max_power_W_;  ///< NaN: any
   Wrench last_;
 };
 

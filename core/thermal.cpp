@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "core/thermal.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/device_profile.hpp"
+#include "core/finite.hpp"
+#include "core/limits.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// What the heat may rise above 1 while the ceiling is on its way down. The rest, up to kMostHeat, is for the
+/// tick in which it came to 1.
+constexpr double kRiseWhileFolding = 0.04;
+
+bool is_positive(double x) noexcept {
+  return is_finite(x) && x > 0.0;
+}
+
+/// How much of the way to where it settles the heat goes in dt.
+double step_share(double dt_s, double time_s) noexcept {
+  return -std::expm1(-dt_s / time_s);
+}
+
+}  // namespace
+
+GroupHeat::GroupHeat(double maximum, double continuous, double thermal_time_s) noexcept
+    : maximum_(is_positive(maximum) ? maximum : 0.0),
+      continuous_(continuous),
+      time_s_(thermal_time_s),
+      rated_(is_positive(continuous) && is_positive(thermal_time_s) && continuous < maximum_),
+      ceiling_(maximum_) {
+  if (!rated_) return;
+  // F falls from r times the rating to the rating along a straight line, in t:
+  //   rise = (t / T) (mean of (F / continuous)^2 - 1) = (t / T) ((r^2 + r + 1) / 3 - 1)
+  const double r = maximum_ / continuous_;
+  fold_time_s_ = kRiseWhileFolding * time_s_ / ((r * r + r + 1.0) / 3.0 - 1.0);
+  ceiling_ = bearable();
+}
+
+/// What may be pushed through the next step without passing kMostHeat, however high the maximum is above the
+/// rating; never less than the rating. h' = h + a ((F / continuous)^2 - h) <= kMostHeat
+double GroupHeat::bearable() const noexcept {
+  const double a = step_share(kLongestStep_s, time_s_);
+  const double square = heat_ + (kMostHeat - heat_) / a;
+  return std::min(maximum_, continuous_ * std::sqrt(std::max(square, 1.0)));
+}
+
+void GroupHeat::advance(double pushed, double dt_s) noexcept {
+  if (!rated_ || !is_positive(dt_s)) return;
+  const double share = (is_finite(pushed) ? std::min(pushed, maximum_) : maximum_) / continuous_;
+  heat_ += step_share(dt_s, time_s_) * (share * share - heat_);
+  if (heat_ >= 1.0) folded_ = true;
+  if (heat_ <= kCooled) folded_ = false;
+  const double step = (maximum_ - continuous_) * (dt_s / fold_time_s_);
+  const double next = folded_ ? std::max(ceiling_ - step, continuous_) : std::min(ceiling_ + step, maximum_);
+  ceiling_ = std::min(next, bearable());
+}
+
+ThermalModel::ThermalModel(const DeviceProfile& profile, double max_force_N, double max_torque_Nm) noexcept
+    : force_(max_force_N, profile.continuous_force_N, profile.thermal_time_s),
+      torque_(max_torque_Nm, profile.continuous_torque_Nm, profile.thermal_time_s) {}
+
+void ThermalModel::advance(const Wrench& F, double dt_s) noexcept {
+  force_.advance(F.force_N.norm(), dt_s);
+  torque_.advance(F.torque_Nm.norm(), dt_s);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/support/limit_cases.hpp"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "core/finite.hpp"
+
+namespace wrenchd::test {
+namespace {
+
+constexpr double kMost = std::numeric_limits<double>::max();
+constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+constexpr std::uint64_t kTicksEach = 64;  ///< of one device
+
+}  // namespace
+
+LimitCases::LimitCases(std::uint64_t seed) : state_(seed), limits_({}, profile_) {}
+
+/// splitmix64 (Steele, Lea, Flood 2014): the cases must not cost more than what they try.
+std::uint64_t LimitCases::bits() noexcept {
+  std::uint64_t z = state_ += 0x9e37'79b9'7f4a'7c15;
+  z = (z ^ (z >> 30)) * 0xbf58'476d'1ce4'e5b9;
+  z = (z ^ (z >> 27)) * 0x94d0'49bb'1331'11eb;
+  return z ^ (z >> 31);
+}
+
+double LimitCases::share() noexcept {
+  return static_cast<double>(bits() >> 11) * 0x1p-53;
+}
+
+double LimitCases::power_of_two(int from, int to) noexcept {
+  return std::ldexp(1.0 + share(), from + static_cast<int>(share() * (to - from)));
+}
+
+/// A finite number of any kind.
+double LimitCases::anything() noexcept {
+  const double sign = chance(0.5) ? 1.0 : -1.0;
+  switch (bits() % 6) {
+    case 0:
+      return sign * 0.0;
+    case 1:
+      return sign * kLeast * static_cast<double>(bits() % 9);
+    case 2:
+      return sign * power_of_two(-1074, -1000);
+    case 3:
+      return sign * power_of_two(300, 1023);
+    case 4:
+      return sign * kMost;
+    default:
+      return sign * power_of_two(-60, 60);
+  }
+}
+
+/// An infinity of either sign, or a NaN of any sign and payload.
+double LimitCases::not_finite() noexcept {
+  constexpr std::uint64_t kSign = 0x8000'0000'0000'0000, kExponent = 0x7ff0'0000'0000'0000;
+  return std::bit_cast<double>(kExponent | (chance(0.5) ? bits() : bits() & kSign));
+}
+
+double LimitCases::beside(double x) noexcept {
+  switch (bits() % 3) {
+    case 0:
+      return x;
+    case 1:
+      return std::nextafter(x, kMost);
+    default:
+      return std::nextafter(x, -kMost);
+  }
+}
+
+Vector3d LimitCases::direction() noexcept {
+  if (chance(0.2)) return Vector3d::Unit(static_cast<Eigen::Index>(bits() % 3)) * (chance(0.5) ? 1.0 : -1.0);
+  Vector3d v(between(-1, 1), between(-1, 1), between(-1, 1));
+  return v.norm() > 1e-3 ? v.normalized() : Vector3d(Vector3d::UnitX());
+}
+
+Vector3d LimitCases::asked(double limit, const Vector3d& last) noexcept {
+  const bool known = is_finite(last);
+  switch (bits() % 10) {
+    case 0:
+      return Vector3d::Zero();
+    case 1:
+      return beside(limit) * direction();
+    case 2:
+      return power_of_two(-3, 900) * direction();
+    case 3:
+      return {anything(), anything(), anything()};
+    case 4:
+      return Vector3d::Constant(anything());
+    case 5:
+      if (known) return between(-2, 2) * 0.25 * last;
+      break;
+    case 6:
+      if (known) return chance(0.5) ? last : Vector3d(-last);
+      break;
+    case 7:
+      if (known) return 0.5 * last + 0.01 * limit * direction();
+      break;
+    default:
+      break;
+  }
+  return between(0, 1.5) * limit * direction();
+}
+
+/// What may stand in the memory of a limiter: nothing of it has to be legal.
+Vector3d LimitCases::any_last(double limit) noexcept {
+  switch (bits() % 6) {
+    case 0:
+      return {anything(), anything(), anything()};
+    case 1:
+      return beside(limit) * direction();
+    case 2:
+      return between(1, 10) * limit * direction();
+    case 3: {
+      Vector3d v = limit * direction();
+      v[static_cast<Eigen::Index>(bits() % 3)] = not_finite();
+      return v;
+    }
+    case 4:
+      return Vector3d::Zero();
+    default:
+      return between(0, 1) * limit * direction();
+  }
+}
+
+Vector3d LimitCases::place() noexcept {
+  const double radius = promise_.workspace_radius_m > 0 ? promise_.workspace_radius_m : 0.2;
+  switch (bits() % 8) {
+    case 0:
+      return promise_.workspace_centre_m + beside(radius) * direction();
+    case 1:
+      return promise_.workspace_centre_m + beside(1.1 * radius) * direction();
+    case 2:
+    case 3:
+      return promise_.workspace_centre_m + between(1, 1.1) * radius * direction();
+    case 4:
+      return chance(0.9) ? Vector3d(promise_.workspace_centre_m + between(1, 3) * radius * direction())
+                         : Vector3d(anything(), anything(), anything());
+    default:
+      return promise_.workspace_centre_m + between(0, 1) * radius * direction();
+  }
+}
+
+Twist LimitCases::motion() noexcept {
+  const Wrench& F = input_.asked;
+  const double f = F.force_N.cwiseAbs().maxCoeff(), tau = F.torque_Nm.cwiseAbs().maxCoeff();
+  const double speed = power_of_two(-8, 4), spin = power_of_two(-5, 7);
+  Twist V{speed * direction(), spin * direction()};
+  switch (bits() % 8) {
+    case 0:
+      return {};
+    case 1:  // pushed by both
+      if (f > 0 && tau > 0) V = {F.force_N / f * speed, F.torque_Nm / tau * spin};
+      return V;
+    case 2:  // one pushes, the other brakes
+      if (f > 0 && tau > 0) V = {F.force_N / f * speed, -F.torque_Nm / tau * spin};
+      return V;
+    case 3:  // braked by both
+      if (f > 0 && tau > 0) V = {-F.force_N / f * speed, -F.torque_Nm / tau * spin};
+      return V;
+    case 4:
+      return {{anything(), anything(), anything()}, {anything(), anything(), anything()}};
+    case 5:
+      V.linear_m_per_s *= power_of_two(0, 40);
+      return V;
+    default:
+      return V;
+  }
+}
+
+double LimitCases::authority() noexcept {
+  switch (bits() % 10) {
+    case 0:
+      return chance(0.5) ? 0.0 : -0.0;
+    case 1:
+      return anything();
+    case 2:
+      return beside(1.0);
+    case 3:
+    case 4:
+      return between(-0.2, 1.2);
+    default:
+      return 1.0;
+  }
+}
+
+double LimitCases::step_s() noexcept {
+  switch (bits() % 10) {
+    case 0:
+      return chance(0.5) ? 0.0 : -0.0;
+    case 1:
+      return anything();
+    case 2:
+      return -between(0, 1);
+    case 3:
+      return beside(kLongestStep_s);
+    case 4:
+      return power_of_two(-30, 4);
+    default:
+      return 1e-3;
+  }
+}
+
+double LimitCases::ceiling(double maximum) noexcept {
+  switch (bits() % 6) {
+    case 0:
+      return between(0, 1) * maximum;
+    case 1:
+      return beside(maximum);
+    case 2:
+      return chance(0.5) ? 0.0 : anything();
+    default:
+      return maximum;
+  }
+}
+
+void LimitCases::another_device() {
+  LimitSettings settings;
+  settings.force_slew_N_per_s = power_of_two(0, 20);
+  settings.torque_slew_Nm_per_s = power_of_two(-4, 14);
+  profile_.max_force_N = power_of_two(-3, 6);
+  profile_.max_torque_Nm = power_of_two(-6, 3);
+  const bool edge = chance(0.7), power = chance(0.7);
+  profile_.workspace_radius_m = edge ? power_of_two(-6, 0) : DeviceProfile::kNotStated;
+  profile_.workspace_centre_m =
+      chance(0.5) ? Vector3d(Vector3d::Zero()) : Vector3d(between(0, 1) * direction());
+  profile_.max_power_W = power ? power_of_two(-6, 8) : DeviceProfile::kNotStated;
+  limits_ = WrenchLimits(settings, profile_);
+  promise_ = {profile_.max_force_N,
+              profile_.max_torque_Nm,
+              profile_.max_force_N,
+              profile_.max_torque_Nm,
+              settings.force_slew_N_per_s,
+              settings.torque_slew_Nm_per_s,
+              edge ? profile_.workspace_radius_m : 0.0,
+              profile_.workspace_centre_m,
+              power ? profile_.max_power_W : 0.0};
+  last_ = Wrench{};
+}
+
+/// One number of the input is none any more.
+void LimitCases::spoil() noexcept {
+  const double bad = not_finite();
+  const auto axis = static_cast<Eigen::Index>(bits() % 3);
+  switch (bits() % 7) {
+    case 0:
+      input_.asked.force_N[axis] = bad;
+      break;
+    case 1:
+      input_.asked.torque_Nm[axis] = bad;
+      break;
+    case 2:
+      input_.V_BH.linear_m_per_s[axis] = bad;
+      break;
+    case 3:
+      input_.V_BH.angular_rad_per_s[axis] = bad;
+      break;
+    case 4:
+      input_.p_BH_m[axis] = bad;
+      break;
+    case 5:
+      input_.authority = bad;
+      break;
+    default:
+      input_.dt_s = bad;
+  }
+}
+
+std::string LimitCases::next() {
+  if (count_++ % kTicksEach == 0) another_device();
+  if (chance(0.1)) {
+    const double force_N = ceiling(promise_.max_force_N), torque_Nm = ceiling(promise_.max_torque_Nm);
+    limits_.set_ceiling(force_N, torque_Nm);
+    promise_.force_ceiling_N = std::fmin(std::fmax(force_N, 0.0), promise_.max_force_N);
+    promise_.torque_ceiling_Nm = std::fmin(std::fmax(torque_Nm, 0.0), promise_.max_torque_Nm);
+  }
+  if (chance(0.1)) {
+    last_ = {any_last(promise_.max_force_N), any_last(promise_.max_torque_Nm)};
+    limits_.follow(last_);
+  }
+  input_.asked = {asked(promise_.max_force_N, last_.force_N), asked(promise_.max_torque_Nm, last_.torque_Nm)};
+  input_.authority = authority();
+  input_.dt_s = step_s();
+  input_.V_BH = motion();
+  input_.p_BH_m = place();
+  if (chance(0.02)) spoil();
+  out_ = limits_.apply(input_);
+  before_ = last_;
+  last_ = out_.F;
+  return broken_invariant(promise_, before_, input_, out_);
+}
+
+std::string LimitCases::describe() const {
+  std::ostringstream text;
+  text.precision(17);
+  const auto show = [&](const char* name, const Vector3d& v) {
+    text << name << " " << v[0] << " " << v[1] << " " << v[2] << "\n";
+  };
+  text << "case " << count_ << ", max " << promise_.max_force_N << " N " << promise_.max_torque_Nm
+       << " N.m, ceiling " << promise_.force_ceiling_N << " N " << promise_.torque_ceiling_Nm << " N.m, slew "
+       << promise_.force_slew_N_per_s << " N/s " << promise_.torque_slew_Nm_per_s << " N.m/s, radius "
+       << promise_.workspace_radius_m << " m, power " << promise_.max_power_W << " W\n";
+  text << "authority " << input_.authority << ", dt " << input_.dt_s << " s, causes "
+       << limit_causes_text(out_.causes) << "\n";
+  show("centre", promise_.workspace_centre_m);
+  show("place", input_.p_BH_m);
+  show("linear", input_.V_BH.linear_m_per_s);
+  show("angular", input_.V_BH.angular_rad_per_s);
+  show("last force", before_.force_N);
+  show("last torque", before_.torque_Nm);
+  show("asked force", input_.asked.force_N);
+  show("asked torque", input_.asked.torque_Nm);
+  show("out force", out_.F.force_N);
+  show("out torque", out_.F.torque_Nm);
+  return text.str();
+}
+
+}  // namespace wrenchd::test
