@@ -21,6 +21,12 @@ struct Wrench {
 inline Wrench operator+(const Wrench& a, const Wrench& b) noexcept {
   return {a.force_N + b.force_N, a.torque_Nm + b.torque_Nm};
 }
+inline Wrench operator-(const Wrench& a, const Wrench& b) noexcept {
+  return {a.force_N - b.force_N, a.torque_Nm - b.torque_Nm};
+}
+inline Wrench operator*(double s, const Wrench& F) noexcept {
+  return {s * F.force_N, s * F.torque_Nm};
+}
 
 /// The same wrench about another point. p_old_new: from the old point to the new one, in the wrench's axes
 /// [m].

@@ -62,6 +62,12 @@ void WrenchLaw::differentiate(const Vector6d& eps, double dt_s) noexcept {
   last_eps_ = eps;
 }
 
+void WrenchLaw::scale(double spring, double damper) noexcept {
+  gains_.stiffness = spring * asked_.stiffness;
+  gains_.integral = spring * asked_.integral;
+  gains_.damping = damper * asked_.damping;
+}
+
 void WrenchLaw::reset() noexcept {
   last_eps_.setZero();
   integral_.setZero();

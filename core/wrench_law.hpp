@@ -57,11 +57,15 @@ class WrenchLaw {
   Wrench update_damping(const Wrench& spring, const Vector6d& eps, bool in_contact, double dt_s) noexcept;
   void reset() noexcept;
 
+  /// As much of the gains it was made with. RT safe.
+  void scale(double spring, double damper) noexcept;
+
  private:
   void integrate(const Vector6d& eps, double dt_s) noexcept;
   void differentiate(const Vector6d& eps, double dt_s) noexcept;
 
   WrenchGains gains_;
+  WrenchGains asked_ = gains_;            ///< before any scale()
   Vector6d last_eps_ = Vector6d::Zero();  ///< zero outside contact: eps grows from zero, without a step
   Vector6d integral_ = Vector6d::Zero();
   Vector6d rate_ = Vector6d::Zero();

@@ -1,0 +1,464 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "collision/penetration.hpp"
+#include "collision/scene.hpp"
+#include "collision/scene_contacts.hpp"
+#include "core/energy_law.hpp"
+#include "core/limits.hpp"
+#include "core/loop_measurement.hpp"
+#include "core/passivity.hpp"
+#include "core/stability_bound.hpp"
+#include "core/wrench_law.hpp"
+#include "devices/hand_path.hpp"
+#include "devices/simulated_handle.hpp"
+#include "tests/support/random_values.hpp"
+
+// Does contact ever give energy to the hand? The ledger is kept on the continuous plant, not on what the
+// encoders say: at each substep the work of the motors on the handle, less what the device's own viscous
+// friction took. Trajectories begin at the surface, so that no way through the air pays for anything.
+//
+// Each trajectory draws its own hand, delays, jitter, losses and encoder. The loop measures itself first, as
+// the daemon does, and the stiffness is a share of the bound that follows from what it measured.
+
+namespace {
+
+using namespace wrenchd;
+using test::RandomValues;
+
+constexpr double kViolation_J = 1e-6;
+constexpr int kSubsteps = 16;         ///< of the plant in a period of the loop
+constexpr double kMeasuring_s = 0.5;  ///< before the hand moves
+/// What the loopback's profile allows.
+DeviceProfile limits_of_the_device() {
+  DeviceProfile profile;
+  profile.max_force_N = 10.0;
+  profile.max_torque_Nm = 0.5;
+  return profile;
+}
+/// A rotation encoder beside one for position: what a step of the one is at this distance.
+constexpr double kEncoderLever_m = 0.1;
+
+struct Options {
+  long trajectories = 1000;
+  std::uint64_t seed = 1;
+  double seconds = 1.5;
+  double times_bound = 0.0;  ///< 0: a random share of it, half to all
+  bool guarded = false;
+  bool pid = false;
+  double angular_share = 1.0;  ///< of pid: angular stiffness, in that of the metric
+};
+
+/// Everything that a trajectory draws but for the hand's way.
+struct Circumstances {
+  double period_s, report_delay_s, command_delay_s, jitter, phase_s, loss;
+  double position_quantum_m, rotation_quantum_rad;
+  double damping_share;  ///< of the law, in what spring and damper take together of the bound
+  double share;          ///< of the bound
+  bool post;             ///< a convex post to press on, not a half-space
+  Pose X_HT;
+  SimulationSettings hand;
+};
+
+Circumstances draw(RandomValues& random, const Options& options) {
+  Circumstances c;
+  c.period_s = random.chance(0.5) ? 1e-3 : 0.5e-3;
+  const double travel_s = random.uniform(0.0, 3e-3), there = random.uniform(0.0, 1.0);
+  c.report_delay_s = there * travel_s;
+  c.command_delay_s = travel_s - c.report_delay_s;
+  c.jitter = random.uniform(0.0, 0.5);
+  c.phase_s = random.uniform(0.0, c.period_s);
+  c.loss = random.uniform(0.0, 0.05);
+  c.position_quantum_m = random.uniform(0.0, 100e-6);
+  c.rotation_quantum_rad = c.position_quantum_m / kEncoderLever_m;
+  c.damping_share = random.chance(0.5) ? 0.0 : random.uniform(0.0, 0.5);
+  c.share = random.uniform(0.5, 1.0);
+  if (options.times_bound > 0.0) c.share = options.times_bound;
+  c.post = random.chance(0.5);
+  if (random.chance(0.5)) c.X_HT = {random.rotation(), random.uniform(0.0, 0.03) * random.unit<3>()};
+  c.hand.hand_stiffness_N_per_m = random.decades(30.0, 800.0);
+  c.hand.hand_damping_N_s_per_m = random.decades(0.3, 8.0);
+  c.hand.hand_stiffness_Nm_per_rad = random.decades(0.1, 3.0);
+  c.hand.hand_damping_Nm_s_per_rad = random.decades(0.001, 0.03);
+  return c;
+}
+
+/// The way of the hand: pushes, taps, drags and turns, and now and then it lets go.
+struct HandWay {
+  std::vector<Waypoint> goals;
+  std::vector<std::pair<double, double>> open_hand;  ///< from, to [s]
+
+  bool holds(double t) const {
+    return std::none_of(open_hand.begin(), open_hand.end(),
+                        [&](const auto& open) { return t >= open.first && t < open.second; });
+  }
+};
+
+/// X_WH: where it starts, touching; z is up and the surface below.
+HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
+  HandWay way;
+  const double touching_m = X_WH.translation_m.z();
+  Vector3d p = X_WH.translation_m, turn = rotation_vector(X_WH.rotation);
+  double t = 0.0;
+  const auto go = [&](double in_s) { way.goals.push_back({t += in_s, p, turn}); };
+  go(0.0);
+  while (t < seconds) {
+    switch (random.integer(0, 3)) {
+      case 0:  // push and hold
+        p.z() = touching_m - random.uniform(0.0, 0.02);
+        go(random.decades(0.04, 0.4));
+        go(random.uniform(0.05, 0.3));
+        break;
+      case 1:  // tap
+        p.z() = touching_m - random.uniform(0.002, 0.015);
+        go(random.decades(0.015, 0.1));
+        p.z() = touching_m + random.uniform(0.0, 0.008);
+        go(random.decades(0.015, 0.1));
+        break;
+      case 2:  // drag, and turn
+        p += Vector3d(random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), 0.0);
+        p.z() = touching_m - random.uniform(-0.004, 0.012);
+        turn += random.vector<3>(0.1);
+        go(random.decades(0.04, 0.4));
+        break;
+      default:  // let go
+        way.open_hand.emplace_back(t, t + 0.15);
+        go(0.15);
+    }
+  }
+  return way;
+}
+
+/// A line that delays, jitters, loses, and keeps the order.
+template <class T>
+class Line {
+ public:
+  Line(double delay_s, double jitter, double loss) : delay_s_(delay_s), jitter_(jitter), loss_(loss) {}
+  void send(double now_s, const T& what, RandomValues& random) {
+    const double delay_s = delay_s_ * (1.0 - jitter_ * random.uniform(0.0, 1.0));
+    const bool lost = random.chance(loss_);
+    last_s_ = std::max(last_s_, now_s + delay_s);
+    if (!lost) under_way_.emplace_back(last_s_, what);
+  }
+  /// The newest that has arrived, and when.
+  bool receive(double now_s, T& what, double& arrived_s) {
+    bool any = false;
+    for (; !under_way_.empty() && under_way_.front().first <= now_s; under_way_.pop_front()) {
+      std::tie(arrived_s, what) = under_way_.front();
+      any = true;
+    }
+    return any;
+  }
+
+ private:
+  double delay_s_, jitter_, loss_;
+  double last_s_ = 0.0;
+  std::deque<std::pair<double, T>> under_way_;
+};
+
+struct Report {
+  Pose X_BH;
+  double device_s = 0.0;
+  std::uint64_t sequence = 0, taken = 0;
+};
+struct Command {
+  Wrench F;
+  std::uint64_t number = 0;
+};
+
+Vector3d rounded(const Vector3d& v, double quantum) {
+  if (!(quantum > 0.0)) return v;
+  return quantum * (v / quantum).array().round().matrix();
+}
+
+/// The host's side: what the servo loop does between a report and a command.
+class Host {
+ public:
+  Host(const Scene& scene, const Circumstances& c, const Options& options, const Pose& X_WP_start)
+      : depth_(scene, {}),
+        M_(scene.tool().solid.inertia),
+        circumstances_(c),
+        options_(options),
+        measured_(2.0 * c.period_s),
+        law_(WrenchGains{}),
+        limits_(LimitSettings{}, limits_of_the_device()),
+        guard_({}, {}),
+        X_WQ_(X_WP_start) {}
+
+  LoopMeasurement& measured() { return measured_; }
+
+  /// The stiffness that the bound allows, from what was measured. Returns that of a translation [N/m].
+  double settle() {
+    const LoopDelay loop{measured_.longest_period_s(), measured_.delay_s()};
+    const SimulationSettings& s = circumstances_.hand;
+    const DeviceDamping device{s.viscous_friction_N_s_per_m, s.viscous_friction_Nm_s_per_rad};
+    constexpr double kStiff_per_s2 = 1e6;  // beyond any bound, so that the scale says all
+    const double d = circumstances_.damping_share;
+    Coupling coupling;
+    coupling.stiffness = energy_stiffness(M_, kStiff_per_s2);
+    coupling.stiffness.bottomRightCorner<3, 3>() *= options_.pid ? options_.angular_share : 1.0;
+    coupling.damping = d / (1.0 - d) * (0.5 * loop.period_s + loop.delay_s) * coupling.stiffness;
+    const double scale =
+        circumstances_.share * stability_bound(device, loop, coupling, circumstances_.X_HT).scale;
+    stiffness_per_s2_ = scale * kStiff_per_s2;
+    WrenchGains gains;
+    gains.stiffness = scale * coupling.stiffness;
+    gains.damping = scale * coupling.damping;
+    law_ = WrenchLaw(gains);
+    PassivityCaps caps;
+    caps.delay_ticks =
+        static_cast<std::size_t>(std::lround(measured_.typical_delay_s() / measured_.period_s().mean_s()));
+    guard_ = PassivityGuard(device, caps);
+    return stiffness_per_s2_ * M_.mass_kg;
+  }
+
+  Wrench tick(const Report& report, bool fresh) {
+    const double dt_s = fresh && sampled_ ? report.device_s - device_s_ : 0.0;
+    if (fresh) {
+      device_s_ = report.device_s;
+      sampled_ = true;
+      render(report.X_BH, dt_s);
+    }
+    Wrench F = F_;
+    if (options_.guarded) F = guard_.guard(F_, report.X_BH, dt_s, in_contact_);
+    const Wrench out = limits_.apply({F, 1.0, circumstances_.period_s, {}, Vector3d::Zero()}).F;
+    if (options_.guarded) guard_.told(out);
+    return out;
+  }
+
+ private:
+  void render(const Pose& X_WH, double dt_s) {
+    const Pose X_WP = X_WH * circumstances_.X_HT;
+    const Penetration depth = depth_.follow(X_WP, X_WQ_);
+    X_WQ_ = depth.projection.X_WQ;
+    in_contact_ = depth.contacts > 0;
+    const Wrench F_T = options_.pid ? law_.update(depth.drive, in_contact_, dt_s)
+                                    : law_.update_damping(energy_wrench(M_, stiffness_per_s2_, X_WP, X_WQ_),
+                                                          depth.drive, in_contact_, dt_s);
+    F_ = wrench_about(X_WH.translation_m, X_WP, F_T);
+  }
+
+  PenetrationDepth depth_;
+  Inertia M_;
+  const Circumstances& circumstances_;
+  const Options& options_;
+  LoopMeasurement measured_;
+  WrenchLaw law_;
+  WrenchLimits limits_;
+  PassivityGuard guard_;
+  double stiffness_per_s2_ = 0.0;
+  Pose X_WQ_;
+  Wrench F_;
+  bool in_contact_ = false;
+  bool sampled_ = false;
+  double device_s_ = 0.0;
+};
+
+/// Work of the motors on the handle, net of the device's friction. Credit is that of one contact only: while
+/// nothing touches and the motors are off the account starts again from 0.
+class Ledger {
+ public:
+  void add(const SimulatedEnergy& energy, bool at_rest) {
+    const double net_J = energy.motors_J - energy.friction_J;
+    worst_J_ = std::max({worst_J_, net_J, net_J - start_J_});
+    if (at_rest) start_J_ = net_J;
+  }
+  double worst_J() const { return worst_J_; }
+
+ private:
+  double start_J_ = 0.0, worst_J_ = 0.0;
+};
+
+TimePoint at(double t_s) {
+  return TimePoint{} + from_seconds(t_s);
+}
+
+/// One trajectory. The device samples, the lines carry, the host ticks, the motors push.
+class Run {
+ public:
+  Run(const Scene& scene, const Pose& X_WT, RandomValues& random, const Circumstances& c,
+      const Options& options)
+      : random_(random),
+        c_(c),
+        seconds_(options.seconds),
+        step_s_(c.period_s / kSubsteps),
+        X_WH_(X_WT * inverse(c.X_HT)),
+        way_(hand_way(random, X_WH_, options.seconds)),
+        path_(way_.goals, false),
+        handle_(c.hand, X_WH_, step_s_),
+        host_(scene, c, options, X_WT),
+        touch_(scene),
+        reports_(c.report_delay_s, c.jitter, c.loss),
+        commands_(c.command_delay_s, c.jitter, c.loss) {}
+
+  double worst_J() {
+    const auto measuring = static_cast<long>(kMeasuring_s / step_s_);
+    const auto moving = static_cast<long>(seconds_ / step_s_);
+    for (long i = 0; i < measuring; ++i) exchange(i);
+    stiffness_N_per_m_ = host_.settle();
+    settled_ = true;
+    for (long i = 0; i < moving; ++i) {
+      exchange(measuring + i);
+      move(static_cast<double>(i) * step_s_, i % kSubsteps == 0);
+    }
+    return ledger_.worst_J();
+  }
+  double stiffness_N_per_m() const { return stiffness_N_per_m_; }
+  double delay_s() { return host_.measured().delay_s(); }
+
+ private:
+  void exchange(long substep) {
+    const double now_s = static_cast<double>(substep) * step_s_;
+    double arrived_s = 0.0;
+    if (commands_.receive(now_s, command_, arrived_s) && settled_) motors_ = command_.F;
+    if (substep % kSubsteps == 0) {
+      const Pose seen = {
+          rotation_from(rounded(rotation_vector(handle_.X_BH().rotation), c_.rotation_quantum_rad)),
+          rounded(handle_.X_BH().translation_m, c_.position_quantum_m)};
+      reports_.send(now_s, {seen, now_s, ++sequence_, command_.number}, random_);
+    }
+    if (now_s + 1e-12 >= next_tick_s_) tick(now_s);
+  }
+
+  /// Ticks are due at their phase; a host that is not a real-time one is up to a fifth of a period late.
+  void tick(double now_s) {
+    const bool fresh = reports_.receive(now_s, report_, arrived_s_);
+    if (report_.sequence > 0) {
+      const Wrench F = host_.tick(report_, fresh);
+      commands_.send(now_s, {F, ++number_}, random_);
+      host_.measured().tick({at(now_s), at(arrived_s_), report_.device_s, report_.sequence, fresh, true,
+                             report_.taken, number_});
+    }
+    ++ticks_;
+    next_tick_s_ = (static_cast<double>(ticks_) + 0.2 * c_.jitter * random_.uniform(0.0, 1.0)) * c_.period_s +
+                   c_.phase_s;
+  }
+
+  void move(double t_s, bool look) {
+    HandTarget goal = path_.at(from_seconds(t_s));
+    if (!way_.holds(t_s)) goal = {handle_.X_BH(), handle_.V_BH()};
+    handle_.step(goal, motors_);
+    const bool off = motors_.force_N.isZero(0.0) && motors_.torque_Nm.isZero(0.0);
+    ledger_.add(handle_.energy(), look && off && free());
+  }
+  /// Of the true pose, not the one that the encoders see.
+  bool free() {
+    const Pose X_WT = handle_.X_BH() * c_.X_HT;
+    touch_.admit(X_WT, 0.0);
+    return touch_.admits(X_WT, 0.0);
+  }
+
+  RandomValues& random_;
+  const Circumstances& c_;
+  double seconds_, step_s_;
+  Pose X_WH_;
+  HandWay way_;
+  HandPath path_;
+  SimulatedHandle handle_;
+  Host host_;
+  SceneContacts touch_;
+  Line<Report> reports_;
+  Line<Command> commands_;
+  Ledger ledger_;
+  Report report_;
+  Command command_;
+  Wrench motors_;
+  bool settled_ = false;
+  double stiffness_N_per_m_ = 0.0;
+  double arrived_s_ = 0.0, next_tick_s_ = 0.0;
+  std::uint64_t sequence_ = 0, number_ = 0, ticks_ = 0;
+};
+
+/// The cube just above the surface at z = 0, turned at random.
+Pose resting(const Scene& scene, RandomValues& random) {
+  Pose X_WT;
+  X_WT.rotation = random.rotation(random.uniform(0.0, 0.8));
+  double lowest_m = 0.0;
+  for (const Vector3d& v : scene.tool().hull.vertices_T_m)
+    lowest_m = std::min(lowest_m, (X_WT.rotation * v).z());
+  X_WT.translation_m = {0.0, 0.0, 1e-6 - lowest_m};
+  return X_WT;
+}
+
+/// The shipped cube above a floor, or above a post 40 mm wide and high: a mesh, as the daemon has them.
+Scene scene_of(bool post) {
+  const char* cube = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
+  SceneSettings settings;
+  settings.tool = {cube, 0.001, 0.2};
+  if (post)
+    settings.meshes.push_back({"post", cube, 0.0008, {Quaterniond::Identity(), {0.0, 0.0, -0.02}}});
+  else
+    settings.half_spaces.push_back({"floor", Vector3d::UnitZ(), 0.0});
+  return Scene(settings);
+}
+
+/// The seed of trajectory n: any of them can be run alone.
+std::uint64_t seed_of(std::uint64_t seed, long n) {
+  return seed + static_cast<std::uint64_t>(n);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("prove_passivity: does contact ever give energy to the hand? A ledger on the plant.");
+  Options options;
+  bool tell = false;
+  app.add_option("--trajectories", options.trajectories)
+      ->check(CLI::Range(1L, 100000000L))
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "of the first; each of the others has the next")
+      ->capture_default_str();
+  app.add_option("--seconds", options.seconds, "of each, in the hand's time")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  app.add_option("--times-bound", options.times_bound,
+                 "stiffness, in the bound's; 0: half of it to all of it")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_flag("--guard", options.guarded, "with the passivity guard");
+  app.add_flag("--pid", options.pid, "the law of Eq. (16), not the energy law");
+  app.add_option("--angular-share", options.angular_share,
+                 "with --pid: angular stiffness, in the one that the tool's inertia gives")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_flag("--tell", tell, "each violation with its circumstances");
+  CLI11_PARSE(app, argc, argv);
+
+  const Scene floor = scene_of(false), posted = scene_of(true);
+  double worst_J = 0.0;
+  std::vector<std::uint64_t> violations;
+  for (long n = 0; n < options.trajectories; ++n) {
+    RandomValues random(seed_of(options.seed, n));
+    const Circumstances c = draw(random, options);
+    const Scene& scene = c.post ? posted : floor;
+    const Pose X_WT = resting(scene, random);
+    Run run(scene, X_WT, random, c, options);
+    const double J = run.worst_J();
+    worst_J = std::max(worst_J, J);
+    if (J <= kViolation_J) continue;
+    violations.push_back(seed_of(options.seed, n));
+    if (tell)
+      std::printf(
+          "seed %llu: %.3f uJ; %s, T %.1f ms, tau %.2f ms, %.0f N/m, quantum %.0f um, loss %.3f, "
+          "damping %.2f, hand %.0f N/m %.1f N.s/m\n",
+          static_cast<unsigned long long>(violations.back()), 1e6 * J, c.post ? "post" : "floor",
+          1e3 * c.period_s, 1e3 * run.delay_s(), run.stiffness_N_per_m(), 1e6 * c.position_quantum_m, c.loss,
+          c.damping_share, c.hand.hand_stiffness_N_per_m, c.hand.hand_damping_N_s_per_m);
+  }
+  std::printf("passivity trajectories %ld worst_uJ %.4f violations %zu seed %llu seconds %g\n",
+              options.trajectories, 1e6 * worst_J, violations.size(),
+              static_cast<unsigned long long>(options.seed), options.seconds);
+  for (std::size_t i = 0; i < std::min<std::size_t>(violations.size(), 10) && !tell; ++i)
+    std::printf("  violated: --trajectories 1 --seed %llu\n", static_cast<unsigned long long>(violations[i]));
+  return violations.empty() ? 0 : 1;
+}
