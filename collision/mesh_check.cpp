@@ -11,12 +11,14 @@
 #include <utility>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_2_algorithms.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Projection_traits_3.h>
 #include <CGAL/Surface_mesh.h>
 
 #include "collision/mesh_repair.hpp"
@@ -179,6 +181,21 @@ SurfaceMesh surface_mesh(const PolygonSoup& soup) {
   return mesh;
 }
 
+/// Whether a face, seen along its normal, neither crosses nor touches itself. CGAL cuts others with more than
+/// four corners into triangles too, and falls over some of them.
+bool is_simple(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
+  Vector3d normal = Vector3d::Zero();
+  std::vector<Kernel::Point_3> points;
+  for (std::size_t i = 0; i < face.size(); ++i) {
+    const Vector3d &p = soup.vertices[face[i]], &next = soup.vertices[face[(i + 1) % face.size()]];
+    normal += p.cross(next);
+    points.emplace_back(p.x(), p.y(), p.z());
+  }
+  if (!normal.allFinite() || normal.isZero(0.0)) return false;
+  const CGAL::Projection_traits_3<Kernel> along({normal.x(), normal.y(), normal.z()});
+  return CGAL::is_simple_2(points.begin(), points.end(), along);
+}
+
 /// Cuts every face of a mesh made of the soup into triangles. Returns for each triangle its face's number in
 /// the file.
 std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh, MeshReport& report) {
@@ -186,8 +203,9 @@ std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh,
   Tally uncut;
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     face_of[f] = soup.face_in_file(f);  // its first triangle keeps the index
-    if (soup.faces[f].size() > 3 &&
-        !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh))
+    const std::size_t corners = soup.faces[f].size();
+    if ((corners > 4 && !is_simple(soup, soup.faces[f])) ||
+        (corners > 3 && !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh)))
       uncut.found([&] {
         return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
                " cannot be cut into triangles";
@@ -272,6 +290,9 @@ std::vector<std::string> wrong_numbers(const PolygonSoup& soup) {
 
 MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles) {
   MeshReport report = report_on(soup);
+  if (soup.faces.empty())
+    report.defects.push_back(
+        "there is no face that has an area; look for a vertex that is much too far away");
   if (!report.defects.empty()) return report;
   check_areas(soup, report.defects);
   if (!report.defects.empty()) return report;

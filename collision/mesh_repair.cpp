@@ -297,7 +297,8 @@ bool Repair::fold_thin_faces() {
     const std::size_t a = face[longest], b = face[next(face, longest)], apex = face[(longest + 2) % 3];
     const auto& p = soup_.vertices;
     const std::size_t nearer = (p[a] - p[apex]).norm() < (p[b] - p[apex]).norm() ? a : b;
-    const auto told = [&] { thin_.found([&] { return face_place(f); }); };
+    const std::size_t thin_face = f;  // clang 14 captures no structured binding
+    const auto told = [&] { thin_.found([&] { return face_place(thin_face); }); };
     if ((p[nearer] - p[apex]).norm() <= tolerance) {
       told();
       changed = true;

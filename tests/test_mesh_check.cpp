@@ -293,6 +293,17 @@ TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must hav
   bad.vertices.emplace_back(1, 0, 0);
   bad.faces.push_back({0, 1, 8});
   refused_with(bad, "face 6 near (0, 0, 0) has no area");
+  refused_with({kBox.vertices, {}}, "no face that has an area");
+}
+
+TEST_CASE("a surface of which the repair leaves nothing is refused") {
+  PolygonSoup far = triangulated(kBox);
+  far.vertices[5].x() = 1e126;  // beside it all other points are one
+  TriangleMesh mesh;
+  const MeshReport report = repair_and_check_surface(far, &mesh);
+  CHECK(mesh.triangles.empty());
+  REQUIRE(report.defects.size() == 1);
+  CHECK(report.defects[0].find("a vertex that is much too far away") != std::string::npos);
 }
 
 TEST_CASE("what has no inside is refused") {
