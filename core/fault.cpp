@@ -1,37 +1,258 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "core/fault.hpp"
 
-namespace wrenchd {
+#include <array>
 
-FaultText text(Fault fault) noexcept {
-  switch (fault) {
-    case Fault::none:
-      return {"none", "nothing is wrong", "nothing to do"};
-    case Fault::device_lost:
-      return {"device_lost", "the device left the bus", "plug it in again; wrenchd comes back disarmed"};
-    case Fault::pose_not_finite:
-      return {"pose_not_finite", "the device reported a pose that is not a number",
-              "compare the profile's report layout with the device's firmware"};
-    case Fault::pose_not_a_rotation:
-      return {"pose_not_a_rotation", "the reported orientation is too far from a unit quaternion",
-              "check byte offset, order (x y z w) and step of 'orientation' in the profile"};
-    case Fault::pose_teleported:
-      return {"pose_teleported", "the pose moved farther between two reports than a hand can",
-              "home the device; check cables and encoders, and the speed limits in the profile"};
-    case Fault::overspeed:
-      return {"overspeed", "the handle moved faster than the profile allows",
-              "hold the handle before arming; lower the stiffness if it ran away by itself"};
-    case Fault::sample_stale:
-      return {"sample_stale", "no new pose arrived for too long",
-              "use a direct USB port; compare the device's report rate with the profile"};
-    case Fault::wrench_not_finite:
-      return {"wrench_not_finite", "the rendering produced a wrench that is not a number",
-              "keep the recording and report it with the scene: this is a defect of wrenchd"};
-    case Fault::write_failed:
-      return {"write_failed", "the device did not take a wrench",
-              "use a direct USB port; the device's own watchdog has switched its motors off by now"};
-  }
-  return {"unknown", "an unknown fault value", "report it: this is a defect of wrenchd"};
+#include "core/watch_limits.hpp"
+
+namespace wrenchd {
+namespace {
+
+using T = Trigger;
+using R = Reaction;
+
+constexpr Duration kAtOnce{0};
+
+// clang-format off
+constexpr std::array kRows = {
+    FaultRow{Fault::device_lost, "device_lost", T::device_gone, R::let_go, kAtOnce,
+             "a read or a write says that nobody is there",
+             "the device left the bus",
+             "what is not there cannot be let go: its own watchdog frees the hand, and nothing may be written to whatever comes next",
+             "plug it in again; wrenchd comes back disarmed"},
+    FaultRow{Fault::wrong_device, "wrong_device", T::noted, R::none, kAtOnce,
+             "ids, serial number and report descriptor at each opening",
+             "another device came back in the place of the one that left",
+             "a port is no identity: forces meant for one device may harm another",
+             "plug in the device that was there, or start wrenchd anew for this one"},
+    FaultRow{Fault::report_malformed, "report_malformed", T::noted, R::none, kAtOnce,
+             "length, id and checksum of each report",
+             "a report was short, long, of an unknown id, or its checksum was wrong",
+             "a field read from the wrong bytes is a pose that nobody had",
+             "check cable and port; compare the profile's layout with the firmware, as with wrenchctl check --against"},
+    FaultRow{Fault::report_repeated, "report_repeated", T::noted, R::none, kAtOnce,
+             "sequence number and device time of each report, modulo their widths",
+             "a report came again, or out of order",
+             "an old pose that is taken for a new one pushes where the hand was",
+             "check hub and cable; a firmware must count its reports up"},
+    FaultRow{Fault::report_missing, "report_missing", T::noted, R::none, kAtOnce,
+             "gaps of the sequence number",
+             "reports of the device are missing",
+             "one is no harm; many are a link that is about to fail",
+             "use a direct USB port; look for a program that opens the device as well"},
+    FaultRow{Fault::link_lossy, "link_lossy", T::hard_fault, R::zero, kAtOnce,
+             "a bucket: 2 in for a bad or missing report, 1 out for a good one, 40 fit",
+             "too many reports are bad or missing",
+             "loss that comes and goes never trips a timeout, and is felt as a rattle that can grow",
+             "use a direct USB port and another cable; then acknowledge"},
+    FaultRow{Fault::sample_late, "sample_late", T::soft_fault, R::fade_10ms, kLateSample,
+             "age of the newest good pose",
+             "the newest pose is a few milliseconds old",
+             "a push that answers an old pose is a push in the wrong place; one USB error alone costs 13 ms",
+             "nothing, if it passes; else use a direct USB port"},
+    FaultRow{Fault::sample_stale, "sample_stale", T::hard_fault, R::zero, kStaleSample,
+             "time since the last good report, against stale_fault_s of the profile",
+             "no new pose arrived for too long",
+             "the device is silent, frozen or sends nonsense: nobody knows where the hand is",
+             "use a direct USB port; compare the device's report rate with the profile; then acknowledge"},
+    FaultRow{Fault::pose_not_finite, "pose_not_finite", T::hard_fault, R::zero, kAtOnce,
+             "the bits of each number, before any arithmetic",
+             "the device reported a pose that is not a number",
+             "a NaN passes most limiters, some of them as full force",
+             "compare the profile's report layout with the device's firmware; then acknowledge"},
+    FaultRow{Fault::pose_not_a_rotation, "pose_not_a_rotation", T::soft_fault, R::zero, kAtOnce,
+             "squared norm of the quaternion outside 0.8 to 1.2 in three samples one after the other; each is dropped",
+             "the reported orientation is too far from a unit quaternion",
+             "another field, another unit or noise is read as an orientation",
+             "check byte offset, order (x y z w) and step of 'orientation' in the profile"},
+    FaultRow{Fault::pose_teleported, "pose_teleported", T::soft_fault, R::zero, kAtOnce,
+             "way since the last pose, against three times the profile's top speed",
+             "the pose moved farther between two reports than a hand can",
+             "a slipped encoder or a brown-out moves the virtual body into a wall, and the wall pushes",
+             "home the device; check cables and encoders, and the speed limits in the profile"},
+    FaultRow{Fault::pose_outside, "pose_outside", T::soft_fault, R::zero, kAtOnce,
+             "distance of the handle from the middle of the workspace, against 1.5 of its radius",
+             "the pose is far out of the device's workspace",
+             "no handle can be there, so an encoder is wrong",
+             "home the device; check workspace_radius_m in the profile"},
+    FaultRow{Fault::pose_stuck, "pose_stuck", T::soft_fault, R::fade_10ms, kStuckPose,
+             "not a bit of the pose changes, while the device reports a twist that would have moved it",
+             "the pose stands still while the device says that it moves",
+             "a dead encoder holds the virtual body in the wall, and the wall pushes for ever",
+             "check the encoders' cables"},
+    FaultRow{Fault::overspeed, "overspeed", T::hard_fault, R::zero, kAtOnce,
+             "speed reported and speed by difference, two samples one after the other, while force can be on the hand",
+             "the handle moved faster than the profile allows",
+             "a handle that nobody holds is flung by the force it feels",
+             "hold the handle before arming; lower the stiffness if it ran away by itself; then acknowledge"},
+    FaultRow{Fault::not_homed, "not_homed", T::disarm, R::zero, kAtOnce,
+             "the homed bits of the reports, once they have been set",
+             "the encoders do not know where they are any more",
+             "the device lost its power for a moment: every pose from here on is off",
+             "home the device, and arm again"},
+    FaultRow{Fault::watchdog_tripped, "watchdog_tripped", T::soft_fault, R::zero, kAtOnce,
+             "the device's report, while it is sent wrenches",
+             "the device's own watchdog switched its motors off while it was driven",
+             "commands do not arrive; to go on at full force when they do would be a kick",
+             "use a direct USB port; look for a program that keeps the bus busy"},
+    FaultRow{Fault::motors_off, "motors_off", T::soft_fault, R::zero, kDeadMotors,
+             "the device's report, while it is told to drive them",
+             "the device says that its motors are off",
+             "an amplifier switched off; when it comes back the force must not come with it",
+             "look at the device's own stop button, power supply and amplifiers"},
+    FaultRow{Fault::wrench_not_finite, "wrench_not_finite", T::hard_fault, R::zero, kAtOnce,
+             "the bits of each number, before the limits",
+             "the rendering produced a wrench that is not a number",
+             "a NaN passes most limiters, some of them as full force",
+             "keep the recording and report it with the scene: this is a defect of wrenchd; then acknowledge"},
+    FaultRow{Fault::projection_failed, "projection_failed", T::soft_fault, R::fade_10ms, kAtOnce,
+             "status of the projection in three ticks one after the other",
+             "no admissible pose near the hand was found",
+             "a wrench towards a pose that is not admissible pushes into the wall",
+             "the obstacles leave no room where the hand is: draw it out, or look at the scene"},
+    FaultRow{Fault::answer_late, "answer_late", T::soft_fault, R::zero, kLateAnswer,
+             "age of the pose when its wrench is ready",
+             "the wrench was ready too late for its pose",
+             "the hand has moved on; where it is now the wrench may push it the wrong way",
+             "give the scene's meshes fewer triangles, or the daemon a faster or less busy processor"},
+    FaultRow{Fault::tick_late, "tick_late", T::soft_fault, R::zero, kLateTick,
+             "time since the last tick",
+             "a tick came some milliseconds late",
+             "the device held the last force for so long, or its watchdog took it: start again from zero",
+             "look at wrenchctl doctor's advice: real-time priority, governor, other load"},
+    FaultRow{Fault::loop_stopped, "loop_stopped", T::hard_fault, R::zero, kStoppedLoop,
+             "time since the last tick, against late_limit_s of the configuration; soft_fault unless realtime is required",
+             "the loop stood still: a debugger, a stopped process, a machine that hangs",
+             "who looks at the device after a halt must not be surprised by its force",
+             "find what held the machine; then acknowledge"},
+    FaultRow{Fault::clock_back, "clock_back", T::hard_fault, R::zero, kAtOnce,
+             "time of the tick, against the last one's",
+             "the clock went back",
+             "every time limit here is by that clock",
+             "report it with the machine's kernel and clock source; then acknowledge"},
+    FaultRow{Fault::suspended, "suspended", T::disarm, R::zero, kAtOnce,
+             "the clock that goes on in sleep, against the one that does not",
+             "the machine slept",
+             "nobody expects a force from a machine that wakes up",
+             "arm again"},
+    FaultRow{Fault::write_blocked, "write_blocked", T::soft_fault, R::fade_10ms, kBlockedWrite,
+             "time since a wrench was last taken",
+             "the device takes no wrench for some milliseconds",
+             "the kernel keeps a write for seconds where the device does not take it; the old force stays meanwhile",
+             "nothing, if it passes; else use a direct USB port"},
+    FaultRow{Fault::write_failed, "write_failed", T::hard_fault, R::zero, kFailedWrite,
+             "time since a wrench was last taken",
+             "the device did not take a wrench for too long",
+             "nothing that is sent arrives; only the device's own watchdog can free the hand now",
+             "use a direct USB port; the device's own watchdog has switched its motors off by now; then acknowledge"},
+    FaultRow{Fault::oscillating, "oscillating", T::noted, R::none, kOscillation,
+             "energy of the motion along the force between 20 and 400 Hz, in contact",
+             "the handle buzzes in contact: half the stiffness from here on, until it is armed again",
+             "delay and a light grip make a stiff wall a motor; the hand feels it before any limit does",
+             "lower the stiffness, or raise the damping, in the configuration"},
+    FaultRow{Fault::still_oscillates, "still_oscillates", T::hard_fault, R::zero, kOscillation,
+             "the same for the third time",
+             "the handle buzzes in contact, whatever the stiffness",
+             "it is not the wall that is too stiff, then",
+             "compare the device's delay and its damping with the profile; then acknowledge"},
+    FaultRow{Fault::energy_made, "energy_made", T::hard_fault, R::zero, kAtOnce,
+             "the ledger of force times way: more than 20 mJ out in 100 ms that nobody put in",
+             "the rendering gave more energy than it took",
+             "a passive wall cannot do that: something between the encoder and the motor lies",
+             "lower the stiffness; compare the device's signs and delays with the profile; then acknowledge"},
+    FaultRow{Fault::pinned, "pinned", T::disarm, R::fade_100ms, kPinned,
+             "95 % of the greatest force, and less than a millimetre of way",
+             "the device pushed with all its force against a hand, or a stop, that did not move",
+             "a hand that cannot get away must not be held",
+             "free the handle, and arm again"},
+    FaultRow{Fault::overheated, "overheated", T::noted, R::none, kAtOnce,
+             "the motors' I2t by the profile's thermal time",
+             "the motors gave more than they can for ever: the limits fold back until they are cool",
+             "a winding that burns does not come back",
+             "rest the hand for a while"},
+    FaultRow{Fault::client_gone, "client_gone", T::disarm, R::fade_100ms, kSilentClient,
+             "the signs of life of whoever armed",
+             "whoever armed does not say any more that it is alive",
+             "force without anybody who could stop it",
+             "start the client again, and arm"},
+    FaultRow{Fault::client_silent, "client_silent", T::disarm, R::fade_100ms, kSilentClient,
+             "the same, from the moment of arming",
+             "whoever armed never said that it is alive",
+             "a watch that waits for the first sign of life never begins",
+             "have the client send its heartbeat before it arms"},
+    FaultRow{Fault::deadman_open, "deadman_open", T::interrupted, R::zero, kAtOnce,
+             "the profile's dead man's button in each report",
+             "the hand let go of the dead man's button",
+             "nobody holds the device",
+             "hold the button; force comes back by the soft start"},
+    FaultRow{Fault::stop_asked, "stop_asked", T::stop, R::zero, kAtOnce,
+             "any client, or SIGUSR1",
+             "somebody said stop",
+             "whoever says stop is right",
+             "look around, then acknowledge (SIGUSR2), and arm"},
+    FaultRow{Fault::stop_button, "stop_button", T::stop, R::zero, kAtOnce,
+             "the profile's stop button in each report",
+             "the stop button of the device was pressed",
+             "whoever says stop is right",
+             "release it and look around, then acknowledge (SIGUSR2), and arm"},
+    FaultRow{Fault::degraded_too_long, "degraded_too_long", T::hard_fault, R::zero, kAtOnce,
+             "time in the state degraded",
+             "what was wrong did not pass within half a second",
+             "a fault that may pass and does not is one to look at",
+             "see the faults before it; then acknowledge"},
+    FaultRow{Fault::degraded_too_often, "degraded_too_often", T::hard_fault, R::zero, kAtOnce,
+             "entries into the state degraded: more than five in ten seconds",
+             "what was wrong passed, and came again and again",
+             "a force that comes and goes surprises the hand each time",
+             "see the faults before it; then acknowledge"},
+    FaultRow{Fault::test_unclean, "test_unclean", T::failed, R::zero, kTestFor,
+             "the self-test: half a second of good poses within five",
+             "the device did not send good poses for half a second",
+             "what does not work at rest will not work in contact",
+             "compare the profile with the device, as with wrenchctl check --against; home it; then acknowledge"},
+    FaultRow{Fault::test_rate, "test_rate", T::failed, R::zero, kAtOnce,
+             "the self-test: reports by sequence number and time of arrival, against 0.9 to 1.1 of report_rate_Hz",
+             "the device does not report at the rate its profile says",
+             "delay decides how stiff a wall may be",
+             "use a direct USB port, or state the rate that is; then acknowledge"},
+    FaultRow{Fault::test_watchdog, "test_watchdog", T::failed, R::zero, kAtOnce,
+             "the self-test: zero wrench with the motors on, then silence; the device has to say that it tripped",
+             "the device's watchdog did not trip when the host fell silent",
+             "it is the only thing that frees the hand when the host dies",
+             "mend the firmware, or take watchdog_s out of the profile, for a quarter of its force; then acknowledge"},
+};
+// clang-format on
+
+constexpr FaultRow kNone{Fault::none,        "none", T::noted,       R::none, kAtOnce, "",
+                         "nothing is wrong", "",     "nothing to do"};
+constexpr FaultRow kUnknown{Fault::none,
+                            "unknown",
+                            T::hard_fault,
+                            R::zero,
+                            kAtOnce,
+                            "",
+                            "an unknown fault value",
+                            "",
+                            "report it: this is a defect of wrenchd"};
+
+constexpr bool in_order() {
+  for (std::size_t i = 0; i < kRows.size(); ++i)
+    if (kRows[i].fault != static_cast<Fault>(i + 1)) return false;
+  return kRows.size() + 1 == kFaultCount;
+}
+static_assert(in_order(), "each fault has its row, in the order of the enumeration");
+static_assert(kFaultCount <= 64, "a FaultSet holds them all");
+
+}  // namespace
+
+std::span<const FaultRow> fault_rows() noexcept {
+  return kRows;
+}
+
+const FaultRow& fault_row(Fault fault) noexcept {
+  const auto value = static_cast<std::size_t>(fault);
+  if (value == 0) return kNone;
+  return value <= kRows.size() ? kRows[value - 1] : kUnknown;
 }
 
 }  // namespace wrenchd

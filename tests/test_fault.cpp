@@ -8,42 +8,50 @@
 
 using namespace wrenchd;
 
-TEST_CASE("every fault has a name of its own, a sentence and a cure", "[fault]") {
-  std::set<std::string> names;
-  std::set<std::string> sentences;
-  const int last = static_cast<int>(Fault::write_failed);
-  for (int value = 0; value <= last; ++value) {
-    const FaultText what = text(static_cast<Fault>(value));
-    INFO(what.name);
-    CHECK_FALSE(what.name.empty());
-    CHECK(what.name != "unknown");
-    CHECK(what.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == std::string_view::npos);
-    CHECK(what.sentence.find(' ') != std::string_view::npos);
-    CHECK(what.cure.find(' ') != std::string_view::npos);
-    names.emplace(what.name);
-    sentences.emplace(what.sentence);
+TEST_CASE("every fault has a name of its own, a detector, a sentence, a reason and a cure", "[fault]") {
+  std::set<std::string> names, sentences;
+  CHECK(fault_rows().size() == kFaultCount - 1);
+  for (const FaultRow& row : fault_rows()) {
+    INFO(row.name);
+    CHECK(&fault_row(row.fault) == &row);
+    CHECK(row.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == std::string_view::npos);
+    for (const std::string_view text : {row.detector, row.sentence, row.why, row.cure}) {
+      CHECK(text.find(' ') != std::string_view::npos);
+      CHECK(text.back() != '.');
+    }
+    names.emplace(row.name);
+    sentences.emplace(row.sentence);
   }
-  CHECK(names.size() == static_cast<std::size_t>(last) + 1);
-  CHECK(sentences.size() == static_cast<std::size_t>(last) + 1);
+  CHECK(names.size() == kFaultCount - 1);
+  CHECK(sentences.size() == kFaultCount - 1);
 }
 
-TEST_CASE("the names that stand in records", "[fault]") {
-  CHECK(text(Fault::none).name == "none");
-  CHECK(text(Fault::device_lost).name == "device_lost");
-  CHECK(text(Fault::pose_not_finite).name == "pose_not_finite");
-  CHECK(text(Fault::pose_not_a_rotation).name == "pose_not_a_rotation");
-  CHECK(text(Fault::pose_teleported).name == "pose_teleported");
-  CHECK(text(Fault::overspeed).name == "overspeed");
-  CHECK(text(Fault::sample_stale).name == "sample_stale");
-  CHECK(text(Fault::wrench_not_finite).name == "wrench_not_finite");
-  CHECK(text(Fault::write_failed).name == "write_failed");
+TEST_CASE("what latches takes the force at once, and its cure names the acknowledgement", "[fault]") {
+  for (const FaultRow& row : fault_rows()) {
+    INFO(row.name);
+    const bool latches =
+        row.trigger == Trigger::hard_fault || row.trigger == Trigger::failed || row.trigger == Trigger::stop;
+    if (latches) CHECK(row.reaction == Reaction::zero);
+    if (latches) CHECK(row.cure.find("acknowledge") != std::string_view::npos);
+    if (row.trigger == Trigger::noted) CHECK(row.reaction == Reaction::none);
+    if (row.trigger != Trigger::noted) CHECK(row.reaction >= Reaction::fade_100ms);
+  }
+}
+
+TEST_CASE("names that stand in records", "[fault]") {
+  CHECK(fault_row(Fault::none).name == "none");
+  CHECK(fault_row(Fault::device_lost).name == "device_lost");
+  CHECK(fault_row(Fault::pose_not_finite).name == "pose_not_finite");
+  CHECK(fault_row(Fault::sample_stale).name == "sample_stale");
+  CHECK(fault_row(Fault::test_watchdog).name == "test_watchdog");
 }
 
 TEST_CASE("a value that is no fault reads unknown", "[fault]") {
-  for (int value = static_cast<int>(Fault::write_failed) + 1; value < 256; ++value) {
-    const FaultText what = text(static_cast<Fault>(value));
-    REQUIRE(what.name == "unknown");
-    REQUIRE_FALSE(what.sentence.empty());
-    REQUIRE_FALSE(what.cure.empty());
+  for (std::size_t value = kFaultCount; value < 256; ++value) {
+    const FaultRow& row = fault_row(static_cast<Fault>(value));
+    REQUIRE(row.name == "unknown");
+    REQUIRE(row.trigger == Trigger::hard_fault);
+    REQUIRE_FALSE(row.sentence.empty());
+    REQUIRE_FALSE(row.cure.empty());
   }
 }

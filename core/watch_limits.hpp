@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/clock.hpp"
+
+namespace wrenchd {
+
+// How long a thing may be wrong until it is a fault: what the detectors use, and the table of faults tells.
+inline constexpr Duration kLateSample = std::chrono::milliseconds(3);  ///< a few reports at 1 kHz
+inline constexpr Duration kStaleSample =
+    std::chrono::milliseconds(20);  ///< unless the profile says otherwise
+inline constexpr Duration kStuckPose = std::chrono::milliseconds(20);
+inline constexpr Duration kDeadMotors =
+    std::chrono::milliseconds(20);  ///< longer than any way there and back
+inline constexpr Duration kLateAnswer = std::chrono::milliseconds(3);
+inline constexpr Duration kLateTick = std::chrono::milliseconds(5);
+inline constexpr Duration kStoppedLoop =
+    std::chrono::milliseconds(20);  ///< unless the configuration says otherwise
+inline constexpr Duration kBlockedWrite = std::chrono::milliseconds(2);
+inline constexpr Duration kFailedWrite = std::chrono::milliseconds(20);
+inline constexpr Duration kOscillation = std::chrono::milliseconds(50);
+inline constexpr Duration kPinned = std::chrono::seconds(1);
+inline constexpr Duration kSilentClient = std::chrono::milliseconds(100);
+inline constexpr Duration kTestFor = std::chrono::seconds(5);
+inline constexpr Duration kSuspended = std::chrono::milliseconds(100);
+
+}  // namespace wrenchd
