@@ -19,8 +19,8 @@ struct Waypoint {
 struct SimulationSettings {
   double handle_mass_kg = 0.15;
   double handle_inertia_kg_m2 = 2.0e-4;  ///< isotropic, about the handle point
-  double viscous_friction_N_s_per_m = 0.5;
-  double viscous_friction_Nm_s_per_rad = 0.002;
+  double viscous_friction_N_s_per_m = 3.0;
+  double viscous_friction_Nm_s_per_rad = 0.008;
   double coulomb_friction_N = 0.0;
   double coulomb_friction_Nm = 0.0;
   double position_quantum_m = 1.0e-5;  ///< encoder step

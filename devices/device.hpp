@@ -22,8 +22,9 @@ struct DeviceSample {
   std::uint32_t missing = 0;       ///< reports lost since the last sample, by sequence number
   std::uint32_t rejected =
       0;  ///< reports dropped in this read: wrong id, length or checksum, backward or duplicate sequence
-  std::uint32_t buttons = 0;  ///< bit mask
-  bool fresh = false;         ///< a new report arrived since the last read
+  std::uint32_t repeated = 0;  ///< of these, the ones with a backward or duplicate sequence
+  std::uint32_t buttons = 0;   ///< bit mask
+  bool fresh = false;          ///< a new report arrived since the last read
   bool motors_on = false;
   bool watchdog_tripped = false;
   bool homed = true;          ///< the encoders know where they are; until then no sample is fresh
@@ -45,6 +46,8 @@ class Device {
   virtual DeviceSample read_newest(TimePoint now) noexcept = 0;
   /// Sends one wrench, on the hand, about the point and in the axes the profile names. RT safe.
   virtual Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept = 0;
+  /// The number of the last command that was sent, as DeviceSample::acknowledged counts them. RT safe.
+  virtual std::uint64_t commands_sent() const noexcept { return 0; }
   /// Sends zero wrench with the motors off, several times; works in every state and never fails. RT safe.
   virtual void release(TimePoint now) noexcept = 0;
   /// Sleeps until a report is waiting or the deadline has passed.

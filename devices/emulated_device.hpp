@@ -39,6 +39,7 @@ class EmulatedDevice {
   bool shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
     return faults_.shows(kind, from, to);
   }
+  const FaultPlan& faults() const noexcept { return faults_; }
 
  protected:
   FaultPlan faults_;  ///< whoever is switched on tells it when

@@ -5,11 +5,12 @@
 
 namespace wrenchd {
 
-bool FaultPlan::shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
-  return std::any_of(faults_.begin(), faults_.end(), [&](const SimulatedFault& fault) {
-    const TimePoint start = power_on_ + fault.start;
-    return fault.kind == kind && start <= to && from < start + fault.duration;
+const SimulatedFault* FaultPlan::find(SimulatedFault::Kind kind, TimePoint from,
+                                      TimePoint to) const noexcept {
+  const auto found = std::find_if(faults_.begin(), faults_.end(), [&](const SimulatedFault& fault) {
+    return fault.kind == kind && start_of(fault) <= to && from < end_of(fault);
   });
+  return found == faults_.end() ? nullptr : &*found;
 }
 
 }  // namespace wrenchd

@@ -1,29 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "core/clock.hpp"
+#include "core/simulated_fault.hpp"
 
 namespace wrenchd {
-
-/// One thing that goes wrong with a simulated device, for a while. devices/README.md tells what each does.
-struct SimulatedFault {
-  enum class Kind : std::uint8_t {
-    unplug,          ///< the device is gone; the link stays gone until it is opened again
-    silence,         ///< no reports
-    freeze,          ///< the last report again and again, sequence and all
-    garble,          ///< one bit of each report is wrong, so a checksum is too
-    short_report,    ///< half of each report
-    bad_quaternion,  ///< orientation of half the length
-    teleport,        ///< position 0.1 m off along x
-    deaf,            ///< no room for commands
-  };
-  Kind kind = Kind::silence;
-  Duration start{};  ///< since power-on
-  Duration duration{};
-};
 
 /// What shall go wrong, and when. Any number of faults may overlap.
 class FaultPlan {
@@ -33,9 +16,20 @@ class FaultPlan {
   /// From here times count. RT safe.
   void power_on(TimePoint now) noexcept { power_on_ = now; }
   /// Whether a fault of this kind shows at any moment from..to. RT safe.
-  bool shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept;
+  bool shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
+    return find(kind, from, to) != nullptr;
+  }
+  /// The first fault of this kind that shows now; null where there is none. RT safe.
+  const SimulatedFault* at(SimulatedFault::Kind kind, TimePoint now) const noexcept {
+    return find(kind, now, now);
+  }
+  /// When a fault began, and when it is over.
+  TimePoint start_of(const SimulatedFault& fault) const noexcept { return power_on_ + fault.start; }
+  TimePoint end_of(const SimulatedFault& fault) const noexcept { return start_of(fault) + fault.duration; }
 
  private:
+  const SimulatedFault* find(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept;
+
   std::vector<SimulatedFault> faults_;
   TimePoint power_on_{};
 };

@@ -59,6 +59,8 @@ Pose HeldArm::start(const std::string& profile) const {
 void HeldArm::inject(const SimulatedFault& fault) {
   if (fault.kind == SimulatedFault::Kind::bad_quaternion)
     throw std::invalid_argument("an arm sends encoder counts, and no quaternion that could be bad");
+  if (!is_of_the_wire(fault.kind) && fault.kind != SimulatedFault::Kind::teleport)
+    throw std::invalid_argument("an emulated arm has no such fault; the loopback device has");
   faults_.add(fault);
 }
 

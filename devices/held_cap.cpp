@@ -64,6 +64,8 @@ void HeldCap::inject(const SimulatedFault& fault) {
   using Kind = SimulatedFault::Kind;
   if (fault.kind == Kind::bad_quaternion || fault.kind == Kind::teleport)
     throw std::invalid_argument("a cap sends how far it is pushed, and no pose that could be bad");
+  if (!is_of_the_wire(fault.kind))
+    throw std::invalid_argument("an emulated cap has no such fault; the loopback device has");
   faults_.add(fault);
 }
 

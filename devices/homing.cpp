@@ -60,7 +60,7 @@ std::string sentence_of(const HomingState& state) {
     case HomingTrouble::none:
       return "";
     case HomingTrouble::device_fault:
-      return "The device: " + std::string(text(state.fault).sentence) + " ";
+      return "The device: " + std::string(fault_row(state.fault).sentence) + " ";
     case HomingTrouble::not_in_rest:
       return "The handle is too far from its rest, or the device counts from somewhere else. ";
     case HomingTrouble::not_still:

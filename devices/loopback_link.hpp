@@ -39,6 +39,8 @@ class LoopbackLink final : public ReportLink, private ReportSink {
   enum class State : std::uint8_t { closed, open, gone };
 
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override;
+  void queue(TimePoint arrives, const Packet& packet) noexcept;
+  void stall() noexcept;
   TimePoint next_arrival(TimePoint now) const noexcept;
 
   EmulatedDevice& device_;
@@ -50,6 +52,9 @@ class LoopbackLink final : public ReportLink, private ReportSink {
   PacketQueue reports_;   ///< device to host
   PacketQueue commands_;  ///< host to device
   Packet last_;           ///< that left the device and was not frozen
+  Packet held_;           ///< that waits for the one which follows it
+  std::uint64_t sent_ = 0;
+  TimePoint last_arrival_{};
   std::uint64_t dropped_ = 0;
 };
 

@@ -14,7 +14,9 @@ namespace wrenchd {
 
 /// One report on its way.
 struct Packet {
-  std::array<std::uint8_t, kMaxReportBytes> bytes{};
+  /// A byte more than a report may have, for one that is too long.
+  static constexpr std::size_t kRoom = kMaxReportBytes + 1;
+  std::array<std::uint8_t, kRoom> bytes{};
   std::size_t length = 0;
   TimePoint arrives{};
 
@@ -29,7 +31,7 @@ class PacketQueue {
 
   /// False, and nothing changes, where the queue is full or the report too long.
   bool push(TimePoint arrives, std::span<const std::uint8_t> report) noexcept {
-    if (count_ == kCapacity || report.size() > kMaxReportBytes) return false;
+    if (count_ == kCapacity || report.size() > Packet::kRoom) return false;
     Packet& packet = packets_[(first_ + count_++) % kCapacity];
     std::copy(report.begin(), report.end(), packet.bytes.begin());
     packet.length = report.size();

@@ -136,7 +136,7 @@ const PoseReportLayout* ProfileDevice::layout(std::size_t index) const noexcept 
 DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
   sample_.fresh = false;
   sample_.fault = Fault::none;
-  sample_.skipped = sample_.missing = sample_.rejected = 0;
+  sample_.skipped = sample_.missing = sample_.rejected = sample_.repeated = 0;
   if (!silent_since_) {
     start(now);
   } else if (const std::optional<Arrival> newest = drain(now); newest && !gone_) {
@@ -214,7 +214,10 @@ const PoseReportLayout* ProfileDevice::understand(std::span<const std::uint8_t> 
     const PoseReportLayout& known = *layout(i);
     PoseReport report = state_;
     if (decode_into(known, bytes, report) != Decoding::ok) continue;
-    if (!count_in(known, report, arrived)) return nullptr;
+    if (!count_in(known, report, arrived)) {
+      ++sample_.repeated;
+      return nullptr;
+    }
     if (deflection_ && (known.translation.present || known.rotation.present)) {
       follow_deflection(arrived);
       const Quaterniond& R_BD = profile_.X_BD.rotation;

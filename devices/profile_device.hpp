@@ -56,7 +56,7 @@ class ProfileDevice final : public Device {
   void close() noexcept override;
 
   const DeviceProfile& profile() const noexcept { return profile_; }
-  std::uint64_t commands_sent() const noexcept { return commands_sent_; }
+  std::uint64_t commands_sent() const noexcept override { return commands_sent_; }
 
   /// Joint angles of the last good sample, where the device has joints. RT safe.
   const JointAngles& joint_angles() const noexcept { return angles_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -18,6 +19,9 @@ constexpr std::uint64_t kSamplesPerReport = 8;
 constexpr double kMaxSubstep_s = 1.0 / 16000.0;
 
 constexpr double kTeleport_m = 0.1;
+constexpr double kRunAway_m_per_s = 3.0;
+constexpr double kShake_m = 1e-3;
+constexpr double kShake_Hz = 80.0;
 constexpr double kBadQuaternionLength = 0.5;
 
 double report_period(const DeviceProfile& profile) {
@@ -89,6 +93,7 @@ void SimulatedDevice::skip_to(TimePoint t) noexcept {
 
 void SimulatedDevice::substep(ReportSink& host) noexcept {
   now_ += substep_;
+  disturb();
   handle_.step(path_.at(now_ - power_on_), motor_demand());
   ++substeps_;
   if (substeps_ % substeps_per_sample_ == 0) firmware_.sample(handle_.X_BH());
@@ -114,7 +119,7 @@ void SimulatedDevice::send_report(ReportSink& host) noexcept {
   using Kind = SimulatedFault::Kind;
   PoseReport report = firmware_.report(now_ - power_on_);
   if (!same_frames_) into_own_frames(report);
-  if (shows(Kind::teleport, now_, now_)) report.X_BH.translation_m.x() += kTeleport_m;
+  spoil(report);
   if (shows(Kind::bad_quaternion, now_, now_)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
   std::array<std::uint8_t, kMaxReportBytes> bytes;
   host.take_report(now_, std::span(bytes).first(encode(pose_layout_, report, bytes)));
@@ -122,6 +127,35 @@ void SimulatedDevice::send_report(ReportSink& host) noexcept {
 
 bool SimulatedDevice::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
   return firmware_.take_command(now_, bytes);
+}
+
+/// What is wrong with what the device says.
+void SimulatedDevice::spoil(PoseReport& report) noexcept {
+  using Kind = SimulatedFault::Kind;
+  const auto value = [](const SimulatedFault& fault, double usual) {
+    return fault.value > 0.0 ? fault.value : usual;
+  };
+  Vector3d& p_m = report.X_BH.translation_m;
+  if (const SimulatedFault* f = faults_.at(Kind::teleport, now_)) p_m.x() += value(*f, kTeleport_m);
+  if (const SimulatedFault* f = faults_.at(Kind::run_away, now_)) {
+    const double way_m = value(*f, kRunAway_m_per_s) * seconds(now_ - faults_.start_of(*f));
+    p_m.x() += kTeleport_m - std::abs(std::fmod(way_m, 2.0 * kTeleport_m) - kTeleport_m);
+  }
+  if (const SimulatedFault* f = faults_.at(Kind::shake, now_))
+    p_m.z() += value(*f, kShake_m) *
+               std::sin(2.0 * std::numbers::pi * kShake_Hz * seconds(now_ - faults_.start_of(*f)));
+  if (const SimulatedFault* f = faults_.at(Kind::press, now_))
+    report.buttons |= std::uint32_t{1} << (static_cast<unsigned>(f->value) & 31U);
+  if (!shows(Kind::stick, now_, now_)) moving_ = report.X_BH;
+  report.X_BH = moving_;
+}
+
+/// What is wrong with the firmware, from before a command or a look at its motors.
+void SimulatedDevice::disturb() noexcept {
+  using Kind = SimulatedFault::Kind;
+  firmware_.keep_awake(!shows(Kind::sleepy, now_, now_));
+  if (shows(Kind::trip, now_, now_)) firmware_.trip_watchdog();
+  if (shows(Kind::dead_motors, now_, now_)) firmware_.switch_off();
 }
 
 TimePoint SimulatedDevice::next_event() const noexcept {

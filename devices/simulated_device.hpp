@@ -50,6 +50,8 @@ class SimulatedDevice final : public HeldDevice {
   void skip_to(TimePoint t) noexcept;
   void substep(ReportSink& host) noexcept;
   void send_report(ReportSink& host) noexcept;
+  void spoil(PoseReport& report) noexcept;
+  void disturb() noexcept;
   Wrench motor_demand() noexcept;
   void into_own_frames(PoseReport& report) const noexcept;
 
@@ -64,6 +66,7 @@ class SimulatedDevice final : public HeldDevice {
   HandPath path_;
   SimulatedHandle handle_;
   SimulatedFirmware firmware_;
+  Pose moving_;  ///< what the encoders said before they got stuck
 
   bool powered_ = false;
   TimePoint power_on_{};

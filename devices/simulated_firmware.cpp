@@ -93,7 +93,7 @@ bool SimulatedFirmware::take_command(TimePoint now, std::span<const std::uint8_t
 }
 
 Wrench SimulatedFirmware::motors(TimePoint until) noexcept {
-  if (motors_on_ && until > hold_until_) trip_watchdog();
+  if (awake_ && motors_on_ && until > hold_until_) trip_watchdog();
   return command_;
 }
 

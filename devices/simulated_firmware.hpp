@@ -43,6 +43,15 @@ class SimulatedFirmware {
   /// Motors off, and the host is told why.
   void trip_watchdog() noexcept;
 
+  // What may be wrong with a firmware, for tests.
+  /// False: the watchdog never trips.
+  void keep_awake(bool awake) noexcept { awake_ = awake; }
+  /// Motors off, and the watchdog has nothing to do with it.
+  void switch_off() noexcept {
+    motors_on_ = false;
+    command_ = {};
+  }
+
   bool motors_on() const noexcept { return motors_on_; }
   bool watchdog_tripped() const noexcept { return watchdog_tripped_; }
   std::uint64_t commands_rejected() const noexcept { return commands_rejected_; }
@@ -72,6 +81,7 @@ class SimulatedFirmware {
   std::optional<std::uint64_t> last_command_;  ///< its sequence
   bool motors_on_ = false;
   bool watchdog_tripped_ = false;
+  bool awake_ = true;
   std::uint64_t commands_rejected_ = 0;
 };
 

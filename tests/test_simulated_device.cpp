@@ -255,6 +255,8 @@ TEST_CASE("a constant wrench moves the hand by force over stiffness") {
 
 TEST_CASE("a free body gains the speed that its mass and friction allow") {
   SimulationSettings s = nobody();
+  s.viscous_friction_N_s_per_m = 0.5;
+  s.viscous_friction_Nm_s_per_rad = 0.002;
   SimulatedDevice simulation(reference_profile(), s);
   Listener host;
   simulation.advance_to({}, host);

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "config/load_loopback_script.hpp"
+
+#include <algorithm>
+
+#include "config/toml_reader.hpp"
+
+namespace wrenchd {
+namespace {
+
+using Kind = SimulatedFault::Kind;
+
+constexpr Range kTime_s{0, 86400};
+
+/// The largest `value` of a kind, and the smallest; nothing where it has none.
+Range value_range(Kind kind) {
+  switch (kind) {
+    case Kind::lose:
+      return {1, 1000};
+    case Kind::late:
+      return {1e-4, 1};
+    case Kind::teleport:
+    case Kind::shake:
+      return {1e-6, 10};
+    case Kind::run_away:
+      return {1e-3, 100};
+    case Kind::press:
+      return {0, 31};
+    default:
+      return {0, 0};
+  }
+}
+
+void read_fault(TomlTable& table, LoopbackScript& script) {
+  SimulatedFault fault;
+  double at_s = 0.0, for_s = 0.0;
+  table.mandatory("at_s").number(at_s, kTime_s);
+  table.mandatory("for_s").number(for_s, {1e-6, 86400});
+  table.mandatory("kind").choice(fault.kind, {{"unplug", Kind::unplug},
+                                              {"silence", Kind::silence},
+                                              {"freeze", Kind::freeze},
+                                              {"repeat", Kind::repeat},
+                                              {"swap", Kind::swap},
+                                              {"lose", Kind::lose},
+                                              {"late", Kind::late},
+                                              {"garble", Kind::garble},
+                                              {"short_report", Kind::short_report},
+                                              {"long_report", Kind::long_report},
+                                              {"wrong_id", Kind::wrong_id},
+                                              {"deaf", Kind::deaf},
+                                              {"swallow", Kind::swallow},
+                                              {"stall", Kind::stall},
+                                              {"bad_quaternion", Kind::bad_quaternion},
+                                              {"teleport", Kind::teleport},
+                                              {"run_away", Kind::run_away},
+                                              {"shake", Kind::shake},
+                                              {"stick", Kind::stick},
+                                              {"press", Kind::press},
+                                              {"trip", Kind::trip},
+                                              {"sleepy", Kind::sleepy},
+                                              {"dead_motors", Kind::dead_motors}});
+  const TomlValue value = table.optional("value");
+  const Range range = value_range(fault.kind);
+  if (value && !(range.max > range.min))
+    value.refuse("a fault of this kind has no value; leave it out");
+  else
+    value.number(fault.value, range);
+  fault.start = from_seconds(at_s);
+  fault.duration = from_seconds(for_s);
+  script.faults.push_back(fault);
+}
+
+void read_command(TomlTable& table, LoopbackScript& script) {
+  TimedCommand command;
+  double at_s = 0.0;
+  table.mandatory("at_s").number(at_s, kTime_s);
+  table.mandatory("what").choice(command.commands, {{"arm", CommandSet{kArm}},
+                                                    {"arm_with_lease", CommandSet{kArm | kLease}},
+                                                    {"live", CommandSet{kBeat}},
+                                                    {"disarm", CommandSet{kDisarm}},
+                                                    {"start_over", CommandSet{kStartOver}},
+                                                    {"stop", CommandSet{kStop}},
+                                                    {"acknowledge", CommandSet{kAcknowledge}},
+                                                    {"quit", CommandSet{kQuit}}});
+  command.at = from_seconds(at_s);
+  script.commands.push_back(command);
+}
+
+void read_script(TomlTable& table, LoopbackScript& script) {
+  for (const TomlValue& fault : table.optional("fault").elements("tables, each headed [[fault]]"))
+    fault.table(read_fault, script);
+  for (const TomlValue& ask : table.optional("ask").elements("tables, each headed [[ask]]"))
+    ask.table(read_command, script);
+}
+
+}  // namespace
+
+LoopbackScript load_loopback_script(const std::filesystem::path& file) {
+  LoopbackScript script;
+  script.file = file;
+  read_toml(file, read_script, script);
+  std::stable_sort(script.commands.begin(), script.commands.end(),
+                   [](const TimedCommand& a, const TimedCommand& b) { return a.at < b.at; });
+  return script;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "config/load_loopback_script.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+
+/// wrenchd with a script, in virtual time.
+ProgramResult run_script(const TemporaryDirectory& dir, const std::string& script,
+                         const std::string& seconds = "4", std::vector<std::string> more = {}) {
+  const fs::path file = dir.write("script.toml", script);
+  std::vector<std::string> arguments = {"--virtual-time", "--seconds",         seconds,
+                                        "--arm",          "--loopback-script", file.string()};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_program("wrenchd", arguments);
+}
+
+bool says(const ProgramResult& result, const std::string& text) {
+  return result.err.find(text) != std::string::npos;
+}
+
+TEST_CASE("a script is read whole, its commands by time", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  const LoopbackScript script = load_loopback_script(dir.write("s.toml", R"(
+[[fault]]
+at_s = 1.5
+for_s = 0.01
+kind = "silence"
+[[fault]]
+at_s = 2
+for_s = 0.5
+kind = "late"
+value = 0.008
+[[ask]]
+at_s = 3.0
+what = "stop"
+[[ask]]
+at_s = 0.5
+what = "arm"
+)"));
+  REQUIRE(script.faults.size() == 2);
+  CHECK(script.faults[0].kind == SimulatedFault::Kind::silence);
+  CHECK(script.faults[0].start == std::chrono::milliseconds(1500));
+  CHECK(script.faults[0].duration == std::chrono::milliseconds(10));
+  CHECK(script.faults[0].value == 0.0);
+  CHECK(script.faults[1].value == 0.008);
+  REQUIRE(script.commands.size() == 2);
+  CHECK(script.commands[0].commands == kArm);
+  CHECK(script.commands[1].at == std::chrono::seconds(3));
+}
+
+TEST_CASE("a script that cannot be is refused with its place and the cure", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  const auto told = [&](const std::string& text) -> std::string {
+    try {
+      load_loopback_script(dir.write("s.toml", text));
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  using Catch::Matchers::Contains;
+  CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silense\"\n"),
+             Contains("4:8") && Contains("silence"));
+  CHECK_THAT(told("[[fault]]\nat_s = -1\nfor_s = 1\nkind = \"silence\"\n"), Contains("2:8"));
+  CHECK_THAT(told("[[fault]]\nat_s = 1\nkind = \"silence\"\n"), Contains("fault[0].for_s"));
+  CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silence\"\nvalue = 3\n"),
+             Contains("5:9") && Contains("leave it out"));
+  CHECK_THAT(told("[[ask]]\nat_s = 1\nwhat = \"jump\"\n"), Contains("3:8") && Contains("disarm"));
+  CHECK_THAT(told("[[fualt]]\nat_s = 1\n"), Contains("fualt") && Contains("fault"));
+  CHECK_THAT(told("fault = 3\n"), Contains("[[fault]]"));
+}
+
+TEST_CASE("a moment of silence degrades the loop, which comes back; the run ends well", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  const auto result = run_script(dir, "[[fault]]\nat_s = 3.0\nfor_s = 0.01\nkind = \"silence\"\n");
+  INFO(result.err);
+  CHECK(result.exit_code == 0);
+  CHECK(says(result, "sample_late: the newest pose is a few milliseconds old"));
+  CHECK(says(result, "state: degraded"));
+  const auto degraded = result.err.find("state: degraded");
+  CHECK(result.err.find("state: active", degraded) != std::string::npos);
+}
+
+TEST_CASE("a latched fault stays until it is acknowledged, and is the exit code", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  const std::string fault = "[[fault]]\nat_s = 2.0\nfor_s = 0.1\nkind = \"run_away\"\n";
+  const auto left = run_script(dir, fault);
+  INFO(left.err);
+  CHECK(left.exit_code == 3);
+  CHECK(says(left, "overspeed: the handle moved faster"));
+  CHECK(says(left, "state: fault"));
+  const auto seen = run_script(dir, fault + "[[ask]]\nat_s = 3.0\nwhat = \"acknowledge\"\n");
+  CHECK(seen.exit_code == 0);
+  const auto latched = seen.err.find("state: fault");
+  const auto tested = seen.err.find("state: self-test", latched);
+  CHECK(tested != std::string::npos);
+  CHECK(seen.err.find("state: disarmed", tested) != std::string::npos);
+  CHECK(seen.err.find("state: waiting", tested) == std::string::npos);  // never armed again by itself
+}
+
+TEST_CASE("a stop, a stall, a client that falls silent: each as it should end", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  CHECK(says(run_script(dir, "[[ask]]\nat_s = 2.5\nwhat = \"stop\"\n"), "state: stopped"));
+  const auto stalled = run_script(dir, "[[fault]]\nat_s = 2.5\nfor_s = 0.009\nkind = \"stall\"\n");
+  INFO(stalled.err);
+  CHECK(says(stalled, "state: degraded"));
+  CHECK(stalled.exit_code == 0);
+  const auto sleepy = run_script(dir, "[[fault]]\nat_s = 0\nfor_s = 9\nkind = \"sleepy\"\n");
+  CHECK(sleepy.exit_code == 3);
+  CHECK(says(sleepy, "test_watchdog: the device's watchdog did not trip"));
+  CHECK_FALSE(says(sleepy, "state: waiting"));
+  const fs::path file = dir.write("lease.toml", "[[ask]]\nat_s = 1.0\nwhat = \"arm_with_lease\"\n");
+  const auto alone =
+      run_program("wrenchd", {"--virtual-time", "--seconds", "4", "--loopback-script", file.string()});
+  CHECK(says(alone, "client_silent: whoever armed never said"));
+  CHECK(alone.exit_code == 0);
+}
+
+TEST_CASE("a script is for simulated devices that can do what it says", "[loopback_script]") {
+  const TemporaryDirectory dir;
+  const fs::path file = dir.write("s.toml", "[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"run_away\"\n");
+  const auto real =
+      run_program("wrenchd", {"--profile", "reference_full_speed", "--loopback-script", file.string()});
+  CHECK(real.exit_code == 1);
+  CHECK(says(real, "nothing can be asked of a real device; simulate one"));
+  const auto arm = run_program("wrenchd", {"--simulate", "polhem", "--virtual-time", "--seconds", "1",
+                                           "--loopback-script", file.string()});
+  CHECK(arm.exit_code == 1);
+  CHECK(says(arm, "s.toml: an emulated arm has no such fault; the loopback device has"));
+}
+
+}  // namespace
+}  // namespace wrenchd
