@@ -60,6 +60,7 @@ void read_servo(TomlTable& table, ServoSettings& servo) {
   table.optional("priority").integer(servo.priority, {1, 49});
   table.optional("cpu").integer(servo.cpu, {-1, 1023});
   table.optional("late_limit_s").number(servo.late_limit_s, {0.002, 1});
+  table.optional("self_test_s").number(servo.self_test_s, {0, 5});
 }
 
 /// One coefficient alone stands for both.

@@ -25,7 +25,9 @@ struct ServoSettings {
   Realtime realtime = Realtime::required;
   int priority = 45;            ///< SCHED_FIFO, below threaded interrupts (50)
   int cpu = -1;                 ///< -1: no affinity
-  double late_limit_s = 0.020;  ///< a tick later than this starts the soft start anew
+  double late_limit_s = 0.020;  ///< a tick later than this is a loop that stood still
+  double self_test_s =
+      0.5;  ///< how long a device's reports have to be good before it may be armed; 0: no test
 };
 
 /// [rendering]

@@ -12,19 +12,18 @@ namespace wrenchd {
 /// Something worth a line in the log, as the servo thread says it: no text, no allocation.
 struct Event {
   enum class Kind : std::uint8_t {
-    engagement,          ///< detail: the new Engagement
-    fault,               ///< detail: the Fault
-    late_tick,           ///< value: how late [s]; the soft start began anew
-    stale_sample,        ///< value: its age [s]; the wrench is zero until a new one comes
-    reports_missing,     ///< detail: how many, by sequence number
-    reports_rejected,    ///< detail: how many were short, long, of another id, garbled or out of order
+    state,      ///< detail: the new State
+    fault,      ///< detail: the Fault; value: how much of it, where that says something
+    stiffness,  ///< value: the share of the spring that stays passive on this device, where less than 1
+    unbounded,  ///< the profile states no damping, so nobody knows how stiff a wall may be
+    refused,    ///< detail: the State in which it was asked to arm, and was not
     no_admissible_pose,  ///< the obstacles contradict each other where the hand is; the proxy stays
     placing,             ///< no admissible pose is known; zero wrench while one is looked for
     placed,              ///< value: how far from the hand it was found [m]
     nowhere,             ///< none was found; zero wrench, and it is looked for again
     released,            ///< the hand was released
   };
-  Kind kind = Kind::engagement;
+  Kind kind = Kind::state;
   TimePoint at{};
   std::uint32_t detail = 0;
   double value = 0.0;

@@ -12,11 +12,15 @@ namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(20);
 
-spdlog::level::level_enum level_of(Event::Kind kind) {
-  switch (kind) {
-    case Event::Kind::fault:
-      return spdlog::level::err;
-    case Event::Kind::engagement:
+spdlog::level::level_enum level_of(const Event& event) {
+  switch (event.kind) {
+    case Event::Kind::fault: {
+      const Trigger trigger = fault_row(static_cast<Fault>(event.detail)).trigger;
+      const bool latches = trigger == Trigger::hard_fault || trigger == Trigger::failed ||
+                           trigger == Trigger::stop || trigger == Trigger::device_gone;
+      return latches ? spdlog::level::err : spdlog::level::warn;
+    }
+    case Event::Kind::state:
     case Event::Kind::placing:
     case Event::Kind::placed:
     case Event::Kind::released:
@@ -26,26 +30,43 @@ spdlog::level::level_enum level_of(Event::Kind kind) {
   }
 }
 
+/// What the value of a fault's event says.
+std::string measured(Fault fault, double value) {
+  switch (fault) {
+    case Fault::tick_late:
+    case Fault::loop_stopped:
+    case Fault::answer_late:
+      return fmt::format(" ({:.1f} ms)", 1e3 * value);
+    case Fault::test_rate:
+      return fmt::format(" ({:.0f} a second)", value);
+    default:
+      return {};
+  }
+}
+
 }  // namespace
 
 std::string to_text(const Event& event) {
   switch (event.kind) {
-    case Event::Kind::engagement:
-      return fmt::format("engagement: {}", name(static_cast<Engagement>(event.detail)));
+    case Event::Kind::state:
+      return fmt::format("state: {}", name(static_cast<State>(event.detail)));
     case Event::Kind::fault: {
-      const FaultText fault = text(static_cast<Fault>(event.detail));
-      return fmt::format("fault {}: {}; {}", fault.name, fault.sentence, fault.cure);
+      const auto fault = static_cast<Fault>(event.detail);
+      const FaultRow& row = fault_row(fault);
+      return fmt::format("{}: {}{}; {}", row.name, row.sentence, measured(fault, event.value), row.cure);
     }
-    case Event::Kind::late_tick:
-      return fmt::format("a tick came {:.1f} ms late; the soft start begins anew", 1e3 * event.value);
-    case Event::Kind::stale_sample:
-      return fmt::format("the newest pose is {:.1f} ms old; zero wrench until a new one comes",
-                         1e3 * event.value);
-    case Event::Kind::reports_missing:
-      return fmt::format("{} reports of the device are missing", event.detail);
-    case Event::Kind::reports_rejected:
-      return fmt::format("{} reports rejected: garbled, of another length or id, or out of order",
-                         event.detail);
+    case Event::Kind::stiffness:
+      return fmt::format(
+          "the device bears {:.0f} % of the stiffness that is asked for, at the rate and delay measured: it "
+          "is "
+          "scaled; lower it in [wrench], or state more damping in the profile if it has more",
+          100.0 * event.value);
+    case Event::Kind::unbounded:
+      return "the profile states no damping: nobody knows how stiff a wall the device bears; measure it, and "
+             "state "
+             "damping_N_s_per_m and damping_Nm_s_per_rad";
+    case Event::Kind::refused:
+      return fmt::format("not armed: {}", transition(Trigger::arm, static_cast<State>(event.detail)).why);
     case Event::Kind::no_admissible_pose:
       return "no admissible pose near the hand: the obstacles leave no room; the proxy stays where it was";
     case Event::Kind::placing:
@@ -77,7 +98,7 @@ EventLog::~EventLog() {
 
 void EventLog::drain() {
   Event event;
-  while (loop_.events().pop(event)) spdlog::log(level_of(event.kind), "{}", to_text(event));
+  while (loop_.events().pop(event)) spdlog::log(level_of(event), "{}", to_text(event));
   const std::uint64_t dropped = loop_.dropped_events();
   if (dropped > dropped_said_)
     spdlog::warn("{} events were dropped: the log fell behind", dropped - dropped_said_);

@@ -8,8 +8,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "core/device_profile.hpp"
-#include "core/engagement.hpp"
 #include "core/fault.hpp"
+#include "core/state.hpp"
 #include "daemon/placer.hpp"
 
 namespace wrenchd {
@@ -34,10 +34,12 @@ double angle(const std::array<double, 7>& X) {
 }
 
 std::string state(const TickRecord& r) {
-  if (r.fault != 0) return fmt::format("fault:{}", text(static_cast<Fault>(r.fault)).name);
+  const auto state = static_cast<State>(r.state);
+  if (r.cause != 0 && (is_latched(state) || state == State::degraded))
+    return fmt::format("{}:{}", name(state), fault_row(static_cast<Fault>(r.cause)).name);
   if (const auto placing = static_cast<Placing>(r.placing); placing != Placing::following)
     return name(placing);
-  return name(static_cast<Engagement>(r.engagement));
+  return name(state);
 }
 
 }  // namespace

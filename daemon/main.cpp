@@ -13,6 +13,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "config/load_loopback_script.hpp"
 #include "daemon/device_start.hpp"
 #include "daemon/event_log.hpp"
 #include "daemon/live_line.hpp"
@@ -24,6 +25,7 @@
 #include "daemon/wall_clock.hpp"
 #include "devices/plugged_link.hpp"
 #include "devices/simulated_link.hpp"
+#include "devices/socket_link.hpp"
 
 // Arguments -> plan -> station -> device -> run -> exit code. A device that is unplugged leads back to the
 // device; every other fault out.
@@ -33,23 +35,27 @@ namespace {
 using namespace wrenchd;
 
 constexpr int kExitRefused = 1;  ///< a file, a device or the kernel said no; nothing was started
-constexpr int kExitFault = 3;    ///< the loop ended with a fault; the hand was released
+constexpr int kExitFault = 3;    ///< it ended with a fault that nobody acknowledged; the hand was released
 
 constexpr auto kLook = std::chrono::milliseconds(100);  ///< how often the live line looks
 /// The zeros of a release are written by a thread of the link's, which a dying process leaves this long.
 constexpr auto kLastWords = std::chrono::milliseconds(50);
 
 std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<CommandSet>::is_always_lock_free &&
+                  std::atomic<ServoLoop*>::is_always_lock_free,
+              "a signal handler may only touch lock-free atomics");
 
-ServoLoop* loop_to_release = nullptr;  ///< for std::terminate only
+std::atomic<ServoLoop*> the_loop{nullptr};  ///< for signals, and for std::terminate
 
 struct Options {
   PlanFiles files;
   std::string simulate;
   std::string realtime;
   std::string record;
+  std::string script;
   double seconds = 0.0;
+  int link_fd = -1;  ///< -1: none
   bool arm = false;
   bool live = false;
   bool virtual_time = false;
@@ -61,8 +67,11 @@ void describe(CLI::App& app, Options& options) {
       "wrenchd: a haptic servo daemon. Reads the hand's pose, computes the generalized penetration\n"
       "depth of the tool in its scene, and writes the wrench back.");
   app.footer(
-      "Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 a fault ended the loop; others:\n"
-      "usage. On every way out the hand is released: zero wrench, motors off.");
+      "Signals: SIGUSR1 is an emergency stop, SIGUSR2 acknowledges a stop or a fault; both leave it "
+      "disarmed.\n"
+      "Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 it ended with a fault that "
+      "nobody\n"
+      "acknowledged; others: usage. On every way out the hand is released: zero wrench, motors off.");
   app.set_version_flag("--version", std::string("wrenchd ") + kVersion);
   app.add_option(
          "-c,--config", options.files.config,
@@ -78,17 +87,29 @@ void describe(CLI::App& app, Options& options) {
                  "a simulated device that speaks as this profile says, in place of a real one")
       ->check(not_empty())
       ->excludes("--profile");
+  app.add_option("--loopback-script", options.script,
+                 "simulated device only: what shall go wrong with it and when (devices/README.md)")
+      ->check(not_empty());
+  app.add_option(
+         "--link-fd", options.link_fd,
+         "inherited SOCK_SEQPACKET socket to a device in another process, which speaks as the profile "
+         "says (devices/README.md)")
+      ->check(CLI::Range(3, 1 << 20))
+      ->excludes("--simulate");
   app.add_option("--realtime", options.realtime, "instead of the configuration's: required, best_effort, off")
       ->check(CLI::IsMember({"required", "best_effort", "off"}));
   app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)")
       ->check(not_empty());
   app.add_option("--seconds", options.seconds, "stop after this many seconds; without it, run until Ctrl-C")
       ->check(number_from(0.001, 1e9));
-  app.add_flag("--arm", options.arm, "arm at once; without it the loop measures, and the motors stay off");
+  app.add_flag(
+      "--arm", options.arm,
+      "arm as soon as the self-test has passed; without it the loop measures, and the motors stay off");
   app.add_flag("--live", options.live, "show a live line, and a summary at the end");
   app.add_flag("--virtual-time", options.virtual_time,
                "simulated device only: time passes as fast as it can be computed, and every run is the same")
-      ->needs("--seconds");
+      ->needs("--seconds")
+      ->excludes("--link-fd");
   app.add_flag("-v,--verbose", options.verbose, "log more");
 }
 
@@ -99,11 +120,18 @@ Plan plan_of(const Options& options) {
   files.simulate = !options.simulate.empty();
   Plan plan = read_plan(files, SearchPath());
   const std::string& name = plan.profile.name;
+  if (options.link_fd >= 0 && name.empty())
+    throw std::runtime_error(
+        "--link-fd: nobody is asked what device is at its other end; name its profile with --profile");
   if (files.simulate && name.empty())
     throw std::runtime_error("--simulate auto: name the profile to simulate, as in --simulate loopback");
   if (options.virtual_time && !plan.simulated)
     throw std::runtime_error(
         "--virtual-time: a real device lives in real time; simulate one, as with --simulate " +
+        (name.empty() ? "loopback" : name));
+  if (!options.script.empty() && (!plan.simulated || options.link_fd >= 0))
+    throw std::runtime_error(
+        "--loopback-script: nothing can be asked of a real device; simulate one, as with --simulate " +
         (name.empty() ? "loopback" : name));
   if (options.realtime == "required") plan.settings.servo.realtime = Realtime::required;
   if (options.realtime == "best_effort") plan.settings.servo.realtime = Realtime::best_effort;
@@ -151,14 +179,45 @@ class LiveView {
   RunTotals totals_;
 };
 
+/// What the command line asks of the loop: to arm, once, as soon as it can be armed, and what a script has at
+/// its times.
+class Wishes {
+ public:
+  Wishes(bool arm, std::vector<TimedCommand> commands, TimePoint start)
+      : arm_(arm), commands_(std::move(commands)), start_(start) {}
+
+  void pass_on(ServoLoop& loop, TimePoint now) {
+    for (; next_ < commands_.size() && start_ + commands_[next_].at <= now; ++next_)
+      loop.ask(commands_[next_].commands);
+    if (!arm_ || loop.state() != State::disarmed) return;
+    loop.arm();
+    arm_ = false;
+  }
+  /// When there is something to pass on again, if it is before t.
+  TimePoint next(TimePoint t) const {
+    return next_ < commands_.size() ? std::min(t, start_ + commands_[next_].at) : t;
+  }
+
+ private:
+  bool arm_;
+  std::vector<TimedCommand> commands_;
+  TimePoint start_;
+  std::size_t next_ = 0;
+};
+
+/// What the run came to: the fault that the loop stands in at its end, if it does.
+Fault fault_of(const ServoLoop& loop, Fault ended) {
+  return ended == Fault::none && is_latched(loop.state()) ? loop.cause() : ended;
+}
+
 /// Wall time: the servo thread ticks, this one looks on.
-Fault run_in_wall_time(Station& station, TimePoint end, WallClock& clock, LiveView& view) {
+Fault run_in_wall_time(Station& station, TimePoint end, WallClock& clock, LiveView& view, Wishes wishes) {
   const ServoSettings& servo = station.plan().settings.servo;
   std::promise<std::vector<RealtimeGrant>> prepared;
   auto grants = prepared.get_future();
   std::atomic<bool> stop_loop{false};
   std::atomic<bool> over{false};
-  Fault fault = Fault::none;
+  Fault fault = Fault::none, latched = Fault::none;
   std::thread servo_thread([&] {
     try {
       prepared.set_value(prepare_servo_thread(servo));
@@ -175,30 +234,36 @@ Fault run_in_wall_time(Station& station, TimePoint end, WallClock& clock, LiveVi
   try {
     log_grants(grants.get());
     while (!stop_requested.load() && !over.load() && clock.now() < end) {
-      std::this_thread::sleep_for(kLook);
+      std::this_thread::sleep_until(wishes.next(clock.now() + kLook));
+      wishes.pass_on(station.loop(), clock.now());
       view.look_at(station.loop());
     }
+    latched = fault_of(station.loop(), Fault::none);
     joined();
   } catch (...) {
     joined();
     throw;
   }
-  return fault;
+  return fault == Fault::none ? latched : fault;
 }
 
 /// Virtual time: the same ticks one after the other, on this thread.
-Fault run_in_virtual_time(Station& station, TimePoint end, VirtualClock& clock, LiveView& view) {
+Fault run_in_virtual_time(Station& station, TimePoint end, VirtualClock& clock, LiveView& view,
+                          Wishes wishes) {
   const Duration period = from_seconds(1.0 / station.plan().settings.servo.rate_Hz);
   TimePoint next_look = clock.now() + kLook;
   Fault fault = Fault::none;
-  while (fault == Fault::none && clock.now() < end && !stop_requested.load()) {
+  while (fault != Fault::device_lost && clock.now() < end && !stop_requested.load()) {
     clock.sleep_until(clock.now() + period);
     fault = station.loop().tick(clock.now(), clock.now());
+    wishes.pass_on(station.loop(), clock.now());
     if (clock.now() < next_look) continue;
     next_look += kLook;
     view.look_at(station.loop());
   }
-  if (fault == Fault::none) station.loop().release(clock.now(), Fault::none);
+  if (fault == Fault::device_lost) return fault;
+  fault = fault_of(station.loop(), Fault::none);
+  station.loop().release(clock.now());
   return fault;
 }
 
@@ -220,8 +285,8 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
       if (stop()) return Fault::none;
       continue;
     }
-    if (options.arm && at_start && not_armed.empty()) station.loop().arm();
-    const Fault fault = run_in_wall_time(station, end, clock, view);
+    const Wishes wishes(options.arm && at_start && not_armed.empty(), {}, clock.now());
+    const Fault fault = run_in_wall_time(station, end, clock, view, wishes);
     station.close();
     if (fault != Fault::device_lost) return fault;
   }
@@ -233,7 +298,7 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
   Station station(std::move(plan), link, clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread,
                   MeshLoader(cache_directory(), [](const std::string& what) { spdlog::info("{}", what); }));
   const Settings& settings = station.plan().settings;
-  loop_to_release = &station.loop();
+  the_loop = &station.loop();
   for (const std::string& remark : station.mesh_remarks()) spdlog::warn("{}", remark);
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
@@ -250,7 +315,7 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
     fault = run_it(station, view);
   }
   view.close(station.loop(), seconds(clock.now() - start));
-  loop_to_release = nullptr;
+  the_loop = nullptr;
   if (recorder && !recorder->error().empty()) spdlog::error("{}", recorder->error());
   if (station.loop().dropped_records() > 0)
     spdlog::warn("{} ticks are missing in the recording: the disk fell behind",
@@ -262,21 +327,41 @@ TimePoint end_of(const Options& options, const Clock& clock) {
   return options.seconds > 0.0 ? clock.now() + from_seconds(options.seconds) : TimePoint::max();
 }
 
+/// The simulated device, with what shall go wrong with it.
+std::unique_ptr<SimulatedLink> scripted_link(const Plan& plan, const LoopbackScript& script, Clock& clock) {
+  auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
+  for (const SimulatedFault& fault : script.faults) try {
+      link->device().inject(fault);
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(script.file.string() + ": " + error.what());
+    }
+  return link;
+}
+
+/// The end of a link that is not plugged in: in this process, or in another.
+std::unique_ptr<ReportLink> link_in_wall_time(const Plan& plan, const LoopbackScript& script,
+                                              const Options& options, Clock& clock) {
+  if (options.link_fd >= 0) return std::make_unique<SocketLink>(options.link_fd);
+  return scripted_link(plan, script, clock);
+}
+
 Fault run_simulated(Plan plan, const Options& options) {
-  const auto run_it = [&options](auto& clock, auto run_in_time) {
-    return [&clock, &options, run_in_time](Station& station, LiveView& view) {
+  LoopbackScript script;
+  if (!options.script.empty()) script = load_loopback_script(options.script);
+  const auto run_it = [&](auto& clock, auto run_in_time) {
+    return [&clock, &options, &script, run_in_time](Station& station, LiveView& view) {
       station.open();
-      if (options.arm) station.loop().arm();
-      return run_in_time(station, end_of(options, clock), clock, view);
+      return run_in_time(station, end_of(options, clock), clock, view,
+                         Wishes(options.arm, script.commands, clock.now()));
     };
   };
   if (options.virtual_time) {
     VirtualClock clock;
-    const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
+    const auto link = scripted_link(plan, script, clock);
     return run(std::move(plan), options, *link, clock, run_it(clock, run_in_virtual_time));
   }
   WallClock clock;
-  const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
+  const auto link = link_in_wall_time(plan, script, options, clock);
   log_grants(lock_memory(plan.settings.servo.realtime));
   return run(std::move(plan), options, *link, clock, run_it(clock, run_in_wall_time));
 }
@@ -294,14 +379,23 @@ Fault run_real(Plan plan, const Options& options) {
   });
 }
 
+/// From a signal handler.
+void ask(CommandSet commands) {
+  if (ServoLoop* loop = the_loop) loop->ask(commands);
+}
+
 void catch_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested.store(true); };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = [](int) { ask(kStop); };
+  sigaction(SIGUSR1, &action, nullptr);
+  action.sa_handler = [](int) { ask(kAcknowledge); };
+  sigaction(SIGUSR2, &action, nullptr);
   std::set_terminate([] {
-    if (loop_to_release != nullptr) {
-      loop_to_release->release(std::chrono::steady_clock::now(), Fault::none);
+    if (ServoLoop* loop = the_loop) {
+      loop->release(std::chrono::steady_clock::now());
       std::this_thread::sleep_for(kLastWords);
     }
     std::abort();
@@ -321,7 +415,7 @@ int main(int argc, char** argv) {
   catch_signals();
   try {
     Plan plan = plan_of(options);
-    const bool simulated = plan.simulated;
+    const bool simulated = plan.simulated || options.link_fd >= 0;
     const Fault fault =
         simulated ? run_simulated(std::move(plan), options) : run_real(std::move(plan), options);
     return fault == Fault::none ? 0 : kExitFault;

@@ -12,8 +12,8 @@ namespace {
 
 constexpr const char* kTable = "/ticks";
 /// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
-/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`.
-constexpr const char* kFormat = "3";
+/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults.
+constexpr const char* kFormat = "4";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;
@@ -61,12 +61,17 @@ constexpr std::array kColumns = {
     WRENCHD_COLUMN(skipped, "1", u32, 1),
     WRENCHD_COLUMN(missing, "1", u32, 1),
     WRENCHD_COLUMN(rejected, "1", u32, 1),
+    WRENCHD_COLUMN(repeated, "1", u32, 1),
     WRENCHD_COLUMN(buttons, "bits", u32, 1),
     WRENCHD_COLUMN(fresh, "bool", u8, 1),
     WRENCHD_COLUMN(motors_on, "bool", u8, 1),
     WRENCHD_COLUMN(watchdog_tripped, "bool", u8, 1),
-    WRENCHD_COLUMN(arm_command, "enum", u8, 1),
-    WRENCHD_COLUMN(start_over, "bool", u8, 1),
+    WRENCHD_COLUMN(homed, "bool", u8, 1),
+    WRENCHD_COLUMN(sample_fault, "enum", u8, 1),
+    WRENCHD_COLUMN(write_fault, "enum", u8, 1),
+    WRENCHD_COLUMN(commands, "bits", u16, 1),
+    WRENCHD_COLUMN(commanded, "1", u64, 1),
+    WRENCHD_COLUMN(slept_ns, "ns", i64, 1),
     WRENCHD_COLUMN(X_BH, "m m m, qx qy qz qw", f64, 7),
     WRENCHD_COLUMN(V_BH, "m/s x3, rad/s x3", f64, 6),
     WRENCHD_COLUMN(X_WP, "m m m, qx qy qz qw", f64, 7),
@@ -79,13 +84,21 @@ constexpr std::array kColumns = {
     WRENCHD_COLUMN(iterations, "1", u16, 1),
     WRENCHD_COLUMN(projection_status, "enum", u8, 1),
     WRENCHD_COLUMN(placing, "enum", u8, 1),
-    WRENCHD_COLUMN(engagement, "enum", u8, 1),
-    WRENCHD_COLUMN(limit_causes, "bits", u8, 1),
+    WRENCHD_COLUMN(state, "enum", u8, 1),
+    WRENCHD_COLUMN(cause, "enum", u8, 1),
+    WRENCHD_COLUMN(faults, "bits", u64, 1),
+    WRENCHD_COLUMN(limit_causes, "bits", u16, 1),
     WRENCHD_COLUMN(dropped, "bits", u8, 1),
-    WRENCHD_COLUMN(fault, "enum", u8, 1),
+    WRENCHD_COLUMN(motors_told, "bool", u8, 1),
     WRENCHD_COLUMN(released, "bool", u8, 1),
     WRENCHD_COLUMN(authority, "1", f64, 1),
+    WRENCHD_COLUMN(stiffness_share, "1", f64, 1),
+    WRENCHD_COLUMN(guard_share, "1", f64, 1),
+    WRENCHD_COLUMN(energy_in_J, "J", f64, 1),
+    WRENCHD_COLUMN(energy_out_J, "J", f64, 1),
+    WRENCHD_COLUMN(injected_J, "J", f64, 1),
     WRENCHD_COLUMN(F_out, "N x3, N.m x3", f64, 6),
+    WRENCHD_COLUMN(answered_ns, "ns", i64, 1),
     WRENCHD_COLUMN(wake_latency_ns, "ns", i64, 1),
     WRENCHD_COLUMN(stage_ns, "ns x5: read projection wrench limits write", i64, kStages),
 };

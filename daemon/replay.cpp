@@ -22,18 +22,29 @@ class RecordedDevice final : public Device {
   void open() override {}
   DeviceSample read_newest(TimePoint) noexcept override;
   Fault write(TimePoint, const Wrench&, bool) noexcept override {
-    return write_failed() ? static_cast<Fault>(record_->fault) : Fault::none;
+    return static_cast<Fault>(record_->write_fault);
   }
+  std::uint64_t commands_sent() const noexcept override { return record_->commanded; }
   void release(TimePoint) noexcept override {}
   void wait_readable(TimePoint) noexcept override {}
   void close() noexcept override {}
 
  private:
-  /// The faults that a write finds; all others came with the sample, or out of the loop itself.
-  bool write_failed() const noexcept {
-    return record_->fault == static_cast<std::uint8_t>(Fault::write_failed);
-  }
+  const TickRecord* record_ = nullptr;
+};
 
+/// The clock of a recording: when a wrench was ready, and how long the machine had slept.
+class RecordedClock final : public Clock {
+ public:
+  void play(const TickRecord& record) noexcept { record_ = &record; }
+
+  TimePoint now() const noexcept override {
+    return TimePoint(Duration(record_ == nullptr ? 0 : record_->answered_ns));
+  }
+  void sleep_until(TimePoint) noexcept override {}
+  Duration slept() const noexcept override { return Duration(record_->slept_ns); }
+
+ private:
   const TickRecord* record_ = nullptr;
 };
 
@@ -67,12 +78,13 @@ DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   sample.skipped = r.skipped;
   sample.missing = r.missing;
   sample.rejected = r.rejected;
+  sample.repeated = r.repeated;
   sample.buttons = r.buttons;
   sample.fresh = r.fresh != 0;
   sample.motors_on = r.motors_on != 0;
   sample.watchdog_tripped = r.watchdog_tripped != 0;
-  const auto fault = static_cast<Fault>(r.fault);
-  if (fault != Fault::wrench_not_finite && !write_failed()) sample.fault = fault;
+  sample.homed = r.homed != 0;
+  sample.fault = static_cast<Fault>(r.sample_fault);
   return sample;
 }
 
@@ -87,16 +99,23 @@ std::optional<Difference> compare(std::uint64_t tick, const char* field, std::sp
 
 std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
   const auto whole = [](const TickRecord& r) {
-    return std::array<double, 11>{r.energy,
+    return std::array<double, 18>{r.energy,
                                   r.authority,
+                                  r.stiffness_share,
+                                  r.guard_share,
+                                  r.energy_in_J,
+                                  r.energy_out_J,
+                                  r.injected_J,
                                   static_cast<double>(r.contacts),
                                   static_cast<double>(r.iterations),
                                   static_cast<double>(r.projection_status),
                                   static_cast<double>(r.placing),
-                                  static_cast<double>(r.engagement),
+                                  static_cast<double>(r.state),
+                                  static_cast<double>(r.cause),
+                                  static_cast<double>(r.motors_told),
                                   static_cast<double>(r.limit_causes),
                                   static_cast<double>(r.dropped),
-                                  static_cast<double>(r.fault),
+                                  static_cast<double>(r.faults),
                                   static_cast<double>(r.released)};
   };
   if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
@@ -105,8 +124,9 @@ std::optional<Difference> compare(const TickRecord& then, const TickRecord& now)
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
   return compare(then.tick,
-                 "energy, authority, contacts, iterations, status, placing, engagement, causes, dropped, "
-                 "fault, released",
+                 "energy, authority, stiffness and guard share, energies, contacts, iterations, status, "
+                 "placing, state, cause, motors, limits, dropped, "
+                 "faults, released",
                  whole(then), whole(now));
 }
 
@@ -119,22 +139,22 @@ std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
         ": what the loop had in mind by then, and where obstacles that move stood, is not in it; replay the "
         "whole recording, from tick 0");
   const Scene scene(plan.scene);
-  const VirtualClock clock;
+  RecordedClock clock;
   RecordedDevice device;
   RecordedPlacer placer;
   ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
   for (const TickRecord& then : recording.ticks) {
+    clock.play(then);
     device.play(then);
     placer.play(then);
     const TimePoint now{Duration(then.now_ns)};
-    if (then.arm_command == 1) loop.arm();
-    if (then.arm_command == 2) loop.disarm();
-    if (then.start_over != 0) loop.start_over();
-    // The record of a stop that was asked for is the last tick's, with zero wrench and `released` set.
-    if (then.released != 0 && then.fault == 0)
-      loop.release(now, Fault::none);
-    else
+    // The record of a release from outside is the last tick's, with zero wrench and `released` set.
+    if ((then.commands & kLetGo) != 0) {
+      loop.release(now);
+    } else {
+      loop.ask(then.commands);
       loop.tick(now, now);
+    }
     TickRecord replayed;
     loop.latest().read(replayed);
     if (auto difference = compare(then, replayed)) return difference;

@@ -1,30 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/servo_loop.hpp"
 
-#include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "core/energy_law.hpp"
 #include "core/finite.hpp"
+#include "core/watch_limits.hpp"
 
 // What wrenchd does, a thousand times a second or more (Algorithm 1 of the paper):
 //
 //   device -> pose p -> contacts -> projection q -> wrench -> limits -> device
 //
-// tick() is that line. Above it is run(), which waits for the next tick and lets nobody out without
-// release(); below it are the stages, in order.
+// tick() is that line. Above it is run(), which waits for the next tick and lets nobody out without a
+// release; below it are the stages, in order. What is wrong, and what was asked for, is looked at as soon as
+// the sample is there, and becomes a state by the table of core/transitions.hpp; the state says how much of
+// the wrench goes out.
 
 namespace wrenchd {
 namespace {
 
-/// A sample older than this no longer pushes: the wrench is zero until a new one comes. A few reports at 1
-/// kHz.
-constexpr Duration kStaleAfter = std::chrono::milliseconds(3);
 /// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
 constexpr int kDevicePatience_periods = 4;
 /// Where the placer found no room it is asked again after so long: a search without end would keep a
 /// processor busy, and a hand does not go far in that time.
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
+
+/// A proxy that found no admissible pose may find one in the next tick, from a little farther on.
+constexpr int kFailures = 3;
+/// Of the device's reports: how long a command may take where nothing says when it arrived.
+constexpr double kAssumedPeriods = 2.0;
+/// An oscillation costs half of the stiffness; the third is none of the stiffness's.
+constexpr double kCalmer = 0.5;
+constexpr int kOscillations = 3;
 
 constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
@@ -55,7 +63,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       driven_(driven_dofs(profile)),
       pacing_(settings.servo.pacing),
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
-      late_limit_(from_seconds(settings.servo.late_limit_s)),
+      realtime_(settings.servo.realtime == Realtime::required),
       penetration_(scene,
                    {settings.rendering.method, settings.rendering.planes, 0.0, settings.rendering.friction}),
       moves_(scene.moves()),
@@ -64,61 +72,86 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       M_(scene.tool().solid.inertia),
       law_(gains_for(settings.rendering.method, settings.wrench.gains)),
       gravity_(profile.masses, X_WB_.rotation),
-      limits_(settings.limits, profile.max_force_N, profile.max_torque_Nm),
-      soft_start_(settings.limits.soft_start_s) {
+      limits_(settings.limits, profile),
+      heat_(profile, limits_.max_force_N(), limits_.max_torque_Nm()),
+      stability_(settings, profile, M_, X_HT_),
+      measured_(kAssumedPeriods /
+                (profile.report_rate_Hz > 0.0 ? profile.report_rate_Hz : settings.servo.rate_Hz)),
+      guard_(stability_.guard(measured_)),
+      acknowledges_(profile.pose_report.acknowledged.present),
+      watches_(settings, profile, limits_.max_force_N(), limits_.max_torque_Nm()),
+      self_test_(profile, settings.servo.self_test_s),
+      machine_(settings.limits.soft_start_s) {
   lose_place();
 }
 
 Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
   TimePoint due = clock.now();
-  while (!stop.load(std::memory_order_relaxed)) {
+  while (machine_.state() != State::shutdown || !stop.load(std::memory_order_relaxed)) {
+    if (stop.load(std::memory_order_relaxed)) ask(kQuit);
     due = wait_for_next(clock, due);
-    const Fault fault = tick(clock.now(), due);
-    if (fault != Fault::none) return fault;  // tick() has released the hand
+    if (tick(clock.now(), due) == Fault::device_lost) return Fault::device_lost;  // the hand was let go
   }
-  return release(clock.now(), Fault::none);
+  return Fault::none;
 }
 
 Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   begin(now, due);
 
-  const DeviceSample sample = device_.read_newest(now);  // the pose the hand gives
+  DeviceSample sample = device_.read_newest(now);  // the pose the hand gives
   record_sample(sample);
   lap(Stage::read);
-  if (sample.fault != Fault::none) return release(now, sample.fault);
-  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) return release(now, Fault::pose_not_finite);
 
-  if (sample.fresh) project(sample);  // contacts, and the closest admissible configuration q
+  look(sample, now);  // what is wrong, what was asked for, and the state that follows
+  if ((found_ & bit(Fault::device_lost)) != 0 || machine_.state() == State::shutdown) {
+    let_go(now);
+    return (found_ & bit(Fault::device_lost)) != 0 ? Fault::device_lost : changed_by_;
+  }
+
+  if (good_) project(sample);  // contacts, and the closest admissible configuration q
   lap(Stage::projection);
 
-  if (sample.fresh) compute_wrench(sample);  // Eq. (16) or the energy law, from p to q
+  if (good_) compute_wrench(sample);  // Eq. (16) or the energy law, from p to q
+  check_answer(sample, now);
   lap(Stage::wrench);
 
-  const Limited out = limit(sample, now);  // soft start, magnitude, slew
+  Limited out = limit(sample, now);  // passivity, soft start, magnitude, slew, power
   lap(Stage::limits);
-  if ((out.causes & kNotFinite) != 0) return release(now, Fault::wrench_not_finite);
 
-  const Fault written = device_.write(now, out.F, soft_start_.state() >= Engagement::ramping);
+  send(now, out);
+  heat_.advance(out.F, dt_s_);
+  measure(sample, now);
   lap(Stage::write);
-  if (written != Fault::none) return release(now, written);
-
-  finish(now, sample, out);
-  return Fault::none;
+  if ((found_ & bit(Fault::device_lost)) != 0) {
+    let_go(now);
+    return Fault::device_lost;
+  }
+  finish(now, out);
+  return changed_by_;
 }
 
-Fault ServoLoop::release(TimePoint now, Fault why) noexcept {
+void ServoLoop::release(TimePoint now) noexcept {
+  machine_.on(Trigger::end);
+  record_.commands = static_cast<CommandSet>(record_.commands | kLetGo);
+  let_go(now);
+}
+
+/// The one way out, whatever led to it: zero wrench, motors off, and nothing is known of what comes next.
+void ServoLoop::let_go(TimePoint now) noexcept {
   device_.release(now);
-  soft_start_.disarm();
+  motors_told_ = false;
+  record_.motors_told = 0;
+  record_.authority = 0.0;
   limits_.reset();
   law_.reset();
   sampled_ = false;  // what comes next may be a device that was plugged in anew, with another clock
-  if (why != Fault::none) say(Event::Kind::fault, now, static_cast<std::uint32_t>(why));
+  watches_.forget();
+  watches_.client.end();
+  say_changes(now);
   say(Event::Kind::released, now);
-  record_.fault = static_cast<std::uint8_t>(why);
   record_.released = 1;
   describe(Limited{});
   publish();
-  return why;
 }
 
 /// Sleeps until the next tick is due, by the clock or by the device's next report. A loop that fell behind
@@ -140,37 +173,98 @@ TimePoint ServoLoop::wait_for_next(Clock& clock, TimePoint due) noexcept {
   return next;
 }
 
-/// Starts the tick's record, takes arm, disarm and start over, and looks at the time: after a gap (a stalled
-/// machine, a debugger, a suspend) the hand gets nothing until the soft start has run again.
+/// Starts the tick's record, and looks at the time.
 void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
   tick_start_ = lap_start_ = clock_.now();
-  const std::uint64_t tick = record_.tick + (last_tick_ ? 1 : 0);
+  const std::uint64_t tick = record_.tick + (ticked_ ? 1 : 0);
   record_ = TickRecord{};
   record_.tick = tick;
   record_.now_ns = now.time_since_epoch().count();
   record_.wake_latency_ns = (now - due).count();
-  record_.arm_command = arm_command_.exchange(0, std::memory_order_relaxed);
-  record_.start_over = start_over_command_.exchange(0, std::memory_order_relaxed);
-  obey_commands();
-
-  const Duration since_last = last_tick_ ? now - *last_tick_ : period_;
-  dt_s_ = std::min(seconds(since_last), 2.0 * seconds(period_));  // a gap must not let the slew limit leap
-  if (since_last > late_limit_ + period_) {
-    soft_start_.interrupt();
-    limits_.reset();
-    say(Event::Kind::late_tick, now, 0, seconds(since_last - period_));
-  }
-  if (!last_tick_) first_tick_ = now;
-  last_tick_ = now;
+  record_.commands = commands_.exchange(kNoCommand, std::memory_order_relaxed);
+  const Duration slept = clock_.slept();
+  record_.slept_ns = slept.count();
+  record_.commanded = device_.commands_sent();
+  found_before_ = found_;
+  found_ = 0;
+  changed_by_ = Fault::none;
+  if (!ticked_) first_tick_ = now;
+  ticked_ = true;
+  now_ = now;
   scene_time_s_ = seconds(now - first_tick_);
+  const FaultSet pace = watches_.pace.look(now, slept);
+  found(pace, now, seconds(watches_.pace.late()));
+  dt_s_ = watches_.pace.dt_s();
 }
 
-/// A hand that felt nothing may have gone through walls while the proxy stayed behind: arming starts over.
-void ServoLoop::obey_commands() noexcept {
-  const bool arms = record_.arm_command == 1 && soft_start_.state() == Engagement::disarmed;
-  if ((arms && has_place()) || record_.start_over != 0) lose_place();
-  if (arms) soft_start_.arm();
-  if (record_.arm_command == 2) soft_start_.disarm();
+/// What is wrong, then what was asked for, so that nobody can arm what is not in order. A loop that was late
+/// finds old reports in the queue, and the newest were dropped at its end: that is no silence of the
+/// device's.
+void ServoLoop::look(DeviceSample& sample, TimePoint now) noexcept {
+  if ((found_ & (bit(Fault::tick_late) | bit(Fault::loop_stopped))) != 0) {
+    late_at_ = now;
+    was_late_ = true;
+  }
+  if (was_late_ && now - late_at_ > kStaleSample) was_late_ = false;
+  if (was_late_ && sample.fault == Fault::sample_stale) sample.fault = Fault::sample_late;
+  const bool there = sample.fault != Fault::device_lost;
+  if (there && transition(Trigger::device_there, machine_.state()).leads) machine_.on(Trigger::device_there);
+  if ((record_.commands & kBeat) != 0) watches_.client.beat(now);
+  found(watches_.look(sample, machine_.state(), motors_told_ && !testing_ && driven_ != kNoDof, now), now);
+  good_ = sample.fresh && sample.fault == Fault::none && is_finite(sample.X_BH) && is_finite(sample.V_BH);
+  if (const Fault overdue = machine_.overdue(); overdue != Fault::none) found(overdue, now);
+  test(sample, now);
+  obey(record_.commands, now);
+}
+
+void ServoLoop::test(const DeviceSample& sample, TimePoint now) noexcept {
+  const bool begins = !testing_;
+  testing_ = machine_.state() == State::self_test;
+  if (!testing_) return;
+  if (begins) {
+    self_test_.begin(now);
+    measured_.reset();
+  }
+  found(self_test_.look(sample, found_, now), now, self_test_.report_rate_Hz());
+  if (self_test_.passed()) {
+    machine_.on(Trigger::passed);
+    if (self_test_.report_rate_Hz() > 0.0) settle_stiffness(now);
+  }
+  testing_ = machine_.state() == State::self_test;
+}
+
+/// The safest first: who stops and arms at once has stopped. A hand that felt nothing may have gone through
+/// walls while the proxy stayed behind, so arming starts over.
+void ServoLoop::obey(CommandSet commands, TimePoint now) noexcept {
+  if ((commands & kStop) != 0) found(Fault::stop_asked, now);
+  if ((commands & kAcknowledge) != 0) machine_.on(Trigger::acknowledge);
+  if ((commands & kQuit) != 0) machine_.on(Trigger::quit);
+  if ((commands & kDisarm) != 0) machine_.on(Trigger::disarm);
+  if ((commands & kStartOver) != 0) lose_place();
+  if ((commands & kArm) == 0 || (commands & (kStop | kDisarm | kQuit)) != 0) return;
+  if (!transition(Trigger::arm, machine_.state()).leads)
+    return say(Event::Kind::refused, now, static_cast<std::uint32_t>(machine_.state()));
+  if (has_place()) lose_place();
+  machine_.on(Trigger::arm);
+  if ((commands & kLease) == 0) return;
+  watches_.client.begin(now);
+  if ((commands & kBeat) != 0) watches_.client.beat(now);
+}
+
+void ServoLoop::found(FaultSet faults, TimePoint now, double value) noexcept {
+  for (; faults != 0; faults &= faults - 1) found(static_cast<Fault>(std::countr_zero(faults)), now, value);
+}
+
+/// Without real-time priority a loop that stands still for a moment is nothing to look at: it comes back as
+/// from a late tick.
+void ServoLoop::found(Fault fault, TimePoint now, double value) noexcept {
+  if (fault == Fault::none) return;
+  const bool changed =
+      fault == Fault::loop_stopped && !realtime_ ? machine_.on(Fault::tick_late) : machine_.on(fault);
+  if (changed) changed_by_ = fault;
+  if (changed || (found_before_ & bit(fault)) == 0)
+    say(Event::Kind::fault, now, static_cast<std::uint32_t>(fault), value);
+  found_ |= bit(fault);
 }
 
 /// Nothing is known of q: no contact, zero wrench, and the soft start waits.
@@ -185,7 +279,7 @@ void ServoLoop::lose_place() noexcept {
   dropped_ = kNoDof;
   law_.reset();
   limits_.reset();
-  soft_start_.interrupt();
+  machine_.on(Trigger::interrupted);
 }
 
 /// Lines 2 to 6: p from the sample, and its projection q, which follows the hand from last tick's as a proxy.
@@ -204,7 +298,7 @@ void ServoLoop::project(const DeviceSample& sample) noexcept {
 /// this tick's q, and the next follows from it, and makes up for what obstacles have moved since.
 void ServoLoop::place() noexcept {
   if (!asked_) {
-    if (placing_ == Placing::nowhere && *last_tick_ < ask_again_) return;
+    if (placing_ == Placing::nowhere && now_ < ask_again_) return;
     placing_ = Placing::seeking;
     placer_.ask({++question_, X_WP_, scene_time_s_});
     asked_ = true;
@@ -217,7 +311,7 @@ void ServoLoop::place() noexcept {
   placing_ = answer.found ? Placing::placed : Placing::nowhere;
   X_WQ_ = answer.X_WQ;
   penetration_.forget(answer.scene_time_s);
-  ask_again_ = *last_tick_ + kAskAgainAfter;
+  ask_again_ = now_ + kAskAgainAfter;
 }
 
 /// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,
@@ -230,8 +324,8 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const bool in_contact = depth_.contacts > 0;
   F_T_ = spring_ == SpringLaw::pid
              ? law_.update(depth_.drive, in_contact, dt_s)
-             : law_.update_damping(energy_wrench(M_, energy_stiffness_per_s2_, X_WP_, X_WQ_), depth_.drive,
-                                   in_contact, dt_s);
+             : law_.update_damping(energy_wrench(M_, share_.spring * energy_stiffness_per_s2_, X_WP_, X_WQ_),
+                                   depth_.drive, in_contact, dt_s);
   const Wrench F = outgoing(X_WB_ * sample.X_BH), F_weight = gravity_.wrench(sample.X_BH);
   dropped_ = static_cast<DofMask>(components(F + F_weight) & ~driven_);
   F_out_ = along(F, driven_);
@@ -246,26 +340,131 @@ Wrench ServoLoop::outgoing(const Pose& X_WH) const noexcept {
   return expressed(X_WB_.rotation.conjugate(), F_H_W);
 }
 
+/// Whether what was computed may be used: in time, and from an admissible pose.
+void ServoLoop::check_answer(const DeviceSample& sample, TimePoint now) noexcept {
+  const TimePoint answered = clock_.now();
+  record_.answered_ns = answered.time_since_epoch().count();
+  if (!good_) return;
+  const bool failed =
+      placing_ == Placing::following && depth_.projection.status == ProjectionStatus::infeasible;
+  failures_ = failed ? failures_ + 1 : 0;
+  if (failures_ >= kFailures) found(Fault::projection_failed, now);
+  const Duration age = answered - sample.arrived;
+  if (age > kLateAnswer && (found_ & bit(Fault::sample_late)) == 0)
+    found(Fault::answer_late, now, seconds(age));
+}
+
 /// Line 8, before it goes out: what the hand may feel of the wrench now, with the handle's weight held. The
 /// weight is no push, so it does not make the hand wait for calm.
 Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
-  stale_ = !sampled_ || now - sample.arrived > kStaleAfter;
-  const double authority = soft_start_.advance(calm(sample), dt_s_);
-  record_.authority = stale_ ? 0.0 : authority;
-  return limits_.apply(F_out_ + F_weight_, record_.authority, dt_s_);
+  const State before = machine_.state();
+  record_.authority = machine_.advance(calm(sample), dt_s_);
+  if (before == State::ramping && machine_.state() == State::active) guard_.lend(wound_up_J());
+  const Wrench F = steadied(sample, now);
+  limits_.set_ceiling(heat_.force_ceiling_N(), heat_.torque_ceiling_Nm());
+  if (is_finite(sample.X_BH) && is_finite(sample.V_BH)) {
+    hand_m_ = sample.X_BH.translation_m;
+    V_hand_ = sample.V_BH;
+  }
+  Limited out = limits_.apply({F + F_weight_, record_.authority, dt_s_, V_hand_, hand_m_});
+  if (guarding_ && guard_.acted()) out.causes |= kPassivity;
+  if (heat_.folded_back()) found(Fault::overheated, now);
+  if ((out.causes & kNotFinite) != 0) {
+    found(Fault::wrench_not_finite, now);
+    lose_place();  // whatever it came from shall not come back with the next tick
+    record_.authority = 0.0;
+  }
+  if (is_driving(machine_.state())) found(watches_.pinned.look(out.F, sample.X_BH, now), now);
+  return out;
 }
 
 bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
-  return has_place() && !stale_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
+  return has_place() && sampled_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
          sample.V_BH.angular_rad_per_s.norm() < kCalmAngularSpeed_rad_per_s &&
          F_out_.force_N.norm() <= kCalmShareOfLimit * limits_.max_force_N() &&
          F_out_.torque_Nm.norm() <= kCalmShareOfLimit * limits_.max_torque_Nm();
 }
 
+/// The stiffness that stays passive with the rate and the delay that were measured just now.
+void ServoLoop::settle_stiffness(TimePoint now) noexcept {
+  share_ = stability_.settle(measured_);
+  guard_ = stability_.guard(measured_);
+  law_.scale(share_.spring, share_.damper);
+  if (!share_.bounded) say(Event::Kind::unbounded, now);
+  if (share_.spring < 1.0 || share_.damper < 1.0) say(Event::Kind::stiffness, now, 0, share_.spring);
+}
+
+void ServoLoop::measure(const DeviceSample& sample, TimePoint now) noexcept {
+  measured_.tick({now, sample.arrived, sample.device_time_s, sample.sequence, sample.fresh, acknowledges_,
+                  sample.acknowledged, record_.commanded});
+}
+
+/// What of the contact's wrench keeps it steady: less of it where it buzzes, and what the passivity guard
+/// leaves. The weight is none of its business, which gives what a hand that lifts it needs. While the force
+/// rises the wall is wound up around a hand that may be in it, so the guard begins when it has risen.
+Wrench ServoLoop::steadied(const DeviceSample& sample, TimePoint now) noexcept {
+  const Wrench asked = calming_ * F_out_;
+  const State state = machine_.state();
+  if (!is_driving(state) || state == State::ramping || wrench_point_ != WrenchPoint::handle) {
+    guard_.reset();
+    guarding_ = false;
+    if (state == State::waiting) {
+      oscillation_.restart();
+      oscillations_ = 0;
+      calming_ = 1.0;
+    }
+    return asked;
+  }
+  if (!good_) return guard_.guard(asked, sample.X_BH, 0.0, depth_.contacts > 0);
+  const double dt_s = guarding_ ? sample.device_time_s - guarded_at_s_ : 0.0;
+  guarding_ = true;
+  guarded_at_s_ = sample.device_time_s;
+  oscillation_.update(asked, sample.V_BH, dt_s, depth_.contacts > 0);
+  if (oscillation_.oscillates()) {
+    ++oscillations_;
+    calming_ *= kCalmer;
+    oscillation_.restart();
+    found(oscillations_ < kOscillations ? Fault::oscillating : Fault::still_oscillates, now);
+  }
+  const Wrench left = guard_.guard(asked, sample.X_BH, dt_s, depth_.contacts > 0);
+  if (guard_.out_of_hand()) found(Fault::energy_made, now);
+  return left;
+}
+
+/// What the spring holds now: half of force times way, and of torque times turn [J].
+double ServoLoop::wound_up_J() const noexcept {
+  if (depth_.contacts == 0) return 0.0;
+  return 0.5 * (F_T_.force_N.dot(depth_.drive.head<3>()) + F_T_.torque_Nm.dot(depth_.drive.tail<3>()));
+}
+
+/// Line 8. In the self-test the device hears what the test wants it to hear. A wrench that was refused for
+/// too long is not what the device shall find when it listens again.
+void ServoLoop::send(TimePoint now, Limited& out) noexcept {
+  const bool testing = machine_.state() == State::self_test;
+  if (testing && !self_test_.speaks()) return;
+  const bool drives = is_driving(machine_.state());
+  hand_over(now, out.F, testing ? self_test_.motors_on() : drives);
+  found(watches_.writes.look(static_cast<Fault>(record_.write_fault), now), now);
+  const bool may_drive = is_driving(machine_.state()) || machine_.state() == State::self_test;
+  if (!motors_told_ || may_drive || (found_ & bit(Fault::device_lost)) != 0) return;
+  out.F = Wrench{};
+  limits_.reset();
+  hand_over(now, out.F, false);
+}
+
+void ServoLoop::hand_over(TimePoint now, const Wrench& F, bool motors_on) noexcept {
+  motors_told_ = motors_on;
+  record_.motors_told = motors_on ? 1 : 0;
+  record_.write_fault = static_cast<std::uint8_t>(device_.write(now, F, motors_on));
+  const Wrench of_contact = F - record_.authority * F_weight_;
+  guard_.told(motors_on ? of_contact : Wrench{});
+}
+
 /// The tick's record goes to whoever looks, its times into the histograms, its news to the log.
-void ServoLoop::finish(TimePoint now, const DeviceSample& sample, const Limited& out) noexcept {
+void ServoLoop::finish(TimePoint now, const Limited& out) noexcept {
+  if (!is_driving(machine_.state()) && machine_.state() != State::waiting) watches_.client.end();
   describe(out);
-  say_changes(now, sample);
+  say_changes(now);
   publish();
   for (std::size_t i = 0; i < kStageCount; ++i) timing_.stage[i].add(Duration(record_.stage_ns[i]));
   timing_.wake_latency.add(Duration(record_.wake_latency_ns));
@@ -288,13 +487,22 @@ void ServoLoop::describe(const Limited& out) noexcept {
   record_.iterations = depth_.projection.iterations;
   record_.projection_status = static_cast<std::uint8_t>(depth_.projection.status);
   record_.placing = static_cast<std::uint8_t>(placing_);
-  record_.engagement = static_cast<std::uint8_t>(soft_start_.state());
+  record_.state = static_cast<std::uint8_t>(machine_.state());
+  record_.cause = static_cast<std::uint8_t>(machine_.cause());
+  record_.faults = found_;
+  record_.stiffness_share = calming_ * share_.spring;
+  record_.guard_share = guard_.share();
+  record_.energy_in_J = guard_.energy_in_J();
+  record_.energy_out_J = guard_.energy_out_J();
+  record_.injected_J = guard_.injected_J();
   record_.limit_causes = out.causes;
   record_.dropped = dropped_;
   record_.F_out = numbers(out.F.force_N, out.F.torque_Nm);
 }
 
 void ServoLoop::publish() noexcept {
+  seen_state_.store(machine_.state(), std::memory_order_relaxed);
+  seen_cause_.store(machine_.cause(), std::memory_order_relaxed);
   latest_.write(record_);
   if (records_ != nullptr && !records_->push(record_))
     dropped_records_.fetch_add(1, std::memory_order_relaxed);
@@ -308,24 +516,21 @@ void ServoLoop::record_sample(const DeviceSample& sample) noexcept {
   record_.skipped = sample.skipped;
   record_.missing = sample.missing;
   record_.rejected = sample.rejected;
+  record_.repeated = sample.repeated;
   record_.buttons = sample.buttons;
   record_.fresh = sample.fresh ? 1 : 0;
   record_.motors_on = sample.motors_on ? 1 : 0;
   record_.watchdog_tripped = sample.watchdog_tripped ? 1 : 0;
-  record_.fault = static_cast<std::uint8_t>(sample.fault);
+  record_.homed = sample.homed ? 1 : 0;
+  record_.sample_fault = static_cast<std::uint8_t>(sample.fault);
   record_.X_BH = numbers(sample.X_BH);
   record_.V_BH = numbers(sample.V_BH.linear_m_per_s, sample.V_BH.angular_rad_per_s);
 }
 
-void ServoLoop::say_changes(TimePoint now, const DeviceSample& sample) noexcept {
-  if (sample.missing > 0) say(Event::Kind::reports_missing, now, sample.missing);
-  if (sample.rejected > 0) say(Event::Kind::reports_rejected, now, sample.rejected);
-  if (stale_ && !said_stale_ && sampled_)
-    say(Event::Kind::stale_sample, now, 0, seconds(now - sample.arrived));
-  said_stale_ = stale_;
-  if (soft_start_.state() != said_engagement_)
-    say(Event::Kind::engagement, now, static_cast<std::uint32_t>(soft_start_.state()));
-  said_engagement_ = soft_start_.state();
+void ServoLoop::say_changes(TimePoint now) noexcept {
+  if (machine_.state() != said_state_)
+    say(Event::Kind::state, now, static_cast<std::uint32_t>(machine_.state()));
+  said_state_ = machine_.state();
   say_placing(now);
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <optional>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
@@ -10,16 +9,22 @@
 #include "collision/scene.hpp"
 #include "config/settings.hpp"
 #include "core/clock.hpp"
+#include "core/command.hpp"
 #include "core/device_profile.hpp"
-#include "core/engagement.hpp"
 #include "core/gravity_compensation.hpp"
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
+#include "core/oscillation.hpp"
+#include "core/state_machine.hpp"
+#include "core/thermal.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/event.hpp"
 #include "daemon/loop_timing.hpp"
 #include "daemon/placer.hpp"
+#include "daemon/self_test.hpp"
+#include "daemon/stability.hpp"
 #include "daemon/tick_record.hpp"
+#include "daemon/watches.hpp"
 #include "devices/device.hpp"
 
 namespace wrenchd {
@@ -43,27 +48,40 @@ class ServoLoop {
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
             Placer& placer, const Clock& clock, RecordRing* records = nullptr);
 
-  /// Ticks until stop is set or a fault ends the loop, and releases the hand on every way out. Returns the
-  /// fault. clock: the same as at construction, to sleep on.
+  /// Ticks until stop is set and the force has faded, or the device is gone, and releases the hand on every
+  /// way out. Faults of every other kind are states in which it goes on. Returns device_lost, or none. clock:
+  /// the same as at construction, to sleep on.
   Fault run(Clock& clock, const std::atomic<bool>& stop) noexcept;
 
-  /// One cycle of the paper's Algorithm 1. A fault ends the loop; the hand has been released then. due: when
-  /// this tick should have started. RT safe.
+  /// One cycle of the paper's Algorithm 1. Returns the fault that changed the state in it, device_lost where
+  /// the device is gone; after that the next tick is that of a device which was opened anew. RT safe.
   Fault tick(TimePoint now, TimePoint due) noexcept;
 
-  /// The one way out: zero wrench, motors off, whatever the state. Harmless when called again. RT safe.
-  Fault release(TimePoint now, Fault why) noexcept;
+  /// The way out that waits for nothing: zero wrench, motors off, whatever the state. Harmless when called
+  /// again. RT safe.
+  void release(TimePoint now) noexcept;
 
-  /// Asks for arming or disarming at the next tick. Any thread.
-  void arm() noexcept { arm_command_.store(1, std::memory_order_relaxed); }
-  void disarm() noexcept { arm_command_.store(2, std::memory_order_relaxed); }
+  /// Asks for something at the next tick. Any thread.
+  void ask(CommandSet commands) noexcept { commands_.fetch_or(commands, std::memory_order_relaxed); }
+  /// By somebody who is there for as long as the process is: the command line.
+  void arm() noexcept { ask(kArm); }
+  /// By somebody who has to call live() at least every 100 ms from now on.
+  void arm_with_lease() noexcept { ask(kArm | kLease | kBeat); }
+  void live() noexcept { ask(kBeat); }
+  void disarm() noexcept { ask(kDisarm); }
+  void stop() noexcept { ask(kStop); }
+  void acknowledge() noexcept { ask(kAcknowledge); }
 
   /// Says that last tick's q means nothing any more: the tool or the scene was changed, an obstacle was put
   /// where the tool is. From the next tick on there is no contact force until the placer has found an
   /// admissible pose near the hand, and then the soft start runs again. Arming does the same by itself. Any
   /// thread.
-  void start_over() noexcept { start_over_command_.store(1, std::memory_order_relaxed); }
+  void start_over() noexcept { ask(kStartOver); }
 
+  /// As of the last tick. Any thread.
+  State state() const noexcept { return seen_state_.load(std::memory_order_relaxed); }
+  /// What led to it.
+  Fault cause() const noexcept { return seen_cause_.load(std::memory_order_relaxed); }
   const LoopTiming& timing() const noexcept { return timing_; }
   LatestValue<TickRecord>& latest() noexcept { return latest_; }
   EventRing& events() noexcept { return events_; }
@@ -72,22 +90,34 @@ class ServoLoop {
 
  private:
   void begin(TimePoint now, TimePoint due) noexcept;
+  void look(DeviceSample& sample, TimePoint now) noexcept;
+  void obey(CommandSet commands, TimePoint now) noexcept;
   void project(const DeviceSample& sample) noexcept;
   void place() noexcept;
   void compute_wrench(const DeviceSample& sample) noexcept;
+  void check_answer(const DeviceSample& sample, TimePoint now) noexcept;
+  void settle_stiffness(TimePoint now) noexcept;
+  void measure(const DeviceSample& sample, TimePoint now) noexcept;
+  Wrench steadied(const DeviceSample& sample, TimePoint now) noexcept;
+  double wound_up_J() const noexcept;
   Limited limit(const DeviceSample& sample, TimePoint now) noexcept;
-  void finish(TimePoint now, const DeviceSample& sample, const Limited& out) noexcept;
+  void send(TimePoint now, Limited& out) noexcept;
+  void hand_over(TimePoint now, const Wrench& F, bool motors_on) noexcept;
+  void let_go(TimePoint now) noexcept;
+  void finish(TimePoint now, const Limited& out) noexcept;
   void describe(const Limited& out) noexcept;
   void publish() noexcept;
 
+  void test(const DeviceSample& sample, TimePoint now) noexcept;
+  void found(FaultSet faults, TimePoint now, double value = 0.0) noexcept;
+  void found(Fault fault, TimePoint now, double value = 0.0) noexcept;
   Wrench outgoing(const Pose& X_WH) const noexcept;
   bool calm(const DeviceSample& sample) const noexcept;
-  void obey_commands() noexcept;
   void lose_place() noexcept;
   bool has_place() const noexcept { return placing_ == Placing::following || placing_ == Placing::placed; }
   void lap(Stage stage) noexcept;
   void say(Event::Kind kind, TimePoint at, std::uint32_t detail = 0, double value = 0.0) noexcept;
-  void say_changes(TimePoint now, const DeviceSample& sample) noexcept;
+  void say_changes(TimePoint now) noexcept;
   void say_placing(TimePoint now) noexcept;
   void record_sample(const DeviceSample& sample) noexcept;
   TimePoint wait_for_next(Clock& clock, TimePoint due) noexcept;
@@ -103,7 +133,7 @@ class ServoLoop {
   DofMask driven_;
   Pacing pacing_;
   Duration period_;
-  Duration late_limit_;
+  bool realtime_;  ///< is required, so a loop that stood still is one to look at
 
   // The state of the rendering
   PenetrationDepth penetration_;
@@ -114,13 +144,27 @@ class ServoLoop {
   WrenchLaw law_;
   GravityCompensation gravity_;
   WrenchLimits limits_;
-  SoftStart soft_start_;
+  ThermalModel heat_;
+
+  // What keeps the contact steady
+  Stability stability_;
+  LoopMeasurement measured_;
+  PassivityGuard guard_;
+  OscillationDetector oscillation_;
+  StiffnessShare share_;       ///< that the device bears
+  double calming_ = 1.0;       ///< what oscillations have left of it
+  int oscillations_ = 0;       ///< since it was armed
+  double guarded_at_s_ = 0.0;  ///< device time of the guard's last sample
+  bool guarding_ = false;      ///< the guard has one
+  bool acknowledges_;          ///< the device says which commands it took
   Placing placing_ = Placing::seeking;
   Pose X_WQ_;  ///< last tick's projection, the proxy; means nothing unless has_place()
   Pose X_WP_;
   Penetration depth_;
-  Wrench F_T_;                  ///< of the law chosen, body frame
-  Wrench F_out_;                ///< the same as the device wants it, before limits
+  Wrench F_T_;    ///< of the law chosen, body frame
+  Wrench F_out_;  ///< the same as the device wants it, before limits
+  Twist V_hand_;  ///< last that were numbers
+  Vector3d hand_m_ = Vector3d::Zero();
   Wrench F_weight_;             ///< that holds the handle's weight, likewise
   DofMask dropped_ = kNoDof;    ///< what of them the device has no motors for; it is not in them
   std::uint32_t question_ = 0;  ///< number of the last one to the placer
@@ -128,23 +172,37 @@ class ServoLoop {
   TimePoint ask_again_{};       ///< not before then
   double sample_time_s_ = 0.0;  ///< device time of the last fresh sample
   bool sampled_ = false;
-  bool stale_ = false;
+  bool good_ = false;         ///< this tick has a new pose that may be used
+  int failures_ = 0;          ///< ticks in a row without an admissible pose
+  bool motors_told_ = false;  ///< the last command said motors on
+
+  // What is wrong, and what follows
+  Watches watches_;
+  SelfTest self_test_;
+  bool testing_ = false;
+  TimePoint late_at_{};  ///< when a tick came late
+  bool was_late_ = false;
+  StateMachine machine_;
+  FaultSet found_ = 0;              ///< in this tick
+  FaultSet found_before_ = 0;       ///< in the last
+  Fault changed_by_ = Fault::none;  ///< the fault that changed the state in this tick
 
   // Book-keeping
+  TimePoint now_{};  ///< of this tick
   TimePoint first_tick_{};
-  std::optional<TimePoint> last_tick_;
+  bool ticked_ = false;
   double scene_time_s_ = 0.0;  ///< of this tick
   double dt_s_ = 0.0;
   TimePoint tick_start_{};
   TimePoint lap_start_{};
   TickRecord record_;
-  Engagement said_engagement_ = Engagement::disarmed;
-  bool said_stale_ = false;
+  State said_state_ = State::disconnected;
   ProjectionStatus said_status_ = ProjectionStatus::free;
   bool said_placed_ = true;
   bool said_nowhere_ = false;
-  std::atomic<std::uint8_t> arm_command_{0};
-  std::atomic<std::uint8_t> start_over_command_{0};
+  std::atomic<CommandSet> commands_{kNoCommand};
+  std::atomic<State> seen_state_{State::disconnected};
+  std::atomic<Fault> seen_cause_{Fault::none};
   LoopTiming timing_;
   LatestValue<TickRecord> latest_;
   EventRing events_;

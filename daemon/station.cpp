@@ -8,6 +8,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "core/watch_limits.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/version.hpp"
 
@@ -58,7 +59,8 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
 std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
   const ServoSettings& servo = plan.settings.servo;
   LinkSettings settings = link_settings(plan.profile);
-  settings.write_deadline = from_seconds(plan.profile.stale_fault_s);
+  settings.write_deadline =
+      kBlockedWrite / 2;  // what is refused for longer is a fault, by the loop's own clock
   settings.priority = servo.realtime == Realtime::off ? 0 : servo.priority;
   return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, settings);
 }

@@ -18,4 +18,12 @@ void WallClock::sleep_until(TimePoint t) noexcept {
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) continue;
 }
 
+/// CLOCK_BOOTTIME goes on in sleep, CLOCK_MONOTONIC does not. Both are read without a system call.
+Duration WallClock::slept() const noexcept {
+  timespec boot{}, monotonic{};
+  clock_gettime(CLOCK_BOOTTIME, &boot);
+  clock_gettime(CLOCK_MONOTONIC, &monotonic);
+  return std::chrono::seconds(boot.tv_sec - monotonic.tv_sec) + Duration(boot.tv_nsec - monotonic.tv_nsec);
+}
+
 }  // namespace wrenchd

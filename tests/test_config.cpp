@@ -123,7 +123,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 46);
+  CHECK(options == 47);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {

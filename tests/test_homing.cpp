@@ -361,7 +361,7 @@ TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[ho
   bench.tick();
   CHECK(bench.state().step == HomingStep::listening);
   CHECK(holds(told(bench.state()), "Waiting for the device to report."));
-  CHECK(holds(told(bench.state()), std::string(text(Fault::sample_stale).sentence)));
+  CHECK(holds(told(bench.state()), std::string(fault_row(Fault::sample_stale).sentence)));
   fault = Fault::none;
   bench.hold(0.5);
   bench.move(0, 0.03);

@@ -6,9 +6,11 @@
 #include <mutex>
 
 #include <catch2/catch.hpp>
+#include <sys/resource.h>
 
 #include "collision/penetration.hpp"
 #include "tests/support/buried.hpp"
+#include "tests/support/fault_rig.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_body.hpp"
 
@@ -64,6 +66,37 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   CHECK(saturated > 500);
   CHECK(allocations == 0);
   CHECK(locks == 0);
+}
+
+TEST_CASE("no fault on its way through the loop allocates, locks or touches a page for the first time",
+          "[realtime][faults]") {
+  std::uint64_t allocations = 0, locks = 0;
+  long page_faults = 0;
+  for (const Injection& injection : injections())
+    for (const State state :
+         {State::self_test, State::waiting, State::active, State::degraded, State::releasing}) {
+      if (!injection.applies(state, Phase::contact)) continue;
+      FaultRig rig(Phase::contact);
+      REQUIRE(rig.bring_to(state));
+      injection.begin(rig);
+      const RealtimeGuard guard;
+      rusage before{}, after{};
+      getrusage(RUSAGE_THREAD, &before);
+      for (int i = 0; i < 120; ++i) rig.tick();
+      getrusage(RUSAGE_THREAD, &after);
+      const std::uint64_t here = guard.allocations();  // what follows allocates
+      locks += guard.locks();
+      allocations += here;
+      INFO(injection.name << ", " << name(state) << rig.broken());
+      CHECK(here == 0);
+      CHECK(rig.broken().empty());
+      page_faults += after.ru_minflt - before.ru_minflt + after.ru_majflt - before.ru_majflt;
+    }
+  CHECK(allocations == 0);
+  CHECK(locks == 0);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  CHECK(page_faults <= 10);  // the first rings and queues of a process that has not locked its memory
+#endif
 }
 
 TEST_CASE("to be placed, to start over and to be armed neither allocates nor locks in the servo thread",

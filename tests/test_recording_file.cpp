@@ -23,8 +23,12 @@ TickRecord random_record(RandomValues& random) {
   };
   any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged), any(r.skipped);
   any(r.missing), any(r.rejected), any(r.buttons), any(r.fresh), any(r.motors_on), any(r.watchdog_tripped);
-  any(r.arm_command), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.engagement);
-  any(r.limit_causes), any(r.dropped), any(r.fault), any(r.released), any(r.start_over), any(r.placing);
+  any(r.commands), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.state), any(r.cause),
+      any(r.faults);
+  any(r.limit_causes), any(r.dropped), any(r.sample_fault), any(r.write_fault), any(r.motors_told),
+      any(r.homed), any(r.slept_ns), any(r.answered_ns), any(r.repeated), any(r.commanded),
+      any(r.stiffness_share), any(r.guard_share), any(r.energy_in_J), any(r.energy_out_J), any(r.injected_J),
+      any(r.released), any(r.placing);
   any(r.wake_latency_ns);
   for (auto& ns : r.stage_ns) any(ns);
   for (auto* list : {&r.X_BH, &r.X_WP, &r.X_WQ})
@@ -65,7 +69,7 @@ TEST_CASE("a recording of another format is refused, with its version", "[record
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   { const RecordingWriter writer(file, {"0.0.9", "", "", ""}); }
-  const std::string named = GENERATE(std::string("1"), std::string("4"));
+  const std::string named = GENERATE(std::string("1"), std::string("3"), std::string("5"));
   {
     const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     const hid_t table = H5Dopen2(opened, "/ticks", H5P_DEFAULT);

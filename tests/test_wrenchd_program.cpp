@@ -39,7 +39,8 @@ TEST_CASE("wrenchd shows contact and a plausible force on the simulated device")
   int free = 0, in_contact = 0;
   double most_force_N = 0.0;
   for (const std::string& line : lines) {
-    if (line.find(" s active ") == std::string::npos) continue;
+    if (line.find(" s active ") == std::string::npos && line.find(" s ramping ") == std::string::npos)
+      continue;
     const bool contact = line.find("| 0 contacts |") == std::string::npos;
     ++(contact ? in_contact : free);
     // F x y z: the table pushes up, and only while it is touched.
@@ -56,7 +57,7 @@ TEST_CASE("wrenchd shows contact and a plausible force on the simulated device")
   CHECK(result.out.find("overruns 0, ticks left out 0") != std::string::npos);
   CHECK(result.err.find("device loopback, tool of 8 hull vertices, 1 obstacles, 1000 Hz") !=
         std::string::npos);
-  CHECK(result.err.find("engagement: active") != std::string::npos);
+  CHECK(result.err.find("state: active") != std::string::npos);
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
@@ -64,7 +65,7 @@ TEST_CASE("wrenchd simulates the device of a profile that is for a real one") {
   const ProgramResult result = run_virtual({"--arm", "--live", "--simulate", "reference_full_speed"});
   CHECK(result.exit_code == 0);
   CHECK(result.err.find("device reference_full_speed,") != std::string::npos);
-  CHECK(result.err.find("engagement: active") != std::string::npos);
+  CHECK(result.err.find("state: active") != std::string::npos);
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
@@ -74,7 +75,7 @@ TEST_CASE("wrenchd simulates devices of every kind, and their hands feel what th
         "wrenchd", {"--arm", "--live", "--simulate", profile, "--virtual-time", "--seconds", "6"});
     INFO(profile << "\n" << result.err << result.out);
     CHECK(result.exit_code == 0);
-    CHECK(result.err.find("engagement: active") != std::string::npos);
+    CHECK(result.err.find("state: active") != std::string::npos);
     CHECK(result.out.find("largest force 0.00 N") == std::string::npos);
     CHECK(result.out.find("torque 0.0 mN.m") != std::string::npos);
   }
@@ -175,7 +176,7 @@ TEST_CASE("wrenchd refuses what it cannot use, with its place, and starts nothin
     CHECK(result.out == "");
     CHECK(result.err.find("wrenchd: ") != std::string::npos);
     CHECK(result.err.find(told) != std::string::npos);
-    CHECK(result.err.find("engagement") == std::string::npos);
+    CHECK(result.err.find("state: ") == std::string::npos);
   }
 }
 
@@ -232,7 +233,7 @@ TEST_CASE("a signal ends wrenchd, and the hand is released") {
   for (const int number : {SIGTERM, SIGINT}) {
     RunningProgram wrenchd("wrenchd", {"--realtime", "off", "--arm", "--live"});
     INFO(number);
-    REQUIRE(wrenchd.says("engagement: "));
+    REQUIRE(wrenchd.says("state: "));
     wrenchd.signal(number);
     const ProgramResult result = wrenchd.wait(std::chrono::seconds(20));
     INFO(result.out << result.err);

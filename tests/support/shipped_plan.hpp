@@ -7,10 +7,13 @@
 
 namespace wrenchd::test {
 
-/// The configuration as it is shipped: simulated device, cube on table.
+/// The configuration as it is shipped: simulated device, cube on table. The self-test is left out, so that a
+/// test begins with what it is about.
 inline Plan shipped_plan() {
-  return read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
-                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  Plan plan = read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
+                        SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  plan.settings.servo.self_test_s = 0.0;
+  return plan;
 }
 
 /// A station with its simulated device within reach, opened.
@@ -52,7 +55,8 @@ struct VirtualStation : SimulatedStation<VirtualClock> {
   }
   double force_N() const { return Vector3d(last.F_out[0], last.F_out[1], last.F_out[2]).norm(); }
   double torque_Nm() const { return Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm(); }
-  Engagement engagement() const { return static_cast<Engagement>(last.engagement); }
+  State state() const { return static_cast<State>(last.state); }
+  Fault cause() const { return static_cast<Fault>(last.cause); }
   void inject(SimulatedFault::Kind kind, double start_s, double duration_s) {
     simulated.inject({kind, from_seconds(start_s), from_seconds(duration_s)});
   }

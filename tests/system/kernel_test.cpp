@@ -190,8 +190,8 @@ std::string summary(const Seen& seen) {
              " rejected, longest gap %.3f ms, ",
              seen.ticks, seen.fresh, seen.missing, seen.skipped, seen.rejected, ms(seen.longest_gap));
   if (seen.fault == Fault::none) return s + "no fault";
-  return s + format("%s after %.3f ms, %.3f ms after the last sample", wrenchd::text(seen.fault).name.data(),
-                    ms(seen.fault_after), ms(seen.fault_silence));
+  return s + format("%s after %.3f ms, %.3f ms after the last sample",
+                    wrenchd::fault_row(seen.fault).name.data(), ms(seen.fault_after), ms(seen.fault_silence));
 }
 
 /// A device plugged in, found, opened over one of the backends, and heard.

@@ -92,7 +92,11 @@ name = "patient"
 stale_fault_s = 1.0
 [match]
 usb = ["1209:6d0f"]
+[pose_report]
+sequence = "none"
 )";
+/// Nor asks for what a mock on a busy machine cannot do.
+const char* const kLenient = "[servo]\nself_test_s = 0\n";
 
 }  // namespace
 
@@ -100,14 +104,16 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   MockMachine machine;
   const TemporaryDirectory files;
   const std::string profile = files.write("patient.toml", kPatient).string();
-  RunningProgram wrenchd("wrenchd", {"--profile", profile, "--realtime", "best_effort", "--arm"});
+  const std::string config = files.write("lenient.toml", kLenient).string();
+  RunningProgram wrenchd("wrenchd",
+                         {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
   REQUIRE(wrenchd.says("no device of profile patient is plugged in; waiting for it"));
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
   REQUIRE(wrenchd.says("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
   REQUIRE(soon([&] { return handle->was_pushed(); }));  // --arm armed it
   handle->unplug();
-  REQUIRE(wrenchd.says("fault device_lost"));
+  REQUIRE(wrenchd.says("device_lost: "));
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-3", .number = 4, .serial = "B2"});
@@ -143,12 +149,14 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
   const TemporaryDirectory files;
   const std::string profile =
       files.write("patient.toml", std::string(kPatient) + "[homing]\ncheck_axes = true\n").string();
+  const std::string config = files.write("lenient.toml", kLenient).string();
   const CalibrationStore store(files.path() / "calibration");
   const bool calibrated = GENERATE(false, true);
   if (calibrated) store.write({"patient", "A1", {}});
   setenv("STATE_DIRECTORY", files.path().c_str(), 1);
   const LiveHandle handle(machine, {});
-  RunningProgram wrenchd("wrenchd", {"--profile", profile, "--realtime", "best_effort", "--arm"});
+  RunningProgram wrenchd("wrenchd",
+                         {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
   unsetenv("STATE_DIRECTORY");
   if (calibrated) {
     CHECK(soon([&] { return handle.was_pushed(); }));

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/client_watch.hpp"
+
+#include "core/watch_limits.hpp"
+
+namespace wrenchd {
+
+FaultSet ClientWatch::look(TimePoint now) const noexcept {
+  if (!last_ || now - *last_ <= kSilentClient) return 0;
+  return bit(beaten_ ? Fault::client_gone : Fault::client_silent);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/clock.hpp"
+#include "core/device_profile.hpp"
+#include "core/fault.hpp"
+#include "devices/device.hpp"
+
+namespace wrenchd {
+
+/// Looks at what the reports say of the pose: no rotation, outside of the workspace, stuck. RT safe.
+class PoseWatch {
+ public:
+  explicit PoseWatch(const DeviceProfile& profile) noexcept;
+
+  FaultSet look(const DeviceSample& sample) noexcept;
+  /// The next pose is the first one.
+  void forget() noexcept;
+
+ private:
+  bool stuck(const DeviceSample& sample) noexcept;
+
+  Vector3d centre_m_;
+  double farthest_m_;  ///< infinite where the profile has no workspace
+  int no_rotations_ = 0;
+  Pose X_BH_;                ///< the last one that moved
+  bool moved_ = false;       ///< there is one
+  double stuck_at_s_ = 0.0;  ///< device time at which it did
+  double last_s_ = 0.0;
+  double way_m_ = 0.0;  ///< that the twist would have gone since
+  double turn_rad_ = 0.0;
+};
+
+}  // namespace wrenchd

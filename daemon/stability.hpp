@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "config/settings.hpp"
+#include "core/device_profile.hpp"
+#include "core/loop_measurement.hpp"
+#include "core/passivity.hpp"
+#include "core/stability_bound.hpp"
+
+namespace wrenchd {
+
+/// How much of the spring and the damper that the configuration asks for a device can bear.
+struct StiffnessShare {
+  double spring = 1.0;
+  double damper = 1.0;
+  bool bounded = false;  ///< the profile states the damping by which it could be computed
+};
+
+/// Holds the stiffness of the configuration against what stays passive, with the rate and the delay that were
+/// measured, and against the most that the profile states.
+class Stability {
+ public:
+  /// X_HT: the tool's body frame in the handle. Throws std::invalid_argument where the gains make no spring.
+  Stability(const Settings& settings, const DeviceProfile& profile, const Inertia& M, const Pose& X_HT);
+
+  /// Where the damper costs more stiffness than it gives steadiness, it is left out. RT safe.
+  StiffnessShare settle(const LoopMeasurement& measured) const noexcept;
+
+  /// The guard that goes with it. RT safe.
+  PassivityGuard guard(const LoopMeasurement& measured) const noexcept;
+
+ private:
+  StiffnessShare share(const LoopDelay& loop) const;
+
+  DeviceDamping damping_;
+  Coupling coupling_;
+  Pose X_HT_;
+  DofMask driven_;
+  double period_s_;
+  double most_spring_;  ///< share that the profile's own maxima leave
+};
+
+}  // namespace wrenchd

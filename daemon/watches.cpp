@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/watches.hpp"
+
+#include "core/finite.hpp"
+
+namespace wrenchd {
+namespace {
+
+std::uint32_t button_bit(int button) noexcept {
+  return button < 0 ? 0U : std::uint32_t{1} << static_cast<unsigned>(button);
+}
+
+}  // namespace
+
+Watches::Watches(const Settings& settings, const DeviceProfile& profile, double max_force_N,
+                 double max_torque_Nm)
+    : pace(from_seconds(1.0 / settings.servo.rate_Hz), from_seconds(settings.servo.late_limit_s)),
+      link(profile.report_rate_Hz),
+      pose(profile),
+      pinned(max_force_N, max_torque_Nm),
+      deadman_button(button_bit(profile.deadman_button)),
+      stop_button(button_bit(profile.stop_button)) {}
+
+FaultSet Watches::look(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
+  FaultSet found = link.look(sample, now) | pose.look(sample) | motors.look(sample, driven, now);
+  // A hand that is fast while it feels nothing does no harm; three orientations that are none are one fault.
+  const bool free = sample.fault == Fault::overspeed && !is_driving(state);
+  if (sample.fault != Fault::none && sample.fault != Fault::pose_not_a_rotation && !free)
+    found |= bit(sample.fault);
+  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) found |= bit(Fault::pose_not_finite);
+  if (homed_ && !sample.homed) found |= bit(Fault::not_homed);
+  if (sample.arrived != TimePoint{}) homed_ = sample.homed;  // before the first report it is anybody's guess
+  return found | buttons(sample, state) | client.look(now);
+}
+
+FaultSet Watches::buttons(const DeviceSample& sample, State state) const noexcept {
+  FaultSet found = 0;
+  if ((sample.buttons & stop_button) != 0) found |= bit(Fault::stop_button);
+  const bool wanted = is_driving(state) || state == State::waiting;
+  if (wanted && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
+    found |= bit(Fault::deadman_open);
+  return found;
+}
+
+void Watches::forget() noexcept {
+  link.forget();
+  pose.forget();
+  motors = MotorWatch();
+  writes.forget();
+  homed_ = false;
+}
+
+}  // namespace wrenchd

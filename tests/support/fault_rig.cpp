@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/support/fault_rig.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace wrenchd::test {
+namespace {
+
+using Kind = SimulatedFault::Kind;
+
+constexpr double kArmAt_s = 0.08;
+constexpr double kPressed_s = 0.5;  ///< by then the hand is where the phase wants it
+constexpr int kDeadman = 0;
+constexpr int kStopButton = 1;
+
+Plan rig_plan(Phase phase) {
+  Plan plan = shipped_plan();
+  plan.settings.servo.realtime = Realtime::required;
+  plan.settings.servo.self_test_s = 0.03;
+  plan.settings.limits.soft_start_s = 0.05;
+  plan.settings.limits.max_force_N = phase == Phase::saturated ? 1.0 : 5.0;
+  plan.profile.deadman_button = kDeadman;
+  plan.profile.stop_button = kStopButton;
+  const double end_z_m = phase == Phase::free ? 0.06 : phase == Phase::contact ? 0.018 : -0.005;
+  plan.settings.simulation.hand_path = {
+      {0.0, {0, 0, 0.06}, {0, 0, 0}}, {0.3, {0, 0, 0.06}, {0, 0, 0}}, {0.42, {0, 0, end_z_m}, {0, 0, 0}}};
+  plan.settings.simulation.hand_repeats = false;
+  return plan;
+}
+
+Invariants::Limits limits_of(const Plan& plan) {
+  return {plan.profile.max_force_N,
+          plan.profile.max_torque_Nm,
+          plan.settings.limits.force_slew_N_per_s,
+          plan.settings.limits.torque_slew_Nm_per_s,
+          1.0 / plan.settings.servo.rate_Hz,
+          0.004};
+}
+
+bool armed(State s, Phase) {
+  return is_driving(s) || s == State::waiting;
+}
+bool under_way(State s, Phase) {
+  return s == State::active || s == State::ramping || s == State::degraded;
+}
+
+std::function<void(FaultRig&)> wire(Kind kind, double for_s, double value = 0.0) {
+  return [=](FaultRig& rig) { rig.inject(kind, for_s, value); };
+}
+std::function<void(FaultRig&)> spoil(std::function<void(DeviceSample&)> how) {
+  return [how](FaultRig& rig) { rig.spoiled.spoil = how; };
+}
+
+}  // namespace
+
+const char* name(Phase phase) {
+  return phase == Phase::free ? "free" : phase == Phase::contact ? "contact" : "saturated";
+}
+
+FaultRig::FaultRig(Phase phase)
+    : plan(rig_plan(phase)),
+      scene(plan.scene),
+      simulated(plan.profile, plan.settings.simulation),
+      link(simulated, clock, plan.settings.simulation),
+      device(plan.profile, link),
+      spoiled(device),
+      placer(scene),
+      loop(plan.settings, plan.profile, spoiled, scene, placer, clock),
+      invariants_(limits_of(plan)) {
+  simulated.inject({Kind::press, Duration{0}, std::chrono::hours(1), kDeadman});
+  spoiled.open();
+}
+
+const TickRecord& FaultRig::tick(Duration after) {
+  clock.step(after);
+  loop.tick(clock.now(), clock.now());
+  loop.latest().read(last_);
+  if (const auto wrong = invariants_.check(last_); wrong && broken_.empty()) broken_ = *wrong;
+  return last_;
+}
+
+bool FaultRig::bring_to(State state) {
+  const auto tick_until = [this](auto there, int most) {
+    for (int i = 0; i < most && !there(); ++i) tick();
+    return there();
+  };
+  const auto in = [this](State s) { return [this, s] { return this->state() == s; }; };
+  const auto at = [this](double t_s) {
+    return [this, t_s] { return clock.now() >= TimePoint{} + from_seconds(t_s); };
+  };
+  if (!tick_until(in(State::disarmed), 300)) return false;
+  if (state != State::disarmed) {
+    if (!tick_until(at(kArmAt_s), 300)) return false;
+    loop.arm();
+    if (!tick_until(in(State::active), 300)) return false;
+  }
+  tick_until(at(kPressed_s), 1000);
+  switch (state) {
+    case State::disarmed:
+    case State::active:
+      break;
+    case State::waiting:
+      loop.start_over();
+      break;
+    case State::degraded:
+    case State::ramping:
+      inject(Kind::silence, 0.005);
+      break;
+    case State::releasing:
+      loop.disarm();
+      break;
+    case State::fault:
+      spoiled.spoil = [](DeviceSample& s) {
+        s.X_BH.translation_m.x() = std::numeric_limits<double>::quiet_NaN();
+      };
+      tick();
+      spoiled.spoil = {};
+      break;
+    case State::stopped:
+      loop.stop();
+      break;
+    case State::self_test:
+      loop.stop();
+      tick();
+      loop.acknowledge();
+      break;
+    default:
+      return false;
+  }
+  return tick_until(in(state), 200);
+}
+
+double FaultRig::force_N() const noexcept {
+  return std::hypot(last_.F_out[0], last_.F_out[1], last_.F_out[2]);
+}
+
+void FaultRig::inject(Kind kind, double for_s, double value) {
+  simulated.inject(
+      {kind, clock.now() - TimePoint{} - std::chrono::milliseconds(1), from_seconds(for_s), value});
+}
+
+const std::vector<State>& rig_states() {
+  static const std::vector<State> states = {State::self_test, State::disarmed, State::waiting,
+                                            State::ramping,   State::active,   State::degraded,
+                                            State::releasing, State::fault,    State::stopped};
+  return states;
+}
+
+const std::vector<Injection>& injections() {
+  static const std::vector<Injection> all = [] {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    constexpr double kInf = std::numeric_limits<double>::infinity();
+    std::vector<Injection> list;
+    const auto add = [&list](Injection injection) { list.push_back(std::move(injection)); };
+    const auto not_testing = [](State s, Phase) { return s != State::self_test; };
+
+    add({"unplugged", Fault::device_lost, 1, wire(Kind::unplug, 0.5)});
+    add({"a write finds nobody",
+         Fault::device_lost,
+         1,
+         [](FaultRig& r) { r.spoiled.write_says = Fault::device_lost; },
+         {},
+         not_testing});
+    add({"garbled", Fault::report_malformed, 3, wire(Kind::garble, 0.1)});
+    add({"garbled for long", Fault::sample_stale, 24, wire(Kind::garble, 0.1)});
+    add({"short", Fault::report_malformed, 3, wire(Kind::short_report, 0.1)});
+    add({"long", Fault::report_malformed, 3, wire(Kind::long_report, 0.1)});
+    add({"of another id", Fault::report_malformed, 3, wire(Kind::wrong_id, 0.1)});
+    add({"frozen", Fault::report_repeated, 3, wire(Kind::freeze, 0.1)});
+    add({"frozen for long", Fault::sample_stale, 24, wire(Kind::freeze, 0.1)});
+    add({"each report twice", Fault::link_lossy, 60, wire(Kind::repeat, 0.3), {}, not_testing});
+    add({"each report after the next", Fault::link_lossy, 60, wire(Kind::swap, 0.3), {}, not_testing});
+    add({"every other report lost", Fault::report_missing, 5, wire(Kind::lose, 0.3, 2)});
+    add({"every other report lost, for long",
+         Fault::link_lossy,
+         100,
+         wire(Kind::lose, 0.3, 2),
+         {},
+         not_testing});
+    add({"late", Fault::sample_late, 6, wire(Kind::late, 0.5, 0.008)});
+    add({"a moment of silence", Fault::sample_late, 6, wire(Kind::silence, 0.006)});
+    add({"silence", Fault::sample_stale, 24, wire(Kind::silence, 0.1)});
+    add({"NaN in the position", Fault::pose_not_finite, 1,
+         spoil([](DeviceSample& s) { s.X_BH.translation_m.y() = kNaN; })});
+    add({"infinity in the position", Fault::pose_not_finite, 1,
+         spoil([](DeviceSample& s) { s.X_BH.translation_m.z() = -kInf; })});
+    add({"NaN in the orientation", Fault::pose_not_finite, 1,
+         spoil([](DeviceSample& s) { s.X_BH.rotation.w() = kNaN; })});
+    add({"NaN in the twist", Fault::pose_not_finite, 1,
+         spoil([](DeviceSample& s) { s.V_BH.angular_rad_per_s.x() = kNaN; })});
+    add({"a quaternion that is none", Fault::pose_not_a_rotation, 5, wire(Kind::bad_quaternion, 0.05)});
+    add({"teleported", Fault::pose_teleported, 3, wire(Kind::teleport, 0.05)});
+    add({"far outside", Fault::pose_outside, 3, wire(Kind::teleport, 0.05, 0.6)});
+    add({"stuck", Fault::pose_stuck, 26, [](FaultRig& r) {
+           r.spoiled.spoil = [X_BH = r.simulated.X_BH()](DeviceSample& s) {
+             s.X_BH = X_BH;
+             s.V_BH.linear_m_per_s = {0.1, 0, 0};
+           };
+         }});
+    add({"run away", Fault::overspeed, 5, wire(Kind::run_away, 0.02), {}, under_way});
+    add({"not homed any more", Fault::not_homed, 1, spoil([](DeviceSample& s) { s.homed = false; })});
+    add({"the watchdog trips", Fault::watchdog_tripped, 4, wire(Kind::trip, 0.002), {}, under_way});
+    add({"commands do not arrive", Fault::watchdog_tripped, 14, wire(Kind::swallow, 0.1), {}, under_way});
+    add({"the motors are off", Fault::motors_off, 26, wire(Kind::dead_motors, 0.1), {}, [](State s, Phase) {
+           return s == State::active;
+         }});
+    add({"no room for commands", Fault::write_blocked, 4, wire(Kind::deaf, 0.1), {}, not_testing});
+    add({"no room for commands, for long", Fault::write_failed, 22, wire(Kind::deaf, 0.1), {}, not_testing});
+    add({"a tick late", Fault::tick_late, 1,
+         [](FaultRig& r) { r.clock.step(std::chrono::milliseconds(8)); }});
+    add({"stopped", Fault::loop_stopped, 1,
+         [](FaultRig& r) { r.clock.step(std::chrono::milliseconds(200)); }});
+    add({"a clock that goes back", Fault::clock_back, 1,
+         [](FaultRig& r) { r.clock.step(std::chrono::milliseconds(-3)); }});
+    add({"asleep", Fault::suspended, 1, [](FaultRig& r) { r.clock.sleep += std::chrono::hours(1); }});
+    add({"a solver out of time", Fault::answer_late, 1,
+         [](FaultRig& r) { r.clock.solver_takes = std::chrono::milliseconds(4); }});
+    add({"a wrench that is not a number", Fault::wrench_not_finite, 4,
+         spoil([](DeviceSample& s) { s.X_BH.translation_m.z() = -1.7e308; })});
+    add({"pinned",
+         Fault::pinned,
+         1200,
+         [](FaultRig&) {},
+         {},
+         [](State s, Phase p) { return s == State::active && p == Phase::saturated; }});
+    add({"nobody lives",
+         Fault::client_silent,
+         103,
+         [](FaultRig& r) { r.loop.ask(kArm | kLease); },
+         {},
+         [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
+    add({"the dead man's button",
+         Fault::deadman_open,
+         1,
+         spoil([](DeviceSample& s) { s.buttons &= ~1U; }),
+         {},
+         armed});
+    add({"the stop button", Fault::stop_button, 1,
+         spoil([](DeviceSample& s) { s.buttons |= 1U << kStopButton; })});
+    add({"somebody says stop", Fault::stop_asked, 1, [](FaultRig& r) { r.loop.stop(); }});
+    add({"what comes again and again",
+         Fault::degraded_too_long,
+         560,
+         [](FaultRig& r) {
+           for (int i = 0; i < 30; ++i)
+             r.simulated.inject({Kind::silence,
+                                 r.clock.now() - TimePoint{} + i * std::chrono::milliseconds(40),
+                                 std::chrono::milliseconds(6)});
+         },
+         {},
+         under_way});
+    add({"what comes back too often",
+         Fault::degraded_too_often,
+         2200,
+         [](FaultRig& r) {
+           for (int i = 0; i < 12; ++i)
+             r.simulated.inject({Kind::silence,
+                                 r.clock.now() - TimePoint{} + i * std::chrono::milliseconds(180),
+                                 std::chrono::milliseconds(6)});
+         },
+         {},
+         [](State s, Phase p) { return s == State::active && p != Phase::saturated; }});
+    const auto testing = [](State s, Phase) { return s == State::self_test; };
+    add({"a test that is never clean", Fault::test_unclean, 5100, wire(Kind::lose, 6.0, 10), {}, testing});
+    add({"a watchdog that sleeps", Fault::test_watchdog, 150, wire(Kind::sleepy, 2.0), {}, testing});
+    add({"another rate", Fault::test_rate, 80, spoil([](DeviceSample& s) { s.sequence *= 2; }), {}, testing});
+    return list;
+  }();
+  return all;
+}
+
+}  // namespace wrenchd::test

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "core/fault.hpp"
+#include "tools/fault_text.hpp"
+
+using namespace wrenchd;
+using Catch::Matchers::Contains;
+
+TEST_CASE("the list of faults has all of them, with what follows and what to do", "[fault_text]") {
+  const std::string text = fault_text();
+  for (const FaultRow& row : fault_rows()) {
+    CHECK_THAT(text, Contains(std::string(row.name) + "\n"));
+    CHECK_THAT(text, Contains(std::string(row.cure)));
+  }
+  CHECK_THAT(fault_text("overspeed"), Contains("state fault; in the same tick, no force in that tick"));
+  CHECK_THAT(fault_text("sample_late"),
+             Contains("state degraded; after 3 ms, within one tick, no force 10 ms later"));
+  CHECK_THAT(fault_text("client_gone"),
+             Contains("state releasing; after 100 ms, within one tick, no force 100 ms later"));
+  CHECK_THAT(fault_text("overheated"), Contains("it is told, and the force stays"));
+}
+
+TEST_CASE("a fault that there is not is told with those that there are", "[fault_text]") {
+  CHECK_THROWS_WITH(fault_text("hunger"), Contains("there is no fault 'hunger'") && Contains("overspeed"));
+}
+
+TEST_CASE("the machine is shown row by row", "[fault_text]") {
+  const std::string text = state_text();
+  CHECK(std::count(text.begin(), text.end(), '\n') == static_cast<long>(transitions().size()) + 1);
+  CHECK_THAT(text, Contains("hard fault") && Contains("somebody has to look at it"));
+}
