@@ -294,7 +294,7 @@ EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes
     if (!sample.homed)
       encoded.remarks.push_back("the encoders are not homed in --at: the motors get nothing");
     else if (sample.fault != Fault::none)
-      throw std::runtime_error("--at: " + std::string(text(sample.fault).sentence));
+      throw std::runtime_error("--at: " + std::string(fault_row(sample.fault).sentence));
     if (at.empty())
       encoded.remarks.push_back("at the home position, which the device reports as " +
                                 hex_text(home_report(profile)));

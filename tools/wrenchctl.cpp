@@ -30,6 +30,7 @@
 #include "tools/calibrate.hpp"
 #include "tools/check.hpp"
 #include "tools/descriptor_source.hpp"
+#include "tools/fault_text.hpp"
 #include "tools/list_devices.hpp"
 #include "tools/make_mesh.hpp"
 #include "tools/output_file.hpp"
@@ -403,6 +404,27 @@ void add_devices(CLI::App& app, bool& all) {
   });
 }
 
+struct FaultOptions {
+  std::string name;
+  bool states = false;
+};
+
+void add_faults(CLI::App& app, FaultOptions& options) {
+  CLI::App* faults =
+      app.add_subcommand("faults",
+                         "What can go wrong: how it is found, what the hand feels of it and how soon,\n"
+                         "why anybody looks for it, and what to do");
+  faults->add_option("name", options.name, "one of them, as the log names it; without it all")
+      ->check(not_empty());
+  faults->add_flag("--states", options.states, "the states instead, and what leads from one to the next");
+  faults->callback([&options] {
+    if (options.states)
+      std::cout << state_text();
+    else
+      std::cout << (options.name.empty() ? fault_text() : fault_text(options.name));
+  });
+}
+
 void add_calibrate(CLI::App& app, CalibrateOptions& options, int& exit_code) {
   CLI::App* calibrate =
       app.add_subcommand("calibrate",
@@ -500,6 +522,9 @@ int main(int argc, char** argv) {
   bool all_devices = false;
   add_devices(app, all_devices);
 
+  FaultOptions fault_options;
+  add_faults(app, fault_options);
+
   CalibrateOptions calibrate_options;
   add_calibrate(app, calibrate_options, exit_code);
 
@@ -530,7 +555,7 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
-          "A subcommand (solve, check, decode, devices, encode, mesh, profile, paper or replay)");
+          "A subcommand (solve, check, decode, devices, encode, faults, mesh, profile, paper or replay)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/fault_text.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "core/fault.hpp"
+
+namespace wrenchd {
+namespace {
+
+double milliseconds(Duration d) {
+  return 1e3 * seconds(d);
+}
+
+/// When the reaction to a fault begins, counted from the moment at which the fault can be seen.
+std::string begins(const FaultRow& row) {
+  if (row.after == Duration{0}) return "in the same tick";
+  return fmt::format("after {:.0f} ms, within one tick", milliseconds(row.after));
+}
+
+/// Until when the hand is free of force, counted from there.
+std::string ends(Reaction reaction) {
+  switch (reaction) {
+    case Reaction::none:
+      return "the force stays";
+    case Reaction::fade_100ms:
+    case Reaction::fade_10ms:
+      return fmt::format("no force {:.0f} ms later", milliseconds(time_to_zero(reaction)));
+    default:
+      return "no force in that tick";
+  }
+}
+
+/// Where a trigger leads from a loop at full force.
+std::string follows(const FaultRow& row) {
+  const Transition& from_active = transition(row.trigger, State::active);
+  if (!from_active.leads) return "it is told, and the force stays";
+  return fmt::format("state {}; {}, {}", name(from_active.to), begins(row),
+                     ends(std::max(from_active.reaction, row.reaction)));
+}
+
+std::string paragraph(const FaultRow& row) {
+  return fmt::format(
+      "{}\n  what happened  {}\n  found by       {}\n  what follows   {}\n  why it exists  {}\n"
+      "  what to do     {}\n",
+      row.name, row.sentence, row.detector, follows(row), row.why, row.cure);
+}
+
+std::string names_of(StateSet set) {
+  std::string names;
+  for (std::size_t s = 0; s < kStateCount; ++s)
+    if (contains(set, static_cast<State>(s)))
+      names += (names.empty() ? "" : ", ") + std::string(name(static_cast<State>(s)));
+  return names;
+}
+
+}  // namespace
+
+std::string fault_text() {
+  std::string text;
+  for (const FaultRow& row : fault_rows()) text += paragraph(row) + "\n";
+  return text +
+         fmt::format("{} faults. wrenchctl faults --states shows what leads where.\n", fault_rows().size());
+}
+
+std::string fault_text(const std::string& name) {
+  std::string names;
+  for (const FaultRow& row : fault_rows()) {
+    if (row.name == name) return paragraph(row);
+    names += (names.empty() ? "" : ", ") + std::string(row.name);
+  }
+  throw std::runtime_error("there is no fault '" + name + "'; the names are " + names);
+}
+
+std::string state_text() {
+  std::string text = fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", "what happens", "in the states",
+                                 "leads to", "the force", "free in", "because");
+  for (const Transition& row : transitions()) {
+    const std::string to = row.leads ? name(row.to) : "-";
+    const std::string within = row.reaction == Reaction::none ? "-"
+                               : time_to_zero(row.reaction) == Duration{0}
+                                   ? "1 tick"
+                                   : fmt::format("{:.0f} ms", milliseconds(time_to_zero(row.reaction)));
+    text += fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", name(row.trigger), names_of(row.from), to,
+                        name(row.reaction), within, row.why);
+  }
+  return text;
+}
+
+}  // namespace wrenchd
