@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Under test: devices/report_descriptor.cpp devices/layout_check.cpp devices/six_axes.cpp
 #include <cstdlib>
 
 #include "devices/layout_check.hpp"

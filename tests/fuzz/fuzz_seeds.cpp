@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "config/calibration_store.hpp"
+#include "config/known_profiles.hpp"
+#include "devices/report_codec.hpp"
+#include "tests/fuzz/fuzz_config.hpp"
+#include "tests/fuzz/fuzz_mesh.hpp"
+#include "tests/fuzz/fuzz_report.hpp"
+#include "tests/support/sample_descriptors.hpp"
+#include "tests/support/sample_meshes.hpp"
+
+// What a fuzzer starts from: DIRECTORY gets small good inputs, DIRECTORY.dict the words of their language.
+// All of it is made of what is shipped and what the tests use.
+
+namespace {
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+namespace fs = std::filesystem;
+
+const fs::path kConfig = WRENCHD_SOURCE_DIR "/config";
+
+struct Seeds {
+  std::vector<std::string> inputs;
+  std::set<std::string> words;
+};
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+char to_char(unsigned byte) {
+  return static_cast<char>(static_cast<unsigned char>(byte));
+}
+
+/// Runs of letters, digits, _ and -: what keys and names are made of.
+std::set<std::string> words_in(const std::string& text) {
+  std::set<std::string> words;
+  std::string word;
+  for (const char c : text + ' ') {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-') {
+      word += c;
+      continue;
+    }
+    if (word.size() > 2 && word.size() < 32) words.insert(word);
+    word.clear();
+  }
+  return words;
+}
+
+/// What stands between quotation marks in our own sources: every key, whether a shipped file uses it or not.
+std::set<std::string> quoted_words(const fs::path& directory) {
+  std::set<std::string> words;
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    if (entry.path().extension() != ".cpp") continue;
+    const std::string text = text_of(entry.path());
+    for (std::size_t open = text.find('"'); open != std::string::npos;) {
+      const std::size_t close = text.find('"', open + 1);
+      if (close == std::string::npos) break;
+      const std::string quoted = text.substr(open + 1, close - open - 1);
+      if (words_in(quoted) == std::set<std::string>{quoted}) words.insert(quoted);
+      open = text.find('"', close + 1);
+    }
+  }
+  return words;
+}
+
+std::string without_comments(const std::string& text) {
+  std::string out, line;
+  for (const char c : text + '\n') {
+    line += c;
+    if (c != '\n') continue;
+    if (line.find_first_not_of(" \n") != std::string::npos && line.front() != '#') out += line;
+    line.clear();
+  }
+  return out;
+}
+
+/// A scene's mesh is looked for beside the input.
+std::string mesh_beside(std::string text) {
+  for (std::size_t at; (at = text.find("../meshes/")) != std::string::npos;) text.erase(at, 10);
+  return text;
+}
+
+Seeds config_seeds() {
+  Seeds seeds;
+  const auto add = [&](FileKind kind, const std::string& text) {
+    seeds.inputs.push_back(to_char(static_cast<unsigned>(kind)) + text);
+    seeds.words.merge(words_in(text));
+  };
+  const auto add_all = [&](FileKind kind, const fs::path& directory) {
+    for (const auto& entry : fs::directory_iterator(directory))
+      add(kind, mesh_beside(without_comments(text_of(entry.path()))));
+  };
+  add(FileKind::settings, without_comments(text_of(kConfig / "wrenchd.toml")));
+  add_all(FileKind::scene, kConfig / "scenes");
+  add_all(FileKind::profile, kConfig / "profiles");
+  add_all(FileKind::hand_script, kConfig / "hands");
+  const std::string kept = to_text(Calibration{"polhem", "A-0017", {{"joint_1", 0.0125}, {"joint_2", -1.5}}});
+  add(FileKind::calibration, kept);
+  add(FileKind::sealed_calibration, kept.substr(0, kept.rfind("# crc32")));
+  seeds.words.merge(quoted_words(kConfig));
+  for (const char* sign :
+       {"[[", "]]", " = ", "= [", "{ ", " }", "\"\"\"", "'''", "nan", "inf", "1e308", "0x7f", "-1"})
+    seeds.words.insert(sign);
+  return seeds;
+}
+
+/// Ten reports a millisecond apart, each read and answered.
+Seeds report_seeds() {
+  Seeds seeds;
+  const auto profiles = known_profiles(SearchPath({kConfig})).profiles;
+  const auto step = [](Step s) { return to_char(static_cast<unsigned>(s)); };
+  for (std::size_t p = 0; p < profiles.size(); ++p) {
+    std::string input(1, to_char(static_cast<unsigned>(p)));
+    input += step(Step::read);
+    for (unsigned i = 0; i < 10; ++i) {
+      input += step(Step::pass) + std::string(1, to_char(0x6f));
+      for (unsigned report = 0; report <= profiles[p].more_reports.size(); ++report) {
+        input += step(Step::plausible) + std::string(1, to_char(report));
+        input +=
+            std::string(1, '\0') + to_char(100) + std::string(1, '\0');  // the next one, a millisecond on
+        input += std::string(15 + 3 + kMaxJoints, to_char(i % 3)) + std::string(1, to_char(1));
+      }
+      input += step(Step::read);
+      input += step(Step::command) + std::string(1, to_char(3)) + std::string(12, to_char(i));
+    }
+    seeds.inputs.push_back(input);
+  }
+  return seeds;
+}
+
+Seeds descriptor_seeds() {
+  Seeds seeds;
+  std::vector<Bytes> samples = sample_descriptors();
+  samples.push_back(reference_descriptor());
+  for (const Bytes& bytes : samples) {
+    seeds.inputs.emplace_back(bytes.begin(), bytes.end());
+    for (std::size_t i = 0; i + 1 < bytes.size(); ++i)
+      seeds.words.emplace(bytes.begin() + static_cast<std::ptrdiff_t>(i),
+                          bytes.begin() + static_cast<std::ptrdiff_t>(i + 2));
+  }
+  return seeds;
+}
+
+Seeds mesh_seeds() {
+  Seeds seeds;
+  const PolygonSoup quads = box({0, 0, 0}, {2, 3, 4}), triangles = triangulated(quads);
+  const std::array<std::vector<std::string>, 4> texts = {{
+      {as_off(quads), as_off(inside_out(quads)), as_off(both(quads, box({5, 0, 0}, {6, 1, 1})))},
+      {as_obj(quads), as_obj(triangles)},
+      {as_ascii_stl(triangles), as_binary_stl(triangles)},
+      {as_ascii_ply(quads), as_binary_ply(triangles), as_binary_ply(quads, true)},
+  }};
+  for (std::size_t format = 0; format < texts.size(); ++format)
+    for (const std::string& text : texts[format])
+      for (const unsigned surface : {0U, 4U}) {
+        seeds.inputs.push_back(to_char(static_cast<unsigned>(format) + surface) + text);
+        if (surface == 0 &&
+            std::all_of(text.begin(), text.end(), [](char c) { return c == '\n' || (c >= ' ' && c <= '~'); }))
+          seeds.words.merge(words_in(text));
+      }
+  for (const char* word : {"COFF",
+                           "NOFF",
+                           "STOFF",
+                           "nOFF",
+                           "4OFF",
+                           "BINARY",
+                           "vn ",
+                           "vt ",
+                           "usemtl",
+                           "mtllib",
+                           "f 1//1",
+                           "-1",
+                           "1/1/1",
+                           "binary_little_endian",
+                           "binary_big_endian",
+                           "property list",
+                           "uint8",
+                           "float64",
+                           "int32",
+                           "ushort",
+                           "short",
+                           "char",
+                           "obj_info",
+                           "comment",
+                           "nan",
+                           "inf",
+                           "1e308",
+                           "1e-308",
+                           "\r\n",
+                           "\\\n"})
+    seeds.words.insert(word);
+  return seeds;
+}
+
+Seeds seeds_of(const std::string& target) {
+  if (target == "fuzz_config") return config_seeds();
+  if (target == "fuzz_report") return report_seeds();
+  if (target == "fuzz_report_descriptor") return descriptor_seeds();
+  if (target == "fuzz_mesh") return mesh_seeds();
+  return {};  // starts from nothing
+}
+
+void write(const Seeds& seeds, const fs::path& directory) {
+  fs::create_directories(directory);
+  for (std::size_t i = 0; i < seeds.inputs.size(); ++i)
+    std::ofstream(directory / ("seed_" + std::to_string(i)), std::ios::binary) << seeds.inputs[i];
+  std::ofstream dictionary(directory.string() + ".dict");
+  for (const std::string& word : seeds.words) {
+    dictionary << '"';
+    for (const char c : word) {
+      std::array<char, 5> code{};
+      std::snprintf(code.data(), code.size(), "\\x%02X",
+                    static_cast<unsigned>(static_cast<unsigned char>(c)));
+      dictionary << code.data();
+    }
+    dictionary << "\"\n";
+  }
+  if (!dictionary)
+    throw std::runtime_error(directory.string() + ": cannot be written; name another directory");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fputs("usage: fuzz_seeds TARGET DIRECTORY\n", stderr);
+    return 2;
+  }
+  try {
+    write(seeds_of(argv[1]), argv[2]);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "fuzz_seeds: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstdint>
+#include <cstdio>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "tests/support/fault_rig.hpp"
+#include "tests/support/random_values.hpp"
+
+// Schedules of faults that nobody thought of: one to four of them, overlapping as they come, in any state,
+// with anything asked of the loop in between. Every tick is held against the invariants; at the end the
+// device is well again, somebody acknowledges, and the loop has to be ready to be armed.
+
+namespace {
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+struct Outcome {
+  std::uint64_t ticks = 0;
+  std::string broken;
+};
+
+/// One schedule, drawn from its number alone.
+Outcome run(std::uint64_t seed) {
+  RandomValues random(seed);
+  FaultRig rig(static_cast<Phase>(random.integer(0, 2)));
+  const auto& states = rig_states();
+  Outcome outcome;
+  const State state =
+      states[static_cast<std::size_t>(random.integer(0, static_cast<int>(states.size()) - 1))];
+  if (!rig.bring_to(state)) {
+    outcome.broken = "does not come to its state";
+    return outcome;
+  }
+  const auto ticks_of = [&](int n) {
+    for (int i = 0; i < n && rig.broken().empty(); ++i) {
+      if (random.integer(0, 400) == 0) rig.loop.ask(static_cast<CommandSet>(1 << random.integer(0, 7)));
+      if (random.integer(0, 40) == 0) rig.loop.live();
+      rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
+                                           : std::chrono::milliseconds(1));
+      if (rig.found(Fault::device_lost)) {  // it is opened again, as the daemon does
+        rig.spoiled.write_says = Fault::none;
+        try {
+          rig.spoiled.open();
+        } catch (const std::runtime_error&) {  // still unplugged
+        }
+      }
+    }
+  };
+  const int faults = random.integer(1, 4);
+  for (int f = 0; f < faults; ++f) {
+    const auto& all = injections();
+    all[static_cast<std::size_t>(random.integer(0, static_cast<int>(all.size()) - 1))].begin(rig);
+    ticks_of(random.integer(1, 120));
+    if (random.integer(0, 1) == 0) rig.spoiled.spoil = {};
+  }
+  rig.spoiled.spoil = {};
+  rig.spoiled.write_says = Fault::none;
+  rig.clock.solver_takes = Duration{0};
+  ticks_of(500);
+  // All planned faults are over after six seconds at most; the device may have to be opened again.
+  for (int i = 0; i < 9000 && rig.broken().empty() && rig.state() != State::disarmed; ++i) {
+    if (i % 500 == 0) rig.loop.ask(kAcknowledge);
+    rig.loop.ask(kDisarm);
+    rig.tick();
+    if (!rig.found(Fault::device_lost)) continue;
+    try {
+      rig.spoiled.open();
+    } catch (const std::runtime_error&) {
+    }
+  }
+  outcome.broken = rig.broken();
+  if (outcome.broken.empty() && rig.state() != State::disarmed)
+    outcome.broken = std::string("does not come back: ") + name(rig.state());
+  outcome.ticks = rig.last().tick + 1;
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Random schedules of faults, each tick held against the invariants.");
+  long schedules = 1000;
+  std::uint64_t seed = 1;
+  app.add_option("--schedules", schedules)->check(CLI::PositiveNumber);
+  app.add_option("--seed", seed);
+  CLI11_PARSE(app, argc, argv);
+  std::uint64_t ticks = 0;
+  long violations = 0;
+  for (long i = 0; i < schedules; ++i) {
+    const std::uint64_t one = seed * 1'000'003 + static_cast<std::uint64_t>(i);
+    const Outcome outcome = run(one);
+    ticks += outcome.ticks;
+    if (outcome.broken.empty()) continue;
+    if (++violations <= 20)
+      std::printf("schedule %llu: %s\n", static_cast<unsigned long long>(one), outcome.broken.c_str());
+  }
+  std::printf("faults schedules %ld ticks %llu violations %ld seed %llu\n", schedules,
+              static_cast<unsigned long long>(ticks), violations, static_cast<unsigned long long>(seed));
+  return violations == 0 ? 0 : 1;
+}

@@ -1,0 +1,402 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <sched.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "config/load_profile.hpp"
+#include "devices/simulated_device.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+// A device outlives the daemon that drives it. Here the device is emulated in this process and the real
+// daemon is another one, so that it can be killed, crashed and stopped at any instant while the hand presses
+// against the table. Each time the force on the handle must end when the firmware's watchdog says so, nobody
+// may speak for the dead, a stopped daemon must not kick when it goes on, and one that is started again must
+// be disarmed.
+//
+// Times are those of the emulated device, which knows of the daemon what hardware would: commands, or
+// silence.
+
+namespace {
+
+using namespace wrenchd;
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+TimePoint wall_now() {
+  return std::chrono::steady_clock::now();
+}
+double milliseconds(Duration d) {
+  return 1e3 * seconds(d);
+}
+
+constexpr double kPath_s = 0.9;
+
+/// Down to the table, 8 mm deep, and up again, every 0.9 s; at rest above it for long enough to arm.
+SimulationSettings pressing_hand() {
+  const Vector3d above(0.0, 0.0, 0.065), pressed(0.0, 0.0, 0.017);
+  const Vector3d none = Vector3d::Zero();
+  SimulationSettings hand;
+  hand.hand_path = {{0.0, above, none},
+                    {0.3, above, none},
+                    {0.5, pressed, none},
+                    {0.7, pressed, none},
+                    {kPath_s, above, none}};
+  hand.report_delay_s = hand.command_delay_s = 0.0;  // the socket has its own
+  return hand;
+}
+
+/// The emulated device at its end of a socket: its life goes on whatever is at the other.
+class FarSide final : private ReportSink {
+ public:
+  explicit FarSide(const DeviceProfile& profile)
+      : step_(from_seconds(1.0 / (16.0 * profile.report_rate_Hz))), device_(profile, pressing_hand()) {
+    device_.advance_to(wall_now(), *this);
+  }
+  ~FarSide() { hang_up(); }
+  FarSide(const FarSide&) = delete;
+  FarSide& operator=(const FarSide&) = delete;
+
+  /// Returns the other end, for the daemon.
+  int plug() {
+    hang_up();
+    std::array<int, 2> ends{};
+    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0)
+      throw std::system_error(errno, std::generic_category(), "socketpair");
+    socket_ = ends[0];
+    heard_ = 0;
+    pushed_ = false;
+    plugged_ = device_.now();
+    return ends[1];
+  }
+
+  /// Lets the time until now pass and takes what the daemon said meanwhile.
+  void live() {
+    for (const TimePoint now = wall_now(); device_.now() + step_ <= now;) {
+      device_.advance_to(device_.now() + step_, *this);
+      if (push_N() == 0.0) continue;
+      pushed_ = pushed_ || device_.now() > plugged_ + kForgotten;
+      last_push_ = device_.now();
+      if (push_N() > strong_N_) strong_for_ += step_;
+    }
+    std::array<std::uint8_t, kMaxReportBytes> bytes;
+    for (ssize_t n; (n = recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0;) {
+      ++heard_;
+      if (!device_.take_command(device_.now(), std::span(bytes).first(static_cast<std::size_t>(n)))) continue;
+      last_command_ = device_.now();
+    }
+  }
+
+  void count_above(double strong_N) {
+    strong_N_ = strong_N;
+    strong_for_ = {};
+  }
+  double push_N() const { return device_.motor_wrench().force_N.norm(); }
+  TimePoint now() const { return device_.now(); }
+  TimePoint last_command() const { return last_command_; }
+  TimePoint last_push() const { return last_push_; }
+  Duration strong_for() const { return strong_for_; }  ///< since count_above()
+  long heard() const { return heard_; }                ///< commands since plug(), good or not
+  /// There was force since plug(), and not what the one before had left to the watchdog.
+  bool pushed() const { return pushed_; }
+
+ private:
+  /// What finds no room is lost, as in any device.
+  void take_report(TimePoint, std::span<const std::uint8_t> report) noexcept override {
+    if (socket_ >= 0) send(socket_, report.data(), report.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  }
+  void hang_up() {
+    if (socket_ >= 0) ::close(socket_);
+    socket_ = -1;
+  }
+
+  static constexpr Duration kForgotten = std::chrono::milliseconds(50);
+
+  Duration step_;
+  SimulatedDevice device_;
+  int socket_ = -1;
+  TimePoint last_command_{}, last_push_{};
+  double strong_N_ = 0.0;
+  Duration strong_for_{};
+  long heard_ = 0;
+  TimePoint plugged_{};
+  bool pushed_ = false;
+};
+
+/// The real daemon as a child; killed when it goes out of scope.
+class Daemon {
+ public:
+  Daemon(const std::string& program, std::vector<std::string> arguments, int socket, const fs::path& log) {
+    constexpr int kSocket = 3;
+    arguments.insert(arguments.begin(), {program, "--link-fd", std::to_string(kSocket)});
+    std::vector<char*> argv;
+    for (std::string& word : arguments) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, socket, kSocket);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                     0600);
+    posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+    const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    ::close(socket);
+    if (error != 0) throw std::system_error(error, std::generic_category(), program);
+  }
+  ~Daemon() { end(); }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  void signal(int number) const { kill(pid_, number); }
+  void end() {
+    if (over_) return;
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+    over_ = true;
+  }
+  /// Looks, and does not wait.
+  void look() {
+    int status = 0;
+    if (over_ || waitpid(pid_, &status, WNOHANG | WUNTRACED) != pid_) return;
+    stopped_ = WIFSTOPPED(status);
+    over_ = !stopped_;
+    exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  bool over() const { return over_; }
+  bool stopped() const { return stopped_; }
+  int exit_code() const { return exit_code_; }  ///< -1: ended by a signal
+
+ private:
+  pid_t pid_ = -1;
+  bool over_ = false, stopped_ = false;
+  int exit_code_ = -1;
+};
+
+struct Figures {
+  double worst_ms = 0.0;         ///< from the last command taken to the last moment of force
+  double after_signal_ms = 0.0;  ///< from the signal to the last moment of force
+  double resume_ms = 0.0;        ///< of strong force after a stopped daemon went on
+  long faults = 0;               ///< of a daemon that was not killed yet, and was started again
+  long violations = 0;
+};
+
+class Proof {
+ public:
+  Proof(std::string program, std::string profile, std::uint64_t seed)
+      : program_(std::move(program)),
+        profile_file_(std::move(profile)),
+        profile_(load_profile_named(profile_file_, SearchPath({WRENCHD_SOURCE_DIR "/config"}))),
+        random_(seed) {
+    if (!(profile_.watchdog_s > 0.0))
+      throw std::runtime_error("profile " + profile_.name +
+                               " has no watchdog, and nothing to prove; take another");
+    // All but the soft start is as shipped: that would only make the proof slower.
+    config_ = files_.write("wrenchd.toml", "[limits]\nsoft_start_s = 0.25\n");
+    bound_ = from_seconds(profile_.watchdog_s + 1.0 / profile_.report_rate_Hz);
+  }
+
+  void kill_once(long number) {
+    number_ = number;
+    signal_ = std::array{SIGKILL, SIGSEGV, SIGSTOP}[random_() % 3];
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      FarSide device(profile_);
+      Daemon daemon = start(device, {"--arm"});
+      if (press(device, daemon)) return kill_pressing(device, daemon);
+      if (daemon.over() && daemon.exit_code() != kExitFault)
+        return violation("the daemon ended by itself with code " + std::to_string(daemon.exit_code()));
+      ++figures_.faults;
+    }
+    violation("the hand never felt the table");
+  }
+
+  const Figures& figures() const { return figures_; }
+  Duration bound() const { return bound_; }
+
+ private:
+  static constexpr auto kLook = 100us;
+  static constexpr double kPressing_N = 0.3;
+  static constexpr int kAttempts = 10;
+  static constexpr int kExitFault = 3;  ///< of the daemon
+
+  void violation(const std::string& what) {
+    ++figures_.violations;
+    std::fprintf(stderr, "kill %ld (signal %d): %s\n", number_, signal_, what.c_str());
+  }
+
+  Daemon start(FarSide& device, std::vector<std::string> more) {
+    more.insert(more.begin(), {"--config", config_, "--profile", profile_file_, "--realtime", "best_effort"});
+    return {program_, std::move(more), device.plug(), files_.path() / "log"};
+  }
+
+  /// False where it did not come to be in time.
+  template <class Condition>
+  bool until(FarSide& device, Daemon& daemon, Duration most, Condition condition) {
+    for (const TimePoint end = wall_now() + most; !condition();) {
+      if (wall_now() >= end) return false;
+      std::this_thread::sleep_for(kLook);
+      device.live();
+      daemon.look();
+    }
+    return true;
+  }
+
+  /// Lives on to a random instant at which the motors push against the hand. False where none came. This
+  /// process may itself have been kept from running, and then the daemon rightly took its silence for a
+  /// fault.
+  bool press(FarSide& device, Daemon& daemon) {
+    const auto pushes = [&] { return daemon.over() || device.push_N() > kPressing_N; };
+    for (const TimePoint end = wall_now() + 20s; wall_now() < end && !daemon.over();) {
+      if (!until(device, daemon, 20s, pushes)) return false;
+      const TimePoint then = wall_now() + std::chrono::microseconds(random_() % 250'000);
+      until(device, daemon, 1s, [&] { return daemon.over() || wall_now() >= then; });
+      if (!daemon.over() && pushes()) return true;
+    }
+    return false;
+  }
+
+  void kill_pressing(FarSide& device, Daemon& daemon) {
+    const TimePoint signalled = device.now();
+    daemon.signal(signal_);
+    if (!until(device, daemon, 5s, [&] { return daemon.over() || daemon.stopped(); }))
+      return violation("the daemon does not end");
+    device.live();  // what it said before
+    expect_silence(device, signalled);
+    if (daemon.stopped()) resume(device, daemon);
+    daemon.end();
+    restart(device);
+  }
+
+  void expect_silence(FarSide& device, TimePoint signalled) {
+    const long heard = device.heard();
+    for (const TimePoint end = device.now() + bound_ + 50ms; device.now() < end;) {
+      std::this_thread::sleep_for(kLook);
+      device.live();
+    }
+    if (device.heard() != heard) violation("something speaks for the dead");
+    if (device.push_N() != 0.0) violation("the motors push on");
+    const Duration held = device.last_push() - device.last_command();
+    if (held > bound_)
+      violation("force for " + std::to_string(milliseconds(held)) + " ms after the last command, more than " +
+                std::to_string(milliseconds(bound_)));
+    figures_.worst_ms = std::max(figures_.worst_ms, milliseconds(held));
+    figures_.after_signal_ms =
+        std::max(figures_.after_signal_ms, milliseconds(device.last_push() - signalled));
+  }
+
+  /// It may still send the command it was about to send, and has to see at the next tick what happened.
+  void resume(FarSide& device, Daemon& daemon) {
+    device.count_above(0.1 * profile_.max_force_N);
+    daemon.signal(SIGCONT);
+    for (const TimePoint end = device.now() + 100ms; device.now() < end;) {
+      std::this_thread::sleep_for(kLook);
+      device.live();
+    }
+    figures_.resume_ms = std::max(figures_.resume_ms, milliseconds(device.strong_for()));
+    if (device.strong_for() > bound_) violation("a stopped daemon kicks when it goes on");
+  }
+
+  void restart(FarSide& device) {
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      Daemon daemon = start(device, {});
+      const bool speaks = until(device, daemon, 20s, [&] { return daemon.over() || device.heard() > 0; });
+      // Through all that the hand does: one that were armed would find it calm.
+      const TimePoint end = device.now() + from_seconds(kPath_s);
+      until(device, daemon, 5s, [&] { return daemon.over() || device.now() > end; });
+      const bool disarmed = !device.pushed();
+      if (!disarmed) violation("the restarted daemon is not disarmed");
+      if (daemon.over() && daemon.exit_code() == kExitFault) {
+        ++figures_.faults;
+        continue;
+      }
+      if (!speaks || daemon.over())
+        return violation("the restarted daemon does not speak, or ends by itself");
+      daemon.signal(SIGTERM);
+      if (!until(device, daemon, 5s, [&] { return daemon.over(); }))
+        return violation("the restarted daemon does not stop when asked");
+      if (daemon.exit_code() != 0)
+        violation("the restarted daemon ends with code " + std::to_string(daemon.exit_code()));
+      if (disarmed && device.pushed()) violation("the restarted daemon pushes as it ends");
+      return;
+    }
+    violation("the restarted daemon finds its device faulty again and again");
+  }
+
+  test::TemporaryDirectory files_;
+  std::string program_, profile_file_;
+  DeviceProfile profile_;
+  std::mt19937_64 random_;
+  std::string config_;
+  Duration bound_{};
+  Figures figures_;
+  long number_ = 0;
+  int signal_ = 0;
+};
+
+/// A device does not wait for other programs. Where this is refused its silences cost attempts, and nothing
+/// else.
+void ask_for_realtime() {
+  const sched_param priority{48};  // above the daemon's 45
+  sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &priority);
+}
+
+std::string beside_this_program(const char* name) {
+  return (fs::read_symlink("/proc/self/exe").parent_path() / name).string();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "prove_kill: is the hand free in time when the daemon is killed, crashes or is stopped? The device "
+      "lives on in\n"
+      "this process.");
+  long kills = 10;
+  std::uint64_t seed = 1;
+  std::string profile = "loopback";
+  std::string program = beside_this_program("wrenchd");
+  app.add_option("--kills", kills, "how many")->check(CLI::Range(1L, 100000000L))->capture_default_str();
+  app.add_option("--seed", seed, "of the instants and the signals")->capture_default_str();
+  app.add_option("--profile", profile, "of the emulated device: one that sends whole poses")
+      ->capture_default_str();
+  app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  const rlimit no_core{0, 0};  // crashing on purpose
+  setrlimit(RLIMIT_CORE, &no_core);
+  ask_for_realtime();
+  try {
+    const TimePoint start = wall_now();
+    Proof proof(program, profile, seed);
+    for (long n = 1; n <= kills; ++n) proof.kill_once(n);
+    const Figures& f = proof.figures();
+    std::printf(
+        "kill kills %ld worst_ms %.3f bound_ms %.3f after_signal_ms %.3f resume_ms %.3f faults %ld "
+        "violations %ld seed "
+        "%llu seconds %.1f\n",
+        kills, f.worst_ms, milliseconds(proof.bound()), f.after_signal_ms, f.resume_ms, f.faults,
+        f.violations, static_cast<unsigned long long>(seed), seconds(wall_now() - start));
+    return f.violations == 0 ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "prove_kill: %s\n", error.what());
+    return 1;
+  }
+}
