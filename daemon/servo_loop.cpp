@@ -237,7 +237,7 @@ void ServoLoop::test(const DeviceSample& sample, TimePoint now) noexcept {
 /// walls while the proxy stayed behind, so arming starts over.
 void ServoLoop::obey(CommandSet commands, TimePoint now) noexcept {
   if ((commands & kStop) != 0) found(Fault::stop_asked, now);
-  if ((commands & kAcknowledge) != 0) machine_.on(Trigger::acknowledge);
+  if ((commands & kAcknowledge) != 0 && (commands & kStop) == 0) machine_.on(Trigger::acknowledge);
   if ((commands & kQuit) != 0) machine_.on(Trigger::quit);
   if ((commands & kDisarm) != 0) machine_.on(Trigger::disarm);
   if ((commands & kStartOver) != 0) lose_place();

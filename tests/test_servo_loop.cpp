@@ -462,6 +462,16 @@ TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
   CHECK(placing(s) == Placing::following);
 }
 
+TEST_CASE("who stops, acknowledges and arms in one breath has stopped", "[servo]") {
+  VirtualStation s;
+  s.station.loop().arm();
+  REQUIRE(s.run(kPressing_s) == Fault::none);
+  s.station.loop().ask(kStop | kAcknowledge | kArm);
+  CHECK(s.tick() == Fault::stop_asked);
+  CHECK(s.state() == State::stopped);
+  CHECK(s.force_N() == 0.0);
+}
+
 TEST_CASE("release may be called at any time, and again", "[servo]") {
   VirtualStation s;
   s.station.loop().release(s.clock.now());

@@ -11,6 +11,7 @@
 
 #include "config/calibration_store.hpp"
 #include "config/known_profiles.hpp"
+#include "core/transitions.hpp"
 #include "devices/report_codec.hpp"
 #include "tests/fuzz/fuzz_config.hpp"
 #include "tests/fuzz/fuzz_mesh.hpp"
@@ -205,7 +206,22 @@ Seeds mesh_seeds() {
   return seeds;
 }
 
+/// A self-test that passes, an arming, a calm hand, and a while at full force.
+Seeds event_seeds() {
+  constexpr int kArmed = 60, kTicks = 400;
+  std::string run;
+  for (int tick = 0; tick < kTicks; ++tick) {
+    run += static_cast<char>(tick == kArmed ? 0x30 : 0x20);
+    run += static_cast<char>(tick >= 24 && tick < 40 ? 0x04 : 0x02);
+    if (tick == kArmed) run += static_cast<char>(Trigger::arm);
+  }
+  Seeds seeds;
+  seeds.inputs.push_back(run);
+  return seeds;
+}
+
 Seeds seeds_of(const std::string& target) {
+  if (target == "fuzz_events") return event_seeds();
   if (target == "fuzz_config") return config_seeds();
   if (target == "fuzz_report") return report_seeds();
   if (target == "fuzz_report_descriptor") return descriptor_seeds();
