@@ -93,6 +93,12 @@ TEST_CASE("a quad that is not flat is cut into triangles") {
   CHECK(report.volume > 30);
 }
 
+TEST_CASE("a face of five corners that crosses itself cannot be cut, and is told") {
+  const PolygonSoup star{{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {3, 1, 0}, {1, 1, 3}},
+                         {{0, 2, 1, 3, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}}};
+  check_defect_with(star, {"face 0", "cannot be cut into triangles"});
+}
+
 TEST_CASE("vertices that no face uses do not count") {
   PolygonSoup soup = kBox;
   soup.vertices.insert(soup.vertices.begin(), Vector3d(1000, 0, 0));
