@@ -141,9 +141,12 @@ void SimulatedDevice::spoil(PoseReport& report) noexcept {
     const double way_m = value(*f, kRunAway_m_per_s) * seconds(now_ - faults_.start_of(*f));
     p_m.x() += kTeleport_m - std::abs(std::fmod(way_m, 2.0 * kTeleport_m) - kTeleport_m);
   }
-  if (const SimulatedFault* f = faults_.at(Kind::shake, now_))
-    p_m.z() += value(*f, kShake_m) *
-               std::sin(2.0 * std::numbers::pi * kShake_Hz * seconds(now_ - faults_.start_of(*f)));
+  if (const SimulatedFault* f = faults_.at(Kind::shake, now_)) {
+    const double swing_m = value(*f, kShake_m), w_per_s = 2.0 * std::numbers::pi * kShake_Hz;
+    const double phase = w_per_s * seconds(now_ - faults_.start_of(*f));
+    p_m.z() += swing_m * std::sin(phase);
+    report.V_BH.linear_m_per_s.z() += swing_m * w_per_s * std::cos(phase);
+  }
   if (const SimulatedFault* f = faults_.at(Kind::press, now_))
     report.buttons |= std::uint32_t{1} << (static_cast<unsigned>(f->value) & 31U);
   if (!shows(Kind::stick, now_, now_)) moving_ = report.X_BH;
