@@ -23,7 +23,7 @@ std::string why_not_by_device(const UsbDevice& device, const WantedDevice& wante
     return "the configuration wants serial number " + wanted.serial + ", it has " + serial_text(device);
   if (wanted.before && !device.same_device(*wanted.before))
     return "it is not the device that was unplugged, " + describe(*wanted.before) +
-           "; plug that one in again, or start wrenchd anew to use this one";
+           "; plug that one in again, or start wrenchd anew to use this one (wrong_device)";
   return {};
 }
 
