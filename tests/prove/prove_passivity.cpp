@@ -56,7 +56,8 @@ struct Options {
   double times_bound = 0.0;  ///< 0: a random share of it, half to all
   bool guarded = false;
   bool pid = false;
-  double angular_share = 1.0;  ///< of pid: angular stiffness, in that of the metric
+  std::vector<double> friction;  ///< of the device, viscous [N.s/m, N.m.s/rad]; empty: as it is shipped
+  double angular_share = 1.0;    ///< of pid: angular stiffness, in that of the metric
 };
 
 /// Everything that a trajectory draws but for the hand's way.
@@ -86,6 +87,10 @@ Circumstances draw(RandomValues& random, const Options& options) {
   if (options.times_bound > 0.0) c.share = options.times_bound;
   c.post = random.chance(0.5);
   if (random.chance(0.5)) c.X_HT = {random.rotation(), random.uniform(0.0, 0.03) * random.unit<3>()};
+  if (!options.friction.empty()) {
+    c.hand.viscous_friction_N_s_per_m = options.friction[0];
+    c.hand.viscous_friction_Nm_s_per_rad = options.friction[1];
+  }
   c.hand.hand_stiffness_N_per_m = random.decades(30.0, 800.0);
   c.hand.hand_damping_N_s_per_m = random.decades(0.3, 8.0);
   c.hand.hand_stiffness_Nm_per_rad = random.decades(0.1, 3.0);
@@ -427,6 +432,11 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--guard", options.guarded, "with the passivity guard");
   app.add_flag("--pid", options.pid, "the law of Eq. (16), not the energy law");
+  app.add_option("--friction", options.friction,
+                 "of the device, viscous: N.s/m and N.m.s/rad; without it that of the simulated device as it "
+                 "is shipped")
+      ->expected(2)
+      ->check(CLI::Range(0.01, 100.0) | CLI::Range(0.0001, 1.0));
   app.add_option("--angular-share", options.angular_share,
                  "with --pid: angular stiffness, in the one that the tool's inertia gives")
       ->check(CLI::Range(0.0, 100.0))
