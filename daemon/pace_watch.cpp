@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "core/watch_limits.hpp"
-
 namespace wrenchd {
 
 FaultSet PaceWatch::look(TimePoint now, Duration slept) noexcept {
@@ -20,6 +18,7 @@ FaultSet PaceWatch::look(TimePoint now, Duration slept) noexcept {
     found |= bit(Fault::loop_stopped);
   else if (late_ > kLateTick)
     found |= bit(Fault::tick_late);
+  if (late_ > kLateTick) late_at_ = now;
   if (woke) found |= bit(Fault::suspended);
   return found;
 }

@@ -5,13 +5,14 @@
 
 #include "core/clock.hpp"
 #include "core/fault.hpp"
+#include "core/watch_limits.hpp"
 
 namespace wrenchd {
 
 /// Looks at the times of the ticks: late, stopped, back, and a machine that slept in between. RT safe.
 class PaceWatch {
  public:
-  /// stopped_after: how late a tick has to be to be no late one any more.
+  /// stopped_after: how late a tick has to be to be a loop that stood still, and not a late one any more.
   PaceWatch(Duration period, Duration stopped_after) noexcept
       : period_(period), stopped_after_(stopped_after) {}
 
@@ -23,11 +24,14 @@ class PaceWatch {
   double dt_s() const noexcept { return dt_s_; }
   /// How late this tick is; nothing where it is not.
   Duration late() const noexcept { return late_; }
+  /// Did a tick come late so short a time ago that old reports are nobody's fault but ours?
+  bool was_late(TimePoint now) const noexcept { return late_at_ && now - *late_at_ <= kStaleSample; }
 
  private:
   Duration period_;
   Duration stopped_after_;
   std::optional<TimePoint> last_;
+  std::optional<TimePoint> late_at_;  ///< the last late one
   Duration slept_{};
   double dt_s_ = 0.0;
   Duration late_{};

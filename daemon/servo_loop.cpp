@@ -28,11 +28,6 @@ constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
 
 /// A proxy that found no admissible pose may find one in the next tick, from a little farther on.
 constexpr int kFailures = 3;
-/// Of the device's reports: how long a command may take where nothing says when it arrived.
-constexpr double kAssumedPeriods = 2.0;
-/// An oscillation costs half of the stiffness; the third is none of the stiffness's.
-constexpr double kCalmer = 0.5;
-constexpr int kOscillations = 3;
 
 constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
@@ -63,7 +58,6 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       driven_(driven_dofs(profile)),
       pacing_(settings.servo.pacing),
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
-      realtime_(settings.servo.realtime == Realtime::required),
       penetration_(scene,
                    {settings.rendering.method, settings.rendering.planes, 0.0, settings.rendering.friction}),
       moves_(scene.moves()),
@@ -74,11 +68,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       gravity_(profile.masses, X_WB_.rotation),
       limits_(settings.limits, profile),
       heat_(profile, limits_.max_force_N(), limits_.max_torque_Nm()),
-      stability_(settings, profile, M_, X_HT_),
-      measured_(kAssumedPeriods /
-                (profile.report_rate_Hz > 0.0 ? profile.report_rate_Hz : settings.servo.rate_Hz)),
-      guard_(stability_.guard(measured_)),
-      acknowledges_(profile.pose_report.acknowledged.present),
+      steady_(settings, profile, M_, X_HT_),
       watches_(settings, profile, limits_.max_force_N(), limits_.max_torque_Nm()),
       self_test_(profile, settings.servo.self_test_s),
       machine_(settings.limits.soft_start_s) {
@@ -98,7 +88,7 @@ Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
 Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   begin(now, due);
 
-  DeviceSample sample = device_.read_newest(now);  // the pose the hand gives
+  const DeviceSample sample = device_.read_newest(now);  // the pose the hand gives
   record_sample(sample);
   lap(Stage::read);
 
@@ -120,7 +110,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
 
   send(now, out);
   heat_.advance(out.F, dt_s_);
-  measure(sample, now);
+  steady_.measure(sample, record_.commanded, now);
   lap(Stage::write);
   if ((found_ & bit(Fault::device_lost)) != 0) {
     let_go(now);
@@ -197,16 +187,8 @@ void ServoLoop::begin(TimePoint now, TimePoint due) noexcept {
   dt_s_ = watches_.pace.dt_s();
 }
 
-/// What is wrong, then what was asked for, so that nobody can arm what is not in order. A loop that was late
-/// finds old reports in the queue, and the newest were dropped at its end: that is no silence of the
-/// device's.
-void ServoLoop::look(DeviceSample& sample, TimePoint now) noexcept {
-  if ((found_ & (bit(Fault::tick_late) | bit(Fault::loop_stopped))) != 0) {
-    late_at_ = now;
-    was_late_ = true;
-  }
-  if (was_late_ && now - late_at_ > kStaleSample) was_late_ = false;
-  if (was_late_ && sample.fault == Fault::sample_stale) sample.fault = Fault::sample_late;
+/// What is wrong, then what was asked for, so that nobody can arm what is not in order.
+void ServoLoop::look(const DeviceSample& sample, TimePoint now) noexcept {
   const bool there = sample.fault != Fault::device_lost;
   if (there && transition(Trigger::device_there, machine_.state()).leads) machine_.on(Trigger::device_there);
   if ((record_.commands & kBeat) != 0) watches_.client.beat(now);
@@ -223,7 +205,7 @@ void ServoLoop::test(const DeviceSample& sample, TimePoint now) noexcept {
   if (!testing_) return;
   if (begins) {
     self_test_.begin(now);
-    measured_.reset();
+    steady_.begin_measuring();
   }
   found(self_test_.look(sample, found_, now), now, self_test_.report_rate_Hz());
   if (self_test_.passed()) {
@@ -255,12 +237,9 @@ void ServoLoop::found(FaultSet faults, TimePoint now, double value) noexcept {
   for (; faults != 0; faults &= faults - 1) found(static_cast<Fault>(std::countr_zero(faults)), now, value);
 }
 
-/// Without real-time priority a loop that stands still for a moment is nothing to look at: it comes back as
-/// from a late tick.
 void ServoLoop::found(Fault fault, TimePoint now, double value) noexcept {
   if (fault == Fault::none) return;
-  const bool changed =
-      fault == Fault::loop_stopped && !realtime_ ? machine_.on(Fault::tick_late) : machine_.on(fault);
+  const bool changed = machine_.on(fault);
   if (changed) changed_by_ = fault;
   if (changed || (found_before_ & bit(fault)) == 0)
     say(Event::Kind::fault, now, static_cast<std::uint32_t>(fault), value);
@@ -324,8 +303,9 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const bool in_contact = depth_.contacts > 0;
   F_T_ = spring_ == SpringLaw::pid
              ? law_.update(depth_.drive, in_contact, dt_s)
-             : law_.update_damping(energy_wrench(M_, share_.spring * energy_stiffness_per_s2_, X_WP_, X_WQ_),
-                                   depth_.drive, in_contact, dt_s);
+             : law_.update_damping(
+                   energy_wrench(M_, steady_.share().spring * energy_stiffness_per_s2_, X_WP_, X_WQ_),
+                   depth_.drive, in_contact, dt_s);
   const Wrench F = outgoing(X_WB_ * sample.X_BH), F_weight = gravity_.wrench(sample.X_BH);
   dropped_ = static_cast<DofMask>(components(F + F_weight) & ~driven_);
   F_out_ = along(F, driven_);
@@ -357,17 +337,18 @@ void ServoLoop::check_answer(const DeviceSample& sample, TimePoint now) noexcept
 /// Line 8, before it goes out: what the hand may feel of the wrench now, with the handle's weight held. The
 /// weight is no push, so it does not make the hand wait for calm.
 Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
-  const State before = machine_.state();
-  record_.authority = machine_.advance(calm(sample), dt_s_);
-  if (before == State::ramping && machine_.state() == State::active) guard_.lend(wound_up_J());
-  const Wrench F = steadied(sample, now);
+  machine_.advance(calm(sample), dt_s_);
+  const Wrench F =
+      steady_.steadied(F_out_, sample, {machine_.state(), good_, depth_.contacts > 0, wound_up_J()});
+  found(steady_.found(), now);  // which may end the force in this very tick
+  record_.authority = machine_.authority();
   limits_.set_ceiling(heat_.force_ceiling_N(), heat_.torque_ceiling_Nm());
   if (is_finite(sample.X_BH) && is_finite(sample.V_BH)) {
     hand_m_ = sample.X_BH.translation_m;
     V_hand_ = sample.V_BH;
   }
   Limited out = limits_.apply({F + F_weight_, record_.authority, dt_s_, V_hand_, hand_m_});
-  if (guarding_ && guard_.acted()) out.causes |= kPassivity;
+  if (steady_.acted()) out.causes |= kPassivity;
   if (heat_.folded_back()) found(Fault::overheated, now);
   if ((out.causes & kNotFinite) != 0) {
     found(Fault::wrench_not_finite, now);
@@ -387,48 +368,10 @@ bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
 
 /// The stiffness that stays passive with the rate and the delay that were measured just now.
 void ServoLoop::settle_stiffness(TimePoint now) noexcept {
-  share_ = stability_.settle(measured_);
-  guard_ = stability_.guard(measured_);
-  law_.scale(share_.spring, share_.damper);
-  if (!share_.bounded) say(Event::Kind::unbounded, now);
-  if (share_.spring < 1.0 || share_.damper < 1.0) say(Event::Kind::stiffness, now, 0, share_.spring);
-}
-
-void ServoLoop::measure(const DeviceSample& sample, TimePoint now) noexcept {
-  measured_.tick({now, sample.arrived, sample.device_time_s, sample.sequence, sample.fresh, acknowledges_,
-                  sample.acknowledged, record_.commanded});
-}
-
-/// What of the contact's wrench keeps it steady: less of it where it buzzes, and what the passivity guard
-/// leaves. The weight is none of its business, which gives what a hand that lifts it needs. While the force
-/// rises the wall is wound up around a hand that may be in it, so the guard begins when it has risen.
-Wrench ServoLoop::steadied(const DeviceSample& sample, TimePoint now) noexcept {
-  const Wrench asked = calming_ * F_out_;
-  const State state = machine_.state();
-  if (!is_driving(state) || state == State::ramping || wrench_point_ != WrenchPoint::handle) {
-    guard_.reset();
-    guarding_ = false;
-    if (state == State::waiting) {
-      oscillation_.restart();
-      oscillations_ = 0;
-      calming_ = 1.0;
-    }
-    return asked;
-  }
-  if (!good_) return guard_.guard(asked, sample.X_BH, 0.0, depth_.contacts > 0);
-  const double dt_s = guarding_ ? sample.device_time_s - guarded_at_s_ : 0.0;
-  guarding_ = true;
-  guarded_at_s_ = sample.device_time_s;
-  oscillation_.update(asked, sample.V_BH, dt_s, depth_.contacts > 0);
-  if (oscillation_.oscillates()) {
-    ++oscillations_;
-    calming_ *= kCalmer;
-    oscillation_.restart();
-    found(oscillations_ < kOscillations ? Fault::oscillating : Fault::still_oscillates, now);
-  }
-  const Wrench left = guard_.guard(asked, sample.X_BH, dt_s, depth_.contacts > 0);
-  if (guard_.out_of_hand()) found(Fault::energy_made, now);
-  return left;
+  const auto [spring, damper, bounded] = steady_.settle();
+  law_.scale(spring, damper);
+  if (!bounded) say(Event::Kind::unbounded, now);
+  if (spring < 1.0 || damper < 1.0) say(Event::Kind::stiffness, now, 0, spring);
 }
 
 /// What the spring holds now: half of force times way, and of torque times turn [J].
@@ -457,7 +400,7 @@ void ServoLoop::hand_over(TimePoint now, const Wrench& F, bool motors_on) noexce
   record_.motors_told = motors_on ? 1 : 0;
   record_.write_fault = static_cast<std::uint8_t>(device_.write(now, F, motors_on));
   const Wrench of_contact = F - record_.authority * F_weight_;
-  guard_.told(motors_on ? of_contact : Wrench{});
+  steady_.told(motors_on ? of_contact : Wrench{});
 }
 
 /// The tick's record goes to whoever looks, its times into the histograms, its news to the log.
@@ -490,11 +433,11 @@ void ServoLoop::describe(const Limited& out) noexcept {
   record_.state = static_cast<std::uint8_t>(machine_.state());
   record_.cause = static_cast<std::uint8_t>(machine_.cause());
   record_.faults = found_;
-  record_.stiffness_share = calming_ * share_.spring;
-  record_.guard_share = guard_.share();
-  record_.energy_in_J = guard_.energy_in_J();
-  record_.energy_out_J = guard_.energy_out_J();
-  record_.injected_J = guard_.injected_J();
+  record_.stiffness_share = steady_.stiffness_share();
+  record_.guard_share = steady_.guard().share();
+  record_.energy_in_J = steady_.guard().energy_in_J();
+  record_.energy_out_J = steady_.guard().energy_out_J();
+  record_.injected_J = steady_.guard().injected_J();
   record_.limit_causes = out.causes;
   record_.dropped = dropped_;
   record_.F_out = numbers(out.F.force_N, out.F.torque_Nm);

@@ -14,7 +14,6 @@
 #include "core/gravity_compensation.hpp"
 #include "core/latest_value.hpp"
 #include "core/limits.hpp"
-#include "core/oscillation.hpp"
 #include "core/state_machine.hpp"
 #include "core/thermal.hpp"
 #include "core/wrench_law.hpp"
@@ -22,7 +21,7 @@
 #include "daemon/loop_timing.hpp"
 #include "daemon/placer.hpp"
 #include "daemon/self_test.hpp"
-#include "daemon/stability.hpp"
+#include "daemon/steady_contact.hpp"
 #include "daemon/tick_record.hpp"
 #include "daemon/watches.hpp"
 #include "devices/device.hpp"
@@ -90,15 +89,13 @@ class ServoLoop {
 
  private:
   void begin(TimePoint now, TimePoint due) noexcept;
-  void look(DeviceSample& sample, TimePoint now) noexcept;
+  void look(const DeviceSample& sample, TimePoint now) noexcept;
   void obey(CommandSet commands, TimePoint now) noexcept;
   void project(const DeviceSample& sample) noexcept;
   void place() noexcept;
   void compute_wrench(const DeviceSample& sample) noexcept;
   void check_answer(const DeviceSample& sample, TimePoint now) noexcept;
   void settle_stiffness(TimePoint now) noexcept;
-  void measure(const DeviceSample& sample, TimePoint now) noexcept;
-  Wrench steadied(const DeviceSample& sample, TimePoint now) noexcept;
   double wound_up_J() const noexcept;
   Limited limit(const DeviceSample& sample, TimePoint now) noexcept;
   void send(TimePoint now, Limited& out) noexcept;
@@ -133,7 +130,6 @@ class ServoLoop {
   DofMask driven_;
   Pacing pacing_;
   Duration period_;
-  bool realtime_;  ///< is required, so a loop that stood still is one to look at
 
   // The state of the rendering
   PenetrationDepth penetration_;
@@ -146,17 +142,7 @@ class ServoLoop {
   WrenchLimits limits_;
   ThermalModel heat_;
 
-  // What keeps the contact steady
-  Stability stability_;
-  LoopMeasurement measured_;
-  PassivityGuard guard_;
-  OscillationDetector oscillation_;
-  StiffnessShare share_;       ///< that the device bears
-  double calming_ = 1.0;       ///< what oscillations have left of it
-  int oscillations_ = 0;       ///< since it was armed
-  double guarded_at_s_ = 0.0;  ///< device time of the guard's last sample
-  bool guarding_ = false;      ///< the guard has one
-  bool acknowledges_;          ///< the device says which commands it took
+  SteadyContact steady_;
   Placing placing_ = Placing::seeking;
   Pose X_WQ_;  ///< last tick's projection, the proxy; means nothing unless has_place()
   Pose X_WP_;
@@ -180,8 +166,6 @@ class ServoLoop {
   Watches watches_;
   SelfTest self_test_;
   bool testing_ = false;
-  TimePoint late_at_{};  ///< when a tick came late
-  bool was_late_ = false;
   StateMachine machine_;
   FaultSet found_ = 0;              ///< in this tick
   FaultSet found_before_ = 0;       ///< in the last

@@ -10,11 +10,16 @@ std::uint32_t button_bit(int button) noexcept {
   return button < 0 ? 0U : std::uint32_t{1} << static_cast<unsigned>(button);
 }
 
+/// Without real-time priority a loop that stands still for a moment is nothing to look at: it is late.
+Duration stopped_after(const ServoSettings& servo) noexcept {
+  return servo.realtime == Realtime::required ? from_seconds(servo.late_limit_s) : Duration::max();
+}
+
 }  // namespace
 
 Watches::Watches(const Settings& settings, const DeviceProfile& profile, double max_force_N,
                  double max_torque_Nm)
-    : pace(from_seconds(1.0 / settings.servo.rate_Hz), from_seconds(settings.servo.late_limit_s)),
+    : pace(from_seconds(1.0 / settings.servo.rate_Hz), stopped_after(settings.servo)),
       link(profile.report_rate_Hz),
       pose(profile),
       pinned(max_force_N, max_torque_Nm),
@@ -23,14 +28,26 @@ Watches::Watches(const Settings& settings, const DeviceProfile& profile, double 
 
 FaultSet Watches::look(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
   FaultSet found = link.look(sample, now) | pose.look(sample) | motors.look(sample, driven, now);
-  // A hand that is fast while it feels nothing does no harm; three orientations that are none are one fault.
-  const bool free = sample.fault == Fault::overspeed && !is_driving(state);
-  if (sample.fault != Fault::none && sample.fault != Fault::pose_not_a_rotation && !free)
-    found |= bit(sample.fault);
+  found |= judged(sample.fault, state, now);
   if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) found |= bit(Fault::pose_not_finite);
   if (homed_ && !sample.homed) found |= bit(Fault::not_homed);
   if (sample.arrived != TimePoint{}) homed_ = sample.homed;  // before the first report it is anybody's guess
   return found | buttons(sample, state) | client.look(now);
+}
+
+/// What the device found in its reports, as far as it counts here.
+FaultSet Watches::judged(Fault fault, State state, TimePoint now) const noexcept {
+  switch (fault) {
+    case Fault::none:
+    case Fault::pose_not_a_rotation:  // three one after the other are one fault, which pose.look() finds
+      return 0;
+    case Fault::overspeed:  // a hand that is fast while it feels nothing does no harm
+      return is_driving(state) ? bit(fault) : 0;
+    case Fault::sample_stale:  // a queue that ran over while we were late is no silence of the device's
+      return bit(pace.was_late(now) ? Fault::sample_late : fault);
+    default:
+      return bit(fault);
+  }
 }
 
 FaultSet Watches::buttons(const DeviceSample& sample, State state) const noexcept {

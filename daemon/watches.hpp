@@ -36,6 +36,7 @@ struct Watches {
   void forget() noexcept;
 
  private:
+  FaultSet judged(Fault fault, State state, TimePoint now) const noexcept;
   FaultSet buttons(const DeviceSample& sample, State state) const noexcept;
 
   bool homed_ = false;  ///< it has been

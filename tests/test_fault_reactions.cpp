@@ -79,5 +79,91 @@ TEST_CASE("every fault in every state and phase is found in time and answered as
   CHECK(faults.size() >= 30);
 }
 
+// Those that take a plan of their own.
+
+TEST_CASE("motors that are warm give less, and say so", "[faults]") {
+  FaultRig rig(Phase::contact, [](Plan& plan) {
+    plan.profile.continuous_force_N = 0.5;
+    plan.profile.continuous_torque_Nm = 0.2;
+    plan.profile.thermal_time_s = 4.0;
+  });
+  REQUIRE(rig.bring_to(State::active));
+  CHECK(rig.force_N() > 1.0);
+  int ticks = 0;
+  for (; ticks < 4000 && !rig.found(Fault::overheated); ++ticks) rig.tick();
+  CHECK(ticks < 2000);
+  for (int i = 0; i < 2000; ++i) rig.tick();
+  CHECK(rig.force_N() < 0.51);
+  CHECK(rig.state() == State::active);
+  CHECK((rig.last().limit_causes & kForceThermal) != 0);
+  CHECK(rig.broken() == "");
+}
+
+TEST_CASE("a contact that buzzes loses half its stiffness, twice, and then the force", "[faults]") {
+  FaultRig rig(Phase::contact);
+  REQUIRE(rig.bring_to(State::active));
+  rig.inject(SimulatedFault::Kind::shake, 2.0, 0.0005);
+  double share = rig.last().stiffness_share;
+  for (const int time : {1, 2}) {
+    int ticks = 0;
+    for (; ticks < 200 && !rig.found(Fault::oscillating); ++ticks) rig.tick();
+    INFO("time " << time << " after " << ticks << " ticks");
+    CHECK(ticks <= 55);
+    CHECK(rig.last().stiffness_share == Approx(0.5 * share));
+    CHECK(rig.state() == State::active);
+    share = rig.last().stiffness_share;
+    rig.tick();
+  }
+  for (int i = 0; i < 200 && rig.state() == State::active; ++i) rig.tick();
+  CHECK(rig.state() == State::fault);
+  CHECK(rig.found(Fault::still_oscillates));
+  CHECK(rig.force_N() == 0.0);
+  CHECK(rig.broken() == "");
+}
+
+TEST_CASE("energy from nowhere, more than the guard can take back, is a fault", "[faults]") {
+  // A wall far beyond what the device bears, at the limit of force; then the handle is said to be farther
+  // out, along the force, than the spring had been pressed.
+  FaultRig rig(Phase::contact, [](Plan& plan) {
+    plan.settings.servo.self_test_s = 0.0;
+    plan.settings.wrench.gains.stiffness *= 20.0;
+    plan.settings.wrench.gains.damping.setZero();
+    plan.settings.limits.max_force_N = 10.0;
+    plan.settings.simulation.hand_stiffness_N_per_m = 3000.0;
+  });
+  REQUIRE(rig.bring_to(State::active));
+  CHECK(rig.force_N() > 5.0);
+  double out_m = 0.0;
+  rig.spoiled.spoil = [&out_m](DeviceSample& s) { s.X_BH.translation_m.z() += out_m; };
+  int ticks = 0;
+  for (; ticks < 20 && !rig.found(Fault::energy_made); ++ticks) {
+    out_m += 0.004;
+    rig.tick();
+  }
+  CHECK(ticks < 10);
+  CHECK(rig.found(Fault::energy_made));
+  CHECK(rig.state() == State::fault);
+  CHECK(rig.broken() == "");
+}
+
+TEST_CASE("a proxy without an admissible pose is a fault after three ticks", "[faults]") {
+  FaultRig rig(Phase::free, [](Plan& plan) {
+    for (const double side : {1.0, -1.0})  // the cube is 50 mm wide
+      plan.scene.half_spaces.push_back({"wall", {side, 0.0, 0.0}, -0.02});
+  });
+  rig.placer.lies = true;
+  rig.placer.lie.translation_m.z() = 0.06;
+  int ticks = 0;
+  for (; ticks < 100 && !rig.found(Fault::projection_failed); ++ticks) rig.tick();
+  CHECK(ticks < 20);
+  CHECK(rig.found(Fault::projection_failed));
+  rig.loop.arm();
+  for (int i = 0; i < 500; ++i) {
+    rig.tick();
+    REQUIRE(rig.force_N() == 0.0);
+  }
+  CHECK(rig.broken() == "");
+}
+
 }  // namespace
 }  // namespace wrenchd::test

@@ -14,7 +14,7 @@ constexpr double kPressed_s = 0.5;  ///< by then the hand is where the phase wan
 constexpr int kDeadman = 0;
 constexpr int kStopButton = 1;
 
-Plan rig_plan(Phase phase) {
+Plan rig_plan(Phase phase, const std::function<void(Plan&)>& adjust) {
   Plan plan = shipped_plan();
   plan.settings.servo.realtime = Realtime::required;
   plan.settings.servo.self_test_s = 0.03;
@@ -26,6 +26,7 @@ Plan rig_plan(Phase phase) {
   plan.settings.simulation.hand_path = {
       {0.0, {0, 0, 0.06}, {0, 0, 0}}, {0.3, {0, 0, 0.06}, {0, 0, 0}}, {0.42, {0, 0, end_z_m}, {0, 0, 0}}};
   plan.settings.simulation.hand_repeats = false;
+  if (adjust) adjust(plan);
   return plan;
 }
 
@@ -58,8 +59,8 @@ const char* name(Phase phase) {
   return phase == Phase::free ? "free" : phase == Phase::contact ? "contact" : "saturated";
 }
 
-FaultRig::FaultRig(Phase phase)
-    : plan(rig_plan(phase)),
+FaultRig::FaultRig(Phase phase, const std::function<void(Plan&)>& adjust)
+    : plan(rig_plan(phase, adjust)),
       scene(plan.scene),
       simulated(plan.profile, plan.settings.simulation),
       link(simulated, clock, plan.settings.simulation),
@@ -224,6 +225,12 @@ const std::vector<Injection>& injections() {
          [](FaultRig&) {},
          {},
          [](State s, Phase p) { return s == State::active && p == Phase::saturated; }});
+    add({"whoever armed is gone",
+         Fault::client_gone,
+         103,
+         [](FaultRig& r) { r.loop.arm_with_lease(); },
+         {},
+         [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
     add({"nobody lives",
          Fault::client_silent,
          103,

@@ -103,7 +103,8 @@ const char* name(Phase phase);
 /// is held against the invariants.
 class FaultRig {
  public:
-  explicit FaultRig(Phase phase);
+  /// adjust: what shall be otherwise in its plan.
+  explicit FaultRig(Phase phase, const std::function<void(Plan&)>& adjust = {});
 
   /// One period later, and the tick. Returns what it recorded.
   const TickRecord& tick(Duration after = std::chrono::milliseconds(1));
