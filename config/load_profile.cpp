@@ -166,6 +166,10 @@ void read_closed_loop(TomlTable& table, DeviceProfile& p) {
   const TomlValue angular = table.optional("damping_Nm_s_per_rad");
   if (is_stated(linear)) linear.number(p.damping_N_s_per_m, {0, 1000});
   if (is_stated(angular)) angular.number(p.damping_Nm_s_per_rad, {0, 100});
+  const TomlValue step = table.optional("encoder_step_m");
+  const TomlValue turn = table.optional("encoder_step_rad");
+  if (is_stated(step)) step.number(p.encoder_step_m, {0, 0.01});
+  if (is_stated(turn)) turn.number(p.encoder_step_rad, {0, 0.1});
   table.optional("max_stiffness_N_per_m").number(p.max_stiffness_N_per_m, {1, 1e6});
   table.optional("max_stiffness_Nm_per_rad").number(p.max_stiffness_Nm_per_rad, {1e-3, 1e4});
 }

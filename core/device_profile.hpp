@@ -272,6 +272,8 @@ struct DeviceProfile {
   // What the device is, closed loop: bounds for stiffness. NaN: not stated.
   double damping_N_s_per_m = kNotStated;
   double damping_Nm_s_per_rad = kNotStated;
+  double encoder_step_m = kNotStated;  ///< at the handle: what reports cannot tell apart
+  double encoder_step_rad = kNotStated;
   double max_stiffness_N_per_m = kNotStated;
   double max_stiffness_Nm_per_rad = kNotStated;
 

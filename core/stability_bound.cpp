@@ -32,11 +32,14 @@ void check_damping(double b, DofMask driven, const char* key) {
            ", 0 or more; measure it with the motors off, or state 0 and nothing can be rendered");
 }
 
-void check(const DeviceDamping& device, const LoopDelay& loop, const Coupling& coupling, DofMask driven) {
+void check(const DeviceDamping& device, const LoopDelay& loop, const Coupling& coupling, DofMask driven,
+           const EncoderStep& step) {
   check_damping(device.linear_N_s_per_m, driven & kLinearDofs, "damping_N_s_per_m");
   check_damping(device.angular_Nm_s_per_rad, driven & kAngularDofs, "damping_Nm_s_per_rad");
   if (!is_finite(loop.period_s) || loop.period_s <= 0.0) refuse("the loop's period must be above 0 s");
   if (!is_finite(loop.delay_s) || loop.delay_s < 0.0) refuse("the loop's delay must be 0 s or more");
+  for (const double s : {step.linear_m, step.angular_rad})
+    if (!is_finite(s) || s < 0.0) refuse("an encoder's step must be 0 or more");
   for (const auto& [name, K] :
        {std::pair{"stiffness", &coupling.stiffness}, {"damping", &coupling.damping}}) {
     if (!finite(*K)) refuse(std::string("the ") + name + " has a number that is not finite");
@@ -93,6 +96,13 @@ double largest_beside(const Matrix6d& L, const Matrix6d& D, const Vector6d& B) {
   return least;
 }
 
+/// The largest s with s S K S <= 4 kStepGain_J I.
+double largest_by_steps(const Matrix6d& K, const EncoderStep& step) {
+  Vector6d S;
+  S << Vector3d::Constant(step.linear_m), Vector3d::Constant(step.angular_rad);
+  return largest_share(S.asDiagonal() * K * S.asDiagonal(), Vector6d::Constant(4.0 * kStepGain_J));
+}
+
 }  // namespace
 
 Matrix6d energy_stiffness(const Inertia& M, double k_per_s2) noexcept {
@@ -108,10 +118,10 @@ Matrix6d at_handle(const Matrix6d& K_T, const Pose& X_HT) noexcept {
   return Ad.transpose() * (0.5 * (K_T + K_T.transpose())) * Ad;
 }
 
-//   s ( (T/2 + tau) K_H + D_H ) <= diag(b I, b_rot I)
+//   s ( (T/2 + tau) K_H + D_H ) <= diag(b I, b_rot I)         s S K_H S <= 4 kStepGain_J I
 StabilityBound stability_bound(const DeviceDamping& device, const LoopDelay& loop, const Coupling& coupling,
-                               const Pose& X_HT, DofMask driven) {
-  check(device, loop, coupling, driven);
+                               const Pose& X_HT, DofMask driven, const EncoderStep& step) {
+  check(device, loop, coupling, driven, step);
   const double lag_s = 0.5 * loop.period_s + loop.delay_s;
   const auto felt = [&](const Matrix6d& K_T) { return driven_block(at_handle(K_T, X_HT), driven); };
   const auto one = [&](int first) {
@@ -120,12 +130,16 @@ StabilityBound stability_bound(const DeviceDamping& device, const LoopDelay& loo
     return K;
   };
   const Vector6d B = diagonal(device, driven);
-  const Matrix6d K_lag = lag_s * felt(coupling.stiffness), D = felt(coupling.damping);
+  const Matrix6d K = felt(coupling.stiffness), D = felt(coupling.damping);
+  const double by_steps = std::min(1.0, largest_by_steps(K, step));
+  const auto stiffest = [&](const Matrix6d& K_one) {
+    return std::min(largest_beside(lag_s * K_one, D, B), largest_by_steps(K_one, step));
+  };
   StabilityBound out;
-  out.scale = std::min(1.0, largest_share(K_lag + D, B));
-  out.scale_undamped = std::min(1.0, largest_share(K_lag, B));
-  out.max_stiffness_N_per_m = largest_beside(lag_s * felt(one(0)), D, B);
-  out.max_stiffness_Nm_per_rad = largest_beside(lag_s * felt(one(3)), D, B);
+  out.scale = std::min(by_steps, largest_share(lag_s * K + D, B));
+  out.scale_undamped = std::min(by_steps, largest_share(lag_s * K, B));
+  out.max_stiffness_N_per_m = stiffest(felt(one(0)));
+  out.max_stiffness_Nm_per_rad = stiffest(felt(one(3)));
   return out;
 }
 

@@ -13,6 +13,16 @@ struct DeviceDamping {
   double angular_Nm_s_per_rad = DeviceProfile::kNotStated;
 };
 
+/// The step of a device's encoders at the handle point: what its reports cannot tell apart. 0: none, or not
+/// stated.
+struct EncoderStep {
+  double linear_m = 0.0;
+  double angular_rad = 0.0;
+};
+
+/// What a wall may gain each time that the handle crosses the edge of a step.
+inline constexpr double kStepGain_J = 0.5e-6;
+
 /// How old a pose is when its wrench acts.
 struct LoopDelay {
   double period_s = 0.0;  ///< T: between two wrenches
@@ -50,6 +60,14 @@ struct StabilityBound {
 /// that is U at the start plus (1/2 + d) sum |dx|_K^2, and |dx|^2 <= T times the integral of v^2. A damper
 /// gives at most |dx_k|_D |dx_(k-d)|_D / T, and a low pass does not add to it.
 ///
+/// The encoders' steps are a bound of their own. Over the edge of a step the wrench jumps by step K, and acts
+/// for the lag t = T/2 + tau on the wrong side of it. Over a way x it gains step K x there and the friction
+/// takes b x^2 / t at least: at most (step K)^2 t / (4 b) is left, which is K step^2 / 4 where K t <= b. A
+/// hand that is held on the edge has that each time; nothing but dry friction of step K / 2 takes it away
+/// altogether (Abbott and Okamura 2005), and a hand cannot feel it where it is small:
+///
+///   s S K_H S <= 4 kStepGain_J I                               S = diag(step I, step_rad I)
+///
 /// So virtual damping counts against passivity, not for it: at frequencies where the delay turns it round it
 /// pushes. For linear stability alone it would count for, within limits; but a hand is not linear, and the
 /// ledger on the plant (tests/prove) is one of energy.
@@ -60,16 +78,13 @@ struct StabilityBound {
 /// What is outside of it:
 /// - A law that is no gradient. Eq. (16) is one where K_T is in proportion to the tool's mass and inertia, as
 ///   the projection is; an angular stiffness of six times that gives energy around closed paths at any rate.
-/// - The encoders' steps. A handle that is held on the edge of one gains up to (step K) v (T/2 + tau) each
-///   time it crosses, and viscous friction has nothing to hold against it as v falls: only dry friction of
-///   step K / 2 has (Abbott and Okamura 2005). It is a microjoule at 100 um, see the ledger.
 /// - What changes the wrench after the law by more than a share of it: limits of growth that hold a wrench
 ///   back on the way in and not on the way out.
 ///
 /// Throws std::invalid_argument where damping of a driven half is not stated, a number is negative or not
 /// finite, T is not above 0, or K or D would pull apart. Not RT safe.
 StabilityBound stability_bound(const DeviceDamping& device, const LoopDelay& loop, const Coupling& coupling,
-                               const Pose& X_HT, DofMask driven = kAllDofs);
+                               const Pose& X_HT, DofMask driven = kAllDofs, const EncoderStep& step = {});
 
 /// K of the energy law (core/energy_law.hpp), for poses close to each other: k diag(m I, H), in T.
 Matrix6d energy_stiffness(const Inertia& M, double k_per_s2) noexcept;

@@ -341,7 +341,7 @@ std::unique_ptr<SimulatedLink> scripted_link(const Plan& plan, const LoopbackScr
 /// The end of a link that is not plugged in: in this process, or in another.
 std::unique_ptr<ReportLink> link_in_wall_time(const Plan& plan, const LoopbackScript& script,
                                               const Options& options, Clock& clock) {
-  if (options.link_fd >= 0) return std::make_unique<SocketLink>(options.link_fd);
+  if (options.link_fd >= 0) return std::make_unique<SocketLink>(options.link_fd, link_settings(plan));
   return scripted_link(plan, script, clock);
 }
 

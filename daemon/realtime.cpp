@@ -52,6 +52,7 @@ std::vector<RealtimeGrant> lock_memory(Realtime mode) {
 
 std::vector<RealtimeGrant> prepare_servo_thread(const ServoSettings& settings) {
   prefault_stack();
+  pthread_setname_np(pthread_self(), "wrenchd-servo");
   if (settings.realtime == Realtime::off) return {};
   std::vector<RealtimeGrant> grants;
   sched_param priority{};

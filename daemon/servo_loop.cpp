@@ -20,8 +20,6 @@
 namespace wrenchd {
 namespace {
 
-/// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
-constexpr int kDevicePatience_periods = 4;
 /// Where the placer found no room it is asked again after so long: a search without end would keep a
 /// processor busy, and a hand does not go far in that time.
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);

@@ -28,6 +28,9 @@
 
 namespace wrenchd {
 
+/// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
+inline constexpr int kDevicePatience_periods = 4;
+
 /// From the servo thread to the recorder. When it is full, records are counted and dropped.
 using RecordRing = boost::lockfree::spsc_queue<TickRecord>;
 

@@ -27,11 +27,17 @@ DeviceDamping stated(const DeviceProfile& profile) {
   return {profile.damping_N_s_per_m, profile.damping_Nm_s_per_rad};
 }
 
+EncoderStep step_of(const DeviceProfile& profile) {
+  const auto stated_or_none = [](double step) { return is_finite(step) ? step : 0.0; };
+  return {stated_or_none(profile.encoder_step_m), stated_or_none(profile.encoder_step_rad)};
+}
+
 }  // namespace
 
 Stability::Stability(const Settings& settings, const DeviceProfile& profile, const Inertia& M,
                      const Pose& X_HT)
     : damping_(stated(profile)),
+      step_(step_of(profile)),
       coupling_(coupling_of(settings, M)),
       X_HT_(X_HT),
       driven_(driven_dofs(profile)),
@@ -48,7 +54,7 @@ StiffnessShare Stability::share(const LoopDelay& loop) const {
   const bool linear = (driven_ & kLinearDofs) == 0 || is_finite(damping_.linear_N_s_per_m);
   const bool angular = (driven_ & kAngularDofs) == 0 || is_finite(damping_.angular_Nm_s_per_rad);
   if (!linear || !angular) return share;
-  const StabilityBound bound = stability_bound(damping_, loop, coupling_, X_HT_, driven_);
+  const StabilityBound bound = stability_bound(damping_, loop, coupling_, X_HT_, driven_, step_);
   share.bounded = true;
   if (bound.scale >= 1.0) return share;
   const bool without = bound.scale_undamped > bound.scale;

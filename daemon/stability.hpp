@@ -33,6 +33,7 @@ class Stability {
   StiffnessShare share(const LoopDelay& loop) const;
 
   DeviceDamping damping_;
+  EncoderStep step_;
   Coupling coupling_;
   Pose X_HT_;
   DofMask driven_;

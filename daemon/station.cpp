@@ -36,6 +36,12 @@ std::unique_ptr<Placer> make_placer(const Scene& scene, PlaceIn place_in) {
   return std::make_unique<PlacerThread>(scene);
 }
 
+/// From when on a loop that says nothing is a stuck one: no late tick takes so long.
+Duration silent_after(const ServoSettings& servo) noexcept {
+  const int periods = servo.pacing == Pacing::device ? kDevicePatience_periods : 1;
+  return periods * from_seconds(1.0 / servo.rate_Hz) + kLateTick;
+}
+
 }  // namespace
 
 Plan read_plan(const PlanFiles& files, const SearchPath& search) {
@@ -56,13 +62,17 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
   return plan;
 }
 
-std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
+LinkSettings link_settings(const Plan& plan) {
   const ServoSettings& servo = plan.settings.servo;
-  LinkSettings settings = link_settings(plan.profile);
+  LinkSettings settings = link_settings(plan.profile, silent_after(servo));
   settings.write_deadline =
       kBlockedWrite / 2;  // what is refused for longer is a fault, by the loop's own clock
   settings.priority = servo.realtime == Realtime::off ? 0 : servo.priority;
-  return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, settings);
+  return settings;
+}
+
+std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
+  return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, link_settings(plan));
 }
 
 Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, MeshLoader meshes)

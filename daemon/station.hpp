@@ -47,6 +47,10 @@ enum class PlaceIn : std::uint8_t {
   step,    ///< in the tick: virtual time, every run the same
 };
 
+/// Of any link that has a thread of its own: how long its writes may take, and when a loop that is silent is
+/// spoken for.
+LinkSettings link_settings(const Plan& plan);
+
 /// The link to the plugged-in device that the plan wants, not opened.
 std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan);
 

@@ -14,13 +14,16 @@
 namespace wrenchd {
 
 struct LatestWriter::Work {
-  Work(Write how, Duration deadline) : write(std::move(how)), slot(deadline) {}
+  Work(Write how, const LinkSettings& settings)
+      : write(std::move(how)), slot(settings.write_deadline), last_word(settings.last_word) {}
 
   void run() noexcept;
+  bool next(Packet& packet) noexcept;
   void write_one(const Packet& packet) noexcept;
 
   Write write;
   WriteSlot slot;
+  LastWord last_word;
   WakeUp wake;
   std::atomic<bool> closing{false};
 
@@ -35,16 +38,24 @@ void LatestWriter::Work::run() noexcept {
   for (bool last_round = false; !slot.gone() && !last_round;) {
     last_round = closing.load(std::memory_order_acquire);
     Packet packet;
-    if (slot.take(packet)) {
+    if (next(packet)) {
       write_one(packet);
       last_round = false;
     } else if (!last_round) {
-      wake.sleep();
+      wake.sleep_until(last_word.due());
     }
   }
   const std::lock_guard lock(mutex);
   over = true;
   changed.notify_all();
+}
+
+/// What the loop handed over, or what is said in its place.
+bool LatestWriter::Work::next(Packet& packet) noexcept {
+  const bool heard = slot.take(packet);
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (heard) last_word.heard(now, packet);
+  return heard || last_word.speak(now, packet);
 }
 
 void LatestWriter::Work::write_one(const Packet& packet) noexcept {
@@ -58,10 +69,12 @@ void LatestWriter::Work::write_one(const Packet& packet) noexcept {
 }
 
 LatestWriter::LatestWriter(Write write, const LinkSettings& settings)
-    : work_(std::make_shared<Work>(std::move(write), settings.write_deadline)),
+    : work_(std::make_shared<Work>(std::move(write), settings)),
       thread_([work = work_] { work->run(); }),
       close_within_(settings.close_within),
-      priority_granted_(raise_priority(thread_, settings.priority)) {}
+      priority_granted_(raise_priority(thread_, settings.priority)) {
+  pthread_setname_np(thread_.native_handle(), "wrenchd-writer");
+}
 
 LatestWriter::~LatestWriter() {
   close();

@@ -18,6 +18,9 @@ namespace wrenchd {
 /// device takes nothing (5 s on hidraw), so it is done here; the servo thread leaves the newest report in a
 /// slot and goes on.
 ///
+/// A loop that falls silent while it pushes is spoken for, as LinkSettings::last_word says: this thread lives
+/// on where that one is stuck.
+///
 /// Every end is the same: the report handed over last is written last, and nothing after it. Who releases the
 /// hand before it closes can rely on zeros being the last word.
 class LatestWriter {

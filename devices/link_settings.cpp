@@ -16,8 +16,9 @@ std::uint8_t constant_at(const ReportFrame& report, std::size_t byte) {
 
 }  // namespace
 
-LinkSettings link_settings(const DeviceProfile& profile) {
+LinkSettings link_settings(const DeviceProfile& profile, Duration silent_after) {
   LinkSettings settings;
+  settings.last_word = LastWord(profile, silent_after);
   settings.longest_report = profile.pose_report.length;
   for (const PoseReportLayout& report : profile.more_reports)
     settings.longest_report = std::max(settings.longest_report, report.length);

@@ -9,9 +9,13 @@
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "devices/falcon_start.hpp"
+#include "devices/last_word.hpp"
 #include "devices/stream_framer.hpp"
 
 namespace wrenchd {
+
+/// A loop of 1 kHz that is later than that is a late one by its own rules, too (core/watch_limits.hpp).
+inline constexpr Duration kSilentAfter = std::chrono::milliseconds(6);
 
 /// What a USB link is told beside the device.
 struct LinkSettings {
@@ -23,6 +27,8 @@ struct LinkSettings {
   /// SCHED_FIFO priority of the link's own thread; 0: an ordinary thread. That of the servo thread is best:
   /// the command goes out as soon as the servo thread sleeps, and neither cuts the other short.
   int priority = 0;
+  /// Speaks for a loop that is stuck.
+  LastWord last_word = {};
   /// Bytes of the longest input report, where it is longer than one packet. Only libusb must know it.
   std::size_t longest_report = 0;
 
@@ -39,7 +45,8 @@ struct LinkSettings {
   StreamFramer::Frame frame = {};
 };
 
-/// What the profile says of a link; the rest as above. Not RT safe.
-LinkSettings link_settings(const DeviceProfile& profile);
+/// What the profile says of a link; the rest as above. silent_after: from when on a loop that pushes and says
+/// nothing is spoken for; it has to be longer than the loop ever is silent. Not RT safe.
+LinkSettings link_settings(const DeviceProfile& profile, Duration silent_after = kSilentAfter);
 
 }  // namespace wrenchd

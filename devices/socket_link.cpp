@@ -26,9 +26,19 @@ bool other_end_is_gone(int socket) noexcept {
   return poll(&state, 1, 0) > 0 && (state.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
 }
 
+LinkStatus send_report(int socket, std::span<const std::uint8_t> report) noexcept {
+  for (;;) {
+    if (send(socket, report.data(), report.size(), kNow) >= 0) return LinkStatus::ok;
+    if (errno == EINTR) continue;
+    const bool full = errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOBUFS;
+    return full ? LinkStatus::empty : LinkStatus::gone;
+  }
+}
+
 }  // namespace
 
 SocketLink::~SocketLink() {
+  close();
   if (socket_ >= 0) ::close(socket_);
 }
 
@@ -41,11 +51,11 @@ void SocketLink::open() {
         "is no SOCK_SEQPACKET socket; whoever starts this program has to pass it one end of a socketpair()");
   fcntl(socket_, F_SETFD, FD_CLOEXEC);  // nobody who is started from here shall hold a device
   if (other_end_is_gone(socket_)) refuse(socket_, "nobody is at its other end any more; start both anew");
-  open_ = true;
+  writer_.emplace([socket = socket_](auto report) { return send_report(socket, report); }, settings_);
 }
 
 LinkRead SocketLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
-  if (!open_) return {LinkStatus::gone, 0, now};
+  if (!writer_) return {LinkStatus::gone, 0, now};
   for (;;) {
     const ssize_t length = recv(socket_, buffer.data(), buffer.size(), kNow | MSG_TRUNC);
     if (length > 0) return {LinkStatus::ok, static_cast<std::size_t>(length), now};
@@ -57,18 +67,12 @@ LinkRead SocketLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcep
   }
 }
 
-LinkStatus SocketLink::write(TimePoint, std::span<const std::uint8_t> report) noexcept {
-  if (!open_) return LinkStatus::gone;
-  for (;;) {
-    if (send(socket_, report.data(), report.size(), kNow) >= 0) return LinkStatus::ok;
-    if (errno == EINTR) continue;
-    const bool full = errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOBUFS;
-    return full ? LinkStatus::empty : LinkStatus::gone;
-  }
+LinkStatus SocketLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  return writer_ ? writer_->hand_over(now, report) : LinkStatus::gone;
 }
 
 void SocketLink::wait_readable(TimePoint deadline) noexcept {
-  if (open_) wait_for_file(socket_, POLLIN, deadline);
+  if (writer_) wait_for_file(socket_, POLLIN, deadline);
 }
 
 }  // namespace wrenchd

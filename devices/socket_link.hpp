@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
+#include "devices/latest_writer.hpp"
+#include "devices/link_settings.hpp"
 #include "devices/report_link.hpp"
 
 namespace wrenchd {
@@ -17,7 +20,8 @@ namespace wrenchd {
 class SocketLink final : public ReportLink {
  public:
   /// Takes the descriptor over, whatever it is; open() looks at it. -1: none.
-  explicit SocketLink(int socket) noexcept : socket_(socket) {}
+  explicit SocketLink(int socket, LinkSettings settings = {})
+      : socket_(socket), settings_(std::move(settings)) {}
   ~SocketLink() override;
   SocketLink(const SocketLink&) = delete;
   SocketLink& operator=(const SocketLink&) = delete;
@@ -27,14 +31,16 @@ class SocketLink final : public ReportLink {
   void open() override;
   /// A report is taken to have arrived now. What waits is read to its end after the other end is gone.
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
+  /// By a thread of the link's own, as with other links: it lives on where the loop is stuck.
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
   /// Nothing is read or written until it is opened again.
-  void close() noexcept override { open_ = false; }
+  void close() noexcept override { writer_.reset(); }
 
  private:
   int socket_;
-  bool open_ = false;
+  LinkSettings settings_;
+  std::optional<LatestWriter> writer_;
 };
 
 }  // namespace wrenchd

@@ -146,6 +146,7 @@ struct UsbLink::Engine {
   std::size_t prefix_bytes;
   bool cut;  ///< packets are a stream of bytes, out of which reports are cut
   StreamFramer framer;
+  LastWord last_word;
   libusb_transfer* out = nullptr;
   Packet out_packet;
   std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE + kMaxReportBytes> out_request{};
@@ -172,6 +173,7 @@ UsbLink::Engine::Engine(const UsbDevice& device, const LinkSettings& settings)
       prefix_bytes(settings.prefix_bytes),
       cut(settings.frame.length > 0),
       framer(settings.frame),
+      last_word(settings.last_word),
       write_deadline(settings.write_deadline),
       close_within(settings.close_within) {
   try {
@@ -344,6 +346,7 @@ void UsbLink::Engine::sleep() noexcept {
   if (in_failed || in_halted || out_halted) wait = std::min<Duration>(wait, retry_at - now);
   if (out_flying && !out_cancelled) wait = std::min<Duration>(wait, out_until - now);
   if (close_at) wait = std::min<Duration>(wait, *close_at - now);
+  if (last_word.due() != TimePoint::max()) wait = std::min<Duration>(wait, last_word.due() - now);
   wait = std::max(wait, Duration::zero());
   timespec timeout{};
   timeout.tv_nsec = wait.count();
@@ -434,7 +437,10 @@ void UsbLink::Engine::retry_failed() noexcept {
 
 void UsbLink::Engine::write_newest() noexcept {
   if (out == nullptr || out_flying || out_halted || ending || gone.load(std::memory_order_relaxed)) return;
-  if (!slot.take(out_packet)) return;
+  const bool heard = slot.take(out_packet);
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (heard) last_word.heard(now, out_packet);
+  if (!heard && !last_word.speak(now, out_packet)) return;
   out->length = static_cast<int>(out_packet.length);
   if (!out_endpoint) {
     write_request();
@@ -443,7 +449,7 @@ void UsbLink::Engine::write_newest() noexcept {
   const int error = libusb_submit_transfer(out);
   out_flying = error == 0;
   out_cancelled = false;
-  out_until = std::chrono::steady_clock::now() + write_deadline;
+  out_until = now + write_deadline;
   if (error == LIBUSB_ERROR_NO_DEVICE) lose();
   if (error != 0) slot.end(error == LIBUSB_ERROR_NO_DEVICE ? LinkStatus::gone : LinkStatus::empty);
 }

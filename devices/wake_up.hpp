@@ -50,6 +50,10 @@ class WakeUp {
     eventfd_t ignored = 0;
     eventfd_read(file_, &ignored);
   }
+  /// The same, until the deadline at most.
+  void sleep_until(TimePoint deadline) noexcept {
+    if (deadline == TimePoint::max() || wait_for_file(file_, POLLIN, deadline) != 0) sleep();
+  }
   /// Readable while a wake-up waits.
   int file() const noexcept { return file_; }
 

@@ -10,7 +10,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "config/load_profile.hpp"
 #include "devices/latest_writer.hpp"
+#include "devices/report_codec.hpp"
 #include "tests/support/no_allocation.hpp"
 
 using namespace wrenchd;
@@ -152,6 +154,24 @@ TEST_CASE("a device that is gone ends the writing", "[usb]") {
   CHECK(bench.hand_over(2) == LinkStatus::gone);
   CHECK_FALSE(bench.writer.close());
   CHECK(bench.gate->taken() == Bytes{1});
+}
+
+TEST_CASE("a loop that is stuck while it pushes is spoken for by the writer", "[usb]") {
+  const DeviceProfile profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
+  WrenchReport push;
+  push.F.force_N = {0.0, 0.0, 1.0};
+  push.enable = true;
+  std::array<std::uint8_t, kMaxReportBytes> bytes{};
+  const std::size_t length = encode(profile.wrench_report, push, bytes);
+  Bench bench({.close_within = 1h, .last_word = LastWord(profile, 6ms)});
+  for (const std::size_t stalls : {1U, 2U}) {
+    const TimePoint start = std::chrono::steady_clock::now();
+    bench.writer.hand_over(start, std::span(bytes).first(length));
+    bench.gate->await_taken(stalls * (1 + LastWord::kTimes));
+    CHECK(std::chrono::steady_clock::now() - start >= 6ms);
+    std::this_thread::sleep_for(20ms);
+    CHECK(bench.gate->taken().size() == stalls * (1 + LastWord::kTimes));
+  }
 }
 
 TEST_CASE("a write that throws is a write that failed", "[usb]") {

@@ -59,6 +59,16 @@ TEST_CASE("a profile that states no damping bounds nothing, and its own maximum 
   CHECK(stability_of(plan).settle(measured(500us, 1)).spring == Approx(0.25));
 }
 
+TEST_CASE("the encoders that a profile states bound the stiffness too", "[stability]") {
+  Plan plan = shipped_plan();
+  plan.profile.encoder_step_m = 200e-6;
+  const StiffnessShare coarse = stability_of(plan).settle(measured(500us, 1));
+  CHECK(coarse.bounded);
+  CHECK(coarse.spring * 600.0 <= 51.0);
+  plan.profile.encoder_step_m = DeviceProfile::kNotStated;
+  CHECK(stability_of(plan).settle(measured(500us, 1)).spring == 1.0);
+}
+
 TEST_CASE("the energy law is bound by its own stiffness", "[stability]") {
   Plan plan = shipped_plan();
   plan.settings.wrench.law = SpringLaw::energy;

@@ -156,6 +156,26 @@ TEST_CASE("what has no motors is not asked about", "[stability_bound]") {
                     Catch::Contains("damping_Nm_s_per_rad"));
 }
 
+TEST_CASE("a coarse encoder bounds a wall that rate and delay would bear", "[stability_bound]") {
+  const LoopDelay loop{0.5e-3, 0.0};
+  const DeviceDamping much{50.0, 0.5};
+  const StabilityBound fine = stability_bound(much, loop, spring(5000.0, 5.0), {});
+  CHECK(fine.scale == 1.0);
+  // K step^2 / 4 is what an edge may give: 200 N/m at 100 um.
+  const StabilityBound coarse =
+      stability_bound(much, loop, spring(5000.0, 5.0), {}, kAllDofs, {100e-6, 1e-3});
+  CHECK(coarse.max_stiffness_N_per_m == Approx(200.0));
+  CHECK(coarse.max_stiffness_Nm_per_rad == Approx(2.0));
+  CHECK(coarse.scale == Approx(0.04));
+  CHECK(coarse.scale_undamped == Approx(0.04));
+  // Of what is not driven no step counts.
+  const StabilityBound turned =
+      stability_bound(much, loop, spring(5000.0, 5.0), {}, kAngularDofs, {100e-6, 1e-3});
+  CHECK(turned.scale == Approx(0.4));
+  CHECK_THROWS_WITH(stability_bound(much, loop, spring(1.0, 1.0), {}, kAllDofs, {-1e-6, 0.0}),
+                    Catch::Contains("encoder's step"));
+}
+
 TEST_CASE("the bound refuses what cannot be, and names it", "[stability_bound]") {
   const LoopDelay loop{1e-3, 1e-3};
   CHECK_THROWS_WITH(stability_bound({}, loop, spring(1.0, 1.0), {}), Catch::Contains("damping_N_s_per_m"));

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -19,6 +20,7 @@
 #include <fcntl.h>
 #include <sched.h>
 #include <spawn.h>
+#include <sys/ptrace.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -32,7 +34,8 @@
 // daemon is another one, so that it can be killed, crashed and stopped at any instant while the hand presses
 // against the table. Each time the force on the handle must end when the firmware's watchdog says so, nobody
 // may speak for the dead, a stopped daemon must not kick when it goes on, and one that is started again must
-// be disarmed.
+// be disarmed. Where only the servo thread stands still, held by a tracer, the rest of the daemon lives:
+// there the link's writer has to speak for it before the watchdog does.
 //
 // Times are those of the emulated device, which knows of the daemon what hardware would: commands, or
 // silence.
@@ -168,6 +171,14 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   void signal(int number) const { kill(pid_, number); }
+  /// Holds the servo thread, and no other. False where it cannot be held.
+  bool hold_servo_thread() {
+    held_ = thread_named("wrenchd-servo");
+    if (held_ < 0 || ptrace(PTRACE_SEIZE, held_, nullptr, nullptr) != 0) return false;
+    ptrace(PTRACE_INTERRUPT, held_, nullptr, nullptr);
+    return waitpid(held_, nullptr, __WALL) == held_;
+  }
+  void let_servo_thread_go() const { ptrace(PTRACE_DETACH, held_, nullptr, nullptr); }
   void end() {
     if (over_) return;
     kill(pid_, SIGKILL);
@@ -187,7 +198,16 @@ class Daemon {
   int exit_code() const { return exit_code_; }  ///< -1: ended by a signal
 
  private:
-  pid_t pid_ = -1;
+  pid_t thread_named(const std::string& wanted) const {
+    for (const auto& task : fs::directory_iterator("/proc/" + std::to_string(pid_) + "/task")) {
+      std::ifstream in(task.path() / "comm");
+      std::string name;
+      if (std::getline(in, name) && name == wanted) return std::stoi(task.path().filename());
+    }
+    return -1;
+  }
+
+  pid_t pid_ = -1, held_ = -1;
   bool over_ = false, stopped_ = false;
   int exit_code_ = -1;
 };
@@ -195,6 +215,7 @@ class Daemon {
 struct Figures {
   double worst_ms = 0.0;         ///< from the last command taken to the last moment of force
   double after_signal_ms = 0.0;  ///< from the signal to the last moment of force
+  double stuck_ms = 0.0;         ///< from the moment the servo thread is held to the last moment of force
   double resume_ms = 0.0;        ///< of strong force after a stopped daemon went on
   long faults = 0;               ///< of a daemon that was not killed yet, and was started again
   long violations = 0;
@@ -217,11 +238,12 @@ class Proof {
 
   void kill_once(long number) {
     number_ = number;
-    signal_ = std::array{SIGKILL, SIGSEGV, SIGSTOP}[random_() % 3];
+    signal_ = std::array{SIGKILL, SIGSEGV, SIGSTOP, kHold}[random_() % 4];
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       FarSide device(profile_);
       Daemon daemon = start(device, {"--arm"});
-      if (press(device, daemon)) return kill_pressing(device, daemon);
+      if (press(device, daemon))
+        return signal_ == kHold ? hold(device, daemon) : kill_pressing(device, daemon);
       if (daemon.over() && daemon.exit_code() != kExitFault)
         return violation("the daemon ended by itself with code " + std::to_string(daemon.exit_code()));
       ++figures_.faults;
@@ -237,6 +259,7 @@ class Proof {
   static constexpr double kPressing_N = 0.3;
   static constexpr int kAttempts = 10;
   static constexpr int kExitFault = 3;  ///< of the daemon
+  static constexpr int kHold = 0;       ///< no signal: the servo thread alone
 
   void violation(const std::string& what) {
     ++figures_.violations;
@@ -281,7 +304,7 @@ class Proof {
       return violation("the daemon does not end");
     device.live();  // what it said before
     expect_silence(device, signalled);
-    if (daemon.stopped()) resume(device, daemon);
+    if (daemon.stopped()) goes_on(device, [&] { daemon.signal(SIGCONT); });
     daemon.end();
     restart(device);
   }
@@ -303,10 +326,30 @@ class Proof {
         std::max(figures_.after_signal_ms, milliseconds(device.last_push() - signalled));
   }
 
+  void hold(FarSide& device, Daemon& daemon) {
+    if (!daemon.hold_servo_thread()) return violation("the servo thread cannot be held");
+    device.live();
+    const TimePoint held = device.now();
+    const long heard = device.heard();
+    for (const TimePoint end = device.now() + bound_ + 50ms; device.now() < end;) {
+      std::this_thread::sleep_for(kLook);
+      device.live();
+    }
+    if (device.heard() == heard) violation("nobody speaks for a loop that is stuck");
+    if (device.push_N() != 0.0 || device.last_push() - held > bound_)
+      violation("force for " + std::to_string(milliseconds(device.last_push() - held)) +
+                " ms after the loop was stuck");
+    figures_.stuck_ms = std::max(figures_.stuck_ms, milliseconds(device.last_push() - held));
+    goes_on(device, [&] { daemon.let_servo_thread_go(); });
+    daemon.end();
+    restart(device);
+  }
+
   /// It may still send the command it was about to send, and has to see at the next tick what happened.
-  void resume(FarSide& device, Daemon& daemon) {
+  template <class Wake>
+  void goes_on(FarSide& device, const Wake& wake) {
     device.count_above(0.1 * profile_.max_force_N);
-    daemon.signal(SIGCONT);
+    wake();
     for (const TimePoint end = device.now() + 100ms; device.now() < end;) {
       std::this_thread::sleep_for(kLook);
       device.live();
@@ -367,7 +410,8 @@ std::string beside_this_program(const char* name) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "prove_kill: is the hand free in time when the daemon is killed, crashes or is stopped? The device "
+      "prove_kill: is the hand free in time when the daemon is killed, crashes, is stopped or stuck? The "
+      "device "
       "lives on in\n"
       "this process.");
   long kills = 10;
@@ -389,10 +433,11 @@ int main(int argc, char** argv) {
     for (long n = 1; n <= kills; ++n) proof.kill_once(n);
     const Figures& f = proof.figures();
     std::printf(
-        "kill kills %ld worst_ms %.3f bound_ms %.3f after_signal_ms %.3f resume_ms %.3f faults %ld "
+        "kill kills %ld worst_ms %.3f bound_ms %.3f after_signal_ms %.3f stuck_ms %.3f resume_ms %.3f faults "
+        "%ld "
         "violations %ld seed "
         "%llu seconds %.1f\n",
-        kills, f.worst_ms, milliseconds(proof.bound()), f.after_signal_ms, f.resume_ms, f.faults,
+        kills, f.worst_ms, milliseconds(proof.bound()), f.after_signal_ms, f.stuck_ms, f.resume_ms, f.faults,
         f.violations, static_cast<unsigned long long>(seed), seconds(wall_now() - start));
     return f.violations == 0 ? 0 : 1;
   } catch (const std::exception& error) {

@@ -207,14 +207,15 @@ class Host {
     const LoopDelay loop{measured_.longest_period_s(), measured_.delay_s()};
     const SimulationSettings& s = circumstances_.hand;
     const DeviceDamping device{s.viscous_friction_N_s_per_m, s.viscous_friction_Nm_s_per_rad};
+    const EncoderStep step{circumstances_.position_quantum_m, circumstances_.rotation_quantum_rad};
     constexpr double kStiff_per_s2 = 1e6;  // beyond any bound, so that the scale says all
     const double d = circumstances_.damping_share;
     Coupling coupling;
     coupling.stiffness = energy_stiffness(M_, kStiff_per_s2);
     coupling.stiffness.bottomRightCorner<3, 3>() *= options_.pid ? options_.angular_share : 1.0;
     coupling.damping = d / (1.0 - d) * (0.5 * loop.period_s + loop.delay_s) * coupling.stiffness;
-    const double scale =
-        circumstances_.share * stability_bound(device, loop, coupling, circumstances_.X_HT).scale;
+    const double scale = circumstances_.share *
+                         stability_bound(device, loop, coupling, circumstances_.X_HT, kAllDofs, step).scale;
     stiffness_per_s2_ = scale * kStiff_per_s2;
     WrenchGains gains;
     gains.stiffness = scale * coupling.stiffness;
