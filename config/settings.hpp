@@ -49,7 +49,7 @@ inline WrenchGains default_gains() {
 
 /// [wrench]
 struct WrenchSettings {
-  SpringLaw law = SpringLaw::pid;
+  SpringLaw law = SpringLaw::energy;
   double energy_stiffness_per_s2 = 3000.0;  ///< k of the energy law: 600 N/m for the shipped cube of 0.2 kg
   WrenchGains gains = default_gains();
 };

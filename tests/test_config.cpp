@@ -205,7 +205,7 @@ TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {
 }
 
 TEST_CASE("a gain is a number, two blocks, or a matrix", "[config]") {
-  CHECK(settings_from("[wrench]\nlaw = 'energy'").wrench.law == SpringLaw::energy);
+  CHECK(settings_from("[wrench]\nlaw = 'pid'").wrench.law == SpringLaw::pid);
   CHECK(settings_from("[wrench]\nenergy_stiffness_per_s2 = 12").wrench.energy_stiffness_per_s2 == 12.0);
   CHECK(settings_from("[wrench]\nstiffness = 5").wrench.gains.stiffness == 5.0 * Matrix6d::Identity());
   CHECK(settings_from("[wrench]\nstiffness = { linear_N_per_m = 2, angular_Nm_per_rad = 3.5 }")

@@ -126,7 +126,7 @@ TEST_CASE("energy from nowhere, more than the guard can take back, is a fault", 
   // out, along the force, than the spring had been pressed.
   FaultRig rig(Phase::contact, [](Plan& plan) {
     plan.settings.servo.self_test_s = 0.0;
-    plan.settings.wrench.gains.stiffness *= 20.0;
+    plan.settings.wrench.energy_stiffness_per_s2 *= 20.0;
     plan.settings.wrench.gains.damping.setZero();
     plan.settings.limits.max_force_N = 10.0;
     plan.settings.simulation.hand_stiffness_N_per_m = 3000.0;

@@ -168,6 +168,7 @@ TEST_CASE("a replay names the first tick and field that differ", "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   Plan plan = recording_plan(Method::exact);
+  plan.settings.wrench.law = SpringLaw::pid;
   record_run(plan, file, 3.0);
   Recording recording = read_recording(file);
   recording.ticks[2500].F_out[2] = std::nextafter(recording.ticks[2500].F_out[2], 1.0);

@@ -102,6 +102,7 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   Plan plan = shipped_plan();
   plan.settings.device.base_in_world = {{0.0, 0.0, 0.0}, {0.0, 0.0, 1.2}};
   plan.settings.device.tool_in_handle = {{0.01, -0.02, 0.0}, {0.0, 0.3, 0.0}};
+  plan.settings.wrench.law = SpringLaw::pid;
   plan.settings.wrench.gains.damping.setZero();
   const Matrix6d K = plan.settings.wrench.gains.stiffness;
   VirtualStation s(plan);

@@ -32,6 +32,7 @@ Stability stability_of(const Plan& plan) {
 
 TEST_CASE("what the shipped device bears is not touched, and ten times as much is scaled", "[stability]") {
   Plan plan = shipped_plan();
+  plan.settings.wrench.law = SpringLaw::pid;
   const LoopMeasurement loop = measured(500us, 1);
   const StiffnessShare shipped = stability_of(plan).settle(loop);
   CHECK(shipped.bounded);
@@ -50,6 +51,7 @@ TEST_CASE("what the shipped device bears is not touched, and ten times as much i
 
 TEST_CASE("a profile that states no damping bounds nothing, and its own maximum does", "[stability]") {
   Plan plan = shipped_plan();
+  plan.settings.wrench.law = SpringLaw::pid;
   plan.settings.wrench.gains.stiffness *= 10.0;
   plan.profile.damping_N_s_per_m = DeviceProfile::kNotStated;
   const StiffnessShare unknown = stability_of(plan).settle(measured(500us, 1));
@@ -81,8 +83,9 @@ TEST_CASE("the energy law is bound by its own stiffness", "[stability]") {
 TEST_CASE("wrenchd scales what is too stiff for the device, and says so", "[stability]") {
   const TemporaryDirectory dir;
   const std::string config =
-      dir.write("stiff.toml",
-                "[wrench]\nstiffness = { linear_N_per_m = 9000.0, angular_Nm_per_rad = 20.0 }\n")
+      dir.write(
+             "stiff.toml",
+             "[wrench]\nlaw = \"pid\"\nstiffness = { linear_N_per_m = 9000.0, angular_Nm_per_rad = 20.0 }\n")
           .string();
   const ProgramResult result =
       run_program("wrenchd", {"--config", config, "--virtual-time", "--seconds", "4", "--arm", "--live"});
