@@ -14,11 +14,14 @@ constexpr Duration kHomingPeriod = std::chrono::milliseconds(1);
 
 }  // namespace
 
-bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop) {
+bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop, const Waits& waits) {
   bool first_attempt = at_start;
   std::string said;  // the same trouble is told once
-  const auto say = [&said](spdlog::level::level_enum level, const std::string& words) {
-    if (words != said) spdlog::log(level, "{}", words);
+  const auto say = [&](spdlog::level::level_enum level, const std::string& words, const char* more) {
+    if (words != said) {
+      spdlog::log(level, "{}{}", words, more);
+      waits(words);
+    }
     said = words;
   };
   return wait.until(
@@ -27,11 +30,11 @@ bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& 
           station.open();
           return true;
         } catch (const DeviceNotFound& missing) {
-          say(spdlog::level::info, std::string(missing.what()) + "; waiting for it");
+          say(spdlog::level::info, missing.what(), "; waiting for it");
           wait.tell(missing.seen());
         } catch (const std::runtime_error& error) {
           if (first_attempt) throw;
-          say(spdlog::level::err, error.what());
+          say(spdlog::level::err, error.what(), "");
         }
         first_attempt = false;
         return false;
@@ -51,7 +54,7 @@ void tell_device(const DeviceProfile& profile, const UsbDevice& device) {
                  100.0 * ProfileDevice::kAuthorityWithoutWatchdog);
 }
 
-bool settle_profile(Plan& plan, const Stop& stop) {
+bool settle_profile(Plan& plan, const Stop& stop, const Waits& waits) {
   DeviceWait wait;
   const KnownProfiles known = known_profiles(SearchPath());
   for (const std::string& refused : known.refused) spdlog::warn("profile refused: {}", refused);
@@ -66,7 +69,10 @@ bool settle_profile(Plan& plan, const Stop& stop) {
           plan.settings.device.profile_file = known.files[choice.pick->profile];
           return true;
         }
-        if (!said) spdlog::info("no device that has a profile is plugged in; waiting for one");
+        if (!said) {
+          spdlog::info("no device that has a profile is plugged in; waiting for one");
+          waits("no device that has a profile is plugged in");
+        }
         said = true;
         wait.tell(seen_instead(plugged, choice));
         return false;
@@ -92,7 +98,7 @@ std::string calibrate(Station& station, const UsbDevice& device, const Calibrati
   }
 }
 
-bool find_rest(Station& station, Clock& clock, const Stop& stop) {
+bool find_rest(Station& station, Clock& clock, const Stop& stop, const Waits& waits) {
   const DeviceProfile& profile = station.plan().profile;
   if (profile.homing.reference != ReferenceUse::each_start) return true;
   DeviceHoming homing(station.device(), profile, DeviceHoming::Extent::rest);
@@ -102,6 +108,7 @@ bool find_rest(Station& station, Clock& clock, const Stop& stop) {
     const HomingState& state = homing.step(clock.now());
     if (const std::string words = told(state); words != said) {
       spdlog::info("homing: {}", words);
+      waits("homing: " + words);
       said = words;
     }
     if (state.step == HomingStep::done) return true;

@@ -14,14 +14,16 @@ namespace wrenchd {
 
 /// When to stop for another reason than a fault.
 using Stop = std::function<bool()>;
+/// Is told that nothing can happen before something outside does, a device or a person, and what.
+using Waits = std::function<void(const std::string& what)>;
 
 /// Where the configuration leaves the profile to the device: that of the one device that has one, which is
 /// waited for. False: it is time to stop.
-bool settle_profile(Plan& plan, const Stop& stop);
+bool settle_profile(Plan& plan, const Stop& stop, const Waits& waits);
 
 /// Opens the station's device, and waits for it where it is not plugged in. False: it is time to stop. What
 /// is wrong with a device that is there at the start is thrown; later it is logged, and waited for its cure.
-bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop);
+bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop, const Waits& waits);
 
 /// What the device can do, said once: what it has no motors for is not felt.
 void tell_device(const DeviceProfile& profile, const UsbDevice& device);
@@ -32,6 +34,6 @@ std::string calibrate(Station& station, const UsbDevice& device, const Calibrati
 
 /// Where the device counts from wherever it was switched on: has the person put the handle into its rest, and
 /// says so in the log. False: the device was lost, or it is time to stop.
-bool find_rest(Station& station, Clock& clock, const Stop& stop);
+bool find_rest(Station& station, Clock& clock, const Stop& stop, const Waits& waits);
 
 }  // namespace wrenchd

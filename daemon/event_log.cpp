@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/fault.hpp"
+#include "daemon/event_journal.hpp"
 
 namespace wrenchd {
 namespace {
@@ -98,7 +99,10 @@ EventLog::~EventLog() {
 
 void EventLog::drain() {
   Event event;
-  while (loop_.events().pop(event)) spdlog::log(level_of(event), "{}", to_text(event));
+  while (loop_.events().pop(event)) {
+    const JournalFields fields(journal_fields(event));
+    spdlog::log(level_of(event), "{}", to_text(event));
+  }
   const std::uint64_t dropped = loop_.dropped_events();
   if (dropped > dropped_said_)
     spdlog::warn("{} events were dropped: the log fell behind", dropped - dropped_said_);

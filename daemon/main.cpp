@@ -16,10 +16,12 @@
 #include "config/load_loopback_script.hpp"
 #include "daemon/device_start.hpp"
 #include "daemon/event_log.hpp"
+#include "daemon/journal.hpp"
 #include "daemon/live_line.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/recorder.hpp"
+#include "daemon/service_notify.hpp"
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
@@ -47,6 +49,12 @@ static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<CommandSet>:
               "a signal handler may only touch lock-free atomics");
 
 std::atomic<ServoLoop*> the_loop{nullptr};  ///< for signals, and for std::terminate
+
+/// There is one manager of this process, and it is told from everywhere here. Lives as long as main().
+ServiceNotify* the_service = nullptr;
+void tell_waiting(const std::string& what) {
+  the_service->waiting(what);
+}
 
 struct Options {
   PlanFiles files;
@@ -211,7 +219,8 @@ Fault fault_of(const ServoLoop& loop, Fault ended) {
 }
 
 /// Wall time: the servo thread ticks, this one looks on.
-Fault run_in_wall_time(Station& station, TimePoint end, WallClock& clock, LiveView& view, Wishes wishes) {
+Fault run_in_wall_time(Station& station, const std::string& device, TimePoint end, WallClock& clock,
+                       LiveView& view, Wishes wishes) {
   const ServoSettings& servo = station.plan().settings.servo;
   std::promise<std::vector<RealtimeGrant>> prepared;
   auto grants = prepared.get_future();
@@ -230,15 +239,22 @@ Fault run_in_wall_time(Station& station, TimePoint end, WallClock& clock, LiveVi
   const auto joined = [&]() noexcept {
     stop_loop.store(true);
     servo_thread.join();
+    the_service->loop_ended();
   };
   try {
     log_grants(grants.get());
+    the_service->running(
+        [&loop = station.loop()] {
+          return LoopView{loop.state(), loop.cause(), loop.timing().tick.count()};
+        },
+        device);
     while (!stop_requested.load() && !over.load() && clock.now() < end) {
       std::this_thread::sleep_until(wishes.next(clock.now() + kLook));
       wishes.pass_on(station.loop(), clock.now());
       view.look_at(station.loop());
     }
     latched = fault_of(station.loop(), Fault::none);
+    if (!over.load()) the_service->stopping("stopping");
     joined();
   } catch (...) {
     joined();
@@ -274,19 +290,21 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
   DeviceWait wait;
   const Stop stop = [&] { return stop_requested.load() || clock.now() >= end; };
   for (bool at_start = true;; at_start = false) {
-    if (!open_device(station, wait, at_start, stop)) return Fault::none;
+    if (!open_device(station, wait, at_start, stop, tell_waiting)) return Fault::none;
     const UsbDevice& device = link.device().value();
     if (at_start) tell_device(station.plan().profile, device);
     if (!at_start) spdlog::info("the device is back, disarmed: {}", describe(device));
     const std::string not_armed = calibrate(station, device, CalibrationStore());
     if (!not_armed.empty()) spdlog::warn("the device may not be armed: {}", not_armed);
-    if (!find_rest(station, clock, stop)) {
+    if (!find_rest(station, clock, stop, tell_waiting)) {
       station.close();
       if (stop()) return Fault::none;
       continue;
     }
     const Wishes wishes(options.arm && at_start && not_armed.empty(), {}, clock.now());
-    const Fault fault = run_in_wall_time(station, end, clock, view, wishes);
+    const Fault fault = run_in_wall_time(station, station.plan().profile.name + ", " + describe(device), end,
+                                         clock, view, wishes);
+    if (fault == Fault::device_lost) tell_waiting("the device was unplugged");
     station.close();
     if (fault != Fault::device_lost) return fault;
   }
@@ -363,14 +381,18 @@ Fault run_simulated(Plan plan, const Options& options) {
   WallClock clock;
   const auto link = link_in_wall_time(plan, script, options, clock);
   log_grants(lock_memory(plan.settings.servo.realtime));
-  return run(std::move(plan), options, *link, clock, run_it(clock, run_in_wall_time));
+  const auto in_wall_time = [&](Station& station, auto&&... more) {
+    return run_in_wall_time(station, station.plan().profile.name + ", simulated", more...);
+  };
+  return run(std::move(plan), options, *link, clock, run_it(clock, in_wall_time));
 }
 
 Fault run_real(Plan plan, const Options& options) {
   WallClock clock;
   const TimePoint end = end_of(options, clock);
   if (plan.profile.name.empty() &&
-      !settle_profile(plan, [&] { return stop_requested.load() || clock.now() >= end; }))
+      !settle_profile(
+          plan, [&] { return stop_requested.load() || clock.now() >= end; }, tell_waiting))
     return Fault::none;
   const auto link = make_plugged_link(plan);
   log_grants(lock_memory(plan.settings.servo.realtime));
@@ -409,10 +431,16 @@ int main(int argc, char** argv) {
   Options options;
   describe(app, options);
   CLI11_PARSE(app, argc, argv);
-  spdlog::set_default_logger(spdlog::stderr_color_mt("wrenchd"));
-  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  if (stderr_is_journal()) {
+    log_to_journal();
+  } else {
+    spdlog::set_default_logger(spdlog::stderr_color_mt("wrenchd"));
+    spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  }
   if (options.verbose) spdlog::set_level(spdlog::level::debug);
   catch_signals();
+  ServiceNotify service;
+  the_service = &service;
   try {
     Plan plan = plan_of(options);
     const bool simulated = plan.simulated || options.link_fd >= 0;
@@ -421,6 +449,7 @@ int main(int argc, char** argv) {
     return fault == Fault::none ? 0 : kExitFault;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "wrenchd: %s\n", error.what());
+    service.stopping(std::string("refused: ") + error.what());
     return kExitRefused;
   }
 }

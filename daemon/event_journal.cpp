@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/event_journal.hpp"
+
+#include <chrono>
+
+#include "core/fault.hpp"
+#include "core/state.hpp"
+
+namespace wrenchd {
+
+JournalFieldList journal_fields(const Event& event) {
+  const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(event.at.time_since_epoch()).count();
+  JournalFieldList fields = {{"WRENCHD_TIME_NS", std::to_string(ns)}};
+  switch (event.kind) {
+    case Event::Kind::state:
+      fields.emplace_back("MESSAGE_ID", kStateMessage);
+      fields.emplace_back("WRENCHD_STATE", name(static_cast<State>(event.detail)));
+      break;
+    case Event::Kind::fault: {
+      const FaultRow& row = fault_row(static_cast<Fault>(event.detail));
+      fields.emplace_back("MESSAGE_ID", kFaultMessage);
+      fields.emplace_back("WRENCHD_FAULT", row.name);
+      fields.emplace_back("WRENCHD_CURE", row.cure);
+      break;
+    }
+    case Event::Kind::refused:
+      fields.emplace_back("MESSAGE_ID", kRenderingMessage);
+      fields.emplace_back("WRENCHD_STATE", name(static_cast<State>(event.detail)));
+      break;
+    default:
+      fields.emplace_back("MESSAGE_ID", kRenderingMessage);
+      break;
+  }
+  return fields;
+}
+
+}  // namespace wrenchd

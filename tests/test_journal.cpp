@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstdlib>
+
+#include <catch2/catch.hpp>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "core/fault.hpp"
+#include "core/state.hpp"
+#include "daemon/event_journal.hpp"
+#include "daemon/journal.hpp"
+
+namespace wrenchd {
+namespace {
+
+std::string field(const JournalFieldList& fields, const std::string& name) {
+  for (const auto& [key, value] : fields)
+    if (key == name) return value;
+  return "(none)";
+}
+
+JournalFieldList one(const std::string& name, const std::string& value) {
+  return {std::pair(name, value)};
+}
+
+TEST_CASE("standard error is the journal where it is the file that the journal names", "[journal]") {
+  struct stat status {};
+  REQUIRE(::fstat(STDERR_FILENO, &status) == 0);
+  const std::string here = std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino);
+  ::unsetenv("JOURNAL_STREAM");
+  CHECK_FALSE(stderr_is_journal());
+  ::setenv("JOURNAL_STREAM", here.c_str(), 1);
+  CHECK(stderr_is_journal());
+  ::setenv("JOURNAL_STREAM", (here + "1").c_str(), 1);  // inherited, and standard error redirected since
+  CHECK_FALSE(stderr_is_journal());
+  ::unsetenv("JOURNAL_STREAM");
+}
+
+TEST_CASE("fields hold for what is logged while they live, the innermost alone", "[journal]") {
+  CHECK(JournalFields::here().empty());
+  {
+    const JournalFields outer(one("A", "1"));
+    CHECK(field(JournalFields::here(), "A") == "1");
+    {
+      const JournalFields inner(one("B", "2"));
+      CHECK(field(JournalFields::here(), "A") == "(none)");
+      CHECK(field(JournalFields::here(), "B") == "2");
+    }
+    CHECK(field(JournalFields::here(), "A") == "1");
+  }
+  CHECK(JournalFields::here().empty());
+}
+
+TEST_CASE("an event can be asked for by its state, its fault and its time", "[journal]") {
+  Event event;
+  event.at = TimePoint(std::chrono::nanoseconds(1234));
+  event.kind = Event::Kind::fault;
+  event.detail = static_cast<std::uint32_t>(Fault::overspeed);
+  JournalFieldList fields = journal_fields(event);
+  CHECK(field(fields, "MESSAGE_ID") == kFaultMessage);
+  CHECK(field(fields, "WRENCHD_FAULT") == "overspeed");
+  CHECK(field(fields, "WRENCHD_CURE") == std::string(fault_row(Fault::overspeed).cure));
+  CHECK(field(fields, "WRENCHD_TIME_NS") == "1234");
+
+  event.kind = Event::Kind::state;
+  event.detail = static_cast<std::uint32_t>(State::active);
+  fields = journal_fields(event);
+  CHECK(field(fields, "MESSAGE_ID") == kStateMessage);
+  CHECK(field(fields, "WRENCHD_STATE") == "active");
+  CHECK(field(fields, "WRENCHD_FAULT") == "(none)");
+
+  event.kind = Event::Kind::placed;
+  CHECK(field(journal_fields(event), "MESSAGE_ID") == kRenderingMessage);
+}
+
+TEST_CASE("ids of messages are 128 bits, and three", "[journal]") {
+  for (const std::string id : {kStateMessage, kFaultMessage, kRenderingMessage}) {
+    CHECK(id.size() == 32);
+    CHECK(id.find_first_not_of("0123456789abcdef") == std::string::npos);
+  }
+  CHECK(std::string(kStateMessage) != kFaultMessage);
+  CHECK(std::string(kStateMessage) != kRenderingMessage);
+  CHECK(std::string(kFaultMessage) != kRenderingMessage);
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include <catch2/catch.hpp>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "daemon/service_notify.hpp"
+#include "tests/support/run_program.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+using namespace std::chrono_literals;
+using Catch::Contains;
+
+std::optional<LoopView> loop(State state, std::uint64_t ticks, Fault cause = Fault::none) {
+  return LoopView{state, cause, ticks};
+}
+
+TEST_CASE("the service is ready when the self-test is over, and not before", "[service_notify]") {
+  ServiceReport report;
+  CHECK(report.look({}) == "STATUS=starting\n");
+  report.running("loopback");
+  CHECK(report.look(loop(State::disconnected, 0)) == "STATUS=disconnected; device loopback\n");
+  CHECK(report.look(loop(State::self_test, 10)) == "STATUS=self-test; device loopback\n");
+  CHECK(report.look(loop(State::self_test, 20)) == "");
+  CHECK(report.look(loop(State::disarmed, 30)) == "READY=1\nWATCHDOG=1\nSTATUS=disarmed; device loopback\n");
+  CHECK(report.look(loop(State::disarmed, 40)) == "WATCHDOG=1\n");
+}
+
+TEST_CASE("a self-test that fails makes it ready all the same, with the fault and its cure as status",
+          "[service_notify]") {
+  ServiceReport report;
+  report.running("loopback");
+  report.look(loop(State::self_test, 10));
+  const FaultRow& row = fault_row(Fault::test_rate);
+  CHECK(report.look(loop(State::fault, 20, Fault::test_rate)) ==
+        "READY=1\nWATCHDOG=1\nSTATUS=fault: test_rate: " + std::string(row.sentence) + "; " +
+            std::string(row.cure) + "; device loopback\n");
+}
+
+TEST_CASE("what waits for a device is ready and alive", "[service_notify]") {
+  ServiceReport report;
+  report.waiting("no device is\nplugged in");
+  CHECK(report.look({}) == "READY=1\nWATCHDOG=1\nSTATUS=waiting: no device is plugged in\n");
+  CHECK(report.look({}) == "WATCHDOG=1\n");
+}
+
+TEST_CASE("a loop that does not tick gives no sign of life, until it ticks again", "[service_notify]") {
+  ServiceReport report;
+  report.running("loopback");
+  report.look(loop(State::disarmed, 7));
+  CHECK(report.look(loop(State::disarmed, 7)) == "");
+  CHECK(report.look(loop(State::disarmed, 7)) == "");
+  CHECK(report.look(loop(State::disarmed, 8)) == "WATCHDOG=1\n");
+}
+
+TEST_CASE("a device that comes back has its loop watched anew, and readiness is told once",
+          "[service_notify]") {
+  ServiceReport report;
+  report.running("a");
+  report.look(loop(State::disarmed, 7));
+  report.waiting("the device was unplugged");
+  CHECK(report.look({}) == "WATCHDOG=1\nSTATUS=waiting: the device was unplugged\n");
+  report.running("a");
+  CHECK(report.look(loop(State::self_test, 7)) == "WATCHDOG=1\nSTATUS=self-test; device a\n");
+  CHECK(report.look(loop(State::self_test, 7)) == "");
+  CHECK(report.look(loop(State::disarmed, 9)) == "WATCHDOG=1\nSTATUS=disarmed; device a\n");
+}
+
+TEST_CASE("reading a configuration anew and stopping are told once each", "[service_notify]") {
+  ServiceReport report;
+  report.running("a");
+  report.look(loop(State::disarmed, 7));
+  report.reloading(123456);
+  CHECK(report.look(loop(State::disarmed, 8)) == "RELOADING=1\nMONOTONIC_USEC=123456\nWATCHDOG=1\n");
+  CHECK(report.look(loop(State::disarmed, 9)) == "WATCHDOG=1\n");
+  report.reloaded();
+  CHECK(report.look(loop(State::disarmed, 10)) == "READY=1\nWATCHDOG=1\n");
+  report.stopping("stopping");
+  CHECK(report.look({}) == "STOPPING=1\nWATCHDOG=1\nSTATUS=stopping\n");
+  report.stopping("refused: x.toml:1:1: no");
+  CHECK(report.look({}) == "WATCHDOG=1\nSTATUS=refused: x.toml:1:1: no\n");
+}
+
+/// Stands in for the service manager: a socket, and what was sent to it.
+class Manager {
+ public:
+  Manager() : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    const std::string path = (dir_.path() / "notify").string();
+    std::strncpy(address.sun_path, path.c_str(), sizeof(address.sun_path) - 1);
+    REQUIRE(::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0);
+    ::setenv("NOTIFY_SOCKET", path.c_str(), 1);
+    ::setenv("WATCHDOG_USEC", "400000", 1);
+  }
+  ~Manager() {
+    ::unsetenv("NOTIFY_SOCKET");
+    ::unsetenv("WATCHDOG_USEC");
+    ::close(socket_);
+  }
+  Manager(const Manager&) = delete;
+  Manager& operator=(const Manager&) = delete;
+
+  /// All that has come since the last time, a line each.
+  std::string heard() {
+    std::string text;
+    char message[4096];
+    for (ssize_t n; (n = ::recv(socket_, message, sizeof(message), 0)) > 0;)
+      text.append(message, static_cast<std::size_t>(n));
+    return text;
+  }
+  /// Waits for it.
+  bool hears(const std::string& text) {
+    for (const auto end = std::chrono::steady_clock::now() + 20s; std::chrono::steady_clock::now() < end;) {
+      all_ += heard();
+      if (all_.find(text) != std::string::npos) return true;
+      std::this_thread::sleep_for(5ms);
+    }
+    return false;
+  }
+  const std::string& all() const { return all_; }
+  void forget() {
+    heard();
+    all_.clear();
+  }
+
+ private:
+  TemporaryDirectory dir_;
+  int socket_;
+  std::string all_;
+};
+
+TEST_CASE("the manager hears of it by its socket, and no more of life once the ticks stand still",
+          "[service_notify]") {
+  Manager manager;
+  std::atomic<std::uint64_t> ticks{0};
+  std::atomic<bool> ticking{true};
+  ServiceNotify service;
+  CHECK(manager.hears("STATUS=starting\n"));
+  service.running(
+      [&] {
+        return LoopView{State::disarmed, Fault::none, ticking ? ++ticks : ticks.load()};
+      },
+      "loopback");
+  CHECK(manager.hears("READY=1\n"));
+  manager.forget();
+  CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\nWATCHDOG=1\n"));
+  ticking = false;
+  service.running([&] { return LoopView{State::disarmed, Fault::none, ticks.load()}; }, "loopback");
+  std::this_thread::sleep_for(150ms);
+  manager.forget();
+  std::this_thread::sleep_for(300ms);
+  CHECK(manager.heard() == "");
+  service.waiting("nothing is plugged in");
+  CHECK(manager.hears("WATCHDOG=1\nSTATUS=waiting: nothing is plugged in\n"));
+}
+
+TEST_CASE("nobody asked: nothing is said and no thread runs", "[service_notify]") {
+  ::unsetenv("NOTIFY_SOCKET");
+  ServiceNotify service;
+  bool asked = false;
+  service.running(
+      [&] {
+        asked = true;
+        return LoopView{};
+      },
+      "loopback");
+  std::this_thread::sleep_for(150ms);
+  service.loop_ended();
+  CHECK_FALSE(asked);
+}
+
+TEST_CASE("wrenchd tells its manager: ready after the self-test, alive, stopping", "[service_notify]") {
+  Manager manager;
+  RunningProgram wrenchd("wrenchd", {"--simulate", "loopback", "--realtime", "best_effort"});
+  CHECK(manager.hears("READY=1\n"));
+  CHECK_THAT(manager.all(), Contains("STATUS=self-test; device loopback, simulated\n"));
+  CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
+  manager.forget();
+  CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\n"));
+  wrenchd.signal(SIGUSR1);
+  CHECK(manager.hears("STATUS=stopped: stop_asked: "));
+  wrenchd.signal(SIGUSR2);
+  CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
+  manager.forget();
+  wrenchd.signal(SIGTERM);
+  CHECK(wrenchd.wait().exit_code == 0);
+  CHECK(manager.hears("STOPPING=1\n"));
+}
+
+TEST_CASE("wrenchd that refuses to start leaves its reason as status, and was never ready",
+          "[service_notify]") {
+  Manager manager;
+  const TemporaryDirectory dir;
+  const std::string file = dir.write("typo.toml", "[servo]\nrat_Hz = 1000\n").string();
+  CHECK(run_program("wrenchd", {"--config", file}).exit_code == 1);
+  CHECK(manager.hears("STATUS=refused: " + file + ":2:1: key 'servo.rat_Hz' is not known"));
+  CHECK_THAT(manager.all(), !Contains("READY=1"));
+}
+
+TEST_CASE("wrenchd without a device is ready, and says what it waits for", "[service_notify]") {
+  Manager manager;
+  RunningProgram wrenchd("wrenchd", {"--profile", "reference_full_speed", "--realtime", "best_effort"});
+  CHECK(manager.hears("STATUS=waiting: "));
+  CHECK_THAT(manager.all(),
+             Contains("READY=1\n") && Contains("no device of profile reference_full_speed is plugged in\n"));
+  wrenchd.signal(SIGTERM);
+  CHECK(wrenchd.wait().exit_code == 0);
+}
+
+}  // namespace
+}  // namespace wrenchd
