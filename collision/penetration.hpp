@@ -67,6 +67,9 @@ class PenetrationDepth {
   /// was admissible when the obstacles stood as at scene_time_s [s]. RT safe.
   void forget(double scene_time_s = 0.0) noexcept;
 
+  /// Whether contacts with mesh obstacles number the features of the meshes, or those of their hulls.
+  bool knows_mesh_features() const noexcept { return proxy_.has_value(); }
+
  private:
   Penetration follow_smoothly(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
   Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;

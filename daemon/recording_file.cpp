@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recording_file.hpp"
 
-#include <array>
-#include <cstddef>
-#include <tuple>
-
 #include <hdf5.h>
+
+#include "daemon/record_fields.hpp"
 
 namespace wrenchd {
 namespace {
@@ -17,92 +15,24 @@ constexpr const char* kFormat = "4";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;
-constexpr hsize_t kStages = std::tuple_size_v<decltype(TickRecord::stage_ns)>;
 
-/// One column of the table: the one place that ties names and units to the fields of TickRecord.
-struct Column {
-  const char* name;
-  const char* unit;
-  std::size_t offset;
-  hid_t (*type)();
-  hsize_t count;
-};
-
-hid_t u64() {
-  return H5T_NATIVE_UINT64;
-}
-hid_t i64() {
-  return H5T_NATIVE_INT64;
-}
-hid_t u32() {
-  return H5T_NATIVE_UINT32;
-}
-hid_t u16() {
-  return H5T_NATIVE_UINT16;
-}
-hid_t u8() {
-  return H5T_NATIVE_UINT8;
-}
-hid_t f64() {
+hid_t type_of(FieldType type) {
+  switch (type) {
+    case FieldType::u8:
+      return H5T_NATIVE_UINT8;
+    case FieldType::u16:
+      return H5T_NATIVE_UINT16;
+    case FieldType::u32:
+      return H5T_NATIVE_UINT32;
+    case FieldType::u64:
+      return H5T_NATIVE_UINT64;
+    case FieldType::i64:
+      return H5T_NATIVE_INT64;
+    case FieldType::f64:
+      break;
+  }
   return H5T_NATIVE_DOUBLE;
 }
-
-#define WRENCHD_COLUMN(field, unit, type, count)           \
-  Column {                                                 \
-#field, unit, offsetof(TickRecord, field), type, count \
-  }
-constexpr std::array kColumns = {
-    WRENCHD_COLUMN(tick, "1", u64, 1),
-    WRENCHD_COLUMN(now_ns, "ns", i64, 1),
-    WRENCHD_COLUMN(arrived_ns, "ns", i64, 1),
-    WRENCHD_COLUMN(device_time_s, "s", f64, 1),
-    WRENCHD_COLUMN(sequence, "1", u64, 1),
-    WRENCHD_COLUMN(acknowledged, "1", u64, 1),
-    WRENCHD_COLUMN(skipped, "1", u32, 1),
-    WRENCHD_COLUMN(missing, "1", u32, 1),
-    WRENCHD_COLUMN(rejected, "1", u32, 1),
-    WRENCHD_COLUMN(repeated, "1", u32, 1),
-    WRENCHD_COLUMN(buttons, "bits", u32, 1),
-    WRENCHD_COLUMN(fresh, "bool", u8, 1),
-    WRENCHD_COLUMN(motors_on, "bool", u8, 1),
-    WRENCHD_COLUMN(watchdog_tripped, "bool", u8, 1),
-    WRENCHD_COLUMN(homed, "bool", u8, 1),
-    WRENCHD_COLUMN(sample_fault, "enum", u8, 1),
-    WRENCHD_COLUMN(write_fault, "enum", u8, 1),
-    WRENCHD_COLUMN(commands, "bits", u16, 1),
-    WRENCHD_COLUMN(commanded, "1", u64, 1),
-    WRENCHD_COLUMN(slept_ns, "ns", i64, 1),
-    WRENCHD_COLUMN(X_BH, "m m m, qx qy qz qw", f64, 7),
-    WRENCHD_COLUMN(V_BH, "m/s x3, rad/s x3", f64, 6),
-    WRENCHD_COLUMN(X_WP, "m m m, qx qy qz qw", f64, 7),
-    WRENCHD_COLUMN(X_WQ, "m m m, qx qy qz qw", f64, 7),
-    WRENCHD_COLUMN(eps, "m x3, rad x3", f64, 6),
-    WRENCHD_COLUMN(F_T, "N x3, N.m x3", f64, 6),
-    WRENCHD_COLUMN(energy, "kg m^2", f64, 1),
-    WRENCHD_COLUMN(kkt_residual, "1", f64, 1),
-    WRENCHD_COLUMN(contacts, "1", u16, 1),
-    WRENCHD_COLUMN(iterations, "1", u16, 1),
-    WRENCHD_COLUMN(projection_status, "enum", u8, 1),
-    WRENCHD_COLUMN(placing, "enum", u8, 1),
-    WRENCHD_COLUMN(state, "enum", u8, 1),
-    WRENCHD_COLUMN(cause, "enum", u8, 1),
-    WRENCHD_COLUMN(faults, "bits", u64, 1),
-    WRENCHD_COLUMN(limit_causes, "bits", u16, 1),
-    WRENCHD_COLUMN(dropped, "bits", u8, 1),
-    WRENCHD_COLUMN(motors_told, "bool", u8, 1),
-    WRENCHD_COLUMN(released, "bool", u8, 1),
-    WRENCHD_COLUMN(authority, "1", f64, 1),
-    WRENCHD_COLUMN(stiffness_share, "1", f64, 1),
-    WRENCHD_COLUMN(guard_share, "1", f64, 1),
-    WRENCHD_COLUMN(energy_in_J, "J", f64, 1),
-    WRENCHD_COLUMN(energy_out_J, "J", f64, 1),
-    WRENCHD_COLUMN(injected_J, "J", f64, 1),
-    WRENCHD_COLUMN(F_out, "N x3, N.m x3", f64, 6),
-    WRENCHD_COLUMN(answered_ns, "ns", i64, 1),
-    WRENCHD_COLUMN(wake_latency_ns, "ns", i64, 1),
-    WRENCHD_COLUMN(stage_ns, "ns x5: read projection wrench limits write", i64, kStages),
-};
-#undef WRENCHD_COLUMN
 
 /// Owns an HDF5 identifier.
 class Handle {
@@ -129,20 +59,21 @@ void quiet() {
 
 hid_t row_type() {
   const hid_t row = H5Tcreate(H5T_COMPOUND, sizeof(TickRecord));
-  for (const Column& column : kColumns) {
-    if (column.count == 1) {
-      H5Tinsert(row, column.name, column.offset, column.type());
+  for (const RecordField& field : tick_fields()) {
+    if (field.count == 1) {
+      H5Tinsert(row, field.name, field.offset, type_of(field.type));
       continue;
     }
-    const Handle array(H5Tarray_create2(column.type(), 1, &column.count), H5Tclose);
-    H5Tinsert(row, column.name, column.offset, array);
+    const hsize_t count = field.count;
+    const Handle array(H5Tarray_create2(type_of(field.type), 1, &count), H5Tclose);
+    H5Tinsert(row, field.name, field.offset, array);
   }
   return row;
 }
 
 std::string units() {
   std::string text;
-  for (const Column& column : kColumns) text += std::string(column.name) + " [" + column.unit + "]\n";
+  for (const RecordField& field : tick_fields()) text += std::string(field.name) + " [" + field.unit + "]\n";
   return text;
 }
 

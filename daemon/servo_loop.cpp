@@ -50,6 +50,7 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
       placer_(placer),
       clock_(clock),
       records_(records),
+      scene_(scene),
       X_WB_(pose_of(settings.device.base_in_world)),
       X_HT_(pose_of(settings.device.tool_in_handle) * scene.tool().X_MT()),
       wrench_point_(profile.wrench_point),
@@ -445,8 +446,15 @@ void ServoLoop::publish() noexcept {
   seen_state_.store(machine_.state(), std::memory_order_relaxed);
   seen_cause_.store(machine_.cause(), std::memory_order_relaxed);
   latest_.write(record_);
+  if (shown_ != nullptr) shown_->write(record_, touches());
   if (records_ != nullptr && !records_->push(record_))
     dropped_records_.fetch_add(1, std::memory_order_relaxed);
+}
+
+/// The contacts of the tick, for whoever looks.
+Touches ServoLoop::touches() const noexcept {
+  if (depth_.contacts == 0) return {};
+  return wrenchd::touches(depth_.projection, scene_, penetration_.knows_mesh_features());
 }
 
 void ServoLoop::record_sample(const DeviceSample& sample) noexcept {

@@ -21,6 +21,7 @@
 #include "daemon/loop_timing.hpp"
 #include "daemon/placer.hpp"
 #include "daemon/self_test.hpp"
+#include "daemon/shared_state.hpp"
 #include "daemon/steady_contact.hpp"
 #include "daemon/tick_record.hpp"
 #include "daemon/watches.hpp"
@@ -49,6 +50,9 @@ class ServoLoop {
   /// recorded.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
             Placer& placer, const Clock& clock, RecordRing* records = nullptr);
+
+  /// Shows every tick to other processes from now on. state must outlive this. Before the loop runs.
+  void show_in(SharedState& state) noexcept { shown_ = &state; }
 
   /// Ticks until stop is set and the force has faded, or the device is gone, and releases the hand on every
   /// way out. Faults of every other kind are states in which it goes on. Returns device_lost, or none. clock:
@@ -107,6 +111,7 @@ class ServoLoop {
   void finish(TimePoint now, const Limited& out) noexcept;
   void describe(const Limited& out) noexcept;
   void publish() noexcept;
+  Touches touches() const noexcept;
 
   void test(const DeviceSample& sample, TimePoint now) noexcept;
   void found(FaultSet faults, TimePoint now, double value = 0.0) noexcept;
@@ -127,6 +132,8 @@ class ServoLoop {
   Placer& placer_;
   const Clock& clock_;
   RecordRing* records_;
+  SharedState* shown_ = nullptr;
+  const Scene& scene_;
   Pose X_WB_;
   Pose X_HT_;
   WrenchPoint wrench_point_;

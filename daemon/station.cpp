@@ -31,6 +31,14 @@ std::filesystem::path named_on_command_line(const std::filesystem::path& name, c
                     search.not_found(name) + ", and from here " + given.lexically_normal().string());
 }
 
+/// How often the loop ticks at most: by the clock, or with each report of the device.
+double tick_rate_Hz(const Plan& plan) {
+  const double reports_Hz = plan.profile.report_rate_Hz;
+  const double rate_Hz = plan.settings.servo.rate_Hz;
+  if (plan.settings.servo.pacing == Pacing::clock || !(reports_Hz > rate_Hz)) return rate_Hz;
+  return reports_Hz;
+}
+
 std::unique_ptr<Placer> make_placer(const Scene& scene, PlaceIn place_in) {
   if (place_in == PlaceIn::step) return std::make_unique<PlacerInStep>(scene);
   return std::make_unique<PlacerThread>(scene);
@@ -89,6 +97,12 @@ Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, Me
 
 Station::~Station() {
   device_.close();
+}
+
+SharedState& Station::show_state() {
+  shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(plan_));
+  loop_.show_in(*shared_state_);
+  return *shared_state_;
 }
 
 RecordingHeader Station::recording_header() const {

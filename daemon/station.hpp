@@ -77,6 +77,8 @@ class Station {
   ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
   RecordRing& records() noexcept { return records_; }
+  /// Shows every tick to other processes from now on. Before the loop runs, once. Throws std::system_error.
+  SharedState& show_state();
 
   /// What a recording of this station must know.
   RecordingHeader recording_header() const;
@@ -88,6 +90,7 @@ class Station {
   ProfileDevice device_;
   std::unique_ptr<Placer> placer_;
   RecordRing records_;
+  std::unique_ptr<SharedState> shared_state_;
   ServoLoop loop_;
 };
 

@@ -7,7 +7,7 @@
 namespace wrenchd {
 
 /// Everything one tick saw and did, in plain numbers: what the live line shows, what a recording keeps, what
-/// a replay compares. Field names carry frame and unit; daemon/recording_file.cpp lists them for the file.
+/// a replay compares. Field names carry frame and unit; daemon/record_fields.cpp lists them.
 ///
 /// Poses are x y z [m], qx qy qz qw. Wrenches are fx fy fz [N], tx ty tz [N.m].
 struct TickRecord {

@@ -40,6 +40,7 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   plan.settings.limits.max_force_N = 1.0;
   plan.settings.recording.file = "not-written";  // records go into the ring, until it is full
   VirtualStation s(plan);
+  s.station.show_state();
   s.inject(SimulatedFault::Kind::garble, 5.0, 0.002);
   s.inject(SimulatedFault::Kind::unplug, 9.99, 1.0);
   s.station.loop().arm();

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Holds the Python package against a daemon at WRENCHD_SOCKET that ticks, has a cube in the hand above a table, and
+lets everybody do everything."""
+
+import gc
+import math
+import os
+import socket
+import tempfile
+import threading
+import time
+import unittest
+
+import wrenchd
+
+
+def soon(done):
+    end = time.monotonic() + 30
+    while time.monotonic() < end:
+        if done():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def insist_on_arming(client):
+    """A busy machine may make the loop late, which is a fault to it."""
+    state = client.status()["state"]
+    if state == "fault":
+        client.acknowledge()
+    if state == "disarmed":
+        client.arm()
+
+
+def rests(client):
+    client.disarm()
+    if client.status()["state"] in ("fault", "stopped"):
+        client.acknowledge()
+    return client.status()["state"] == "disarmed"
+
+
+class Answers(threading.Thread):
+    """A daemon that sends what it is told to, and ends."""
+
+    def __init__(self, *answers):
+        super().__init__(daemon=True)
+        self.directory = tempfile.TemporaryDirectory()
+        self.path = os.path.join(self.directory.name, "control.sock")
+        self.answers = answers
+        self.listening = socket.socket(socket.AF_UNIX)
+        self.listening.bind(self.path)
+        self.listening.listen()
+        self.start()
+
+    def run(self):
+        peer, _ = self.listening.accept()
+        for answer in self.answers:
+            peer.recv(65536)
+            for i in range(0, len(answer), 5):
+                peer.sendall(answer[i:i + 5])
+        peer.close()
+
+
+class Commands(unittest.TestCase):
+    def setUp(self):
+        self.client = wrenchd.Client()
+        self.addCleanup(self.client.close)
+        self.assertTrue(soon(lambda: rests(self.client)))
+
+    def test_lease_arm_and_stop(self):
+        with self.assertRaises(wrenchd.Refused) as refused:
+            self.client.arm()
+        self.assertEqual(refused.exception.code, wrenchd.Refused.NOT_NOW)
+        with self.client.lease():
+            with wrenchd.Client() as other, self.assertRaises(wrenchd.Refused) as refused:
+                other.lease()
+            self.assertEqual(refused.exception.code, wrenchd.Refused.TAKEN)
+
+            def active():
+                insist_on_arming(self.client)
+                return self.client.status()["state"] == "active"
+
+            self.assertTrue(soon(active))
+            with self.client.open_state() as state:
+                self.assertTrue(soon(lambda: len(state.latest().touches) == 4))
+                tick = state.latest()
+            self.client.stop()
+            self.assertTrue(soon(lambda: self.client.status()["state"] in ("stopped", "fault")))
+        self.assertTrue(soon(lambda: rests(self.client)))
+        if tick.touches:
+            self.assertAlmostEqual(sum(touch.share for touch in tick.touches), 1.0)
+
+    def test_a_lease_ends_with_its_connection(self):
+        dying = wrenchd.Client()
+        dying.lease()
+        dying.close()
+
+        def free():
+            try:
+                self.client.lease().give()
+                return True
+            except wrenchd.Refused:
+                return False
+
+        self.assertTrue(soon(free))
+
+    def test_refusals_have_a_sentence(self):
+        with self.assertRaisesRegex(wrenchd.Refused, "there is no method 'dance'"):
+            self.client.call("dance")
+        self.assertIn("state", self.client.status())
+
+    def test_events(self):
+        self.assertIn("state", self.client.subscribe("no_such_event"))
+        self.assertIsNone(self.client.event(0.01))
+        self.client.unsubscribe()
+
+
+class ReadsState(unittest.TestCase):
+    def setUp(self):
+        self.client = wrenchd.Client()
+        self.addCleanup(self.client.close)
+        self.state = self.client.open_state()
+        self.addCleanup(self.state.close)
+
+    def test_ticks_have_all_that_is_described(self):
+        described = self.state.describe()
+        self.assertIn("X_WQ", described)
+        tick = self.state.next()
+        for name, (unit, meaning) in described.items():
+            with self.subTest(name):
+                self.assertTrue(unit and meaning)
+                value = getattr(tick, name)
+                if unit == "bool":
+                    self.assertIsInstance(value, bool)
+                if unit == "enum":
+                    self.assertIsInstance(value, str)
+        self.assertEqual(len(tick.F_out), 6)
+        self.assertEqual(len(tick.X_WP), 7)
+        self.assertAlmostEqual(math.hypot(*tick.X_WP[3:]), 1.0)
+        self.assertIsInstance(tick["state"], int)
+        self.assertIsInstance(tick.faults, list)
+        with self.assertRaisesRegex(AttributeError, "describe"):
+            tick.no_such_field
+
+    def test_latest_is_not_older_than_next(self):
+        tick = self.state.next()
+        self.assertGreaterEqual(self.state.latest().tick, tick.tick)
+
+    def test_a_slow_reader_is_told_what_it_missed(self):
+        first = self.state.next().tick
+        written = self.state._written
+        slots = self.state._layout.slots
+        self.assertTrue(soon(lambda: self.state.behind > slots + 10))
+        second = self.state.next().tick
+        self.assertEqual(second - first, self.state.missed + 1)
+        self.assertGreater(self.state.missed, slots // 2)
+        self.assertLess(self.state.behind, slots)
+        self.assertGreater(written(), slots)
+
+    def test_touches_name_what_touches(self):
+        def touched():
+            return bool(self.state.latest().touches)
+
+        self.assertTrue(soon(touched))
+        for tick in self.state.ticks(5000):
+            if tick.touches:
+                break
+        touch = tick.touches[0]
+        self.assertEqual(touch.obstacle, "table")
+        self.assertRegex(str(touch), r"^hull vertex \d+ on table plane$")
+        self.assertEqual(touch.normal_W, (0.0, 0.0, 1.0))
+        self.assertLess(abs(touch.point_W_m[2]), 1e-6)
+
+    def test_arrays_are_the_same_ticks(self):
+        try:
+            import numpy
+        except ImportError:
+            self.skipTest("numpy is not installed")
+        array = self.state.array(200)
+        self.assertTrue((numpy.diff(array["tick"].astype(numpy.int64)) == 1).all())
+        self.assertEqual(array["F_out"].shape, (200, 6))
+        self.assertEqual(array["touches"]["point_W_m"].shape, (200, 16, 3))
+        numpy.testing.assert_allclose(numpy.linalg.norm(array["X_WP"][:, 3:], axis=1), 1.0)
+
+
+class Unhappy(unittest.TestCase):
+    def test_no_daemon(self):
+        with self.assertRaisesRegex(wrenchd.NoDaemon, "/nowhere/s: No such file.*start it"):
+            wrenchd.Client("/nowhere/s")
+
+    def test_a_daemon_that_ends_is_an_error_and_no_wait(self):
+        client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"result":{"state":"disarmed"}}\n').path)
+        self.assertEqual(client.status(), {"state": "disarmed"})
+        for _ in range(3):
+            with self.assertRaises(wrenchd.Gone):
+                client.status()
+        with self.assertRaises(wrenchd.Gone):
+            client.event()
+        self.assertFalse(client.is_there())
+
+    def test_half_a_line_is_no_answer(self):
+        client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"res').path, 1.0)
+        with self.assertRaises((wrenchd.Gone, wrenchd.Timeout)):
+            client.status()
+
+    def test_a_daemon_that_hangs(self):
+        client = wrenchd.Client(Answers(b"", b"").path, 0.1)
+        with self.assertRaises(wrenchd.Timeout):
+            client.status()
+
+    def test_nonsense(self):
+        client = wrenchd.Client(Answers(b"[1]\n").path)
+        with self.assertRaises(wrenchd.ProtocolError):
+            client.status()
+
+    def test_events_between_answers_are_kept(self):
+        event = b'{"jsonrpc":"2.0","method":"event","params":{"name":"fault","sequence":%d}}\n'
+        client = wrenchd.Client(Answers(event % 1 + event % 2 + b'{"jsonrpc":"2.0","id":1,"result":{}}\n').path)
+        client.status()
+        self.assertEqual([client.event()["sequence"], client.event()["sequence"]], [1, 2])
+
+    def test_memory_that_is_not_sealed_is_refused(self):
+        with wrenchd.Client() as client:
+            layout = client.call("state.open")["layout"]
+        unsealed = os.memfd_create("unsealed", os.MFD_ALLOW_SEALING)
+        os.ftruncate(unsealed, layout["bytes"])
+        with self.assertRaisesRegex(wrenchd.ProtocolError, "not sealed"):
+            wrenchd.State(layout, unsealed)
+        with self.assertRaises(wrenchd.ProtocolError):
+            wrenchd.State({**layout, "version": 2}, os.memfd_create("x"))
+
+    def test_no_descriptor_is_left(self):
+        def count():
+            gc.collect()
+            return len(os.listdir("/proc/self/fd"))
+
+        before = count()
+        for _ in range(10):
+            with wrenchd.Client() as client:
+                client.call("state.open")  # its descriptor is nobody's
+                client.status()
+                with client.open_state() as state:
+                    state.next()
+        self.assertEqual(count(), before)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/support/stub_daemon.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "core/fault.hpp"
+#include "daemon/realtime.hpp"
+#include "daemon/shared_state.hpp"
+#include "daemon/state_layout.hpp"
+
+namespace wrenchd::test {
+namespace {
+
+using nlohmann::json;
+
+struct Refusal {
+  int code;
+  std::string message;
+};
+
+int listen_at(const std::string& path) {
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof(address.sun_path)) throw std::runtime_error(path + " is too long for a socket");
+  std::memcpy(address.sun_path, path.data(), path.size());
+  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 || listen(fd, 8) != 0)
+    throw std::runtime_error(path + ": " + std::strerror(errno));
+  return fd;
+}
+
+/// The descriptor goes with the first byte.
+void send_line(int peer, const std::string& line, int descriptor = -1) {
+  iovec part = {const_cast<char*>(line.data()), line.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> ancillary{};
+  if (descriptor >= 0) {
+    message.msg_control = ancillary.data();
+    message.msg_controllen = ancillary.size();
+    cmsghdr* const rights = CMSG_FIRSTHDR(&message);
+    rights->cmsg_level = SOL_SOCKET;
+    rights->cmsg_type = SCM_RIGHTS;
+    rights->cmsg_len = CMSG_LEN(sizeof(int));
+    std::memcpy(CMSG_DATA(rights), &descriptor, sizeof(int));
+  }
+  sendmsg(peer, &message, MSG_NOSIGNAL);
+}
+
+Plan shown_plan() {
+  Plan plan = shipped_plan();
+  plan.settings.servo.realtime = Realtime::best_effort;
+  return plan;
+}
+
+}  // namespace
+
+StubDaemon::StubDaemon()
+    : simulated_(shown_plan()), state_(simulated_.station.show_state()), listening_(listen_at(socket())) {
+  servo_ = std::thread([this] {
+    prepare_servo_thread(simulated_.station.plan().settings.servo);
+    loop().run(simulated_.clock, stop_loop_);
+  });
+  while (loop().state() == State::disconnected) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  serving_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+}
+
+StubDaemon::~StubDaemon() {
+  serving_.request_stop();
+  serving_.join();
+  hang_up();
+  close(listening_);
+  stop_loop_.store(true);
+  servo_.join();
+}
+
+std::vector<std::string> StubDaemon::asked() const {
+  const std::lock_guard lock(mutex_);
+  return asked_;
+}
+
+void StubDaemon::tell(const std::string& name, const std::string& level) {
+  const std::lock_guard lock(mutex_);
+  ++sequence_;
+  const json event = {
+      {"jsonrpc", "2.0"},
+      {"method", "event"},
+      {"params", {{"sequence", sequence_}, {"time_ns", 7}, {"name", name}, {"level", level}}}};
+  for (const auto& [fd, peer] : peers_)
+    if (peer.subscribed &&
+        (peer.names.empty() || std::find(peer.names.begin(), peer.names.end(), name) != peer.names.end()))
+      send_line(fd, event.dump() + "\n");
+}
+
+void StubDaemon::send_raw(const std::string& bytes) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [fd, peer] : peers_)
+    for (std::size_t i = 0; i < bytes.size(); i += 3) send_line(fd, bytes.substr(i, 3));
+}
+
+void StubDaemon::hang_up() {
+  const std::lock_guard lock(mutex_);
+  while (!peers_.empty()) end(peers_.begin()->first);
+}
+
+void StubDaemon::end(int peer) {
+  peers_.erase(peer);
+  close(peer);
+  int held = peer;
+  if (holder_.compare_exchange_strong(held, -1)) loop().disarm();
+}
+
+void StubDaemon::serve(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    std::vector<pollfd> waited = {{listening_, POLLIN, 0}};
+    {
+      const std::lock_guard lock(mutex_);
+      for (const auto& [fd, peer] : peers_) waited.push_back({fd, POLLIN, 0});
+    }
+    if (poll(waited.data(), waited.size(), 5) <= 0) continue;
+    const std::lock_guard lock(mutex_);
+    for (const pollfd& one : waited) {
+      if (one.revents == 0) continue;
+      if (one.fd == listening_)
+        peers_[accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC)];
+      else if (peers_.count(one.fd) == 1 && !receive(one.fd))
+        end(one.fd);
+    }
+  }
+}
+
+bool StubDaemon::receive(int peer) {
+  std::array<char, 4096> bytes;
+  const ssize_t got = recv(peer, bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (got <= 0) return false;
+  std::string& received = peers_[peer].received;
+  received.append(bytes.data(), static_cast<std::size_t>(got));
+  for (std::size_t at; (at = received.find('\n')) != std::string::npos;) {
+    const std::string line = received.substr(0, at);
+    received.erase(0, at + 1);
+    answer(peer, line);
+  }
+  return true;
+}
+
+void StubDaemon::answer(int peer, const std::string& line) {
+  const json request = json::parse(line);
+  const std::string method = request.at("method");
+  if (method == "beat") {
+    if (holder_.load() == peer) ++beats_;
+    loop().live();
+  } else {
+    asked_.push_back(method);
+  }
+  if (!request.contains("id") || silent_.load()) return;
+  json reply = {{"jsonrpc", "2.0"}, {"id", request["id"]}};
+  int descriptor = -1;
+  try {
+    reply["result"] = result_of(peer, method, request.at("params"), descriptor);
+  } catch (const Refusal& refusal) {
+    reply["error"] = {{"code", refusal.code}, {"message", refusal.message}};
+  }
+  send_line(peer, reply.dump() + "\n", descriptor);
+}
+
+json StubDaemon::status() {
+  json cause;
+  if (const Fault fault = loop().cause(); fault != Fault::none)
+    cause = {{"name", fault_row(fault).name}, {"sentence", fault_row(fault).sentence}};
+  return {{"state", name(loop().state())}, {"cause", cause}, {"sequence", sequence_}};
+}
+
+json StubDaemon::result_of(int peer, const std::string& method, const json& params, int& descriptor) {
+  const auto ask = [&](CommandSet commands) {
+    loop().ask(commands);
+    return json::object();
+  };
+  if (method == "describe") return {{"protocol", 1}, {"methods", json::array()}};
+  if (method == "status") return status();
+  if (method == "devices") return json::array();
+  if (method == "reload") throw Refusal{-32004, "wrenchd.toml:3: no such key; delete it"};
+  if (method == "subscribe") {
+    peers_[peer].subscribed = true;
+    peers_[peer].names = params.value("events", std::vector<std::string>());
+    return status();
+  }
+  if (method == "unsubscribe") {
+    peers_[peer].subscribed = false;
+    return json::object();
+  }
+  if (method == "lease.take") {
+    int nobody = -1;
+    if (!holder_.compare_exchange_strong(nobody, peer) && nobody != peer)
+      throw Refusal{-32003, "another client has the lease; wait until it gives it back"};
+    return {{"beat_within_s", 0.1}};
+  }
+  if (method == "lease.give") {
+    int held = peer;
+    if (holder_.compare_exchange_strong(held, -1)) loop().disarm();
+    return json::object();
+  }
+  if (method == "arm") {
+    if (holder_.load() != peer) throw Refusal{-32002, "only who has the lease may arm; take it first"};
+    return ask(kArm | kLease | kBeat);
+  }
+  if (method == "disarm") return ask(kDisarm);
+  if (method == "stop") return ask(kStop);
+  if (method == "acknowledge") return ask(kAcknowledge);
+  if (method == "start_over") return ask(kStartOver);
+  if (method == "state.open") {
+    json answer;
+    open_state(state_, simulated_.station.scene(), [&](const json& result, int handed_over) {
+      answer = result;
+      descriptor = handed_over;
+    });
+    return answer;
+  }
+  throw Refusal{-32601, "there is no method '" + method + "'; describe lists them"};
+}
+
+}  // namespace wrenchd::test

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+#include <wrenchd/client.hpp>
+
+#include "tests/support/run_program.hpp"
+#include "tests/support/stub_daemon.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using namespace std::chrono_literals;
+
+namespace {
+
+template <class Done>
+bool soon(const Done& done) {
+  for (int i = 0; i < 1000; ++i) {
+    if (done()) return true;
+    std::this_thread::sleep_for(10ms);
+  }
+  return false;
+}
+
+template <class Act>
+int code_of(const Act& act) {
+  try {
+    act();
+  } catch (const ClientError& error) {
+    INFO(error.what());
+    return error.code();
+  }
+  return 0;
+}
+
+/// A busy machine may make the loop late, which is a fault to it.
+void insist_on_arming(Client& client) {
+  const std::string state = client.state();
+  if (state == "fault") client.acknowledge();
+  if (state == "disarmed") client.arm();
+}
+
+bool rests(Client& client) {
+  if (client.state() == "fault") client.acknowledge();
+  return client.state() == "disarmed";
+}
+
+std::size_t open_descriptors() {
+  const std::filesystem::directory_iterator all("/proc/self/fd");
+  return static_cast<std::size_t>(std::distance(begin(all), end(all)));
+}
+
+}  // namespace
+
+TEST_CASE("a client takes the lease, arms, and reads what the hand feels", "[client]") {
+  StubDaemon daemon;
+  Client client(daemon.socket());
+  CHECK(soon([&] { return client.state() == "disarmed"; }));
+  CHECK(code_of([&] { client.arm(); }) == ClientError::kNotNow);
+  client.take_lease();
+  StateReader state = client.open_state();
+  TickState tick;
+  std::uint64_t last = 0;
+  bool pushed = false;
+  for (int i = 0; i < 20'000 && !pushed; ++i) {
+    REQUIRE(state.next(tick));
+    if (i > 0) CHECK(tick.tick() == last + 1);
+    last = tick.tick();
+    if (last % 100 == 0) insist_on_arming(client);
+    pushed = tick.state() == "active" && tick.wrench()[2] > 0.1 && tick.touches().size() == 4;
+  }
+  CHECK(pushed);
+  CHECK(state.missed() == 0);
+  CHECK(daemon.beats() > 10);
+  CHECK(soon([&] {
+    client.disarm();
+    return rests(client);
+  }));
+  client.stop();
+  CHECK(soon([&] { return client.state() == "stopped"; }));
+  client.acknowledge();
+  CHECK(soon([&] { return client.state() == "disarmed"; }));
+  client.give_lease();
+  CHECK_FALSE(daemon.leased());
+  const int beats = daemon.beats();
+  std::this_thread::sleep_for(100ms);
+  CHECK(daemon.beats() == beats);
+}
+
+TEST_CASE("a client that dies fades out: its lease ends with its connection", "[client]") {
+  StubDaemon daemon;
+  {
+    Client client(daemon.socket());
+    client.take_lease();
+    REQUIRE(soon([&] {
+      insist_on_arming(client);
+      return client.state() == "active";
+    }));
+  }
+  CHECK(soon([&] { return !is_driving(daemon.loop().state()); }));
+  CHECK_FALSE(daemon.leased());
+}
+
+TEST_CASE("what the daemon refuses comes with its sentence and its code", "[client]") {
+  StubDaemon daemon;
+  Client first(daemon.socket());
+  Client second(daemon.socket());
+  first.take_lease();
+  CHECK(code_of([&] { second.take_lease(); }) == ClientError::kTaken);
+  CHECK(code_of([&] { second.reload(); }) == ClientError::kRefusedInput);
+  CHECK(code_of([&] { second.call("dance"); }) == -32601);
+  CHECK(code_of([&] { second.call("status", "no JSON"); }) == ClientError::kProtocol);
+  CHECK_THROWS_WITH(second.reload(), "wrenchd.toml:3: no such key; delete it");
+  CHECK(second.state() == "disarmed");  // the connection goes on
+}
+
+TEST_CASE("events come in order, those asked for only, whatever answers come in between", "[client]") {
+  StubDaemon daemon;
+  Client client(daemon.socket());
+  const auto snapshot = nlohmann::json::parse(client.subscribe({"state", "fault"}));
+  CHECK(snapshot["state"] == "disarmed");
+  const auto sequence = snapshot["sequence"].get<std::uint64_t>();
+  ClientEvent event;
+  CHECK_FALSE(client.poll_event(event, 1ms));
+  daemon.tell("state", "info");
+  daemon.tell("scene", "info");
+  daemon.tell("fault", "error");
+  CHECK(client.state() == "disarmed");
+  REQUIRE(client.poll_event(event));
+  CHECK(event.name == "state");
+  CHECK(event.sequence == sequence + 1);
+  CHECK(event.time_ns == 7);
+  REQUIRE(client.poll_event(event));
+  CHECK(event.name == "fault");
+  CHECK(event.level == "error");
+  CHECK(nlohmann::json::parse(event.json)["sequence"] == sequence + 3);
+  daemon.send_raw(
+      "{\"jsonrpc\":\"2.0\",\"method\":\"event\",\"params\":{\"name\":\"device\"}}\n");  // in many parts
+  REQUIRE(client.poll_event(event));
+  CHECK(event.name == "device");
+  client.unsubscribe();
+  daemon.tell("state", "info");
+  CHECK_FALSE(client.poll_event(event, 20ms));
+}
+
+TEST_CASE("a daemon that goes, hangs or talks nonsense is an error, never a wait without end", "[client]") {
+  StubDaemon daemon;
+  Client client(daemon.socket(), 200ms);
+  StateReader state = client.open_state();
+  TickState tick;
+  REQUIRE(state.next(tick));
+  SECTION("hangs") {
+    daemon.fall_silent();
+    CHECK(code_of([&] { client.status(); }) == ClientError::kTimeout);
+  }
+  SECTION("talks nonsense") {
+    daemon.send_raw("[1]\n");
+    CHECK(code_of([&] { client.status(); }) == ClientError::kProtocol);
+  }
+  SECTION("goes") {
+    daemon.hang_up();
+    CHECK(code_of([&] { client.status(); }) == ClientError::kGone);
+    CHECK(code_of([&] { client.status(); }) == ClientError::kGone);
+    ClientEvent event;
+    CHECK(code_of([&] { client.poll_event(event); }) == ClientError::kGone);
+    REQUIRE(state.next(tick));  // the memory is there still, and written to
+  }
+}
+
+TEST_CASE("a reader hears that the daemon is gone", "[client]") {
+  auto daemon = std::make_unique<StubDaemon>();
+  Client client(daemon->socket());
+  StateReader state = client.open_state();
+  TickState tick;
+  REQUIRE(state.next(tick));
+  daemon.reset();
+  CHECK(code_of([&] {
+          while (state.next(tick, 10s)) continue;
+        }) == ClientError::kGone);
+  CHECK(state.latest(tick));  // what it left behind can be read
+  CHECK(tick.integer("released") == 1);
+}
+
+TEST_CASE("no daemon: the error names where it was looked for, and the cure", "[client]") {
+  CHECK(code_of([] { Client("/nowhere/control.sock"); }) == ClientError::kNoDaemon);
+  CHECK_THROWS_WITH(Client("/nowhere/control.sock"),
+                    Catch::Contains("/nowhere/control.sock: No such file") && Catch::Contains("start it"));
+  CHECK_THROWS_AS(Client(std::string(200, 'x')), ClientError);
+}
+
+TEST_CASE("clients leave no descriptor behind, taken or not", "[client]") {
+  StubDaemon daemon;
+  { const Client client(daemon.socket()); }
+  CHECK(soon([&] { return daemon.asked().empty(); }));
+  std::this_thread::sleep_for(50ms);
+  const std::size_t before = open_descriptors();
+  for (int i = 0; i < 20; ++i) {
+    Client client(daemon.socket());
+    client.call("state.open");  // its descriptor is nobody's
+    client.status();
+    StateReader state = client.open_state();
+    StateReader moved = std::move(state);
+    TickState tick;
+    CHECK(moved.next(tick));
+  }
+  CHECK(soon([&] { return open_descriptors() == before; }));
+}
+
+TEST_CASE("the example prints what the hand feels", "[client]") {
+  const StubDaemon daemon;
+  setenv("WRENCHD_SOCKET", daemon.socket().c_str(), 1);
+  const ProgramResult ran = run_program("wrenchd_client_example", {"3"});
+  setenv("WRENCHD_SOCKET", "/nowhere/control.sock", 1);
+  const ProgramResult alone = run_program("wrenchd_client_example", {"3"});
+  unsetenv("WRENCHD_SOCKET");
+  INFO(ran.out << ran.err);
+  CHECK(ran.exit_code == 0);
+  CHECK(ran.out.starts_with("wrenchd is disarmed\ntick "));
+  CHECK(std::count(ran.out.begin(), ran.out.end(), '\n') == 4);
+  CHECK(alone.exit_code == 1);
+  CHECK(alone.err.find("no wrenchd answers (") == 0);
+}

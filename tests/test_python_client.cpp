@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <catch2/catch.hpp>
+#include <sys/wait.h>
+
+#include "tests/support/stub_daemon.hpp"
+
+using namespace wrenchd::test;
+
+namespace {
+
+struct Ran {
+  int exit_code;
+  std::string out;
+};
+
+/// A Python program of the tree, with the package of the tree, as a client of this daemon.
+Ran run_python(const StubDaemon& daemon, const std::string& program) {
+  const std::string command = "WRENCHD_SOCKET=" + daemon.socket() +
+                              " PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=" WRENCHD_SOURCE_DIR
+                              "/tools/python timeout 120 python3 -W error " WRENCHD_SOURCE_DIR "/" +
+                              program + " 2>&1";
+  FILE* const pipe = popen(command.c_str(), "r");
+  REQUIRE(pipe != nullptr);
+  std::string out;
+  std::array<char, 4096> bytes;
+  for (std::size_t got; (got = fread(bytes.data(), 1, bytes.size(), pipe)) > 0;)
+    out.append(bytes.data(), got);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, out};
+}
+
+std::string contents(const std::string& name) {
+  std::ifstream in(WRENCHD_SOURCE_DIR "/" + name);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("the Python package does what it says", "[python]") {
+  StubDaemon daemon;
+  const Ran ran = run_python(daemon, "tests/python/check_client.py");
+  INFO(ran.out);
+  CHECK(ran.exit_code == 0);
+  CHECK(ran.out.find("Ran ") != std::string::npos);
+}
+
+TEST_CASE("the Python client reads 1,000 consecutive ticks while the machine is loaded", "[python]") {
+  StubDaemon daemon;
+  const Ran ran = run_python(daemon, "tests/python/consecutive_ticks.py");
+  INFO(ran.out);
+  CHECK(ran.exit_code == 0);
+  CHECK(ran.out.find("1000 ticks in ") == 0);
+}
+
+TEST_CASE("the Python example works as printed", "[python]") {
+  StubDaemon daemon;
+  const Ran ran = run_python(daemon, "tools/python/example.py");
+  INFO(ran.out);
+  CHECK(ran.exit_code == 0);
+  CHECK(ran.out.find("wrenchd is disarmed\n") == 0);
+  CHECK(ran.out.find("\nticks missed: 0\n") != std::string::npos);
+}
+
+TEST_CASE("what the README prints as a Python program is the example", "[python]") {
+  std::istringstream example(contents("tools/python/example.py"));
+  std::string printed;
+  int lines = 0;
+  for (std::string line; std::getline(example, line);) {
+    if (line.starts_with("#")) continue;
+    printed += line.empty() ? "\n" : "    " + line + "\n";
+    lines += line.empty() ? 0 : 1;
+  }
+  CHECK(lines <= 10);
+  const std::string readme = contents("README.md");
+  if (readme.find("    import wrenchd\n") != std::string::npos)
+    CHECK(readme.find(printed) != std::string::npos);
+}

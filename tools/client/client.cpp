@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <wrenchd/client.hpp>
+
+#include "client_connection.hpp"
+
+namespace wrenchd {
+namespace {
+
+using nlohmann::json;
+
+/// So many beats in the time that the daemon waits for one.
+constexpr double kBeatsInTime = 4.0;
+
+}  // namespace
+
+/// The thread that says that the program lives. It ends by itself where the connection does.
+class Client::Beating {
+ public:
+  Beating(std::shared_ptr<ClientConnection> connection, std::chrono::duration<double> every)
+      : thread_([connection = std::move(connection), every](const std::stop_token& stop) {
+          std::mutex mutex;
+          std::condition_variable_any ended;
+          std::unique_lock lock(mutex);
+          while (!stop.stop_requested()) {
+            try {
+              connection->notify("beat");
+            } catch (const ClientError&) {
+              return;  // whoever calls next hears of it
+            }
+            ended.wait_for(lock, stop, every, [] { return false; });
+          }
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
+Client::Client(const std::string& socket, std::chrono::milliseconds answer_within)
+    : connection_(std::make_shared<ClientConnection>(socket, answer_within)) {}
+Client::~Client() = default;
+Client::Client(Client&& other) noexcept = default;
+Client& Client::operator=(Client&& other) noexcept = default;
+
+std::string Client::call(const std::string& method, const std::string& params) {
+  const json parsed = json::parse(params, nullptr, false);
+  if (!parsed.is_object())
+    throw ClientError(ClientError::kProtocol,
+                      "the parameters of '" + method + "' are no JSON object: " + params);
+  return connection_->call(method, parsed).dump();
+}
+
+std::string Client::state() {
+  return connection_->call("status", json::object()).value("state", "unknown");
+}
+
+std::string Client::subscribe(const std::vector<std::string>& names) {
+  json params = json::object();
+  if (!names.empty()) params["events"] = names;
+  return connection_->call("subscribe", params).dump();
+}
+
+bool Client::poll_event(ClientEvent& out, std::chrono::milliseconds timeout) {
+  json event;
+  if (!connection_->poll_event(event, timeout)) return false;
+  out.sequence = event.value("sequence", std::uint64_t{0});
+  out.time_ns = event.value("time_ns", std::int64_t{0});
+  out.name = event.value("name", "");
+  out.level = event.value("level", "");
+  out.json = event.dump();
+  return true;
+}
+
+void Client::take_lease() {
+  const json lease = connection_->call("lease.take", json::object());
+  const std::chrono::duration<double> within(lease.value("beat_within_s", 0.1));
+  beating_ = std::make_unique<Beating>(connection_, within / kBeatsInTime);
+}
+
+void Client::give_lease() {
+  beating_.reset();
+  call("lease.give");
+}
+
+void Client::beat() {
+  connection_->notify("beat");
+}
+
+StateReader Client::open_state() {
+  int descriptor = -1;
+  const json answer = connection_->call("state.open", json::object(), &descriptor);
+  if (descriptor < 0 || !answer.contains("layout"))
+    throw ClientError(ClientError::kProtocol, "wrenchd handed no shared memory over; see its log");
+  return StateReader(answer["layout"].dump(), descriptor,
+                     [connection = connection_] { return connection->is_there(); });
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client_connection.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+#include <wrenchd/client_error.hpp>
+
+namespace wrenchd {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kLongestLine = 16U << 20;
+/// Events that nobody polls for are kept so far; then the oldest go.
+constexpr std::size_t kMostEvents = 10'000;
+
+[[noreturn]] void gone(const std::string& why) {
+  throw ClientError(ClientError::kGone,
+                    "wrenchd ended the connection (" + why + "); connect again when it is back");
+}
+
+std::vector<std::string> places(const std::string& named) {
+  if (!named.empty()) return {named};
+  if (const char* set = std::getenv("WRENCHD_SOCKET"); set != nullptr && *set != '\0') return {set};
+  std::vector<std::string> all = {"/run/wrenchd/control.sock"};
+  if (const char* run = std::getenv("XDG_RUNTIME_DIR"); run != nullptr && *run != '\0')
+    all.push_back(std::string(run) + "/wrenchd/control.sock");
+  return all;
+}
+
+/// 0, or why not.
+int try_to_connect(int descriptor, const std::string& place) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (place.size() >= sizeof(address.sun_path)) return ENAMETOOLONG;
+  std::memcpy(address.sun_path, place.data(), place.size());
+  return connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 ? 0 : errno;
+}
+
+int connected(const std::string& named) {
+  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (descriptor < 0)
+    throw ClientError(ClientError::kNoDaemon, std::string("socket: ") + std::strerror(errno));
+  std::string tried;
+  for (const std::string& place : places(named)) {
+    const int error = try_to_connect(descriptor, place);
+    if (error == 0) return descriptor;
+    tried += (tried.empty() ? "" : "; ") + place + ": " + std::strerror(error);
+    if (error == EACCES) tried += " (are you in the group that may connect?)";
+  }
+  close(descriptor);
+  throw ClientError(ClientError::kNoDaemon,
+                    "no wrenchd answers (" + tried + "); start it, or name its socket in WRENCHD_SOCKET");
+}
+
+}  // namespace
+
+ClientConnection::ClientConnection(const std::string& socket, std::chrono::milliseconds answer_within)
+    : socket_(connected(socket)), answer_within_(answer_within) {}
+
+ClientConnection::~ClientConnection() {
+  drop_descriptor();
+  close(socket_);
+}
+
+void ClientConnection::drop_descriptor() noexcept {
+  if (descriptor_ >= 0) close(descriptor_);
+  descriptor_ = -1;
+}
+
+json ClientConnection::call(const std::string& method, const json& params, int* descriptor) {
+  const auto end = Clock::now() + answer_within_;
+  const std::lock_guard lock(reading_);
+  drop_descriptor();
+  const std::int64_t id = ++last_id_;
+  send({{"jsonrpc", "2.0"}, {"id", id}, {"method", method}, {"params", params}});
+  for (std::string line;;) {
+    if (!read_line(line, end))
+      throw ClientError(ClientError::kTimeout, "wrenchd did not answer '" + method + "' within " +
+                                                   std::to_string(answer_within_.count()) +
+                                                   " ms; see its log");
+    json message = json::parse(line, nullptr, false);
+    if (!message.is_object())
+      throw ClientError(ClientError::kProtocol, "what answers is not wrenchd: " + line.substr(0, 80));
+    if (message.contains("method")) {
+      keep_event(std::move(message));
+      continue;
+    }
+    if (const auto error = message.find("error"); error != message.end()) {
+      if (message.value("id", json()) != id && !message.value("id", json()).is_null()) continue;
+      throw ClientError(error->value("code", int{ClientError::kProtocol}),
+                        error->value("message", method + " was refused"));
+    }
+    if (message.value("id", json()) != id) continue;  // of a call that was given up
+    if (descriptor != nullptr) *descriptor = std::exchange(descriptor_, -1);
+    return message.value("result", json::object());
+  }
+}
+
+void ClientConnection::notify(const std::string& method) {
+  send({{"jsonrpc", "2.0"}, {"method", method}, {"params", json::object()}});
+}
+
+bool ClientConnection::poll_event(json& out, std::chrono::milliseconds timeout) {
+  const auto end = Clock::now() + timeout;
+  const std::lock_guard lock(reading_);
+  for (std::string line; events_.empty();) {
+    if (!read_line(line, end)) return false;
+    json message = json::parse(line, nullptr, false);
+    if (message.is_object() && message.contains("method")) keep_event(std::move(message));
+  }
+  out = std::move(events_.front());
+  events_.pop_front();
+  return true;
+}
+
+void ClientConnection::keep_event(json message) {
+  if (!message.contains("params")) return;
+  if (events_.size() == kMostEvents) events_.pop_front();
+  events_.push_back(std::move(message["params"]));
+}
+
+/// What has come is told even where the connection ended after it.
+bool ClientConnection::is_there() const noexcept {
+  pollfd here = {socket_, POLLRDHUP, 0};
+  return poll(&here, 1, 0) >= 0 && (here.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
+}
+
+bool ClientConnection::wait_for(short events, Clock::time_point end) const {
+  for (;;) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+    pollfd here = {socket_, events, 0};
+    const int ready = poll(&here, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+    if (ready > 0) return true;
+    if (ready == 0) return false;
+    if (errno != EINTR) gone(std::strerror(errno));
+  }
+}
+
+/// False where no whole line came in time.
+bool ClientConnection::read_line(std::string& line, Clock::time_point end) {
+  for (;;) {
+    const std::size_t at = received_.find('\n', looked_at_);
+    if (at != std::string::npos) {
+      line = received_.substr(0, at);
+      received_.erase(0, at + 1);
+      looked_at_ = 0;
+      return true;
+    }
+    looked_at_ = received_.size();
+    if (received_.size() > kLongestLine) gone("a line without end");
+    if (!wait_for(POLLIN, end)) return false;
+    receive();
+  }
+}
+
+void ClientConnection::receive() {
+  std::array<char, 65536> bytes;
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> ancillary{};
+  iovec part = {bytes.data(), bytes.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = ancillary.data();
+  message.msg_controllen = ancillary.size();
+  const ssize_t got = recvmsg(socket_, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+  if (got == 0) gone("end of file");
+  if (got < 0) {
+    if (errno == EAGAIN || errno == EINTR) return;
+    gone(std::strerror(errno));
+  }
+  for (cmsghdr* one = CMSG_FIRSTHDR(&message); one != nullptr; one = CMSG_NXTHDR(&message, one)) {
+    if (one->cmsg_level != SOL_SOCKET || one->cmsg_type != SCM_RIGHTS) continue;
+    drop_descriptor();
+    std::memcpy(&descriptor_, CMSG_DATA(one), sizeof(int));
+  }
+  received_.append(bytes.data(), static_cast<std::size_t>(got));
+}
+
+void ClientConnection::send(const json& request) {
+  const std::string line = request.dump() + "\n";
+  const auto end = Clock::now() + answer_within_;
+  const std::lock_guard lock(writing_);
+  for (std::size_t sent = 0; sent < line.size();) {
+    const ssize_t n = ::send(socket_, line.data() + sent, line.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (n > 0) {
+      sent += static_cast<std::size_t>(n);
+      continue;
+    }
+    if (errno == EINTR) continue;
+    if (errno != EAGAIN) gone(std::strerror(errno));
+    if (!wait_for(POLLOUT, end)) gone("it takes no more requests");
+  }
+}
+
+}  // namespace wrenchd

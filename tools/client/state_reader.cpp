@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cstring>
+#include <map>
+#include <thread>
+#include <utility>
+
+#include <fcntl.h>
+#include <nlohmann/json.hpp>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <wrenchd/state_reader.hpp>
+
+namespace wrenchd {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uint64_t kVersion = 1;
+/// How often a reader that waits asks whether the daemon is there still.
+constexpr auto kLookAround = std::chrono::milliseconds(50);
+
+[[noreturn]] void not_understood(const std::string& what) {
+  throw ClientError(ClientError::kProtocol, "the daemon's state cannot be read: " + what +
+                                                "; use the client library of the daemon's version");
+}
+
+struct Field {
+  std::string name, unit, doc;
+  char type = 'f';  ///< f, i or u
+  std::size_t width = 8;
+  std::size_t count = 1;
+  std::size_t offset = 0;
+  std::vector<std::string> values, bits;
+};
+
+using Fields = std::map<std::string, Field, std::less<>>;
+
+Field read_field(const json& from, std::size_t room) {
+  Field field;
+  field.name = from.at("name");
+  field.unit = from.at("unit");
+  field.doc = from.at("doc");
+  field.count = from.at("count");
+  field.offset = from.at("offset");
+  const std::string type = from.at("type");
+  static const std::map<std::string, std::size_t> kWidths = {{"u8", 1},  {"u16", 2}, {"u32", 4},
+                                                             {"u64", 8}, {"i64", 8}, {"f64", 8}};
+  const auto width = kWidths.find(type);
+  if (width == kWidths.end()) not_understood("field '" + field.name + "' is of type '" + type + "'");
+  field.type = type.front();
+  field.width = width->second;
+  if (field.count == 0 || field.count > room || field.offset > room ||
+      field.offset + field.count * field.width > room)
+    not_understood("field '" + field.name + "' lies outside of its record");
+  if (from.contains("values")) field.values = from.at("values").get<std::vector<std::string>>();
+  if (from.contains("bits")) field.bits = from.at("bits").get<std::vector<std::string>>();
+  return field;
+}
+
+Fields read_fields(const json& list, std::size_t room) {
+  if (!list.is_array() || list.empty()) not_understood("its layout has no fields");
+  Fields fields;
+  for (const json& one : list) {
+    Field field = read_field(one, room);
+    fields.emplace(field.name, field);
+  }
+  return fields;
+}
+
+const Field& field_of(const Fields& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  if (found == fields.end())
+    throw ClientError(ClientError::kProtocol,
+                      "the daemon's state has no field '" + std::string(name) + "'; describe() lists them");
+  return found->second;
+}
+
+std::uint64_t bits_of(const Field& field, const std::byte* record, std::size_t i) {
+  if (i >= field.count)
+    throw ClientError(ClientError::kProtocol, "field '" + field.name + "' has " +
+                                                  std::to_string(field.count) + " numbers, and number " +
+                                                  std::to_string(i) + " was asked for");
+  std::uint64_t bits = 0;  // of a little-endian machine, as the reader has made sure
+  std::memcpy(&bits, record + field.offset + i * field.width, field.width);
+  return bits;
+}
+
+double number_of(const Field& field, const std::byte* record, std::size_t i) {
+  const std::uint64_t bits = bits_of(field, record, i);
+  if (field.type == 'f') return std::bit_cast<double>(bits);
+  if (field.type == 'i') return static_cast<double>(static_cast<std::int64_t>(bits));
+  return static_cast<double>(bits);
+}
+
+std::string text_of(const Field& field, const std::byte* record) {
+  const std::uint64_t value = bits_of(field, record, 0);
+  if (!field.bits.empty()) {
+    std::string all;
+    for (unsigned bit = 0; bit < 64; ++bit) {
+      if ((value >> bit & 1) == 0) continue;
+      const std::string name = bit < field.bits.size() ? field.bits[bit] : "bit " + std::to_string(bit);
+      all += (all.empty() ? "" : ", ") + name;
+    }
+    return all;
+  }
+  return value < field.values.size() ? field.values[value] : std::to_string(value);
+}
+
+}  // namespace
+
+struct TickState::Layout {
+  std::size_t bytes, header_bytes, written_offset, slots, slot_bytes, record_offset, record_bytes;
+  double rate_Hz;
+  Fields fields;
+  std::size_t touches_offset, touch_bytes, most_touches;
+  Fields touch_fields;
+  std::vector<std::string> obstacles;
+
+  explicit Layout(const json& from) {
+    if (from.at("version").get<std::uint64_t>() != kVersion)
+      not_understood("its layout is of version " + from.at("version").dump());
+    if (from.at("byte_order") != "little" || std::endian::native != std::endian::little)
+      not_understood("only little-endian machines are known");
+    bytes = from.at("bytes");
+    header_bytes = from.at("header_bytes");
+    written_offset = from.at("written_offset");
+    slots = from.at("slots");
+    slot_bytes = from.at("slot_bytes");
+    record_offset = from.at("record_offset");
+    record_bytes = from.at("record_bytes");
+    rate_Hz = from.at("rate_Hz");
+    const bool fits = slots > 0 && slot_bytes % 8 == 0 && record_bytes % 8 == 0 && header_bytes % 8 == 0 &&
+                      record_offset == 8 && record_bytes < slot_bytes && header_bytes >= 64 &&
+                      header_bytes < bytes && written_offset % 8 == 0 && written_offset < header_bytes &&
+                      slots <= (bytes - header_bytes) / slot_bytes && rate_Hz > 0.0;
+    if (!fits) not_understood("the sizes in its layout contradict each other");
+    fields = read_fields(from.at("fields"), record_bytes);
+    const json& touches = from.at("touches");
+    touches_offset = touches.at("offset");
+    touch_bytes = touches.at("bytes");
+    most_touches = touches.at("most");
+    if (touch_bytes == 0 || touches_offset > record_bytes ||
+        most_touches > (record_bytes - touches_offset) / touch_bytes)
+      not_understood("the contacts lie outside of the record");
+    touch_fields = read_fields(touches.at("fields"), touch_bytes);
+    obstacles = from.at("obstacles").get<std::vector<std::string>>();
+  }
+};
+
+double TickState::number(std::string_view field, std::size_t i) const {
+  if (!layout_) throw ClientError(ClientError::kProtocol, "no tick was read yet; call next() or latest()");
+  return number_of(field_of(layout_->fields, field), reinterpret_cast<const std::byte*>(words_.data()), i);
+}
+
+std::int64_t TickState::integer(std::string_view field, std::size_t i) const {
+  if (!layout_) throw ClientError(ClientError::kProtocol, "no tick was read yet; call next() or latest()");
+  const Field& what = field_of(layout_->fields, field);
+  const std::uint64_t bits = bits_of(what, reinterpret_cast<const std::byte*>(words_.data()), i);
+  return what.type == 'f' ? static_cast<std::int64_t>(std::bit_cast<double>(bits))
+                          : static_cast<std::int64_t>(bits);
+}
+
+std::string TickState::text(std::string_view field) const {
+  if (!layout_) throw ClientError(ClientError::kProtocol, "no tick was read yet; call next() or latest()");
+  return text_of(field_of(layout_->fields, field), reinterpret_cast<const std::byte*>(words_.data()));
+}
+
+std::vector<TouchState> TickState::touches() const {
+  const auto count =
+      std::min<std::size_t>(static_cast<std::size_t>(integer("touch_count")), layout_->most_touches);
+  std::vector<TouchState> out(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->touches_offset +
+                            k * layout_->touch_bytes;
+    const auto get = [&](std::string_view name, std::size_t i = 0) {
+      return number_of(field_of(layout_->touch_fields, name), from, i);
+    };
+    const auto feature = [&](const std::string& body) {
+      std::string name = text_of(field_of(layout_->touch_fields, body + "_feature_kind"), from);
+      if (name == "plane" || name == "none") return name;
+      const auto number = [&](const std::string& which) {
+        return std::to_string(bits_of(field_of(layout_->touch_fields, body + which), from, 0));
+      };
+      name += " " + number("_first");
+      return name.find("edge") == std::string::npos ? name : name + "-" + number("_second");
+    };
+    TouchState& touch = out[k];
+    for (std::size_t i = 0; i < 3; ++i) {
+      touch.point_W_m[i] = get("point_W_m", i);
+      touch.normal_W[i] = get("normal_W", i);
+    }
+    touch.share = get("share");
+    touch.multiplier_kg_m = get("multiplier_kg_m");
+    touch.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
+    touch.obstacle = touch.obstacle_number < layout_->obstacles.size()
+                         ? layout_->obstacles[touch.obstacle_number]
+                         : "obstacle " + std::to_string(touch.obstacle_number);
+    touch.tool_feature = feature("tool");
+    touch.obstacle_feature = feature("obstacle");
+  }
+  return out;
+}
+
+StateReader::StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there)
+    : is_there_(std::move(is_there)) {
+  const struct Closed {
+    int descriptor;
+    ~Closed() { close(descriptor); }
+  } closed{descriptor};
+  try {
+    layout_ = std::make_shared<const TickState::Layout>(json::parse(layout));
+  } catch (const json::exception& error) {
+    not_understood(error.what());
+  }
+  // Memory that could shrink would end this process where it is read.
+  const int seals = fcntl(descriptor, F_GET_SEALS);
+  struct stat file {};
+  if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || fstat(descriptor, &file) != 0 ||
+      static_cast<std::uint64_t>(file.st_size) < layout_->bytes)
+    not_understood("its memory is not sealed, or too small");
+  void* const mapped = mmap(nullptr, layout_->bytes, PROT_READ, MAP_SHARED, descriptor, 0);
+  if (mapped == MAP_FAILED) not_understood(std::string("mmap: ") + std::strerror(errno));
+  memory_ = static_cast<const std::byte*>(mapped);
+  bytes_ = layout_->bytes;
+  if (std::memcmp(memory_, "WRENCHST", 8) != 0) {
+    unmap();
+    not_understood("its memory does not begin with WRENCHST");
+  }
+  next_ = behind();
+}
+
+StateReader::~StateReader() {
+  unmap();
+}
+
+StateReader::StateReader(StateReader&& other) noexcept
+    : layout_(std::move(other.layout_)),
+      is_there_(std::move(other.is_there_)),
+      memory_(std::exchange(other.memory_, nullptr)),
+      bytes_(other.bytes_),
+      next_(other.next_),
+      missed_(other.missed_) {}
+
+StateReader& StateReader::operator=(StateReader&& other) noexcept {
+  if (this == &other) return *this;
+  unmap();
+  layout_ = std::move(other.layout_);
+  is_there_ = std::move(other.is_there_);
+  memory_ = std::exchange(other.memory_, nullptr);
+  bytes_ = other.bytes_;
+  next_ = other.next_;
+  missed_ = other.missed_;
+  return *this;
+}
+
+void StateReader::unmap() noexcept {
+  if (memory_ != nullptr) munmap(const_cast<std::byte*>(memory_), bytes_);
+  memory_ = nullptr;
+}
+
+namespace {
+
+/// A word that another process writes. Loads of lock-free atomics write nothing, so read-only memory will do.
+std::uint64_t load(const std::byte* at, std::memory_order order) {
+  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+  return reinterpret_cast<const std::atomic<std::uint64_t>*>(at)->load(order);
+}
+
+}  // namespace
+
+std::uint64_t StateReader::behind() const noexcept {
+  return load(memory_ + layout_->written_offset, std::memory_order_acquire) - next_;
+}
+
+/// A word of a newer record is seen together with its guard, for words are stored with release order; so two
+/// equal guards have only the words of one record between them.
+StateReader::Copied StateReader::copy(std::uint64_t i, TickState& out) const {
+  const std::byte* slot = memory_ + layout_->header_bytes + i % layout_->slots * layout_->slot_bytes;
+  const std::uint64_t whole = 2 * i + 2;
+  if (load(slot, std::memory_order_acquire) != whole) return Copied::overrun;
+  out.layout_ = layout_;
+  out.words_.resize(layout_->record_bytes / 8);
+  for (std::size_t k = 0; k < out.words_.size(); ++k)
+    out.words_[k] = load(slot + layout_->record_offset + 8 * k, std::memory_order_acquire);
+  return load(slot, std::memory_order_relaxed) == whole ? Copied::whole : Copied::overrun;
+}
+
+/// Goes on in the middle of what is there, so as not to be overrun again at once.
+void StateReader::skip() {
+  const std::uint64_t ahead = behind();
+  if (ahead <= layout_->slots / 2) return;
+  const std::uint64_t left_out = ahead - layout_->slots / 2;
+  missed_ += left_out;
+  next_ += left_out;
+}
+
+bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + timeout;
+  const auto pause = std::chrono::duration<double>(0.25 / layout_->rate_Hz);
+  auto look_around = Clock::now() + kLookAround;
+  for (;;) {
+    while (behind() > 0) {
+      if (copy(next_, out) == Copied::whole) {
+        ++next_;
+        return true;
+      }
+      skip();
+    }
+    const auto now = Clock::now();
+    if (now >= end) return false;
+    if (now >= look_around) {
+      look_around = now + kLookAround;
+      if (is_there_ && !is_there_() && behind() == 0)
+        throw ClientError(ClientError::kGone, "the daemon is gone; connect again when it is back");
+    }
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+bool StateReader::latest(TickState& out) const {
+  for (;;) {
+    const std::uint64_t written = load(memory_ + layout_->written_offset, std::memory_order_acquire);
+    if (written == 0) return false;
+    if (copy(written - 1, out) == Copied::whole) return true;
+  }
+}
+
+double StateReader::rate_Hz() const noexcept {
+  return layout_->rate_Hz;
+}
+
+std::vector<std::string> StateReader::describe() const {
+  std::vector<std::string> lines;
+  for (const auto& [name, field] : layout_->fields)
+    lines.push_back(name + " [" + field.unit + "]: " + field.doc);
+  return lines;
+}
+
+}  // namespace wrenchd

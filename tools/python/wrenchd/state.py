@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The daemon's state at the rate of its servo loop, from memory that the daemon writes and this maps read-only.
+
+The memory is a ring of records, each behind a guard: 2 i + 1 while record i is being written, 2 i + 2 when it is
+whole. Two equal guards before and after a copy, and the copy is whole. That holds where a processor keeps its
+loads in order, as x86 does; on others there are thousands of instructions of the interpreter in between, and a lock
+taken, which orders them in practice.
+"""
+
+import fcntl
+import mmap
+import os
+import struct
+import sys
+import threading
+import time
+
+from .errors import Gone, ProtocolError
+
+_VERSION = 1
+_F_GET_SEALS = 1034
+_F_SEAL_SHRINK = 2
+_LOOK_AROUND_S = 0.05  # how often a reader that waits asks whether the daemon is there still
+_TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i64": "q", "f64": "d"}
+
+
+class _Field:
+    def __init__(self, described, room):
+        self.name = described["name"]
+        self.unit = described["unit"]
+        self.doc = described["doc"]
+        self.count = described["count"]
+        self.offset = described["offset"]
+        if described["type"] not in _TYPES:
+            raise ProtocolError(f"field '{self.name}' of the state is of an unknown type; use the package of the "
+                                "daemon's version")
+        self.code = _TYPES[described["type"]]
+        self.values = described.get("values")
+        self.bits = described.get("bits")
+        self.format = struct.Struct(f"<{self.count}{self.code}")
+        if self.offset < 0 or self.offset + self.format.size > room:
+            raise ProtocolError(f"field '{self.name}' of the state lies outside of its record")
+
+    def raw(self, record, base=0):
+        numbers = self.format.unpack_from(record, base + self.offset)
+        return numbers if self.count > 1 else numbers[0]
+
+    def value(self, record, base=0):
+        number = self.raw(record, base)
+        if self.values:
+            return self.values[number] if number < len(self.values) else str(number)
+        if self.bits is not None:
+            return [self.bits[i] if i < len(self.bits) else f"bit {i}" for i in range(64) if number >> i & 1]
+        return bool(number) if self.unit == "bool" else number
+
+
+class _Layout:
+    def __init__(self, described):
+        try:
+            if described["version"] != _VERSION:
+                raise ProtocolError(f"the state's layout is of version {described['version']}, and {_VERSION} is what "
+                                    "can be read; use the package of the daemon's version")
+            if described["byte_order"] != sys.byteorder or sys.byteorder != "little":
+                raise ProtocolError("only little-endian machines are known")
+            self.bytes = described["bytes"]
+            self.header_bytes = described["header_bytes"]
+            self.written_word = described["written_offset"] // 8
+            self.slots = described["slots"]
+            self.slot_bytes = described["slot_bytes"]
+            self.record_offset = described["record_offset"]
+            self.record_bytes = described["record_bytes"]
+            self.rate_Hz = described["rate_Hz"]
+            if self.slots < 1 or self.header_bytes + self.slots * self.slot_bytes > self.bytes:
+                raise ProtocolError("the sizes in the state's layout contradict each other")
+            self.fields = {f["name"]: _Field(f, self.record_bytes) for f in described["fields"]}
+            touches = described["touches"]
+            self.touches_offset = touches["offset"]
+            self.touch_bytes = touches["bytes"]
+            self.most_touches = touches["most"]
+            if self.touches_offset + self.most_touches * self.touch_bytes > self.record_bytes:
+                raise ProtocolError("the contacts lie outside of the record")
+            self.touch_fields = {f["name"]: _Field(f, self.touch_bytes) for f in touches["fields"]}
+            self.obstacles = described["obstacles"]
+        except (KeyError, TypeError) as error:
+            raise ProtocolError(f"the state's layout cannot be understood ({error!r}); use the package of the daemon's "
+                                "version") from error
+
+    def dtype(self):
+        import numpy
+
+        def of(fields, size, extra=()):
+            named = [(f.name, (f.code if f.count == 1 else (f.code, (f.count,))), f.offset) for f in fields.values()]
+            named += extra
+            return numpy.dtype({"names": [n for n, _, _ in named], "formats": [t for _, t, _ in named],
+                                "offsets": [o for _, _, o in named], "itemsize": size})
+
+        touch = of(self.touch_fields, self.touch_bytes)
+        return of(self.fields, self.record_bytes, [("touches", (touch, (self.most_touches,)), self.touches_offset)])
+
+
+class Touch:
+    """A contact that holds the proxy: point_W_m, normal_W, share, multiplier_kg_m; and by name obstacle,
+    tool_feature, obstacle_feature."""
+
+    def __init__(self, layout, record, base):
+        for name in ("point_W_m", "normal_W", "share", "multiplier_kg_m"):
+            setattr(self, name, layout.touch_fields[name].value(record, base))
+        self.kind = layout.touch_fields["contact_kind"].value(record, base)
+        self.obstacle_number = layout.touch_fields["obstacle"].value(record, base)
+        known = self.obstacle_number < len(layout.obstacles)
+        self.obstacle = layout.obstacles[self.obstacle_number] if known else f"obstacle {self.obstacle_number}"
+        self.tool_feature = self._feature(layout, record, base, "tool")
+        self.obstacle_feature = self._feature(layout, record, base, "obstacle")
+
+    @staticmethod
+    def _feature(layout, record, base, body):
+        def of(name):
+            return layout.touch_fields[body + name].value(record, base)
+
+        kind = of("_feature_kind")
+        if kind in ("plane", "none"):
+            return kind
+        return f"{kind} {of('_first')}-{of('_second')}" if "edge" in kind else f"{kind} {of('_first')}"
+
+    def __str__(self):
+        return f"{self.tool_feature} on {self.obstacle} {self.obstacle_feature}"
+
+    def __repr__(self):
+        return f"<{self}, {100 * self.share:.0f} %>"
+
+
+class Tick:
+    """One tick of the servo loop. Every field of State.describe() is an attribute: a number or a tuple of numbers;
+    for states, faults and the like their name; for bits a list of names. touches: the contacts, those that carry
+    most first. tick["state"] is the bare number."""
+
+    __slots__ = ("_layout", "_record")
+
+    def __init__(self, layout, record):
+        self._layout = layout
+        self._record = record
+
+    def __getattr__(self, name):
+        try:
+            field = self._layout.fields[name]
+        except KeyError:
+            raise AttributeError(f"a tick has no field '{name}'; State.describe() lists them") from None
+        return field.value(self._record)
+
+    def __getitem__(self, name):
+        return self._layout.fields[name].raw(self._record)
+
+    def __dir__(self):
+        return [*super().__dir__(), *self._layout.fields]
+
+    @property
+    def touches(self):
+        layout = self._layout
+        count = min(self.touch_count, layout.most_touches)
+        return [Touch(layout, self._record, layout.touches_offset + i * layout.touch_bytes) for i in range(count)]
+
+    def __repr__(self):
+        return f"<tick {self.tick}: {self.state}>"
+
+
+class State:
+    """Reads the ticks. The daemon knows nothing of readers: one that is slow misses ticks, and is told how many.
+    Client.open_state() makes one; an object serves one thread."""
+
+    def __init__(self, layout, descriptor, is_there=lambda: True):
+        try:
+            self._layout = _Layout(layout)
+            seals = fcntl.fcntl(descriptor, _F_GET_SEALS)
+            if not seals & _F_SEAL_SHRINK or os.fstat(descriptor).st_size < self._layout.bytes:
+                raise ProtocolError("the state's memory is not sealed, or too small")
+            self._memory = mmap.mmap(descriptor, self._layout.bytes, mmap.MAP_SHARED, mmap.PROT_READ)
+        finally:
+            os.close(descriptor)
+        self._words = memoryview(self._memory).cast("Q")  # a word is read at once, not byte by byte
+        self._in_order = threading.Lock()
+        self._is_there = is_there
+        self._next = self._written()
+        self.missed = 0  # ticks that were overwritten before they were taken
+
+    def close(self):
+        self._words.release()
+        self._memory.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    @property
+    def rate_Hz(self):
+        """Of the servo loop, as configured."""
+        return self._layout.rate_Hz
+
+    @property
+    def behind(self):
+        """Ticks that were written and not taken yet."""
+        return self._written() - self._next
+
+    def describe(self):
+        """What a tick has: {name: (unit, meaning)}."""
+        return {field.name: (field.unit, field.doc) for field in self._layout.fields.values()}
+
+    def latest(self):
+        """The newest tick, whatever was taken before. None where there was none at all."""
+        while True:
+            written = self._written()
+            if written == 0:
+                return None
+            record = self._copy(written - 1)
+            if record is not None:
+                return Tick(self._layout, record)
+
+    def next(self, timeout_s=1.0):
+        """Waits for the tick after the last one taken. None where none came in time. One that was overrun goes on
+        with newer ones, and `missed` grows. Raises Gone where the daemon is gone."""
+        record = self._next_record(timeout_s)
+        return None if record is None else Tick(self._layout, record)
+
+    def ticks(self, count=None):
+        """The next ticks one after the other: so many, or until the daemon is gone, which raises Gone."""
+        taken = 0
+        while count is None or taken < count:
+            tick = self.next()
+            if tick is not None:
+                taken += 1
+                yield tick
+
+    def array(self, count):
+        """The next `count` ticks as a numpy structured array, a column a field: array["F_out"] is count x 6."""
+        import numpy
+
+        out = numpy.empty(count, self._layout.dtype())
+        rows = out.view(numpy.uint8).reshape(count, self._layout.record_bytes)
+        taken = 0
+        while taken < count:
+            record = self._next_record(1.0)
+            if record is not None:
+                rows[taken] = numpy.frombuffer(record, numpy.uint8)
+                taken += 1
+        return out
+
+    def _written(self):
+        return self._words[self._layout.written_word]
+
+    def _copy(self, i):
+        layout = self._layout
+        at = layout.header_bytes + i % layout.slots * layout.slot_bytes
+        if self._words[at // 8] != 2 * i + 2:
+            return None
+        with self._in_order:
+            begin = at + layout.record_offset
+            record = self._memory[begin:begin + layout.record_bytes]
+        return record if self._words[at // 8] == 2 * i + 2 else None
+
+    def _next_record(self, timeout_s):
+        end = time.monotonic() + timeout_s
+        look_around = time.monotonic() + _LOOK_AROUND_S
+        while True:
+            while self._written() > self._next:
+                record = self._copy(self._next)
+                if record is not None:
+                    self._next += 1
+                    return record
+                # Overrun: goes on in the middle of what is there, so as not to be overrun again at once.
+                left_out = self._written() - self._next - self._layout.slots // 2
+                self.missed += max(left_out, 0)
+                self._next += max(left_out, 0)
+            now = time.monotonic()
+            if now >= end:
+                return None
+            if now >= look_around:
+                look_around = now + _LOOK_AROUND_S
+                if not self._is_there() and self._written() == self._next:
+                    raise Gone("the daemon is gone; connect again when it is back")
+            time.sleep(0.25 / self._layout.rate_Hz)
