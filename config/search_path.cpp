@@ -9,7 +9,14 @@
 namespace wrenchd {
 namespace fs = std::filesystem;
 
-SearchPath::SearchPath() : SearchPath({"/etc/wrenchd", "/usr/share/wrenchd", WRENCHD_SOURCE_CONFIG_DIR}) {}
+SearchPath::SearchPath()
+    : SearchPath({"/etc/wrenchd", "/usr/share/wrenchd"
+#ifdef WRENCHD_SOURCE_CONFIG_DIR
+                  ,
+                  WRENCHD_SOURCE_CONFIG_DIR
+#endif
+      }) {
+}
 
 SearchPath::SearchPath(std::vector<fs::path> directories) : directories_(std::move(directories)) {}
 

@@ -15,7 +15,7 @@ namespace wrenchd {
 ///   any other name         along the directories below
 ///
 /// The directories: /etc/wrenchd (the administrator's), /usr/share/wrenchd (the package's), then config/ of
-/// the source tree wrenchd was built from.
+/// the source tree wrenchd was built from, unless a package was built (WRENCHD_SEARCH_SOURCE=OFF).
 class SearchPath {
  public:
   SearchPath();

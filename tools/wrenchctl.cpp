@@ -30,6 +30,7 @@
 #include "tools/calibrate.hpp"
 #include "tools/check.hpp"
 #include "tools/descriptor_source.hpp"
+#include "tools/doctor.hpp"
 #include "tools/fault_text.hpp"
 #include "tools/list_devices.hpp"
 #include "tools/make_mesh.hpp"
@@ -40,6 +41,7 @@
 #include "tools/propose_profile.hpp"
 #include "tools/report_text.hpp"
 #include "tools/solve.hpp"
+#include "tools/udev_rules.hpp"
 
 namespace {
 
@@ -48,6 +50,7 @@ using namespace wrenchd;
 constexpr int kExitRefused = 1;     ///< a file was refused, or cannot be written
 constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is no solid
 constexpr int kExitDiffers = 4;     ///< wrenchctl replay: a tick came out differently
+constexpr int kExitUnfit = 5;       ///< wrenchctl doctor: something is wrong
 constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: a pose had no admissible pose near it
 
 const std::map<std::string, Method> kMethods = {{"exact", Method::exact},
@@ -404,6 +407,54 @@ void add_devices(CLI::App& app, bool& all) {
   });
 }
 
+struct RuleOptions {
+  std::filesystem::path from;
+  std::string output = "-";
+};
+
+void run_udev_rules(const RuleOptions& options) {
+  const SearchPath search = options.from.empty() ? SearchPath() : SearchPath({options.from});
+  const KnownProfiles known = known_profiles(search);
+  if (!known.refused.empty()) throw std::runtime_error(known.refused.front());
+  if (known.profiles.empty())
+    throw std::runtime_error((options.from.empty() ? "the search path" : options.from.string()) +
+                             " holds no profiles/*.toml; name the directory above that of the profiles");
+  write_output(options.output, udev_rules(known.profiles));
+}
+
+void add_udev_rules(CLI::App& app, RuleOptions& options) {
+  CLI::App* rules = app.add_subcommand("udev-rules",
+                                       "The udev rules for the devices that there are profiles for: who may\n"
+                                       "open them, no autosuspend, and that plugging one in starts wrenchd");
+  rules
+      ->add_option("--from", options.from,
+                   "a directory whose profiles/*.toml are meant, instead of the search path")
+      ->check(not_empty());
+  rules->add_option("-o,--output", options.output, "rules file to write; - writes standard output")
+      ->check(not_empty())
+      ->capture_default_str();
+  rules->callback([&options] { run_udev_rules(options); });
+}
+
+int run_doctor() {
+  Patient patient = this_machine(known_profiles(SearchPath()).profiles);
+  patient.wake_ups = measure_wake_ups(std::chrono::seconds(1));
+  const std::vector<Finding> findings = examine(patient);
+  std::cout << text(findings);
+  return unfit(findings) ? kExitUnfit : 0;
+}
+
+void add_doctor(CLI::App& app, int& exit_code) {
+  CLI::App* doctor = app.add_subcommand(
+      "doctor",
+      "Whether this machine is fit for a servo loop: kernel, processors, limits, service,\n"
+      "udev rules, devices, and how late it wakes up; and what to do about each");
+  doctor->footer(
+      "Each line begins with ok, better (it would do good) or WRONG. Sleeps for a second, to measure; opens\n"
+      "no device and changes nothing. Exit code 5: something is wrong.");
+  doctor->callback([&exit_code] { exit_code = run_doctor(); });
+}
+
 struct FaultOptions {
   std::string name;
   bool states = false;
@@ -489,6 +540,7 @@ int main(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done; 1 refused (a file, its place and the cure are on standard error);\n"
       "2 mesh: not a solid; 3 solve: a pose had no admissible pose near it; 4 replay: a tick differs;\n"
+      "5 doctor: something is wrong; "
       "over 100: the command line was not understood.");
   app.require_subcommand(0, 1);  // an unknown one is then told by its name
   int exit_code = 0;
@@ -521,6 +573,11 @@ int main(int argc, char** argv) {
 
   bool all_devices = false;
   add_devices(app, all_devices);
+
+  RuleOptions rule_options;
+  add_udev_rules(app, rule_options);
+
+  add_doctor(app, exit_code);
 
   FaultOptions fault_options;
   add_faults(app, fault_options);
@@ -555,7 +612,9 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
-          "A subcommand (solve, check, decode, devices, encode, faults, mesh, profile, paper or replay)");
+          "A subcommand (solve, check, decode, devices, doctor, encode, faults, mesh, profile, paper, replay "
+          "or "
+          "udev-rules)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <sstream>
+
+#include <catch2/catch.hpp>
+
+#include "config/known_profiles.hpp"
+#include "tests/support/run_program.hpp"
+#include "tools/udev_rules.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+
+DeviceProfile profile(const std::string& name, Transport transport, std::vector<UsbId> usb) {
+  DeviceProfile p;
+  p.name = name;
+  p.transport = transport;
+  p.match.usb = std::move(usb);
+  return p;
+}
+
+/// The lines that act, without the comments.
+std::vector<std::string> rules_of(const std::vector<DeviceProfile>& profiles) {
+  std::istringstream text(udev_rules(profiles));
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(text, line);)
+    if (!line.empty() && line[0] != '#') lines.push_back(line);
+  return lines;
+}
+
+bool has(const std::string& line, const std::string& part) {
+  return line.find(part) != std::string::npos;
+}
+
+TEST_CASE("a device with motors: its hidraw node is the service's alone, and plugging it in starts it",
+          "[udev_rules]") {
+  DeviceProfile arm = profile("arm", Transport::hidraw, {{0x16c0, 0x0486}});
+  arm.match.usage_page = 0xffab;
+  CHECK(rules_of({arm}) ==
+        std::vector<std::string>{
+            R"(ACTION=="remove", GOTO="wrenchd_end")",
+            R"(SUBSYSTEM=="hidraw", KERNELS=="*:16C0:0486.*", GROUP="wrenchd", MODE="0660", TAG-="uaccess", )"
+            R"(TAG+="systemd", ENV{SYSTEMD_WANTS}+="wrenchd.service")",
+            R"(SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ATTR{idVendor}=="16c0", )"
+            R"(ATTR{idProduct}=="0486", TEST=="power/control", ATTR{power/control}="on")",
+            R"(LABEL="wrenchd_end")"});
+}
+
+TEST_CASE("a device past the kernel: its USB node, and not only its power", "[udev_rules]") {
+  const auto lines = rules_of({profile("falcon", Transport::libusb, {{0x0403, 0xcb48}})});
+  REQUIRE(lines.size() == 4);
+  CHECK(lines[1] ==
+        R"(SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ATTR{idVendor}=="0403", ATTR{idProduct}=="cb48", )"
+        R"(GROUP="wrenchd", MODE="0660", TAG-="uaccess", TAG+="systemd", )"
+        R"(ENV{SYSTEMD_WANTS}+="wrenchd.service")");
+}
+
+TEST_CASE("a device that drives nothing keeps its people, and moves no pointer", "[udev_rules]") {
+  DeviceProfile mouse = profile("mouse", Transport::hidraw, {{0x046d, 0xc626}});
+  mouse.has_output = false;
+  mouse.match.usage_page = 1;
+  const auto lines = rules_of({mouse});
+  REQUIRE(lines.size() == 5);
+  CHECK(has(lines[1], R"(KERNELS=="*:046D:C626.*")"));
+  CHECK_FALSE(has(lines[1], "uaccess"));
+  CHECK(lines[3] == R"(SUBSYSTEM=="input", ATTRS{idVendor}=="046d", ATTRS{idProduct}=="c626", )"
+                    R"(ENV{LIBINPUT_IGNORE_DEVICE}="1")");
+}
+
+TEST_CASE("a profile that is used only when named gets its node, and starts nothing", "[udev_rules]") {
+  DeviceProfile named = profile("named", Transport::hidraw, {{0x16c0, 0x0486}});
+  named.match.only_when_named = true;
+  const auto alone = rules_of({named});
+  CHECK(has(alone[1], R"(GROUP="wrenchd")"));
+  CHECK_FALSE(has(alone[1], "SYSTEMD_WANTS"));
+  const auto both = rules_of({named, profile("arm", Transport::hidraw, {{0x16c0, 0x0486}})});
+  CHECK(both.size() == alone.size());
+  CHECK(has(both[1], "SYSTEMD_WANTS"));
+}
+
+TEST_CASE("what cannot be used, and what is simulated, has no rule", "[udev_rules]") {
+  CHECK(rules_of({profile("touch", Transport::hidraw, {{0x2988, 0x0302}}),
+                  profile("loopback", Transport::loopback, {{0x1209, 0x0009}})})
+            .size() == 2);
+}
+
+TEST_CASE("every shipped profile has rules for each of its ids, and none is open to all", "[udev_rules]") {
+  REQUIRE(kShipped.refused.empty());
+  const std::string text = udev_rules(kShipped.profiles);
+  int ids = 0;
+  for (const DeviceProfile& shipped : kShipped.profiles) {
+    if (shipped.transport == Transport::loopback) continue;
+    for (const auto* list : {&shipped.match.usb, &shipped.match.usb_by_layout})
+      for (const UsbId id : *list) {
+        char name[16];
+        std::snprintf(name, sizeof(name), "# %04x:%04x:", id.vendor, id.product);
+        INFO(shipped.name << " " << name);
+        const std::size_t at = text.find(name);
+        REQUIRE(at != std::string::npos);
+        const std::string block = text.substr(at, text.find("\n\n", at) - at);
+        CHECK(has(block.substr(0, block.find('\n')), " " + shipped.name));
+        CHECK(has(block, shipped.transport == Transport::libusb ? "DEVTYPE}==\"usb_device\", ATTR{idVendor}"
+                                                                : "SUBSYSTEM==\"hidraw\""));
+        CHECK(has(block, R"(GROUP="wrenchd", MODE="0660")"));
+        CHECK(has(block, R"(ATTR{power/control}="on")"));
+        ++ids;
+      }
+  }
+  CHECK(ids > 20);
+  CHECK_FALSE(has(text, "0666"));
+  CHECK_FALSE(has(text, R"(TAG+="uaccess")"));
+}
+
+TEST_CASE("wrenchctl udev-rules: a profile more is a rule more, one that is refused ends it",
+          "[udev_rules][wrenchctl]") {
+  const TemporaryDirectory dir;
+  dir.write("profiles/mine.toml",
+            "inherits = \"reference_full_speed\"\nname = \"mine\"\n[match]\nusb = [\"1209:0042\"]\n");
+  dir.write("profiles/reference_full_speed.toml", "");
+  std::filesystem::remove(dir.path() / "profiles/reference_full_speed.toml");
+  std::filesystem::copy(WRENCHD_SOURCE_DIR "/config/profiles/reference_full_speed.toml",
+                        dir.path() / "profiles");
+  std::filesystem::copy(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml", dir.path() / "profiles");
+  const ProgramResult good = run_program("wrenchctl", {"udev-rules", "--from", dir.path().string()});
+  INFO(good.err);
+  CHECK(good.exit_code == 0);
+  CHECK(has(good.out, "# 1209:0001: reference_full_speed\n"));
+  CHECK(has(good.out, "# 1209:0042: mine\n"));
+  dir.write("profiles/bad.toml", "name = \"bad\"\nspeed = 3\n");
+  const ProgramResult bad = run_program("wrenchctl", {"udev-rules", "--from", dir.path().string()});
+  CHECK(bad.exit_code == 1);
+  CHECK(bad.out == "");
+  CHECK(has(bad.err, "bad.toml"));
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,396 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/doctor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <sstream>
+#include <thread>
+#include <utility>
+
+#include <grp.h>
+#include <pthread.h>
+#include <pwd.h>
+#include <sched.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "daemon/loop_timing.hpp"
+#include "daemon/realtime.hpp"
+#include "daemon/version.hpp"
+#include "daemon/wall_clock.hpp"
+#include "devices/match_profile.hpp"
+#include "devices/plugged_device.hpp"
+#include "devices/usb_devices.hpp"
+#include "tools/udev_rules.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What a servo thread of 1 kHz bears: a tenth of its period is not noticed; a whole one is a lost tick.
+constexpr Duration kGoodWakeUp = std::chrono::microseconds(100);
+constexpr Duration kBadWakeUp = std::chrono::milliseconds(1);
+constexpr std::uint64_t kServoPriority = 45;  ///< of wrenchd.toml
+constexpr std::uint64_t kLeastMemory_bytes = std::uint64_t{512} << 20U;
+constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
+
+constexpr const char* kGroup = "wrenchd";
+constexpr const char* kOperators = "wrench";
+
+Finding ok(std::string what) {
+  return {Health::ok, std::move(what), {}};
+}
+
+/// A file's text without the line's end; empty where it cannot be read.
+std::string content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\0')) text.pop_back();
+  return text;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+/// The first of these that is there.
+std::optional<fs::path> first_of(const fs::path& root, std::initializer_list<const char*> directories,
+                                 const std::string& name) {
+  for (const char* directory : directories) {
+    std::error_code ignored;
+    if (fs::exists(root / directory / name, ignored)) return root / directory / name;
+  }
+  return {};
+}
+
+std::optional<fs::path> unit_file(const fs::path& root) {
+  return first_of(root, {"etc/systemd/system", "lib/systemd/system", "usr/lib/systemd/system"},
+                  "wrenchd.service");
+}
+
+// --- kernel and processors --------------------------------------------------------------------------------
+
+Finding kernel(const Patient& p) {
+  const std::string release = content(p.root / "proc/sys/kernel/osrelease");
+  if (content(p.root / "sys/kernel/realtime") == "1") return ok("kernel: " + release + ", PREEMPT_RT");
+  return {Health::better,
+          "kernel: " + release + " is not PREEMPT_RT: under load it may wake the servo thread late",
+          "apt install linux-image-rt-amd64, and boot it"};
+}
+
+/// What else stands on the kernel's command line is for those who want the last microseconds.
+Finding boot_options(const Patient& p) {
+  std::istringstream line(content(p.root / "proc/cmdline"));
+  bool isolated = false, threaded = content(p.root / "sys/kernel/realtime") == "1";
+  for (std::string word; line >> word;) {
+    isolated = isolated || word.starts_with("isolcpus=");
+    threaded = threaded || word == "threadirqs";
+  }
+  if (isolated && threaded) return ok("boot options: a processor is isolated, interrupts are threads");
+  std::string what = "boot options:", cure;
+  if (!isolated) {
+    what += " no processor is kept for the servo thread";
+    cure =
+        "isolcpus=N on the kernel's command line and cpu = N under [servo], where two or more are to spare";
+  }
+  if (!threaded) {
+    what += std::string(isolated ? "" : ";") + " interrupts come before the servo thread";
+    cure += std::string(cure.empty() ? "" : "; ") + "threadirqs there, or a PREEMPT_RT kernel";
+  }
+  return {Health::better, what, cure};
+}
+
+Finding governor(const Patient& p) {
+  std::set<std::string> others;
+  int processors = 0, slow = 0;
+  std::error_code error;
+  for (fs::directory_iterator entry(p.root / "sys/devices/system/cpu", error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = content(entry->path() / "cpufreq/scaling_governor");
+    if (name.empty()) continue;
+    ++processors;
+    if (name == "performance") continue;
+    ++slow;
+    others.insert(name);
+  }
+  if (processors == 0)
+    return ok("governor: the kernel does not change the speed of this machine's processors");
+  if (slow == 0) return ok("governor: performance on all " + std::to_string(processors) + " processors");
+  std::string names;
+  for (const std::string& name : others) names += (names.empty() ? "" : ", ") + name;
+  return {Health::better,
+          "governor: " + names + " on " + std::to_string(slow) + " of " + std::to_string(processors) +
+              " processors: they are slow when the servo thread wakes",
+          "cpupower frequency-set -g performance (package linux-cpupower)"};
+}
+
+Finding rt_share(const Patient& p) {
+  const std::string text = content(p.root / "proc/sys/kernel/sched_rt_runtime_us");
+  const long us = text.empty() ? -1 : std::atol(text.c_str());
+  if (us < 0 || us >= 500000)
+    return ok("real-time share: " +
+              (us < 0 ? std::string("all of a processor") : std::to_string(us / 10000) + " %"));
+  return {Health::wrong, "real-time share: only " + std::to_string(us / 10000) + " % of a processor's time",
+          "sysctl -w kernel.sched_rt_runtime_us=950000"};
+}
+
+// --- limits -----------------------------------------------------------------------------------------------
+
+std::string size_text(std::uint64_t bytes) {
+  return bytes == kNoLimit ? "unlimited" : std::to_string(bytes >> 20U) + " MiB";
+}
+
+std::vector<Finding> user_limits(const Patient& p) {
+  if (p.is_root) return {ok("limits of " + p.user + ": root needs none")};
+  const std::string cure =
+      "nothing, where it runs as a service; else a line in /etc/security/limits.d, and log in anew: " +
+      p.user;
+  std::vector<Finding> found;
+  if (p.rtprio_limit >= kServoPriority)
+    found.push_back(ok("real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit)));
+  else
+    found.push_back({Health::better,
+                     "real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit) +
+                         ", and the servo thread wants " + std::to_string(kServoPriority),
+                     cure + " - rtprio 49"});
+  const std::string memory = "memory that " + p.user + " may lock: " + size_text(p.memlock_limit_bytes);
+  if (p.memlock_limit_bytes >= kLeastMemory_bytes)
+    found.push_back(ok(memory));
+  else
+    found.push_back({Health::better, memory, cure + " - memlock unlimited"});
+  return found;
+}
+
+/// The value of a setting in a unit file and its drop-ins; the last counts.
+std::string setting(const Patient& p, const fs::path& unit, const std::string& key) {
+  std::vector<fs::path> files = {unit};
+  std::vector<fs::path> more;
+  std::error_code error;
+  for (fs::directory_iterator entry(p.root / "etc/systemd/system/wrenchd.service.d", error), end;
+       !error && entry != end; entry.increment(error))
+    if (entry->path().extension() == ".conf") more.push_back(entry->path());
+  std::sort(more.begin(), more.end());
+  files.insert(files.end(), more.begin(), more.end());
+  std::string value;
+  for (const fs::path& file : files)
+    for (const std::string& line : lines_of(content(file)))
+      if (line.starts_with(key + "=")) value = line.substr(key.size() + 1);
+  return value;
+}
+
+std::vector<Finding> service(const Patient& p) {
+  const auto unit = unit_file(p.root);
+  if (!unit)
+    return {{Health::better,
+             "service: wrenchd.service is not installed: wrenchd runs only where somebody starts it",
+             "install the package: tools/package, then apt install ./build/package/wrenchd_*.deb"}};
+  std::vector<Finding> found;
+  const std::string priority = setting(p, *unit, "LimitRTPRIO"), memory = setting(p, *unit, "LimitMEMLOCK");
+  const std::string cure = "systemctl edit wrenchd: under [Service], ";
+  const bool may = priority == "infinity" || std::strtoul(priority.c_str(), nullptr, 10) >= kServoPriority;
+  found.push_back(may ? ok("service: LimitRTPRIO=" + priority)
+                      : Finding{Health::wrong,
+                                "service: LimitRTPRIO=" + priority + ", and the servo thread wants " +
+                                    std::to_string(kServoPriority),
+                                cure + "LimitRTPRIO=49"});
+  found.push_back(memory == "infinity"
+                      ? ok("service: LimitMEMLOCK=infinity")
+                      : Finding{Health::better,
+                                "service: LimitMEMLOCK=" + memory + ": a large mesh may not fit",
+                                cure + "LimitMEMLOCK=infinity"});
+  return found;
+}
+
+// --- groups, rules and devices ----------------------------------------------------------------------------
+
+bool has_group(const Patient& p, const std::string& name) {
+  for (const std::string& line : lines_of(content(p.root / "etc/group")))
+    if (line.starts_with(name + ":")) return true;
+  return false;
+}
+
+Finding groups(const Patient& p) {
+  if (!has_group(p, kGroup))
+    return {unit_file(p.root) ? Health::wrong : Health::better,
+            std::string("groups: there is no group ") + kGroup + ", which the nodes of devices belong to",
+            std::string("systemd-sysusers, which the package runs; or groupadd --system ") + kGroup};
+  const auto in = [&p](const char* group) {
+    return std::find(p.groups.begin(), p.groups.end(), group) != p.groups.end();
+  };
+  if (!p.is_root && in(kGroup))
+    return {Health::wrong,
+            "groups: " + p.user + " is in " + kGroup + ", and may push the hand past all limits",
+            "gpasswd -d " + p.user + " " + kGroup + ": it is the service's alone"};
+  if (p.is_root || in(kOperators)) return ok("groups: " + p.user + " may arm");
+  return {Health::better,
+          "groups: " + p.user + " is not in " + kOperators + ", and may only look on and stop",
+          "usermod -aG " + std::string(kOperators) + " " + p.user + ", and log in anew"};
+}
+
+/// Those of its lines that act.
+std::set<std::string> acting(const std::string& rules) {
+  std::set<std::string> lines;
+  for (const std::string& line : lines_of(rules))
+    if (!line.empty() && line[0] != '#') lines.insert(line);
+  return lines;
+}
+
+Finding rules(const Patient& p) {
+  const auto file =
+      first_of(p.root, {"etc/udev/rules.d", "run/udev/rules.d", "lib/udev/rules.d", "usr/lib/udev/rules.d"},
+               "70-wrenchd.rules");
+  const std::string cure = "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules, then udevadm trigger";
+  if (!file)
+    return {p.nodes.empty() && !unit_file(p.root) ? Health::better : Health::wrong,
+            "udev rules: there are none, so that only root can open a device", cure};
+  const std::string name = "/" + file->lexically_relative(p.root).string(), installed = content(*file);
+  const std::set<std::string> there = acting(installed);
+  std::size_t missing = 0;
+  const std::set<std::string> wanted = acting(udev_rules(p.profiles));
+  for (const std::string& line : wanted) missing += there.count(line) == 0 ? 1 : 0;
+  if (missing > 0)
+    return {Health::wrong,
+            "udev rules: " + name + " lacks " + std::to_string(missing) + " of the " +
+                std::to_string(wanted.size()) + " lines for the profiles of wrenchd " + kVersion,
+            cure};
+  return ok("udev rules: " + name + " has all profiles");
+}
+
+std::vector<Finding> devices(const Patient& p) {
+  if (p.nodes.empty()) return {ok("devices: none that has a profile is plugged in")};
+  std::vector<Finding> found;
+  for (const DeviceNode& node : p.nodes) {
+    std::array<char, 8> mode{};
+    std::snprintf(mode.data(), mode.size(), "%04o", node.mode);
+    const std::string who =
+        "device " + node.profile + ": " + node.node + " is of group " + node.group + ", mode " + mode.data();
+    if (node.group != kGroup || (node.mode & 0060U) != 0060U)
+      found.push_back({Health::wrong, who + ": the service cannot open it",
+                       "udevadm trigger, or unplug it and plug it in again, where the udev rules are right"});
+    else if ((node.mode & 0006U) != 0)
+      found.push_back({Health::wrong, who + ": anybody may push the hand past all limits",
+                       "look for the rule that opens it: grep -l 0666 /etc/udev/rules.d/*"});
+    else
+      found.push_back(ok(who));
+    if (node.place.empty()) continue;
+    const std::string control = content(p.root / "sys/bus/usb/devices" / node.place / "power/control");
+    if (control == "auto")
+      found.push_back(
+          {Health::wrong, "device " + node.profile + " in " + node.place + ": it may fall asleep",
+           "udevadm trigger, or: echo on > /sys/bus/usb/devices/" + node.place + "/power/control"});
+    else if (!control.empty())
+      found.push_back(ok("device " + node.profile + " in " + node.place + ": it stays awake"));
+  }
+  return found;
+}
+
+// --- wake-ups ---------------------------------------------------------------------------------------------
+
+std::string us_text(Duration d) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.0f us", static_cast<double>(d.count()) / 1e3);
+  return text.data();
+}
+
+Finding wake_ups(const WakeUps& seen) {
+  const std::string what = "wake-ups: p50 " + us_text(seen.p50) + ", p99.9 " + us_text(seen.p999) +
+                           ", at most " + us_text(seen.max) + " late, " + (seen.fifo ? "with" : "without") +
+                           " SCHED_FIFO";
+  if (seen.p999 <= kGoodWakeUp) return ok(what);
+  if (!seen.fifo)
+    return {Health::better, what, "run it as root, or raise the limits above, to see what the service gets"};
+  return {seen.p999 <= kBadWakeUp ? Health::better : Health::wrong, what,
+          "the cures above; nothing else that is heavy on this machine; no virtual machine"};
+}
+
+}  // namespace
+
+std::vector<Finding> examine(const Patient& patient) {
+  std::vector<Finding> all = {kernel(patient), boot_options(patient), governor(patient), rt_share(patient)};
+  const auto add = [&all](std::vector<Finding> more) {
+    all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+  };
+  add(user_limits(patient));
+  add(service(patient));
+  add({groups(patient), rules(patient)});
+  add(devices(patient));
+  if (patient.wake_ups) add({wake_ups(*patient.wake_ups)});
+  return all;
+}
+
+std::string text(std::span<const Finding> findings) {
+  std::string text;
+  for (const Finding& f : findings) {
+    text += f.health == Health::ok ? "ok      " : f.health == Health::better ? "better  " : "WRONG   ";
+    text += f.what + "\n";
+    if (!f.cure.empty()) text += "        -> " + f.cure + "\n";
+  }
+  return text;
+}
+
+bool unfit(std::span<const Finding> findings) noexcept {
+  return std::any_of(findings.begin(), findings.end(),
+                     [](const Finding& f) { return f.health == Health::wrong; });
+}
+
+Patient this_machine(std::vector<DeviceProfile> profiles) {
+  Patient p;
+  const uid_t uid = ::geteuid();
+  p.is_root = uid == 0;
+  const passwd* const user = ::getpwuid(uid);
+  p.user = user != nullptr ? user->pw_name : std::to_string(uid);
+  std::vector<gid_t> ids(256);
+  const int count = ::getgroups(static_cast<int>(ids.size()), ids.data());
+  ids.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
+  for (const gid_t id : ids)
+    if (const group* const g = ::getgrgid(id); g != nullptr) p.groups.emplace_back(g->gr_name);
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_RTPRIO, &limit) == 0) p.rtprio_limit = limit.rlim_cur;
+  if (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0)
+    p.memlock_limit_bytes = limit.rlim_cur == RLIM_INFINITY ? kNoLimit : limit.rlim_cur;
+  p.profiles = std::move(profiles);
+  for (const UsbDevice& device : list_usb_devices()) {
+    const MatchResult match = match_profile(plugged_facts(device).device, p.profiles);
+    if (!match.profile) continue;
+    const DeviceProfile& profile = p.profiles[*match.profile];
+    const std::string& node = profile.transport == Transport::libusb ? device.usb_node : device.hidraw_node;
+    struct stat status {};
+    if (node.empty() || ::stat(node.c_str(), &status) != 0) continue;
+    const group* const g = ::getgrgid(status.st_gid);
+    p.nodes.push_back({profile.name, node, device.place,
+                       g != nullptr ? g->gr_name : std::to_string(status.st_gid), status.st_mode & 0777U});
+  }
+  return p;
+}
+
+WakeUps measure_wake_ups(Duration for_so_long) {
+  constexpr Duration kPeriod = std::chrono::milliseconds(1);
+  WakeUps seen;
+  DurationHistogram late;
+  std::thread([&] {
+    sched_param priority{};
+    priority.sched_priority = static_cast<int>(kServoPriority);
+    seen.fifo = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority) == 0;
+    WallClock clock;
+    const TimePoint end = clock.now() + for_so_long;
+    for (TimePoint due = clock.now() + kPeriod; due < end; due = std::max(due, clock.now()) + kPeriod) {
+      clock.sleep_until(due);
+      late.add(std::max<Duration>(clock.now() - due, Duration::zero()));
+    }
+  }).join();
+  seen.p50 = late.quantile(0.5);
+  seen.p999 = late.quantile(0.999);
+  seen.max = late.max();
+  return seen;
+}
+
+}  // namespace wrenchd
