@@ -555,7 +555,8 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
     std::string told;
   } const table[] = {
       {{},
-       "A subcommand (solve, check, decode, devices, encode, faults, mesh, profile, paper or replay) is "
+       "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, decode, "
+       "devices, encode, faults, mesh, profile, paper or replay) is "
        "required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
