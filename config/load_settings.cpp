@@ -178,6 +178,23 @@ void read_recording(TomlTable& table, RecordingSettings& recording) {
   table.optional("file").path(recording.file);
 }
 
+/// Whether the groups exist is asked when the daemon starts: a configuration may be checked on another
+/// machine.
+void read_control(TomlTable& table, ControlSettings& control) {
+  const TomlValue socket = table.optional("socket");
+  if (socket.text(control.socket) && !control.socket.empty() && control.socket != kNoSocket &&
+      control.socket.front() != '/')
+    socket.refuse("expected an absolute path, or \"" + std::string(kNoSocket) + "\", found \"" +
+                  printable(control.socket) + "\"; clients and daemon have to mean the same file");
+  table.optional("observers").text(control.observers);
+  for (const auto& [key, group] :
+       {std::pair{"operators", &control.operators}, std::pair{"administrators", &control.administrators}}) {
+    const TomlValue value = table.optional(key);
+    if (value.text(*group) && *group == kEverybody)
+      value.refuse("only observers may be everybody; name a group");
+  }
+}
+
 void read_settings(TomlTable& table, const Lookup& lookup, Settings& s) {
   read_file_name(table.optional("scene"), lookup, s.scene);
   table.optional("device").table_or_empty(read_device, lookup, s.device);
@@ -187,6 +204,7 @@ void read_settings(TomlTable& table, const Lookup& lookup, Settings& s) {
   table.optional("limits").table(read_limits, s.limits);
   table.optional("simulation").table_or_empty(read_simulation, lookup, s.simulation);
   table.optional("recording").table(read_recording, s.recording);
+  table.optional("control").table(read_control, s.control);
 }
 
 }  // namespace

@@ -77,6 +77,18 @@ struct RecordingSettings {
   std::filesystem::path file;  ///< empty: no recording
 };
 
+/// [control]
+struct ControlSettings {
+  std::string socket;          ///< path; empty: the usual place; kNoSocket: none
+  std::string observers;       ///< group that may connect; empty: only the daemon's own user and root
+  std::string operators;       ///< group that may arm besides; its members have to be observers too
+  std::string administrators;  ///< group that may reconfigure besides, likewise
+};
+/// In the place of the path of the control socket.
+inline constexpr const char* kNoSocket = "none";
+/// In the place of the group of observers: everybody on this machine.
+inline constexpr const char* kEverybody = "*";
+
 /// All of wrenchd.toml.
 struct Settings {
   std::filesystem::path file;
@@ -88,6 +100,7 @@ struct Settings {
   LimitSettings limits;           ///< [limits]
   SimulationSettings simulation;  ///< [simulation]
   RecordingSettings recording;
+  ControlSettings control;
 };
 
 }  // namespace wrenchd

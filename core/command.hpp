@@ -19,6 +19,7 @@ enum Command : CommandSet {
   kLease = 64,        ///< with kArm: whoever arms promises signs of life
   kBeat = 128,        ///< a sign of life
   kLetGo = 256,       ///< the hand was released from outside: only in records
+  kHungUp = 512,      ///< whoever promised signs of life is gone: no need to wait for its silence
 };
 
 }  // namespace wrenchd

@@ -15,12 +15,14 @@ class ClientWatch {
   /// Somebody armed who promised to say that it lives.
   void begin(TimePoint now) noexcept {
     last_ = now;
-    beaten_ = false;
+    beaten_ = gone_ = false;
   }
   void beat(TimePoint now) noexcept {
     if (last_) last_ = now;
     beaten_ = true;
   }
+  /// Its connection has ended: what the watch would find after 100 ms it finds now.
+  void hang_up() noexcept { gone_ = last_.has_value(); }
   /// Nobody is armed any more.
   void end() noexcept { last_.reset(); }
 
@@ -29,6 +31,7 @@ class ClientWatch {
  private:
   std::optional<TimePoint> last_;
   bool beaten_ = false;
+  bool gone_ = false;
 };
 
 }  // namespace wrenchd

@@ -12,7 +12,7 @@ namespace wrenchd {
 /// Something worth a line in the log, as the servo thread says it: no text, no allocation.
 struct Event {
   enum class Kind : std::uint8_t {
-    state,      ///< detail: the new State
+    state,      ///< detail: the new State; value: the Fault that led to it, as a number
     fault,      ///< detail: the Fault; value: how much of it, where that says something
     stiffness,  ///< value: the share of the spring that stays passive on this device, where less than 1
     unbounded,  ///< the profile states no damping, so nobody knows how stiff a wall may be

@@ -14,8 +14,9 @@
 #include <unistd.h>
 
 #include "config/load_loopback_script.hpp"
+#include "daemon/control.hpp"
 #include "daemon/device_start.hpp"
-#include "daemon/event_log.hpp"
+#include "daemon/event_feed.hpp"
 #include "daemon/journal.hpp"
 #include "daemon/live_line.hpp"
 #include "daemon/option_checks.hpp"
@@ -62,6 +63,7 @@ struct Options {
   std::string realtime;
   std::string record;
   std::string script;
+  std::string control;
   double seconds = 0.0;
   int link_fd = -1;  ///< -1: none
   bool arm = false;
@@ -106,6 +108,9 @@ void describe(CLI::App& app, Options& options) {
       ->excludes("--simulate");
   app.add_option("--realtime", options.realtime, "instead of the configuration's: required, best_effort, off")
       ->check(CLI::IsMember({"required", "best_effort", "off"}));
+  app.add_option("--control", options.control,
+                 "path of the control socket, instead of the configuration's; none: no socket")
+      ->check(not_empty());
   app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)")
       ->check(not_empty());
   app.add_option("--seconds", options.seconds, "stop after this many seconds; without it, run until Ctrl-C")
@@ -310,6 +315,23 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
   }
 }
 
+/// The control socket, where one is wanted. The usual place may be another daemon's; one that somebody named
+/// may not.
+std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const Options& options) {
+  const SocketPlace place = socket_place(options.control, station.plan().settings.control);
+  if (place.path.empty() || options.virtual_time) return nullptr;
+  auto control = std::make_unique<Control>(station, feed);
+  try {
+    control->open(place.path);
+    spdlog::info("control socket: {}", place.path.string());
+    return control;
+  } catch (const std::runtime_error& error) {
+    if (place.asked_for) throw;
+    spdlog::warn("no control socket: {}", error.what());
+    return nullptr;
+  }
+}
+
 /// Builds the station around its link, and runs it.
 Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
           const std::function<Fault(Station&, LiveView&)>& run_it) {
@@ -329,7 +351,8 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
   const TimePoint start = clock.now();
   Fault fault = Fault::none;
   {
-    const EventLog log(station.loop());
+    EventFeed feed(station.loop());
+    const auto control = open_control(station, feed, options);
     fault = run_it(station, view);
   }
   view.close(station.loop(), seconds(clock.now() - start));

@@ -191,6 +191,7 @@ void ServoLoop::look(const DeviceSample& sample, TimePoint now) noexcept {
   const bool there = sample.fault != Fault::device_lost;
   if (there && transition(Trigger::device_there, machine_.state()).leads) machine_.on(Trigger::device_there);
   if ((record_.commands & kBeat) != 0) watches_.client.beat(now);
+  if ((record_.commands & kHungUp) != 0) watches_.client.hang_up();
   found(watches_.look(sample, machine_.state(), motors_told_ && !testing_ && driven_ != kNoDof, now), now);
   good_ = sample.fresh && sample.fault == Fault::none && is_finite(sample.X_BH) && is_finite(sample.V_BH);
   if (const Fault overdue = machine_.overdue(); overdue != Fault::none) found(overdue, now);
@@ -222,7 +223,7 @@ void ServoLoop::obey(CommandSet commands, TimePoint now) noexcept {
   if ((commands & kQuit) != 0) machine_.on(Trigger::quit);
   if ((commands & kDisarm) != 0) machine_.on(Trigger::disarm);
   if ((commands & kStartOver) != 0) lose_place();
-  if ((commands & kArm) == 0 || (commands & (kStop | kDisarm | kQuit)) != 0) return;
+  if ((commands & kArm) == 0 || (commands & (kStop | kDisarm | kQuit | kHungUp)) != 0) return;
   if (!transition(Trigger::arm, machine_.state()).leads)
     return say(Event::Kind::refused, now, static_cast<std::uint32_t>(machine_.state()));
   if (has_place()) lose_place();
@@ -478,7 +479,8 @@ void ServoLoop::record_sample(const DeviceSample& sample) noexcept {
 
 void ServoLoop::say_changes(TimePoint now) noexcept {
   if (machine_.state() != said_state_)
-    say(Event::Kind::state, now, static_cast<std::uint32_t>(machine_.state()));
+    say(Event::Kind::state, now, static_cast<std::uint32_t>(machine_.state()),
+        static_cast<double>(machine_.cause()));
   said_state_ = machine_.state();
   say_placing(now);
 }

@@ -74,6 +74,8 @@ class ServoLoop {
   /// By somebody who has to call live() at least every 100 ms from now on.
   void arm_with_lease() noexcept { ask(kArm | kLease | kBeat); }
   void live() noexcept { ask(kBeat); }
+  /// Who armed so is gone, and cannot say so itself: the force fades now. Who armed without is not meant.
+  void hang_up() noexcept { ask(kHungUp); }
   void disarm() noexcept { ask(kDisarm); }
   void stop() noexcept { ask(kStop); }
   void acknowledge() noexcept { ask(kAcknowledge); }

@@ -1,3 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#define CATCH_CONFIG_MAIN
+#define CATCH_CONFIG_RUNNER
+#include <cstdlib>
+
 #include <catch2/catch.hpp>
+#include <spdlog/spdlog.h>
+
+/// Daemons that tests start beside each other have no socket unless a test gives them one: the usual place is
+/// for one daemon, and may be that of the machine's own. What is logged here nobody reads.
+int main(int argc, char** argv) {
+  setenv("WRENCHD_SOCKET", "none", 1);
+  spdlog::default_logger()->set_level(spdlog::level::off);
+  return Catch::Session().run(argc, argv);
+}

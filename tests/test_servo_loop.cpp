@@ -10,7 +10,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "core/wrench_law.hpp"
-#include "daemon/event_log.hpp"
+#include "daemon/event_feed.hpp"
 #include "daemon/live_line.hpp"
 #include "daemon/wall_clock.hpp"
 #include "devices/simulated_link.hpp"

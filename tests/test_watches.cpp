@@ -146,3 +146,18 @@ TEST_CASE("a client that lives is heard, whoever armed without a lease is not as
   watch.end();
   CHECK(watch.look(TimePoint{1h}) == 0);
 }
+
+TEST_CASE("a client that hangs up is gone at once, where it had promised to live", "[watches]") {
+  ClientWatch watch;
+  watch.hang_up();
+  CHECK(watch.look(TimePoint{1s}) == 0);  // whoever armed without a lease is not meant
+  watch.begin(TimePoint{1s});
+  watch.beat(TimePoint{1s});
+  CHECK(watch.look(TimePoint{1s}) == 0);
+  watch.hang_up();
+  CHECK(watch.look(TimePoint{1s}) == bit(Fault::client_gone));
+  watch.end();
+  CHECK(watch.look(TimePoint{1s}) == 0);
+  watch.begin(TimePoint{2s});  // the next one is another
+  CHECK(watch.look(TimePoint{2s}) == 0);
+}

@@ -29,6 +29,7 @@
 #include "daemon/version.hpp"
 #include "tools/calibrate.hpp"
 #include "tools/check.hpp"
+#include "tools/control_commands.hpp"
 #include "tools/descriptor_source.hpp"
 #include "tools/doctor.hpp"
 #include "tools/fault_text.hpp"
@@ -532,10 +533,42 @@ void add_paper(CLI::App& app, std::filesystem::path& directory) {
   });
 }
 
+/// What a daemon that runs is asked for.
+void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
+  const auto add = [&](const char* name, const char* what, auto&& run) {
+    CLI::App* command = app.add_subcommand(name, what);
+    command->group("A daemon that runs");
+    command
+        ->add_option("--socket", options.socket,
+                     "its control socket; without it $WRENCHD_SOCKET, then /run/wrenchd/control.sock, then\n"
+                     "$XDG_RUNTIME_DIR/wrenchd/control.sock")
+        ->check(not_empty());
+    command->add_flag("--json", options.json, "what it says, as it says it");
+    command->callback([run] { run(); });
+    return command;
+  };
+  add("status", "State, cause and cure, device, limits, lease, and the times of ticks",
+      [&] { run_status(options); });
+  add("watch", "The status, then everything that happens, until Ctrl-C", [&] {
+    run_watch(options);
+  })->add_option("events", options.events, "names of events to show; without them all (wrenchctl describe)");
+  add("arm", "Takes the lease and arms; Ctrl-C, or the end of this program, disarms", [&] {
+    exit_code = run_arm(options);
+  })->add_flag("--from-other", options.from_other, "administrators: take the lease from whoever has it");
+  add("describe", "What can be asked of it, by whom; and its events", [&] {
+    run_describe(options);
+  })->add_option("method", options.method, "one method");
+  for (const auto& [name, what] : {std::pair{"disarm", "The force fades, whoever armed"},
+                                   std::pair{"stop", "Emergency stop; anybody may"},
+                                   std::pair{"acknowledge", "Somebody has looked at a fault, or a stop"},
+                                   std::pair{"reload", "Reads the configuration again"}})
+    add(name, what, [&options, name = name] { run_request(name, options); });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("wrenchctl: checks what wrenchd reads, and computes what it would feel.");
+  CLI::App app("wrenchctl: talks to wrenchd, checks what it reads, and computes what it would feel.");
   app.set_version_flag("--version", std::string("wrenchctl ") + kVersion);
   app.footer(
       "Exit codes: 0 done; 1 refused (a file, its place and the cure are on standard error);\n"
@@ -578,6 +611,8 @@ int main(int argc, char** argv) {
   add_udev_rules(app, rule_options);
 
   add_doctor(app, exit_code);
+  ControlOptions control_options;
+  add_control(app, control_options, exit_code);
 
   FaultOptions fault_options;
   add_faults(app, fault_options);
@@ -612,9 +647,8 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
-          "A subcommand (solve, check, decode, devices, doctor, encode, faults, mesh, profile, paper, replay "
-          "or "
-          "udev-rules)");
+          "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, "
+          "decode, devices, doctor, encode, faults, mesh, profile, paper, replay or udev-rules)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

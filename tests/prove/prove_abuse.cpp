@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "daemon/json_rpc.hpp"
+#include "daemon/recording_file.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tools/control_client.hpp"
+
+// What abuse of the control socket costs the servo loop. The real daemon runs, armed by a client that keeps
+// its lease, and records every tick. Slices of a second in which other processes abuse its socket by all
+// means take turns with slices in which nobody does, in one run: what else the machine does falls on both
+// alike. The times that ticks took, and by how much they came late, are taken from the recording.
+
+namespace {
+
+using namespace wrenchd;
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+std::string request(const std::string& method) {
+  return R"({"jsonrpc":"2.0","id":1,"method":")" + method + "\"}\n";
+}
+
+OwnedFd connected(const fs::path& path) {
+  OwnedFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.native().copy(address.sun_path, sizeof address.sun_path - 1);
+  if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return {};
+  return fd;
+}
+
+/// Sends as much of it as goes without waiting long. False: nobody is there any more.
+bool push(int fd, const std::string& bytes) {
+  for (std::size_t sent = 0; sent < bytes.size();) {
+    const ssize_t more = ::send(fd, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (more > 0) {
+      sent += static_cast<std::size_t>(more);
+    } else if (errno == EAGAIN) {
+      std::this_thread::sleep_for(200us);
+      return true;
+    } else {
+      return false;
+    }
+  }
+  return true;
+}
+
+void drain(int fd) {
+  std::array<char, 65536> bytes;
+  while (::recv(fd, bytes.data(), bytes.size(), MSG_DONTWAIT) > 0) {
+  }
+}
+
+/// One way to misbehave, for as long as it is wanted.
+using Abuse = void (*)(const fs::path& path, const std::atomic<bool>& wanted);
+
+void floods_requests(const fs::path& path, const std::atomic<bool>& wanted) {
+  const OwnedFd fd = connected(path);
+  std::string many;
+  for (int i = 0; i < 50; ++i) many += request("describe");
+  while (wanted && fd && push(fd.get(), many)) drain(fd.get());
+}
+
+void never_reads(const fs::path& path, const std::atomic<bool>& wanted) {
+  const OwnedFd fd = connected(path);
+  const std::string line = request("subscribe") + request("status") + request("describe");
+  while (wanted && fd && push(fd.get(), line)) {
+  }
+}
+
+void floods_rubbish(const fs::path& path, const std::atomic<bool>& wanted) {
+  const OwnedFd fd = connected(path);
+  const std::string rubbish = std::string(40000, '[') + "\n{\"jsonrpc\":\"2.0\",\n\xff\xfe\n";
+  while (wanted && fd && push(fd.get(), rubbish)) drain(fd.get());
+}
+
+void endless_line(const fs::path& path, const std::atomic<bool>& wanted) {
+  const std::string piece(65536, 'x');
+  while (wanted) {
+    const OwnedFd fd = connected(path);
+    if (!fd) return;
+    for (int i = 0; i < 1600 && wanted && push(fd.get(), piece); ++i) {
+    }
+  }
+}
+
+void connects(const fs::path& path, const std::atomic<bool>& wanted) {
+  std::vector<OwnedFd> kept;
+  while (wanted) {
+    kept.push_back(connected(path));
+    if (kept.size() > 50) kept.clear();
+    std::this_thread::sleep_for(100us);
+  }
+}
+
+void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
+  const OwnedFd fd = connected(path);
+  const std::string line = request("devices") + request("arm") + request("beat") + request("lease.give");
+  while (wanted && fd && push(fd.get(), line)) drain(fd.get());
+}
+
+constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
+                                          endless_line,    connects,    asks_for_all};
+
+/// The abusers, in a process of their own.
+class Abusers {
+ public:
+  Abusers(const fs::path& path, int threads) {
+    if (::pipe2(pipe_.data(), O_CLOEXEC) != 0)
+      throw std::system_error(errno, std::generic_category(), "pipe");
+    pid_ = ::fork();
+    if (pid_ == 0) live(path, threads);
+    ::close(pipe_[0]);
+  }
+  ~Abusers() {
+    ::close(pipe_[1]);
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Abusers(const Abusers&) = delete;
+  Abusers& operator=(const Abusers&) = delete;
+
+  void begin() { tell('b'); }
+  void end() { tell('e'); }
+
+ private:
+  void tell(char what) { [[maybe_unused]] const ssize_t n = ::write(pipe_[1], &what, 1); }
+
+  [[noreturn]] void live(const fs::path& path, int threads) {
+    ::close(pipe_[1]);
+    std::atomic<bool> wanted{false};
+    for (int i = 0; i < threads; ++i)
+      std::thread([&wanted, path, i] {
+        while (true) {
+          while (!wanted) std::this_thread::sleep_for(1ms);
+          kAbuses[static_cast<std::size_t>(i) % kAbuses.size()](path, wanted);
+          std::this_thread::sleep_for(1ms);
+        }
+      }).detach();
+    for (char what = 0; ::read(pipe_[0], &what, 1) == 1;) wanted = what == 'b';
+    ::_exit(0);
+  }
+
+  std::array<int, 2> pipe_{};
+  pid_t pid_ = -1;
+};
+
+class Daemon {
+ public:
+  Daemon(const std::string& program, std::vector<std::string> words, const fs::path& log) {
+    words.insert(words.begin(), program);
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                     0600);
+    const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throw std::system_error(error, std::generic_category(), program);
+  }
+  ~Daemon() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  bool lives() const { return ::waitpid(pid_, nullptr, WNOHANG) == 0; }
+  /// Its exit code; -1: by a signal.
+  int end() {
+    ::kill(pid_, SIGTERM);
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t pid_ = -1;
+};
+
+/// Keeps the lease on a connection and a thread of its own.
+class Holder {
+ public:
+  explicit Holder(const std::string& path) : client_(path) {
+    client_.call("lease.take");
+    client_.call("arm");
+    thread_ = std::jthread([this](const std::stop_token& stop) {
+      for (auto last = std::chrono::steady_clock::now(); !stop.stop_requested();) {
+        client_.say("beat");
+        const auto now = std::chrono::steady_clock::now();
+        if (now - last > longest_.load()) longest_ = now - last;
+        last = now;
+        std::this_thread::sleep_for(10ms);
+      }
+    });
+  }
+  /// Between two of its beats: what this machine kept it waiting.
+  double longest_ms() const { return 1e-6 * static_cast<double>(longest_.load().count()); }
+
+ private:
+  ControlClient client_;
+  std::atomic<std::chrono::nanoseconds> longest_{0ns};
+  std::jthread thread_;
+};
+
+struct Slice {
+  std::int64_t begin_ns, end_ns;
+  bool abused;
+};
+
+struct Times {
+  std::vector<double> tick_us, late_us;
+
+  static double quantile(std::vector<double>& values, double share) {
+    if (values.empty()) return std::nan("");
+    const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), values.begin() + at, values.end());
+    return values[static_cast<std::size_t>(at)];
+  }
+};
+
+std::int64_t now_ns() {
+  return std::chrono::steady_clock::now().time_since_epoch().count();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("prove_abuse: does abuse of the control socket reach the servo loop?");
+  long slices = 10;
+  double slice_s = 1.0;
+  std::uint64_t seed = 1;
+  int threads = 12;
+  std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "wrenchd").string();
+  app.add_option("--slices", slices, "pairs of a quiet and an abused slice")
+      ->check(CLI::Range(1L, 1000000L))
+      ->capture_default_str();
+  app.add_option("--slice-s", slice_s, "how long each is")
+      ->check(CLI::Range(0.1, 60.0))
+      ->capture_default_str();
+  app.add_option("--threads", threads, "that abuse at the same time")
+      ->check(CLI::Range(1, 200))
+      ->capture_default_str();
+  app.add_option("--seed", seed, "of which slice of a pair comes first")->capture_default_str();
+  app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const test::TemporaryDirectory files;
+    const fs::path socket = files.path() / "control.sock", recording = files.path() / "run.h5";
+    Daemon daemon(program, {"--realtime", "best_effort", "--control", socket, "--record", recording},
+                  files.path() / "log");
+    for (int i = 0; i < 500 && !connected(socket); ++i) std::this_thread::sleep_for(10ms);
+    ControlClient watcher(socket);
+    for (int i = 0; i < 500 && watcher.call("status")["state"] != "disarmed"; ++i)
+      std::this_thread::sleep_for(10ms);
+    Abusers abusers(socket, threads);
+    Holder holder(socket);
+    long violations = 0;
+    const auto violation = [&violations](const std::string& what) {
+      ++violations;
+      std::fprintf(stderr, "prove_abuse: %s\n", what.c_str());
+    };
+    std::mt19937_64 random(seed);
+    std::vector<Slice> done;
+    double slowest_answer_ms = 0.0;
+    long lost_leases = 0;
+    for (long pair = 0; pair < slices; ++pair) {
+      const bool abused_first = random() % 2 == 0;
+      for (const bool abused : {abused_first, !abused_first}) {
+        if (abused) abusers.begin();
+        std::this_thread::sleep_for(100ms);  // until they are all at it, or all done
+        Slice slice{now_ns(), 0, abused};
+        const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(slice_s);
+        while (std::chrono::steady_clock::now() < until) {
+          std::this_thread::sleep_for(20ms);
+          const auto asked = std::chrono::steady_clock::now();
+          const Json status = watcher.call("status");
+          if (abused)
+            slowest_answer_ms = std::max(
+                slowest_answer_ms,
+                std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - asked).count());
+          if (status["lease"].is_null()) ++lost_leases;
+          if (status["state"] == "stopped") violation("somebody stopped it who did not ask for it");
+        }
+        slice.end_ns = now_ns();
+        abusers.end();
+        done.push_back(slice);
+        if (!daemon.lives()) throw std::runtime_error("the daemon has ended");
+      }
+    }
+    // Anybody's stop, in the middle of it.
+    abusers.begin();
+    std::this_thread::sleep_for(200ms);
+    const auto stop_asked = std::chrono::steady_clock::now();
+    watcher.call("stop");
+    const double stop_ms =
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_asked).count();
+    abusers.end();
+    std::this_thread::sleep_for(100ms);
+    if (watcher.call("status")["state"] != "stopped") violation("stop did not stop it");
+    if (lost_leases > 0 && holder.longest_ms() < 80.0) violation("a holder that beat in time lost the lease");
+    daemon.end();
+
+    std::array<Times, 2> times;
+    for (const TickRecord& record : read_recording(recording).ticks)
+      for (const Slice& slice : done)
+        if (record.now_ns >= slice.begin_ns && record.now_ns < slice.end_ns) {
+          std::int64_t took_ns = 0;
+          for (const std::int64_t stage : record.stage_ns) took_ns += stage;
+          times[slice.abused ? 1 : 0].tick_us.push_back(1e-3 * static_cast<double>(took_ns));
+          times[slice.abused ? 1 : 0].late_us.push_back(1e-3 * static_cast<double>(record.wake_latency_ns));
+        }
+    const auto p = [&](int abused, auto member, double share) {
+      return Times::quantile(times[static_cast<std::size_t>(abused)].*member, share);
+    };
+    const double quiet_us = p(0, &Times::tick_us, 0.999), abused_us = p(1, &Times::tick_us, 0.999);
+    const double quiet_late_us = p(0, &Times::late_us, 0.999), abused_late_us = p(1, &Times::late_us, 0.999);
+    std::printf(
+        "abuse ticks %zu abused_ticks %zu tick_p50_us %.1f abused_tick_p50_us %.1f tick_p99_9_us %.1f "
+        "abused_tick_p99_9_us %.1f tick_difference_us %.1f late_p99_9_us %.1f abused_late_p99_9_us %.1f "
+        "late_difference_us %.1f slowest_answer_ms %.1f stop_ms %.1f longest_beat_ms %.1f lost_leases %ld "
+        "violations %ld seed %llu\n",
+        times[0].tick_us.size(), times[1].tick_us.size(), p(0, &Times::tick_us, 0.5),
+        p(1, &Times::tick_us, 0.5), quiet_us, abused_us, abused_us - quiet_us, quiet_late_us, abused_late_us,
+        abused_late_us - quiet_late_us, slowest_answer_ms, stop_ms, holder.longest_ms(), lost_leases,
+        violations, static_cast<unsigned long long>(seed));
+    return violations == 0 ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "prove_abuse: %s\n", error.what());
+    return 1;
+  }
+}

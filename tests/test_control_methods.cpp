@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cctype>
+
+#include <catch2/catch.hpp>
+
+#include "config/config_error.hpp"
+#include "tests/support/control_rig.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+/// All methods of the daemon, on a station that nobody ticks.
+struct Table {
+  VirtualStation s{resting_plan()};
+  EventFeed feed{s.station.loop()};
+  Control control{s.station, feed};
+  const MethodTable& methods = control.methods();
+};
+
+RpcError refused(const MethodTable& table, const std::string& method, const Json& params, Role role) {
+  try {
+    table.look_up({method, params, 1, true}, role);
+  } catch (const RpcError& error) {
+    return error;
+  }
+  FAIL("method '" << method << "' takes " << params.dump());
+  throw std::logic_error("not reached");
+}
+
+bool says(const RpcError& error, const std::string& text) {
+  return std::string(error.what()).find(text) != std::string::npos;
+}
+
+/// A value of that type.
+Json value_of(ParamType type) {
+  switch (type) {
+    case ParamType::boolean:
+      return true;
+    case ParamType::integer:
+      return 3;
+    case ParamType::number:
+      return 2.5;
+    case ParamType::text:
+      return "text";
+    case ParamType::texts:
+      return Json::array({"a", "b"});
+    case ParamType::vector:
+      return Json::array({1, 2.5, -3});
+    case ParamType::object:
+      return Json::object();
+  }
+  return nullptr;
+}
+
+const std::vector<Json> kWrongForAll = {nullptr, Json::array({1, "a"}), Json::array({1.0, 2.0})};
+
+/// Every parameter, with a value that it takes.
+Json good_params(const MethodRow& row) {
+  Json params = Json::object();
+  for (const ParamRow& param : row.params) params[param.name] = value_of(param.type);
+  return params;
+}
+
+TEST_CASE("every method is documented, and takes its parameters and no other", "[control_methods]") {
+  const Table t;
+  REQUIRE(t.methods.methods().size() >= 13);
+  for (const auto& [name, row] : t.methods.methods()) {
+    INFO(name);
+    CHECK(row.name == name);
+    CHECK(row.doc.size() > 10);
+    CHECK(row.doc.back() == '.');
+    CHECK(static_cast<bool>(row.run));
+    for (const char c : name) CHECK((std::islower(static_cast<unsigned char>(c)) || c == '.' || c == '_'));
+    const Json good = good_params(row);
+    CHECK(&t.methods.look_up({name, good, 1, true}, row.least) == &row);
+
+    Json more = good;
+    more["no_such_thing"] = 1;
+    const RpcError unknown = refused(t.methods, name, more, Role::administrator);
+    CHECK(unknown.code() == RpcCode::wrong_params);
+    CHECK(says(unknown, "'no_such_thing'"));
+    for (const ParamRow& param : row.params) {
+      INFO(param.name);
+      CHECK(param.doc.size() > 5);
+      for (const Json& wrong : kWrongForAll) {
+        Json bad = good;
+        bad[param.name] = wrong;
+        const RpcError error = refused(t.methods, name, bad, Role::administrator);
+        CHECK(error.code() == RpcCode::wrong_params);
+        CHECK(says(error, "'" + param.name + "' has to be " + words(param.type)));
+      }
+      Json less = good;
+      less.erase(param.name);
+      if (param.required) CHECK(says(refused(t.methods, name, less, Role::administrator), "is missing"));
+      if (!param.required) CHECK_NOTHROW(t.methods.look_up({name, less, 1, true}, row.least));
+    }
+  }
+}
+
+TEST_CASE("every method refuses each role below its own, whatever the parameters are", "[control_methods]") {
+  const Table t;
+  int refusals = 0;
+  for (const auto& [name, row] : t.methods.methods())
+    for (const Role role : {Role::observer, Role::operator_}) {
+      if (role >= row.least) continue;
+      INFO(name);
+      for (const Json& params : {good_params(row), Json{{"no_such_thing", 1}}}) {
+        const RpcError error = refused(t.methods, name, params, role);
+        CHECK(error.code() == RpcCode::not_allowed);
+        CHECK(error.details()["needs"] == wrenchd::name(row.least));
+        CHECK(says(error, "group '"));
+        ++refusals;
+      }
+    }
+  CHECK(refusals >= 10);
+}
+
+TEST_CASE("anybody may stop and look, operators may arm, and nobody below", "[control_methods]") {
+  const Table t;
+  for (const char* open : {"describe", "status", "subscribe", "unsubscribe", "stop", "devices"})
+    CHECK(t.methods.methods().at(open).least == Role::observer);
+  for (const char* closed :
+       {"lease.take", "lease.give", "beat", "arm", "disarm", "acknowledge", "start_over"})
+    CHECK(t.methods.methods().at(closed).least == Role::operator_);
+}
+
+TEST_CASE("what does not exist is told with what is nearest", "[control_methods]") {
+  const Table t;
+  const RpcError error = refused(t.methods, "lease_take", Json::object(), Role::observer);
+  CHECK(error.code() == RpcCode::no_such_method);
+  CHECK(says(error, "did you mean 'lease.take'?"));
+  CHECK(says(refused(t.methods, "subscribe", {{"event", Json::array()}}, Role::observer),
+             "there is no parameter 'event'; did you mean 'events'?"));
+  CHECK(refused(t.methods, std::string(60000, 'x'), Json::object(), Role::observer).code() ==
+        RpcCode::no_such_method);
+}
+
+TEST_CASE("describe tells all of the table", "[control_methods]") {
+  const Table t;
+  const Json told = t.methods.describe();
+  CHECK(told["protocol"] == 1);
+  CHECK(told["methods"].size() == t.methods.methods().size());
+  for (const Json& method : told["methods"]) {
+    const MethodRow& row = t.methods.methods().at(method["name"].get<std::string>());
+    CHECK(method["role"] == name(row.least));
+    CHECK(method["doc"] == row.doc);
+    CHECK(method["params"].size() == row.params.size());
+  }
+  std::set<std::string> events;
+  for (const Json& event : told["events"]) {
+    events.insert(event["name"].get<std::string>());
+    CHECK(event["doc"].get<std::string>().size() > 10);
+  }
+  for (const char* name : {"state", "fault", "device", "lease", "stiffness", "placing", "lost"})
+    CHECK(events.count(name) == 1);
+  CHECK(told["errors"].size() == 9);
+  for (const Json& error : told["errors"]) CHECK(error["code"].get<int>() < 0);
+  CHECK(told["roles"]["administrator"].get<std::string>().find("group 'daemon'") != std::string::npos);
+}
+
+TEST_CASE("a method that fails is answered, and its error has a kind", "[control_methods]") {
+  const auto thrown = [](const auto& error) {
+    MethodTable table;
+    table.add(MethodRow{
+        "fail", Role::observer, {}, "Fails.", [&](const Json&, const Caller&) -> Answer { throw error; }});
+    try {
+      MethodTable::run(table.methods().at("fail"), Json::object(), {});
+    } catch (const RpcError& told) {
+      return told;
+    }
+    throw std::logic_error("nothing was thrown");
+  };
+  CHECK(thrown(RpcError(RpcCode::taken, "Taken.")).code() == RpcCode::taken);
+  const RpcError config = thrown(ConfigError("scene.toml", Place{3, 4}, "is wrong; mend it"));
+  CHECK(config.code() == RpcCode::refused);
+  CHECK(says(config, "scene.toml:3:4: is wrong; mend it"));
+  const RpcError internal = thrown(std::runtime_error("the disk is full"));
+  CHECK(internal.code() == RpcCode::internal);
+  CHECK(says(internal, "the disk is full"));
+}
+
+TEST_CASE("a row that is there already is not added again", "[control_methods]") {
+  Table t;
+  CHECK_THROWS_AS(t.control.methods().add(MethodRow{"stop", Role::observer, {}, "Again.", {}}),
+                  std::logic_error);
+  CHECK_THROWS_AS(t.control.methods().add(EventRow{"state", "Again."}), std::logic_error);
+}
+
+}  // namespace
+}  // namespace wrenchd

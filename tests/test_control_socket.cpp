@@ -1,0 +1,673 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+
+#include <catch2/catch.hpp>
+#include <fcntl.h>
+#include <sys/wait.h>
+
+#include "tests/support/control_rig.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+using namespace std::chrono_literals;
+
+int code_of(RpcCode code) {
+  return static_cast<int>(code);
+}
+
+std::string request(const std::string& method, const std::string& params = "{}",
+                    const std::string& id = "1") {
+  return R"({"jsonrpc":"2.0","id":)" + id + R"(,"method":")" + method + R"(","params":)" + params + "}\n";
+}
+
+/// The code of the error in the next line; 0: it is none; -1: no line came.
+int next_code(RigClient& client) {
+  const auto line = client.line();
+  if (!line) return -1;
+  const Json told = Json::parse(*line, nullptr, false);
+  return told.is_object() && told.contains("error") ? told["error"]["code"].get<int>() : 0;
+}
+
+bool hangs_up(RigClient& client) {
+  while (client.line(2000ms)) {
+  }
+  return client.over();
+}
+
+std::size_t open_descriptors() {
+  std::size_t count = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) ++count;
+  return count;
+}
+
+double resident_MB() {
+  std::ifstream statm("/proc/self/statm");
+  double size = 0.0, resident = 0.0;
+  statm >> size >> resident;
+  return resident * static_cast<double>(getpagesize()) / 1e6;
+}
+
+/// Bytes with open files and credentials beside them.
+void send_files(const RigClient& client, int count) {
+  const OwnedFd file(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  std::vector<char> control(CMSG_SPACE(static_cast<std::size_t>(count) * sizeof(int)));
+  std::string bytes = request("status");
+  iovec part{bytes.data(), bytes.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  cmsghdr* header = CMSG_FIRSTHDR(&message);
+  header->cmsg_level = SOL_SOCKET;
+  header->cmsg_type = SCM_RIGHTS;
+  header->cmsg_len = CMSG_LEN(static_cast<std::size_t>(count) * sizeof(int));
+  for (int i = 0; i < count; ++i) {
+    const int fd = file.get();
+    std::memcpy(CMSG_DATA(header) + static_cast<std::size_t>(i) * sizeof fd, &fd, sizeof fd);
+  }
+  ::sendmsg(client.fd(), &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+void claim_root(const RigClient& client) {
+  std::array<char, CMSG_SPACE(sizeof(ucred))> control{};
+  std::string bytes = request("lease.take");
+  iovec part{bytes.data(), bytes.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  cmsghdr* header = CMSG_FIRSTHDR(&message);
+  header->cmsg_level = SOL_SOCKET;
+  header->cmsg_type = SCM_CREDENTIALS;
+  header->cmsg_len = CMSG_LEN(sizeof(ucred));
+  const ucred root{getpid(), geteuid(), getegid()};
+  std::memcpy(CMSG_DATA(header), &root, sizeof root);
+  ::sendmsg(client.fd(), &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+/// What somebody may try, and what has to come of it besides: nothing.
+struct Abuse {
+  std::string name;
+  std::function<void(ControlRig&)> run;
+};
+
+/// One line from an observer, and the code of its answer.
+Abuse line_of(const std::string& name, const std::string& line, RpcCode code, As who = As::observer) {
+  return {name, [=](ControlRig& rig) {
+            RigClient client = rig.connect(who);
+            client.send(line);
+            CHECK(next_code(client) == code_of(code));
+            CHECK(client.code("status") == 0);  // and the connection goes on
+          }};
+}
+
+Abuse forbidden(const std::string& method) {
+  return line_of("observer asks for " + method, request(method), RpcCode::not_allowed);
+}
+
+void flood(RigClient& client, const std::string& line, int lines) {
+  for (int i = 0; i < lines && client.send(line); ++i) {
+  }
+}
+
+std::vector<Abuse> abuses() {
+  const std::string nested(30000, '[');
+  std::vector<Abuse> table = {
+      forbidden("arm"),
+      forbidden("disarm"),
+      forbidden("lease.take"),
+      forbidden("lease.give"),
+      forbidden("beat"),
+      forbidden("acknowledge"),
+      forbidden("start_over"),
+      line_of("no such method", request("sudo"), RpcCode::no_such_method),
+      line_of("a method with a path in it", request("../../stop"), RpcCode::no_such_method),
+      line_of("a method of 60 kB", request(std::string(60000, 'm')), RpcCode::no_such_method),
+      line_of("a role in the parameters", request("arm", R"({"role":"administrator"})"),
+              RpcCode::not_allowed),
+      line_of("a uid in the request",
+              R"({"jsonrpc":"2.0","id":1,"method":"arm","uid":0})"
+              "\n",
+              RpcCode::no_request),
+      line_of("operator arms without the lease", request("arm"), RpcCode::not_now, As::operator_),
+      line_of("operator beats without the lease", request("beat"), RpcCode::not_now, As::operator_),
+      line_of("operator gives what it has not", request("lease.give"), RpcCode::not_now, As::operator_),
+      line_of("operator takes the lease from another", request("lease.take", R"({"from_other":true})"),
+              RpcCode::not_allowed, As::operator_),
+      line_of("a batch with stop in it", "[" + request("stop").substr(0, request("stop").size() - 1) + "]\n",
+              RpcCode::no_request),
+      line_of("another version",
+              R"({"jsonrpc":"1.0","id":1,"method":"stop"})"
+              "\n",
+              RpcCode::no_request),
+      line_of("no version",
+              R"({"id":1,"method":"stop"})"
+              "\n",
+              RpcCode::no_request),
+      line_of("two methods",
+              R"({"jsonrpc":"2.0","id":1,"method":"status","method":"stop"})"
+              "\n",
+              RpcCode::no_json),
+      line_of("a zero byte", std::string("{\"jsonrpc\":\"2.0\",\0\"id\":1,\"method\":\"stop\"}\n", 42),
+              RpcCode::no_json),
+      line_of("a zero byte behind the request", request("stop").insert(request("stop").size() - 1, 1, '\0'),
+              RpcCode::no_json),
+      line_of("bytes that are no UTF-8", request("stop", "{\"a\":\"\xff\xfe\"}"), RpcCode::no_json),
+      line_of("surrogates", request("stop", R"({"a":"\ud800"})"), RpcCode::no_json),
+      line_of("30,000 arrays in each other", request("stop", "{\"a\":" + nested), RpcCode::no_json),
+      line_of("a huge id", request("stop", "{}", "99999999999999999999999"), RpcCode::no_request),
+      line_of("an id of 60 kB", request("stop", "{}", '"' + std::string(60000, 'i') + '"'),
+              RpcCode::no_request),
+      line_of("an id that is an object", request("stop", "{}", "{}"), RpcCode::no_request),
+      line_of("a number beyond all numbers", request("stop", R"({"a":1e999})"), RpcCode::no_json),
+      line_of("parameters without names", request("stop", "[1]"), RpcCode::wrong_params),
+      line_of("parameters that stop does not have", request("stop", R"({"softly":true})"),
+              RpcCode::wrong_params),
+      line_of("an empty line", "\n", RpcCode::no_json),
+      line_of("60 kB of blanks", std::string(60000, ' ') + "\n", RpcCode::no_json),
+      line_of("another protocol", "GET / HTTP/1.1\r\n", RpcCode::no_json),
+      line_of("no event of that name", request("subscribe", R"({"events":["everything"]})"),
+              RpcCode::wrong_params),
+      {"half a line, and hangs up",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::operator_);
+         client.send(request("lease.take").substr(0, 40));
+         client.hang_up();
+       }},
+      {"a request without its end, and hangs up",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         std::string stop = request("stop");
+         stop.pop_back();
+         client.send(stop);
+         client.hang_up();
+         std::this_thread::sleep_for(50ms);
+       }},
+      {"a byte at a time",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         for (const char byte : request("status")) {
+           client.send(std::string_view(&byte, 1));
+           std::this_thread::sleep_for(1ms);
+         }
+         CHECK(next_code(client) == 0);
+       }},
+      {"a line without end",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         client.send(std::string(kMaxLineBytes + 4096, 'x'));
+         CHECK(next_code(client) == code_of(RpcCode::no_json));
+         CHECK(hangs_up(client));
+       }},
+      {"a line of 100 MB",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         const std::string piece(std::size_t{1} << 16, '{');
+         const double before_MB = resident_MB();
+         int pieces = 0;
+         while (pieces < 1600 && client.send(piece)) ++pieces;
+         CHECK(pieces < 100);
+         CHECK(resident_MB() - before_MB < 20.0);
+       }},
+      {"requests before the line of 100 MB still count for nothing",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         client.send(request("arm") + std::string(200000, 'y'));
+         CHECK(next_code(client) == code_of(RpcCode::not_allowed));
+       }},
+      {"strangers",
+       [](ControlRig& rig) {
+         for (int i = 0; i < 100; ++i) {
+           RigClient client = rig.connect(As::stranger);
+           client.send(request("stop"));
+           if (i > 0) continue;
+           CHECK(next_code(client) == code_of(RpcCode::not_allowed));
+           CHECK(hangs_up(client));
+         }
+       }},
+      {"a thousand connections",
+       [](ControlRig& rig) {
+         for (int i = 0; i < 1000; ++i) rig.connect(As::observer);
+       }},
+      {"more connections than there are places, all kept",
+       [](ControlRig& rig) {
+         std::vector<RigClient> kept;
+         for (int i = 0; i < 100; ++i) kept.emplace_back(rig.path(), 7000U);
+         CHECK(kept.back().code("status") == 0);
+         CHECK(rig.connect(As::operator_).code("status") == 0);
+       }},
+      {"a flood of requests whose answers nobody reads",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         flood(client, request("describe"), 3000);
+         CHECK(rig.connect(As::observer).code("status") == 0);
+       }},
+      {"a flood of rubbish",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         flood(client, "\x01\x02}{][\"\\\n", 20000);
+       }},
+      {"a flood of notifications that are not allowed",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"arm\"}\n", 5000);
+         flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"lease.take\"}\n", 100);
+       }},
+      {"a subscriber that never reads",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         client.send(request("subscribe"));
+         const double before_MB = resident_MB();
+         for (int i = 0; i < 20000; ++i)
+           rig.feed().tell("log", EventLevel::info, "noise " + std::string(200, 'n'));
+         CHECK(resident_MB() - before_MB < 20.0);
+       }},
+      {"subscribes and does not, again and again",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         flood(client, request("subscribe") + request("unsubscribe"), 300);
+       }},
+      {"20,000 names to subscribe to",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         std::string names = "\"state\"";
+         while (names.size() < 60000) names += ",\"state\"";
+         client.send(request("subscribe", "{\"events\":[" + names + "]}"));
+         CHECK(next_code(client) == 0);
+       }},
+      {"open files beside the request",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         for (int i = 0; i < 20; ++i) send_files(client, 100);
+         for (int i = 0; i < 20; ++i) CHECK(next_code(client) == 0);
+       }},
+      {"credentials beside the request",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         claim_root(client);
+         CHECK(next_code(client) == code_of(RpcCode::not_allowed));
+       }},
+      {"bytes out of band",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         for (int i = 0; i < 10; ++i) {
+           ::send(client.fd(), "!", 1, MSG_OOB | MSG_NOSIGNAL | MSG_DONTWAIT);
+           client.send(request("status"));
+         }
+       }},
+      {"shuts down what it reads, and asks on",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         ::shutdown(client.fd(), SHUT_RD);
+         flood(client, request("describe"), 200);
+       }},
+      {"shuts down both sides at once",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         ::shutdown(client.fd(), SHUT_RDWR);
+         std::this_thread::sleep_for(20ms);
+       }},
+      {"hangs up over answers that it has not read",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::observer);
+         flood(client, request("status"), 50);
+         std::this_thread::sleep_for(20ms);
+       }},
+      {"asks for much that takes long",
+       [](ControlRig& rig) {
+         std::vector<RigClient> clients;
+         for (int i = 0; i < 15; ++i) {
+           clients.push_back(rig.connect(As::observer));
+           clients.back().send(request("devices") + request("devices") + request("devices"));
+         }
+         CHECK(rig.connect(As::observer).code("status") == 0);
+       }},
+      {"takes and gives the lease without end",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::operator_);
+         flood(client, request("lease.take") + request("lease.give"), 200);
+       }},
+      {"two want the lease",
+       [](ControlRig& rig) {
+         RigClient first = rig.connect(As::operator_), second = rig.connect(As::operator_);
+         CHECK(first.code("lease.take") == 0);
+         CHECK(second.code("lease.take") == code_of(RpcCode::taken));
+         CHECK(second.code("arm") == code_of(RpcCode::taken));
+         CHECK(second.code("beat") == code_of(RpcCode::taken));
+         CHECK(second.code("lease.give") == code_of(RpcCode::taken));
+         CHECK(second.code("lease.take", {{"from_other", true}}) == code_of(RpcCode::not_allowed));
+       }},
+      {"another process keeps the holder's connection open",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::operator_);
+         CHECK(client.code("lease.take") == 0);
+         CHECK(client.code("arm") == 0);
+         const pid_t child = ::fork();
+         if (child == 0) {
+           ::pause();
+           ::_exit(0);
+         }
+         client.hang_up();  // it is still open over there
+         CHECK(rig.comes_to(State::disarmed, 2000ms));
+         ::kill(child, SIGKILL);
+         ::waitpid(child, nullptr, 0);
+       }},
+      {"the holder hangs up in the middle of a line",
+       [](ControlRig& rig) {
+         RigClient client = rig.connect(As::operator_);
+         client.send(request("lease.take") + request("arm"));
+         CHECK(next_code(client) == 0);
+         CHECK(next_code(client) == 0);
+         CHECK(rig.comes_to(State::waiting, 500ms));
+         client.send("{\"jsonrpc\":\"2.0\",\"meth");
+         client.hang_up();
+       }},
+  };
+  return table;
+}
+
+/// Nothing was done that nobody may do, and the daemon is well: it ticks, and answers soon.
+void check_well(ControlRig& rig) {
+  CHECK(rig.comes_to(State::disarmed, 2000ms));
+  RigClient client = rig.connect(As::observer);
+  const auto asked = std::chrono::steady_clock::now();
+  const Json before = client.result("status");
+  CHECK(std::chrono::steady_clock::now() - asked < 2s);
+  const auto end = asked + 3s;
+  Json status = before;
+  while ((status["tick"] == before["tick"] || !status["lease"].is_null()) &&
+         std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(10ms);
+    status = client.result("status");
+  }
+  CHECK(status["tick"] > before["tick"]);
+  CHECK(status["lease"].is_null());
+  CHECK(status["armed_by"].is_null());
+  CHECK(status["state"] == "disarmed");
+}
+
+TEST_CASE("whatever is done to the socket, the daemon lives and nobody gets what is not his",
+          "[control_socket]") {
+  ControlRig rig;
+  check_well(rig);
+  const std::size_t descriptors = open_descriptors();
+  const auto table = abuses();
+  CHECK(table.size() >= 60);
+  for (const Abuse& abuse : table) {
+    INFO(abuse.name);
+    abuse.run(rig);
+    check_well(rig);
+  }
+  // All that they held is closed again.
+  for (int i = 0; i < 200 && open_descriptors() > descriptors; ++i) std::this_thread::sleep_for(10ms);
+  CHECK(open_descriptors() <= descriptors);
+}
+
+TEST_CASE("anybody who may connect can stop, and only operators take it back", "[control_socket]") {
+  ControlRig rig;
+  RigClient observer = rig.connect(As::observer), operating = rig.connect(As::operator_);
+  CHECK(operating.code("acknowledge") == code_of(RpcCode::not_now));
+  CHECK(observer.result("stop")["asked"] == "stop");
+  CHECK(rig.comes_to(State::stopped));
+  CHECK(observer.code("acknowledge") == code_of(RpcCode::not_allowed));
+  CHECK(operating.code("lease.take") == 0);
+  CHECK(operating.code("arm") == code_of(RpcCode::not_now));
+  CHECK(rig.state() == State::stopped);
+  CHECK(operating.code("acknowledge") == 0);
+  CHECK(rig.comes_to(State::disarmed));
+}
+
+TEST_CASE("stop and another's beats get through while many flood", "[control_socket]") {
+  ControlRig rig;
+  RigClient holder = rig.connect(As::operator_);
+  std::atomic<bool> over{false};
+  std::vector<std::thread> floods;
+  for (int i = 0; i < 12; ++i)
+    floods.emplace_back([&rig, &over, i] {
+      while (!over) {
+        RigClient client(rig.path(), 8000U + static_cast<uid_t>(i % 3));
+        for (int k = 0; k < 200 && !over; ++k)
+          if (!client.send(i % 2 == 0 ? request("describe") : std::string(3000, '{') + '\n')) break;
+      }
+    });
+  REQUIRE(holder.code("lease.take") == 0);
+  int kept = 0;
+  std::chrono::steady_clock::duration longest{};  // between this thread's beats: the machine may be busy
+  for (auto last = std::chrono::steady_clock::now(); kept < 40; ++kept) {
+    holder.beat();
+    const auto now = std::chrono::steady_clock::now();
+    longest = std::max(longest, now - last);
+    last = now;
+    std::this_thread::sleep_for(20ms);
+  }
+  const bool holds = holder.code("beat") == 0;
+  if (longest < 60ms) CHECK(holds);
+  RigClient observer = rig.connect(As::observer);
+  const auto asked = std::chrono::steady_clock::now();
+  observer.send(request("stop"));
+  CHECK(rig.comes_to(State::stopped, 2000ms));
+  CHECK(std::chrono::steady_clock::now() - asked < 1s);
+  over = true;
+  for (std::thread& flood : floods) flood.join();
+}
+
+TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releases it by hanging up",
+          "[control_socket]") {
+  ControlRig rig;
+  RigClient watcher = rig.connect(As::observer);
+  const Json first = watcher.result("subscribe");
+  CHECK(first["state"] == "disarmed");
+  auto holder = std::make_optional(rig.connect(As::operator_));
+  std::jthread heart([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      holder->beat();
+      std::this_thread::sleep_for(10ms);
+    }
+  });
+  // Where the machine lets a beat wait for too long it is tried again.
+  for (int attempt = 0; attempt < 5 && rig.state() != State::active; ++attempt) {
+    CHECK(holder->result("lease.take")["beat_within_s"] == 0.1);
+    CHECK(holder->code("arm") == 0);
+    rig.comes_to(State::active, 2000ms);
+  }
+  REQUIRE(rig.state() == State::active);
+  CHECK(watcher.result("status")["armed_by"].get<std::string>().find("uid 60003") != std::string::npos);
+  heart.request_stop();
+  heart.join();
+  holder.reset();
+  CHECK(rig.comes_to(State::disarmed, 1000ms));
+  rig.feed().drain();
+  std::uint64_t next = first["sequence"].get<std::uint64_t>() + 1;
+  std::vector<std::string> states;
+  for (Json event; rig.state() != State::disarmed || next <= rig.feed().snapshot().sequence;) {
+    event = watcher.events.empty() ? Json(nullptr) : watcher.events.front();
+    if (event.is_null()) {
+      const auto line = watcher.line();
+      REQUIRE(line);
+      event = Json::parse(*line)["params"];
+    } else {
+      watcher.events.pop_front();
+    }
+    CHECK(event["sequence"] == next++);  // none is missing
+    if (event["name"] == "state") states.push_back(event["state"]);
+  }
+  REQUIRE(states.size() >= 5);
+  states.erase(states.begin(), states.end() - 5);
+  CHECK(states == std::vector<std::string>{"waiting", "ramping", "active", "releasing", "disarmed"});
+}
+
+TEST_CASE("an administrator takes the lease from another, who is told", "[control_socket]") {
+  ControlRig rig;
+  RigClient holder = rig.connect(As::operator_), administrator = rig.connect(As::administrator);
+  holder.result("subscribe", {{"events", {"lease"}}});
+  CHECK(holder.code("lease.take") == 0);
+  CHECK(administrator.code("lease.take") == code_of(RpcCode::taken));
+  CHECK(administrator.result("lease.take", {{"from_other", true}})["beat_within_s"] == 0.1);
+  const Json taken = holder.event("lease");
+  CHECK(taken["holder"].get<std::string>().find("uid 60003") != std::string::npos);
+  CHECK(holder.event("lease")["holder"].is_null());
+  CHECK(holder.event("lease")["holder"].get<std::string>().find("uid 60004") != std::string::npos);
+}
+
+TEST_CASE("events come in their order, and what a slow reader loses is counted", "[control_socket]") {
+  ControlRig rig;
+  RigClient slow = rig.connect(As::observer), chosen = rig.connect(As::observer);
+  const auto from = slow.result("subscribe")["sequence"].get<std::uint64_t>();
+  chosen.result("subscribe", {{"events", {"lease"}}});
+  constexpr int kTold = 20000;
+  for (int i = 0; i < kTold; ++i)
+    rig.feed().tell("log", EventLevel::info, "event " + std::string(100, '.'), {{"i", i}});
+  rig.feed().tell("lease", EventLevel::info, "the last", {{"holder", nullptr}});
+  std::uint64_t got = 0, lost = 0, last = from;
+  while (last < from + kTold + 1) {
+    const auto line = slow.line();
+    REQUIRE(line);
+    const Json event = Json::parse(*line)["params"];
+    const auto sequence = event["sequence"].get<std::uint64_t>();
+    if (event["name"] == "lost") {
+      lost += event["count"].get<std::uint64_t>();
+      CHECK(sequence == last + event["count"].get<std::uint64_t>());
+    } else {
+      CHECK(sequence == last + 1);
+      ++got;
+    }
+    last = sequence;
+  }
+  CHECK(lost > 0);
+  CHECK(got + lost == kTold + 1);
+  CHECK(chosen.event("lease")["text"] == "the last");
+  CHECK(slow.code("unsubscribe") == 0);
+  slow.events.clear();
+  rig.feed().tell("log", EventLevel::info, "nobody hears");
+  CHECK(slow.event("log", 100ms).is_null());
+}
+
+TEST_CASE("who has said its last word still gets its answers", "[control_socket]") {
+  ControlRig rig;
+  RigClient client = rig.connect(As::observer);
+  client.send(request("status") + request("devices", "{}", "2") + request("status", "{}", "3"));
+  ::shutdown(client.fd(), SHUT_WR);
+  std::set<int> ids;
+  while (const auto line = client.line()) ids.insert(Json::parse(*line)["id"].get<int>());
+  CHECK(ids == std::set<int>{1, 2, 3});
+  CHECK(client.over());
+}
+
+TEST_CASE("what takes long keeps nobody waiting, and is answered when it is done", "[control_socket]") {
+  std::atomic<bool> go{false};
+  const MethodRow slow{"test.wait",
+                       Role::observer,
+                       {},
+                       "Waits until the test lets it go.",
+                       [&go](const Json&, const Caller& caller) {
+                         while (!go) std::this_thread::sleep_for(1ms);
+                         return Answer(Json{{"client", caller.client}});
+                       },
+                       true};
+  ControlRig rig(resting_plan(), {slow});
+  RigClient patient = rig.connect(As::observer);
+  patient.send(request("test.wait", "{}", "\"w\""));
+  CHECK(patient.code("status") == 0);
+  CHECK(patient.code("test.wait") == code_of(RpcCode::not_now));
+  std::vector<RigClient> others;
+  for (std::size_t i = 0; i < SlowWork::kMostWaiting + 2; ++i) {
+    others.push_back(rig.connect(As::observer));
+    others.back().send(request("test.wait", "{}", "\"w\""));
+    if (i >= SlowWork::kMostWaiting) CHECK(next_code(others.back()) == code_of(RpcCode::not_now));
+    CHECK(others.back().code("status") == 0);
+  }
+  others.front().hang_up();
+  go = true;
+  const auto line = patient.line();
+  REQUIRE(line);
+  CHECK(Json::parse(*line)["result"].contains("client"));
+  CHECK(next_code(others[1]) == 0);
+}
+
+TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
+  std::array<int, 2> ends{};
+  REQUIRE(::pipe2(ends.data(), O_CLOEXEC) == 0);
+  const OwnedFd read_end(ends[0]);
+  OwnedFd write_end(ends[1]);
+  const MethodRow open{
+      "test.open", Role::observer, {}, "Hands over the end of a pipe.", [&](const Json&, const Caller&) {
+        return Answer(Json{{"open", true}}, write_end.get());
+      }};
+  ControlRig rig(resting_plan(), {open});
+  RigClient client = rig.connect(As::observer);
+  client.send(request("status") + request("test.open", "{}", "2"));
+  std::string text;
+  OwnedFd got;
+  while (text.find("\"open\":true") == std::string::npos) {
+    std::array<char, 4096> bytes;
+    std::array<char, CMSG_SPACE(sizeof(int))> control{};
+    iovec part{bytes.data(), bytes.size()};
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const ssize_t received = ::recvmsg(client.fd(), &message, MSG_CMSG_CLOEXEC);
+    REQUIRE(received > 0);
+    text.append(bytes.data(), static_cast<std::size_t>(received));
+    if (cmsghdr* header = CMSG_FIRSTHDR(&message); header && header->cmsg_type == SCM_RIGHTS) {
+      CHECK(text.find("\"id\":2") != std::string::npos);  // with its reply, and not before
+      int fd = -1;
+      std::memcpy(&fd, CMSG_DATA(header), sizeof fd);
+      got = OwnedFd(fd);
+    }
+  }
+  REQUIRE(got);
+  CHECK(::write(got.get(), "x", 1) == 1);
+  char byte = 0;
+  CHECK(::read(read_end.get(), &byte, 1) == 1);
+  CHECK(byte == 'x');
+}
+
+TEST_CASE("a daemon that ends tells those who listen, and hangs up", "[control_socket]") {
+  auto rig = std::make_optional<ControlRig>();
+  RigClient client = rig->connect(As::operator_);
+  CHECK(client.code("lease.take") == 0);
+  client.result("subscribe");
+  rig.reset();
+  std::vector<std::string> names;
+  while (const auto line = client.line()) names.push_back(Json::parse(*line)["params"]["name"]);
+  CHECK(client.over());
+  CHECK(std::find(names.begin(), names.end(), "lease") != names.end());
+}
+
+TEST_CASE("an idle socket costs no time", "[control_socket]") {
+  ControlRig rig;
+  RigClient client = rig.connect(As::observer);
+  const auto told_before = client.result("status")["sequence"].get<std::uint64_t>();
+  // The thread's own clock, found by its name.
+  const auto control_ticks = [] {
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+      std::string name, line;
+      std::getline(std::ifstream(task.path() / "comm"), name);
+      if (name != "control") continue;
+      std::ifstream schedstat(task.path() / "schedstat");
+      std::uint64_t run_ns = 0, wait_ns = 0, slices = 0;
+      schedstat >> run_ns >> wait_ns >> slices;
+      return slices;
+    }
+    return std::uint64_t{0};
+  };
+  const std::uint64_t before = control_ticks();
+  std::this_thread::sleep_for(300ms);
+  REQUIRE(before > 0);
+  // Each event of the loop, which may tell of a busy machine, wakes it once.
+  const auto told = client.result("status")["sequence"].get<std::uint64_t>() - told_before;
+  CHECK(control_ticks() - before <= 4 + told);
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/control_commands.hpp"
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <thread>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "tools/control_client.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A third of what the lease allows, so that two may be late.
+constexpr auto kBeatEvery = 30ms;
+constexpr auto kFadesWithin = 2s;
+
+std::atomic<bool> interrupted{false};
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted.store(true); };
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+}
+
+void print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+}
+
+std::string pretty(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+std::string text_or(const Json& value, const char* otherwise) {
+  return value.is_string() ? value.get<std::string>() : otherwise;
+}
+
+std::string times(const Json& times) {
+  return fmt::format("{:.1f} / {:.1f} / {:.1f} us", times["p50_us"].get<double>(),
+                     times["p99_9_us"].get<double>(), times["max_us"].get<double>());
+}
+
+void show(const Json& event, const ControlOptions& options) {
+  print(options.json ? event.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n' : event_text(event));
+}
+
+/// The states in which there is force, or will be.
+bool is_armed(const std::string& state) {
+  return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
+}
+
+/// Until the hand is free: the daemon tells. The connection may end before.
+void see_it_fade(ControlClient& client, const ControlOptions& options, std::string state) {
+  const auto end = std::chrono::steady_clock::now() + kFadesWithin;
+  while ((is_armed(state) || state == "releasing") && std::chrono::steady_clock::now() < end) {
+    const auto event = client.event(kBeatEvery);
+    client.say("beat");
+    if (!event) continue;
+    show(*event, options);
+    if ((*event)["name"] == "state") state = (*event)["state"];
+  }
+}
+
+}  // namespace
+
+std::string status_text(const Json& s) {
+  std::string text = fmt::format("state      {}\n", s["state"].get<std::string>());
+  if (const Json& cause = s["cause"]; cause.is_object())
+    text += fmt::format("cause      {}: {}\nwhat to do {}\n", cause["name"].get<std::string>(),
+                        cause["sentence"].get<std::string>(), cause["cure"].get<std::string>());
+  const Json &device = s["device"], &limits = s["limits"], &timing = s["timing"];
+  text += fmt::format("device     {}{}, {}\n", text_or(device["profile"], "?"),
+                      device["simulated"].get<bool>() ? " (simulated)" : "",
+                      device["present"].get<bool>() ? "present" : "not there");
+  text += fmt::format("armed by   {}\nlease      {}\n", text_or(s["armed_by"], "nobody"),
+                      text_or(s["lease"], "nobody has it"));
+  text += fmt::format("limits     {:g} N, {:g} N.m", limits["max_force_N"].get<double>(),
+                      limits["max_torque_Nm"].get<double>());
+  if (const double authority = limits["authority"].get<double>(); authority < 1.0)
+    text += fmt::format(", and {:.0f} % of them: the device has no watchdog", 100.0 * authority);
+  text +=
+      fmt::format("\nstiffness  {:.0f} % of what is asked for\n", 100.0 * s["stiffness_share"].get<double>());
+  text += fmt::format("scene      {}, {} obstacles\n", s["scene"]["file"].get<std::string>(),
+                      s["scene"]["obstacles"].get<std::uint64_t>());
+  text += fmt::format("ticks      {} at {:g} Hz, {} late, {} left out\n", s["tick"].get<std::uint64_t>(),
+                      s["rates"]["rate_Hz"].get<double>(), timing["overruns"].get<std::uint64_t>(),
+                      timing["skipped"].get<std::uint64_t>());
+  return text + fmt::format("a tick     {} (p50 / p99.9 / max)\nwake-up    {} late\n", times(timing["tick"]),
+                            times(timing["wake_latency"]));
+}
+
+std::string event_text(const Json& event) {
+  return fmt::format("{:>14.3f} s  {:<7} {}\n", 1e-9 * event["time_ns"].get<double>(),
+                     event["level"].get<std::string>(), event["text"].get<std::string>());
+}
+
+void run_status(const ControlOptions& options) {
+  ControlClient client(options.socket);
+  const Json status = client.call("status");
+  print(options.json ? pretty(status)
+                     : status_text(status) + "wrenchd    " + status["version"].get<std::string>() + " at " +
+                           client.path() + "\n");
+}
+
+void run_watch(const ControlOptions& options) {
+  catch_signals();
+  ControlClient client(options.socket);
+  const Json params = options.events.empty() ? Json::object() : Json{{"events", options.events}};
+  const Json status = client.call("subscribe", params);
+  print(options.json ? status.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n'
+                     : status_text(status));
+  while (!interrupted)
+    if (const auto event = client.event(200ms)) show(*event, options);
+}
+
+int run_arm(const ControlOptions& options) {
+  catch_signals();
+  ControlClient client(options.socket);
+  client.call("subscribe", {{"events", {"state", "fault", "refused", "lease", "lost"}}});
+  client.call("lease.take", options.from_other ? Json{{"from_other", true}} : Json::object());
+  client.call("arm");
+  std::string state = "waiting";
+  while (!interrupted) {
+    client.say("beat");
+    const auto event = client.event(kBeatEvery);
+    if (!event) continue;
+    show(*event, options);
+    const auto name = (*event)["name"].get<std::string>();
+    if (name == "state") state = (*event)["state"];
+    if (name == "refused" || !is_armed(state)) {
+      see_it_fade(client, options, state);
+      std::fputs("wrenchctl: the daemon has disarmed; wrenchctl status says why\n", stderr);
+      return 1;
+    }
+  }
+  client.call("disarm");
+  see_it_fade(client, options, state);
+  client.call("lease.give");
+  return 0;
+}
+
+void run_request(const std::string& method, const ControlOptions& options) {
+  ControlClient client(options.socket);
+  const Json result = client.call(method);
+  if (options.json) return print(pretty(result));
+  if (!result.contains("asked")) return print(result.empty() ? "done\n" : pretty(result));
+  std::this_thread::sleep_for(150ms);  // a fade, and a little for the event
+  print(fmt::format("asked: {}; state {}\n", method, client.call("status")["state"].get<std::string>()));
+}
+
+void run_describe(const ControlOptions& options) {
+  ControlClient client(options.socket);
+  const Json all = client.call("describe");
+  if (options.json) return print(pretty(all));
+  bool found = false;
+  for (const Json& method : all["methods"]) {
+    if (!options.method.empty() && method["name"] != options.method) continue;
+    found = true;
+    print(fmt::format("{}  ({})\n  {}\n", method["name"].get<std::string>(),
+                      method["role"].get<std::string>(), method["doc"].get<std::string>()));
+    for (const auto& [name, param] : method["params"].items())
+      print(fmt::format("    {}: {}{}; {}\n", name, param["type"].get<std::string>(),
+                        param["required"].get<bool>() ? "" : ", may be left out",
+                        param["doc"].get<std::string>()));
+  }
+  if (!found)
+    throw std::runtime_error("there is no method '" + options.method +
+                             "'; wrenchctl describe, without a name, lists them");
+  if (!options.method.empty()) return;
+  print("\nevents\n");
+  for (const Json& event : all["events"])
+    print(fmt::format("  {:<10} {}\n", event["name"].get<std::string>(), event["doc"].get<std::string>()));
+  print("\nroles\n");
+  for (const auto& [role, who] : all["roles"].items())
+    print(fmt::format("  {:<14} {}\n", role, who.get<std::string>()));
+}
+
+}  // namespace wrenchd
