@@ -157,6 +157,27 @@ class ReadsState(unittest.TestCase):
         self.assertLess(self.state.behind, slots)
         self.assertGreater(written(), slots)
 
+    def test_a_record_that_is_written_over_while_it_is_copied_is_not_taken(self):
+        state = self.state
+        memory, words, late = state._memory, state._words, []
+
+        class Memory:
+            def __getitem__(self, where):
+                late.append(where)
+                return memory[where]
+
+        class Words:
+            def __getitem__(self, word):
+                return words[word] + len(late)
+
+        newest = state._written() - 1
+        self.assertIsNotNone(state._copy(newest))
+        state._memory, state._words = Memory(), Words()
+        taken = state._copy(newest)
+        state._memory, state._words = memory, words
+        self.assertEqual(len(late), 1)
+        self.assertIsNone(taken)
+
     def test_touches_name_what_touches(self):
         def touched():
             return bool(self.state.latest().touches)
