@@ -105,6 +105,16 @@ TEST_CASE("a client that dies fades out: its lease ends with its connection", "[
   CHECK_FALSE(daemon.leased());
 }
 
+TEST_CASE("a lease that was lost is told when arming, and is given back without ado", "[client]") {
+  StubDaemon daemon;
+  Client client(daemon.socket());
+  client.take_lease();
+  daemon.end_lease();
+  CHECK(code_of([&] { client.arm(); }) == ClientError::kNotNow);
+  CHECK_NOTHROW(client.give_lease());
+  CHECK_NOTHROW(client.take_lease());
+}
+
 TEST_CASE("what the daemon refuses comes with its sentence and its code", "[client]") {
   StubDaemon daemon;
   Client first(daemon.socket());

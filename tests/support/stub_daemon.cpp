@@ -108,6 +108,11 @@ void StubDaemon::send_raw(const std::string& bytes) {
     for (std::size_t i = 0; i < bytes.size(); i += 3) send_line(fd, bytes.substr(i, 3));
 }
 
+void StubDaemon::end_lease() {
+  holder_.store(-1);
+  loop().disarm();
+}
+
 void StubDaemon::hang_up() {
   const std::lock_guard lock(mutex_);
   while (!peers_.empty()) end(peers_.begin()->first);
@@ -206,7 +211,8 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   }
   if (method == "lease.give") {
     int held = peer;
-    if (holder_.compare_exchange_strong(held, -1)) loop().disarm();
+    if (!holder_.compare_exchange_strong(held, -1)) throw Refusal{-32002, "you do not hold the lease"};
+    loop().disarm();
     return json::object();
   }
   if (method == "arm") {

@@ -39,6 +39,8 @@ class StubDaemon {
   void send_raw(const std::string& bytes);
   /// From here on nothing is answered.
   void fall_silent() { silent_.store(true); }
+  /// As when a beat came too late.
+  void end_lease();
   /// Ends all connections.
   void hang_up();
 

@@ -85,7 +85,11 @@ void Client::take_lease() {
 
 void Client::give_lease() {
   beating_.reset();
-  call("lease.give");
+  try {
+    call("lease.give");
+  } catch (const ClientError& error) {  // lost meanwhile: there is nothing to give back
+    if (error.code() != ClientError::kNotNow && error.code() != ClientError::kTaken) throw;
+  }
 }
 
 void Client::beat() {
