@@ -23,6 +23,7 @@
 #include "daemon/realtime.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/service_notify.hpp"
+#include "daemon/state_methods.hpp"
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
@@ -322,6 +323,7 @@ std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const O
   if (place.path.empty() || options.virtual_time) return nullptr;
   auto control = std::make_unique<Control>(station, feed);
   try {
+    add_state_methods(control->methods(), station);
     control->open(place.path);
     spdlog::info("control socket: {}", place.path.string());
     return control;
