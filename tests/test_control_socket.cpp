@@ -239,9 +239,13 @@ std::vector<Abuse> abuses() {
        }},
       {"more connections than there are places, all kept",
        [](ControlRig& rig) {
+         RigClient same(rig.path(), 7000U), other = rig.connect(As::observer);
+         CHECK(same.code("status") == 0);
          std::vector<RigClient> kept;
          for (int i = 0; i < 100; ++i) kept.emplace_back(rig.path(), 7000U);
          CHECK(kept.back().code("status") == 0);
+         CHECK(same.code("status") == 0);   // who makes use of his place keeps it
+         CHECK(other.code("status") == 0);  // and who is not the one who crowds, in any case
          CHECK(rig.connect(As::operator_).code("status") == 0);
        }},
       {"a flood of requests whose answers nobody reads",
