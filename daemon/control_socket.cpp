@@ -207,7 +207,8 @@ void ControlSocket::make_room() {
   auto leaves = clients_.end();
   const auto before = [&](const Client& a, const Client& b) {
     const int of_a = connections[a.peer.uid], of_b = connections[b.peer.uid];
-    return of_a != of_b ? of_a > of_b : a.last_heard < b.last_heard;
+    if (of_a != of_b) return of_a > of_b;
+    return a.spoke != b.spoke ? !a.spoke : a.last_heard < b.last_heard;
   };
   for (auto client = clients_.begin(); client != clients_.end(); ++client)
     if (!lease_.held_by(client->first) &&
@@ -283,6 +284,7 @@ void ControlSocket::take_line(Client& client, std::string_view line) {
   Caller caller{client.number, client.role, client.peer.text(), &client.subscription};
   try {
     const MethodRow& row = methods_.look_up(request, client.role);
+    client.spoke = true;
     if (row.slow) return do_slowly(client, row, request, caller);
     const Answer answer = MethodTable::run(row, request.params, caller);
     if (!request.wants_reply) return;

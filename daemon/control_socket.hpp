@@ -39,9 +39,9 @@ using Identify = std::function<std::optional<Peer>(int socket)>;
 
 /// Serves the control socket: one thread, all clients in turns. It does nothing while nobody asks.
 ///
-/// When all places are taken a newcomer gets that of the connection of the user with the most which has been
-/// silent for longest; one that holds the lease never gives way. So nobody can keep others out, and anybody
-/// who may connect can stop.
+/// When all places are taken a newcomer gets one of the user with the most connections: of those that have
+/// never made a good request, else of all, the one that has been silent for longest; one that holds the lease
+/// never gives way. So no user can keep another out, and anybody who may connect can stop.
 class ControlSocket {
  public:
   /// Serves at once. All of these must outlive this; the table may not change any more. The lease belongs to
@@ -75,6 +75,7 @@ class ControlSocket {
     TimePoint last_heard{};
     std::uint32_t told_epoll = 0;  ///< what we wait for
     bool readable = false;
+    bool spoke = false;          ///< it has made a good request
     bool half_closed = false;    ///< it has shut down its side; what it said before may not be read yet
     bool no_more_input = false;  ///< and it is
     bool hung_up = false;        ///< it has shut down both sides

@@ -23,7 +23,7 @@ struct DaemonParts {
 /// the rows of its events. All must outlive the table.
 void add_daemon_methods(MethodTable& table, const DaemonParts& parts);
 
-/// What `status` answers. Any thread but the servo's.
+/// What `status` answers. From a method that is not slow: the lease belongs to that thread.
 Json status_json(const DaemonParts& parts);
 
 }  // namespace wrenchd

@@ -64,7 +64,11 @@ std::string printed(const Settings& s) {
       << s.limits.max_force_N << ' ' << s.limits.max_torque_Nm << ' ' << s.limits.force_slew_N_per_s << ' '
       << s.limits.torque_slew_Nm_per_s << ' ' << s.limits.soft_start_s << '\n';
   print(out, s.simulation);
-  out << s.recording.file;
+  out << s.recording.file << '\n'
+      << s.control.socket << '\n'
+      << s.control.observers << '\n'
+      << s.control.operators << '\n'
+      << s.control.administrators;
   return out.str();
 }
 
@@ -123,7 +127,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 47);
+  CHECK(options == 51);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {

@@ -76,6 +76,8 @@ TEST_CASE("wrenchctl arm holds the hand until it is interrupted, and everybody c
           "[control_commands]") {
   const Daemon daemon;
   RunningProgram watch("wrenchctl", {"watch", "--socket", daemon.socket, "--json"});
+  for (int i = 0; i < 500 && watch.out().empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   RunningProgram arm("wrenchctl", {"arm", "--socket", daemon.socket});
   REQUIRE(daemon.comes_to("active"));
   const Json status = Json::parse(daemon.ctl({"status", "--json"}).out);

