@@ -24,6 +24,8 @@ spdlog::level::level_enum level_of(const Event& event) {
     case Event::Kind::placing:
     case Event::Kind::placed:
     case Event::Kind::released:
+    case Event::Kind::changing:
+    case Event::Kind::changed:
       return spdlog::level::info;
     default:
       return spdlog::level::warn;
@@ -78,6 +80,10 @@ std::string to_text(const Event& event) {
              "is looked for again";
     case Event::Kind::released:
       return "the hand is released: zero wrench, motors off";
+    case Event::Kind::changing:
+      return fmt::format("rendering {} begins to take the place of the one before", event.detail);
+    case Event::Kind::changed:
+      return fmt::format("rendering {} is felt from now on", event.detail);
   }
   return "unknown event";
 }

@@ -42,6 +42,7 @@ constexpr auto kLook = std::chrono::milliseconds(100);  ///< how often the live 
 constexpr auto kLastWords = std::chrono::milliseconds(50);
 
 std::atomic<bool> stop_requested{false};
+std::atomic<bool> reload_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<CommandSet>::is_always_lock_free &&
                   std::atomic<ServoLoop*>::is_always_lock_free,
               "a signal handler may only touch lock-free atomics");
@@ -67,7 +68,8 @@ void describe(CLI::App& app, Options& options) {
       "wrenchd: a haptic servo daemon. Reads the hand's pose, computes the generalized penetration\n"
       "depth of the tool in its scene, and writes the wrench back.");
   app.footer(
-      "Signals: SIGUSR1 is an emergency stop, SIGUSR2 acknowledges a stop or a fault; both leave it "
+      "Signals: SIGHUP reads the configuration again (all of it or, where anything is refused, nothing);\n"
+      "SIGUSR1 is an emergency stop, SIGUSR2 acknowledges a stop or a fault; both leave it "
       "disarmed.\n"
       "Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 it ended with a fault that "
       "nobody\n"
@@ -292,6 +294,33 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
   }
 }
 
+/// Reads the configuration again where somebody asks for it, on a thread of its own: meshes take time.
+class Reloader {
+ public:
+  Reloader(Workbench& workbench, const Options& options)
+      : thread_([&workbench, &options](const std::stop_token& stop) {
+          while (!stop.stop_requested()) {
+            if (reload_requested.exchange(false)) reload(workbench, options);
+            std::this_thread::sleep_for(kLook);
+          }
+        }) {}
+
+ private:
+  static void reload(Workbench& workbench, const Options& options) {
+    try {
+      const ReloadResult result = workbench.reload([&options] { return plan_of(options); });
+      for (const std::string& remark : result.remarks) spdlog::warn("{}", remark);
+      for (const std::string& what : result.not_applied) spdlog::warn("reload: not applied: {}", what);
+      for (const std::string& what : result.applied) spdlog::info("reload: applied: {}", what);
+      if (result.applied.empty() && result.not_applied.empty()) spdlog::info("reload: nothing has changed");
+    } catch (const std::exception& error) {
+      spdlog::error("reload: refused, and everything stays as it was: {}", error.what());
+    }
+  }
+
+  std::jthread thread_;
+};
+
 /// Builds the station around its link, and runs it.
 Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
           const std::function<Fault(Station&, LiveView&)>& run_it) {
@@ -312,6 +341,7 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
   Fault fault = Fault::none;
   {
     const EventLog log(station.loop());
+    const Reloader reloader(station.workbench(), options);
     fault = run_it(station, view);
   }
   view.close(station.loop(), seconds(clock.now() - start));
@@ -389,6 +419,8 @@ void catch_signals() {
   action.sa_handler = [](int) { stop_requested.store(true); };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = [](int) { reload_requested.store(true); };
+  sigaction(SIGHUP, &action, nullptr);
   action.sa_handler = [](int) { ask(kStop); };
   sigaction(SIGUSR1, &action, nullptr);
   action.sa_handler = [](int) { ask(kAcknowledge); };

@@ -12,8 +12,9 @@ namespace {
 
 constexpr const char* kTable = "/ticks";
 /// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
-/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults.
-constexpr const char* kFormat = "4";
+/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults; 5: what
+/// was changed while the loop ran.
+constexpr const char* kFormat = "5";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;
@@ -84,6 +85,11 @@ constexpr std::array kColumns = {
     WRENCHD_COLUMN(iterations, "1", u16, 1),
     WRENCHD_COLUMN(projection_status, "enum", u8, 1),
     WRENCHD_COLUMN(placing, "enum", u8, 1),
+    WRENCHD_COLUMN(rendering, "1", u32, 1),
+    WRENCHD_COLUMN(changes, "1", u32, 1),
+    WRENCHD_COLUMN(rendering_sum, "1", u64, 1),
+    WRENCHD_COLUMN(next_share, "1", f64, 1),
+    WRENCHD_COLUMN(through, "1", f64, 1),
     WRENCHD_COLUMN(state, "enum", u8, 1),
     WRENCHD_COLUMN(cause, "enum", u8, 1),
     WRENCHD_COLUMN(faults, "bits", u64, 1),
