@@ -139,7 +139,7 @@ void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
   turn_rad_ = X_start_.rotation.angularDistance(X_WT.rotation);
   for (const std::uint32_t k : pairs_.listed().near_by()) {
     Seen& seen = seen_[k];
-    if (!seen.obstacle->motion.moves()) {
+    if (!seen.obstacle->moves()) {
       seen.X_OT_start = start.seen_from(seen.X_WO);
       seen.X_OT_end = end.seen_from(seen.X_WO);
       continue;

@@ -114,7 +114,7 @@ void NearPairs::find_near_by() noexcept {
   near_by_.clear();
   for (std::uint32_t k = 0; k < scene_.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene_.meshes()[k];
-    if (obstacle.motion.moves()) continue;
+    if (obstacle.moves()) continue;
     const double together_m = obstacle.radius_m + tool_m + near_reach_m_;
     if ((obstacle.centre_W_m - near_p_WT_m_).squaredNorm() <= together_m * together_m) near_by_.push_back(k);
   }
@@ -129,11 +129,9 @@ void NearPairs::find_moving_near_by() noexcept {
                         (way_.X_WT_end.translation_m - way_.X_WT_start.translation_m).norm();
   for (std::uint32_t k = 0; k < scene_.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene_.meshes()[k];
-    if (!obstacle.motion.moves()) continue;
+    if (!obstacle.moves()) continue;
     const Pose X_WO = obstacle.X_WO_at(way_.start_s);
-    const double moved_m =
-        (way_.end_s - way_.start_s) * (obstacle.motion.linear_m_per_s.norm() +
-                                       obstacle.motion.angular_rad_per_s.norm() * obstacle.centre_O_m.norm());
+    const double moved_m = (way_.end_s - way_.start_s) * obstacle.fastest_m_per_s();
     const double together_m = obstacle.radius_m + tool_m + moved_m;
     if ((X_WO * obstacle.centre_O_m - way_.X_WT_start.translation_m).squaredNorm() > together_m * together_m)
       continue;

@@ -27,7 +27,7 @@ Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
 /// Of a scene of meshes that are not held as convex bodies as well.
 std::string why_only_exact(const Scene& scene) {
   for (const MeshObstacle& obstacle : scene.meshes())
-    if (obstacle.motion.moves())
+    if (obstacle.moves())
       return "the obstacle '" + obstacle.name +
              "' moves, which only method exact can deal with; choose it, or let all obstacles stand still";
   return "the tool or an obstacle ('" + scene.meshes().front().name +

@@ -46,16 +46,16 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
 
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;
-  const bool all_stand =
-      std::none_of(settings.meshes.begin(), settings.meshes.end(),
-                   [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves(); });
+  const bool all_stand = std::none_of(
+      settings.meshes.begin(), settings.meshes.end(),
+      [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves() || obstacle.later; });
   bool all_convex = all_stand && fills_its_hull(tool.mesh, tool.hull);
   std::map<std::tuple<std::filesystem::path, double, BodyKind>, Made> all_made;
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
     const auto [at, is_new] = all_made.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
     Made& made = at->second;
     if (is_new) made = make(obstacle, all_convex, loader);
-    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM, obstacle.motion);
+    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM, obstacle.motion, obstacle.later);
     all_convex = all_convex && made.hull;
     if (!all_convex) continue;
     ConvexBody hull = *made.hull;
@@ -69,7 +69,7 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
 }
 
 bool any_moves(const std::vector<MeshObstacle>& meshes) {
-  return std::any_of(meshes.begin(), meshes.end(), [](const MeshObstacle& m) { return m.motion.moves(); });
+  return std::any_of(meshes.begin(), meshes.end(), [](const MeshObstacle& m) { return m.moves(); });
 }
 
 double farthest_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
@@ -90,13 +90,21 @@ ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
 }
 
 MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_,
-                           const ObstacleMotion& motion_)
-    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_), motion(motion_) {
+                           const ObstacleMotion& motion_, const std::optional<LaterMotion>& later_)
+    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_), motion(motion_), later(later_) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : mesh->surface.vertices_m()) box.extend(p);
   centre_O_m = box.center();
   centre_W_m = X_WO * centre_O_m;
   radius_m = farthest_m(mesh->surface.vertices_m(), centre_O_m);
+}
+
+double MeshObstacle::fastest_m_per_s() const noexcept {
+  const double lever_m = centre_O_m.norm();
+  const auto fastest = [lever_m](const ObstacleMotion& m) {
+    return m.linear_m_per_s.norm() + m.angular_rad_per_s.norm() * lever_m;
+  };
+  return later ? std::max(fastest(motion), fastest(later->motion)) : fastest(motion);
 }
 
 Scene::Scene(const SceneSettings& settings, MeshLoader& loader) : Scene(load(settings, loader)) {}
@@ -119,8 +127,20 @@ Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vec
   if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const TreedMesh>(tool_.mesh);
 }
 
+Scene::Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes) : Scene(other) {
+  for (std::size_t k = 0; k < meshes_.size(); ++k) {
+    MeshObstacle& obstacle = meshes_[k];
+    obstacle.X_WO = meshes[k].X_WM;
+    obstacle.centre_W_m = obstacle.X_WO * obstacle.centre_O_m;
+    obstacle.motion = meshes[k].motion;
+    obstacle.later = meshes[k].later;
+  }
+  moves_ = any_moves(meshes_);
+  convex_.clear();  // which are made where they stood
+}
+
 Pose Scene::motion(std::uint32_t number, double from_s, double to_s) const noexcept {
-  if (from_s == to_s || number < first_mesh() || !meshes_[number - first_mesh()].motion.moves()) return {};
+  if (from_s == to_s || number < first_mesh() || !meshes_[number - first_mesh()].moves()) return {};
   const MeshObstacle& obstacle = meshes_[number - first_mesh()];
   return obstacle.X_WO_at(to_s) * inverse(obstacle.X_WO_at(from_s));
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,19 +29,25 @@ struct ConvexObstacle {
 struct MeshObstacle {
   /// The same mesh may be many obstacles.
   MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_,
-               const ObstacleMotion& motion_ = {});
+               const ObstacleMotion& motion_ = {}, const std::optional<LaterMotion>& later_ = {});
   MeshObstacle(std::string name_, TreedMesh mesh_, const Pose& X_WO_, const ObstacleMotion& motion_ = {})
       : MeshObstacle(std::move(name_), std::make_shared<const TreedMesh>(std::move(mesh_)), X_WO_, motion_) {}
 
-  /// Where it stands at scene time t_s [s]: X_WO until time 0. RT safe.
-  Pose X_WO_at(double t_s) const noexcept { return motion.at(X_WO, t_s); }
+  /// Where it stands at scene time t_s [s]: X_WO until it sets out. RT safe.
+  Pose X_WO_at(double t_s) const noexcept {
+    return later && t_s >= later->from_s ? later->motion.at(later->X_WO, t_s) : motion.at(X_WO, t_s);
+  }
+  bool moves() const noexcept { return motion.moves() || (later && later->motion.moves()); }
+  /// How fast the centre of the sphere that holds it is at most [m/s].
+  double fastest_m_per_s() const noexcept;
 
   std::string name;
   std::shared_ptr<const TreedMesh> mesh;
-  Pose X_WO;              ///< at scene time 0
-  ObstacleMotion motion;  ///< from there
-  Vector3d centre_O_m;    ///< of a sphere that holds it
-  Vector3d centre_W_m;    ///< the same, at scene time 0
+  Pose X_WO;                         ///< at scene time 0
+  ObstacleMotion motion;             ///< from there
+  std::optional<LaterMotion> later;  ///< and in the place of that
+  Vector3d centre_O_m;               ///< of a sphere that holds it
+  Vector3d centre_W_m;               ///< the same, at scene time 0
   double radius_m;
 };
 
@@ -64,6 +71,9 @@ class Scene {
   /// tool_mesh: the tool's own mesh, where it is at hand already.
   Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex = {},
         std::vector<MeshObstacle> meshes = {}, std::shared_ptr<const TreedMesh> tool_mesh = nullptr);
+
+  /// The same bodies, the meshes where these settings have them; there is one for each. Nothing is read.
+  Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes);
 
   const ToolBody& tool() const noexcept { return tool_; }
   double tool_radius_m() const noexcept { return tool_radius_m_; }

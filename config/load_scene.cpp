@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "config/load_scene.hpp"
 
+#include <algorithm>
+
 #include "config/toml_reader.hpp"
 
 namespace wrenchd {
@@ -125,7 +127,30 @@ void read_scene(TomlTable& table, SceneSettings& scene) {
   }
 }
 
+bool has_name(const SceneSettings& scene, const std::string& name) {
+  const auto has_it = [&name](const auto& obstacle) { return obstacle.name == name; };
+  return std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), has_it) ||
+         std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it);
+}
+
+/// By its name it is moved and removed, so it has one of its own.
+void read_added(TomlTable& table, SceneSettings& scene) {
+  std::string name;
+  const TomlValue key = table.optional("name");
+  if (key.text(name) && has_name(scene, name))
+    key.refuse("there is an obstacle '" + name + "' already; give this one another name, or remove that one");
+  for (std::size_t i = scene.half_spaces.size() + scene.meshes.size(); name.empty(); ++i)
+    if (const std::string free = "obstacle[" + std::to_string(i) + "]"; !has_name(scene, free)) name = free;
+  read_obstacle(table, scene, name);
+}
+
 }  // namespace
+
+void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene) {
+  SceneSettings with = scene;
+  read_toml_node(source, obstacle, read_added, with);
+  scene = std::move(with);
+}
 
 SceneSettings load_scene(const std::filesystem::path& file) {
   SceneSettings scene;

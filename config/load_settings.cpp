@@ -207,7 +207,18 @@ void read_settings(TomlTable& table, const Lookup& lookup, Settings& s) {
   table.optional("control").table(read_control, s.control);
 }
 
+void read_rendering_changes(TomlTable& table, Settings& s) {
+  table.optional("rendering").table(read_rendering, s.rendering);
+  table.optional("wrench").table(read_wrench, s.wrench);
+}
+
 }  // namespace
+
+void change_rendering(const TomlNode& changes, const fs::path& source, Settings& settings) {
+  Settings changed = settings;
+  read_toml_node(source, changes, read_rendering_changes, changed);
+  settings = std::move(changed);
+}
 
 Settings load_settings(const fs::path& file, const SearchPath& search) {
   Settings settings;

@@ -22,7 +22,7 @@ double within(double x, double most) noexcept {
 
 /// A setting of 0, or one that is no number, leaves the profile's. A profile that states nothing allows
 /// nothing.
-double tighter(double setting, double profile, double highest) noexcept {
+double within_profile(double setting, double profile, double highest) noexcept {
   const double own = within(profile, highest);
   return is_finite(setting) && setting > 0.0 ? std::min(setting, own) : own;
 }
@@ -73,6 +73,19 @@ bool all_finite(const LimitInput& in) noexcept {
 
 }  // namespace
 
+LimitSettings tighter(const LimitSettings& a, const LimitSettings& b, const DeviceProfile& profile) noexcept {
+  const auto least = [](double x, double y, double own, double highest) {
+    return within_profile(x, own, highest) <= within_profile(y, own, highest) ? x : y;
+  };
+  LimitSettings both;
+  both.max_force_N = least(a.max_force_N, b.max_force_N, profile.max_force_N, kHighestForce_N);
+  both.max_torque_Nm = least(a.max_torque_Nm, b.max_torque_Nm, profile.max_torque_Nm, kHighestTorque_Nm);
+  both.force_slew_N_per_s = std::min(a.force_slew_N_per_s, b.force_slew_N_per_s);
+  both.torque_slew_Nm_per_s = std::min(a.torque_slew_Nm_per_s, b.torque_slew_Nm_per_s);
+  both.soft_start_s = std::max(a.soft_start_s, b.soft_start_s);
+  return both;
+}
+
 const char* text(LimitCause cause) noexcept {
   switch (cause) {
     case kNotLimited:
@@ -114,8 +127,8 @@ std::string limit_causes_text(std::uint16_t causes) {
 }
 
 WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile)
-    : max_force_N_(tighter(settings.max_force_N, profile.max_force_N, kHighestForce_N)),
-      max_torque_Nm_(tighter(settings.max_torque_Nm, profile.max_torque_Nm, kHighestTorque_Nm)),
+    : max_force_N_(within_profile(settings.max_force_N, profile.max_force_N, kHighestForce_N)),
+      max_torque_Nm_(within_profile(settings.max_torque_Nm, profile.max_torque_Nm, kHighestTorque_Nm)),
       force_ceiling_N_(max_force_N_),
       torque_ceiling_Nm_(max_torque_Nm_),
       force_slew_N_per_s_(within(settings.force_slew_N_per_s, std::numeric_limits<double>::max())),
@@ -123,6 +136,12 @@ WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& p
       workspace_radius_m_(profile.workspace_radius_m),
       workspace_centre_m_(profile.workspace_centre_m),
       max_power_W_(profile.max_power_W) {}
+
+void WrenchLimits::change(const LimitSettings& settings, const DeviceProfile& profile) noexcept {
+  const Wrench last = last_;
+  *this = WrenchLimits(settings, profile);
+  last_ = last;
+}
 
 void WrenchLimits::set_ceiling(double force_N, double torque_Nm) noexcept {
   force_ceiling_N_ = within(force_N, max_force_N_);

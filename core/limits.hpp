@@ -19,6 +19,9 @@ struct LimitSettings {
   double soft_start_s = 1.0;  ///< from armed to full authority
 };
 
+/// Of each limit the tighter one: no more than either of them lets go out with this profile. RT safe.
+LimitSettings tighter(const LimitSettings& a, const LimitSettings& b, const DeviceProfile& profile) noexcept;
+
 /// No profile and no setting reaches further, whatever they say.
 inline constexpr double kHighestForce_N = 200.0;
 inline constexpr double kHighestTorque_Nm = 20.0;
@@ -93,6 +96,9 @@ class WrenchLimits {
 
   /// Nothing goes out any more: the next wrench grows from zero. RT safe.
   void reset() noexcept { last_ = Wrench{}; }
+
+  /// Other settings from here on, though what went out last stays what it was. RT safe.
+  void change(const LimitSettings& settings, const DeviceProfile& profile) noexcept;
 
   /// What went out last is this, though it did not come from here: the next wrench grows from it. RT safe.
   void follow(const Wrench& last) noexcept { last_ = last; }

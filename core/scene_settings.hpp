@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct MeshObstacleSettings {
   /// beyond it, or that it goes through.
   BodyKind kind = BodyKind::solid;
   ObstacleMotion motion = {};  ///< of M; turns are about M's origin
+  std::optional<LaterMotion> later = {};
 };
 
 struct SceneSettings {

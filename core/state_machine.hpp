@@ -30,6 +30,9 @@ class StateMachine {
   /// ramp_s: of the rise after arming.
   explicit StateMachine(double ramp_s) noexcept : ramp_s_(ramp_s) {}
 
+  /// Another rise from here on; one that is under way goes on as it began. RT safe.
+  void set_ramp_s(double ramp_s) noexcept { ramp_s_ = ramp_s; }
+
   /// Something happened: the state and the force become what its row says. Returns the row. at_least: the
   /// reaction that comes with a fault, where it is harder than the row's.
   const Transition& on(Trigger trigger, Reaction at_least = Reaction::none) noexcept;

@@ -48,6 +48,19 @@ double GroupHeat::bearable() const noexcept {
   return std::min(maximum_, continuous_ * std::sqrt(std::max(square, 1.0)));
 }
 
+/// A ceiling that was on its way goes on from where it was, unless the new maximum is below it. Heat that
+/// nobody counted, because the maximum was below the rating, is taken for as much as it can have been.
+void GroupHeat::change_maximum(double maximum) noexcept {
+  if (maximum == maximum_) return;
+  const GroupHeat before = *this;
+  *this = GroupHeat(maximum, continuous_, time_s_);
+  if (!rated_) return;
+  const double share = before.maximum_ / continuous_;
+  heat_ = before.rated_ ? before.heat_ : share * share;
+  folded_ = before.folded_;
+  ceiling_ = std::min({before.rated_ ? before.ceiling_ : bearable(), bearable(), maximum_});
+}
+
 void GroupHeat::advance(double pushed, double dt_s) noexcept {
   if (!rated_ || !is_positive(dt_s)) return;
   const double share = (is_finite(pushed) ? std::min(pushed, maximum_) : maximum_) / continuous_;

@@ -25,6 +25,9 @@ class GroupHeat {
   /// `pushed`: |F| over the last dt_s; more than the maximum, or not finite, counts as the maximum. RT safe.
   void advance(double pushed, double dt_s) noexcept;
 
+  /// Another maximum from here on; the motors are as warm as they were. RT safe.
+  void change_maximum(double maximum) noexcept;
+
   double ceiling() const noexcept { return ceiling_; }
   double heat() const noexcept { return heat_; }
   bool folded_back() const noexcept { return folded_; }
@@ -51,6 +54,12 @@ class ThermalModel {
 
   /// F: what went out for the last dt_s. Time that does not pass, or runs backwards, warms nothing. RT safe.
   void advance(const Wrench& F, double dt_s) noexcept;
+
+  /// As at construction, for maxima that are changed. RT safe.
+  void change_maxima(double max_force_N, double max_torque_Nm) noexcept {
+    force_.change_maximum(max_force_N);
+    torque_.change_maximum(max_torque_Nm);
+  }
 
   /// For WrenchLimits::set_ceiling, at the next tick.
   double force_ceiling_N() const noexcept { return force_.ceiling(); }

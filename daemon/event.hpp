@@ -22,6 +22,8 @@ struct Event {
     placed,              ///< value: how far from the hand it was found [m]
     nowhere,             ///< none was found; zero wrench, and it is looked for again
     released,            ///< the hand was released
+    changing,            ///< detail: number of a rendering that begins to take the place of another
+    changed,             ///< detail: number of the rendering that is felt from now on
   };
   Kind kind = Kind::state;
   TimePoint at{};

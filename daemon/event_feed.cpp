@@ -27,6 +27,8 @@ EventLevel level_of(const Event& event) {
     case Event::Kind::placing:
     case Event::Kind::placed:
     case Event::Kind::released:
+    case Event::Kind::changing:
+    case Event::Kind::changed:
       return EventLevel::info;
     default:
       return EventLevel::warning;
@@ -83,6 +85,9 @@ std::string name_of(Event::Kind kind) {
       return "placing";
     case Event::Kind::released:
       return "released";
+    case Event::Kind::changing:
+    case Event::Kind::changed:
+      return "scene";
   }
   return "log";
 }
@@ -107,6 +112,9 @@ Json fields_of(const Event& event) {
       return {{"outcome", "placed"}, {"distance_m", event.value}};
     case Event::Kind::nowhere:
       return {{"outcome", "nowhere"}};
+    case Event::Kind::changing:
+    case Event::Kind::changed:
+      return {{"rendering", event.detail}, {"felt", event.kind == Event::Kind::changed}};
     case Event::Kind::released:
       break;
   }
@@ -146,7 +154,7 @@ Json fault_json(Fault fault) {
 }
 
 std::span<const EventRow> feed_events() {
-  static const std::array<EventRow, 8> rows = {{
+  static const std::array<EventRow, 10> rows = {{
       {"state", "The loop came to another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
        "Something is wrong. fault: name, sentence, cure; value: how much of it, where that says "
@@ -160,6 +168,10 @@ std::span<const EventRow> feed_events() {
        "outcome: seeking, placed (distance_m: how far from the hand), nowhere, "
        "no_admissible_pose. Where the tool stands is looked for after each arming."},
       {"released", "The hand was released: zero wrench, motors off."},
+      {"scene",
+       "What is rendered changes. rendering: the number of the new one, as in the record of a tick; felt: "
+       "false where it begins to take the place of the one before, true where it has."},
+      {"reload", "The configuration was read again. applied, not_applied: keys; refused: why, or null."},
       {"log", "What else the log has."},
   }};
   return rows;
@@ -197,6 +209,10 @@ std::string to_text(const Event& event) {
              "is looked for again";
     case Event::Kind::released:
       return "the hand is released: zero wrench, motors off";
+    case Event::Kind::changing:
+      return fmt::format("rendering {} begins to take the place of the one before", event.detail);
+    case Event::Kind::changed:
+      return fmt::format("rendering {} is felt from now on", event.detail);
   }
   return "unknown event";
 }

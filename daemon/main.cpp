@@ -22,6 +22,7 @@
 #include "daemon/option_checks.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/recorder.hpp"
+#include "daemon/scene_methods.hpp"
 #include "daemon/service_notify.hpp"
 #include "daemon/state_methods.hpp"
 #include "daemon/station.hpp"
@@ -46,6 +47,7 @@ constexpr auto kLook = std::chrono::milliseconds(100);  ///< how often the live 
 constexpr auto kLastWords = std::chrono::milliseconds(50);
 
 std::atomic<bool> stop_requested{false};
+std::atomic<bool> reload_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<CommandSet>::is_always_lock_free &&
                   std::atomic<ServoLoop*>::is_always_lock_free,
               "a signal handler may only touch lock-free atomics");
@@ -78,7 +80,8 @@ void describe(CLI::App& app, Options& options) {
       "wrenchd: a haptic servo daemon. Reads the hand's pose, computes the generalized penetration\n"
       "depth of the tool in its scene, and writes the wrench back.");
   app.footer(
-      "Signals: SIGUSR1 is an emergency stop, SIGUSR2 acknowledges a stop or a fault; both leave it "
+      "Signals: SIGHUP reads the configuration again (all of it or, where anything is refused, nothing);\n"
+      "SIGUSR1 is an emergency stop, SIGUSR2 acknowledges a stop or a fault; both leave it "
       "disarmed.\n"
       "Exit codes: 0 stopped as asked; 1 refused (file, device, kernel); 3 it ended with a fault that "
       "nobody\n"
@@ -324,6 +327,7 @@ std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const O
   auto control = std::make_unique<Control>(station, feed);
   try {
     add_state_methods(control->methods(), station);
+    add_scene_methods(control->methods(), station.workbench(), feed, [&options] { return plan_of(options); });
     control->open(place.path);
     spdlog::info("control socket: {}", place.path.string());
     return control;
@@ -333,6 +337,30 @@ std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const O
     return nullptr;
   }
 }
+
+/// Reads the configuration again where a signal asks for it, on a thread of its own: meshes take time.
+class Reloader {
+ public:
+  Reloader(Station& station, EventFeed& feed, const Options& options)
+      : thread_([&](const std::stop_token& stop) {
+          while (!stop.stop_requested()) {
+            if (reload_requested.exchange(false)) read_again(station, feed, options);
+            std::this_thread::sleep_for(kLook);
+          }
+        }) {}
+
+ private:
+  static void read_again(Station& station, EventFeed& feed, const Options& options) {
+    if (the_service != nullptr) the_service->reloading();
+    try {
+      reload(station.workbench(), feed, [&options] { return plan_of(options); });
+    } catch (const std::exception&) {  // that is told by now
+    }
+    if (the_service != nullptr) the_service->reloaded();
+  }
+
+  std::jthread thread_;
+};
 
 /// Builds the station around its link, and runs it.
 Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
@@ -355,6 +383,7 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
   {
     EventFeed feed(station.loop());
     const auto control = open_control(station, feed, options);
+    const Reloader reloader(station, feed, options);
     fault = run_it(station, view);
   }
   view.close(station.loop(), seconds(clock.now() - start));
@@ -436,6 +465,8 @@ void catch_signals() {
   action.sa_handler = [](int) { stop_requested.store(true); };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = [](int) { reload_requested.store(true); };
+  sigaction(SIGHUP, &action, nullptr);
   action.sa_handler = [](int) { ask(kStop); };
   sigaction(SIGUSR1, &action, nullptr);
   action.sa_handler = [](int) { ask(kAcknowledge); };

@@ -49,6 +49,16 @@ void PlacerThread::run(const std::stop_token& stop) noexcept {
   }
 }
 
+std::shared_ptr<Placer> make_placer(std::shared_ptr<const Scene> scene, PlaceIn place_in) {
+  const Scene& its = *scene;
+  const auto with_scene = [&scene](auto placer) {
+    // The scene goes after the placer that uses it.
+    return std::shared_ptr<Placer>(placer.release(), [scene = std::move(scene)](Placer* p) { delete p; });
+  };
+  if (place_in == PlaceIn::step) return with_scene(std::make_unique<PlacerInStep>(its));
+  return with_scene(std::make_unique<PlacerThread>(its));
+}
+
 PlacerInStep::PlacerInStep(const Scene& scene) : penetration_(scene, kNearest) {}
 
 void PlacerInStep::ask(const PlacementQuestion& question) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <thread>
 
 #include "collision/penetration.hpp"
@@ -49,6 +50,12 @@ class Placer {
   virtual bool answer(PlacementAnswer& answer) noexcept = 0;
 };
 
+/// Where the proxy's place is looked for when it is not known.
+enum class PlaceIn : std::uint8_t {
+  thread,  ///< beside the servo loop
+  step,    ///< in the tick: virtual time, every run the same
+};
+
 /// Looks on a thread of its own, with the priority of the thread that makes it. For a search of any length.
 class PlacerThread final : public Placer {
  public:
@@ -84,5 +91,8 @@ class PlacerInStep final : public Placer {
   PlacementQuestion question_;
   bool asked_ = false;
 };
+
+/// One that keeps its scene.
+std::shared_ptr<Placer> make_placer(std::shared_ptr<const Scene> scene, PlaceIn place_in);
 
 }  // namespace wrenchd

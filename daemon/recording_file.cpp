@@ -10,8 +10,9 @@ namespace {
 
 constexpr const char* kTable = "/ticks";
 /// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
-/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults.
-constexpr const char* kFormat = "4";
+/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults; 5: what
+/// was changed while the loop ran.
+constexpr const char* kFormat = "5";
 constexpr hsize_t kChunkRows =
     1024;  ///< about a second at 1 kHz: what a crash can cost, and a good block to compress
 constexpr unsigned kDeflateLevel = 1;

@@ -144,6 +144,12 @@ std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
   RecordedPlacer placer;
   ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
   for (const TickRecord& then : recording.ticks) {
+    if (then.changes > 0)
+      throw RecordingError(
+          "at tick " + std::to_string(then.tick) +
+          " the scene, the workspace or a limit was changed while the loop ran, and to what is not in the "
+          "recording: it can be replayed up to there, and is the same bits so far; record a run without "
+          "changes to replay all of it");
     clock.play(then);
     device.play(then);
     placer.play(then);

@@ -4,7 +4,6 @@
 #include <bit>
 #include <limits>
 
-#include "core/energy_law.hpp"
 #include "core/finite.hpp"
 #include "core/watch_limits.hpp"
 
@@ -20,12 +19,12 @@
 namespace wrenchd {
 namespace {
 
-/// Where the placer found no room it is asked again after so long: a search without end would keep a
-/// processor busy, and a hand does not go far in that time.
-constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
-
 /// A proxy that found no admissible pose may find one in the next tick, from a little farther on.
 constexpr int kFailures = 3;
+
+/// How fast the wrench of the contact goes away, and comes back, for what happens to the workspace [s].
+constexpr double kShutOver_s = 0.050;
+constexpr double kOpenOver_s = 0.100;
 
 constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
 
@@ -45,34 +44,35 @@ std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
 }  // namespace
 
 ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
-                     const Scene& scene, Placer& placer, const Clock& clock, RecordRing* records)
-    : device_(device),
-      placer_(placer),
+                     std::unique_ptr<Rendering> rendering, const Clock& clock, RecordRing* records)
+    : profile_(profile),
+      device_(device),
       clock_(clock),
       records_(records),
-      scene_(scene),
-      X_WB_(pose_of(settings.device.base_in_world)),
-      X_HT_(pose_of(settings.device.tool_in_handle) * scene.tool().X_MT()),
       wrench_point_(profile.wrench_point),
       driven_(driven_dofs(profile)),
       pacing_(settings.servo.pacing),
       period_(from_seconds(1.0 / settings.servo.rate_Hz)),
-      penetration_(scene,
-                   {settings.rendering.method, settings.rendering.planes, 0.0, settings.rendering.friction}),
-      moves_(scene.moves()),
-      spring_(settings.wrench.law),
-      energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
-      M_(scene.tool().solid.inertia),
-      law_(gains_for(settings.rendering.method, settings.wrench.gains)),
-      gravity_(profile.masses, X_WB_.rotation),
+      renderings_(std::move(rendering)),
+      workspace_(pose_of(settings.device.base_in_world)),
+      gravity_(profile.masses, pose_of(settings.device.base_in_world).rotation),
+      limit_settings_(settings.limits),
       limits_(settings.limits, profile),
       heat_(profile, limits_.max_force_N(), limits_.max_torque_Nm()),
-      steady_(settings, profile, M_, X_HT_),
+      steady_(settings, profile, felt().stability()),
       watches_(settings, profile, limits_.max_force_N(), limits_.max_torque_Nm()),
       self_test_(profile, settings.servo.self_test_s),
       machine_(settings.limits.soft_start_s) {
   lose_place();
 }
+
+ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
+                     const Scene& scene, Placer& placer, const Clock& clock, RecordRing* records)
+    : ServoLoop(settings, profile, device,
+                std::make_unique<Rendering>(0, settings, profile,
+                                            std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene),
+                                            std::shared_ptr<Placer>(std::shared_ptr<void>(), &placer)),
+                clock, records) {}
 
 Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
   TimePoint due = clock.now();
@@ -92,6 +92,7 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   lap(Stage::read);
 
   look(sample, now);  // what is wrong, what was asked for, and the state that follows
+  take_changes(now);  // another scene, workspace, limit, made ready outside
   if ((found_ & bit(Fault::device_lost)) != 0 || machine_.state() == State::shutdown) {
     let_go(now);
     return (found_ & bit(Fault::device_lost)) != 0 ? Fault::device_lost : changed_by_;
@@ -132,7 +133,7 @@ void ServoLoop::let_go(TimePoint now) noexcept {
   record_.motors_told = 0;
   record_.authority = 0.0;
   limits_.reset();
-  law_.reset();
+  renderings_.lose_law();
   sampled_ = false;  // what comes next may be a device that was plugged in anew, with another clock
   watches_.forget();
   watches_.client.end();
@@ -226,7 +227,7 @@ void ServoLoop::obey(CommandSet commands, TimePoint now) noexcept {
   if ((commands & kArm) == 0 || (commands & (kStop | kDisarm | kQuit | kHungUp)) != 0) return;
   if (!transition(Trigger::arm, machine_.state()).leads)
     return say(Event::Kind::refused, now, static_cast<std::uint32_t>(machine_.state()));
-  if (has_place()) lose_place();
+  if (felt().has_place()) lose_place();
   machine_.on(Trigger::arm);
   if ((commands & kLease) == 0) return;
   watches_.client.begin(now);
@@ -248,49 +249,110 @@ void ServoLoop::found(Fault fault, TimePoint now, double value) noexcept {
 
 /// Nothing is known of q: no contact, zero wrench, and the soft start waits.
 void ServoLoop::lose_place() noexcept {
-  placing_ = Placing::seeking;
-  asked_ = false;
+  if (renderings_.lose_place()) change_rendering();
   said_nowhere_ = false;
-  penetration_.forget();
-  depth_ = Penetration{};
-  depth_.projection.status = ProjectionStatus::infeasible;
-  F_T_ = F_out_ = F_weight_ = Wrench{};
+  F_out_ = F_weight_ = Wrench{};
   dropped_ = kNoDof;
-  law_.reset();
   limits_.reset();
   machine_.on(Trigger::interrupted);
+}
+
+/// What was made ready outside, between two ticks. What the hand feels of another scene, or of another
+/// workspace, changes over many ticks; where there is no force it may change at once.
+void ServoLoop::take_changes(TimePoint now) noexcept {
+  const bool force = is_driving(machine_.state());
+  switch (renderings_.change(force)) {
+    case Renderings::News::none:
+      break;
+    case Renderings::News::comes:
+      scale_renderings();
+      say(Event::Kind::changing, now, renderings_.next()->number());
+      ++changes_;
+      break;
+    case Renderings::News::taken_over:
+      change_rendering();
+      if (!force || !felt().has_place()) lose_place();
+  }
+  if (WorkspaceWish wish; wishes_.read(wish)) change_workspace(wish);
+  if (LocalModelSet models; new_models_.read(models)) {
+    ++changes_;
+    models_.take(models);
+    models_share_ = steady_.bearable(models_.load());
+  }
+  if (LimitSettings asked; new_limits_.read(asked)) change_limits(asked);
+}
+
+/// What is felt is another rendering.
+void ServoLoop::change_rendering() noexcept {
+  steady_.change(felt().stability());
+  scale_renderings();
+  say(Event::Kind::changed, now_, felt().number());
+  ++changes_;
+}
+
+/// Each as stiff as the device bears.
+void ServoLoop::scale_renderings() noexcept {
+  renderings_.felt().scale(steady_.share());
+  if (Rendering* next = renderings_.next()) next->scale(steady_.bearable(next->stability()));
+}
+
+/// Where the tool stands is taken from the proxy when the clutch lets it go on: it touches, and does not
+/// press.
+void ServoLoop::change_workspace(const WorkspaceWish& wish) noexcept {
+  ++changes_;
+  workspace_.set_scale(wish.scale);
+  if (wish.clutched && !workspace_.clutched()) workspace_.clutch_in();
+  if (!wish.clutched && workspace_.clutched())
+    workspace_.clutch_out(felt().has_place() ? felt().X_WQ() * inverse(felt().X_HT()) : workspace_.X_WH());
+  recentres_ = recentres_ || wish.recentred != recentred_;
+  recentred_ = wish.recentred;
+  shut_ = wish.clutched || recentres_;
+}
+
+/// What is looser is left out while anything can go out.
+void ServoLoop::change_limits(LimitSettings asked) noexcept {
+  ++changes_;
+  const bool armed = is_driving(machine_.state()) || machine_.state() == State::waiting;
+  if (armed) asked = tighter(limit_settings_, asked, profile_);
+  limit_settings_ = asked;
+  limits_.change(asked, profile_);
+  heat_.change_maxima(limits_.max_force_N(), limits_.max_torque_Nm());
+  watches_.pinned = PinnedWatch(limits_.max_force_N(), limits_.max_torque_Nm());
+  machine_.set_ramp_s(asked.soft_start_s);
+}
+
+/// What clients know of the surroundings of the handle, in the axes of the base.
+Wrench ServoLoop::feel_local_models(const DeviceSample& sample) noexcept {
+  if (wrench_point_ == WrenchPoint::world_origin) return {};
+  modelled_ = models_.feel(workspace_.X_WH(), workspace_.in_world(sample.V_BH), now_, dt_s_, models_share_);
+  steady_.lend(modelled_.given_J);
+  return modelled_.any ? workspace_.on_the_hand(modelled_.F_H_W) : Wrench{};
+}
+
+/// How much of the contact's wrench the hand feels: nothing of a tool that stands apart from it.
+void ServoLoop::let_through() noexcept {
+  const double last = through_;
+  if (shut_) through_ = std::max(through_ - dt_s_ / kShutOver_s, 0.0);
+  if (!shut_) through_ = std::min(through_ + dt_s_ / kOpenOver_s, 1.0);
+  steady_.lend((through_ - last) * renderings_.wound_up_J() + last * renderings_.given_J());
+  if (!recentres_ || through_ > 0.0) return;
+  recentres_ = false;
+  shut_ = workspace_.clutched();
+  workspace_.recentre();
+  lose_place();
 }
 
 /// Lines 2 to 6: p from the sample, and its projection q, which follows the hand from last tick's as a proxy.
 /// One that is caught between obstacles that move has lost its place.
 void ServoLoop::project(const DeviceSample& sample) noexcept {
-  X_WP_ = X_WB_ * sample.X_BH * X_HT_;
-  if (!has_place()) return place();
-  depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s_);
-  if (moves_ && depth_.projection.status == ProjectionStatus::infeasible) return lose_place();
-  X_WQ_ = depth_.projection.X_WQ;
-  placing_ = Placing::following;
-}
-
-/// There is no q to follow from. The search for one may take seconds, so another thread does it, whatever the
-/// scene: asked at one tick, it answers at a later one, with a pose near to where the hand was then. That is
-/// this tick's q, and the next follows from it, and makes up for what obstacles have moved since.
-void ServoLoop::place() noexcept {
-  if (!asked_) {
-    if (placing_ == Placing::nowhere && now_ < ask_again_) return;
-    placing_ = Placing::seeking;
-    placer_.ask({++question_, X_WP_, scene_time_s_});
-    asked_ = true;
-    return;
+  const double scale = workspace_.scale();
+  const Pose X_WH = workspace_.follow(sample.X_BH, dt_s_);
+  if (workspace_.scale() != scale) {
+    steady_.set_workspace_scale(workspace_.scale());
+    scale_renderings();
   }
-  PlacementAnswer answer;
-  if (!placer_.answer(answer) || answer.number != question_)
-    return;  // one that was asked before we started over
-  asked_ = false;
-  placing_ = answer.found ? Placing::placed : Placing::nowhere;
-  X_WQ_ = answer.X_WQ;
-  penetration_.forget(answer.scene_time_s);
-  ask_again_ = now_ + kAskAgainAfter;
+  if (!renderings_.project(X_WH, now_, scene_time_s_)) lose_place();
+  whereabouts_.write({X_WH, scene_time_s_, now_});
 }
 
 /// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,
@@ -300,13 +362,15 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
   const double dt_s = sampled_ ? sample.device_time_s - sample_time_s_ : 0.0;
   sample_time_s_ = sample.device_time_s;
   sampled_ = true;
-  const bool in_contact = depth_.contacts > 0;
-  F_T_ = spring_ == SpringLaw::pid
-             ? law_.update(depth_.drive, in_contact, dt_s)
-             : law_.update_damping(
-                   energy_wrench(M_, steady_.share().spring * energy_stiffness_per_s2_, X_WP_, X_WQ_),
-                   depth_.drive, in_contact, dt_s);
-  const Wrench F = outgoing(X_WB_ * sample.X_BH), F_weight = gravity_.wrench(sample.X_BH);
+  renderings_.press(dt_s);
+  Wrench F = outgoing(felt());
+  if (const Rendering* next = renderings_.next())
+    F = renderings_.mixed(F, outgoing(*next),
+                          {limits_.max_force_N(), limits_.max_torque_Nm(), limit_settings_.soft_start_s},
+                          dt_s_);
+  let_through();
+  const Wrench F_weight = gravity_.wrench(sample.X_BH);
+  F = through_ * F + feel_local_models(sample);
   dropped_ = static_cast<DofMask>(components(F + F_weight) & ~driven_);
   F_out_ = along(F, driven_);
   F_weight_ = along(F_weight, driven_);
@@ -314,10 +378,10 @@ void ServoLoop::compute_wrench(const DeviceSample& sample) noexcept {
 
 /// About the handle point in the axes of the device base, or the paper's spatial wrench W_S: as the profile
 /// says.
-Wrench ServoLoop::outgoing(const Pose& X_WH) const noexcept {
-  if (wrench_point_ == WrenchPoint::world_origin) return spatial_wrench(X_WP_, F_T_);
-  const Wrench F_H_W = wrench_about(X_WH.translation_m, X_WP_, F_T_);
-  return expressed(X_WB_.rotation.conjugate(), F_H_W);
+Wrench ServoLoop::outgoing(const Rendering& rendering) const noexcept {
+  if (wrench_point_ == WrenchPoint::world_origin) return spatial_wrench(rendering.X_WP(), rendering.F_T());
+  const Wrench F_H_W = wrench_about(workspace_.X_WH().translation_m, rendering.X_WP(), rendering.F_T());
+  return workspace_.on_the_hand(F_H_W);
 }
 
 /// Whether what was computed may be used: in time, and from an admissible pose.
@@ -325,8 +389,8 @@ void ServoLoop::check_answer(const DeviceSample& sample, TimePoint now) noexcept
   const TimePoint answered = clock_.now();
   record_.answered_ns = answered.time_since_epoch().count();
   if (!good_) return;
-  const bool failed =
-      placing_ == Placing::following && depth_.projection.status == ProjectionStatus::infeasible;
+  const bool failed = felt().placing() == Placing::following &&
+                      felt().depth().projection.status == ProjectionStatus::infeasible;
   failures_ = failed ? failures_ + 1 : 0;
   if (failures_ >= kFailures) found(Fault::projection_failed, now);
   const Duration age = answered - sample.arrived;
@@ -338,8 +402,9 @@ void ServoLoop::check_answer(const DeviceSample& sample, TimePoint now) noexcept
 /// weight is no push, so it does not make the hand wait for calm.
 Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
   machine_.advance(calm(sample), dt_s_);
-  const Wrench F =
-      steady_.steadied(F_out_, sample, {machine_.state(), good_, depth_.contacts > 0, wound_up_J()});
+  const Wrench F = steady_.steadied(F_out_, sample,
+                                    {machine_.state(), good_, renderings_.in_contact() && through_ > 0.0,
+                                     through_ * renderings_.wound_up_J()});
   found(steady_.found(), now);  // which may end the force in this very tick
   record_.authority = machine_.authority();
   limits_.set_ceiling(heat_.force_ceiling_N(), heat_.torque_ceiling_Nm());
@@ -360,7 +425,7 @@ Limited ServoLoop::limit(const DeviceSample& sample, TimePoint now) noexcept {
 }
 
 bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
-  return has_place() && sampled_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
+  return felt().has_place() && sampled_ && sample.V_BH.linear_m_per_s.norm() < kCalmSpeed_m_per_s &&
          sample.V_BH.angular_rad_per_s.norm() < kCalmAngularSpeed_rad_per_s &&
          F_out_.force_N.norm() <= kCalmShareOfLimit * limits_.max_force_N() &&
          F_out_.torque_Nm.norm() <= kCalmShareOfLimit * limits_.max_torque_Nm();
@@ -369,15 +434,9 @@ bool ServoLoop::calm(const DeviceSample& sample) const noexcept {
 /// The stiffness that stays passive with the rate and the delay that were measured just now.
 void ServoLoop::settle_stiffness(TimePoint now) noexcept {
   const auto [spring, damper, bounded] = steady_.settle();
-  law_.scale(spring, damper);
+  scale_renderings();
   if (!bounded) say(Event::Kind::unbounded, now);
   if (spring < 1.0 || damper < 1.0) say(Event::Kind::stiffness, now, 0, spring);
-}
-
-/// What the spring holds now: half of force times way, and of torque times turn [J].
-double ServoLoop::wound_up_J() const noexcept {
-  if (depth_.contacts == 0) return 0.0;
-  return 0.5 * (F_T_.force_N.dot(depth_.drive.head<3>()) + F_T_.torque_Nm.dot(depth_.drive.tail<3>()));
 }
 
 /// Line 8. In the self-test the device hears what the test wants it to hear. A wrench that was refused for
@@ -415,21 +474,28 @@ void ServoLoop::finish(TimePoint now, const Limited& out) noexcept {
 }
 
 void ServoLoop::describe(const Limited& out) noexcept {
-  record_.X_WP = numbers(X_WP_);
+  const Rendering& rendering = felt();
+  const Penetration& depth = rendering.depth();
+  record_.X_WP = numbers(rendering.X_WP());
   record_.X_WQ.fill(kNotSet);
-  if (has_place()) record_.X_WQ = numbers(X_WQ_);
+  if (rendering.has_place()) record_.X_WQ = numbers(rendering.X_WQ());
   record_.eps.fill(kNotSet);
   record_.energy = record_.kkt_residual = kNotSet;
-  if (placing_ == Placing::following) {
-    record_.eps = numbers(depth_.eps.head<3>(), depth_.eps.tail<3>());
-    record_.energy = depth_.projection.energy;
-    record_.kkt_residual = depth_.projection.kkt_residual;
+  if (rendering.placing() == Placing::following) {
+    record_.eps = numbers(depth.eps.head<3>(), depth.eps.tail<3>());
+    record_.energy = depth.projection.energy;
+    record_.kkt_residual = depth.projection.kkt_residual;
   }
-  record_.F_T = numbers(F_T_.force_N, F_T_.torque_Nm);
-  record_.contacts = depth_.contacts;
-  record_.iterations = depth_.projection.iterations;
-  record_.projection_status = static_cast<std::uint8_t>(depth_.projection.status);
-  record_.placing = static_cast<std::uint8_t>(placing_);
+  record_.F_T = numbers(rendering.F_T().force_N, rendering.F_T().torque_Nm);
+  record_.contacts = depth.contacts;
+  record_.iterations = depth.projection.iterations;
+  record_.projection_status = static_cast<std::uint8_t>(depth.projection.status);
+  record_.placing = static_cast<std::uint8_t>(rendering.placing());
+  record_.rendering = rendering.number();
+  record_.rendering_sum = rendering.sum();
+  record_.next_share = renderings_.share();
+  record_.through = through_;
+  record_.changes = changes_;
   record_.state = static_cast<std::uint8_t>(machine_.state());
   record_.cause = static_cast<std::uint8_t>(machine_.cause());
   record_.faults = found_;
@@ -446,6 +512,8 @@ void ServoLoop::describe(const Limited& out) noexcept {
 void ServoLoop::publish() noexcept {
   seen_state_.store(machine_.state(), std::memory_order_relaxed);
   seen_cause_.store(machine_.cause(), std::memory_order_relaxed);
+  seen_rendering_.store(felt().number(), std::memory_order_relaxed);
+  seen_changing_.store(renderings_.next() != nullptr, std::memory_order_relaxed);
   latest_.write(record_);
   if (shown_ != nullptr) shown_->write(record_, touches());
   if (records_ != nullptr && !records_->push(record_))
@@ -454,8 +522,7 @@ void ServoLoop::publish() noexcept {
 
 /// The contacts of the tick, for whoever looks.
 Touches ServoLoop::touches() const noexcept {
-  if (depth_.contacts == 0) return {};
-  return wrenchd::touches(depth_.projection, scene_, penetration_.knows_mesh_features());
+  return felt().touches();
 }
 
 void ServoLoop::record_sample(const DeviceSample& sample) noexcept {
@@ -487,17 +554,19 @@ void ServoLoop::say_changes(TimePoint now) noexcept {
 
 /// Each once: that the proxy's place is looked for, that it was found, that there is none.
 void ServoLoop::say_placing(TimePoint now) noexcept {
-  if (has_place() != said_placed_) {
-    if (has_place())
-      say(Event::Kind::placed, now, 0, (X_WQ_.translation_m - X_WP_.translation_m).norm());
+  const bool placed = felt().has_place();
+  if (placed != said_placed_) {
+    if (placed)
+      say(Event::Kind::placed, now, 0, (felt().X_WQ().translation_m - felt().X_WP().translation_m).norm());
     else
       say(Event::Kind::placing, now);
   }
-  said_placed_ = has_place();
-  if (placing_ == Placing::nowhere && !said_nowhere_) say(Event::Kind::nowhere, now);
-  said_nowhere_ = said_nowhere_ || placing_ == Placing::nowhere;
-  if (placing_ != Placing::following) return;
-  const ProjectionStatus status = depth_.projection.status;
+  said_placed_ = placed;
+  const bool nowhere = felt().placing() == Placing::nowhere;
+  if (nowhere && !said_nowhere_) say(Event::Kind::nowhere, now);
+  said_nowhere_ = said_nowhere_ || nowhere;
+  if (felt().placing() != Placing::following) return;
+  const ProjectionStatus status = felt().depth().projection.status;
   if (status != said_status_ && status == ProjectionStatus::infeasible)
     say(Event::Kind::no_admissible_pose, now);
   said_status_ = status;

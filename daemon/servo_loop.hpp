@@ -2,10 +2,10 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
-#include "collision/penetration.hpp"
 #include "collision/scene.hpp"
 #include "config/settings.hpp"
 #include "core/clock.hpp"
@@ -16,15 +16,17 @@
 #include "core/limits.hpp"
 #include "core/state_machine.hpp"
 #include "core/thermal.hpp"
-#include "core/wrench_law.hpp"
 #include "daemon/event.hpp"
+#include "daemon/local_models.hpp"
 #include "daemon/loop_timing.hpp"
 #include "daemon/placer.hpp"
+#include "daemon/renderings.hpp"
 #include "daemon/self_test.hpp"
 #include "daemon/shared_state.hpp"
 #include "daemon/steady_contact.hpp"
 #include "daemon/tick_record.hpp"
 #include "daemon/watches.hpp"
+#include "daemon/workspace.hpp"
 #include "devices/device.hpp"
 
 namespace wrenchd {
@@ -46,8 +48,11 @@ using RecordRing = boost::lockfree::spsc_queue<TickRecord>;
 /// After construction nothing here allocates, locks, logs, throws or waits, but for the sleep in run().
 class ServoLoop {
  public:
-  /// Everything is kept by reference or copied; the device is open. records may be null: then nothing is
-  /// recorded.
+  /// Profile, device and clock are kept by reference; the device is open. rendering: what is felt first.
+  /// records may be null: then nothing is recorded.
+  ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
+            std::unique_ptr<Rendering> rendering, const Clock& clock, RecordRing* records = nullptr);
+  /// The same with a rendering of its own, of a scene and a placer that are kept by reference.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
             Placer& placer, const Clock& clock, RecordRing* records = nullptr);
 
@@ -86,10 +91,35 @@ class ServoLoop {
   /// thread.
   void start_over() noexcept { ask(kStartOver); }
 
+  /// Where another rendering is handed over, to be felt from one of the next ticks on without a jump
+  /// (daemon/renderings.hpp). One thread.
+  RenderingExchange& exchange() noexcept { return renderings_.exchange(); }
+  /// Another workspace (daemon/workspace.hpp), from the next tick on and without a jump. One thread.
+  void set_workspace(const WorkspaceWish& wish) noexcept { wishes_.write(wish); }
+  /// Other limits, from the next tick on. What is tighter holds whatever the state, what is looser only where
+  /// nothing can go out: while the loop is armed it is left out. One thread.
+  void set_limits(const LimitSettings& limits) noexcept { new_limits_.write(limits); }
+  /// What clients know of the surroundings of the handle, all of it, from the next tick on. A profile whose
+  /// wrench is not about the handle knows none. One thread.
+  void set_local_models(const LocalModelSet& models) noexcept { new_models_.write(models); }
+  /// Where the handle was in the world at the last tick, and when. One thread.
+  struct Whereabouts {
+    Pose X_WH;
+    double scene_time_s = 0.0;
+    TimePoint at{};
+  };
+  Whereabouts whereabouts() noexcept {
+    whereabouts_.read(last_seen_);
+    return last_seen_;
+  }
+
   /// As of the last tick. Any thread.
   State state() const noexcept { return seen_state_.load(std::memory_order_relaxed); }
   /// What led to it.
   Fault cause() const noexcept { return seen_cause_.load(std::memory_order_relaxed); }
+  /// Number of the rendering that is felt, and whether another is on its way in its place.
+  std::uint32_t rendering() const noexcept { return seen_rendering_.load(std::memory_order_relaxed); }
+  bool changing() const noexcept { return seen_changing_.load(std::memory_order_relaxed); }
   const LoopTiming& timing() const noexcept { return timing_; }
   LatestValue<TickRecord>& latest() noexcept { return latest_; }
   EventRing& events() noexcept { return events_; }
@@ -100,12 +130,16 @@ class ServoLoop {
   void begin(TimePoint now, TimePoint due) noexcept;
   void look(const DeviceSample& sample, TimePoint now) noexcept;
   void obey(CommandSet commands, TimePoint now) noexcept;
+  void take_changes(TimePoint now) noexcept;
+  void change_rendering() noexcept;
+  void scale_renderings() noexcept;
+  void change_workspace(const WorkspaceWish& wish) noexcept;
+  void change_limits(LimitSettings asked) noexcept;
+  void let_through() noexcept;
   void project(const DeviceSample& sample) noexcept;
-  void place() noexcept;
   void compute_wrench(const DeviceSample& sample) noexcept;
   void check_answer(const DeviceSample& sample, TimePoint now) noexcept;
   void settle_stiffness(TimePoint now) noexcept;
-  double wound_up_J() const noexcept;
   Limited limit(const DeviceSample& sample, TimePoint now) noexcept;
   void send(TimePoint now, Limited& out) noexcept;
   void hand_over(TimePoint now, const Wrench& F, bool motors_on) noexcept;
@@ -118,10 +152,11 @@ class ServoLoop {
   void test(const DeviceSample& sample, TimePoint now) noexcept;
   void found(FaultSet faults, TimePoint now, double value = 0.0) noexcept;
   void found(Fault fault, TimePoint now, double value = 0.0) noexcept;
-  Wrench outgoing(const Pose& X_WH) const noexcept;
+  Wrench outgoing(const Rendering& rendering) const noexcept;
+  Wrench feel_local_models(const DeviceSample& sample) noexcept;
   bool calm(const DeviceSample& sample) const noexcept;
   void lose_place() noexcept;
-  bool has_place() const noexcept { return placing_ == Placing::following || placing_ == Placing::placed; }
+  const Rendering& felt() const noexcept { return renderings_.felt(); }
   void lap(Stage stage) noexcept;
   void say(Event::Kind kind, TimePoint at, std::uint32_t detail = 0, double value = 0.0) noexcept;
   void say_changes(TimePoint now) noexcept;
@@ -130,44 +165,38 @@ class ServoLoop {
   TimePoint wait_for_next(Clock& clock, TimePoint due) noexcept;
 
   // Constant after construction
+  const DeviceProfile& profile_;
   Device& device_;
-  Placer& placer_;
   const Clock& clock_;
   RecordRing* records_;
   SharedState* shown_ = nullptr;
-  const Scene& scene_;
-  Pose X_WB_;
-  Pose X_HT_;
   WrenchPoint wrench_point_;
   DofMask driven_;
   Pacing pacing_;
   Duration period_;
 
   // The state of the rendering
-  PenetrationDepth penetration_;
-  bool moves_;  ///< do obstacles?
-  SpringLaw spring_;
-  double energy_stiffness_per_s2_;
-  Inertia M_;
-  WrenchLaw law_;
+  Renderings renderings_;
+  Workspace workspace_;
+  LocalModels models_;
+  LocalModels::Felt modelled_;
+  double models_share_ = 1.0;  ///< that the device bears of them
   GravityCompensation gravity_;
+  LimitSettings limit_settings_;
   WrenchLimits limits_;
   ThermalModel heat_;
 
   SteadyContact steady_;
-  Placing placing_ = Placing::seeking;
-  Pose X_WQ_;  ///< last tick's projection, the proxy; means nothing unless has_place()
-  Pose X_WP_;
-  Penetration depth_;
-  Wrench F_T_;    ///< of the law chosen, body frame
-  Wrench F_out_;  ///< the same as the device wants it, before limits
+  Wrench F_out_;  ///< of the law chosen, as the device wants it, before limits
   Twist V_hand_;  ///< last that were numbers
   Vector3d hand_m_ = Vector3d::Zero();
-  Wrench F_weight_;             ///< that holds the handle's weight, likewise
-  DofMask dropped_ = kNoDof;    ///< what of them the device has no motors for; it is not in them
-  std::uint32_t question_ = 0;  ///< number of the last one to the placer
-  bool asked_ = false;          ///< and it is not answered yet
-  TimePoint ask_again_{};       ///< not before then
+  Wrench F_weight_;           ///< that holds the handle's weight, likewise
+  DofMask dropped_ = kNoDof;  ///< what of them the device has no motors for; it is not in them
+  double through_ = 1.0;      ///< the share of the contact's wrench that is let through
+  bool shut_ = false;         ///< it goes to 0, else to 1
+  bool recentres_ = false;    ///< once it is there
+  std::uint32_t recentred_ = 0;
+  std::uint32_t changes_ = 0;   ///< from outside, since the start
   double sample_time_s_ = 0.0;  ///< device time of the last fresh sample
   bool sampled_ = false;
   bool good_ = false;         ///< this tick has a new pose that may be used
@@ -196,9 +225,16 @@ class ServoLoop {
   ProjectionStatus said_status_ = ProjectionStatus::free;
   bool said_placed_ = true;
   bool said_nowhere_ = false;
+  LatestValue<WorkspaceWish> wishes_;
+  LatestValue<LimitSettings> new_limits_;
+  LatestValue<LocalModelSet> new_models_;
+  LatestValue<Whereabouts> whereabouts_;
+  Whereabouts last_seen_;  ///< belongs to its reader
   std::atomic<CommandSet> commands_{kNoCommand};
   std::atomic<State> seen_state_{State::disconnected};
   std::atomic<Fault> seen_cause_{Fault::none};
+  std::atomic<std::uint32_t> seen_rendering_{0};
+  std::atomic<bool> seen_changing_{false};
   LoopTiming timing_;
   LatestValue<TickRecord> latest_;
   EventRing events_;

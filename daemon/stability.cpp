@@ -42,19 +42,25 @@ Stability::Stability(const Settings& settings, const DeviceProfile& profile, con
       X_HT_(X_HT),
       driven_(driven_dofs(profile)),
       period_s_(1.0 / settings.servo.rate_Hz),
-      most_spring_(std::min(share_of(profile.max_stiffness_N_per_m,
-                                     coupling_.stiffness.topLeftCorner<3, 3>().diagonal().maxCoeff()),
-                            share_of(profile.max_stiffness_Nm_per_rad,
-                                     coupling_.stiffness.bottomRightCorner<3, 3>().diagonal().maxCoeff()))) {
-  share({period_s_, period_s_});  // what cannot be computed is refused here, and not in the loop
+      max_linear_N_per_m_(profile.max_stiffness_N_per_m),
+      max_angular_Nm_per_rad_(profile.max_stiffness_Nm_per_rad) {
+  share({period_s_, period_s_}, 1.0);  // what cannot be computed is refused here, and not in the loop
 }
 
-StiffnessShare Stability::share(const LoopDelay& loop) const {
-  StiffnessShare share{most_spring_, 1.0, false};
+/// x_W = s x_H makes K at the handle s K s for translations: as if the device had the 1 / s^2 of its damping.
+StiffnessShare Stability::share(const LoopDelay& loop, double workspace_scale) const {
+  const double square = workspace_scale * workspace_scale;
+  const Matrix6d& K = coupling_.stiffness;
+  StiffnessShare share{
+      std::min(share_of(max_linear_N_per_m_ / square, K.topLeftCorner<3, 3>().diagonal().maxCoeff()),
+               share_of(max_angular_Nm_per_rad_, K.bottomRightCorner<3, 3>().diagonal().maxCoeff())),
+      1.0, false};
   const bool linear = (driven_ & kLinearDofs) == 0 || is_finite(damping_.linear_N_s_per_m);
   const bool angular = (driven_ & kAngularDofs) == 0 || is_finite(damping_.angular_Nm_s_per_rad);
   if (!linear || !angular) return share;
-  const StabilityBound bound = stability_bound(damping_, loop, coupling_, X_HT_, driven_, step_);
+  const DeviceDamping damping = {damping_.linear_N_s_per_m / square, damping_.angular_Nm_s_per_rad};
+  const EncoderStep step = {workspace_scale * step_.linear_m, step_.angular_rad};
+  const StabilityBound bound = stability_bound(damping, loop, coupling_, X_HT_, driven_, step);
   share.bounded = true;
   if (bound.scale >= 1.0) return share;
   const bool without = bound.scale_undamped > bound.scale;
@@ -63,13 +69,25 @@ StiffnessShare Stability::share(const LoopDelay& loop) const {
   return share;
 }
 
-StiffnessShare Stability::settle(const LoopMeasurement& measured) const noexcept {
+StiffnessShare Stability::settle(const LoopMeasurement& measured, double workspace_scale) const noexcept {
   const double period_s = std::max(measured.longest_period_s(), period_s_);
   try {
-    return share({period_s, measured.delay_s()});
+    return share({period_s, measured.delay_s()}, workspace_scale);
   } catch (...) {  // the constructor has seen that only the times could do this
     return {0.0, 0.0, true};
   }
+}
+
+double Stability::share_at_handle(const LoopMeasurement& measured,
+                                  const LocalModels::Load& load) const noexcept {
+  const double late_s = 0.5 * std::max(measured.longest_period_s(), period_s_) + measured.delay_s();
+  const auto share_of = [late_s](double b, double k, double d) {
+    const double takes = late_s * k + d;
+    return is_finite(b) && takes > b ? b / takes : 1.0;
+  };
+  return std::min(
+      share_of(damping_.linear_N_s_per_m, load.stiffness_N_per_m, load.damping_N_s_per_m),
+      share_of(damping_.angular_Nm_s_per_rad, load.stiffness_Nm_per_rad, load.damping_Nm_s_per_rad));
 }
 
 PassivityGuard Stability::guard(const LoopMeasurement& measured) const noexcept {

@@ -6,6 +6,7 @@
 #include "core/loop_measurement.hpp"
 #include "core/passivity.hpp"
 #include "core/stability_bound.hpp"
+#include "daemon/local_models.hpp"
 
 namespace wrenchd {
 
@@ -23,14 +24,19 @@ class Stability {
   /// X_HT: the tool's body frame in the handle. Throws std::invalid_argument where the gains make no spring.
   Stability(const Settings& settings, const DeviceProfile& profile, const Inertia& M, const Pose& X_HT);
 
-  /// Where the damper costs more stiffness than it gives steadiness, it is left out. RT safe.
-  StiffnessShare settle(const LoopMeasurement& measured) const noexcept;
+  /// Where the damper costs more stiffness than it gives steadiness, it is left out. workspace_scale: metres
+  /// that the tool goes for a metre of the handle, which feels the scale's square of the stiffness. RT safe.
+  StiffnessShare settle(const LoopMeasurement& measured, double workspace_scale = 1.0) const noexcept;
+
+  /// How much of springs and brakes about the handle, each alike in all directions, stays passive: 0 to 1; 1
+  /// where the profile states no damping. RT safe.
+  double share_at_handle(const LoopMeasurement& measured, const LocalModels::Load& load) const noexcept;
 
   /// The guard that goes with it. RT safe.
   PassivityGuard guard(const LoopMeasurement& measured) const noexcept;
 
  private:
-  StiffnessShare share(const LoopDelay& loop) const;
+  StiffnessShare share(const LoopDelay& loop, double workspace_scale) const;
 
   DeviceDamping damping_;
   EncoderStep step_;
@@ -38,7 +44,8 @@ class Stability {
   Pose X_HT_;
   DofMask driven_;
   double period_s_;
-  double most_spring_;  ///< share that the profile's own maxima leave
+  double max_linear_N_per_m_;  ///< the profile's own maxima
+  double max_angular_Nm_per_rad_;
 };
 
 }  // namespace wrenchd

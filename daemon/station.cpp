@@ -39,11 +39,6 @@ double tick_rate_Hz(const Plan& plan) {
   return reports_Hz;
 }
 
-std::unique_ptr<Placer> make_placer(const Scene& scene, PlaceIn place_in) {
-  if (place_in == PlaceIn::step) return std::make_unique<PlacerInStep>(scene);
-  return std::make_unique<PlacerThread>(scene);
-}
-
 /// From when on a loop that says nothing is a stuck one: no late tick takes so long.
 Duration silent_after(const ServoSettings& servo) noexcept {
   const int periods = servo.pacing == Pacing::device ? kDevicePatience_periods : 1;
@@ -83,16 +78,23 @@ std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
   return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, link_settings(plan));
 }
 
-Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, MeshLoader meshes)
+Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& meshes)
+    : Station(std::move(plan), link, clock, place_in, meshes, meshes) {}
+
+/// The loader that has read the scene is told from a fresh one, by which it is read again.
+Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& fresh,
+                 MeshLoader used)
     : plan_(std::move(plan)),
-      scene_(plan_.scene, meshes),
-      mesh_remarks_(meshes.changes()),
+      scene_(std::make_shared<const Scene>(plan_.scene, used)),
+      mesh_remarks_(used.changes()),
       device_(plan_.profile, link),
-      placer_(make_placer(scene_, place_in)),
       records_(Recorder::kRingRecords),
-      loop_(plan_.settings, plan_.profile, device_, scene_, *placer_, clock,
-            plan_.settings.recording.file.empty() ? nullptr : &records_) {
-  mesh_remarks_.insert(mesh_remarks_.end(), meshes.remarks().begin(), meshes.remarks().end());
+      loop_(plan_.settings, plan_.profile, device_,
+            std::make_unique<Rendering>(0, plan_.settings, plan_.profile, scene_,
+                                        make_placer(scene_, place_in)),
+            clock, plan_.settings.recording.file.empty() ? nullptr : &records_),
+      workbench_(plan_, scene_, loop_, place_in, fresh) {
+  mesh_remarks_.insert(mesh_remarks_.end(), used.remarks().begin(), used.remarks().end());
 }
 
 Station::~Station() {

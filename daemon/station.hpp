@@ -13,21 +13,15 @@
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "daemon/placer.hpp"
+#include "daemon/plan.hpp"
 #include "daemon/recording_file.hpp"
 #include "daemon/servo_loop.hpp"
+#include "daemon/workbench.hpp"
 #include "devices/plugged_link.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/report_link.hpp"
 
 namespace wrenchd {
-
-/// What the files say, read and checked, before anything is built from it.
-struct Plan {
-  Settings settings;
-  DeviceProfile profile;  ///< without a name where the settings leave it to the device that is plugged in
-  SceneSettings scene;
-  bool simulated = true;  ///< a simulated device speaks as the profile says; no other is opened
-};
 
 /// What a command line names: the configuration, and what stands in place of what the configuration names. A
 /// file is taken as it is given, from the working directory, and then looked for along the search path.
@@ -40,12 +34,6 @@ struct PlanFiles {
 
 /// Reads the configuration, its scene and its profile. Throws ConfigError.
 Plan read_plan(const PlanFiles& files, const SearchPath& search);
-
-/// Where the proxy's place is looked for when it is not known.
-enum class PlaceIn : std::uint8_t {
-  thread,  ///< beside the servo loop
-  step,    ///< in the tick: virtual time, every run the same
-};
 
 /// Of any link that has a thread of its own: how long its writes may take, and when a loop that is silent is
 /// spoken for.
@@ -60,13 +48,13 @@ class Station {
   /// Link and clock must outlive this. meshes: reads those of the scene; its changes and remarks are kept.
   /// Throws MeshError, std::runtime_error.
   Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in = PlaceIn::thread,
-          MeshLoader meshes = {});
+          const MeshLoader& meshes = {});
   ~Station();
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
 
   const Plan& plan() const noexcept { return plan_; }
-  const Scene& scene() const noexcept { return scene_; }
+  const Scene& scene() const noexcept { return *scene_; }  ///< of the start
   /// What a person should know of the meshes of the scene, a sentence each.
   const std::vector<std::string>& mesh_remarks() const noexcept { return mesh_remarks_; }
   /// Opens the device, closing it first where it was open: before the loop runs, and after each fault. The
@@ -76,6 +64,8 @@ class Station {
   /// The device, for its homing; only while no servo thread runs.
   ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
+  /// Where what is rendered is changed while the loop runs.
+  Workbench& workbench() noexcept { return workbench_; }
   RecordRing& records() noexcept { return records_; }
   /// Shows every tick to other processes from now on. Before the loop runs, once. Throws std::system_error.
   SharedState& show_state();
@@ -85,13 +75,16 @@ class Station {
 
  private:
   Plan plan_;
-  Scene scene_;
+  std::shared_ptr<const Scene> scene_;
   std::vector<std::string> mesh_remarks_;
   ProfileDevice device_;
-  std::unique_ptr<Placer> placer_;
   RecordRing records_;
   std::unique_ptr<SharedState> shared_state_;
   ServoLoop loop_;
+  Workbench workbench_;
+
+  Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& fresh,
+          MeshLoader used);
 };
 
 }  // namespace wrenchd

@@ -16,10 +16,11 @@ double report_rate_Hz(const Settings& settings, const DeviceProfile& profile) {
 
 }  // namespace
 
-SteadyContact::SteadyContact(const Settings& settings, const DeviceProfile& profile, const Inertia& M,
-                             const Pose& X_HT)
-    : stability_(settings, profile, M, X_HT),
+SteadyContact::SteadyContact(const Settings& settings, const DeviceProfile& profile,
+                             const Stability& stability)
+    : stability_(stability),
       measured_(kAssumedPeriods / report_rate_Hz(settings, profile)),
+      settled_by_(measured_),
       guard_(stability_.guard(measured_)),
       about_handle_(profile.wrench_point == WrenchPoint::handle),
       acknowledges_(profile.pose_report.acknowledged.present) {}
@@ -30,9 +31,26 @@ void SteadyContact::measure(const DeviceSample& sample, std::uint64_t commanded,
 }
 
 const StiffnessShare& SteadyContact::settle() noexcept {
-  share_ = stability_.settle(measured_);
+  settled_by_ = measured_;
+  settled_ = true;
+  share_ = bearable(stability_);
   guard_ = stability_.guard(measured_);
   return share_;
+}
+
+StiffnessShare SteadyContact::bearable(const Stability& stability) const noexcept {
+  return settled_ ? stability.settle(settled_by_, workspace_scale_) : StiffnessShare{};
+}
+
+/// The guard knows the device and the delay, and no walls: it stays.
+void SteadyContact::change(const Stability& stability) noexcept {
+  stability_ = stability;
+  share_ = bearable(stability_);
+}
+
+void SteadyContact::set_workspace_scale(double scale) noexcept {
+  workspace_scale_ = scale;
+  share_ = bearable(stability_);
 }
 
 Wrench SteadyContact::steadied(const Wrench& asked, const DeviceSample& sample,

@@ -12,8 +12,8 @@ namespace wrenchd {
 /// walls may be, gives less where the handle buzzes all the same, and guards the energy. RT safe.
 class SteadyContact {
  public:
-  /// As Stability. Throws as it does.
-  SteadyContact(const Settings& settings, const DeviceProfile& profile, const Inertia& M, const Pose& X_HT);
+  /// stability: of what is rendered first.
+  SteadyContact(const Settings& settings, const DeviceProfile& profile, const Stability& stability);
 
   // --- the loop as it is, once a tick ---
   void begin_measuring() noexcept { measured_.reset(); }
@@ -22,6 +22,17 @@ class SteadyContact {
   /// How stiff the walls may be by what was measured since begin_measuring(); the guard goes by that too.
   const StiffnessShare& settle() noexcept;
   const StiffnessShare& share() const noexcept { return share_; }
+  /// How stiff other walls may be, by what was measured when settle() was called last: as stiff as they are
+  /// where that was never.
+  StiffnessShare bearable(const Stability& stability) const noexcept;
+  /// Likewise of springs and brakes about the handle.
+  double bearable(const LocalModels::Load& load) const noexcept {
+    return stability_.share_at_handle(settled_ ? settled_by_ : measured_, load);
+  }
+  /// These are the walls from here on.
+  void change(const Stability& stability) noexcept;
+  /// Metres that the tool goes for a metre of the handle, from here on.
+  void set_workspace_scale(double scale) noexcept;
 
   // --- the contact ---
   struct Moment {
@@ -35,6 +46,10 @@ class SteadyContact {
   /// spring holds by then. What holds the handle's weight is none of its business: a hand that lifts it is
   /// given work.
   Wrench steadied(const Wrench& asked, const DeviceSample& sample, const Moment& moment) noexcept;
+  /// The spring was wound up from outside by so much, and not by the hand: it may give that back.
+  void lend(double energy_J) noexcept {
+    if (guarding_) guard_.lend(energy_J);
+  }
   /// What went out of it, after the limits.
   void told(const Wrench& sent) noexcept { guard_.told(sent); }
 
@@ -53,6 +68,9 @@ class SteadyContact {
 
   Stability stability_;
   LoopMeasurement measured_;
+  LoopMeasurement settled_by_;  ///< what was measured by then
+  bool settled_ = false;
+  double workspace_scale_ = 1.0;
   PassivityGuard guard_;
   OscillationDetector oscillation_;
   bool about_handle_;  ///< wrenches are about the handle: of others the guard knows nothing

@@ -49,6 +49,13 @@ struct TickRecord {
   std::uint8_t projection_status = 0;  ///< ProjectionStatus; infeasible unless following
   std::uint8_t placing = 0;            ///< Placing
 
+  // What was changed from outside while the loop ran
+  std::uint32_t rendering = 0;      ///< number of the one that all of the above is of; 0: that of the start
+  std::uint32_t changes = 0;        ///< how many so far, of whatever
+  std::uint64_t rendering_sum = 0;  ///< Rendering::sum()
+  double next_share = 0.0;          ///< of F_out that another rendering has, which takes its place
+  double through = 1.0;             ///< share of the contact's wrench that the workspace lets through
+
   // What went out
   std::uint8_t state = 0;          ///< State
   std::uint8_t cause = 0;          ///< Fault that led to it

@@ -97,4 +97,22 @@ TEST_CASE("after whole turns it stands as at the start, and its quaternion never
   }
 }
 
+TEST_CASE("a motion between two poses sets out when it is to, arrives, and stands there", "[motion]") {
+  const Pose X_to = {rotation_from({0.3, -0.2, 1.0}) * kStart.rotation, {1.0, -2.0, 0.5}};
+  const ObstacleMotion motion = ObstacleMotion::between(kStart, X_to, 7.0, 2.5);
+  for (const double t : {-1.0, 0.0, 6.999, 7.0}) CHECK(same_bits(motion.at(kStart, t), kStart));
+  CHECK(apart(motion.at(kStart, 9.5), X_to) < 1e-12);
+  for (const double t : {9.5001, 10.0, 1e9}) CHECK(same_bits(motion.at(kStart, t), motion.at(kStart, 9.5)));
+  const double speed = motion.linear_m_per_s.norm() + motion.angular_rad_per_s.norm();
+  for (double t = 6.9; t < 9.6; t += 0.01)
+    CHECK(apart(motion.at(kStart, t), motion.at(kStart, t + 0.01)) <= 0.01 * speed * (1.0 + 1e-9));
+}
+
+TEST_CASE("to and fro goes by the time since it set out", "[motion]") {
+  ObstacleMotion later = kToAndFro;
+  later.begin_s = 3.0;
+  for (const double t : {3.0, 3.5, 4.25, 6.0, 10.5})
+    CHECK(apart(later.at(kStart, t), kToAndFro.at(kStart, t - 3.0)) < 1e-12);
+}
+
 }  // namespace wrenchd

@@ -183,3 +183,25 @@ TEST_CASE("a replay names the first tick and field that differ", "[replay]") {
   REQUIRE(difference.has_value());
   CHECK(difference->field.rfind("F_T[", 0) == 0);
 }
+
+TEST_CASE("a recording in which something was changed from outside is replayed up to there, and says so",
+          "[replay]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const Plan plan = recording_plan(Method::exact);
+  {
+    VirtualStation s(plan);
+    Recorder recorder(s.station.records(), file, s.station.recording_header());
+    for (int i = 0; i < 3000; ++i) {
+      if (i == 50) s.station.loop().arm();
+      if (i == 2000)
+        s.station.workbench().set_rendering(read_toml_text("[wrench]\nlaw = \"energy\"", "here"), "here");
+      REQUIRE(s.tick() == Fault::none);
+    }
+  }
+  Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 3000);
+  CHECK_THROWS_WITH(replay(recording, plan), Catch::Contains("at tick 2000 the scene"));
+  recording.ticks.resize(2000);
+  CHECK_FALSE(replay(recording, plan).has_value());
+}

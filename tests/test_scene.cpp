@@ -111,5 +111,31 @@ TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodie
   CHECK(by_hand.convex().empty());
 }
 
+TEST_CASE("a scene with its meshes elsewhere shares them, and what moves later moves", "[scene][moving]") {
+  const TemporaryDirectory dir;
+  SceneSettings settings = box_above_floor(dir);
+  MeshObstacleSettings post;
+  post.name = "post";
+  post.mesh = settings.tool.mesh;
+  settings.meshes = {post, post};
+  const Scene first(settings);
+  CHECK_FALSE(first.moves());
+  settings.meshes[0].X_WM.translation_m = {0, 0, 3};
+  settings.meshes[1].later = {
+      5.0, {Quaterniond::Identity(), {1, 0, 0}}, {{0.1, 0, 0}, {0, 0, 0}, 0.0, 5.0, 2.0}};
+  const Scene second(first, settings.meshes);
+  CHECK(second.moves());
+  CHECK(second.meshes()[0].mesh == first.meshes()[0].mesh);
+  CHECK(second.tool_mesh() == first.tool_mesh());
+  CHECK(second.meshes()[0].X_WO_at(1.0).translation_m == Vector3d(0, 0, 3));
+  CHECK((second.meshes()[0].centre_W_m - Vector3d(1, 1, 4)).norm() < 1e-15);
+  const MeshObstacle& moved = second.meshes()[1];
+  CHECK(moved.X_WO_at(4.9).translation_m == Vector3d::Zero());
+  CHECK((moved.X_WO_at(6.0).translation_m - Vector3d(1.1, 0, 0)).norm() < 1e-15);
+  CHECK((moved.X_WO_at(60.0).translation_m - Vector3d(1.2, 0, 0)).norm() < 1e-15);
+  CHECK((second.motion(second.first_mesh() + 1, 5.5, 6.5).translation_m - Vector3d(0.1, 0, 0)).norm() <
+        1e-15);
+}
+
 }  // namespace
 }  // namespace wrenchd

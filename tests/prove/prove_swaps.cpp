@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "config/load_scene.hpp"
+#include "config/load_settings.hpp"
+#include "config/toml_file.hpp"
+#include "daemon/realtime.hpp"
+#include "daemon/station.hpp"
+#include "daemon/wall_clock.hpp"
+#include "devices/loopback_link.hpp"
+#include "devices/simulated_device.hpp"
+#include "tests/support/invariants.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+// Changes of what is rendered, thousands of them and half of them wrong, while the real loop runs in wall
+// time and a simulated hand presses. Every tick is looked at: what it computed from has to be what was handed
+// over, and every wrench within its limits and its slew. Ticks are timed with changes and without, turn and
+// turn about in one run, for what the machine does besides is the same for both.
+
+namespace {
+
+using namespace wrenchd;
+namespace fs = std::filesystem;
+
+struct Times {
+  std::vector<double> tick_us, late_us;
+
+  static double quantile(std::vector<double>& x, double share) {
+    if (x.empty()) return 0.0;
+    std::sort(x.begin(), x.end());
+    return x[std::min(x.size() - 1, static_cast<std::size_t>(share * static_cast<double>(x.size())))];
+  }
+  void print(const char* name) {
+    std::printf(
+        "%s ticks %zu tick_us p50 %.1f p99.9 %.1f max %.1f wake_us p50 %.1f p99.9 %.1f max %.1f late_ticks "
+        "%zu\n",
+        name, tick_us.size(), quantile(tick_us, 0.5), quantile(tick_us, 0.999), quantile(tick_us, 1.0),
+        quantile(late_us, 0.5), quantile(late_us, 0.999), quantile(late_us, 1.0),
+        static_cast<std::size_t>(
+            std::count_if(late_us.begin(), late_us.end(), [](double us) { return us > 1000.0; })));
+  }
+};
+
+Plan plan_of() {
+  Plan plan = read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
+                        SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  plan.settings.servo.realtime = Realtime::best_effort;
+  plan.settings.servo.self_test_s = 0.0;
+  plan.settings.recording.file = "ring";  // the records are taken from the ring by this program
+  plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()},
+                                        {0.4, {0, 0, 0.065}, Vector3d::Zero()},
+                                        {0.8, {0, 0, 0.017}, Vector3d::Zero()},
+                                        {1.5, {0.01, 0.01, 0.015}, {0.1, 0.1, 0.0}},
+                                        {2.0, {0, 0, 0.065}, Vector3d::Zero()}};
+  return plan;
+}
+
+/// Asks for one change after the other.
+class Asker {
+ public:
+  Asker(Workbench& bench, const fs::path& directory, std::uint64_t seed)
+      : bench_(bench), directory_(directory), engine_(seed) {}
+
+  /// True where it was taken.
+  bool ask(bool good) {
+    const std::string gain = good ? to_text(between(200.0, 900.0)) : "-1.0";
+    try {
+      switch (static_cast<int>(between(0.0, 5.0))) {
+        case 0:
+          bench_.load(scene(good));
+          return true;
+        case 1:
+          bench_.set_rendering(
+              toml("[wrench]\nstiffness = { linear_N_per_m = " + gain + ", angular_Nm_per_rad = 1.0 }"),
+              "ask");
+          return true;
+        case 2:
+          bench_.move(good ? "block" : "blok",
+                      {Quaterniond::Identity(), {between(-0.08, 0.08), between(-0.08, 0.08), 0.0}}, 0.5);
+          return true;
+        case 3:
+          bench_.remove(good ? "block" : "blok");
+          return true;
+        default:
+          bench_.reload([&] {
+            Plan plan = plan_of();
+            change_rendering(
+                toml("[wrench]\nstiffness = { linear_N_per_m = " + gain + ", angular_Nm_per_rad = 1.0 }"),
+                "ask", plan.settings);
+            plan.scene = load_scene(scene(good));
+            return plan;
+          });
+          return true;
+      }
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
+
+ private:
+  double between(double low, double high) { return std::uniform_real_distribution(low, high)(engine_); }
+  static TomlNode toml(const std::string& text) { return read_toml_text(text, "ask"); }
+
+  fs::path scene(bool good) {
+    const std::string mesh = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
+    const fs::path file = directory_ / ("scene" + std::to_string(++scenes_ % 4) + ".toml");
+    std::ofstream out(file);
+    out << "[tool]\nmesh = \"" << mesh << "\"\nscale = 0.001\nmass = 0.2\n"
+        << "[[obstacle]]\nname = \"table\"\nhalf_space = { normal = [0, 0, " << (good ? 1 : 0)
+        << "], offset = 0 }\n"
+        << "[[obstacle]]\nname = \"block\"\nmesh = \"" << mesh << "\"\nscale = 0.001\nposition_m = ["
+        << between(-0.08, 0.08) << ", " << between(-0.08, 0.08) << ", -0.02]\n";
+    return file;
+  }
+
+  Workbench& bench_;
+  fs::path directory_;
+  std::mt19937_64 engine_;
+  int scenes_ = 0;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Changes what is rendered, many times and half of them wrong, while the real loop runs.");
+  int changes = 10000;
+  std::uint64_t seed = 1;
+  app.add_option("--changes", changes)->capture_default_str()->check(CLI::Range(10, 10000000));
+  app.add_option("--seed", seed)->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+
+  const test::TemporaryDirectory directory;
+  const Plan plan = plan_of();
+  for (const RealtimeGrant& grant : lock_memory(plan.settings.servo.realtime))
+    std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.what.c_str());
+  WallClock clock;
+  SimulatedDevice simulated(plan.profile, plan.settings.simulation);
+  LoopbackLink link(simulated, clock, plan.settings.simulation);
+  Station station(plan, link, clock);
+  station.open();
+
+  std::map<std::uint32_t, std::uint64_t> sums;  // of what was handed over, by number
+  std::mutex sums_mutex;
+  std::atomic<bool> changing{false}, over{false};
+  Times with, without;
+  test::Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
+                               plan.settings.limits.force_slew_N_per_s,
+                               plan.settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3});
+  std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, pushed = 0, loop_faults = 0;
+  std::vector<TickRecord> waiting;  // for a sum that was not told yet
+  const auto judge = [&](const TickRecord& r) {
+    const std::lock_guard lock(sums_mutex);
+    const auto sum = sums.find(r.rendering);
+    if (sum == sums.end()) return false;
+    torn += sum->second == r.rendering_sum ? 0 : 1;
+    return true;
+  };
+
+  std::atomic<bool> stop{false};
+  std::thread servo([&] {
+    for (const RealtimeGrant& grant : prepare_servo_thread(plan.settings.servo))
+      std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.what.c_str());
+    station.loop().run(clock, stop);
+  });
+  std::thread watcher([&] {
+    bool first = true;
+    TickRecord r;
+    while (!over.load() || station.records().read_available() > 0) {
+      if (!station.records().pop(r)) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        continue;
+      }
+      if (first) {
+        const std::lock_guard lock(sums_mutex);
+        sums[0] = r.rendering_sum;
+        first = false;
+      }
+      if (const auto what = invariants.check(r)) {
+        if (++broken < 5) std::printf("broken %s\n", what->c_str());
+      }
+      double tick_us = 0.0;
+      for (const std::int64_t ns : r.stage_ns) tick_us += 1e-3 * static_cast<double>(ns);
+      Times& times = changing.load() ? with : without;
+      times.tick_us.push_back(tick_us);
+      times.late_us.push_back(1e-3 * static_cast<double>(r.wake_latency_ns));
+      in_contact += r.contacts > 0 ? 1 : 0;
+      pushed += r.F_out[2] > 0.2 ? 1 : 0;
+      loop_faults +=
+          (r.faults & (bit(Fault::tick_late) | bit(Fault::loop_stopped) | bit(Fault::answer_late))) != 0;
+      if (!judge(r)) waiting.push_back(r);
+    }
+  });
+
+  Asker asker(station.workbench(), directory.path(), seed);
+  int applied = 0, refused = 0, done = 0;
+  constexpr int kInARow = 250;
+  while (done < changes) {
+    // As long without as with: turn and turn about.
+    changing.store(true);
+    const TimePoint began = clock.now();
+    for (int i = 0; i < kInARow && done < changes; ++i, ++done) {
+      (asker.ask(done % 2 == 0) ? applied : refused) += 1;
+      const auto [number, sum] = station.workbench().handed_over();
+      {
+        const std::lock_guard lock(sums_mutex);
+        if (number > 0) sums[number] = sum;
+      }
+      if (station.loop().state() == State::disarmed) station.loop().arm();
+      if (is_latched(station.loop().state())) station.loop().acknowledge();
+    }
+    const Duration took = clock.now() - began;
+    while (station.loop().changing()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    changing.store(false);
+    std::this_thread::sleep_for(took);
+  }
+  stop.store(true);
+  servo.join();
+  over.store(true);
+  watcher.join();
+  for (const TickRecord& r : waiting) unknown += judge(r) ? 0 : 1;
+
+  std::printf("changes %d applied %d refused %d renderings %u\n", changes, applied, refused,
+              station.loop().rendering());
+  std::printf(
+      "torn %llu unknown %llu broken %llu in_contact %llu pushed %llu late_or_stopped %llu dropped %llu\n",
+      static_cast<unsigned long long>(torn), static_cast<unsigned long long>(unknown),
+      static_cast<unsigned long long>(broken), static_cast<unsigned long long>(in_contact),
+      static_cast<unsigned long long>(pushed), static_cast<unsigned long long>(loop_faults),
+      static_cast<unsigned long long>(station.loop().dropped_records()));
+  with.print("with");
+  without.print("without");
+  return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && refused > 0 && pushed > 0 ? 0 : 1;
+}
