@@ -440,7 +440,7 @@ TEST_CASE("a configuration with anything wrong in it is refused whole", "[workbe
   s.press();
   const std::uint32_t changes = s.last.changes;
   c.write("[limits]\nmax_force_N = 1.0\n[wrench]\nstiffness = \"soft\"\n");
-  CHECK_THROWS_WITH(s.bench().reload([&c] { return c.read(); }), Catch::Contains("wrenchd.toml:5:"));
+  CHECK_THROWS_WITH(s.bench().reload([&c] { return c.read(); }), Catch::Contains("wrenchd.toml:6:"));
   c.write("[limits]\nmax_force_N = 1.0\n");
   c.write_scene("[[obstacle]]\nmesh = \"nowhere.off\"\n");
   CHECK_THROWS_WITH(s.bench().reload([&c] { return c.read(); }), Catch::Contains("scene.toml:6:"));

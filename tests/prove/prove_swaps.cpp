@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -75,16 +76,14 @@ class Asker {
 
   /// True where it was taken.
   bool ask(bool good) {
-    const std::string gain = good ? to_text(between(200.0, 900.0)) : "-1.0";
+    const std::string gain = good ? to_text(between(1000.0, 4500.0)) : "-1.0";
     try {
       switch (static_cast<int>(between(0.0, 5.0))) {
         case 0:
           bench_.load(scene(good));
           return true;
         case 1:
-          bench_.set_rendering(
-              toml("[wrench]\nstiffness = { linear_N_per_m = " + gain + ", angular_Nm_per_rad = 1.0 }"),
-              "ask");
+          bench_.set_rendering(toml("[wrench]\nenergy_stiffness_per_s2 = " + gain), "ask");
           return true;
         case 2:
           bench_.move(good ? "block" : "blok",
@@ -96,9 +95,7 @@ class Asker {
         default:
           bench_.reload([&] {
             Plan plan = plan_of();
-            change_rendering(
-                toml("[wrench]\nstiffness = { linear_N_per_m = " + gain + ", angular_Nm_per_rad = 1.0 }"),
-                "ask", plan.settings);
+            change_rendering(toml("[wrench]\nenergy_stiffness_per_s2 = " + gain), "ask", plan.settings);
             plan.scene = load_scene(scene(good));
             return plan;
           });
@@ -158,7 +155,9 @@ int main(int argc, char** argv) {
   test::Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
                                plan.settings.limits.force_slew_N_per_s,
                                plan.settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3});
-  std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, pushed = 0, loop_faults = 0;
+  std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, loop_faults = 0;
+  std::atomic<std::uint64_t> pushed{0};
+  std::set<std::uint32_t> felt;     // numbers of the renderings in the records
   std::vector<TickRecord> waiting;  // for a sum that was not told yet
   const auto judge = [&](const TickRecord& r) {
     const std::lock_guard lock(sums_mutex);
@@ -195,6 +194,7 @@ int main(int argc, char** argv) {
       Times& times = changing.load() ? with : without;
       times.tick_us.push_back(tick_us);
       times.late_us.push_back(1e-3 * static_cast<double>(r.wake_latency_ns));
+      felt.insert(r.rendering);
       in_contact += r.contacts > 0 ? 1 : 0;
       pushed += r.F_out[2] > 0.2 ? 1 : 0;
       loop_faults +=
@@ -205,6 +205,11 @@ int main(int argc, char** argv) {
 
   Asker asker(station.workbench(), directory.path(), seed);
   int applied = 0, refused = 0, done = 0;
+  // A hand that presses, before anything is changed.
+  for (const TimePoint end = clock.now() + std::chrono::seconds(20); pushed == 0 && clock.now() < end;) {
+    if (station.loop().state() == State::disarmed) station.loop().arm();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   constexpr int kInARow = 250;
   while (done < changes) {
     // As long without as with: turn and turn about.
@@ -231,13 +236,13 @@ int main(int argc, char** argv) {
   watcher.join();
   for (const TickRecord& r : waiting) unknown += judge(r) ? 0 : 1;
 
-  std::printf("changes %d applied %d refused %d renderings %u\n", changes, applied, refused,
-              station.loop().rendering());
+  std::printf("changes %d applied %d refused %d renderings %u felt %zu\n", changes, applied, refused,
+              station.loop().rendering(), felt.size());
   std::printf(
       "torn %llu unknown %llu broken %llu in_contact %llu pushed %llu late_or_stopped %llu dropped %llu\n",
       static_cast<unsigned long long>(torn), static_cast<unsigned long long>(unknown),
       static_cast<unsigned long long>(broken), static_cast<unsigned long long>(in_contact),
-      static_cast<unsigned long long>(pushed), static_cast<unsigned long long>(loop_faults),
+      static_cast<unsigned long long>(pushed.load()), static_cast<unsigned long long>(loop_faults),
       static_cast<unsigned long long>(station.loop().dropped_records()));
   with.print("with");
   without.print("without");
