@@ -45,8 +45,8 @@ struct Times {
   }
   void print(const char* name) {
     std::printf(
-        "%s ticks %zu tick_us p50 %.1f p99.9 %.1f max %.1f wake_us p50 %.1f p99.9 %.1f max %.1f late_ticks "
-        "%zu\n",
+        "%s ticks %zu tick_p50_us %.1f tick_p999_us %.1f tick_max_us %.1f wake_p50_us %.1f wake_p999_us %.1f "
+        "wake_max_us %.1f late_ticks %zu\n",
         name, tick_us.size(), quantile(tick_us, 0.5), quantile(tick_us, 0.999), quantile(tick_us, 1.0),
         quantile(late_us, 0.5), quantile(late_us, 0.999), quantile(late_us, 1.0),
         static_cast<std::size_t>(
@@ -236,15 +236,15 @@ int main(int argc, char** argv) {
   watcher.join();
   for (const TickRecord& r : waiting) unknown += judge(r) ? 0 : 1;
 
-  std::printf("changes %d applied %d refused %d renderings %u felt %zu\n", changes, applied, refused,
-              station.loop().rendering(), felt.size());
+  const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
   std::printf(
-      "torn %llu unknown %llu broken %llu in_contact %llu pushed %llu late_or_stopped %llu dropped %llu\n",
-      static_cast<unsigned long long>(torn), static_cast<unsigned long long>(unknown),
-      static_cast<unsigned long long>(broken), static_cast<unsigned long long>(in_contact),
-      static_cast<unsigned long long>(pushed.load()), static_cast<unsigned long long>(loop_faults),
-      static_cast<unsigned long long>(station.loop().dropped_records()));
-  with.print("with");
-  without.print("without");
+      "swaps changes %d applied %d refused %d felt %zu torn %llu unknown %llu violations %llu in_contact "
+      "%llu "
+      "pushed %llu late_or_stopped %llu dropped %llu seed %llu\n",
+      changes, applied, refused, felt.size(), number(torn), number(unknown), number(broken + torn + unknown),
+      number(in_contact), number(pushed), number(loop_faults), number(station.loop().dropped_records()),
+      number(seed));
+  with.print("swaps_with");
+  without.print("swaps_without");
   return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && refused > 0 && pushed > 0 ? 0 : 1;
 }
