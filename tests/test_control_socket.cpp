@@ -14,6 +14,13 @@
 namespace wrenchd {
 namespace {
 
+/// A sanitizer keeps memory that was freed, and makes the socket's thread too slow for a heart that beats.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
 using namespace test;
 using namespace std::chrono_literals;
 
@@ -215,7 +222,7 @@ std::vector<Abuse> abuses() {
          int pieces = 0;
          while (pieces < 1600 && client.send(piece)) ++pieces;
          CHECK(pieces < 100);
-         CHECK(resident_MB() - before_MB < 20.0);
+         if (!kSanitized) CHECK(resident_MB() - before_MB < 20.0);
        }},
       {"requests before the line of 100 MB still count for nothing",
        [](ControlRig& rig) {
@@ -455,7 +462,7 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
     std::this_thread::sleep_for(20ms);
   }
   const bool holds = holder.code("beat") == 0;
-  if (longest < 60ms) CHECK(holds);
+  if (!kSanitized && longest < 60ms) CHECK(holds);
   RigClient observer = rig.connect(As::observer);
   const auto asked = std::chrono::steady_clock::now();
   observer.send(request("stop"));
