@@ -279,7 +279,7 @@ std::vector<Abuse> abuses() {
          const double before_MB = resident_MB();
          for (int i = 0; i < 20000; ++i)
            rig.feed().tell("log", EventLevel::info, "noise " + std::string(200, 'n'));
-         CHECK(resident_MB() - before_MB < 20.0);
+         if (!kSanitized) CHECK(resident_MB() - before_MB < 20.0);
        }},
       {"subscribes and does not, again and again",
        [](ControlRig& rig) {
@@ -467,7 +467,7 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
   const auto asked = std::chrono::steady_clock::now();
   observer.send(request("stop"));
   CHECK(rig.comes_to(State::stopped, 2000ms));
-  CHECK(std::chrono::steady_clock::now() - asked < 1s);
+  if (!kSanitized) CHECK(std::chrono::steady_clock::now() - asked < 1s);
   over = true;
   for (std::thread& flood : floods) flood.join();
 }
@@ -661,25 +661,24 @@ TEST_CASE("an idle socket costs no time", "[control_socket]") {
   ControlRig rig;
   RigClient client = rig.connect(As::observer);
   const auto told_before = client.result("status")["sequence"].get<std::uint64_t>();
-  // The thread's own clock, found by its name.
-  const auto control_ticks = [] {
+  // How often the thread, found by its name, went to sleep by itself: a busy machine does not count.
+  const auto sleeps = [] {
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
-      std::string name, line;
-      std::getline(std::ifstream(task.path() / "comm"), name);
-      if (name != "control") continue;
-      std::ifstream schedstat(task.path() / "schedstat");
-      std::uint64_t run_ns = 0, wait_ns = 0, slices = 0;
-      schedstat >> run_ns >> wait_ns >> slices;
-      return slices;
+      std::string line;
+      std::getline(std::ifstream(task.path() / "comm"), line);
+      if (line != "control") continue;
+      const std::string wanted = "voluntary_ctxt_switches:";
+      for (std::ifstream status(task.path() / "status"); std::getline(status, line);)
+        if (line.starts_with(wanted)) return std::stoull(line.substr(wanted.size()));
     }
-    return std::uint64_t{0};
+    return 0ULL;
   };
-  const std::uint64_t before = control_ticks();
+  const auto before = sleeps();
   std::this_thread::sleep_for(300ms);
   REQUIRE(before > 0);
   // Each event of the loop, which may tell of a busy machine, wakes it once.
   const auto told = client.result("status")["sequence"].get<std::uint64_t>() - told_before;
-  CHECK(control_ticks() - before <= 4 + told);
+  CHECK(sleeps() - before <= 4 + told);
 }
 
 }  // namespace
