@@ -258,6 +258,8 @@ class Proof {
   static constexpr auto kLook = 100us;
   static constexpr double kPressing_N = 0.3;
   static constexpr int kAttempts = 10;
+  /// A daemon that does not press by then has found a fault, and waits for somebody to look at it.
+  static constexpr auto kPatience = 6s;
   static constexpr int kExitFault = 3;  ///< of the daemon
   static constexpr int kHold = 0;       ///< no signal: the servo thread alone
 
@@ -289,7 +291,7 @@ class Proof {
   bool press(FarSide& device, Daemon& daemon) {
     const auto pushes = [&] { return daemon.over() || device.push_N() > kPressing_N; };
     for (const TimePoint end = wall_now() + 20s; wall_now() < end && !daemon.over();) {
-      if (!until(device, daemon, 20s, pushes)) return false;
+      if (!until(device, daemon, kPatience, pushes)) return false;
       const TimePoint then = wall_now() + std::chrono::microseconds(random_() % 250'000);
       until(device, daemon, 1s, [&] { return daemon.over() || wall_now() >= then; });
       if (!daemon.over() && pushes()) return true;
