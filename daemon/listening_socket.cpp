@@ -189,9 +189,11 @@ void ListeningSocket::bind_private() {
 
 /// The directory is ours, so that the path is still what was made.
 void ListeningSocket::open_to(const RoleRules& rules) {
-  const auto group = rules.observers   ? rules.observers
-                     : rules.operators ? rules.operators
-                                       : rules.administrators;
+  // Where everybody may connect no group has to own it.
+  const auto group = rules.everybody_observes ? std::nullopt
+                     : rules.observers        ? rules.observers
+                     : rules.operators        ? rules.operators
+                                              : rules.administrators;
   if (group && ::chown(path_.c_str(), static_cast<uid_t>(-1), *group) != 0)
     throw refusal(path_, "cannot be given to group " + std::to_string(*group) + ": " + reason() +
                              "; make the user that wrenchd runs as a member of it");

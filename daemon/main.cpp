@@ -319,6 +319,20 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
   }
 }
 
+/// Reads the configuration again, and tells everybody who wants to know. Throws as Workbench::reload().
+ReloadResult read_again(Station& station, EventFeed& feed, const Options& options) {
+  struct Reloading {
+    Reloading() {
+      if (the_service != nullptr) the_service->reloading();
+    }
+    ~Reloading() {
+      if (the_service != nullptr) the_service->reloaded();
+    }
+  };
+  const Reloading reloading;
+  return reload(station.workbench(), feed, [&options] { return plan_of(options); });
+}
+
 /// The control socket, where one is wanted. The usual place may be another daemon's; one that somebody named
 /// may not.
 std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const Options& options) {
@@ -327,7 +341,8 @@ std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const O
   auto control = std::make_unique<Control>(station, feed);
   try {
     add_state_methods(control->methods(), station);
-    add_scene_methods(control->methods(), station.workbench(), feed, [&options] { return plan_of(options); });
+    add_scene_methods(control->methods(), station.workbench(),
+                      [&] { return read_again(station, feed, options); });
     control->open(place.path);
     spdlog::info("control socket: {}", place.path.string());
     return control;
@@ -344,21 +359,15 @@ class Reloader {
   Reloader(Station& station, EventFeed& feed, const Options& options)
       : thread_([&](const std::stop_token& stop) {
           while (!stop.stop_requested()) {
-            if (reload_requested.exchange(false)) read_again(station, feed, options);
+            try {
+              if (reload_requested.exchange(false)) read_again(station, feed, options);
+            } catch (const std::exception&) {  // that is told by now
+            }
             std::this_thread::sleep_for(kLook);
           }
         }) {}
 
  private:
-  static void read_again(Station& station, EventFeed& feed, const Options& options) {
-    if (the_service != nullptr) the_service->reloading();
-    try {
-      reload(station.workbench(), feed, [&options] { return plan_of(options); });
-    } catch (const std::exception&) {  // that is told by now
-    }
-    if (the_service != nullptr) the_service->reloaded();
-  }
-
   std::jthread thread_;
 };
 

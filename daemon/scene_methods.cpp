@@ -114,9 +114,9 @@ std::string listed(const std::vector<std::string>& what) {
   return text.empty() ? "nothing" : text;
 }
 
-Answer reloaded(Workbench& workbench, EventFeed& feed, const std::function<Plan()>& read) {
+Answer reloaded(const std::function<ReloadResult()>& reload_all) {
   return answered([&] {
-    const ReloadResult result = reload(workbench, feed, read);
+    const ReloadResult result = reload_all();
     return Answer(
         Json{{"applied", result.applied}, {"not_applied", result.not_applied}, {"remarks", result.remarks}});
   });
@@ -166,8 +166,7 @@ ReloadResult reload(Workbench& workbench, EventFeed& feed, const std::function<P
   throw;
 }
 
-void add_scene_methods(MethodTable& table, Workbench& workbench, EventFeed& feed,
-                       std::function<Plan()> read) {
+void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<ReloadResult()> reload_all) {
   Workbench& bench = workbench;
   table.add(MethodRow{"scene.get",
                       Role::observer,
@@ -290,16 +289,14 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, EventFeed& feed
                         return Answer(Json::object());
                       },
                       true});
-  table.add(
-      MethodRow{"reload",
-                Role::administrator,
-                {},
-                "Reads the configuration again, all of it or nothing. Answers what was applied, and what "
-                "was not and why.",
-                [&bench, &feed, read = std::move(read)](const Json&, const Caller&) {
-                  return reloaded(bench, feed, read);
-                },
-                true});
+  table.add(MethodRow{
+      "reload",
+      Role::administrator,
+      {},
+      "Reads the configuration again, all of it or nothing. Answers what was applied, and what "
+      "was not and why.",
+      [reload_all = std::move(reload_all)](const Json&, const Caller&) { return reloaded(reload_all); },
+      true});
 }
 
 }  // namespace wrenchd

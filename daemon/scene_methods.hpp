@@ -10,8 +10,8 @@
 namespace wrenchd {
 
 /// The rows of what is rendered: scene, rendering, workspace, local models, reload. Both must outlive the
-/// table. read: the plan, read again from its files with the command line on top.
-void add_scene_methods(MethodTable& table, Workbench& workbench, EventFeed& feed, std::function<Plan()> read);
+/// table. reload_all: what `reload` does; it throws as Workbench::reload().
+void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<ReloadResult()> reload_all);
 
 /// Reads the configuration again, and tells what became of it. Throws as Workbench::reload(), when that is
 /// told.
