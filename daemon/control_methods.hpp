@@ -36,6 +36,7 @@ struct Subscription {
   bool on = false;
   std::set<std::string> names;  ///< none: all
   std::uint64_t next = 0;       ///< sequence number of the first that it has not got
+  bool behind = false;          ///< there are events already that it has not got
 };
 
 /// Who asks.

@@ -353,6 +353,7 @@ void ControlSocket::tell_events(Client& client) {
                                                   "for the status"},
                                      {"count", batch.lost}}));
   subscription.next = batch.next;
+  subscription.behind = batch.more;
   for (std::string& line : batch.lines) send(client, std::move(line));
 }
 
@@ -390,7 +391,9 @@ void ControlSocket::want(Client& client) {
     if (!client.half_closed) wanted |= EPOLLRDHUP;
     if (!client.line_waits && may_take(client)) wanted |= EPOLLIN;
   }
-  if (!client.out.empty()) wanted |= EPOLLOUT;
+  // No news comes of events that did not fit into this round: the next is asked for.
+  const bool behind = client.subscription.on && client.subscription.behind;
+  if (!client.out.empty() || behind) wanted |= EPOLLOUT;
   if (wanted == client.told_epoll) return;
   epoll_event event{};
   event.events = wanted;

@@ -307,10 +307,11 @@ EventFeed::Batch EventFeed::since(std::uint64_t next, const std::set<std::string
   for (std::size_t bytes = 0; batch.next <= now_.sequence; ++batch.next) {
     const Kept& event = kept_[batch.next - first];
     if (!names.empty() && !names.contains(event.name)) continue;
-    if (bytes + event.line.size() > max_bytes) break;
+    if (bytes > 0 && bytes + event.line.size() > max_bytes) break;
     bytes += event.line.size();
     batch.lines.push_back(event.line);
   }
+  batch.more = batch.next <= now_.sequence;
   return batch;
 }
 

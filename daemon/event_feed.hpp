@@ -66,6 +66,7 @@ class EventFeed {
     std::vector<std::string> lines;  ///< notifications, each with its '\n'
     std::uint64_t next = 0;          ///< what to ask for next time
     std::uint64_t lost = 0;          ///< events that are kept no longer, of any name
+    bool more = false;               ///< there was no room for all
   };
   /// Events from that sequence number on, of these names (none given: all), until they are max_bytes long.
   Batch since(std::uint64_t next, const std::set<std::string>& names, std::size_t max_bytes) const;

@@ -266,7 +266,7 @@ class Unhappy(unittest.TestCase):
                 client.status()
                 with client.open_state() as state:
                     state.next()
-        self.assertEqual(count(), before)
+        self.assertLessEqual(count(), before)  # those of the test before may close only now
 
 
 if __name__ == "__main__":
