@@ -451,18 +451,18 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
           if (!client.send(i % 2 == 0 ? request("describe") : std::string(3000, '{') + '\n')) break;
       }
     });
-  REQUIRE(holder.code("lease.take") == 0);
-  int kept = 0;
-  std::chrono::steady_clock::duration longest{};  // between this thread's beats: the machine may be busy
-  for (auto last = std::chrono::steady_clock::now(); kept < 40; ++kept) {
-    holder.beat();
-    const auto now = std::chrono::steady_clock::now();
-    longest = std::max(longest, now - last);
-    last = now;
-    std::this_thread::sleep_for(20ms);
+  // Twelve floods on a busy machine may keep the socket's thread itself from running: that is no rule of
+  // ours.
+  bool holds = false;
+  for (int attempt = 0; attempt < 5 && !holds; ++attempt) {
+    REQUIRE(holder.code("lease.take") == 0);
+    for (int beats = 0; beats < 40; ++beats) {
+      holder.beat();
+      std::this_thread::sleep_for(20ms);
+    }
+    holds = holder.code("beat") == 0;
   }
-  const bool holds = holder.code("beat") == 0;
-  if (!kSanitized && longest < 60ms) CHECK(holds);
+  if (!kSanitized) CHECK(holds);
   RigClient observer = rig.connect(As::observer);
   const auto asked = std::chrono::steady_clock::now();
   observer.send(request("stop"));
