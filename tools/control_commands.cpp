@@ -2,13 +2,17 @@
 #include "tools/control_commands.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <optional>
+#include <string>
 #include <thread>
 
 #include <spdlog/fmt/fmt.h>
+#include <wrenchd/client.hpp>
 
-#include "tools/control_client.hpp"
+#include "daemon/json_rpc.hpp"
 
 namespace wrenchd {
 namespace {
@@ -18,6 +22,8 @@ using namespace std::chrono_literals;
 /// A third of what the lease allows, so that two may be late.
 constexpr auto kBeatEvery = 30ms;
 constexpr auto kFadesWithin = 2s;
+/// What takes longest, a mesh of a million triangles, takes less.
+constexpr auto kAnswerWithin = 60s;
 
 std::atomic<bool> interrupted{false};
 
@@ -54,12 +60,23 @@ bool is_armed(const std::string& state) {
   return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
 }
 
+Json call(Client& client, const std::string& method, const Json& params = Json::object()) {
+  return Json::parse(client.call(method, params.dump()));
+}
+
+/// The next event; nothing: none came so soon.
+std::optional<Json> next_event(Client& client, std::chrono::milliseconds limit) {
+  ClientEvent event;
+  if (!client.poll_event(event, limit)) return {};
+  return Json::parse(event.json);
+}
+
 /// Until the hand is free: the daemon tells. The connection may end before.
-void see_it_fade(ControlClient& client, const ControlOptions& options, std::string state) {
+void see_it_fade(Client& client, const ControlOptions& options, std::string state) {
   const auto end = std::chrono::steady_clock::now() + kFadesWithin;
   while ((is_armed(state) || state == "releasing") && std::chrono::steady_clock::now() < end) {
-    const auto event = client.event(kBeatEvery);
-    client.say("beat");
+    const auto event = next_event(client, kBeatEvery);
+    client.beat();
     if (!event) continue;
     show(*event, options);
     if ((*event)["name"] == "state") state = (*event)["state"];
@@ -100,34 +117,34 @@ std::string event_text(const Json& event) {
 }
 
 void run_status(const ControlOptions& options) {
-  ControlClient client(options.socket);
-  const Json status = client.call("status");
+  Client client(options.socket, kAnswerWithin);
+  const Json status = call(client, "status");
   print(options.json ? pretty(status)
                      : status_text(status) + "wrenchd    " + status["version"].get<std::string>() + " at " +
-                           client.path() + "\n");
+                           client.socket() + "\n");
 }
 
 void run_watch(const ControlOptions& options) {
   catch_signals();
-  ControlClient client(options.socket);
+  Client client(options.socket, kAnswerWithin);
   const Json params = options.events.empty() ? Json::object() : Json{{"events", options.events}};
-  const Json status = client.call("subscribe", params);
+  const Json status = call(client, "subscribe", params);
   print(options.json ? status.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n'
                      : status_text(status));
   while (!interrupted)
-    if (const auto event = client.event(200ms)) show(*event, options);
+    if (const auto event = next_event(client, 200ms)) show(*event, options);
 }
 
 int run_arm(const ControlOptions& options) {
   catch_signals();
-  ControlClient client(options.socket);
-  client.call("subscribe", {{"events", {"state", "fault", "refused", "lease", "lost"}}});
-  client.call("lease.take", options.from_other ? Json{{"from_other", true}} : Json::object());
-  client.call("arm");
+  Client client(options.socket, kAnswerWithin);
+  call(client, "subscribe", {{"events", {"state", "fault", "refused", "lease", "lost"}}});
+  call(client, "lease.take", options.from_other ? Json{{"from_other", true}} : Json::object());
+  call(client, "arm");
   std::string state = "waiting";
   while (!interrupted) {
-    client.say("beat");
-    const auto event = client.event(kBeatEvery);
+    client.beat();
+    const auto event = next_event(client, kBeatEvery);
     if (!event) continue;
     show(*event, options);
     const auto name = (*event)["name"].get<std::string>();
@@ -138,24 +155,24 @@ int run_arm(const ControlOptions& options) {
       return 1;
     }
   }
-  client.call("disarm");
+  call(client, "disarm");
   see_it_fade(client, options, state);
-  client.call("lease.give");
+  call(client, "lease.give");
   return 0;
 }
 
 void run_request(const std::string& method, const ControlOptions& options) {
-  ControlClient client(options.socket);
-  const Json result = client.call(method);
+  Client client(options.socket, kAnswerWithin);
+  const Json result = call(client, method);
   if (options.json) return print(pretty(result));
   if (!result.contains("asked")) return print(result.empty() ? "done\n" : pretty(result));
   std::this_thread::sleep_for(150ms);  // a fade, and a little for the event
-  print(fmt::format("asked: {}; state {}\n", method, client.call("status")["state"].get<std::string>()));
+  print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
 }
 
 void run_describe(const ControlOptions& options) {
-  ControlClient client(options.socket);
-  const Json all = client.call("describe");
+  Client client(options.socket, kAnswerWithin);
+  const Json all = call(client, "describe");
   if (options.json) return print(pretty(all));
   bool found = false;
   for (const Json& method : all["methods"]) {

@@ -24,11 +24,12 @@
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <wrenchd/client.hpp>
 
 #include "daemon/json_rpc.hpp"
+#include "daemon/listening_socket.hpp"
 #include "daemon/recording_file.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/control_client.hpp"
 
 // What abuse of the control socket costs the servo loop. The real daemon runs, armed by a client that keeps
 // its lease, and records every tick. Slices of a second in which other processes abuse its socket by all
@@ -251,11 +252,11 @@ class Holder {
   bool does(const char* method) try {
     client_.call(method);
     return true;
-  } catch (const RpcError&) {
+  } catch (const ClientError&) {
     return false;
   }
 
-  ControlClient client_;
+  Client client_;
   std::chrono::nanoseconds longest_{0};  ///< since it took the lease
   std::chrono::nanoseconds worst_{0};
   long lost_ = 0, wronged_ = 0;
@@ -314,9 +315,8 @@ int main(int argc, char** argv) {
         {"--realtime", "best_effort", "--config", config, "--control", socket, "--record", recording},
         files.path() / "log");
     for (int i = 0; i < 500 && !connected(socket); ++i) std::this_thread::sleep_for(10ms);
-    ControlClient watcher(socket);
-    for (int i = 0; i < 500 && watcher.call("status")["state"] != "disarmed"; ++i)
-      std::this_thread::sleep_for(10ms);
+    Client watcher(socket);
+    for (int i = 0; i < 500 && watcher.state() != "disarmed"; ++i) std::this_thread::sleep_for(10ms);
     constexpr uid_t kNobody = 65534;
     Abusers abusers(socket, threads, kNobody);
     Holder holder(socket);
@@ -338,7 +338,7 @@ int main(int argc, char** argv) {
         while (std::chrono::steady_clock::now() < until) {
           std::this_thread::sleep_for(20ms);
           const auto asked = std::chrono::steady_clock::now();
-          const Json status = watcher.call("status");
+          const Json status = Json::parse(watcher.status());
           if (abused)
             slowest_answer_ms = std::max(
                 slowest_answer_ms,
@@ -361,7 +361,7 @@ int main(int argc, char** argv) {
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_asked).count();
     abusers.end();
     std::this_thread::sleep_for(100ms);
-    if (watcher.call("status")["state"] != "stopped") violation("stop did not stop it");
+    if (watcher.state() != "stopped") violation("stop did not stop it");
     if (holder.wronged() > 0) violation("a holder that beat in time lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
 

@@ -48,6 +48,10 @@ Client::~Client() = default;
 Client::Client(Client&& other) noexcept = default;
 Client& Client::operator=(Client&& other) noexcept = default;
 
+const std::string& Client::socket() const noexcept {
+  return connection_->place();
+}
+
 std::string Client::call(const std::string& method, const std::string& params) {
   const json parsed = json::parse(params, nullptr, false);
   if (!parsed.is_object())

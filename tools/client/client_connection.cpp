@@ -8,8 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include <grp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 #include <wrenchd/client_error.hpp>
@@ -46,16 +48,32 @@ int try_to_connect(int descriptor, const std::string& place) {
   return connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 ? 0 : errno;
 }
 
-int connected(const std::string& named) {
+/// Who may connect there, from the file.
+std::string who_may(const std::string& place) {
+  struct stat status {};
+  if (stat(place.c_str(), &status) != 0 || (status.st_mode & 0060U) == 0)
+    return "only the user that wrenchd runs as, and root, may; set 'observers' under [control] in "
+           "wrenchd.toml to a group of yours";
+  const struct group* group = getgrgid(status.st_gid);
+  const std::string name = group != nullptr ? group->gr_name : std::to_string(status.st_gid);
+  return "group '" + name + "' may; add yourself to it with: sudo usermod -aG " + name +
+         " $USER, and log in anew";
+}
+
+/// found: where the daemon is.
+int connected(const std::string& named, std::string& found) {
   const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0)
     throw ClientError(ClientError::kNoDaemon, std::string("socket: ") + std::strerror(errno));
   std::string tried;
   for (const std::string& place : places(named)) {
     const int error = try_to_connect(descriptor, place);
-    if (error == 0) return descriptor;
+    if (error == 0) {
+      found = place;
+      return descriptor;
+    }
     tried += (tried.empty() ? "" : "; ") + place + ": " + std::strerror(error);
-    if (error == EACCES) tried += " (are you in the group that may connect?)";
+    if (error == EACCES) tried += " (" + who_may(place) + ")";
   }
   close(descriptor);
   throw ClientError(ClientError::kNoDaemon,
@@ -65,7 +83,7 @@ int connected(const std::string& named) {
 }  // namespace
 
 ClientConnection::ClientConnection(const std::string& socket, std::chrono::milliseconds answer_within)
-    : socket_(connected(socket)), answer_within_(answer_within) {}
+    : socket_(connected(socket, place_)), answer_within_(answer_within) {}
 
 ClientConnection::~ClientConnection() {
   drop_descriptor();

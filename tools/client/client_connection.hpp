@@ -29,6 +29,7 @@ class ClientConnection {
   void notify(const std::string& method);
   bool poll_event(nlohmann::json& out, std::chrono::milliseconds timeout);
   bool is_there() const noexcept;
+  const std::string& place() const noexcept { return place_; }
 
  private:
   bool read_line(std::string& line, Clock::time_point end);
@@ -38,6 +39,7 @@ class ClientConnection {
   void drop_descriptor() noexcept;
   void keep_event(nlohmann::json message);
 
+  std::string place_;  ///< path of the socket; before socket_, which finds it
   int socket_;
   std::chrono::milliseconds answer_within_;
   std::mutex reading_;

@@ -35,6 +35,9 @@ class Client {
   Client(Client&& other) noexcept;
   Client& operator=(Client&& other) noexcept;
 
+  /// Path of the socket at which the daemon was found.
+  const std::string& socket() const noexcept;
+
   /// Any method that describe() lists. params and the result are JSON objects.
   std::string call(const std::string& method, const std::string& params = "{}");
 
