@@ -64,6 +64,13 @@ class PassivityGuard {
   /// that rises around a hand which is in it.
   void lend(double energy_J) noexcept { net_J_ -= energy_J > 0.0 ? energy_J : 0.0; }
 
+  /// The same by obstacles that move against the hand; and what those that move away take out of the spring
+  /// (below 0) the hand has no right to any more. Taking makes no debt: it was not the loop that gave.
+  void push(double energy_J) noexcept {
+    if (energy_J > 0.0) return lend(energy_J);
+    if (net_J_ < 0.0) net_J_ = net_J_ - energy_J < 0.0 ? net_J_ - energy_J : 0.0;
+  }
+
   /// What really went out this tick, after the limits. Without it the guard takes what it gave for sent.
   void told(const Wrench& sent_B) noexcept;
 

@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "collision/obstacle_work.hpp"
 #include "core/energy_law.hpp"
 
 namespace wrenchd {
@@ -87,9 +88,13 @@ bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) no
     place(now, scene_time_s);
     return true;
   }
+  const double since_s = placing_ == Placing::following ? scene_time_s_ : scene_time_s;
+  pushed_T_ = 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
   depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s);
   if (scene_->moves() && depth_.projection.status == ProjectionStatus::infeasible) return false;
   X_WQ_ = depth_.projection.X_WQ;
+  pushed_T_ += 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
+  scene_time_s_ = scene_time_s;
   placing_ = Placing::following;
   return true;
 }
@@ -156,6 +161,12 @@ Touches Rendering::touches() const noexcept {
 double Rendering::wound_up_J() const noexcept {
   if (!in_contact()) return 0.0;
   return 0.5 * (F_T_.force_N.dot(depth_.drive.head<3>()) + F_T_.torque_Nm.dot(depth_.drive.tail<3>()));
+}
+
+/// Half of force times way is wound_up_J() where T is what it is: the spring is that many J for a kg m^2.
+double Rendering::pushed_J() const noexcept {
+  const double T = depth_.projection.energy;
+  return placing_ == Placing::following && T > 0.0 ? wound_up_J() / T * pushed_T_ : 0.0;
 }
 
 std::uint64_t Rendering::sum() const noexcept {

@@ -60,6 +60,8 @@ class Rendering {
   const Wrench& F_T() const noexcept { return F_T_; }  ///< body frame
   /// What the spring holds now: half of force times way, and of torque times turn [J].
   double wound_up_J() const noexcept;
+  /// What obstacles that move put into it in this tick, and not the hand; below 0 where they took it [J].
+  double pushed_J() const noexcept;
 
   std::uint32_t number() const noexcept { return number_; }
   const Scene& scene() const noexcept { return *scene_; }
@@ -93,6 +95,8 @@ class Rendering {
   Pose X_WP_;
   Penetration depth_;
   Wrench F_T_;
+  double scene_time_s_ = 0.0;  ///< of depth_
+  double pushed_T_ = 0.0;      ///< of what obstacles moved since the tick before [kg m^2]
   bool seeks_near_ = false;
   Pose X_near_;
   bool begins_ = false;         ///< pressed, and not at its first touch: what it comes with is no speed

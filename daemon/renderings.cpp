@@ -63,6 +63,11 @@ double Renderings::wound_up_J() const noexcept {
   return (1.0 - share_) * felt_->wound_up_J() + share_ * next_->wound_up_J();
 }
 
+double Renderings::pushed_J() const noexcept {
+  if (!next_ || share_ == 0.0) return felt_->pushed_J();
+  return (1.0 - share_) * felt_->pushed_J() + share_ * next_->pushed_J();
+}
+
 bool Renderings::in_contact() const noexcept {
   return felt_->in_contact() || (share_ > 0.0 && next_->in_contact());
 }

@@ -59,6 +59,8 @@ class Renderings {
   /// alone.
   double wound_up_J() const noexcept;
   double given_J() const noexcept { return given_J_; }
+  /// What obstacles that move put into them in this tick, or took [J].
+  double pushed_J() const noexcept;
   bool in_contact() const noexcept;
 
   /// No time has passed for the laws since nobody knows when.

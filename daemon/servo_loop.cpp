@@ -335,6 +335,7 @@ void ServoLoop::let_through() noexcept {
   if (shut_) through_ = std::max(through_ - dt_s_ / kShutOver_s, 0.0);
   if (!shut_) through_ = std::min(through_ + dt_s_ / kOpenOver_s, 1.0);
   steady_.lend((through_ - last) * renderings_.wound_up_J() + last * renderings_.given_J());
+  steady_.push(last * renderings_.pushed_J());
   if (!recentres_ || through_ > 0.0) return;
   recentres_ = false;
   shut_ = workspace_.clutched();

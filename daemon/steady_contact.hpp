@@ -50,6 +50,10 @@ class SteadyContact {
   void lend(double energy_J) noexcept {
     if (guarding_) guard_.lend(energy_J);
   }
+  /// Obstacles that move wound it up by so much in this tick, or took so much out of it (below 0).
+  void push(double energy_J) noexcept {
+    if (guarding_) guard_.push(calming_ * energy_J);
+  }
   /// What went out of it, after the limits.
   void told(const Wrench& sent) noexcept { guard_.told(sent); }
 

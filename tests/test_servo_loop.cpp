@@ -535,6 +535,28 @@ TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the 
   CHECK(most_tilt > 0.02);
 }
 
+// The guard knows the hand's work alone: to it this would be energy from nowhere.
+TEST_CASE("a plunger that presses against a hand at rest pushes with all its force", "[servo][moving]") {
+  Plan plan = shipped_plan();
+  plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
+  plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, {}}};
+  plan.settings.simulation.hand_repeats = false;
+  VirtualStation s(plan);
+  s.station.loop().arm();
+  double least_share = 1.0, most_N = 0.0, worst_J = 0.0, gave_J = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    least_share = std::min(least_share, s.last.guard_share);
+    most_N = std::max(most_N, s.force_N());
+    worst_J = std::max(worst_J, s.last.injected_J);
+    gave_J = s.last.energy_out_J;
+  }
+  CHECK(most_N > 1.0);
+  CHECK(gave_J > 1e-3);
+  CHECK(least_share == 1.0);
+  CHECK(worst_J < 1e-5);
+}
+
 TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
   VirtualStation a;
   VirtualStation b;
