@@ -18,6 +18,7 @@
 #include <CLI/CLI.hpp>
 #include <fcntl.h>
 #include <grp.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -33,8 +34,10 @@
 
 // What abuse of the control socket costs the servo loop. The real daemon runs, armed by a client that keeps
 // its lease, and records every tick. Slices of a second in which other processes abuse its socket by all
-// means take turns with slices in which nobody does, in one run: what else the machine does falls on both
-// alike. The times that ticks took, and by how much they came late, are taken from the recording.
+// means take turns with slices in which nobody does, and with some in which they do the same to a socket of
+// somebody else: that costs the machine as much, and what is left is the daemon's. All in one run, so that
+// what else the machine does falls on all alike. The times that ticks took, and by how much they came late,
+// are taken from the recording.
 
 namespace {
 
@@ -174,6 +177,50 @@ class Abusers {
   pid_t pid_ = -1;
 };
 
+/// Somebody else's socket: takes every connection, and reads whatever comes, in a process of its own.
+class Decoy {
+ public:
+  explicit Decoy(const fs::path& path) : listens_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.native().copy(address.sun_path, sizeof address.sun_path - 1);
+    if (::bind(listens_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        ::listen(listens_.get(), 64) != 0)
+      throw std::system_error(errno, std::generic_category(), path.string());
+    fs::permissions(path, fs::perms::all);
+    pid_ = ::fork();
+    if (pid_ == 0) live();
+  }
+  ~Decoy() {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Decoy(const Decoy&) = delete;
+  Decoy& operator=(const Decoy&) = delete;
+
+ private:
+  [[noreturn]] void live() const {
+    std::vector<pollfd> peers = {{listens_.get(), POLLIN, 0}};
+    std::array<char, 65536> bytes;
+    while (::poll(peers.data(), peers.size(), -1) > 0 || errno == EINTR) {
+      for (std::size_t i = peers.size() - 1; i > 0; --i) {
+        if (peers[i].revents == 0) continue;
+        const ssize_t got = ::recv(peers[i].fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
+        if (got > 0 || (got < 0 && errno == EAGAIN)) continue;
+        ::close(peers[i].fd);
+        peers.erase(peers.begin() + static_cast<std::ptrdiff_t>(i));
+      }
+      if (peers[0].revents == 0) continue;
+      const int peer = ::accept4(listens_.get(), nullptr, nullptr, SOCK_CLOEXEC);
+      if (peer >= 0) peers.push_back({peer, POLLIN, 0});
+    }
+    ::_exit(1);
+  }
+
+  OwnedFd listens_;
+  pid_t pid_ = -1;
+};
+
 class Daemon {
  public:
   Daemon(const std::string& program, std::vector<std::string> words, const fs::path& log) {
@@ -263,9 +310,12 @@ class Holder {
   std::jthread thread_;
 };
 
+/// What happens in a slice.
+enum Kind : std::size_t { kQuiet, kBusy, kAbused, kKinds };
+
 struct Slice {
   std::int64_t begin_ns, end_ns;
-  bool abused;
+  Kind kind;
 };
 
 struct Times {
@@ -292,7 +342,7 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   int threads = 12;
   std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "wrenchd").string();
-  app.add_option("--slices", slices, "pairs of a quiet and an abused slice")
+  app.add_option("--slices", slices, "rounds of a quiet, a busy and an abused slice")
       ->check(CLI::Range(1L, 1000000L))
       ->capture_default_str();
   app.add_option("--slice-s", slice_s, "how long each is")
@@ -301,7 +351,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "that abuse at the same time")
       ->check(CLI::Range(1, 200))
       ->capture_default_str();
-  app.add_option("--seed", seed, "of which slice of a pair comes first")->capture_default_str();
+  app.add_option("--seed", seed, "of the order in a round")->capture_default_str();
   app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
@@ -318,6 +368,8 @@ int main(int argc, char** argv) {
     Client watcher(socket);
     for (int i = 0; i < 500 && watcher.state() != "disarmed"; ++i) std::this_thread::sleep_for(10ms);
     constexpr uid_t kNobody = 65534;
+    const Decoy decoy(files.path() / "decoy.sock");
+    Abusers busy(files.path() / "decoy.sock", threads, kNobody);
     Abusers abusers(socket, threads, kNobody);
     Holder holder(socket);
     long violations = 0;
@@ -328,24 +380,27 @@ int main(int argc, char** argv) {
     std::mt19937_64 random(seed);
     std::vector<Slice> done;
     double slowest_answer_ms = 0.0;
-    for (long pair = 0; pair < slices; ++pair) {
-      const bool abused_first = random() % 2 == 0;
-      for (const bool abused : {abused_first, !abused_first}) {
-        if (abused) abusers.begin();
+    std::array<Kind, kKinds> round = {kQuiet, kBusy, kAbused};
+    for (long i = 0; i < slices; ++i) {
+      std::shuffle(round.begin(), round.end(), random);
+      for (const Kind kind : round) {
+        if (kind == kBusy) busy.begin();
+        if (kind == kAbused) abusers.begin();
         std::this_thread::sleep_for(100ms);  // until they are all at it, or all done
-        Slice slice{now_ns(), 0, abused};
+        Slice slice{now_ns(), 0, kind};
         const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(slice_s);
         while (std::chrono::steady_clock::now() < until) {
           std::this_thread::sleep_for(20ms);
           const auto asked = std::chrono::steady_clock::now();
           const Json status = Json::parse(watcher.status());
-          if (abused)
+          if (kind == kAbused)
             slowest_answer_ms = std::max(
                 slowest_answer_ms,
                 std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - asked).count());
           if (status["state"] == "stopped") violation("somebody stopped it who did not ask for it");
         }
         slice.end_ns = now_ns();
+        busy.end();
         abusers.end();
         done.push_back(slice);
         if (!daemon.lives()) throw std::runtime_error("the daemon has ended");
@@ -365,29 +420,28 @@ int main(int argc, char** argv) {
     if (holder.wronged() > 0) violation("a holder that beat in time lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
 
-    std::array<Times, 2> times;
+    std::array<Times, kKinds> times;
     for (const TickRecord& record : read_recording(recording).ticks)
       for (const Slice& slice : done)
         if (record.now_ns >= slice.begin_ns && record.now_ns < slice.end_ns) {
           std::int64_t took_ns = 0;
           for (const std::int64_t stage : record.stage_ns) took_ns += stage;
-          times[slice.abused ? 1 : 0].tick_us.push_back(1e-3 * static_cast<double>(took_ns));
-          times[slice.abused ? 1 : 0].late_us.push_back(1e-3 * static_cast<double>(record.wake_latency_ns));
+          times[slice.kind].tick_us.push_back(1e-3 * static_cast<double>(took_ns));
+          times[slice.kind].late_us.push_back(1e-3 * static_cast<double>(record.wake_latency_ns));
         }
-    const auto p = [&](int abused, auto member, double share) {
-      return Times::quantile(times[static_cast<std::size_t>(abused)].*member, share);
-    };
-    const double quiet_us = p(0, &Times::tick_us, 0.999), abused_us = p(1, &Times::tick_us, 0.999);
-    const double quiet_late_us = p(0, &Times::late_us, 0.999), abused_late_us = p(1, &Times::late_us, 0.999);
+    constexpr std::array<const char*, kKinds> kNames = {"quiet", "busy", "abused"};
+    std::printf("abuse");
+    for (std::size_t kind = 0; kind < kKinds; ++kind) {
+      auto& [tick_us, late_us] = times[kind];
+      std::printf(" %s_ticks %zu %s_tick_p50_us %.1f %s_tick_p99_9_us %.1f %s_late_p99_9_us %.1f",
+                  kNames[kind], tick_us.size(), kNames[kind], Times::quantile(tick_us, 0.5), kNames[kind],
+                  Times::quantile(tick_us, 0.999), kNames[kind], Times::quantile(late_us, 0.999));
+    }
     std::printf(
-        "abuse ticks %zu abused_ticks %zu tick_p50_us %.1f abused_tick_p50_us %.1f tick_p99_9_us %.1f "
-        "abused_tick_p99_9_us %.1f tick_difference_us %.1f late_p99_9_us %.1f abused_late_p99_9_us %.1f "
-        "late_difference_us %.1f slowest_answer_ms %.1f stop_ms %.1f longest_beat_ms %.1f lost_leases %ld "
-        "violations %ld seed %llu\n",
-        times[0].tick_us.size(), times[1].tick_us.size(), p(0, &Times::tick_us, 0.5),
-        p(1, &Times::tick_us, 0.5), quiet_us, abused_us, abused_us - quiet_us, quiet_late_us, abused_late_us,
-        abused_late_us - quiet_late_us, slowest_answer_ms, stop_ms, holder.worst_ms(), holder.lost(),
-        violations, static_cast<unsigned long long>(seed));
+        " slowest_answer_ms %.1f stop_ms %.1f longest_beat_ms %.1f lost_leases %ld violations %ld seed "
+        "%llu\n",
+        slowest_answer_ms, stop_ms, holder.worst_ms(), holder.lost(), violations,
+        static_cast<unsigned long long>(seed));
     return violations == 0 ? 0 : 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "prove_abuse: %s\n", error.what());
