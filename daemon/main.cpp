@@ -21,6 +21,7 @@
 #include "daemon/live_line.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/realtime.hpp"
+#include "daemon/realtime_watch.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/scene_methods.hpp"
 #include "daemon/service_notify.hpp"
@@ -227,6 +228,14 @@ Fault fault_of(const ServoLoop& loop, Fault ended) {
   return ended == Fault::none && is_latched(loop.state()) ? loop.cause() : ended;
 }
 
+/// Where real time is required a hand shall not feel a loop that has lost it.
+void tell_realtime(const RealtimeWatch::News& news, Station& station) {
+  const bool disarms = news.lost && station.plan().settings.servo.realtime == Realtime::required;
+  if (disarms) station.loop().disarm();
+  spdlog::log(news.lost ? spdlog::level::err : spdlog::level::info, "{}{}", news.text,
+              disarms ? "; disarmed, as realtime = \"required\"" : "");
+}
+
 /// Wall time: the servo thread ticks, this one looks on.
 Fault run_in_wall_time(Station& station, const std::string& device, TimePoint end, WallClock& clock,
                        LiveView& view, Wishes wishes) {
@@ -235,9 +244,11 @@ Fault run_in_wall_time(Station& station, const std::string& device, TimePoint en
   auto grants = prepared.get_future();
   std::atomic<bool> stop_loop{false};
   std::atomic<bool> over{false};
+  std::atomic<pid_t> servo_number{0};
   Fault fault = Fault::none, latched = Fault::none;
   std::thread servo_thread([&] {
     try {
+      servo_number.store(gettid());
       prepared.set_value(prepare_servo_thread(servo));
       fault = station.loop().run(clock, stop_loop);
     } catch (...) {  // only prepare_servo_thread() throws: the loop has not run yet
@@ -257,10 +268,12 @@ Fault run_in_wall_time(Station& station, const std::string& device, TimePoint en
           return LoopView{loop.state(), loop.cause(), loop.timing().tick.count()};
         },
         device);
+    RealtimeWatch realtime(servo_number.load());
     while (!stop_requested.load() && !over.load() && clock.now() < end) {
       std::this_thread::sleep_until(wishes.next(clock.now() + kLook));
       wishes.pass_on(station.loop(), clock.now());
       view.look_at(station.loop());
+      if (const auto news = realtime.look()) tell_realtime(*news, station);
     }
     latched = fault_of(station.loop(), Fault::none);
     if (!over.load()) the_service->stopping("stopping");
