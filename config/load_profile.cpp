@@ -150,13 +150,34 @@ void read_button(const TomlValue& value, int& button, const DeviceProfile& p) {
 
 /// What buttons mean. The reports must have been read before.
 void read_buttons(TomlTable& table, DeviceProfile& p) {
-  const TomlValue deadman = table.optional("deadman");
-  const TomlValue stop = table.optional("stop");
-  read_button(deadman, p.deadman_button, p);
-  read_button(stop, p.stop_button, p);
-  if (p.stop_button >= 0 && p.stop_button == p.deadman_button)
-    stop.refuse(
-        "is the deadman button as well; a button cannot be held and be let go at a time, so name another");
+  struct Meaning {
+    const char* name;
+    int* button;
+    TomlValue value;
+    bool ends_force;
+  };
+  const std::array<Meaning, 4> meanings = {
+      {{"deadman", &p.deadman_button, table.optional("deadman"), true},
+       {"stop", &p.stop_button, table.optional("stop"), true},
+       {"recentre", &p.recentre_button, table.optional("recentre"), false},
+       {"slow", &p.slow_button, table.optional("slow"), false}}};
+  for (std::size_t i = 0; i < meanings.size(); ++i) {
+    const auto& [name, button, value, ends_force] = meanings[i];
+    if (is_stated(value) && ends_force && !p.has_output) {
+      value.refuse("the device has no motors, and no force to end: there is no wrench_report; leave it out");
+      continue;
+    }
+    if (is_stated(value) && button == &p.slow_button &&
+        !(p.deflection && p.deflection->mode == Deflection::Mode::rate)) {
+      value.refuse("only what is steered can go slower: [deflection] with mode \"rate\"; leave it out");
+      continue;
+    }
+    read_button(value, *button, p);
+    for (std::size_t k = 0; k < i; ++k)
+      if (*button >= 0 && *button == *meanings[k].button)
+        value.refuse(std::string("is the ") + meanings[k].name +
+                     " button as well; a button means one thing, so name another");
+  }
 }
 
 // ----------------------------------------------------------------------------------------------------------
@@ -282,13 +303,60 @@ void read_frames(TomlTable& table, DeviceProfile& p) {
 
 // --- the rest ---------------------------------------------------------------------------------------------
 
+/// Where a steered pose stays. The box stands instead of the reach, unless both are stated.
+void read_reach(TomlTable& table, Deflection& d) {
+  const TomlValue reach = table.optional("reach_m");
+  const TomlValue least = table.optional("box_min_m"), most = table.optional("box_max_m");
+  if (is_stated(reach)) reach.number(d.reach_m, {1e-3, 10});
+  if (is_stated(least) != is_stated(most))
+    (is_stated(least) ? least : most)
+        .refuse("is one of two corners: state box_min_m and box_max_m, or neither");
+  if (!is_stated(least) || !is_stated(most)) return;
+  if (!is_stated(reach)) d.reach_m = Deflection::kEndless;
+  if (!least.vector(d.box_min_m, {-10, 10}) || !most.vector(d.box_max_m, {-10, 10})) return;
+  if (d.box_min_m.maxCoeff() > 0.0)
+    least.refuse("the pose begins at 0, inside of the box; no number may be above 0");
+  if (d.box_max_m.minCoeff() < 0.0)
+    most.refuse("the pose begins at 0, inside of the box; no number may be below 0");
+}
+
+/// How a cap steers, all of it optional; and where "none" takes back what is inherited.
+void read_steering(TomlTable& table, Deflection& d) {
+  const TomlValue full_m = table.optional("full_m"), full_rad = table.optional("full_rad");
+  const TomlValue dead_zone = table.optional("dead_zone"), curve = table.optional("curve");
+  const TomlValue slow = table.optional("slow");
+  const TomlValue leash_m = table.optional("leash_m"), leash_rad = table.optional("leash_rad");
+  const bool has_end = is_stated(full_m) && is_stated(full_rad);
+  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_end) {
+    if (!is_stated(value)) return;
+    if (d.mode != Deflection::Mode::rate) {
+      if (!value.is_inherited())
+        value.refuse("belongs to mode \"rate\", in which the deflection is a velocity; leave it out");
+    } else if (needs_end && !has_end) {
+      value.refuse("is reckoned by the end of the cap's way; state full_m and full_rad");
+    } else {
+      value.number(out, range);
+    }
+  };
+  read(full_m, d.full_m, {1e-5, 1}, true);
+  read(full_rad, d.full_rad, {1e-4, 3.2}, true);
+  read(dead_zone, d.dead_zone, {0, 0.9}, true);
+  read(curve, d.curve, {1, 5}, true);
+  read(slow, d.slow, {0.01, 1}, false);
+  read(leash_m, d.leash_m, {1e-4, 0.5}, true);
+  read(leash_rad, d.leash_rad, {1e-3, 3.1}, true);
+  if (is_stated(leash_m) == is_stated(leash_rad)) return;
+  (is_stated(leash_m) ? leash_m : leash_rad).refuse("is one of two: state leash_m and leash_rad, or neither");
+}
+
 void read_deflection(TomlTable& table, DeviceProfile& p) {
   Deflection d;
   table.optional("mode").choice(d.mode,
                                 {{"rate", Deflection::Mode::rate}, {"position", Deflection::Mode::position}});
   table.mandatory("linear_gain").number(d.linear_gain, {1e-3, 1e6});
   table.mandatory("angular_gain").number(d.angular_gain, {1e-3, 1e6});
-  table.optional("reach_m").number(d.reach_m, {1e-3, 10});
+  read_reach(table, d);
+  read_steering(table, d);
   p.deflection = d;
 }
 
@@ -405,11 +473,7 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   keep_alive.table(read_keep_alive, p);
   if (keep_alive && p.stream == StreamStyle::lock_step)
     keep_alive.refuse("a lock-step device is spoken to all the time; leave it out");
-  const TomlValue buttons = table.optional("buttons");
-  if (buttons && !shape.output)
-    buttons.refuse("the device has no motors: there is no wrench_report; leave it out");
-  else
-    buttons.table(read_buttons, p);
+  table.optional("buttons").table(read_buttons, p);
   check_pose_parts(pose_report, p);
   check_told_apart(pose_report, more_reports, p);
 }

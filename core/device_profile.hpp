@@ -149,8 +149,11 @@ enum class PoseSource : std::uint8_t {
   deflection,  ///< it sends how far a cap is pushed
 };
 
-/// How the deflection of a cap moves a pose.
+/// How the deflection of a cap moves a pose (devices/deflection_pose.hpp has the equations).
 struct Deflection {
+  static constexpr double kNotStated = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double kEndless = std::numeric_limits<double>::infinity();
+
   enum class Mode : std::uint8_t {
     rate,      ///< deflection is velocity; the pose stays where it is left
     position,  ///< deflection is the pose; it springs back with the cap
@@ -158,7 +161,22 @@ struct Deflection {
   Mode mode = Mode::rate;
   double linear_gain = 1.0;   ///< rate: m/s a metre of deflection; position: m a metre
   double angular_gain = 1.0;  ///< rad/s, or rad, a radian
-  double reach_m = 0.2;       ///< the pose stays within this distance of where it began
+
+  // Where the pose stays: within this distance of where it began, and within this box of B.
+  double reach_m = 0.2;
+  Vector3d box_min_m = Vector3d::Constant(-kEndless);
+  Vector3d box_max_m = Vector3d::Constant(kEndless);
+
+  // Rate only, and but for `slow` only where the end of the cap's way is stated.
+  double full_m = kNotStated;  ///< deflection at the end of the cap's way, where the speed is gain times it
+  double full_rad = kNotStated;
+  double dead_zone = 0.0;       ///< share of the way in which nothing moves
+  double curve = 1.0;           ///< exponent from deflection to speed; more is finer near the rest
+  double slow = 0.2;            ///< share of the speed while the slow button is held
+  double leash_m = kNotStated;  ///< how far from where the world holds it the pose may be, the cap at its end
+  double leash_rad = kNotStated;
+
+  bool has_leash() const noexcept { return leash_m > 0.0; }
 };
 
 inline constexpr std::size_t kMaxJoints = 6;
@@ -266,8 +284,10 @@ struct DeviceProfile {
   double thermal_time_s = kNotStated;              ///< time constant of their windings
 
   // Buttons that have a meaning here, by their number in the reports. -1: the device has none.
-  int deadman_button = -1;  ///< held, or there is no force
-  int stop_button = -1;     ///< pressed: emergency stop
+  int deadman_button = -1;   ///< held, or there is no force
+  int stop_button = -1;      ///< pressed: emergency stop
+  int recentre_button = -1;  ///< pressed: handle and tool are back where they began
+  int slow_button = -1;      ///< held: a cap steers at a share of its speed
 
   // What the device is, closed loop: bounds for stiffness. NaN: not stated.
   double damping_N_s_per_m = kNotStated;
@@ -303,6 +323,11 @@ struct DeviceProfile {
   FixedReport keep_alive;
   double keep_alive_period_s = kNotStated;
 };
+
+/// The bit of a button in a mask of them; none for -1.
+inline std::uint32_t button_bit(int button) noexcept {
+  return button < 0 ? 0U : std::uint32_t{1} << static_cast<unsigned>(button);
+}
 
 /// What makes a pose of this device's reports.
 inline PoseSource pose_source(const DeviceProfile& profile) noexcept {

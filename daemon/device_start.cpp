@@ -46,7 +46,16 @@ void tell_device(const DeviceProfile& profile, const UsbDevice& device) {
   const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
   spdlog::info("device {} ({}): senses {}, drives {}", describe(device), text(profile.transport),
                dof_text(sensed), dof_text(driven));
-  if (driven != kAllDofs)
+}
+
+void tell_motors(const DeviceProfile& profile) {
+  const DofMask driven = driven_dofs(profile);
+  if (!profile.has_output)
+    spdlog::info(
+        "it has no motors: the tool follows it and stops at what it touches, armed or not; the wrench is "
+        "computed "
+        "and shown, and felt by nobody");
+  else if (driven != kAllDofs)
     spdlog::info("what the wrench has along {} is dropped: no motor pushes there",
                  dof_text(static_cast<DofMask>(kAllDofs & ~driven)));
   if (profile.has_output && !(profile.watchdog_s > 0.0))

@@ -25,8 +25,10 @@ bool settle_profile(Plan& plan, const Stop& stop, const Waits& waits);
 /// is wrong with a device that is there at the start is thrown; later it is logged, and waited for its cure.
 bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop, const Waits& waits);
 
-/// What the device can do, said once: what it has no motors for is not felt.
+/// What the device is, said once.
 void tell_device(const DeviceProfile& profile, const UsbDevice& device);
+/// What it has no motors for, said once: that is not felt.
+void tell_motors(const DeviceProfile& profile);
 
 /// Lets the opened device take over its stored calibration, where its profile asks for one. Returns why it
 /// may not be armed, with the cure; empty: it may.

@@ -9,6 +9,7 @@
 
 #include "core/device_profile.hpp"
 #include "core/fault.hpp"
+#include "core/pose.hpp"
 #include "core/state.hpp"
 #include "daemon/placer.hpp"
 
@@ -42,32 +43,48 @@ std::string state(const TickRecord& r) {
   return name(state);
 }
 
+/// fx fy fz [N], tx ty tz [N.m].
+std::array<double, 6> wrench(const TickRecord& r, ShownWrench shown) {
+  if (shown == ShownWrench::sent) return r.F_out;
+  const Quaterniond R_WP(r.X_WP[6], r.X_WP[3], r.X_WP[4], r.X_WP[5]);
+  const Vector3d f = R_WP * Vector3d(r.F_T[0], r.F_T[1], r.F_T[2]);
+  const Vector3d t = R_WP * Vector3d(r.F_T[3], r.F_T[4], r.F_T[5]);
+  return {f.x(), f.y(), f.z(), t.x(), t.y(), t.z()};
+}
+
+std::string remark(const TickRecord& r, ShownWrench shown) {
+  if (shown == ShownWrench::on_tool) return " on the tool (no motors)";
+  return r.dropped == 0 ? "" : " (no motor: " + dof_text(r.dropped) + ")";
+}
+
 }  // namespace
 
-std::string live_line(const TickRecord& r, const LoopTiming& timing) {
-  const std::string dropped = r.dropped == 0 ? "" : " (no motor: " + dof_text(r.dropped) + ")";
+std::string live_line(const TickRecord& r, const LoopTiming& timing, ShownWrench shown) {
+  const std::array<double, 6> F = wrench(r, shown);
   return fmt::format(
       "{:7.2f} s {:<8} | tool {:+6.1f} {:+6.1f} {:+6.1f} mm {:4.1f} deg | {} contacts | "
       "F {:+5.2f} {:+5.2f} {:+5.2f} N | T {:+6.1f} {:+6.1f} {:+6.1f} mN.m{} | tick {} us",
       r.device_time_s, state(r), 1e3 * r.X_WP[0], 1e3 * r.X_WP[1], 1e3 * r.X_WP[2],
-      angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts, r.F_out[0], r.F_out[1], r.F_out[2],
-      1e3 * r.F_out[3], 1e3 * r.F_out[4], 1e3 * r.F_out[5], dropped, times(timing.tick));
+      angle(r.X_WP) * 180.0 / std::numbers::pi, r.contacts, F[0], F[1], F[2], 1e3 * F[3], 1e3 * F[4],
+      1e3 * F[5], remark(r, shown), times(timing.tick));
 }
 
 void look(RunTotals& totals, const TickRecord& r) {
   ++totals.looks;
   if (r.contacts > 0) ++totals.ticks_in_contact;
   totals.ticks = r.tick + 1;
-  totals.most_force_N = std::max(totals.most_force_N, length(&r.F_out[0]));
-  totals.most_torque_Nm = std::max(totals.most_torque_Nm, length(&r.F_out[3]));
+  const std::array<double, 6> F = wrench(r, totals.shown);
+  totals.most_force_N = std::max(totals.most_force_N, length(F.data()));
+  totals.most_torque_Nm = std::max(totals.most_torque_Nm, length(&F[3]));
 }
 
 std::string summary(const RunTotals& totals, const LoopTiming& timing) {
   std::string text = fmt::format(
       "{} ticks in {:.2f} s ({:.1f} Hz); in contact at {} of {} looks; largest force {:.2f} N, torque {:.1f} "
-      "mN.m\n",
+      "mN.m{}\n",
       totals.ticks, totals.seconds, static_cast<double>(totals.ticks) / std::max(totals.seconds, 1e-9),
-      totals.ticks_in_contact, totals.looks, totals.most_force_N, 1e3 * totals.most_torque_Nm);
+      totals.ticks_in_contact, totals.looks, totals.most_force_N, 1e3 * totals.most_torque_Nm,
+      totals.shown == ShownWrench::on_tool ? " on the tool, not sent: no motors" : "");
   text += fmt::format("{:<14} {:>24}\n", "", "p50 / p99.9 / max [us]");
   text += fmt::format("{:<14} {:>24}\n", "wake-up late", times(timing.wake_latency));
   text += fmt::format("{:<14} {:>24}\n", "tick", times(timing.tick));

@@ -170,7 +170,9 @@ void log_grants(const std::vector<RealtimeGrant>& grants) {
 /// Shows the loop to a person: in place on a terminal, a line twice a second elsewhere.
 class LiveView {
  public:
-  explicit LiveView(bool shown) : shown_(shown), terminal_(isatty(STDOUT_FILENO) != 0) {}
+  LiveView(bool shown, const DeviceProfile& profile) : shown_(shown), terminal_(isatty(STDOUT_FILENO) != 0) {
+    if (!profile.has_output) totals_.shown = ShownWrench::on_tool;
+  }
 
   void look_at(ServoLoop& loop) {
     TickRecord record;
@@ -178,7 +180,7 @@ class LiveView {
     look(totals_, record);
     if (!shown_ || (!terminal_ && totals_.looks % 5 != 0)) return;
     std::fputs(terminal_ ? "\r\x1b[K" : "", stdout);
-    std::fputs(live_line(record, loop.timing()).c_str(), stdout);
+    std::fputs(live_line(record, loop.timing(), totals_.shown).c_str(), stdout);
     std::fputs(terminal_ ? "" : "\n", stdout);
     std::fflush(stdout);
   }
@@ -315,6 +317,7 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
     if (!open_device(station, wait, at_start, stop, tell_waiting)) return Fault::none;
     const UsbDevice& device = link.device().value();
     if (at_start) tell_device(station.plan().profile, device);
+    if (at_start) tell_motors(station.plan().profile);
     if (!at_start) spdlog::info("the device is back, disarmed: {}", describe(device));
     const std::string not_armed = calibrate(station, device, CalibrationStore());
     if (!not_armed.empty()) spdlog::warn("the device may not be armed: {}", not_armed);
@@ -399,7 +402,7 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
   if (!settings.recording.file.empty())
     recorder =
         std::make_unique<Recorder>(station.records(), settings.recording.file, station.recording_header());
-  LiveView view(options.live);
+  LiveView view(options.live, station.plan().profile);
   const TimePoint start = clock.now();
   Fault fault = Fault::none;
   {
@@ -445,6 +448,7 @@ Fault run_simulated(Plan plan, const Options& options) {
   const auto run_it = [&](auto& clock, auto run_in_time) {
     return [&clock, &options, &script, run_in_time](Station& station, LiveView& view) {
       station.open();
+      tell_motors(station.plan().profile);
       return run_in_time(station, end_of(options, clock), clock, view,
                          Wishes(options.arm, script.commands, clock.now()));
     };

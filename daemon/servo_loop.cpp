@@ -198,6 +198,7 @@ void ServoLoop::look(const DeviceSample& sample, TimePoint now) noexcept {
   if (const Fault overdue = machine_.overdue(); overdue != Fault::none) found(overdue, now);
   test(sample, now);
   obey(record_.commands, now);
+  heed_buttons(sample.buttons);
 }
 
 void ServoLoop::test(const DeviceSample& sample, TimePoint now) noexcept {
@@ -232,6 +233,19 @@ void ServoLoop::obey(CommandSet commands, TimePoint now) noexcept {
   if ((commands & kLease) == 0) return;
   watches_.client.begin(now);
   if ((commands & kBeat) != 0) watches_.client.beat(now);
+}
+
+/// The recentre button. A device without motors has leapt back already, and nothing has to fade.
+void ServoLoop::heed_buttons(std::uint32_t buttons) noexcept {
+  const bool recentre = (buttons & ~buttons_ & button_bit(profile_.recentre_button)) != 0;
+  buttons_ = buttons;
+  if (!recentre) return;
+  if (driven_ != kNoDof) {
+    recentres_ = shut_ = true;
+    return;
+  }
+  workspace_.recentre();
+  lose_place();
 }
 
 void ServoLoop::found(FaultSet faults, TimePoint now, double value) noexcept {
@@ -353,7 +367,14 @@ void ServoLoop::project(const DeviceSample& sample) noexcept {
     scale_renderings();
   }
   if (!renderings_.project(X_WH, now_, scene_time_s_)) lose_place();
+  device_.hold(held());
   whereabouts_.write({X_WH, scene_time_s_, now_});
+}
+
+/// Where the world holds the handle, in the base.
+std::optional<Pose> ServoLoop::held() const noexcept {
+  if (felt().placing() != Placing::following || workspace_.clutched()) return {};
+  return workspace_.in_base(felt().X_WQ() * inverse(felt().X_HT()));
 }
 
 /// Line 7: the body wrench, and the same wrench as the device wants it. The law runs on the device's clock,

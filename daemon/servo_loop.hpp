@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
@@ -130,6 +131,7 @@ class ServoLoop {
   void begin(TimePoint now, TimePoint due) noexcept;
   void look(const DeviceSample& sample, TimePoint now) noexcept;
   void obey(CommandSet commands, TimePoint now) noexcept;
+  void heed_buttons(std::uint32_t buttons) noexcept;
   void take_changes(TimePoint now) noexcept;
   void change_rendering() noexcept;
   void scale_renderings() noexcept;
@@ -137,6 +139,7 @@ class ServoLoop {
   void change_limits(LimitSettings asked) noexcept;
   void let_through() noexcept;
   void project(const DeviceSample& sample) noexcept;
+  std::optional<Pose> held() const noexcept;
   void compute_wrench(const DeviceSample& sample) noexcept;
   void check_answer(const DeviceSample& sample, TimePoint now) noexcept;
   void settle_stiffness(TimePoint now) noexcept;
@@ -196,6 +199,7 @@ class ServoLoop {
   bool shut_ = false;         ///< it goes to 0, else to 1
   bool recentres_ = false;    ///< once it is there
   std::uint32_t recentred_ = 0;
+  std::uint32_t buttons_ = 0;   ///< of the last tick
   std::uint32_t changes_ = 0;   ///< from outside, since the start
   double sample_time_s_ = 0.0;  ///< device time of the last fresh sample
   bool sampled_ = false;

@@ -6,10 +6,6 @@
 namespace wrenchd {
 namespace {
 
-std::uint32_t button_bit(int button) noexcept {
-  return button < 0 ? 0U : std::uint32_t{1} << static_cast<unsigned>(button);
-}
-
 /// Without real-time priority a loop that stands still for a moment is nothing to look at: it is late.
 Duration stopped_after(const ServoSettings& servo) noexcept {
   return servo.realtime == Realtime::required ? from_seconds(servo.late_limit_s) : Duration::max();
@@ -24,7 +20,8 @@ Watches::Watches(const Settings& settings, const DeviceProfile& profile, double 
       pose(profile),
       pinned(max_force_N, max_torque_Nm),
       deadman_button(button_bit(profile.deadman_button)),
-      stop_button(button_bit(profile.stop_button)) {}
+      stop_button(button_bit(profile.stop_button)),
+      has_motors(profile.has_output) {}
 
 FaultSet Watches::look(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
   FaultSet found = link.look(sample, now) | pose.look(sample) | motors.look(sample, driven, now);
@@ -43,8 +40,10 @@ FaultSet Watches::judged(Fault fault, State state, TimePoint now) const noexcept
       return 0;
     case Fault::overspeed:  // a hand that is fast while it feels nothing does no harm
       return is_driving(state) ? bit(fault) : 0;
-    case Fault::sample_stale:  // a queue that ran over while we were late is no silence of the device's
-      return bit(pace.was_late(now) ? Fault::sample_late : fault);
+    // A queue that ran over while we were late is no silence of the device's; and one that pushes nobody is
+    // no danger: the pose stands still by now, and goes on when it is heard again.
+    case Fault::sample_stale:
+      return bit(pace.was_late(now) || !has_motors ? Fault::sample_late : fault);
     default:
       return bit(fault);
   }

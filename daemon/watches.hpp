@@ -29,6 +29,7 @@ struct Watches {
   ClientWatch client;
   std::uint32_t deadman_button;  ///< bit; 0: there is none
   std::uint32_t stop_button;
+  bool has_motors;
 
   /// What the sample says, as of now. driven: the last command switched the motors on.
   FaultSet look(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept;

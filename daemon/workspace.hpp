@@ -48,6 +48,11 @@ class Workspace {
   double scale_asked() const noexcept { return scale_asked_; }
   const Pose& X_WH() const noexcept { return X_WH_; }  ///< of the last follow()
 
+  /// A pose of the handle in the world, as it is in the base. Means nothing while the clutch is in.
+  Pose in_base(const Pose& X_WH) const noexcept {
+    const Quaterniond R_BW = X_WB_.rotation.conjugate();
+    return {R_BW * X_WH.rotation, R_BW * (X_WH.translation_m - X_WB_.translation_m) / scale_};
+  }
   /// The handle's twist, as it is in the world.
   Twist in_world(const Twist& V_BH) const noexcept {
     const Twist V_W = expressed(X_WB_.rotation, V_BH);

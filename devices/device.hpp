@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
@@ -44,6 +45,10 @@ class Device {
   virtual void open() = 0;
   /// Drains what has arrived and returns the newest sample. RT safe.
   virtual DeviceSample read_newest(TimePoint now) noexcept = 0;
+  /// Where the world holds the handle, in the base: the handle with the tool where the world allows it.
+  /// Nothing: that is not known. A device whose pose is steered keeps near it; one with a handle of its own
+  /// does not care. RT safe.
+  virtual void hold(const std::optional<Pose>& /*X_BG*/) noexcept {}
   /// Sends one wrench, on the hand, about the point and in the axes the profile names. RT safe.
   virtual Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept = 0;
   /// The number of the last command that was sent, as DeviceSample::acknowledged counts them. RT safe.

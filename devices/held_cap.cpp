@@ -45,6 +45,8 @@ HeldCap::HeldCap(const DeviceProfile& profile, const SimulationSettings& setting
     : profile_(profile),
       path_(settings.hand_path, settings.hand_repeats),
       coding_(cap_coding(profile)),
+      linear_(*profile.deflection, profile.deflection->linear_gain, profile.deflection->full_m),
+      angular_(*profile.deflection, profile.deflection->angular_gain, profile.deflection->full_rad),
       mouse_(coding_.format),
       seen_(unmoved()) {}
 
@@ -103,6 +105,11 @@ void HeldCap::take_report(TimePoint sent, std::span<const std::uint8_t> report) 
   host_->take_report(sent, report);
 }
 
+void HeldCap::see(TimePoint now, const Pose& X_BH) noexcept {
+  seen_.put(X_BH);
+  seen_at_ = std::max(seen_at_, now);
+}
+
 void HeldCap::look(TimePoint now) noexcept {
   seen_.advance(seconds(now - seen_at_));
   seen_at_ = std::max(seen_at_, now);
@@ -123,8 +130,15 @@ void HeldCap::push() noexcept {
   if (now_ < grasped_at_) linear = angular = Vector3d::Zero();
   const Quaterniond R_DB = profile_.X_BD.rotation.conjugate();
   std::array<int, 6> counts{};
-  put(R_DB * linear / (how.linear_gain * coding_.translation_step_m), std::span(counts).first(3));
-  put(R_DB * angular / (how.angular_gain * coding_.rotation_step_rad), std::span(counts).last(3));
+  if (how.mode == Deflection::Mode::rate) {
+    linear = linear_.deflection(linear);
+    angular = angular_.deflection(angular);
+  } else {
+    linear /= how.linear_gain;
+    angular /= how.angular_gain;
+  }
+  put(R_DB * linear / coding_.translation_step_m, std::span(counts).first(3));
+  put(R_DB * angular / coding_.rotation_step_rad, std::span(counts).last(3));
   if (counts == counts_) return;
   counts_ = counts;
   mouse_.push(counts);

@@ -25,10 +25,10 @@ struct CapCoding {
 CapCoding cap_coding(const DeviceProfile& profile);
 
 /// An emulated SpaceMouse in a simulated hand, which steers a tool by it along the hand path. It feels
-/// nothing, but it sees where the tool is: what the reports so far have made of it since the device was
-/// opened. Every millisecond it pushes the cap by, in the base B,
+/// nothing, but it sees where the handle is: where see() was told, and what the reports have made of it
+/// since. Every millisecond it pushes the cap by, in the base B,
 ///
-///   rate       linear_gain t = v_G + k (p_G - p_H),    angular_gain r = w_G + k log(R_G R_H')
+///   rate       v(t) = v_G + k (p_G - p_H),             v(r) = w_G + k log(R_G R_H')
 ///   position   linear_gain t = p_G,                    angular_gain r = log(R_G)
 ///
 /// as far as the cap goes, to the nearest count. Where the path rests and the tool is there the cap is let
@@ -52,6 +52,7 @@ class HeldCap final : public HeldDevice, private ReportSink {
     return mouse_.take_command(now, bytes);
   }
   TimePoint next_event() const noexcept override { return mouse_.next_event(); }
+  void see(TimePoint now, const Pose& X_BH) noexcept override;
 
   /// Of the tool, as the hand sees it.
   const Pose& X_BH() const noexcept override { return seen_.X_BH(); }
@@ -67,6 +68,7 @@ class HeldCap final : public HeldDevice, private ReportSink {
   DeviceProfile profile_;
   HandPath path_;
   CapCoding coding_;
+  SteeringCurve linear_, angular_;
   EmulatedSpaceMouse mouse_;
   DeflectionPose seen_;
   TimePoint seen_at_{};

@@ -14,6 +14,9 @@ class HeldDevice : public EmulatedDevice {
   /// A host begins to speak with it. Not RT safe.
   virtual void open(TimePoint /*now*/) {}
 
+  /// Where a pose that is steered has come to, in B: the hand looks at it. RT safe.
+  virtual void see(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
+
   // The truth, for tests: not what the encoders see.
   virtual const Pose& X_BH() const noexcept = 0;
   virtual const Wrench& motor_wrench() const noexcept = 0;  ///< on the hand, about H, in B

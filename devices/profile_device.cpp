@@ -218,10 +218,9 @@ const PoseReportLayout* ProfileDevice::understand(std::span<const std::uint8_t> 
       ++sample_.repeated;
       return nullptr;
     }
-    if (deflection_ && (known.translation.present || known.rotation.present)) {
+    if (deflection_) {
       follow_deflection(arrived);
-      const Quaterniond& R_BD = profile_.X_BD.rotation;
-      deflection_->push(R_BD * report.translation_m, R_BD * report.rotation_rad);
+      steer(report);
     }
     state_ = report;
     const std::uint64_t bit = std::uint64_t{1} << i;
@@ -310,6 +309,15 @@ Fault ProfileDevice::make_pose(PoseReport& report) noexcept {
   return Fault::none;
 }
 
+/// What the cap and its buttons ask for from now on.
+void ProfileDevice::steer(const PoseReport& report) noexcept {
+  const Quaterniond& R_BD = profile_.X_BD.rotation;
+  deflection_->push(R_BD * report.translation_m, R_BD * report.rotation_rad);
+  const std::uint32_t recentre = button_bit(profile_.recentre_button);
+  if ((report.buttons & ~state_.buttons & recentre) != 0) deflection_->recentre();
+  deflection_->go_slowly((report.buttons & button_bit(profile_.slow_button)) != 0);
+}
+
 /// The cap's pose goes on between reports, and is as of now.
 void ProfileDevice::follow_deflection(TimePoint now) noexcept {
   if (now <= deflected_at_) return;
@@ -323,6 +331,7 @@ void ProfileDevice::follow_deflection(TimePoint now) noexcept {
   sample_.fresh = true;
   sample_.X_BH = deflection_->X_BH();
   sample_.V_BH = deflection_->V_BH();
+  link_.show(now, sample_.X_BH);
   if (lost) sample_.fault = Fault::sample_stale;
 }
 

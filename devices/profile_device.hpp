@@ -51,6 +51,9 @@ class ProfileDevice final : public Device {
   /// ceiling, independent of all limits above. With motors off the wrench sent is zero. A wrench that is not
   /// finite sends zero with the motors off.
   Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept override;
+  void hold(const std::optional<Pose>& X_BG) noexcept override {
+    if (deflection_) deflection_->hold(X_BG);
+  }
   void release(TimePoint now) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override { link_.wait_readable(deadline); }
   void close() noexcept override;
@@ -87,6 +90,7 @@ class ProfileDevice final : public Device {
   Fault judge(PoseReport report) noexcept;
   Fault judge_motion(const PoseReport& report) noexcept;
   void follow_deflection(TimePoint now) noexcept;
+  void steer(const PoseReport& report) noexcept;
   void kick(TimePoint now) noexcept;
 
   Fault send(TimePoint now, const Wrench& F, bool motors_on) noexcept;

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/clock.hpp"
+#include "core/pose.hpp"
 
 namespace wrenchd {
 
@@ -36,6 +37,9 @@ class ReportLink {
   virtual LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept = 0;
   /// Sleeps until a report is waiting or the deadline has passed. RT safe but for the sleep it is there for.
   virtual void wait_readable(TimePoint deadline) noexcept = 0;
+  /// Where a pose that is steered has come to, in the base: what whoever steers sees on the screen. Only a
+  /// simulated hand looks. RT safe.
+  virtual void show(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
   /// Closes the transport; harmless when closed.
   virtual void close() noexcept = 0;
 };

@@ -32,6 +32,7 @@ class SimulatedLink final : public ReportLink {
     return wire_.write(now, report);
   }
   void wait_readable(TimePoint deadline) noexcept override { wire_.wait_readable(deadline); }
+  void show(TimePoint now, const Pose& X_BH) noexcept override { device_->see(now, X_BH); }
   void close() noexcept override { wire_.close(); }
 
   /// For faults on request, and for the truth.

@@ -229,6 +229,11 @@ const std::string kForce = R"(force = { byte = 4, bits = 16, order = "big_endian
 const std::string kVelocity = "linear_velocity = { byte = 28, bits = 12, bit = 4, step_m_per_s = 0.001 }";
 const std::string kTranslation = R"(translation = { byte = 1, type = "i16", step_m = 4e-6 })";
 
+/// What kMouse has at the end of [deflection], and one key more.
+std::string steering(const std::string& key) {
+  return "angular_gain = 11.0\nfull_m = 0.001\nfull_rad = 0.09\n" + key;
+}
+
 const std::vector<Bad> kTable = {
     // the device
     {kWhole, "name = \"p\"\n", "", "", "key 'name' is missing"},
@@ -327,6 +332,10 @@ const std::vector<Bad> kTable = {
     {kWhole, "[closed_loop]", "[buttons]\nestop = 1\n[closed_loop]", "estop", "did you mean 'stop'?"},
     {kWhole, "[closed_loop]", "[buttons]\ndeadman = 3\nstop = 3\n[closed_loop]", "3\n[closed",
      "is the deadman button as well"},
+    {kWhole, "[closed_loop]", "[buttons]\nstop = 3\nrecentre = 3\n[closed_loop]", "3\n[closed",
+     "is the stop button as well"},
+    {kWhole, "[closed_loop]", "[buttons]\nslow = 3\n[closed_loop]", "3\n[closed",
+     "only what is steered can go slower"},
     {kWhole, "buttons = { byte = 1, type = \"u32\" }\n[wrench_report]",
      "[buttons]\ndeadman = 2\n[wrench_report]", "2\n",
      "no report carries a button of this number; they carry 0 to 1"},
@@ -334,7 +343,9 @@ const std::vector<Bad> kTable = {
      "no report carries a button of this number; they carry 0"},
     {kDelta, "[pose_report]", "[buttons]\nstop = 0\n[pose_report]", "0\n[pose",
      "no report carries buttons; give pose_report its 'buttons'"},
-    {kMouse, "[deflection]", "[buttons]\nstop = 0\n[deflection]", "[buttons]", "the device has no motors"},
+    {kMouse, "[deflection]", "[buttons]\nstop = 0\n[deflection]", "0\n[defl", "the device has no motors"},
+    {kMouse, "[deflection]", "[buttons]\nrecentre = 0\n[deflection]", "0\n[defl",
+     "no report carries buttons"},
     {kWhole, "damping_N_s_per_m = 0.5", "damping_N_s_per_m = -0.5", "-0.5", "found -0.5"},
     {kWhole, "max_stiffness_N_per_m", "max_stiffness_N_per_mm", "max_stiffness_N_per_mm",
      "give it in N/m as 'max_stiffness_N_per_m'"},
@@ -423,6 +434,26 @@ const std::vector<Bad> kTable = {
     {kMouse, "mode = \"rate\"", "mode = \"speed\"", "\"speed\"", R"(expected "rate" or "position")"},
     {kMouse, "linear_gain = 71.0\n", "", "[deflection]", "key 'deflection.linear_gain' is missing"},
     {kMouse, "angular_gain = 11.0", "angular_gain = 0", "0", "from 0.001 to 1000000, found 0"},
+    // how a cap steers
+    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\ndead_zone = 0.1", "0.1",
+     "state full_m and full_rad"},
+    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nfull_m = 0.001", "0.001",
+     "state full_m and full_rad"},
+    {kMouse, "angular_gain = 11.0", steering("dead_zone = 1.0"), "1.0\n[pose", "from 0 to 0.9, found 1"},
+    {kMouse, "angular_gain = 11.0", steering("curve = 0.5"), "0.5\n[pose", "from 1 to 5, found 0.5"},
+    {kMouse, "angular_gain = 11.0", steering("slow = 0"), "0\n[pose", "from 0.01 to 1, found 0"},
+    {kMouse, "angular_gain = 11.0", steering("leash_m = 0.01"), "0.01\n", "state leash_m and leash_rad"},
+    {kMouse, "angular_gain = 11.0", steering("leash_m = 10\nleash_rad = 0.2"), "10\n",
+     "from 0.0001 to 0.5 m, found 10"},
+    {kMouse, "angular_gain = 11.0", steering("leash_mm = 10\nleash_rad = 0.2"), "leash_mm",
+     "give it in m as 'leash_m'"},
+    {kMouse, "mode = \"rate\"", "mode = \"position\"\ncurve = 2.0", "2.0", "belongs to mode \"rate\""},
+    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nbox_min_m = [-1, -1, -1]", "[-1, -1, -1]",
+     "state box_min_m and box_max_m"},
+    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nbox_min_m = [-1, 0.1, -1]\nbox_max_m = [1, 1, 1]",
+     "[-1, 0.1, -1]", "no number may be above 0"},
+    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nbox_min_m = [-1, -1, -1]\nbox_max_m = [1, 1, -1]",
+     "[1, 1, -1]", "no number may be below 0"},
     {kArm, "joints = { byte = 0, type = \"i16\" }", kTranslation, "[pose_report]",
      "[kinematics] needs joints in a report"},
     {kArm, "type = \"capstan_arm\"", "type = \"scara\"", "\"scara\"", R"(expected "capstan_arm" or "delta")"},

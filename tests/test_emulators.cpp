@@ -81,20 +81,22 @@ TEST_CASE("a SpaceMouse that nobody touches is silent, and that is no fault", "[
 }
 
 TEST_CASE("what the cap is pushed comes out as the way of the tool, in both formats", "[emulators]") {
-  // Full deflection to the right, half toward the user, a quarter down: -y, -x / 2, -z / 4 in the base.
+  // To the right, half as much toward the user, a quarter down: -y, -x / 2, -z / 4 in the base.
+  const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
   for (const auto& [name, format] : {std::pair("spacemouse_split", Mouse::Format::split),
                                      {"spacemouse_combined", Mouse::Format::combined}}) {
     Bench<Mouse> bench(name, format);
     bench.open();
     bench.steps(100);
-    bench.emulator.push({320, 160, 80, 0, 0, 0});
+    bench.emulator.push({280, 140, 70, 0, 0, 0});
     const TimePoint pushed = bench.clock.now();
     while (bench.sample.V_BH.linear_m_per_s.isZero()) bench.step();
     CHECK(bench.clock.now() - pushed <= 17ms);
     const Vector3d start = bench.sample.X_BH.translation_m;
     bench.steps(1000);
     const Vector3d way = bench.sample.X_BH.translation_m - start;
-    const Vector3d expected = 71.0 * 4e-6 * Vector3d(-160, -320, -80);  // one second
+    const double firmness = std::pow((pushed_m.norm() / 1.4e-3 - 0.08) / 0.92, 2.0);
+    const Vector3d expected = 71.0 * 1.4e-3 * firmness * pushed_m.normalized();  // one second
     INFO(name << ": " << way.transpose() << " is not " << expected.transpose());
     CHECK((way - expected).norm() < 1e-6);
     CHECK(bench.sample.X_BH.rotation.angularDistance(Quaterniond::Identity()) < 1e-9);
@@ -104,8 +106,35 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
     const Quaterniond before = bench.sample.X_BH.rotation;
     bench.steps(500);
     const Vector3d turn = rotation_vector(bench.sample.X_BH.rotation * before.conjugate());
-    CHECK((turn - Vector3d(0, 0, 0.5 * 11.4 * 2.5e-4 * 200)).norm() < 1e-6);
+    const double turned = std::pow((200 * 2.5e-4 / 0.0875 - 0.08) / 0.92, 2.0);
+    CHECK((turn - Vector3d(0, 0, 0.5 * 11.4 * 0.0875 * turned)).norm() < 1e-6);
   }
+}
+
+TEST_CASE("a cap's buttons bring the pose back to where it began, and make it slow", "[emulators]") {
+  Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
+  bench.open();
+  bench.emulator.push({0, -350, 0, 0, 0, 100});
+  bench.steps(500);
+  const double fast_m_per_s = bench.sample.V_BH.linear_m_per_s.norm();
+  CHECK(fast_m_per_s == Approx(71.0 * 1.4e-3));
+  REQUIRE(bench.sample.X_BH.translation_m.x() > 0.02);
+
+  bench.emulator.press(2);
+  bench.steps(20);
+  CHECK(bench.sample.V_BH.linear_m_per_s.norm() == Approx(0.2 * fast_m_per_s));
+  bench.emulator.press(0);
+  bench.steps(20);
+  CHECK(bench.sample.V_BH.linear_m_per_s.norm() == Approx(fast_m_per_s));
+
+  bench.emulator.push({});
+  bench.steps(60);
+  bench.emulator.press(1);
+  bench.steps(20);
+  CHECK(same_bits(bench.sample.X_BH, {}));
+  bench.emulator.push({0, -350, 0, 0, 0, 0});  // pressed as it is, the pose goes on from there
+  bench.steps(500);
+  CHECK(bench.sample.X_BH.translation_m.x() > 0.02);
 }
 
 TEST_CASE("a cap let go sends three packets of zeros and the pose stays", "[emulators]") {

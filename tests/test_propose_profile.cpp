@@ -149,6 +149,9 @@ TEST_CASE("the end of a cap's way means the same speed whatever the device count
     CHECK(profile.deflection->linear_gain * pose.translation.step * expected.counts ==
           Approx(0.1).epsilon(0.01));
     CHECK(profile.deflection->angular_gain * rotation.step * expected.counts == Approx(1.0).epsilon(0.01));
+    CHECK(profile.deflection->full_m == Approx(pose.translation.step * expected.counts).epsilon(1e-3));
+    CHECK(profile.deflection->full_rad == Approx(rotation.step * expected.counts).epsilon(1e-3));
+    CHECK(profile.deflection->has_leash());
   }
 }
 

@@ -83,7 +83,10 @@ TEST_CASE("wrenchd simulates devices of every kind, and their hands feel what th
       "wrenchd", {"--arm", "--live", "--simulate", "spacemouse_split", "--virtual-time", "--seconds", "6"});
   CHECK(mouse.exit_code == 0);
   CHECK(mouse.out.find("in contact at 0 of") == std::string::npos);
-  CHECK(mouse.out.find("(no motor: x y z rx ry rz)") != std::string::npos);
+  CHECK(mouse.err.find("it has no motors: the tool follows it") != std::string::npos);
+  CHECK(mouse.out.find(" mN.m on the tool (no motors) | tick ") != std::string::npos);
+  CHECK(mouse.out.find("largest force 0.00 N") == std::string::npos);
+  CHECK(mouse.out.find(" on the tool, not sent: no motors\n") != std::string::npos);
 }
 
 TEST_CASE("wrenchd in virtual time says the same every time") {

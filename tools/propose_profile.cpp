@@ -308,13 +308,27 @@ std::string gain(const SixAxes& device, const Half& half) {
   return key + "# GUESSED: " + half.speed_text + " at the end of the cap's way\n";
 }
 
+/// [m] or [rad] at the end of the cap's way; 0 where that cannot be told.
+double end_of_way(const SixAxes& device, const Half& half) {
+  return is_row(device, half) ? step_of(device, half).si * counts_to_end(device, half) : 0.0;
+}
+
+/// How it steers: as the SpaceMouse's shipped profiles have it.
+std::string steering(const SixAxes& device) {
+  const double full_m = end_of_way(device, kTranslation), full_rad = end_of_way(device, kRotation);
+  if (!(full_m >= 1e-5 && full_m <= 1.0 && full_rad >= 1e-4 && full_rad <= 3.2)) return {};
+  return "full_m = " + number_text(full_m, 4) + "\nfull_rad = " + number_text(full_rad, 4) +
+         "\n# GUESSED: what feels right. A push goes with some twist, and nobody feels a wall with it.\n"
+         "dead_zone = 0.08\ncurve = 2.0\nleash_m = 0.010\nleash_rad = 0.2\n";
+}
+
 std::string deflection_table(const SixAxes& device) {
   return "\n# GUESSED: that the axes say how far a cap is pushed and twisted, which springs back. If they "
          "say "
          "where a\n"
          "# handle is, mode = \"position\" with gains of 1.\n"
          "[deflection]\nmode = \"rate\"\n" +
-         gain(device, kTranslation) + gain(device, kRotation);
+         gain(device, kTranslation) + gain(device, kRotation) + steering(device);
 }
 
 /// Nothing but buttons from its first to its last, and padding: what a mask can hold.
