@@ -23,6 +23,7 @@
 #include "core/finite.hpp"
 #include "core/friction.hpp"
 #include "core/inertia.hpp"
+#include "core/make_mesh.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/replay.hpp"
 #include "daemon/station.hpp"
@@ -34,7 +35,6 @@
 #include "tools/doctor.hpp"
 #include "tools/fault_text.hpp"
 #include "tools/list_devices.hpp"
-#include "tools/make_mesh.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_figures.hpp"
 #include "tools/paper_tables.hpp"
@@ -277,7 +277,7 @@ void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
                    ->check(CLI::IsMember(kinds))
                    ->excludes(file);
   mesh->add_option("--triangles", options.wanted.triangles, "about so many")
-      ->check(CLI::Range(std::size_t{8}, std::size_t{20000000}))
+      ->check(CLI::Range(MadeMesh::kFewest, MadeMesh::kMost))
       ->needs(make)
       ->capture_default_str();
   mesh->add_option("--seed", options.wanted.seed, "which of the bumpy ones")
