@@ -139,6 +139,7 @@ TEST_CASE("every shipped file loads", "[config]") {
     CHECK(load_profile(file).name == file.stem());
   }
   for (const auto& file : shipped("scenes")) CHECK_NOTHROW(load_scene(file));
+  for (const auto& file : shipped("gallery")) CHECK_NOTHROW(load_settings(file, kShipped));
   for (const auto& file : shipped("hands")) {
     SimulationSettings simulation;
     CHECK_NOTHROW(load_hand_script(file, simulation));

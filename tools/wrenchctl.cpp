@@ -34,6 +34,7 @@
 #include "tools/descriptor_source.hpp"
 #include "tools/doctor.hpp"
 #include "tools/fault_text.hpp"
+#include "tools/gallery.hpp"
 #include "tools/list_devices.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_figures.hpp"
@@ -533,6 +534,16 @@ void add_paper(CLI::App& app, std::filesystem::path& directory) {
   });
 }
 
+void add_gallery(CLI::App& app, std::string& name) {
+  CLI::App* gallery =
+      app.add_subcommand("gallery", "Scenes to try: what there is to feel and see, and the command for each");
+  gallery->add_option("name", name, "one of them; without it, a line for each")
+      ->check(not_empty("name a scene, or leave it out"));
+  gallery->callback([&name] {
+    std::cout << (name.empty() ? gallery_text(SearchPath()) : gallery_text(SearchPath(), name));
+  });
+}
+
 /// What a daemon that runs is asked for.
 void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   const auto add = [&](const char* name, const char* what, auto&& run) {
@@ -626,6 +637,9 @@ int main(int argc, char** argv) {
   ProfileOptions profile_options;
   add_profile(app, profile_options);
 
+  std::string exhibit;
+  add_gallery(app, exhibit);
+
   std::filesystem::path paper_directory = "wrenchd-paper";
   add_paper(app, paper_directory);
 
@@ -648,7 +662,7 @@ int main(int argc, char** argv) {
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
           "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, "
-          "decode, devices, doctor, encode, faults, mesh, profile, paper, replay or udev-rules)");
+          "decode, devices, doctor, encode, faults, gallery, mesh, profile, paper, replay or udev-rules)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;
