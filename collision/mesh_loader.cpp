@@ -93,11 +93,12 @@ T MeshLoader::kept(const std::vector<std::string_view>& made_from, bool large, c
   return value;
 }
 
-std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& file, BodyKind kind) {
+std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& file, BodyKind kind,
+                                                   const std::optional<MadeMesh>& made) {
   std::error_code error;
   const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
-  auto& loaded = loaded_[{error ? file : same, kind}];
-  if (!loaded) loaded = read(file, kind);
+  auto& loaded = loaded_[{error || made ? file : same, kind}];
+  if (!loaded) loaded = std::make_shared<const LoadedMesh>(made ? make(*made, file, kind) : read(file, kind));
   const std::string begin = loaded->file.string() + ": ";
   for (const std::string& change : loaded->changes) add_once(changes_, begin + change);
   if (kind == BodyKind::surface)
@@ -108,26 +109,42 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& 
   return loaded;
 }
 
-std::shared_ptr<const LoadedMesh> MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
+LoadedMesh MeshLoader::checked(PolygonSoup soup, const std::filesystem::path& file, BodyKind kind) const {
+  LoadedMesh made;
+  tell(file, soup.faces.size(), "checking");
+  const MeshReport report = kind == BodyKind::solid ? repair_and_check_solid(soup, &made.mesh)
+                                                    : repair_and_check_surface(soup, &made.mesh);
+  if (!report.defects.empty()) throw MeshError(refusal(file, soup, kind, report));
+  made.changes = report.changes;
+  return made;
+}
+
+LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
   MeshSource source = read_mesh_source(file);
   const std::size_t size = source.bytes.size();
   const bool large = size >= kManyBytes;
   if (progress_ && large)
     progress_(file.filename().string() + ": reading " + grouped(size / 1'000'000) + " MB");
   const std::string extension = file.extension().string();
-  const auto make = [&] {
-    LoadedMesh made;
-    PolygonSoup soup = parse_mesh(source);
-    tell(file, soup.faces.size(), "checking");
-    const MeshReport report = kind == BodyKind::solid ? repair_and_check_solid(soup, &made.mesh)
-                                                      : repair_and_check_surface(soup, &made.mesh);
-    if (!report.defects.empty()) throw MeshError(refusal(file, soup, kind, report));
-    made.changes = report.changes;
-    return made;
-  };
-  LoadedMesh loaded = kept<LoadedMesh>({"mesh", extension, name_of(kind), source.bytes}, large, make);
+  LoadedMesh loaded = kept<LoadedMesh>({"mesh", extension, name_of(kind), source.bytes}, large,
+                                       [&] { return checked(parse_mesh(source), file, kind); });
   loaded.file = file;
-  return std::make_shared<const LoadedMesh>(std::move(loaded));
+  return loaded;
+}
+
+/// What was made is looked at like a file: a body of somebody's measures may come out thinner than it can be.
+LoadedMesh MeshLoader::make(const MadeMesh& made, const std::filesystem::path& name, BodyKind kind) {
+  const TriangleMesh mesh = make_mesh(made);
+  const bool large = mesh.triangles.size() >= kManyTriangles;
+  const std::vector<std::string_view> made_from = {"made", name_of(kind), bytes_of(mesh.vertices_m),
+                                                   bytes_of(mesh.triangles)};
+  LoadedMesh loaded = kept<LoadedMesh>(made_from, large, [&] {
+    PolygonSoup soup{mesh.vertices_m, {}};
+    for (const auto& [a, b, c] : mesh.triangles) soup.faces.push_back({a, b, c});
+    return checked(std::move(soup), name, kind);
+  });
+  loaded.file = name;
+  return loaded;
 }
 
 ConvexBody MeshLoader::hull(const LoadedMesh& loaded) {

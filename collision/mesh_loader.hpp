@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,11 +16,12 @@
 #include "collision/mesh_size.hpp"
 #include "collision/treed_mesh.hpp"
 #include "core/convex_body.hpp"
+#include "core/make_mesh.hpp"
 #include "core/triangle_mesh.hpp"
 
 namespace wrenchd {
 
-/// A mesh file that was read, repaired and checked.
+/// A mesh file that was read, repaired and checked; or a mesh that was made, and checked like one.
 struct LoadedMesh {
   std::filesystem::path file;
   TriangleMesh mesh;                 ///< in the file's own units
@@ -43,8 +45,10 @@ class MeshLoader {
   MeshLoader(std::filesystem::path cache, Progress progress)
       : cache_(std::move(cache)), progress_(std::move(progress)) {}
 
-  /// Throws MeshError that names the file, the defect, its place and the cure.
-  std::shared_ptr<const LoadedMesh> load(const std::filesystem::path& file, BodyKind kind);
+  /// made: what is to be made in the place of the file, whose name is name_of() it. Throws MeshError that
+  /// names the file, the defect, its place and the cure.
+  std::shared_ptr<const LoadedMesh> load(const std::filesystem::path& file, BodyKind kind,
+                                         const std::optional<MadeMesh>& made = {});
 
   /// The convex hull, in file units.
   ConvexBody hull(const LoadedMesh& loaded);
@@ -62,7 +66,9 @@ class MeshLoader {
   const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
  private:
-  std::shared_ptr<const LoadedMesh> read(const std::filesystem::path& file, BodyKind kind);
+  LoadedMesh read(const std::filesystem::path& file, BodyKind kind);
+  LoadedMesh make(const MadeMesh& made, const std::filesystem::path& name, BodyKind kind);
+  LoadedMesh checked(PolygonSoup soup, const std::filesystem::path& file, BodyKind kind) const;
   void tell(const std::filesystem::path& file, std::size_t triangles, const std::string& what) const;
   template <class T, class Make>
   T kept(const std::vector<std::string_view>& made_from, bool large, const Make& make);

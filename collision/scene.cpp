@@ -25,7 +25,7 @@ struct Made {
 
 Made make(const MeshObstacleSettings& obstacle, bool all_convex, MeshLoader& loader) {
   Made made;
-  made.loaded = loader.load(obstacle.mesh, obstacle.kind);
+  made.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.made);
   loader.look_at_size(*made.loaded, obstacle.scale, kObstacleSize);
   require_size_for_contacts(made.loaded->mesh, obstacle.scale, obstacle.mesh);
   TriangleMesh mesh = made.loaded->mesh;

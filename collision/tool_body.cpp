@@ -44,7 +44,7 @@ ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, double scale, double mass
 }
 
 ToolBody load_tool(const ToolSettings& settings, MeshLoader& loader) {
-  const auto loaded = loader.load(settings.mesh, BodyKind::solid);
+  const auto loaded = loader.load(settings.mesh, BodyKind::solid, settings.made);
   ToolBody tool = tool_body(loaded->mesh, loader.hull(*loaded), settings.scale, settings.mass_kg);
   require_usable(tool.solid, settings.mesh, settings.scale);
   loader.look_at_size(*loaded, settings.scale, kToolSize);

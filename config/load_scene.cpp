@@ -2,8 +2,12 @@
 #include "config/load_scene.hpp"
 
 #include <algorithm>
+#include <optional>
+#include <vector>
 
+#include "config/nearest_key.hpp"
 #include "config/toml_reader.hpp"
+#include "core/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {
@@ -12,6 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr Range kScale = {1e-9, 1e6};
 constexpr Range kMass = {1e-6, 1e6};
+constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kTurn = {-10.0, 10.0};
 constexpr Range kTurnBack = {0.0, 86400.0};
@@ -19,18 +24,55 @@ constexpr Range kTurnBack = {0.0, 86400.0};
 /// Shorter than this a normal is a slip of the keyboard rather than a direction.
 constexpr double kMinNormal = 1e-9;
 
-void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh) {
+void read_kind(const TomlValue& value, MadeMesh& made) {
+  if (!value.text(made.kind)) return;
+  std::vector<KnownKey> known;
+  for (const MeshKind& kind : mesh_kinds()) known.push_back({kind.name, ""});
+  if (std::any_of(known.begin(), known.end(), [&](const KnownKey& key) { return key.name == made.kind; }))
+    return;
+  const NearestKey nearest = nearest_key(made.kind, known);
+  std::string all;
+  for (const KnownKey& key : known) all += (all.empty() ? "" : ", ") + key.name;
+  value.refuse("nothing of kind '" + printable(made.kind) + "' can be made; " +
+               (nearest.name.empty() ? "there are " + all : nearest.advice));
+}
+
+void read_made(TomlTable& table, MadeMesh& made) {
+  read_kind(table.mandatory("make"), made);
+  table.optional("triangles")
+      .integer(made.triangles,
+               {static_cast<double>(MadeMesh::kFewest), static_cast<double>(MadeMesh::kMost)});
+  const TomlValue seed = table.optional("seed");
+  seed.integer(made.seed, {0, 4294967295.0});
+  if (seed && made.kind != "bumpy" && made.kind != "boulder")
+    seed.refuse("only bumpy and boulder are made by chance; leave it out");
+  const TomlValue size = table.optional("size_m");
+  size.vector(made.size_m, kSide);
+  if (size && made.kind != "box")
+    size.refuse("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
+}
+
+/// A file, or what is to be made instead of one.
+void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
+               std::optional<MadeMesh>& made) {
+  if (value.is_table()) {
+    value.table(read_made, made.emplace());
+    mesh = name_of(*made);
+    return;
+  }
   if (!value.path(mesh)) return;
   mesh = scene.file.parent_path() / mesh;
   std::error_code ignored;
   if (fs::is_regular_file(mesh, ignored)) return;
-  value.refuse("no such file; looked for " + fs::absolute(mesh).lexically_normal().string() +
-               "; name an OFF, OBJ, STL or PLY file, relative to this scene");
+  value.refuse(
+      "no such file; looked for " + fs::absolute(mesh).lexically_normal().string() +
+      "; name an OFF, OBJ, STL or PLY file, relative to this scene, or say what is to be made, as in { make "
+      "= \"gear\" }");
 }
 
 /// The mass may stand in [tool] or at the top of the file.
 void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
-  read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh);
+  read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.made);
   table.optional("scale", "m").number(scene.tool.scale, kScale);
   const TomlValue mass = table.optional("mass", "kg");
   mass.number(scene.tool.mass_kg, kMass);
@@ -83,7 +125,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
                         const std::string& name) {
   MeshObstacleSettings obstacle;
   obstacle.name = name;
-  read_mesh(mesh, scene, obstacle.mesh);
+  read_mesh(mesh, scene, obstacle.mesh, obstacle.made);
   keys.scale.number(obstacle.scale, kScale);
   keys.position.vector(obstacle.X_WM.translation_m, kAny);
   Vector3d rotation_vector_rad = Vector3d::Zero();

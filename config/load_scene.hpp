@@ -9,7 +9,7 @@
 
 namespace wrenchd {
 
-/// Reads a scene; config/scenes/cube_on_table.toml shows the format. The mesh path comes back as one that can
+/// Reads a scene; config/scenes/cube_on_table.toml shows the format. A mesh path comes back as one that can
 /// be opened from here, and normals as unit vectors; a scene without obstacles is free space. Throws
 /// ConfigError.
 SceneSettings load_scene(const std::filesystem::path& file);

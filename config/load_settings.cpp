@@ -195,7 +195,13 @@ void read_control(TomlTable& table, ControlSettings& control) {
   }
 }
 
+void read_view(TomlTable& table, ViewSettings& view) {
+  table.optional("eye_m").vector(view.eye_m, {-10, 10});
+  table.optional("target_m").vector(view.target_m, {-10, 10});
+}
+
 void read_settings(TomlTable& table, const Lookup& lookup, Settings& s) {
+  table.optional("description").text(s.description);
   read_file_name(table.optional("scene"), lookup, s.scene);
   table.optional("device").table_or_empty(read_device, lookup, s.device);
   table.optional("servo").table(read_servo, s.servo);
@@ -205,6 +211,7 @@ void read_settings(TomlTable& table, const Lookup& lookup, Settings& s) {
   table.optional("simulation").table_or_empty(read_simulation, lookup, s.simulation);
   table.optional("recording").table(read_recording, s.recording);
   table.optional("control").table(read_control, s.control);
+  table.optional("view").table(read_view, s.view);
 }
 
 void read_rendering_changes(TomlTable& table, Settings& s) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "config/search_path.hpp"
 
-#include <map>
 #include <utility>
 
 #include "config/config_error.hpp"
+#include "config/toml_files.hpp"
 
 namespace wrenchd {
 namespace fs = std::filesystem;
@@ -57,18 +57,7 @@ fs::path profile_file(const std::string& name) {
 }
 
 std::vector<fs::path> profile_files(const SearchPath& search) {
-  std::map<fs::path, fs::path> by_name;
-  for (const fs::path& directory : search.directories()) {
-    std::error_code error;
-    for (fs::directory_iterator entry(directory / "profiles", error), end; !error && entry != end;
-         entry.increment(error)) {
-      if (entry->path().extension() == ".toml") by_name.emplace(entry->path().filename(), entry->path());
-    }
-  }
-  std::vector<fs::path> files;
-  files.reserve(by_name.size());
-  for (const auto& [name, file] : by_name) files.push_back(file);
-  return files;
+  return toml_files("profiles", search);
 }
 
 }  // namespace wrenchd

@@ -89,9 +89,16 @@ inline constexpr const char* kNoSocket = "none";
 /// In the place of the group of observers: everybody on this machine.
 inline constexpr const char* kEverybody = "*";
 
+/// [view]: from where a picture of the scene is best taken. Equal points: nobody has said.
+struct ViewSettings {
+  Vector3d eye_m = Vector3d::Zero();
+  Vector3d target_m = Vector3d::Zero();
+};
+
 /// All of wrenchd.toml.
 struct Settings {
   std::filesystem::path file;
+  std::string description;  ///< what there is to feel and to see, for people
   std::filesystem::path scene = "scenes/cube_on_table.toml";  ///< looked up along the search path
   DeviceSettings device;
   ServoSettings servo;
@@ -101,6 +108,7 @@ struct Settings {
   SimulationSettings simulation;  ///< [simulation]
   RecordingSettings recording;
   ControlSettings control;
+  ViewSettings view;
 };
 
 }  // namespace wrenchd

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/make_mesh.hpp"
 #include "core/obstacle_motion.hpp"
 #include "core/pose.hpp"
 #include "core/triangle_mesh.hpp"
@@ -14,9 +15,10 @@ namespace wrenchd {
 
 /// The virtual body in the hand. M is the frame the mesh file is written in.
 struct ToolSettings {
-  std::filesystem::path mesh;  ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
-  double scale = 1.0;          ///< metres per mesh unit
-  double mass_kg = 1.0;        ///< of the uniform solid; scales T, moves no minimiser
+  std::filesystem::path mesh;         ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
+  std::optional<MadeMesh> made = {};  ///< then it is made, and `mesh` is name_of() it instead of a file
+  double scale = 1.0;                 ///< metres per mesh unit
+  double mass_kg = 1.0;               ///< of the uniform solid; scales T, moves no minimiser
 };
 
 /// Solid where normal_W . x < offset_m.
@@ -30,8 +32,9 @@ struct HalfSpaceSettings {
 struct MeshObstacleSettings {
   std::string name;
   std::filesystem::path mesh;
-  double scale = 1.0;  ///< metres per mesh unit
-  Pose X_WM;           ///< at scene time 0
+  std::optional<MadeMesh> made = {};  ///< as for the tool
+  double scale = 1.0;                 ///< metres per mesh unit
+  Pose X_WM;                          ///< at scene time 0
   /// A surface may be open or cut through itself. It has no inside: nothing pushes a tool out that starts
   /// beyond it, or that it goes through.
   BodyKind kind = BodyKind::solid;

@@ -8,9 +8,9 @@
 #include "collision/mesh_file.hpp"
 #include "collision/scene.hpp"
 #include "core/inertia.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/make_mesh.hpp"
 
 // Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or refused
 // with its name, the place and the cure.

@@ -68,7 +68,10 @@ std::string printed(const Settings& s) {
       << s.control.socket << '\n'
       << s.control.observers << '\n'
       << s.control.operators << '\n'
-      << s.control.administrators;
+      << s.control.administrators << '\n'
+      << s.description << '\n'
+      << s.view.eye_m.transpose() << '\n'
+      << s.view.target_m.transpose();
   return out.str();
 }
 
@@ -127,7 +130,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 51);
+  CHECK(options == 54);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {
@@ -136,6 +139,7 @@ TEST_CASE("every shipped file loads", "[config]") {
     CHECK(load_profile(file).name == file.stem());
   }
   for (const auto& file : shipped("scenes")) CHECK_NOTHROW(load_scene(file));
+  for (const auto& file : shipped("gallery")) CHECK_NOTHROW(load_settings(file, kShipped));
   for (const auto& file : shipped("hands")) {
     SimulationSettings simulation;
     CHECK_NOTHROW(load_hand_script(file, simulation));
@@ -193,6 +197,25 @@ TEST_CASE("a mesh may move, and stands still unless it is told to", "[config]") 
   CHECK(turning.moves());
   CHECK(turning.linear_m_per_s == Vector3d::Zero());
   CHECK(turning.turn_back_s == 0.0);
+}
+
+TEST_CASE("a mesh may be made instead of read", "[config]") {
+  const SceneSettings scene = scene_from(
+      "[tool]\nmesh = { make = 'gear', triangles = 5000 }\nscale = 2\n"
+      "[[obstacle]]\nmesh = { make = 'boulder', seed = 7 }\nkind = 'surface'\n"
+      "[[obstacle]]\nmesh = { make = 'box', size_m = [0.1, 0.2, 0.3] }\n"
+      "[[obstacle]]\nmesh = 'cube.off'\n");
+  REQUIRE(scene.tool.made.has_value());
+  CHECK(scene.tool.made->kind == "gear");
+  CHECK(scene.tool.made->triangles == 5000);
+  CHECK(scene.tool.mesh == "made gear, 5000 triangles");
+  CHECK(scene.tool.scale == 2.0);
+  REQUIRE(scene.meshes.size() == 3);
+  CHECK(scene.meshes[0].made.value().seed == 7);
+  CHECK(scene.meshes[0].mesh == "made boulder, 20000 triangles, seed 7");
+  CHECK(scene.meshes[0].kind == BodyKind::surface);
+  CHECK(scene.meshes[1].made.value().size_m == Vector3d(0.1, 0.2, 0.3));
+  CHECK_FALSE(scene.meshes[2].made.has_value());
 }
 
 TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {

@@ -5,8 +5,8 @@
 
 #include "collision/convex_hull.hpp"
 #include "core/convex_body.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/random_body.hpp"
-#include "tools/make_mesh.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

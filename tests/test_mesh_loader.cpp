@@ -5,9 +5,9 @@
 #include "collision/mesh_file.hpp"
 #include "collision/mesh_loader.hpp"
 #include "collision/scene.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {
@@ -151,6 +151,28 @@ TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "
     load();
     CHECK(told.size() == 1);
   }
+}
+
+TEST_CASE("a mesh that is made is checked and kept like one of a file", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const fs::path cache = dir.path() / "cache";
+  const MadeMesh bumpy = {"bumpy", 60000};
+  const std::string name = name_of(bumpy), size = grouped(make_mesh(bumpy).triangles.size());
+  std::vector<std::string> told;
+  const auto load = [&] {
+    told.clear();
+    MeshLoader loader(cache, [&](const std::string& what) { told.push_back(what); });
+    const auto loaded = loader.load(name, BodyKind::solid, bumpy);
+    CHECK(loader.load(name, BodyKind::solid, bumpy) == loaded);
+    CHECK(loader.changes().empty());
+    CHECK(loaded->file == name);
+    return loaded->mesh;
+  };
+  CHECK(load().vertices_m == make_mesh(bumpy).vertices_m);
+  CHECK(told == std::vector<std::string>{name + ": " + size + " triangles, checking"});
+  CHECK(files_of(cache).size() == 1);
+  CHECK(load().triangles == make_mesh(bumpy).triangles);
+  CHECK(told.empty());
 }
 
 TEST_CASE("a cache that cannot be written is a remark", "[mesh_loader]") {

@@ -4,9 +4,9 @@
 #include "collision/mesh_check.hpp"
 #include "collision/mesh_repair.hpp"
 #include "core/inertia.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/sample_meshes.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "collision/mesh_file.hpp"
 #include "collision/mesh_size.hpp"
-#include "tools/make_mesh.hpp"
+#include "core/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {

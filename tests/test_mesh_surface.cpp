@@ -6,8 +6,8 @@
 #include <catch2/catch.hpp>
 
 #include "collision/mesh_surface.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/random_values.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "collision/pair_sieve.hpp"
 #include "collision/triangle_pair.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/random_values.hpp"
 #include "tests/support/repeats.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {

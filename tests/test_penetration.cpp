@@ -11,11 +11,11 @@
 
 #include "collision/convex_hull.hpp"
 #include "collision/penetration.hpp"
+#include "core/make_mesh.hpp"
 #include "core/metric.hpp"
 #include "core/wrench_law.hpp"
 #include "tests/support/pressed.hpp"
 #include "tests/support/repeats.hpp"
-#include "tools/make_mesh.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

@@ -6,9 +6,9 @@
 #include "collision/scene.hpp"
 #include "collision/tree_walk.hpp"
 #include "collision/triangle_pair.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/exact_meeting.hpp"
 #include "tests/support/random_values.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "collision/triangle_tree.hpp"
-#include "tools/make_mesh.hpp"
+#include "core/make_mesh.hpp"
 
 namespace wrenchd {
 namespace {

@@ -556,7 +556,7 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
   } const table[] = {
       {{},
        "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, decode, "
-       "devices, doctor, encode, faults, mesh, profile, paper, replay or udev-rules) is required"},
+       "devices, doctor, encode, faults, gallery, mesh, profile, paper, replay or udev-rules) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},

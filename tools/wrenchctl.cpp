@@ -23,6 +23,7 @@
 #include "core/finite.hpp"
 #include "core/friction.hpp"
 #include "core/inertia.hpp"
+#include "core/make_mesh.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/replay.hpp"
 #include "daemon/station.hpp"
@@ -33,8 +34,8 @@
 #include "tools/descriptor_source.hpp"
 #include "tools/doctor.hpp"
 #include "tools/fault_text.hpp"
+#include "tools/gallery.hpp"
 #include "tools/list_devices.hpp"
-#include "tools/make_mesh.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_figures.hpp"
 #include "tools/paper_tables.hpp"
@@ -277,7 +278,7 @@ void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
                    ->check(CLI::IsMember(kinds))
                    ->excludes(file);
   mesh->add_option("--triangles", options.wanted.triangles, "about so many")
-      ->check(CLI::Range(std::size_t{8}, std::size_t{20000000}))
+      ->check(CLI::Range(MadeMesh::kFewest, MadeMesh::kMost))
       ->needs(make)
       ->capture_default_str();
   mesh->add_option("--seed", options.wanted.seed, "which of the bumpy ones")
@@ -533,6 +534,16 @@ void add_paper(CLI::App& app, std::filesystem::path& directory) {
   });
 }
 
+void add_gallery(CLI::App& app, std::string& name) {
+  CLI::App* gallery =
+      app.add_subcommand("gallery", "Scenes to try: what there is to feel and see, and the command for each");
+  gallery->add_option("name", name, "one of them; without it, a line for each")
+      ->check(not_empty("name a scene, or leave it out"));
+  gallery->callback([&name] {
+    std::cout << (name.empty() ? gallery_text(SearchPath()) : gallery_text(SearchPath(), name));
+  });
+}
+
 /// What a daemon that runs is asked for.
 void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   const auto add = [&](const char* name, const char* what, auto&& run) {
@@ -626,6 +637,9 @@ int main(int argc, char** argv) {
   ProfileOptions profile_options;
   add_profile(app, profile_options);
 
+  std::string exhibit;
+  add_gallery(app, exhibit);
+
   std::filesystem::path paper_directory = "wrenchd-paper";
   add_paper(app, paper_directory);
 
@@ -648,7 +662,7 @@ int main(int argc, char** argv) {
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
           "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, "
-          "decode, devices, doctor, encode, faults, mesh, profile, paper, replay or udev-rules)");
+          "decode, devices, doctor, encode, faults, gallery, mesh, profile, paper, replay or udev-rules)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

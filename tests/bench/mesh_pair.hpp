@@ -6,7 +6,7 @@
 
 #include "collision/scene.hpp"
 #include "collision/tree_walk.hpp"
-#include "tools/make_mesh.hpp"
+#include "core/make_mesh.hpp"
 
 namespace wrenchd::bench {
 

@@ -6,9 +6,9 @@
 #include <thread>
 #include <vector>
 
+#include "core/make_mesh.hpp"
 #include "tests/support/shipped_plan.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd::test {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "collision/scene.hpp"
+#include "core/make_mesh.hpp"
 #include "tests/support/random_values.hpp"
-#include "tools/make_mesh.hpp"
 
 namespace wrenchd::test {
 

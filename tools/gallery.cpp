@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/gallery.hpp"
+
+#include <algorithm>
+#include <sstream>
+#include <stdexcept>
+
+#include "config/load_settings.hpp"
+#include "config/nearest_key.hpp"
+#include "config/toml_files.hpp"
+
+namespace wrenchd {
+namespace {
+
+constexpr std::size_t kColumns = 100;
+
+/// Words, with single blanks between them.
+std::string on_one_line(const std::string& text) {
+  std::istringstream words(text);
+  std::string line;
+  for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+  return line;
+}
+
+std::string first_sentence(const std::string& line) {
+  const std::size_t end = line.find(". ");
+  return end == std::string::npos ? line : line.substr(0, end + 1);
+}
+
+std::string paragraph(const std::string& text) {
+  std::istringstream words(text);
+  std::string out, line;
+  for (std::string word; words >> word; line += (line.empty() ? "" : " ") + word) {
+    if (line.size() + 1 + word.size() <= kColumns) continue;
+    out += line + '\n';
+    line.clear();
+  }
+  return out + line + '\n';
+}
+
+}  // namespace
+
+std::vector<Exhibit> gallery(const SearchPath& search) {
+  std::vector<Exhibit> all;
+  for (const std::filesystem::path& file : toml_files("gallery", search))
+    all.push_back({file.stem().string(), file, on_one_line(load_settings(file, search).description)});
+  return all;
+}
+
+std::string gallery_text(const SearchPath& search) {
+  const std::vector<Exhibit> all = gallery(search);
+  std::size_t wide = 0;
+  for (const Exhibit& exhibit : all) wide = std::max(wide, exhibit.name.size());
+  std::string text;
+  for (const auto& [name, file, description] : all)
+    text += name + std::string(wide - name.size() + 2, ' ') + first_sentence(description) + '\n';
+  return text;
+}
+
+std::string gallery_text(const SearchPath& search, const std::string& name) {
+  const std::vector<Exhibit> all = gallery(search);
+  std::vector<KnownKey> known;
+  std::string names;
+  for (const Exhibit& exhibit : all) {
+    if (exhibit.name == name)
+      return paragraph(exhibit.description) + "\n    wrenchd --arm --live --config gallery/" + name +
+             ".toml\n\n" + "or, from a source tree, tools/run " + name + ". It is " + exhibit.file.string() +
+             ".\n";
+    known.push_back({exhibit.name, ""});
+    names += (names.empty() ? "" : ", ") + exhibit.name;
+  }
+  const NearestKey nearest = nearest_key(name, known);
+  throw std::runtime_error("gallery: there is no '" + name + "'; " +
+                           (nearest.name.empty() ? "there are " + names : nearest.advice));
+}
+
+}  // namespace wrenchd
