@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/scene_methods.hpp"
 
+#include <cstdint>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "collision/mesh_file.hpp"
 #include "config/config_error.hpp"
 #include "config/search_path.hpp"
+#include "daemon/scene_shapes.hpp"
 
 namespace wrenchd {
 namespace {
@@ -45,6 +48,30 @@ Answer answered(const Act& act) {
 Json handed_over(const Workbench& workbench) {
   return {{"rendering", workbench.handed_over().number}};
 }
+
+/// What the bodies look like, in memory of its own; the same memory for as long as the meshes are the same.
+class ShapesKept {
+ public:
+  Answer answer(Workbench& bench) {
+    const Workbench::Shown shown = bench.shown();
+    if (!shapes_ || !shapes_->fits(*shown.scene)) {
+      shapes_ = std::make_unique<SceneShapes>(shown.scene);
+      ++number_;
+    }
+    Json result = shapes_->description(*shown.scene);
+    result["shapes"] = number_;
+    result["rendering"] = shown.number;
+    result["scene_time_begins_ns"] = shown.scene_time_begins.time_since_epoch().count();
+    result["X_WB"] = pose_json(shown.X_WB);
+    result["X_HT"] = pose_json(shown.X_HT);
+    result["wrench_about"] = shown.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
+    return {std::move(result), shapes_->descriptor()};
+  }
+
+ private:
+  std::unique_ptr<SceneShapes> shapes_;
+  std::uint64_t number_ = 0;
+};
 
 Json scene_json(const Workbench& workbench) {
   const SceneSettings scene = workbench.scene();
@@ -174,6 +201,19 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
                       "The tool and the obstacles, each with its name.",
                       [&bench](const Json&, const Caller&) { return Answer(scene_json(bench)); },
                       true});
+  table.add(
+      MethodRow{"scene.shapes",
+                Role::observer,
+                {},
+                "What the bodies look like: hands over the descriptor of a sealed memory with their "
+                "triangles beside the "
+                "answer (SCM_RIGHTS), and answers where in it they lie, where the bodies stand and how they "
+                "move by scene "
+                "time, which begins at scene_time_begins_ns. The memory stays the same while 'shapes' does.",
+                [&bench, kept = std::make_shared<ShapesKept>()](const Json&, const Caller&) {
+                  return kept->answer(bench);
+                },
+                true});
   table.add(MethodRow{
       "scene.load",
       Role::operator_,

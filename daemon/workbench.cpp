@@ -388,4 +388,19 @@ Workbench::HandedOver Workbench::handed_over() const {
   return {number_, sum_};
 }
 
+Workbench::Shown Workbench::shown() {
+  const std::lock_guard lock(mutex_);
+  const ServoLoop::Whereabouts seen = loop_.whereabouts();
+  const auto pose_of = [](const PlacementSettings& placed) {
+    return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
+  };
+  const DeviceSettings& device = plan_.settings.device;
+  return {scene_,
+          number_,
+          seen.at - from_seconds(seen.scene_time_s),
+          pose_of(device.base_in_world),
+          pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
+          plan_.profile.wrench_point};
+}
+
 }  // namespace wrenchd

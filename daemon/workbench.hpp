@@ -86,6 +86,16 @@ class Workbench {
     std::uint64_t sum;
   };
   HandedOver handed_over() const;
+  /// What there is to be drawn: the scene that was handed over last, and where and when it is.
+  struct Shown {
+    std::shared_ptr<const Scene> scene;
+    std::uint32_t number;         ///< of its rendering
+    TimePoint scene_time_begins;  ///< the time of the tick that is scene time 0
+    Pose X_WB;                    ///< device base in the world
+    Pose X_HT;                    ///< tool body in the handle
+    WrenchPoint wrench_point;     ///< what the wrenches in records are about
+  };
+  Shown shown();
 
   static constexpr double kSetsOutAfter_s = 0.200;
 

@@ -44,6 +44,7 @@
 #include "tools/report_text.hpp"
 #include "tools/solve.hpp"
 #include "tools/udev_rules.hpp"
+#include "tools/view/view.hpp"
 
 namespace {
 
@@ -544,6 +545,30 @@ void add_gallery(CLI::App& app, std::string& name) {
   });
 }
 
+void add_view(CLI::App& app, ViewOptions& options) {
+  CLI::App* view = app.add_subcommand("view",
+                                      "Serves a page that shows what the hand feels, to browsers on this\n"
+                                      "machine: of a daemon that runs, or of a recording");
+  view->group("A daemon that runs");
+  view->add_option("recording", options.recording, "HDF5 file of wrenchd --record; without it the daemon")
+      ->check(not_empty());
+  view->add_option("--port", options.port, "to listen on, at 127.0.0.1; 0: one that is free")
+      ->capture_default_str();
+  view->add_option("--socket", options.socket, "the daemon's control socket; without it as for status")
+      ->check(not_empty());
+  view->add_flag("--open", options.open, "open the page in a browser, by xdg-open");
+  view->add_option("-c,--config", options.files.config, "of a recording: the configuration it was made with")
+      ->capture_default_str()
+      ->check(not_empty());
+  view->add_option("--scene", options.files.scene, "the scene, where the command line named one")
+      ->check(not_empty());
+  view->add_option("--profile", options.files.profile, "the profile, likewise")->check(not_empty());
+  view->footer(
+      "Prints the address, which only works as a whole: it holds a token. The page arms with the rights of\n"
+      "whoever runs this, for as long as it is open and seen; anybody's stop works always.");
+  view->callback([&options] { run_view(options); });
+}
+
 /// What a daemon that runs is asked for.
 void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   const auto add = [&](const char* name, const char* what, auto&& run) {
@@ -625,6 +650,9 @@ int main(int argc, char** argv) {
   ControlOptions control_options;
   add_control(app, control_options, exit_code);
 
+  ViewOptions view_options;
+  add_view(app, view_options);
+
   FaultOptions fault_options;
   add_faults(app, fault_options);
 
@@ -661,7 +689,8 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
-          "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, "
+          "A subcommand (status, watch, view, arm, disarm, stop, acknowledge, reload, describe; solve, "
+          "check, "
           "decode, devices, doctor, encode, faults, gallery, mesh, profile, paper, replay or udev-rules)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");

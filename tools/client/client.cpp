@@ -52,12 +52,25 @@ const std::string& Client::socket() const noexcept {
   return connection_->place();
 }
 
-std::string Client::call(const std::string& method, const std::string& params) {
-  const json parsed = json::parse(params, nullptr, false);
+namespace {
+
+json parameters(const std::string& method, const std::string& params) {
+  json parsed = json::parse(params, nullptr, false);
   if (!parsed.is_object())
     throw ClientError(ClientError::kProtocol,
                       "the parameters of '" + method + "' are no JSON object: " + params);
-  return connection_->call(method, parsed).dump();
+  return parsed;
+}
+
+}  // namespace
+
+std::string Client::call(const std::string& method, const std::string& params) {
+  return connection_->call(method, parameters(method, params)).dump();
+}
+
+std::string Client::call(const std::string& method, const std::string& params, int& descriptor) {
+  descriptor = -1;
+  return connection_->call(method, parameters(method, params), &descriptor).dump();
 }
 
 std::string Client::state() {

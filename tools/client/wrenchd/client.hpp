@@ -40,6 +40,8 @@ class Client {
 
   /// Any method that describe() lists. params and the result are JSON objects.
   std::string call(const std::string& method, const std::string& params = "{}");
+  /// The same, for methods that hand over a descriptor: it is the caller's to close; -1 where none came.
+  std::string call(const std::string& method, const std::string& params, int& descriptor);
 
   std::string describe() { return call("describe"); }
   std::string status() { return call("status"); }

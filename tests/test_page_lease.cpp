@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <chrono>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "tests/support/stub_daemon.hpp"
+#include "tools/view/page_lease.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using namespace std::chrono_literals;
+
+namespace {
+
+using Wish = PageLease::Wish;
+
+template <class Done>
+bool soon(const Done& done) {
+  for (int i = 0; i < 500; ++i) {
+    if (done()) return true;
+    std::this_thread::sleep_for(10ms);
+  }
+  return false;
+}
+
+/// A daemon, and what the lease tells its pages.
+struct Rig {
+  StubDaemon daemon;
+  std::mutex mutex;
+  std::vector<PageLease::Told> told;
+  PageLease lease{daemon.socket(), [this](const PageLease::Told& one) {
+                    const std::scoped_lock lock(mutex);
+                    told.push_back(one);
+                  }};
+
+  Rig() {
+    soon([this] { return daemon.loop().state() == State::disarmed; });
+  }
+  bool was_told(std::uint64_t page, const std::string& what, bool done) {
+    return soon([&] {
+      const std::scoped_lock lock(mutex);
+      for (const PageLease::Told& one : told)
+        if (one.page == page && one.what == what && one.done == done) return true;
+      return false;
+    });
+  }
+  /// Lives for so long, at a frame's pace.
+  void live(std::uint64_t page, std::chrono::milliseconds time) {
+    for (const auto end = std::chrono::steady_clock::now() + time; std::chrono::steady_clock::now() < end;) {
+      lease.lives(page);
+      lease.loop_is(name(daemon.loop().state()));
+      std::this_thread::sleep_for(16ms);
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a page holds the lease for as long as it says that it lives", "[view]") {
+  Rig rig;
+  rig.lease.ask(1, Wish::arm);
+  REQUIRE(rig.was_told(1, "arm", true));
+  rig.live(1, 2 * PageLease::kSilentPage);
+  CHECK(rig.daemon.leased());
+  CHECK(rig.daemon.beats() > 20);
+  CHECK(rig.lease.holder() == 1);
+  const auto silent = std::chrono::steady_clock::now();
+  CHECK(soon([&] { return !rig.daemon.leased(); }));
+  CHECK(std::chrono::steady_clock::now() - silent > PageLease::kSilentPage / 2);
+  CHECK(rig.was_told(1, "lease", false));
+  CHECK(rig.lease.holder() == 0);
+}
+
+TEST_CASE("a page that is closed lets go at once", "[view]") {
+  Rig rig;
+  rig.lease.ask(1, Wish::arm);
+  REQUIRE(rig.was_told(1, "arm", true));
+  rig.lease.lives(1);
+  const auto closed = std::chrono::steady_clock::now();
+  rig.lease.gone(1);
+  CHECK(soon([&] { return !rig.daemon.leased(); }));
+  CHECK(std::chrono::steady_clock::now() - closed < PageLease::kSilentPage);
+}
+
+TEST_CASE("only the page that armed keeps it armed, and any page disarms", "[view]") {
+  Rig rig;
+  rig.lease.ask(1, Wish::arm);
+  REQUIRE(rig.was_told(1, "arm", true));
+  rig.live(1, 200ms);
+  rig.lease.ask(2, Wish::arm);
+  CHECK(rig.was_told(2, "arm", false));
+  CHECK(rig.lease.holder() == 1);
+  rig.lease.gone(2);  // it has nothing to let go of
+  rig.live(1, 200ms);
+  CHECK(rig.daemon.leased());
+  rig.lease.ask(3, Wish::disarm);
+  CHECK(rig.was_told(3, "disarm", true));
+  CHECK(rig.was_told(1, "lease", false));
+  CHECK(soon([&] { return !rig.daemon.leased(); }));
+}
+
+TEST_CASE("a stop goes to the daemon whoever asks, with or without the lease", "[view]") {
+  Rig rig;
+  rig.lease.ask(7, Wish::stop);
+  CHECK(rig.was_told(7, "stop", true));
+  const auto asked = rig.daemon.asked();
+  CHECK(std::find(asked.begin(), asked.end(), "stop") != asked.end());
+}
+
+TEST_CASE("a daemon that is not there is told to the page that asked", "[view]") {
+  Rig rig;
+  std::vector<PageLease::Told> told;
+  std::mutex mutex;
+  PageLease lost("/nowhere/control.sock", [&](const PageLease::Told& one) {
+    const std::scoped_lock lock(mutex);
+    told.push_back(one);
+  });
+  for (const Wish wish : {Wish::arm, Wish::stop}) lost.ask(1, wish);
+  CHECK(soon([&] {
+    const std::scoped_lock lock(mutex);
+    return told.size() == 2;
+  }));
+  const std::scoped_lock lock(mutex);
+  for (const PageLease::Told& one : told) {
+    CHECK_FALSE(one.done);
+    CHECK(one.text.find("/nowhere/control.sock") != std::string::npos);
+  }
+}

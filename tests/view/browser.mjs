@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the tests of the page share: the programs, and a browser that draws by software.
+import { spawn } from "node:child_process";
+import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+
+const binaries = process.env.WRENCHD_BINARY_DIR;
+export const source = process.env.WRENCHD_SOURCE_DIR;
+const CHROMIUM = "/usr/bin/chromium";
+const SKIPPED = 77;
+
+export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+
+/** Waits until it is so; fails, with what it was told to say, where it never is. */
+export async function until(what, holds, limit_ms = 60000) {
+  for (const end = Date.now() + limit_ms; Date.now() < end; await sleep(50)) {
+    const value = await holds();
+    if (value) return value;
+  }
+  throw new Error(`it never came to this: ${what}`);
+}
+
+const running = [];
+const directory = mkdtempSync(join(tmpdir(), "wrenchd-view-"));
+export const file = (name) => join(directory, name);
+
+/** A program that runs beside the test; out: what it has said. */
+export function start(program, words) {
+  const child = spawn(join(binaries, program), words);
+  const one = { child, out: "", err: "", ended: new Promise((done) => child.on("close", done)) };
+  child.stdout.on("data", (data) => (one.out += data));
+  child.stderr.on("data", (data) => (one.err += data));
+  running.push(one);
+  return one;
+}
+
+export async function finished(program, words) {
+  const one = start(program, words);
+  const code = await one.ended;
+  if (code !== 0) throw new Error(`${program} ${words.join(" ")} ended with ${code}: ${one.err}`);
+  return one.out;
+}
+
+/** A daemon with the simulated device. Where tests share a machine its loop may be late, which is no fault here. */
+export async function daemon(more = []) {
+  const socket = file("control.sock");
+  const one = start("wrenchd", ["--realtime", "best_effort", "--control", socket, ...more]);
+  await until("the daemon answers", () => existsSync(socket) && /disarmed/.test(one.err));
+  return { ...one, socket, status: async () => JSON.parse(await finished("wrenchctl", ["status", "--json", "--socket", socket])) };
+}
+
+/** The view, and the address that it prints. */
+export async function view(words) {
+  const one = start("wrenchctl", ["view", ...words]);
+  const url = await until(`an address (${one.err})`, () => /http:\S+/.exec(one.out)?.[0]);
+  return { ...one, url };
+}
+
+let browser;
+/** A page, of which every complaint fails the test. */
+export async function open(url, options = {}) {
+  if (!existsSync(CHROMIUM)) {
+    console.log(`skipped: ${CHROMIUM} is not there; install the package chromium`);
+    await end(SKIPPED);
+  }
+  const { chromium } = await import(pathToFileURL(join(process.env.WRENCHD_TEST_LIBRARIES, "node_modules/playwright-core/index.mjs")));
+  browser ??= await chromium.launch({
+    executablePath: CHROMIUM,
+    args: ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+      "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+  });
+  const page = await browser.newPage({ viewport: { width: 1280, height: 720 }, ...options });
+  page.setDefaultTimeout(60000);
+  const complaints = [];
+  page.on("pageerror", (error) => complaints.push(error.message));
+  page.on("console", (message) => ["error", "warning"].includes(message.type()) && complaints.push(message.text()));
+  page.on("request", (request) => !request.url().startsWith(new URL(url).origin) && !request.url().startsWith("data:") && complaints.push(`asks for ${request.url()}`));
+  await page.goto(url);
+  // Software that draws slowly says so; that is no complaint of ours.
+  const own = () => complaints.filter((text) => !/GPU stall|GL Driver|swiftshader/i.test(text));
+  return Object.assign(page, { complaints: own });
+}
+
+export const text = (page, id) => page.locator(`#${id}`).textContent();
+
+async function end(code) {
+  await browser?.close();
+  for (const { child } of running) if (child.exitCode === null) child.kill("SIGTERM");
+  await Promise.race([Promise.all(running.map(({ ended }) => ended)), sleep(5000)]);
+  for (const { child } of running) if (child.exitCode === null) child.kill("SIGKILL");
+  rmSync(directory, { recursive: true, force: true });
+  process.exit(code);
+}
+
+/** Runs what is given, and ends the process with its outcome, and everything that it has started. */
+export async function test(run) {
+  try {
+    await run();
+    await end(0);
+  } catch (error) {
+    console.error(error);
+    for (const { err } of running) if (err !== "") console.error(err.trimEnd().split("\n").slice(-12).join("\n"));
+    await end(1);
+  }
+}
+
+export { readFileSync };

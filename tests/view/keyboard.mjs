@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Everything by keys alone; light and dark; narrow and wide.
+import assert from "node:assert/strict";
+import { daemon, open, test, text, until, view } from "./browser.mjs";
+
+test(async () => {
+  const wrenchd = await daemon();
+  const { url } = await view(["--socket", wrenchd.socket]);
+  const state = async () => (await wrenchd.status()).state;
+  const page = await open(url, { viewport: { width: 1000, height: 600 } });
+  await until("the page shows the state", async () => (await text(page, "state")) === "disarmed");
+
+  // A stop from anywhere, by Space and by Escape, and even where Space would press a button.
+  for (const key of ["Space", "Escape"]) {
+    await until("it is armed", async () => {
+      const now = await state();
+      if (now === "fault" || now === "stopped") await page.keyboard.press("k");
+      if (now === "disarmed") await page.keyboard.press("a");
+      return now === "active";
+    });
+    await page.locator("#theme").focus();
+    await page.keyboard.press(key);
+    await until(`${key} stops`, async () => (await state()) === "stopped");
+    assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), "auto");
+  }
+  await page.keyboard.press("k");
+  await until("k acknowledges", async () => (await state()) === "disarmed");
+
+  // The focus goes where it is seen to go.
+  await page.locator("#arm").focus();
+  const visited = ["arm"];
+  for (let i = 0; i < 9; ++i) {
+    await page.keyboard.press("Tab");
+    const { id, outline } = await page.evaluate(() => {
+      const style = getComputedStyle(document.activeElement);
+      return { id: document.activeElement.id, outline: style.outlineStyle !== "none" && Number.parseFloat(style.outlineWidth) >= 2 };
+    });
+    visited.push(id);
+    if (id !== "") assert.ok(outline, `the focus on ${id} is not seen`);
+  }
+  for (const id of ["arm", "stop", "fit", "theme", "help", "canvas"]) assert.ok(visited.includes(id), `${id} of ${visited}`);
+  assert.ok(visited.indexOf("arm") < visited.indexOf("stop") && visited.indexOf("stop") < visited.indexOf("canvas"));
+
+  await page.keyboard.press("?");
+  await until("the keys are listed", () => page.locator("#keys").isVisible());
+  await page.keyboard.press("Enter");
+  await until("the list is closed", async () => !(await page.locator("#keys").isVisible()));
+
+  const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const light = await ground();
+  await page.keyboard.press("t");
+  await page.keyboard.press("t");
+  assert.notEqual(await ground(), light);
+
+  // Nothing is cut off, or wider than the window.
+  for (const [width, height] of [[1280, 720], [1920, 1080], [420, 800]]) {
+    await page.setViewportSize({ width, height });
+    const spills = await page.evaluate(() => {
+      const wide = document.documentElement.scrollWidth > innerWidth;
+      const outside = [...document.querySelectorAll("button, .state, output, figcaption")].filter((e) => {
+        const box = e.getBoundingClientRect();
+        return box.width > 0 && (box.left < -1 || box.right > innerWidth + 1);
+      });
+      return [wide, ...outside.map((e) => e.id || e.className)];
+    });
+    assert.deepEqual(spills, [false], `${width} x ${height}`);
+    if (width > 900) {
+      const high = await page.evaluate(() => document.documentElement.scrollHeight <= innerHeight);
+      assert.ok(high, `${width} x ${height} has to be scrolled`);
+    }
+  }
+  assert.deepEqual(page.complaints(), []);
+});

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A running daemon: the page shows it, arms it, and is watched while it does.
+import assert from "node:assert/strict";
+import { daemon, open, sleep, test, text, until, view } from "./browser.mjs";
+
+const ARMED = ["waiting", "ramping", "active", "degraded"];
+
+test(async () => {
+  const wrenchd = await daemon();
+  const server = await view(["--socket", wrenchd.socket]);
+  const state = async () => (await wrenchd.status()).state;
+  const small = { viewport: { width: 700, height: 500 } };  // software draws it: a page that is slow is disarmed
+  const page = await open(server.url, small);
+  await until("the page shows the state", async () => (await text(page, "state")) === "disarmed");
+  await until("the scene is there", () => page.evaluate(() => window.view.world().ghost !== null));
+  assert.equal(await page.locator("#disarm").isDisabled(), true);
+
+  const armed = async () => {
+    await until("it is armed", async () => {
+      const now = await state();
+      if (now === "fault") await page.locator("#acknowledge").click();  // a busy machine
+      if (now === "disarmed") await page.locator("#arm").click({ timeout: 1000 }).catch(() => {});
+      return ARMED.includes(now);
+    });
+  };
+
+  // Armed: force is felt and shown.
+  await armed();
+  await until("the page says who armed", async () => /process/.test(await text(page, "armed-by")));
+  await until("a force is shown", async () => Number(await text(page, "force")) > 0.5);
+  const { frame, world } = await page.evaluate(() => ({ frame: window.view.frame(), world: window.view.world() }));
+  frame.p.forEach((x, i) => assert.ok(Math.abs(world.ghost[i] - x) < 1e-6));
+  assert.ok(frame.touches.length > 0 && frame.touches[0].obstacle === "table");
+
+  // Disarmed on purpose is no fault.
+  await armed();
+  await page.keyboard.press("d");
+  await until("it is disarmed", async () => (await state()) === "disarmed" && (await wrenchd.status()).lease === null);
+  assert.equal((await wrenchd.status()).cause, null);
+
+  // A page that hangs lets go.
+  await armed();
+  const hung = page.evaluate(() => {
+    for (const end = performance.now() + 4000; performance.now() < end;);
+  });
+  await until("it is disarmed while the page hangs", async () => !ARMED.includes(await state()), 3900);
+  await hung;
+  await until("the page says why", async () => /nobody has seen this page/.test(await text(page, "toast")));
+
+  // Stop, by the button, whoever armed.
+  await armed();
+  await page.locator("#stop").click();
+  await until("it is stopped", async () => (await state()) === "stopped");
+  await until("the banner says what to do", async () => /cknowledge/.test(await text(page, "banner-cure")));
+  await page.locator("#acknowledge").click();
+  await until("it is disarmed again", async () => (await state()) === "disarmed");
+
+  // A tab that is closed lets go.
+  await armed();
+  assert.deepEqual(page.complaints(), []);
+  await page.close();
+  await until("it is disarmed when the tab is closed", async () => !ARMED.includes(await state()), 3000);
+
+  // A daemon that ends is told, and one that comes back is shown again.
+  const again = await open(server.url, small);
+  await until("the page shows the daemon", async () => (await text(again, "state")) === "disarmed");
+  wrenchd.child.kill("SIGTERM");
+  await wrenchd.ended;
+  await until("the page says that it is gone", async () => (await text(again, "state")) === "connection lost");
+  assert.match(await text(again, "banner-what"), /No connection to wrenchd/);
+  assert.equal(await again.locator("#arm").isDisabled(), true);
+  await daemon();
+  await until("it is back", async () => (await text(again, "state")) === "disarmed");
+  assert.equal(await again.locator("#banner").isVisible(), false);
+
+  // So is the end of the view.
+  server.child.kill("SIGTERM");
+  await until("the page says that nobody serves it", async () => /wrenchctl view/.test(await text(again, "banner-what")));
+  await sleep(100);
+});

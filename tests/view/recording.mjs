@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The page shows what the recording says: its numbers and its scene, held against the columns as h5py reads them.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { writeFileSync } from "node:fs";
+import { file, finished, open, source, test, text, until, view } from "./browser.mjs";
+
+// In virtual time a tick takes no time at all: one is made to have taken long.
+const COLUMNS = `
+import h5py, json, sys
+with h5py.File(sys.argv[1], "r+") as f:
+    row = f["ticks"][7000]
+    row["stage_ns"][1] = 1234567
+    f["ticks"][7000] = row
+ticks = h5py.File(sys.argv[1])["ticks"][:]
+begin = int(ticks["now_ns"][0])
+rows = []
+for i in map(int, sys.argv[2:]):
+    r = ticks[i % len(ticks)]
+    rows.append({"t": (int(r["now_ns"]) - begin) * 1e-9, "tick": int(r["tick"]), "state": int(r["state"]),
+                 **{k: [float(x) for x in r[k]] for k in ("X_WP", "X_WQ", "F_out")},
+                 "energy": float(r["energy"]), "contacts": int(r["contacts"]), "authority": float(r["authority"])})
+last_ten = ticks[ticks["now_ns"] > int(ticks["now_ns"][-1]) - 10 * 10**9]
+print(json.dumps({"rows": rows, "count": len(ticks), "end": (int(ticks["now_ns"][-1]) - begin) * 1e-9,
+                  "most_force_N": float(max((last_ten["F_out"][:, :3] ** 2).sum(1) ** 0.5)),
+                  "longest_us": float(last_ten["stage_ns"].sum(1).max()) * 1e-3}))`;
+const STATES = ["disconnected", "self-test", "disarmed", "waiting", "ramping", "active", "degraded", "releasing", "fault", "stopped", "shutdown"];
+
+const near = (got, expected, within, what) => assert.ok(Math.abs(got - expected) <= within, `${what}: ${got}, and ${expected} was recorded`);
+const length3 = ([x, y, z]) => Math.hypot(x, y, z);
+
+test(async () => {
+  const recording = file("run.h5");
+  await finished("wrenchd", ["--virtual-time", "--seconds", "8", "--arm", "--record", recording, "--control", "none"]);
+  const script = file("columns.py");
+  writeFileSync(script, COLUMNS);
+  const numbers = [100, 2500, 3210, 4000, 5555, 6789, -1];
+  const columns = JSON.parse(execFileSync("/usr/bin/python3", [script, recording, ...numbers.map(String)]));
+  assert.ok(columns.rows.some(({ state, contacts }) => STATES[state] === "active" && contacts > 0));
+
+  const { url } = await view([recording, "--config", `${source}/config/wrenchd.toml`]);
+  const page = await open(url);
+  await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));
+  assert.equal(await page.locator("#stop").isVisible(), false);
+  near(Number(await page.locator("#scrub").getAttribute("max")), columns.end, 1e-6, "its end");
+
+  for (const row of columns.rows) {
+    await page.evaluate((t) => {
+      const slider = document.getElementById("scrub");
+      slider.step = "any";
+      slider.value = t;
+      slider.dispatchEvent(new Event("input"));
+    }, row.t + 1e-5);
+    await until(`tick ${row.tick} is shown`, async () => (await text(page, "tick")) === String(row.tick));
+    const what = `tick ${row.tick}`;
+    assert.equal(await text(page, "state"), STATES[row.state], what);
+    near(Number(await text(page, "force")), length3(row.F_out), 0.00501, `${what}, force`);
+    near(Number(await text(page, "torque")), 1e3 * length3(row.F_out.slice(3)), 0.0501, `${what}, torque`);
+    const gap = [0, 1, 2].map((i) => row.X_WQ[i] - row.X_WP[i]);
+    near(Number(await text(page, "depth")), 1e3 * length3(gap), 0.000501, `${what}, penetration`);
+    near(Number(await text(page, "energy")), 1e6 * row.energy, 0.0000501, `${what}, energy`);
+    near(Number(await text(page, "authority")), 100 * row.authority, 0.501, `${what}, authority`);
+    assert.equal(await text(page, "contacts"), String(row.contacts), what);
+    const world = await page.evaluate(() => window.view.world());
+    row.X_WP.forEach((x, i) => near(world.ghost[i], x, 1e-6, `${what}, ghost`));
+    row.X_WQ.forEach((x, i) => near(world.tool[i], x, 1e-6, `${what}, tool`));
+    const force = row.F_out.slice(0, 3);
+    if (length3(force) > 0.1) force.forEach((x, i) => near(world.force[i], x / length3(force), 1e-5, `${what}, arrow`));
+  }
+
+  // At the end: the curves and the histogram have the extremes of single ticks.
+  const most = await page.evaluate(() => Math.max(...window.view.history().values[3]));
+  near(most, columns.most_force_N, 1e-9, "the greatest force of the curve");
+  const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.took.max_us));
+  near(longest, columns.longest_us, 1e-6, "the longest tick");
+  assert.ok((await page.evaluate(() => window.view.world().triangles)) > 20);
+
+  // Keys: to the beginning, a tick, a tenth of a second, play, pause.
+  await page.keyboard.press("Home");
+  await until("the beginning", async () => (await text(page, "play-time")) === "0.000 s");
+  await page.keyboard.press("ArrowRight");
+  await until("a tenth of a second", async () => (await text(page, "play-time")) === "0.100 s");
+  await page.keyboard.press("Space");
+  await until("it plays", async () => Number.parseFloat(await text(page, "play-time")) > 1);
+  assert.equal(await text(page, "play"), "Pause");
+  await page.keyboard.press("Space");
+  assert.equal(await text(page, "play"), "Play");
+  assert.deepEqual(page.complaints(), []);
+});

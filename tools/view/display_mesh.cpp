@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/view/display_mesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_map>
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+namespace wrenchd {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Triangle = std::array<std::uint32_t, 3>;
+
+struct Surface {
+  std::vector<Vector3d> vertices;
+  std::vector<Triangle> triangles;
+
+  Vector3d area(const Triangle& t) const {
+    return 0.5 * (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
+  }
+};
+
+/// What is known of the vertices that become one: the squared distances to the planes of their triangles.
+struct Cell {
+  Vector3d sum = Vector3d::Zero();  ///< of vertices
+  double count = 0.0;
+  Matrix3d A = Matrix3d::Zero();
+  Vector3d b = Vector3d::Zero();
+  std::uint32_t number = 0;
+
+  /// Where those distances are least; where that is anywhere along a line or a plane, nearest to the mean.
+  Vector3d best(double reach) const {
+    constexpr double kFlat =
+        1e-3;  ///< of the greatest: planes that differ by less say nothing of a direction
+    const Vector3d mean = sum / count;
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(A);
+    const Vector3d rest = b - A * mean;
+    Vector3d step = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) {
+      const double lambda = solver.eigenvalues()[i];
+      if (lambda <= kFlat * solver.eigenvalues()[2] || lambda <= 0.0) continue;
+      step += solver.eigenvectors().col(i) * (solver.eigenvectors().col(i).dot(rest) / lambda);
+    }
+    return step.norm() <= reach ? Vector3d(mean + step) : mean;
+  }
+};
+
+Surface clustered(const Surface& fine, const Vector3d& origin, double side) {
+  std::unordered_map<std::uint64_t, Cell> cells;
+  cells.reserve(fine.vertices.size() / 4);
+  std::vector<Cell*> cell_of(fine.vertices.size());
+  for (std::size_t i = 0; i < fine.vertices.size(); ++i) {
+    std::uint64_t key = 0;
+    for (int k = 0; k < 3; ++k)  // 21 bits each: fine enough for any mesh that has to be made coarser
+      key = key << 21U | (static_cast<std::uint64_t>((fine.vertices[i][k] - origin[k]) / side) & 0x1fffffU);
+    Cell& cell = cells[key];
+    if (cell.count == 0.0) cell.number = static_cast<std::uint32_t>(cells.size() - 1);
+    cell.sum += fine.vertices[i];
+    cell.count += 1.0;
+    cell_of[i] = &cell;
+  }
+  for (const Triangle& t : fine.triangles) {
+    const Vector3d area = fine.area(t);
+    const double size = area.norm();
+    if (size == 0.0) continue;
+    const Vector3d n = area / size;
+    for (const std::uint32_t v : t) {
+      cell_of[v]->A += size * n * n.transpose();
+      cell_of[v]->b += size * n * n.dot(fine.vertices[t[0]]);
+    }
+  }
+  Surface coarse;
+  coarse.vertices.resize(cells.size());
+  for (const auto& [key, cell] : cells) coarse.vertices[cell.number] = cell.best(side);
+  for (const Triangle& t : fine.triangles) {
+    Triangle c = {cell_of[t[0]]->number, cell_of[t[1]]->number, cell_of[t[2]]->number};
+    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
+    std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
+    coarse.triangles.push_back(c);
+  }
+  std::sort(coarse.triangles.begin(), coarse.triangles.end());
+  coarse.triangles.erase(std::unique(coarse.triangles.begin(), coarse.triangles.end()),
+                         coarse.triangles.end());
+  return coarse;
+}
+
+Surface coarser(const Surface& fine, std::size_t most) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : fine.vertices) box.extend(p);
+  double area = 0.0;
+  for (const Triangle& t : fine.triangles) area += fine.area(t).norm();
+  // About two triangles a cell that the surface passes through.
+  double side = std::max(std::sqrt(2.0 * area / static_cast<double>(most)), box.sizes().maxCoeff() / 2e6);
+  constexpr int kTries = 20;
+  Surface coarse;
+  for (int i = 0; i < kTries; ++i) {
+    coarse = clustered(fine, box.min(), side);
+    if (coarse.triangles.size() <= most) break;
+    side *= 1.05 * std::sqrt(static_cast<double>(coarse.triangles.size()) / static_cast<double>(most));
+  }
+  return coarse;
+}
+
+/// The triangles at each vertex, one after the other.
+struct Around {
+  std::vector<std::uint32_t> begin, triangles;
+
+  explicit Around(const Surface& s) : begin(s.vertices.size() + 1, 0), triangles(3 * s.triangles.size()) {
+    for (const Triangle& t : s.triangles)
+      for (const std::uint32_t v : t) ++begin[v + 1];
+    for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+    std::vector<std::uint32_t> at(begin.begin(), begin.end() - 1);
+    for (std::uint32_t i = 0; i < s.triangles.size(); ++i)
+      for (const std::uint32_t v : s.triangles[i]) triangles[at[v]++] = i;
+  }
+  std::span<const std::uint32_t> of(std::uint32_t v) const {
+    return {triangles.data() + begin[v], begin[v + 1] - begin[v]};
+  }
+};
+
+void append(std::vector<float>& to, const Vector3d& v) {
+  for (int i = 0; i < 3; ++i) to.push_back(static_cast<float>(v[i]));
+}
+
+void draw(const Surface& s, DisplayMesh& out) {
+  const double bend = std::cos(kCrease_rad);
+  std::vector<Vector3d> areas, normals;
+  for (const Triangle& t : s.triangles) {
+    areas.push_back(s.area(t));
+    normals.push_back(areas.back().stableNormalized());
+  }
+  const Around around(s);
+  out.positions.reserve(9 * s.triangles.size());
+  out.normals.reserve(9 * s.triangles.size());
+  for (std::uint32_t i = 0; i < s.triangles.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t v = s.triangles[i][static_cast<std::size_t>(k)];
+      const std::uint32_t w = s.triangles[i][static_cast<std::size_t>((k + 1) % 3)];
+      Vector3d normal = Vector3d::Zero();
+      for (const std::uint32_t j : around.of(v))
+        if (normals[j].dot(normals[i]) >= bend) normal += areas[j];
+      append(out.positions, s.vertices[v]);
+      append(out.normals, normal.isZero(0.0) ? normals[i] : Vector3d(normal.stableNormalized()));
+      bool smooth = false, other = false;
+      for (const std::uint32_t j : around.of(v)) {
+        const Triangle& t = s.triangles[j];
+        if (j == i || std::find(t.begin(), t.end(), w) == t.end()) continue;
+        other = true;
+        smooth = smooth || normals[j].dot(normals[i]) >= bend;
+      }
+      if (smooth || (other && v > w)) continue;  // of two triangles one draws their edge
+      append(out.lines, s.vertices[v]);
+      append(out.lines, s.vertices[w]);
+    }
+}
+
+}  // namespace
+
+DisplayMesh display_mesh(std::span<const float> vertices, std::span<const Triangle> triangles,
+                         std::size_t most) {
+  Surface surface;
+  for (std::size_t i = 0; i + 2 < vertices.size(); i += 3)
+    surface.vertices.emplace_back(vertices[i], vertices[i + 1], vertices[i + 2]);
+  for (const Triangle& t : triangles)
+    for (const std::uint32_t v : t)
+      if (v >= surface.vertices.size())
+        throw std::invalid_argument("a triangle names vertex " + std::to_string(v) + " of " +
+                                    std::to_string(surface.vertices.size()));
+  surface.triangles.assign(triangles.begin(), triangles.end());
+  DisplayMesh out;
+  out.triangles_given = triangles.size();
+  if (triangles.size() > most) surface = coarser(surface, most);
+  draw(surface, out);
+  return out;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/view/live_feed.hpp"
+
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace wrenchd {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kAgain = 300ms;      ///< between two attempts to connect
+constexpr auto kWatched = 6ms;      ///< between two looks: a frame has ticks that are no older
+constexpr auto kUnwatched = 100ms;  ///< the memory keeps two seconds
+constexpr auto kStatusEvery =
+    1s;  ///< what no event tells: who has the lease is told, how long ticks take is not
+constexpr std::size_t kMostEvents = 200;
+
+/// Memory of another process, for as long as it is looked at.
+class Mapped {
+ public:
+  explicit Mapped(int descriptor) {
+    struct stat file {};
+    if (descriptor >= 0 && fstat(descriptor, &file) == 0) {
+      bytes_ = static_cast<std::size_t>(file.st_size);
+      memory_ = mmap(nullptr, bytes_, PROT_READ, MAP_SHARED, descriptor, 0);
+    }
+    if (descriptor >= 0) close(descriptor);
+    if (memory_ == MAP_FAILED) throw std::runtime_error("the shapes of the scene cannot be mapped");
+  }
+  ~Mapped() { munmap(memory_, bytes_); }
+  Mapped(const Mapped&) = delete;
+  Mapped& operator=(const Mapped&) = delete;
+  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(memory_), bytes_}; }
+
+ private:
+  void* memory_ = MAP_FAILED;
+  std::size_t bytes_ = 0;
+};
+
+void pause(const std::stop_token& stop, std::chrono::milliseconds time) {
+  for (const auto end = std::chrono::steady_clock::now() + time;
+       !stop.stop_requested() && std::chrono::steady_clock::now() < end;)
+    std::this_thread::sleep_for(std::min<std::chrono::milliseconds>(time, 20ms));
+}
+
+}  // namespace
+
+LiveFeed::LiveFeed(std::string socket) : socket_(std::move(socket)) {
+  link_.why = "looking for wrenchd";
+  reading_ = std::jthread([this](const std::stop_token& stop) { follow(stop); });
+  scene_thread_ = std::jthread([this](const std::stop_token& stop) { follow_scene(stop); });
+}
+
+LiveFeed::~LiveFeed() {
+  reading_.request_stop();
+  scene_thread_.request_stop();
+}
+
+void LiveFeed::disconnected(const std::string& why) {
+  connection_.store(0);
+  const std::scoped_lock lock(mutex_);
+  if (link_.connected || link_.why != why) ++link_.told;
+  link_.connected = false;
+  link_.why = why;
+}
+
+void LiveFeed::follow(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    try {
+      Client client(socket_);
+      client.subscribe();
+      StateReader reader = client.open_state();
+      ask_status(client);
+      {
+        const std::scoped_lock lock(mutex_);
+        link_.connected = true;
+        link_.why.clear();
+        link_.rate_Hz = reader.rate_Hz();
+        connection_.store(++link_.number);
+        ++link_.told;
+        history_ = Extremes(kStretch_ns, kKept);
+        took_ = late_ = RecentTimes{};
+      }
+      read(client, reader, stop);
+    } catch (const ClientError& error) {
+      disconnected(error.what());
+    }
+    pause(stop, kAgain);
+  }
+}
+
+void LiveFeed::read(Client& client, StateReader& reader, const std::stop_token& stop) {
+  TickState state;
+  auto ask_again = std::chrono::steady_clock::now() + kStatusEvery;
+  while (!stop.stop_requested()) {
+    bool any = false;
+    while (reader.next(state, 0ms)) {
+      any = true;
+      const ViewTick tick = view_tick(state);
+      const ChannelValues values = tick.channels();
+      const std::scoped_lock lock(mutex_);
+      history_.add(tick.time_ns, values);
+      took_.add(tick.time_ns, tick.took_ns);
+      late_.add(tick.time_ns, tick.late_ns);
+    }
+    if (any) {
+      Now now{view_tick(state), view_words(state), reader.missed()};
+      rendering_.store(now.tick.rendering);
+      const std::scoped_lock lock(mutex_);
+      now_ = std::move(now);
+    }
+    bool news = std::chrono::steady_clock::now() >= ask_again;
+    ClientEvent event;
+    while (client.poll_event(event, 0ms)) {
+      news = news || event.name != "log";
+      const std::scoped_lock lock(mutex_);
+      if (events_.size() < kMostEvents) events_.push_back(event.json);
+    }
+    if (news) {
+      ask_status(client);
+      ask_again = std::chrono::steady_clock::now() + kStatusEvery;
+    }
+    std::this_thread::sleep_for(watched_.load() ? kWatched : kUnwatched);
+  }
+}
+
+void LiveFeed::ask_status(Client& client) {
+  Json status = Json::parse(client.status());
+  const std::scoped_lock lock(mutex_);
+  if (status == link_.status) return;
+  link_.status = std::move(status);
+  ++link_.told;
+}
+
+/// The scene is fetched with each connection, and whenever the ticks are of another rendering.
+void LiveFeed::follow_scene(const std::stop_token& stop) {
+  std::uint64_t of_connection = 0;
+  std::uint32_t of_rendering = 0;
+  for (; !stop.stop_requested(); std::this_thread::sleep_for(30ms)) {
+    const std::uint64_t connection = connection_.load();
+    const std::uint32_t rendering = rendering_.load();
+    if (connection == 0 || (connection == of_connection && rendering == of_rendering)) continue;
+    try {
+      if (connection != of_connection) {
+        const std::scoped_lock lock(mutex_);
+        scene_ = nullptr;  // another daemon may count its meshes as the last did
+      }
+      Client client(socket_, 60s);
+      fetch_scene(client);
+      of_connection = connection;
+      of_rendering = rendering;
+    } catch (const std::exception& error) {
+      {
+        const std::scoped_lock lock(mutex_);
+        why_no_scene_ = error.what();
+      }
+      pause(stop, 1s);
+    }
+  }
+}
+
+void LiveFeed::fetch_scene(Client& client) {
+  int descriptor = -1;
+  const Json description = Json::parse(client.call("scene.shapes", "{}", descriptor));
+  const Mapped memory(descriptor);
+  const auto known = scene();
+  auto made = std::make_shared<const ViewScene>(description, memory.bytes(), known.get());
+  const std::scoped_lock lock(mutex_);
+  scene_ = std::move(made);
+  why_no_scene_.clear();
+}
+
+LiveFeed::Link LiveFeed::link() const {
+  const std::scoped_lock lock(mutex_);
+  return link_;
+}
+
+std::optional<LiveFeed::Now> LiveFeed::now() const {
+  const std::scoped_lock lock(mutex_);
+  return now_;
+}
+
+std::shared_ptr<const ViewScene> LiveFeed::scene() const {
+  const std::scoped_lock lock(mutex_);
+  return scene_;
+}
+
+std::string LiveFeed::why_no_scene() const {
+  const std::scoped_lock lock(mutex_);
+  return why_no_scene_;
+}
+
+RecentTimes::Sum LiveFeed::took() const {
+  const std::scoped_lock lock(mutex_);
+  return took_.sum();
+}
+
+RecentTimes::Sum LiveFeed::late() const {
+  const std::scoped_lock lock(mutex_);
+  return late_.sum();
+}
+
+void LiveFeed::look_at_history(const std::function<void(const Extremes&)>& look) const {
+  const std::scoped_lock lock(mutex_);
+  look(history_);
+}
+
+std::vector<std::string> LiveFeed::events() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+std::string LiveFeed::state() const {
+  const std::scoped_lock lock(mutex_);
+  return now_ ? now_->words.state : std::string();
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <wrenchd/client.hpp>
+
+#include "daemon/json_rpc.hpp"
+#include "tools/view/extremes.hpp"
+#include "tools/view/recent_times.hpp"
+#include "tools/view/view_scene.hpp"
+#include "tools/view/view_tick.hpp"
+
+namespace wrenchd {
+
+/// What a running daemon shows: its ticks through shared memory, its events and its status as they come, and
+/// its scene. Connects by itself, again and again. Two threads of its own, one for the ticks and one for the
+/// scene, which may take seconds to be made ready; whoever asks never waits for either for long.
+class LiveFeed {
+ public:
+  static constexpr std::int64_t kStretch_ns = 10'000'000;
+  static constexpr std::size_t kKept = 1'000;  ///< ten seconds
+
+  /// socket: as Client has it.
+  explicit LiveFeed(std::string socket);
+  ~LiveFeed();
+  LiveFeed(const LiveFeed&) = delete;
+  LiveFeed& operator=(const LiveFeed&) = delete;
+
+  /// Whether anybody looks; else the ticks are taken in larger portions.
+  void watched(bool by_anybody) noexcept { watched_.store(by_anybody); }
+
+  /// What there is now. Any thread.
+  struct Link {
+    bool connected = false;
+    std::string why;           ///< it is not
+    std::uint64_t number = 0;  ///< one more with each connection
+    double rate_Hz = 0.0;
+    Json status;             ///< as the daemon told it last; null before
+    std::uint64_t told = 0;  ///< one more whenever status or why is another
+  };
+  Link link() const;
+  /// The newest tick. Nothing where there was none yet.
+  struct Now {
+    ViewTick tick;
+    ViewWords words;
+    std::uint64_t missed = 0;
+  };
+  std::optional<Now> now() const;
+  std::shared_ptr<const ViewScene> scene() const;
+  std::string why_no_scene() const;
+  RecentTimes::Sum took() const;
+  RecentTimes::Sum late() const;
+  /// With the lock held for so long.
+  void look_at_history(const std::function<void(const Extremes&)>& look) const;
+  /// Events since the last call, oldest first: their JSON.
+  std::vector<std::string> events();
+  std::string state() const;  ///< of the newest tick
+
+  const std::string& socket() const noexcept { return socket_; }
+
+ private:
+  void follow(const std::stop_token& stop);
+  void read(Client& client, StateReader& reader, const std::stop_token& stop);
+  void ask_status(Client& client);
+  void disconnected(const std::string& why);
+  void follow_scene(const std::stop_token& stop);
+  void fetch_scene(Client& client);
+
+  std::string socket_;
+  std::atomic<bool> watched_{false};
+  std::atomic<std::uint32_t> rendering_{0};
+  std::atomic<std::uint64_t> connection_{0};  ///< 0: none
+
+  mutable std::mutex mutex_;  ///< of what follows
+  Link link_;
+  std::optional<Now> now_;
+  Extremes history_{kStretch_ns, kKept};
+  RecentTimes took_, late_;
+  std::vector<std::string> events_;
+  std::shared_ptr<const ViewScene> scene_;
+  std::string why_no_scene_;
+
+  std::jthread reading_, scene_thread_;  ///< last: they use all of the above
+};
+
+}  // namespace wrenchd

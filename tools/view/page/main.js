@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The page of wrenchctl view: what comes in is shown, what is pressed is said.
+import { Connection } from "./connection.js";
+import { History, Plots } from "./plots.js";
+import { World } from "./world.js";
+
+const $ = (id) => document.getElementById(id);
+const root = document.documentElement;
+const PLOTS_EVERY_MS = 50;
+const ALIVE_EVERY_MS = 100;
+const STATES = { gone: "connection lost" };
+const ARMED = ["waiting", "ramping", "active", "degraded"];
+
+const world = new World($("canvas"));
+const plots = new Plots();
+const history = new History();
+
+let mode = "none";
+let page = 0;
+let faults = {};
+let frame = null;
+let link = null;
+let rate_Hz = 0;
+let lastFault = null;
+let times = null;
+let connected = false;
+
+const set = (id, text) => {
+  const element = $(id);
+  if (element.textContent !== text) element.textContent = text;
+};
+/** The daemon's tables have no capitals and no full stops. */
+const sentence = (text) => (text === "" ? "" : text[0].toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : "."));
+const fixed = (x, digits) => (x === null || x === undefined ? "–" : x.toFixed(digits));
+const length3 = ([x, y, z]) => Math.hypot(x, y, z);
+const ago = (s) => (s < 100 ? `${s.toFixed(0)} s` : s < 6000 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(1)} h`);
+const running = (tick) => (rate_Hz > 0 ? `running for ${ago(tick / rate_Hz)}` : "–");
+const readable = (name) => name.replaceAll("_", " ");
+
+// --- what is shown ---
+
+function showState(state) {
+  const chip = $("state");
+  set("state", STATES[state] ?? readable(state));
+  if (chip.dataset.state !== state) chip.dataset.state = state;
+}
+
+function showFrame(now) {
+  const { F } = now;
+  set("force", fixed(length3(F.slice(0, 3)), 2));
+  set("torque", fixed(1e3 * length3(F.slice(3)), 1));
+  set("depth", now.depth_m === null ? "–" : fixed(1e3 * now.depth_m, 3));
+  set("angle", now.angle_rad === null ? "–" : fixed((180 / Math.PI) * now.angle_rad, 2));
+  set("energy", now.energy === null ? "–" : fixed(1e6 * now.energy, 4));
+  set("authority", fixed(100 * now.authority, 0));
+  set("contacts", String(now.contacts));
+  set("time", mode === "recording" ? `${now.t.toFixed(3)} s` : running(now.tick));
+  set("tick", String(now.tick) + (now.missed ? `, ${now.missed} not seen` : ""));
+  set("placing", readable(now.placing));
+  set("limits", now.limits === "" ? "nothing" : now.limits);
+  showTouches(now.touches);
+  $("untold").hidden = now.touches.length > 0 || now.contacts === 0;
+  if (mode === "recording" || connected) showState(now.state);
+  showCause(now);
+  if (mode === "recording") showPlayer(now);
+}
+
+function showTouches(touches) {
+  const body = $("touches").tBodies[0];
+  while (body.rows.length > touches.length) body.deleteRow(-1);
+  while (body.rows.length < touches.length) {
+    const row = body.insertRow();
+    for (let i = 0; i < 4; ++i) row.insertCell();
+    const meter = document.createElement("meter");
+    meter.max = 1;
+    row.cells[0].append(meter, document.createElement("span"));
+  }
+  touches.forEach(({ share, obstacle, tool, on }, i) => {
+    const [cell, ...others] = body.rows[i].cells;
+    cell.firstChild.value = share ?? 0;
+    cell.lastChild.textContent = ` ${fixed(100 * (share ?? 0), 0)} %`;
+    [obstacle, tool, on].forEach((text, k) => {
+      if (others[k].textContent !== text) others[k].textContent = text;
+    });
+  });
+}
+
+function showBanner(level, what, sentence, cure) {
+  $("banner").hidden = false;
+  $("banner").dataset.level = level;
+  set("banner-what", what);
+  set("banner-sentence", sentence);
+  set("banner-cure", cure);
+}
+
+/** The fault that the loop stands in, or none. */
+function showCause(now) {
+  if (mode === "live" && !connected) return;
+  const cause = now.cause;
+  const bad = now.state === "fault" || now.state === "stopped" || now.state === "degraded" || now.state === "disconnected";
+  if (cause === "none" || !bad) {
+    $("banner").hidden = true;
+  } else {
+    const known = faults[cause] ?? link?.status?.cause ?? { sentence: "", cure: "" };
+    const stopped = now.state === "stopped";
+    const cure = sentence(known.cure) + (stopped && mode === "live" && !/cknowledge/.test(known.cure) ? " Then acknowledge." : "");
+    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.sentence), cure);
+  }
+  if (mode === "live" && cause !== "none" && bad && lastFault?.cause !== cause) lastFault = { cause, t: now.t };
+  if (mode === "recording") lastFault = lastFaultAt(now.t);
+  if (lastFault) {
+    const known = faults[lastFault.cause];
+    const when = mode === "recording" ? `at ${lastFault.t.toFixed(2)} s` : `${ago(Math.max(now.t - lastFault.t, 0))} ago`;
+    set("last-fault", `${readable(lastFault.cause)}, ${when}` + (known ? `: ${known.sentence}; ${known.cure}` : ""));
+  } else {
+    set("last-fault", mode === "recording" ? "none until now" : "none seen");
+  }
+}
+
+function showLink() {
+  connected = link.connected;
+  if (!connected) {
+    showState("gone");
+    showBanner("bad", "No connection to wrenchd", link.why, frame ? "What is shown is the last that was heard." : "");
+    set("about", "");
+  }
+  const status = link.status;
+  if (!status) return;
+  const percent = status.limits.authority < 1 ? `, ${Math.round(100 * status.limits.authority)} % of them: no watchdog` : "";
+  set("about", `${status.scene.file.split("/").pop().replace(/\.toml$/, "").replaceAll("_", " ")} · ` +
+    `${status.device.profile}${status.device.simulated ? ", simulated" : ""} · ${status.rates.rate_Hz} Hz`);
+  $("about").title = status.scene.file;
+  set("most", `${status.limits.max_force_N} N, ${status.limits.max_torque_Nm} N·m${percent}`);
+  set("armed-by", status.armed_by ?? "nobody");
+  set("device", status.device.present ? "present" : "not there");
+}
+
+function showButtons() {
+  const state = connected ? frame?.state : "";
+  $("arm").disabled = state !== "disarmed";
+  $("disarm").disabled = !ARMED.includes(state);
+  $("acknowledge").disabled = state !== "fault" && state !== "stopped";
+  $("stop").disabled = !connected;
+}
+
+function showTimes() {
+  const line = ({ p50_us, p99_9_us, max_us }) => `p50 ${p50_us.toFixed(0)}, p99.9 ${p99_9_us.toFixed(0)}, longest ${max_us.toFixed(0)} us`;
+  set("times-took", line(times.took));
+  set("times-late", line(times.late));
+  plots.drawTimes(times, rate_Hz > 0 ? 1e6 / rate_Hz : 0);
+}
+
+let toastEnds = 0;
+function toast(text) {
+  $("toast").hidden = false;
+  set("toast", text);
+  toastEnds = performance.now() + 6000;
+}
+
+// --- a recording is played ---
+
+const player = { duration: 0, t: 0, playing: false, asked: false, changes: [] };
+
+function lastFaultAt(t) {
+  let last = null;
+  for (const one of player.changes) if (one.t <= t && one.cause !== "none") last = { cause: one.cause, t: one.t };
+  return last;
+}
+
+function showMarks() {
+  $("marks").replaceChildren(...player.changes.map(({ t, state }, i) => {
+    const mark = document.createElement("i");
+    const end = player.changes[i + 1]?.t ?? player.duration;
+    mark.dataset.state = state;
+    mark.style.left = `${(100 * t) / player.duration}%`;
+    mark.style.width = `${(100 * (end - t)) / player.duration}%`;
+    return mark;
+  }));
+}
+
+function showPlayer() {
+  set("play-time", `${player.t.toFixed(3)} s`);
+  set("play", player.playing ? "Pause" : "Play");
+  if (document.activeElement !== $("scrub") || player.playing) $("scrub").value = player.t;
+}
+
+/** One moment is asked for at a time: a slow machine shows fewer, and never lags behind. */
+function seek(t) {
+  player.t = Math.min(Math.max(t, 0), player.duration);
+  player.stale = true;
+}
+
+function askMoment() {
+  if (player.asked || !player.stale) return;
+  player.asked = true;
+  player.stale = false;
+  connection.say("at", { t: player.t });
+}
+
+function play(on) {
+  if (on && player.t >= player.duration) seek(0);
+  player.playing = on;
+  showPlayer();
+}
+
+// --- what comes in ---
+
+const connection = new Connection({
+  hello(hello) {
+    mode = root.dataset.mode = hello.mode;
+    page = hello.page;
+    faults = hello.faults;
+    document.title = mode === "live" ? "wrenchd" : `${hello.name} – wrenchd`;
+    if (mode !== "recording") return;
+    connected = true;
+    rate_Hz = hello.rate_Hz;
+    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, asked: false });
+    $("scrub").max = hello.duration_s;
+    set("play-end", `${hello.duration_s.toFixed(3)} s`);
+    set("about", `${hello.name} · recorded by wrenchd ${hello.recorded_by} · ${Math.round(rate_Hz)} Hz`);
+    showMarks();
+    seek(player.t);
+  },
+  link(message) {
+    link = message;
+    if (link.rate_Hz > 0) rate_Hz = link.rate_Hz;
+    showLink();
+  },
+  mesh: (mesh) => world.mesh(mesh),
+  scene(scene) {
+    world.show(scene);
+    const sum = (key) => scene.meshes.reduce((all, mesh) => all + mesh[key], 0);
+    $("note").className = "";
+    set("note", sum("shown") < sum("triangles")
+      ? `${sum("triangles").toLocaleString("en")} triangles, drawn with ${sum("shown").toLocaleString("en")}` : "");
+    if (frame) world.take(frame);
+  },
+  no_scene({ why }) {
+    $("note").className = why === "" ? "" : "problem";
+    set("note", why === "" ? "" : `The scene cannot be shown: ${why}`);
+  },
+  history: (message) => history.add(message),
+  frame(now) {
+    frame = now;
+    player.asked = false;
+    if (mode === "recording" && !player.playing) player.t = Math.min(player.t, player.duration);
+    world.take(now);
+  },
+  times(now) {
+    times = now;
+    showTimes();
+  },
+  event({ event }) {
+    if (event.name === "refused" || event.name === "reload") toast(event.text);
+    if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
+  },
+  told({ what, done, text }) {
+    if (!done && text !== "") toast(what === "lease" ? text : `${what}: ${text}`);
+  },
+  lost() {
+    connected = false;
+    player.asked = false;
+    showState("gone");
+    showBanner("bad", "No connection to wrenchctl view", "The program that serves this page has ended, or does not answer.",
+      "Start wrenchctl view again and open the address that it prints. What is shown is the last that was heard.");
+    showButtons();
+  },
+});
+
+// --- what is pressed ---
+
+const wish = (what) => mode === "live" && connection.say(what);
+$("arm").onclick = () => wish("arm");
+$("disarm").onclick = () => wish("disarm");
+$("acknowledge").onclick = () => wish("acknowledge");
+$("stop").onclick = () => wish("stop");
+$("fit").onclick = () => world.fit(frame?.p);
+$("help").onclick = () => $("keys").showModal();
+$("play").onclick = () => play(!player.playing);
+$("scrub").oninput = () => {
+  const t = Number($("scrub").value);
+  play(false);
+  seek(t);
+};
+
+const THEMES = ["auto", "light", "dark"];
+function theme(name) {
+  root.dataset.theme = name;
+  set("theme", `Theme: ${name}`);
+  try {
+    localStorage.setItem("theme", name);
+  } catch { /* a browser that keeps nothing */ }
+  world.recolour();
+  plots.recolour();
+}
+const nextTheme = () => theme(THEMES[(THEMES.indexOf(root.dataset.theme) + 1) % THEMES.length]);
+$("theme").onclick = nextTheme;
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => theme(root.dataset.theme));
+try {
+  theme(THEMES.find((name) => name === localStorage.getItem("theme")) ?? "auto");
+} catch {
+  theme("auto");
+}
+
+const common = {
+  f: () => world.fit(frame?.p),
+  g: () => {
+    world.showGhost = !world.showGhost;
+    if (frame) world.take(frame);
+  },
+  t: nextTheme,
+  "?": () => ($("keys").open ? $("keys").close() : $("keys").showModal()),
+};
+const keys = {
+  live: { " ": () => wish("stop"), Escape: () => wish("stop"), a: () => !$("arm").disabled && wish("arm"),
+    d: () => wish("disarm"), k: () => !$("acknowledge").disabled && wish("acknowledge") },
+  recording: { " ": () => play(!player.playing), ArrowLeft: (e) => seek(player.t - (e.shiftKey ? 1 : 0.1)),
+    ArrowRight: (e) => seek(player.t + (e.shiftKey ? 1 : 0.1)), ",": () => seek(player.t - 1 / rate_Hz),
+    ".": () => seek(player.t + 1 / rate_Hz), Home: () => seek(0), End: () => seek(player.duration) },
+  none: {},
+};
+// Before anything else hears of it: a stop is a stop wherever the focus is.
+addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  const own = keys[mode][key];
+  if (!own && event.target instanceof HTMLSelectElement) return;
+  const act = own ?? common[key];
+  if (!act || (event.repeat && mode === "live")) return;
+  if (!(key === "Escape" && $("keys").open)) event.preventDefault();
+  if (mode === "recording" && own && key !== " ") play(false);
+  event.stopPropagation();
+  act(event);
+}, { capture: true });
+
+// --- every frame of the screen ---
+
+let plotted = 0, said = 0, before = performance.now();
+function draw(now) {
+  requestAnimationFrame(draw);
+  if (mode === "recording") {
+    if (player.playing) {
+      seek(player.t + (Number($("speed").value) * (now - before)) / 1000);
+      if (player.t >= player.duration) play(false);
+    }
+    askMoment();
+  }
+  before = now;
+  // Only a page that is drawn says that it lives.
+  if (mode === "live" && document.visibilityState === "visible" && now - said > ALIVE_EVERY_MS) {
+    said = now;
+    connection.say("alive");
+  }
+  if (frame) showFrame(frame);
+  showButtons();
+  world.draw(now);
+  if (now - plotted > PLOTS_EVERY_MS && frame) {
+    plotted = now;
+    plots.draw(history, frame.t);
+  }
+  if (toastEnds > 0 && now > toastEnds) {
+    toastEnds = 0;
+    $("toast").hidden = true;
+  }
+}
+requestAnimationFrame(draw);
+
+/** For tests, and for the curious at the console. */
+window.view = {
+  frame: () => frame,
+  page: () => page,
+  world: () => world.inspect(),
+  history: () => history,
+  times: () => times,
+  player,
+};

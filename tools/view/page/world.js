@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The scene in 3D: bodies, contacts, arrows. Metres, Z up, all in the world frame.
+import * as THREE from "three";
+import { OrbitControls } from "orbit";
+import { css } from "./plots.js";
+
+const colour = (name) => new THREE.Color(css(name));
+
+/** A pose as records have it: x y z [m], qx qy qz qw. */
+function place(object, pose) {
+  object.position.set(pose[0], pose[1], pose[2]);
+  object.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
+}
+
+const UP = new THREE.Vector3(0, 1, 0);
+
+/** An arrow of any length and thickness, along +Y before it is turned. */
+class Arrow extends THREE.Group {
+  constructor(material) {
+    super();
+    this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), material);
+    this.head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 24).translate(0, 0.5, 0), material);
+    this.add(this.shaft, this.head);
+    this.renderOrder = 3;
+  }
+
+  /** from, along: Vector3; along's length is the arrow's [m]. */
+  point(from, along, thickness) {
+    const length = along.length();
+    this.visible = length > 1.5 * thickness;
+    if (!this.visible) return;
+    const head = Math.min(5 * thickness, 0.6 * length);
+    this.position.copy(from);
+    this.quaternion.setFromUnitVectors(UP, along.clone().divideScalar(length));
+    this.shaft.scale.set(thickness, length - head, thickness);
+    this.head.position.y = length - head;
+    this.head.scale.set(0.45 * head, head, 0.45 * head);
+  }
+}
+
+/** Three quarters of a turn about an axis, with a head: a torque. */
+class Turn extends THREE.Group {
+  constructor(material) {
+    super();
+    const arc = 1.5 * Math.PI;
+    this.ring = new THREE.Mesh(new THREE.TorusGeometry(1, 0.05, 10, 48, arc), material);
+    this.head = new THREE.Mesh(new THREE.ConeGeometry(0.16, 0.42, 20), material);
+    this.head.position.set(0, -1, 0);  // at the end of the arc; there it goes towards +X
+    this.head.rotation.z = -Math.PI / 2;
+    this.add(this.ring, this.head);
+  }
+
+  about(at, axis, radius) {
+    this.visible = radius > 0;
+    if (!this.visible) return;
+    this.position.copy(at);
+    this.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), axis);
+    this.scale.setScalar(radius);
+  }
+}
+
+export class World {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(38, 1, 0.001, 100);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => (this.changed = true));
+    this.controls.addEventListener("start", () => (this.touched = true));
+    this.controls.listenToKeyEvents?.(canvas);
+    this.light();
+    this.materials = {
+      tool: new THREE.MeshLambertMaterial(),
+      ghost: new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
+      obstacle: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }),
+      moving: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }),
+      plane: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.55, depthWrite: false }),
+      edge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }),
+      ghostEdge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6 }),
+      grid: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.35 }),
+      contact: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }),
+      force: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }),
+      torque: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }),
+    };
+    this.bodies = new THREE.Group();
+    this.marks = new THREE.Group();
+    this.scene.add(this.bodies, this.marks);
+    this.force = new Arrow(this.materials.force);
+    this.torque = new Turn(this.materials.torque);
+    this.force.visible = this.torque.visible = false;
+    this.scene.add(this.force, this.torque);
+    this.meshes = new Map();
+    this.contacts = [];
+    this.obstacles = [];
+    this.size = 0.05;
+    this.showGhost = true;
+    this.recolour();
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.resize();
+  }
+
+  light() {
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x8a94a3, 2.1);
+    this.sky.position.set(0, 0, 1);
+    const key = new THREE.DirectionalLight(0xffffff, 1.7);
+    key.position.set(-0.5, 0.6, 1);
+    const fill = new THREE.DirectionalLight(0xffffff, 0.5);
+    fill.position.set(0.8, -0.7, 0.3);
+    this.scene.add(this.sky, key, fill);
+  }
+
+  recolour() {
+    const set = (name, variable) => this.materials[name].color.copy(colour(variable));
+    set("tool", "--tool");
+    set("ghost", "--ghost");
+    set("obstacle", "--obstacle");
+    set("moving", "--moving");
+    set("plane", "--obstacle");
+    set("edge", "--edge");
+    set("ghostEdge", "--ghost");
+    set("grid", "--edge");
+    set("contact", "--contact");
+    set("force", "--force");
+    set("torque", "--torque");
+    this.changed = true;
+  }
+
+  /** A mesh of the scene that comes next. */
+  mesh({ number, positions, normals, lines }) {
+    if (number === 0) this.meshes.clear();
+    const surface = new THREE.BufferGeometry();
+    surface.setAttribute("position", new THREE.BufferAttribute(positions, 3));
+    surface.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
+    surface.computeBoundingSphere();
+    const edges = new THREE.BufferGeometry();
+    edges.setAttribute("position", new THREE.BufferAttribute(lines, 3));
+    this.meshes.set(number, { surface, edges });
+  }
+
+  body(number, material, edge) {
+    const { surface, edges } = this.meshes.get(number);
+    const body = new THREE.Group();
+    body.add(new THREE.Mesh(surface, material), new THREE.LineSegments(edges, edge));
+    return body;
+  }
+
+  /** Which mesh is whose. */
+  show({ tool, obstacles }) {
+    this.bodies.clear();
+    const radius = this.meshes.get(tool.mesh).surface.boundingSphere.radius;
+    this.size = radius;
+    this.tool = this.body(tool.mesh, this.materials.tool, this.materials.edge);
+    this.ghost = this.body(tool.mesh, this.materials.ghost, this.materials.ghostEdge);
+    this.ghost.renderOrder = 2;
+    this.tool.visible = this.ghost.visible = false;
+    this.bodies.add(this.tool, this.ghost);
+    this.obstacles = obstacles.map((one) => {
+      const body = one.half_space ? this.plane(one.half_space) : this.body(one.mesh, one.moves ? this.materials.moving : this.materials.obstacle, this.materials.edge);
+      if (one.pose) place(body, one.pose);
+      this.bodies.add(body);
+      return body;
+    });
+    this.fitted = false;
+    this.changed = true;
+  }
+
+  /** A patch of the border of a half-space, with a grid that gives a measure. */
+  plane({ normal, offset_m }) {
+    const size = Math.max(6 * this.size, 0.1), step = 10 ** Math.floor(Math.log10(size / 5));
+    const half = Math.ceil(size / step) * step;
+    const body = new THREE.Group();
+    body.add(new THREE.Mesh(new THREE.PlaneGeometry(2 * half, 2 * half), this.materials.plane));
+    const points = [];
+    for (let x = -half; x <= half + step / 2; x += step) points.push(x, -half, 0, x, half, 0, -half, x, 0, half, x, 0);
+    const grid = new THREE.BufferGeometry();
+    grid.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+    body.add(new THREE.LineSegments(grid, this.materials.grid));
+    const n = new THREE.Vector3(...normal);
+    body.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
+    body.position.copy(n.multiplyScalar(offset_m));
+    return body;
+  }
+
+  /** One moment. */
+  take(frame) {
+    this.changed = true;
+    if (this.tool) {
+      this.ghost.visible = this.showGhost;
+      place(this.ghost, frame.p);
+      this.tool.visible = frame.q !== null;
+      if (frame.q !== null) place(this.tool, frame.q);
+    }
+    for (const [number, pose] of frame.moved) if (this.obstacles[number]) place(this.obstacles[number], pose);
+    this.touch(frame.touches);
+    this.push(frame.wrench);
+    if (!this.fitted && this.tool) this.fit(frame.p);
+  }
+
+  touch(touches) {
+    while (this.contacts.length < touches.length) {
+      const point = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), this.materials.contact);
+      const normal = new Arrow(this.materials.contact);
+      point.renderOrder = normal.renderOrder = 3;
+      this.marks.add(point, normal);
+      this.contacts.push({ point, normal });
+    }
+    this.contacts.forEach(({ point, normal }, i) => {
+      point.visible = normal.visible = i < touches.length;
+      if (i >= touches.length) return;
+      const { p, n, share } = touches[i];
+      point.position.set(...p);
+      point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(share ?? 0)));
+      normal.point(point.position, new THREE.Vector3(...n).multiplyScalar(this.size * (0.15 + 1.1 * (share ?? 0))), 0.014 * this.size);
+    });
+  }
+
+  /** 3 N are as long as the tool is large; a torque of 0.1 N.m has its radius. */
+  push({ at, force, torque }) {
+    const from = new THREE.Vector3(...at), f = new THREE.Vector3(...force), m = new THREE.Vector3(...torque);
+    this.force.point(from, f.multiplyScalar((2 * this.size) / 3), 0.03 * this.size);
+    const strength = m.length();
+    const radius = strength < 1e-3 ? 0 : this.size * Math.min(0.25 + strength / 0.1, 1.5);
+    this.torque.about(from, strength > 0 ? m.divideScalar(strength) : UP, radius);
+  }
+
+  /** Looks at the tool with its surroundings, from above and to the side. */
+  fit(p) {
+    const target = p ? new THREE.Vector3(p[0], p[1], p[2]) : this.ghost ? this.ghost.position.clone() : new THREE.Vector3();
+    const box = new THREE.Box3();
+    for (const body of this.obstacles) {
+      const mesh = body.children[0].geometry;
+      if (mesh instanceof THREE.PlaneGeometry) continue;
+      body.updateMatrixWorld(true);
+      mesh.computeBoundingBox();
+      box.union(mesh.boundingBox.clone().applyMatrix4(body.matrixWorld));
+    }
+    box.expandByPoint(target.clone().addScalar(1.2 * this.size)).expandByPoint(target.clone().addScalar(-1.2 * this.size));
+    const sphere = box.getBoundingSphere(new THREE.Sphere());
+    const radius = Math.min(sphere.radius, 12 * this.size);  // a floor of ten metres is no reason to lose the tool
+    const centre = radius < sphere.radius ? target : sphere.center;
+    const distance = (1.15 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
+    const aside = new THREE.Vector3(-0.62, -0.78, 0.55).normalize();
+    this.camera.position.copy(centre).addScaledVector(aside, distance);
+    this.camera.near = distance / 200;
+    this.camera.far = distance * 60;
+    this.camera.updateProjectionMatrix();
+    this.controls.target.copy(centre);
+    this.controls.update();
+    this.fitted = true;
+    this.changed = true;
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.changed = true;
+  }
+
+  /** Where frames come slowly there are fewer pixels, and more again where they come fast. */
+  pace(now) {
+    const took = now - (this.before ?? now);
+    this.before = now;
+    if (took > 250) return;  // nothing was drawn meanwhile: it says nothing
+    this.usual = 0.95 * (this.usual ?? 16) + 0.05 * took;
+    if (now < (this.steady ?? 0)) return;
+    const most = Math.min(devicePixelRatio, 2), ratio = this.renderer.getPixelRatio();
+    const wanted = this.usual > 50 ? Math.max(0.75 * ratio, 0.4) : this.usual < 20 ? Math.min(1.25 * ratio, most) : ratio;
+    if (wanted === ratio) return;
+    this.steady = now + (wanted < ratio ? 1000 : 10000);
+    this.renderer.setPixelRatio(wanted);
+    this.changed = true;
+  }
+
+  draw(now) {
+    this.pace(now);
+    if (!this.changed) return;
+    this.changed = false;
+    this.renderer.render(this.scene, this.camera);
+    this.drawn = (this.drawn ?? 0) + 1;
+  }
+
+  /** What stands where, for whoever wants to check it. */
+  inspect() {
+    const pose = (body) => (body?.visible ? [...body.position.toArray(), ...body.quaternion.toArray()] : null);
+    return {
+      tool: pose(this.tool),
+      ghost: pose(this.ghost),
+      obstacles: this.obstacles.map(pose),
+      contacts: this.contacts.filter(({ point }) => point.visible).map(({ point }) => point.position.toArray()),
+      force: this.force.visible ? new THREE.Vector3(0, 1, 0).applyQuaternion(this.force.quaternion).toArray() : null,
+      triangles: this.renderer.info.render.triangles,
+      drawn: this.drawn ?? 0,
+    };
+  }
+}

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/view/recorded_feed.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/fault.hpp"
+#include "core/state.hpp"
+
+namespace wrenchd {
+namespace {
+
+constexpr double kNs = 1e9;
+
+}  // namespace
+
+RecordedFeed::RecordedFeed(std::string name, Recording recording, std::shared_ptr<const ViewScene> scene,
+                           std::string why_no_scene)
+    : name_(std::move(name)),
+      recording_(std::move(recording)),
+      scene_(std::move(scene)),
+      why_no_scene_(std::move(why_no_scene)) {
+  if (recording_.ticks.empty()) throw RecordingError(name_ + ": has no ticks; there is nothing to be seen");
+  for (const TickRecord& record : recording_.ticks) history_.add(record.now_ns, view_tick(record).channels());
+}
+
+double RecordedFeed::duration_s() const noexcept {
+  return static_cast<double>(recording_.ticks.back().now_ns - begin_ns()) / kNs;
+}
+
+double RecordedFeed::rate_Hz() const noexcept {
+  const auto& ticks = recording_.ticks;
+  std::vector<std::int64_t> steps_ns;
+  for (std::size_t i = 1; i < ticks.size() && i < 10'000; ++i)
+    steps_ns.push_back(ticks[i].now_ns - ticks[i - 1].now_ns);
+  if (steps_ns.empty()) return 0.0;
+  const auto middle = steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
+  std::nth_element(steps_ns.begin(), middle, steps_ns.end());
+  return *middle > 0 ? kNs / static_cast<double>(*middle) : 0.0;
+}
+
+std::int64_t RecordedFeed::time_ns(double t_s) const {
+  const double t = std::isfinite(t_s) ? std::clamp(t_s, 0.0, duration_s()) : 0.0;
+  return begin_ns() + std::llround(t * kNs);
+}
+
+std::size_t RecordedFeed::number_at(double t_s) const {
+  const auto& ticks = recording_.ticks;
+  const auto after = std::upper_bound(ticks.begin(), ticks.end(), time_ns(t_s),
+                                      [](std::int64_t t, const TickRecord& one) { return t < one.now_ns; });
+  return static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - ticks.begin() - 1, 0));
+}
+
+Json RecordedFeed::frame(double t_s) const {
+  const TickRecord& record = recording_.ticks[number_at(t_s)];
+  return frame_json(view_tick(record), view_words(record, {}), scene_.get(), begin_ns());
+}
+
+std::pair<std::uint64_t, std::uint64_t> RecordedFeed::stretches(double t_s) const {
+  const std::int64_t to = time_ns(t_s);
+  return {history_.from(to - std::llround(kHistory_s * kNs)), history_.from(to + 1)};
+}
+
+std::pair<RecentTimes::Sum, RecentTimes::Sum> RecordedFeed::times(double t_s) const {
+  RecentTimes took, late;
+  const std::size_t last = number_at(t_s);
+  const std::int64_t from = recording_.ticks[last].now_ns - RecentTimes::kSeconds * 1'000'000'000;
+  for (std::size_t i = number_at(t_s - static_cast<double>(RecentTimes::kSeconds)); i <= last; ++i) {
+    if (recording_.ticks[i].now_ns < from) continue;
+    const ViewTick tick = view_tick(recording_.ticks[i]);
+    took.add(tick.time_ns, tick.took_ns);
+    late.add(tick.time_ns, tick.late_ns);
+  }
+  return {took.sum(), late.sum()};
+}
+
+Json RecordedFeed::changes() const {
+  Json out = Json::array();
+  const TickRecord* before = nullptr;
+  for (const TickRecord& record : recording_.ticks) {
+    if (before == nullptr || before->state != record.state || before->cause != record.cause)
+      out.push_back({{"t", static_cast<double>(record.now_ns - begin_ns()) / kNs},
+                     {"state", wrenchd::name(static_cast<State>(record.state))},
+                     {"cause", record.cause == 0 ? std::string_view("none")
+                                                 : fault_row(static_cast<Fault>(record.cause)).name}});
+    before = &record;
+  }
+  return out;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/view/view.hpp"
+
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include <spawn.h>
+#include <unistd.h>
+
+#include "collision/mesh_source.hpp"
+#include "daemon/scene_shapes.hpp"
+#include "tools/view/live_feed.hpp"
+#include "tools/view/recorded_feed.hpp"
+#include "tools/view/view_server.hpp"
+
+namespace wrenchd {
+namespace {
+
+void serve(ViewServer& server, const ViewOptions& options) {
+  std::string url = server.url();
+  std::printf("%s\n", url.c_str());
+  std::fflush(stdout);
+  if (options.open) {
+    std::string program = "xdg-open";
+    char* const words[] = {program.data(), url.data(), nullptr};
+    pid_t pid = -1;
+    if (posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) != 0)
+      std::fputs("wrenchctl: there is no xdg-open; open the address yourself\n", stderr);
+  }
+  server.run();
+}
+
+Pose pose_of(const PlacementSettings& placed) {
+  return {rotation_from(placed.rotation_vector_rad), placed.position_m};
+}
+
+/// The scene of a recording, from the files that it was made with.
+std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const Plan& plan) {
+  MeshLoader meshes(cache_directory(),
+                    [](const std::string& what) { std::fprintf(stderr, "wrenchctl: %s\n", what.c_str()); });
+  const auto scene = std::make_shared<const Scene>(plan.scene, meshes);
+  const SceneShapes shapes(scene);
+  Json description = shapes.description(*scene);
+  const DeviceSettings& device = plan.settings.device;
+  description["shapes"] = 1;
+  description["rendering"] = 0;
+  description["scene_time_begins_ns"] = recording.ticks.front().now_ns;
+  description["X_WB"] = pose_json(pose_of(device.base_in_world));
+  description["X_HT"] = pose_json(pose_of(device.tool_in_handle) * scene->tool().X_MT());
+  description["wrench_about"] = plan.profile.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
+  return std::make_shared<const ViewScene>(description, shapes.bytes());
+}
+
+}  // namespace
+
+void run_view(const ViewOptions& options) {
+  PageFiles files(PageFiles::directory());
+  if (options.recording.empty()) {
+    LiveFeed feed(options.socket);
+    ViewServer server(options.port, std::move(files), feed);
+    return serve(server, options);
+  }
+  Recording recording = read_recording(options.recording);
+  std::shared_ptr<const ViewScene> scene;
+  std::string why;
+  if (!recording.ticks.empty()) try {
+      scene = scene_of(recording, read_plan(options.files, SearchPath()));
+    } catch (const std::exception& error) {
+      why = error.what();
+      std::fprintf(stderr, "wrenchctl: the scene cannot be shown: %s\n", why.c_str());
+    }
+  const RecordedFeed feed(options.recording.filename().string(), std::move(recording), std::move(scene), why);
+  ViewServer server(options.port, std::move(files), feed);
+  serve(server, options);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/view/view_scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+#include "daemon/scene_shapes.hpp"
+#include "tools/view/display_mesh.hpp"
+
+namespace wrenchd {
+namespace {
+
+Vector3d vector_of(const Json& json) {
+  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
+
+Pose pose_of(const Json& x) {
+  const auto at = [&](std::size_t i) { return x.at(i).get<double>(); };
+  return {Quaterniond(at(6), at(3), at(4), at(5)).normalized(), {at(0), at(1), at(2)}};
+}
+
+ObstacleMotion motion_of(const Json& json) {
+  return {vector_of(json.at("linear_m_per_s")), vector_of(json.at("angular_rad_per_s")),
+          json.at("turn_back_s").get<double>(), json.at("begin_s").get<double>(),
+          json.at("last_s").get<double>()};
+}
+
+std::optional<LaterMotion> later_of(const Json& json) {
+  return LaterMotion{json.at("from_s").get<double>(), pose_of(json.at("X_WO")), motion_of(json.at("motion"))};
+}
+
+template <class T>
+std::vector<T> part(std::span<const std::byte> bytes, std::size_t offset, std::size_t count) {
+  if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T))
+    throw std::runtime_error("the shapes of the scene lie outside of their memory");
+  std::vector<T> out(count);
+  if (count > 0) std::memcpy(out.data(), bytes.data() + offset, count * sizeof(T));
+  return out;
+}
+
+std::string message_of(std::uint32_t number, const DisplayMesh& mesh) {
+  const std::array<std::uint32_t, 4> head = {1, number, static_cast<std::uint32_t>(mesh.positions.size() / 3),
+                                             static_cast<std::uint32_t>(mesh.lines.size() / 3)};
+  std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
+  for (const std::vector<float>* part : {&mesh.positions, &mesh.normals, &mesh.lines})
+    out.append(reinterpret_cast<const char*>(part->data()), part->size() * sizeof(float));
+  return out;
+}
+
+std::size_t shown_of(const std::string& message) {
+  std::uint32_t corners = 0;
+  std::memcpy(&corners, message.data() + 8, 4);
+  return corners / 3;
+}
+
+}  // namespace
+
+ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, const ViewScene* known) try
+    : shapes_(description.at("shapes").get<std::uint64_t>()),
+      rendering_(description.at("rendering").get<std::uint32_t>()),
+      begins_ns_(description.at("scene_time_begins_ns").get<std::int64_t>()),
+      X_WB_(pose_of(description.at("X_WB"))),
+      X_HT_(pose_of(description.at("X_HT"))),
+      about_handle_(description.at("wrench_about") == "handle") {
+  const Json& meshes = description.at("meshes");
+  std::size_t all = 0;
+  for (const Json& mesh : meshes) given_.push_back(mesh.at("triangles").get<std::size_t>());
+  for (const std::size_t one : given_) all += one;
+  if (known != nullptr && known->shapes_ == shapes_) {
+    meshes_ = known->meshes_;
+  } else {
+    std::uint32_t number = 0;
+    for (const Json& mesh : meshes) {
+      // Each mesh gets its share, and none is made too coarse to be known again.
+      constexpr double kLeast = 2'000.0;
+      const auto triangles = static_cast<double>(given_[number]);
+      const double share = static_cast<double>(kMostTriangles) * triangles /
+                           static_cast<double>(std::max(all, kMostTriangles));
+      const auto vertices = part<float>(bytes, mesh.at("vertices_offset").get<std::size_t>(),
+                                        3 * mesh.at("vertices").get<std::size_t>());
+      const auto corners = part<std::array<std::uint32_t, 3>>(
+          bytes, mesh.at("triangles_offset").get<std::size_t>(), given_[number]);
+      const DisplayMesh drawn =
+          display_mesh(vertices, corners, static_cast<std::size_t>(std::max(share, kLeast)));
+      meshes_.push_back(std::make_shared<const std::string>(message_of(number, drawn)));
+      ++number;
+    }
+  }
+  Json obstacles = Json::array();
+  std::uint32_t number = 0;
+  for (const Json& one : description.at("obstacles")) {
+    names_.push_back(one.at("name").get<std::string>());
+    Json shown = {{"name", names_.back()}};
+    if (one.contains("half_space")) {
+      shown["half_space"] = one["half_space"];
+    } else {
+      shown["mesh"] = one.at("mesh");
+      shown["pose"] = one.at("X_WO");
+      if (one.contains("motion") || one.contains("later"))
+        moving_.push_back({number, pose_of(one.at("X_WO")),
+                           one.contains("motion") ? motion_of(one["motion"]) : ObstacleMotion{},
+                           one.contains("later") ? later_of(one["later"]) : std::nullopt});
+      shown["moves"] = one.contains("motion") || one.contains("later");
+    }
+    obstacles.push_back(std::move(shown));
+    ++number;
+  }
+  Json sizes = Json::array();
+  for (std::size_t i = 0; i < meshes_.size(); ++i)
+    sizes.push_back({{"triangles", given_[i]}, {"shown", shown_of(*meshes_[i])}});
+  text_ = Json{{"type", "scene"},
+               {"shapes", shapes_},
+               {"meshes", sizes},
+               {"tool", description.at("tool")},
+               {"obstacles", obstacles}}
+              .dump(-1, ' ', false, Json::error_handler_t::replace);
+} catch (const nlohmann::json::exception& error) {
+  throw std::runtime_error(std::string("the scene is not told as this program knows it: ") + error.what());
+} catch (const std::invalid_argument& error) {
+  throw std::runtime_error(std::string("the shapes of the scene: ") + error.what());
+}
+
+Json ViewScene::moved(std::int64_t time_ns) const {
+  const double t_s = 1e-9 * static_cast<double>(time_ns - begins_ns_);
+  Json out = Json::array();
+  for (const Moving& one : moving_) {
+    const Pose X_WO = one.later && t_s >= one.later->from_s ? one.later->motion.at(one.later->X_WO, t_s)
+                                                            : one.motion.at(one.X_WO, t_s);
+    out.push_back({one.number, pose_json(X_WO)});
+  }
+  return out;
+}
+
+std::string ViewScene::obstacle_name(std::uint32_t number) const {
+  return number < names_.size() ? names_[number] : "obstacle " + std::to_string(number);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,480 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/view/view_server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <deque>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <sys/random.h>
+
+#include "core/fault.hpp"
+#include "daemon/version.hpp"
+#include "tools/view/live_feed.hpp"
+#include "tools/view/page_lease.hpp"
+#include "tools/view/recorded_feed.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using namespace std::chrono_literals;
+
+constexpr auto kFrameEvery = 16ms;
+constexpr auto kTimesEvery = 250ms;
+constexpr auto kRequestWithin = 20s;
+constexpr std::size_t kMostConnections = 32;
+constexpr std::size_t kMostWaiting = 256;  ///< messages to a page that does not read: then it is hung up on
+constexpr std::size_t kLongestMessage = 4096;  ///< from a page
+
+std::string random_token() {
+  std::array<unsigned char, 16> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw std::system_error(errno, std::generic_category(), "getrandom");
+  std::string token;
+  for (const unsigned char byte : bytes) {
+    token += "0123456789abcdef"[byte >> 4U];
+    token += "0123456789abcdef"[byte & 15U];
+  }
+  return token;
+}
+
+/// Takes as long wherever they differ.
+bool same(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned different = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) different |= static_cast<unsigned>(a[i] ^ b[i]);
+  return different == 0;
+}
+
+std::shared_ptr<const std::string> text_of(const Json& json) {
+  return std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+Json sum_json(const RecentTimes::Sum& sum) {
+  return {{"bins", sum.bins},
+          {"count", sum.count},
+          {"p50_us", sum.p50_us},
+          {"p99_9_us", sum.p99_9_us},
+          {"max_us", sum.max_us}};
+}
+
+Json times_json(const RecentTimes::Sum& took, const RecentTimes::Sum& late) {
+  return {{"type", "times"}, {"took", sum_json(took)}, {"late", sum_json(late)}};
+}
+
+/// What every page has to know of faults: their sentences and cures.
+Json faults_json() {
+  Json out = Json::object();
+  for (const FaultRow& row : fault_rows())
+    out[std::string(row.name)] = {{"sentence", row.sentence}, {"cure", row.cure}};
+  return out;
+}
+
+}  // namespace
+
+struct ViewServer::Server {
+  class Page;
+
+  asio::io_context io{1};
+  tcp::acceptor acceptor{io};
+  asio::steady_timer frame_timer{io};
+  asio::signal_set signals{io};
+  PageFiles files;
+  std::string token = random_token();
+  std::uint16_t port = 0;
+  LiveFeed* live = nullptr;
+  const RecordedFeed* recorded = nullptr;
+  std::map<std::uint64_t, std::weak_ptr<Page>> pages;
+  std::uint64_t last_page = 0;
+  std::size_t connections = 0;
+  std::unique_ptr<PageLease> lease;  ///< last: its threads post to io
+
+  Server(std::uint16_t wanted_port, PageFiles page_files);
+  ~Server() { lease.reset(); }
+  void accept();
+  void push_frames();
+  void tell(const PageLease::Told& told);
+
+  bool is_ours(beast::string_view authority) const {
+    const std::string number = ":" + std::to_string(port);
+    return authority == "127.0.0.1" + number || authority == "localhost" + number;
+  }
+  bool is_our_origin(beast::string_view origin) const {
+    constexpr beast::string_view kScheme = "http://";
+    return origin.starts_with(kScheme) && is_ours(origin.substr(kScheme.size()));
+  }
+};
+
+/// A page that is open: its WebSocket.
+class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
+ public:
+  Page(tcp::socket&& socket, Server& server)
+      : socket_(std::move(socket)), server_(server), number_(++server.last_page) {}
+  ~Page() {
+    server_.pages.erase(number_);
+    --server_.connections;
+    if (server_.lease) server_.lease->gone(number_);
+  }
+  Page(const Page&) = delete;
+  Page& operator=(const Page&) = delete;
+
+  void open(const http::request<http::string_body>& request) {
+    socket_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
+    socket_.read_message_max(kLongestMessage);
+    socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
+      if (error) return;
+      self->server_.pages[self->number_] = self;
+      self->greet();
+      self->read();
+    });
+  }
+
+  void send(std::shared_ptr<const std::string> message, bool text = true) {
+    if (waiting_.size() >= kMostWaiting) return hang_up();
+    waiting_.push_back({std::move(message), text});
+    if (waiting_.size() == 1) write();
+  }
+  void send(const Json& json) { send(text_of(json)); }
+
+  /// What is new, unless it has yet to read what came before.
+  void push(const std::shared_ptr<const std::string>& frame, std::chrono::steady_clock::time_point now) {
+    if (!waiting_.empty()) return;
+    LiveFeed& feed = *server_.live;
+    const LiveFeed::Link link = feed.link();
+    if (link.told != link_told_) {
+      link_told_ = link.told;
+      send({{"type", "link"},
+            {"connected", link.connected},
+            {"why", link.why},
+            {"socket", feed.socket()},
+            {"rate_Hz", link.rate_Hz},
+            {"status", link.status}});
+    }
+    const auto scene = feed.scene();
+    if (scene != scene_) show(scene);
+    if (const std::string why = feed.why_no_scene(); why != why_no_scene_) {
+      why_no_scene_ = why;
+      send({{"type", "no_scene"}, {"why", why}});
+    }
+    if (link.connected && frame) {
+      std::string history;
+      feed.look_at_history([&](const Extremes& extremes) {
+        const bool anew =
+            link.number != history_of_ || history_at_ < extremes.first() || history_at_ > extremes.end();
+        if (anew) history_at_ = extremes.first();
+        if (anew || history_at_ < extremes.end())
+          history = history_message(extremes, history_at_, extremes.end(), anew, 0);
+        history_at_ = extremes.end();
+        history_of_ = link.number;
+      });
+      if (!history.empty()) send(std::make_shared<const std::string>(std::move(history)), false);
+      send(frame);
+    }
+    if (link.connected && now >= times_at_) {
+      times_at_ = now + kTimesEvery;
+      send(times_json(feed.took(), feed.late()));
+    }
+  }
+
+  void hang_up() {
+    beast::error_code ignored;
+    beast::get_lowest_layer(socket_).socket().close(ignored);
+  }
+
+ private:
+  struct Message {
+    std::shared_ptr<const std::string> bytes;
+    bool text;
+  };
+
+  void greet() {
+    Json hello = {{"type", "hello"}, {"version", kVersion}, {"page", number_}, {"faults", faults_json()}};
+    if (const RecordedFeed* feed = server_.recorded) {
+      hello.update({{"mode", "recording"},
+                    {"name", feed->name()},
+                    {"recorded_by", feed->version()},
+                    {"duration_s", feed->duration_s()},
+                    {"rate_Hz", feed->rate_Hz()},
+                    {"changes", feed->changes()}});
+      send(hello);
+      if (feed->scene()) show(feed->scene());
+      if (!feed->why_no_scene().empty()) send({{"type", "no_scene"}, {"why", feed->why_no_scene()}});
+      at(0.0);
+    } else {
+      hello["mode"] = "live";
+      send(hello);
+    }
+  }
+
+  void show(const std::shared_ptr<const ViewScene>& scene) {
+    if (scene && !(scene_ && scene_->meshes() == scene->meshes()))
+      for (const auto& mesh : scene->meshes()) send(mesh, false);
+    if (scene) send(std::make_shared<const std::string>(scene->text()));
+    scene_ = scene;
+  }
+
+  /// A moment of a recording.
+  void at(double t_s) {
+    const RecordedFeed& feed = *server_.recorded;
+    const auto [from, to] = feed.stretches(t_s);
+    const bool goes_on = history_at_ >= from && history_at_ <= to && history_at_ > 0;
+    send(std::make_shared<const std::string>(
+             history_message(feed.history(), goes_on ? history_at_ : from, to, !goes_on, feed.begin_ns())),
+         false);
+    history_at_ = to;
+    const auto now = std::chrono::steady_clock::now();
+    if (!goes_on || now >= times_at_) {
+      times_at_ = now + kTimesEvery;
+      const auto [took, late] = feed.times(t_s);
+      send(times_json(took, late));
+    }
+    send(feed.frame(t_s));  // last: the page asks again when it has come
+  }
+
+  void read() {
+    socket_.async_read(buffer_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+      if (error) return self->hang_up();
+      self->hear(beast::buffers_to_string(self->buffer_.data()));
+      self->buffer_.consume(self->buffer_.size());
+      self->read();
+    });
+  }
+
+  void hear(const std::string& text) {
+    const Json said = Json::parse(text, nullptr, false);
+    if (!said.is_object() || !said.contains("type") || !said["type"].is_string()) return hang_up();
+    const std::string type = said["type"];
+    if (server_.recorded != nullptr) {
+      if (type == "at" && said.contains("t") && said["t"].is_number()) at(said["t"].get<double>());
+      return;
+    }
+    PageLease& lease = *server_.lease;
+    if (type == "alive") lease.lives(number_);
+    if (type == "stop") lease.ask(number_, PageLease::Wish::stop);
+    if (type == "arm") lease.ask(number_, PageLease::Wish::arm);
+    if (type == "disarm") lease.ask(number_, PageLease::Wish::disarm);
+    if (type == "acknowledge") lease.ask(number_, PageLease::Wish::acknowledge);
+  }
+
+  void write() {
+    socket_.text(waiting_.front().text);
+    socket_.async_write(asio::buffer(*waiting_.front().bytes),
+                        [self = shared_from_this()](beast::error_code error, std::size_t) {
+                          if (error) return self->hang_up();
+                          self->waiting_.pop_front();
+                          if (!self->waiting_.empty()) self->write();
+                        });
+  }
+
+  websocket::stream<beast::tcp_stream> socket_;
+  Server& server_;
+  std::uint64_t number_;
+  beast::flat_buffer buffer_;
+  std::deque<Message> waiting_;
+  std::uint64_t link_told_ = ~std::uint64_t{0};
+  std::shared_ptr<const ViewScene> scene_;
+  std::string why_no_scene_;
+  std::uint64_t history_of_ = 0, history_at_ = 0;
+  std::chrono::steady_clock::time_point times_at_{};
+};
+
+namespace {
+
+/// A connection of which nobody knows yet what it wants.
+template <class Server>
+class Visit : public std::enable_shared_from_this<Visit<Server>> {
+ public:
+  Visit(tcp::socket&& socket, Server& server) : stream_(std::move(socket)), server_(server) {}
+  ~Visit() {
+    if (!became_page_) --server_.connections;
+  }
+  Visit(const Visit&) = delete;
+  Visit& operator=(const Visit&) = delete;
+
+  void read() {
+    request_ = {};
+    stream_.expires_after(kRequestWithin);
+    http::async_read(stream_, buffer_, request_,
+                     [self = this->shared_from_this()](beast::error_code error, std::size_t) {
+                       if (!error) self->answer();
+                     });
+  }
+
+ private:
+  /// What was asked for below the token; nothing: the token is another.
+  std::optional<std::string> wanted() const {
+    const auto target = request_.target();
+    const std::size_t end = server_.token.size() + 1;
+    if (target.size() < end + 1 || target[0] != '/' || target[end] != '/') return {};
+    if (!same({target.data() + 1, end - 1}, server_.token)) return {};
+    return std::string(target.substr(end + 1));
+  }
+
+  void answer() {
+    const auto origin = request_.find(http::field::origin);
+    const bool from_us = origin == request_.end() || server_.is_our_origin(origin->value());
+    const bool upgrade = websocket::is_upgrade(request_);
+    if (!server_.is_ours(request_[http::field::host]) || !from_us || (upgrade && origin == request_.end()))
+      return refuse(http::status::forbidden,
+                    "This page is served to browsers that were sent to it by wrenchctl view.\n");
+    const auto name = wanted();
+    if (!name)
+      return refuse(http::status::forbidden,
+                    "The address is not complete: open the one that wrenchctl view printed, all of it.\n");
+    if (upgrade && *name == "live") {
+      stream_.expires_never();
+      became_page_ = true;
+      std::make_shared<typename Server::Page>(stream_.release_socket(), server_)->open(request_);
+      return;
+    }
+    if (request_.method() != http::verb::get && request_.method() != http::verb::head)
+      return refuse(http::status::method_not_allowed, "Only GET is answered here.\n");
+    const PageFiles::File* file = server_.files.find(*name);
+    if (file == nullptr) return refuse(http::status::not_found, "There is no such file.\n");
+    respond(http::status::ok, file->type, file->bytes);
+  }
+
+  void refuse(http::status status, const char* why) { respond(status, "text/plain; charset=utf-8", why); }
+
+  void respond(http::status status, const std::string& type, const std::string& body) {
+    auto response = std::make_shared<http::response<http::string_body>>(status, request_.version());
+    response->set(http::field::server, "wrenchctl view");
+    response->set(http::field::content_type, type);
+    response->set(http::field::cache_control, "no-store");
+    response->set("X-Content-Type-Options", "nosniff");
+    response->set("Referrer-Policy", "no-referrer");
+    response->set("Cross-Origin-Resource-Policy", "same-origin");
+    response->set("Cross-Origin-Opener-Policy", "same-origin");
+    response->set("Content-Security-Policy", server_.files.security_policy());
+    response->keep_alive(request_.keep_alive());
+    response->content_length(body.size());
+    if (request_.method() != http::verb::head) response->body() = body;
+    http::async_write(stream_, *response,
+                      [self = this->shared_from_this(), response](beast::error_code error, std::size_t) {
+                        if (!error && response->keep_alive()) return self->read();
+                        self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+                      });
+  }
+
+  beast::tcp_stream stream_;
+  Server& server_;
+  beast::flat_buffer buffer_;
+  http::request<http::string_body> request_;
+  bool became_page_ = false;
+};
+
+}  // namespace
+
+ViewServer::Server::Server(std::uint16_t wanted_port, PageFiles page_files) : files(std::move(page_files)) {
+  try {
+    const tcp::endpoint here(asio::ip::address_v4::loopback(), wanted_port);
+    acceptor.open(here.protocol());
+    acceptor.set_option(tcp::acceptor::reuse_address(true));
+    acceptor.bind(here);
+    acceptor.listen();
+  } catch (const boost::system::system_error& error) {
+    throw std::runtime_error("127.0.0.1:" + std::to_string(wanted_port) + " cannot be listened on: " +
+                             error.code().message() + "; name another port, or none, with --port");
+  }
+  port = acceptor.local_endpoint().port();
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) signals.add(signal);
+  signals.async_wait([this](beast::error_code error, int) {
+    if (!error) io.stop();
+  });
+}
+
+void ViewServer::Server::accept() {
+  acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (!error && connections < kMostConnections) {
+      socket.set_option(tcp::no_delay(true), error);
+      ++connections;
+      std::make_shared<Visit<Server>>(std::move(socket), *this)->read();
+    }
+    accept();
+  });
+}
+
+/// The same frame for all pages that can take one.
+void ViewServer::Server::push_frames() {
+  frame_timer.expires_after(kFrameEvery);
+  frame_timer.async_wait([this](beast::error_code error) {
+    if (!error) push_frames();
+  });
+  live->watched(!pages.empty());
+  const std::vector<std::string> events = live->events();
+  lease->loop_is(live->state());
+  if (pages.empty()) return;
+  std::shared_ptr<const std::string> frame;
+  if (const auto now = live->now()) {
+    Json json = frame_json(now->tick, now->words, live->scene().get(), 0);
+    json["missed"] = now->missed;
+    json["held_by"] = lease->holder();
+    frame = text_of(json);
+  }
+  const auto time = std::chrono::steady_clock::now();
+  for (const auto& [number, weak] : pages) {
+    const auto page = weak.lock();
+    if (!page) continue;
+    for (const std::string& event : events)
+      page->send(std::make_shared<const std::string>(R"({"type":"event","event":)" + event + "}"));
+    page->push(frame, time);
+  }
+}
+
+void ViewServer::Server::tell(const PageLease::Told& told) {
+  const auto found = pages.find(told.page);
+  if (found == pages.end()) return;
+  if (const auto page = found->second.lock())
+    page->send({{"type", "told"}, {"what", told.what}, {"done", told.done}, {"text", told.text}});
+}
+
+ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed)
+    : server_(std::make_unique<Server>(port, std::move(files))) {
+  server_->live = &feed;
+  server_->lease =
+      std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Told& told) {
+        asio::post(server->io, [server, told] { server->tell(told); });
+      });
+}
+
+ViewServer::ViewServer(std::uint16_t port, PageFiles files, const RecordedFeed& feed)
+    : server_(std::make_unique<Server>(port, std::move(files))) {
+  server_->recorded = &feed;
+}
+
+ViewServer::~ViewServer() = default;
+
+std::string ViewServer::url() const {
+  return "http://127.0.0.1:" + std::to_string(server_->port) + "/" + server_->token + "/";
+}
+
+void ViewServer::run() {
+  server_->accept();
+  if (server_->live != nullptr) server_->push_frames();
+  server_->io.run();
+}
+
+void ViewServer::stop() {
+  server_->io.stop();
+}
+
+}  // namespace wrenchd
