@@ -17,6 +17,7 @@ struct Bench {
   FaultSet found = 0;
   Fault said = Fault::none;
   bool works = true;  ///< its watchdog
+  bool wakes = true;  ///< its motors come on when they are told to
   int silent_ticks = 0;
 
   explicit Bench(bool can_tell = true) : profile(profile_of(can_tell)), test(profile, 0.5) {
@@ -38,7 +39,7 @@ struct Bench {
     sample.fresh = true;
     silent_ticks = test.speaks() ? 0 : silent_ticks + 1;
     if (test.speaks()) {
-      sample.motors_on = test.motors_on();
+      sample.motors_on = wakes && test.motors_on();
       if (test.motors_on()) sample.watchdog_tripped = false;
     } else if (works && silent_ticks > 8) {
       sample.watchdog_tripped = sample.watchdog_tripped || sample.motors_on;
@@ -125,6 +126,15 @@ TEST_CASE("a watchdog that does not trip is told; where it cannot be seen it is 
   Bench mute(false);
   mute.works = false;
   CHECK(mute.ticks_until_passed(1000) > 0);
+}
+
+TEST_CASE("motors that do not come on when they are told to are told, and nothing is waited for",
+          "[self_test]") {
+  Bench bench;
+  bench.wakes = false;
+  CHECK(bench.ticks_until_passed(2000) == -1);
+  CHECK(bench.said == Fault::test_watchdog);
+  CHECK(bench.test.speaks());  // it has not come to the silence in which the watchdog would trip
 }
 
 TEST_CASE("a device that has to be homed first has all the time it needs", "[self_test]") {
