@@ -141,6 +141,21 @@ TEST_CASE("a wall that goes away lets the hand go gently, and one that comes tak
   CHECK((s.last.limit_causes & kPassivity) == 0);
 }
 
+TEST_CASE("an obstacle that is added may be made instead of read", "[workbench]") {
+  Bench s;
+  s.press();
+  const char* wall =
+      "name = \"wall\"\nmesh = { make = \"box\", size_m = [0.02, 0.2, 0.2] }\n"
+      "position_m = [0.034, 0.0, 0.0]";
+  CHECK(s.bench().add(toml(wall), "request") == "wall");
+  s.go_for(1.5);
+  CHECK(s.last.rendering == 1);
+  CHECK(s.last.X_WQ[0] < -0.0009);  // its face is at 24 mm, and the cube reaches 25
+  CHECK(s.bench().scene().meshes.back().mesh == "made box 0.02 x 0.2 x 0.2 m, 20000 triangles");
+  const char* unknown = "name = \"pot\"\nmesh = { make = \"teapot\" }";
+  CHECK_THROWS_WITH(s.bench().add(toml(unknown), "request"), Catch::Contains("nothing of kind 'teapot'"));
+}
+
 TEST_CASE("a stiffness that is changed in contact goes over without a jump", "[workbench]") {
   Bench s;
   s.press();
