@@ -138,11 +138,12 @@ export class World {
   }
 
   /** A mesh of the scene that comes next. */
-  mesh({ number, positions, normals, lines }) {
+  mesh({ number, positions, normals, triangles, lines }) {
     if (number === 0) this.meshes.clear();
     const surface = new THREE.BufferGeometry();
     surface.setAttribute("position", new THREE.BufferAttribute(positions, 3));
     surface.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
+    surface.setIndex(new THREE.BufferAttribute(triangles, 1));
     surface.computeBoundingSphere();
     const edges = new THREE.BufferGeometry();
     edges.setAttribute("position", new THREE.BufferAttribute(lines, 3));
