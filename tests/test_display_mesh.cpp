@@ -2,6 +2,7 @@
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <string>
 
 #include <catch2/catch.hpp>
 
@@ -25,11 +26,15 @@ Vector3d third(const std::vector<float>& xs, std::size_t i) {
   return {xs[3 * i], xs[3 * i + 1], xs[3 * i + 2]};
 }
 
+/// Of a corner of a triangle.
+Vector3d position(const DisplayMesh& mesh, std::size_t i) {
+  return third(mesh.positions, mesh.corners[i]);
+}
+
 double volume(const DisplayMesh& mesh) {
   double six = 0.0;
-  for (std::size_t t = 0; t < mesh.triangles(); ++t)
-    six += third(mesh.positions, 3 * t)
-               .dot(third(mesh.positions, 3 * t + 1).cross(third(mesh.positions, 3 * t + 2)));
+  for (std::size_t i = 0; i < mesh.corners.size(); i += 3)
+    six += position(mesh, i).dot(position(mesh, i + 1).cross(position(mesh, i + 2)));
   return six / 6.0;
 }
 
@@ -39,10 +44,10 @@ TEST_CASE("a cube is drawn flat, with its twelve edges", "[view]") {
   const DisplayMesh cube = drawn(make_mesh({.kind = "cube", .triangles = 12, .seed = 1}));
   REQUIRE(cube.triangles() >= 12);
   for (std::size_t t = 0; t < cube.triangles(); ++t) {
-    const Vector3d a = third(cube.positions, 3 * t), b = third(cube.positions, 3 * t + 1),
-                   c = third(cube.positions, 3 * t + 2);
+    const Vector3d a = position(cube, 3 * t), b = position(cube, 3 * t + 1), c = position(cube, 3 * t + 2);
     const Vector3d n = (b - a).cross(c - a).normalized();
-    for (std::size_t k = 0; k < 3; ++k) CHECK((third(cube.normals, 3 * t + k) - n).norm() < 1e-5);
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK((third(cube.normals, cube.corners[3 * t + k]) - n).norm() < 1e-5);
   }
   double length = 0.0, side = 0.0;
   for (std::size_t i = 0; i + 1 < cube.lines.size() / 3; i += 2)
@@ -54,6 +59,7 @@ TEST_CASE("a cube is drawn flat, with its twelve edges", "[view]") {
 TEST_CASE("a sphere is drawn smooth, without an edge", "[view]") {
   const DisplayMesh sphere = drawn(make_mesh({.kind = "sphere", .triangles = 5000, .seed = 1}));
   CHECK(sphere.lines.empty());
+  CHECK(sphere.positions.size() / 3 < sphere.triangles());  // corners are shared
   double worst = 1.0;
   for (std::size_t i = 0; i < sphere.positions.size() / 3; ++i)
     worst = std::min(worst, third(sphere.positions, i).normalized().dot(third(sphere.normals, i)));
@@ -70,6 +76,10 @@ TEST_CASE("a large mesh is drawn with fewer triangles, and keeps its shape", "[v
     CHECK(coarse.triangles() <= 8'000);
     CHECK(coarse.triangles() > 2'000);
     CHECK(volume(coarse) == Approx(whole).epsilon(0.01));
+    const bool round = std::string(kind) == "sphere";
+    const double lines_a_triangle =
+        static_cast<double>(coarse.lines.size()) / 6.0 / static_cast<double>(coarse.triangles());
+    CHECK((lines_a_triangle < 0.001) == round);  // and its edges
     CHECK(drawn(fine, fine.triangles.size()).triangles() == fine.triangles.size());
   }
 }

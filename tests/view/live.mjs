@@ -27,10 +27,13 @@ test(async () => {
   // Armed: force is felt and shown.
   await armed();
   await until("the page says who armed", async () => /process/.test(await text(page, "armed-by")));
-  await until("a force is shown", async () => Number(await text(page, "force")) > 0.5);
-  const { frame, world } = await page.evaluate(() => ({ frame: window.view.frame(), world: window.view.world() }));
+  const { frame, world } = await until("a force is shown", async () => {
+    await armed();
+    const now = await page.evaluate(() => ({ frame: window.view.frame(), world: window.view.world() }));
+    return Number(await text(page, "force")) > 0.5 && now.frame.touches.length > 0 && now;
+  });
   frame.p.forEach((x, i) => assert.ok(Math.abs(world.ghost[i] - x) < 1e-6));
-  assert.ok(frame.touches.length > 0 && frame.touches[0].obstacle === "table");
+  assert.equal(frame.touches[0].obstacle, "table");
 
   // Disarmed on purpose is no fault.
   await armed();

@@ -58,7 +58,7 @@ test(async () => {
     near(Number(await text(page, "torque")), 1e3 * length3(row.F_out.slice(3)), 0.0501, `${what}, torque`);
     const gap = [0, 1, 2].map((i) => row.X_WQ[i] - row.X_WP[i]);
     near(Number(await text(page, "depth")), 1e3 * length3(gap), 0.000501, `${what}, penetration`);
-    near(Number(await text(page, "energy")), 1e6 * row.energy, 0.0000501, `${what}, energy`);
+    near(Number(await text(page, "energy")), 1e6 * row.energy, 0.000501, `${what}, energy`);
     near(Number(await text(page, "authority")), 100 * row.authority, 0.501, `${what}, authority`);
     assert.equal(await text(page, "contacts"), String(row.contacts), what);
     const world = await page.evaluate(() => window.view.world());

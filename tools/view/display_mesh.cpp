@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <stdexcept>
+#include <string>
 #include <unordered_map>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -16,6 +19,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Triangle = std::array<std::uint32_t, 3>;
+
+/// A cell or two may bend a smooth surface by more than kCrease_rad.
+constexpr double kCoarseCrease_rad = 1.0;
 
 struct Surface {
   std::vector<Vector3d> vertices;
@@ -78,15 +84,20 @@ Surface clustered(const Surface& fine, const Vector3d& origin, double side) {
   Surface coarse;
   coarse.vertices.resize(cells.size());
   for (const auto& [key, cell] : cells) coarse.vertices[cell.number] = cell.best(side);
+  std::map<Triangle, int> sides;
   for (const Triangle& t : fine.triangles) {
     Triangle c = {cell_of[t[0]]->number, cell_of[t[1]]->number, cell_of[t[2]]->number};
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
     std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
-    coarse.triangles.push_back(c);
+    const bool turned = c[1] > c[2];
+    if (turned) std::swap(c[1], c[2]);
+    sides[c] += turned ? -1 : 1;
   }
-  std::sort(coarse.triangles.begin(), coarse.triangles.end());
-  coarse.triangles.erase(std::unique(coarse.triangles.begin(), coarse.triangles.end()),
-                         coarse.triangles.end());
+  // Two that lie on each other and look opposite ways are a fold that was flattened: neither is drawn.
+  for (const auto& [c, net] : sides) {
+    if (net > 0) coarse.triangles.push_back(c);
+    if (net < 0) coarse.triangles.push_back({c[0], c[2], c[1]});
+  }
   return coarse;
 }
 
@@ -128,16 +139,26 @@ void append(std::vector<float>& to, const Vector3d& v) {
   for (int i = 0; i < 3; ++i) to.push_back(static_cast<float>(v[i]));
 }
 
-void draw(const Surface& s, DisplayMesh& out) {
+void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
   const double bend = std::cos(kCrease_rad);
+  const double line_bend = made_coarser ? std::cos(kCoarseCrease_rad) : bend;
   std::vector<Vector3d> areas, normals;
   for (const Triangle& t : s.triangles) {
     areas.push_back(s.area(t));
     normals.push_back(areas.back().stableNormalized());
   }
   const Around around(s);
-  out.positions.reserve(9 * s.triangles.size());
-  out.normals.reserve(9 * s.triangles.size());
+  std::vector<std::vector<std::pair<Vector3d, std::uint32_t>>> corners(s.vertices.size());
+  // The corner of a vertex with this normal, which many triangles share where the surface is smooth.
+  const auto corner = [&](std::uint32_t v, const Vector3d& normal) {
+    for (const auto& [known, number] : corners[v])
+      if ((known - normal).squaredNorm() < 1e-8) return number;
+    const auto number = static_cast<std::uint32_t>(out.positions.size() / 3);
+    append(out.positions, s.vertices[v]);
+    append(out.normals, normal);
+    corners[v].emplace_back(normal, number);
+    return number;
+  };
   for (std::uint32_t i = 0; i < s.triangles.size(); ++i)
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t v = s.triangles[i][static_cast<std::size_t>(k)];
@@ -145,16 +166,18 @@ void draw(const Surface& s, DisplayMesh& out) {
       Vector3d normal = Vector3d::Zero();
       for (const std::uint32_t j : around.of(v))
         if (normals[j].dot(normals[i]) >= bend) normal += areas[j];
-      append(out.positions, s.vertices[v]);
-      append(out.normals, normal.isZero(0.0) ? normals[i] : Vector3d(normal.stableNormalized()));
-      bool smooth = false, other = false;
+      out.corners.push_back(corner(v, normal.isZero(0.0) ? normals[i] : Vector3d(normal.stableNormalized())));
+      int others = 0;
+      double straightest = -1.0;
       for (const std::uint32_t j : around.of(v)) {
         const Triangle& t = s.triangles[j];
         if (j == i || std::find(t.begin(), t.end(), w) == t.end()) continue;
-        other = true;
-        smooth = smooth || normals[j].dot(normals[i]) >= bend;
+        ++others;
+        straightest = std::max(straightest, normals[j].dot(normals[i]));
       }
-      if (smooth || (other && v > w)) continue;  // of two triangles one draws their edge
+      if (others > 0 && (straightest >= line_bend || v > w))
+        continue;                                 // of two triangles one draws their edge
+      if (made_coarser && others != 1) continue;  // where cells became one there is no edge of the body's own
       append(out.lines, s.vertices[v]);
       append(out.lines, s.vertices[w]);
     }
@@ -175,8 +198,9 @@ DisplayMesh display_mesh(std::span<const float> vertices, std::span<const Triang
   surface.triangles.assign(triangles.begin(), triangles.end());
   DisplayMesh out;
   out.triangles_given = triangles.size();
-  if (triangles.size() > most) surface = coarser(surface, most);
-  draw(surface, out);
+  const bool make_coarser = triangles.size() > most;
+  if (make_coarser) surface = coarser(surface, most);
+  draw(surface, make_coarser, out);
   return out;
 }
 

@@ -9,14 +9,15 @@
 
 namespace wrenchd {
 
-/// A mesh as a screen wants it, in its own frame [m]: three corners a triangle, each with its position and a
-/// normal, and the edges at which the surface bends, two points each.
+/// A mesh as a screen wants it, in its own frame [m]: corners with a position and a normal, three of them a
+/// triangle, and the edges at which the surface bends, two points each.
 struct DisplayMesh {
-  std::vector<float> positions;     ///< 9 a triangle
-  std::vector<float> normals;       ///< likewise; smooth but for bends of more than kCrease_rad
-  std::vector<float> lines;         ///< 6 a line
-  std::size_t triangles_given = 0;  ///< before it was made coarser
-  std::size_t triangles() const noexcept { return positions.size() / 9; }
+  std::vector<float> positions;        ///< 3 a corner
+  std::vector<float> normals;          ///< likewise; smooth but for bends of more than kCrease_rad
+  std::vector<std::uint32_t> corners;  ///< 3 a triangle
+  std::vector<float> lines;            ///< 6 a line
+  std::size_t triangles_given = 0;     ///< before it was made coarser
+  std::size_t triangles() const noexcept { return corners.size() / 3; }
 };
 
 inline constexpr double kCrease_rad = 0.6;  ///< 34 degrees

@@ -28,16 +28,16 @@ const char* name(PageLease::Wish wish) {
   return "";
 }
 
-bool is_driving(const std::string& state) {
-  return state == "ramping" || state == "active" || state == "degraded" || state == "releasing";
-}
-
 std::int64_t now_ns() {
   return std::chrono::steady_clock::now().time_since_epoch().count();
 }
 
 bool is_armed(const std::string& state) {
   return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
+}
+
+bool is_over(const std::string& state) {
+  return !is_armed(state) && state != "releasing";
 }
 
 }  // namespace
@@ -90,7 +90,8 @@ Client& PageLease::client() {
 
 void PageLease::arm(std::uint64_t page) {
   const std::uint64_t other = holder_.load();
-  if (other != 0 && other != page)
+  if (other == page) return;  // it was pressed twice
+  if (other != 0)
     throw ClientError(ClientError::kTaken, "Another page of this view has armed; disarm there first.");
   client().call("lease.take");
   lived_at_ns_.store(now_ns());
@@ -112,7 +113,7 @@ void PageLease::let_go(const std::string& why) {
   try {
     client().call("disarm");
     // The lease is kept until the force has faded: to the daemon, one that ends before is a client that died.
-    for (int i = 0; i < kFadeLooks && is_driving(client().state()); ++i) {
+    for (int i = 0; i < kFadeLooks && !is_over(client().state()); ++i) {
       client().beat();
       std::this_thread::sleep_for(kBeatEvery);
     }

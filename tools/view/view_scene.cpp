@@ -41,18 +41,21 @@ std::vector<T> part(std::span<const std::byte> bytes, std::size_t offset, std::s
 }
 
 std::string message_of(std::uint32_t number, const DisplayMesh& mesh) {
-  const std::array<std::uint32_t, 4> head = {1, number, static_cast<std::uint32_t>(mesh.positions.size() / 3),
-                                             static_cast<std::uint32_t>(mesh.lines.size() / 3)};
+  const auto count = [](std::size_t numbers) { return static_cast<std::uint32_t>(numbers / 3); };
+  const std::array<std::uint32_t, 5> head = {1, number, count(mesh.positions.size()),
+                                             count(mesh.corners.size()), count(mesh.lines.size())};
   std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
-  for (const std::vector<float>* part : {&mesh.positions, &mesh.normals, &mesh.lines})
+  for (const std::vector<float>* part : {&mesh.positions, &mesh.normals})
     out.append(reinterpret_cast<const char*>(part->data()), part->size() * sizeof(float));
+  out.append(reinterpret_cast<const char*>(mesh.corners.data()), mesh.corners.size() * sizeof(std::uint32_t));
+  out.append(reinterpret_cast<const char*>(mesh.lines.data()), mesh.lines.size() * sizeof(float));
   return out;
 }
 
 std::size_t shown_of(const std::string& message) {
-  std::uint32_t corners = 0;
-  std::memcpy(&corners, message.data() + 8, 4);
-  return corners / 3;
+  std::uint32_t triangles = 0;
+  std::memcpy(&triangles, message.data() + 12, 4);
+  return triangles;
 }
 
 }  // namespace

@@ -31,8 +31,9 @@ class ViewScene {
 
   /// {type: "scene", tool, obstacles, ...}: which mesh is whose, and where it stands.
   const std::string& text() const noexcept { return text_; }
-  /// A binary message for each mesh: u32 1, number, corners, points of lines; then floats: positions and
-  /// normals of the corners, points of the lines.
+  /// A binary message for each mesh: u32 1, number, how many corners, triangles, points of lines; then
+  /// floats: positions and normals of the corners; u32: corners of the triangles; floats: points of the
+  /// lines.
   const std::vector<std::shared_ptr<const std::string>>& meshes() const noexcept { return meshes_; }
 
   /// Where the obstacles that move stand at this time (CLOCK_MONOTONIC): [[number, pose], ...].

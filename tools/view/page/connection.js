@@ -4,14 +4,16 @@
 const KIND_MESH = 1;
 const KIND_HISTORY = 2;
 
-/** A mesh: its number, corners with normals, and lines; all floats in metres. */
+/** A mesh: its number, corners with normals, which of them are triangles, and lines; metres. */
 function meshOf(buffer) {
-  const [, number, corners, points] = new Uint32Array(buffer, 0, 4);
+  const [, number, corners, triangles, points] = new Uint32Array(buffer, 0, 5);
+  const floats = 20, indices = floats + 24 * corners, lines = indices + 12 * triangles;
   return {
     number,
-    positions: new Float32Array(buffer, 16, 3 * corners),
-    normals: new Float32Array(buffer, 16 + 12 * corners, 3 * corners),
-    lines: new Float32Array(buffer, 16 + 24 * corners, 3 * points),
+    positions: new Float32Array(buffer, floats, 3 * corners),
+    normals: new Float32Array(buffer, floats + 12 * corners, 3 * corners),
+    triangles: new Uint32Array(buffer, indices, 3 * triangles),
+    lines: new Float32Array(buffer, lines, 3 * points),
   };
 }
 

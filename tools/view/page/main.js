@@ -8,6 +8,7 @@ const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
 const PLOTS_EVERY_MS = 50;
 const ALIVE_EVERY_MS = 100;
+const DRAWN_WITHIN_MS = 2000;
 const STATES = { gone: "connection lost" };
 const ARMED = ["waiting", "ramping", "active", "degraded"];
 
@@ -51,7 +52,7 @@ function showFrame(now) {
   set("torque", fixed(1e3 * length3(F.slice(3)), 1));
   set("depth", now.depth_m === null ? "–" : fixed(1e3 * now.depth_m, 3));
   set("angle", now.angle_rad === null ? "–" : fixed((180 / Math.PI) * now.angle_rad, 2));
-  set("energy", now.energy === null ? "–" : fixed(1e6 * now.energy, 4));
+  set("energy", now.energy === null ? "–" : fixed(1e6 * now.energy, 3));
   set("authority", fixed(100 * now.authority, 0));
   set("contacts", String(now.contacts));
   set("time", mode === "recording" ? `${now.t.toFixed(3)} s` : running(now.tick));
@@ -144,7 +145,7 @@ function showButtons() {
 }
 
 function showTimes() {
-  const line = ({ p50_us, p99_9_us, max_us }) => `p50 ${p50_us.toFixed(0)}, p99.9 ${p99_9_us.toFixed(0)}, longest ${max_us.toFixed(0)} us`;
+  const line = ({ p50_us, p99_9_us, max_us }) => `p50 ${p50_us.toFixed(0)} · p99.9 ${p99_9_us.toFixed(0)} · max ${max_us.toFixed(0)} us`;
   set("times-took", line(times.took));
   set("times-late", line(times.late));
   plots.drawTimes(times, rate_Hz > 0 ? 1e6 / rate_Hz : 0);
@@ -335,7 +336,7 @@ addEventListener("keydown", (event) => {
 
 // --- every frame of the screen ---
 
-let plotted = 0, said = 0, before = performance.now();
+let plotted = 0, drawnAt = 0, before = performance.now();
 function draw(now) {
   requestAnimationFrame(draw);
   if (mode === "recording") {
@@ -346,14 +347,10 @@ function draw(now) {
     askMoment();
   }
   before = now;
-  // Only a page that is drawn says that it lives.
-  if (mode === "live" && document.visibilityState === "visible" && now - said > ALIVE_EVERY_MS) {
-    said = now;
-    connection.say("alive");
-  }
+  drawnAt = now;
   if (frame) showFrame(frame);
   showButtons();
-  world.draw(now);
+  world.draw();
   if (now - plotted > PLOTS_EVERY_MS && frame) {
     plotted = now;
     plots.draw(history, frame.t);
@@ -364,6 +361,12 @@ function draw(now) {
   }
 }
 requestAnimationFrame(draw);
+
+// A page says that it lives while it is drawn, however slowly, and can be seen.
+setInterval(() => {
+  const seen = document.visibilityState === "visible" && performance.now() - drawnAt < DRAWN_WITHIN_MS;
+  if (mode === "live" && seen) connection.say("alive");
+}, ALIVE_EVERY_MS);
 
 /** For tests, and for the curious at the console. */
 window.view = {

@@ -12,6 +12,15 @@ function place(object, pose) {
   object.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
 }
 
+/** Of faces in one plane the lower number is seen; edges lie before all of them. */
+const behind = (steps) => ({ polygonOffset: true, polygonOffsetFactor: steps, polygonOffsetUnits: steps });
+
+/** 1, 2 or 5 times a power of ten, just below x. */
+function round125(x) {
+  const decade = 10 ** Math.floor(Math.log10(x));
+  return decade * (x / decade >= 5 ? 5 : x / decade >= 2 ? 2 : 1);
+}
+
 const UP = new THREE.Vector3(0, 1, 0);
 
 /** An arrow of any length and thickness, along +Y before it is turned. */
@@ -73,14 +82,14 @@ export class World {
     this.controls.listenToKeyEvents?.(canvas);
     this.light();
     this.materials = {
-      tool: new THREE.MeshLambertMaterial(),
-      ghost: new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.3, depthWrite: false }),
-      obstacle: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }),
-      moving: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }),
-      plane: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.55, depthWrite: false }),
+      tool: new THREE.MeshLambertMaterial(behind(1)),
+      ghost: new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.3, depthWrite: false, ...behind(3) }),
+      obstacle: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, ...behind(1) }),
+      moving: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, ...behind(1) }),
+      plane: new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, transparent: true, opacity: 0.55, depthWrite: false, ...behind(2) }),
       edge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }),
       ghostEdge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6 }),
-      grid: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.35 }),
+      grid: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.3 }),
       contact: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true }),
       force: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }),
       torque: new THREE.MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }),
@@ -129,11 +138,12 @@ export class World {
   }
 
   /** A mesh of the scene that comes next. */
-  mesh({ number, positions, normals, lines }) {
+  mesh({ number, positions, normals, triangles, lines }) {
     if (number === 0) this.meshes.clear();
     const surface = new THREE.BufferGeometry();
     surface.setAttribute("position", new THREE.BufferAttribute(positions, 3));
     surface.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
+    surface.setIndex(new THREE.BufferAttribute(triangles, 1));
     surface.computeBoundingSphere();
     const edges = new THREE.BufferGeometry();
     edges.setAttribute("position", new THREE.BufferAttribute(lines, 3));
@@ -169,7 +179,7 @@ export class World {
 
   /** A patch of the border of a half-space, with a grid that gives a measure. */
   plane({ normal, offset_m }) {
-    const size = Math.max(6 * this.size, 0.1), step = 10 ** Math.floor(Math.log10(size / 5));
+    const size = Math.max(6 * this.size, 0.1), step = round125(size / 8);
     const half = Math.ceil(size / step) * step;
     const body = new THREE.Group();
     body.add(new THREE.Mesh(new THREE.PlaneGeometry(2 * half, 2 * half), this.materials.plane));
@@ -241,7 +251,7 @@ export class World {
     const sphere = box.getBoundingSphere(new THREE.Sphere());
     const radius = Math.min(sphere.radius, 12 * this.size);  // a floor of ten metres is no reason to lose the tool
     const centre = radius < sphere.radius ? target : sphere.center;
-    const distance = (1.15 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
+    const distance = (0.95 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
     const aside = new THREE.Vector3(-0.62, -0.78, 0.55).normalize();
     this.camera.position.copy(centre).addScaledVector(aside, distance);
     this.camera.near = distance / 200;
@@ -262,23 +272,7 @@ export class World {
     this.changed = true;
   }
 
-  /** Where frames come slowly there are fewer pixels, and more again where they come fast. */
-  pace(now) {
-    const took = now - (this.before ?? now);
-    this.before = now;
-    if (took > 250) return;  // nothing was drawn meanwhile: it says nothing
-    this.usual = 0.95 * (this.usual ?? 16) + 0.05 * took;
-    if (now < (this.steady ?? 0)) return;
-    const most = Math.min(devicePixelRatio, 2), ratio = this.renderer.getPixelRatio();
-    const wanted = this.usual > 50 ? Math.max(0.75 * ratio, 0.4) : this.usual < 20 ? Math.min(1.25 * ratio, most) : ratio;
-    if (wanted === ratio) return;
-    this.steady = now + (wanted < ratio ? 1000 : 10000);
-    this.renderer.setPixelRatio(wanted);
-    this.changed = true;
-  }
-
-  draw(now) {
-    this.pace(now);
+  draw() {
     if (!this.changed) return;
     this.changed = false;
     this.renderer.render(this.scene, this.camera);
