@@ -25,9 +25,8 @@ double along(const Vector3d& t, const Vector3d& w) noexcept {
 }
 
 /// How far to go back along a way of this length.
-double excess(double length, double leash, double nothing, double most) noexcept {
-  const double too_far = length - leash;
-  return too_far > nothing ? std::min(too_far, most) : 0.0;
+double excess(double length, double leash, double nothing) noexcept {
+  return length - leash > nothing ? length - leash : 0.0;
 }
 
 }  // namespace
@@ -84,8 +83,7 @@ void DeflectionPose::take_in(const Pose& before, double dt_s) noexcept {
   const Vector3d turn = rotation_vector(before.rotation * held_->rotation.conjugate());
   const double firmness = std::max(linear_.firmness(translation_m_) * along(translation_m_, way),
                                    angular_.firmness(rotation_rad_) * along(rotation_rad_, turn));
-  const double back_m =
-      excess(way.norm(), firmness * settings_.leash_m, kNoWay_m, dt_s * max_linear_m_per_s_);
+  const double back_m = excess(way.norm(), firmness * settings_.leash_m, kNoWay_m);
   if (back_m > 0.0) {
     X_BH_.translation_m -= back_m * way.normalized();
     const Vector3d step =
@@ -93,8 +91,7 @@ void DeflectionPose::take_in(const Pose& before, double dt_s) noexcept {
     X_BH_.translation_m = before.translation_m + step;
     V_BH_.linear_m_per_s = step / dt_s;
   }
-  const double back_rad =
-      excess(turn.norm(), firmness * settings_.leash_rad, kNoTurn_rad, dt_s * max_angular_rad_per_s_);
+  const double back_rad = excess(turn.norm(), firmness * settings_.leash_rad, kNoTurn_rad);
   if (back_rad > 0.0) {
     X_BH_.rotation = (rotation_from(-back_rad * turn.normalized()) * X_BH_.rotation).normalized();
     const Vector3d step = no_longer_than(rotation_vector(X_BH_.rotation * before.rotation.conjugate()),

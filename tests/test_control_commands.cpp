@@ -28,7 +28,7 @@ struct Daemon {
   std::string socket = (dir.path() / "control.sock").string();
   RunningProgram program;
 
-  Daemon() : program("wrenchd", arguments()) {
+  explicit Daemon(const std::string& profile = "loopback") : program("wrenchd", arguments(profile)) {
     const bool runs = program.says("control socket: " + socket) && program.says("state: disarmed");
     INFO(program.err());
     REQUIRE(runs);
@@ -48,11 +48,12 @@ struct Daemon {
   }
 
  private:
-  std::vector<std::string> arguments() const {
+  std::vector<std::string> arguments(const std::string& profile) const {
     dir.write("hand.toml", kStillHand);
     const auto config = dir.write(
         "wrenchd.toml", "[limits]\nsoft_start_s = 0.25\n[simulation]\nhand_script = \"hand.toml\"\n");
-    return {"--realtime", "best_effort", "--config", config.string(), "--control", socket};
+    return {"--realtime", "best_effort", "--config",   config.string(),
+            "--control",  socket,        "--simulate", profile};
   }
 };
 
@@ -70,6 +71,11 @@ TEST_CASE("wrenchctl tells the status of a daemon, for a person and for a progra
   CHECK(status["state"] == "disarmed");
   CHECK(status["device"]["profile"] == "loopback");
   CHECK(status["tick"] > 0);
+}
+
+TEST_CASE("wrenchctl tells that a device without motors is not felt", "[control_commands]") {
+  const Daemon daemon("spacemouse_split");
+  has(daemon.ctl({"status"}).out, "limits     0 N, 0 N.m: it has no motors, and nothing is felt\n");
 }
 
 TEST_CASE("wrenchctl arm holds the hand until it is interrupted, and everybody can watch",

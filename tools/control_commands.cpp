@@ -98,7 +98,9 @@ std::string status_text(const Json& s) {
                       text_or(s["lease"], "nobody has it"));
   text += fmt::format("limits     {:g} N, {:g} N.m", limits["max_force_N"].get<double>(),
                       limits["max_torque_Nm"].get<double>());
-  if (const double authority = limits["authority"].get<double>(); authority < 1.0)
+  if (limits["max_force_N"] == 0.0 && limits["max_torque_Nm"] == 0.0)
+    text += ": it has no motors, and nothing is felt";
+  else if (const double authority = limits["authority"].get<double>(); authority < 1.0)
     text += fmt::format(", and {:.0f} % of them: the device has no watchdog", 100.0 * authority);
   text +=
       fmt::format("\nstiffness  {:.0f} % of what is asked for\n", 100.0 * s["stiffness_share"].get<double>());

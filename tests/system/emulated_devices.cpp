@@ -168,11 +168,18 @@ void polhem(Backend backend) {
 
 // --- SpaceMouse -------------------------------------------------------------------------------------------
 
+/// Share of the speed for a share of the cap's way, as its profiles have it.
+double firmness(double share) {
+  return std::pow((share - 0.08) / 0.92, 2.0);
+}
+
 void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const char* profile) {
   const bool split = format_of == EmulatedSpaceMouse::Format::split;
-  Row row(backend, format("SpaceMouse emulator, %s", split ? "split" : "combined"),
-          "found by its profile; silent at rest without a fault; pushed for 0.5 s the tool's way is velocity "
-          "times time to 1e-6; let go it stops; the LED goes off at release, by SET_REPORT");
+  Row row(
+      backend, format("SpaceMouse emulator, %s", split ? "split" : "combined"),
+      "found by its profile; silent at rest without a fault; pushed for 0.5 s the tool's way is velocity "
+      "times time to 1e-6; let go it stops; a button brings it back to where it began; the LED goes off at "
+      "release, by SET_REPORT");
   EmulatedSpaceMouse mouse(format_of);
   UsbShape shape;
   shape.report_descriptor = split ? space_navigator() : space_mouse_wireless();
@@ -188,15 +195,17 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   p.host.ticks(300);
   CHECK_THAT(row,
              p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, {}) && p.host.sample.sequence == 0);
-  p.far.with([&] { mouse.push({320, 160, 80, 0, 0, -200}); });
+  p.far.with([&] { mouse.push({280, 140, 70, 0, 0, -200}); });
   p.host.ticks(50);
   const DeviceSample before = p.host.sample;
   while (p.host.sample.arrived < before.arrived + 500ms && p.host.fault == Fault::none) p.host.ticks(1);
   const double time_s = seconds(p.host.sample.arrived - before.arrived);
   const Vector3d way = p.host.sample.X_BH.translation_m - before.X_BH.translation_m;
   const Vector3d turn = rotation_vector(p.host.sample.X_BH.rotation * before.X_BH.rotation.conjugate());
-  const Vector3d expected_way = time_s * 71.0 * 4e-6 * Vector3d(-160, -320, -80);
-  const Vector3d expected_turn = time_s * 11.4 * 2.5e-4 * Vector3d(0, 0, 200);
+  const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
+  const Vector3d expected_way =
+      time_s * 71.0 * 1.4e-3 * firmness(pushed_m.norm() / 1.4e-3) * pushed_m.normalized();
+  const Vector3d expected_turn = time_s * 11.4 * 0.0875 * firmness(200 * 2.5e-4 / 0.0875) * Vector3d::UnitZ();
   row.saw(format("way to %s, turn to %s", (way - expected_way).norm() < 1e-6 ? "1e-6 m" : "more",
                  (turn - expected_turn).norm() < 1e-6 ? "1e-6 rad" : "more"));
   CHECK_THAT(row, p.host.fault == Fault::none && time_s > 0.49);
@@ -212,6 +221,10 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   CHECK_THAT(row, p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, left.X_BH));
   CHECK_THAT(row, p.host.sample.sequence == left.sequence);
   CHECK_THAT(row, p.far.with([&] { return mouse.led(); }) && p.far.taken() == 0);
+  p.far.with([&] { mouse.press(1); });
+  p.host.ticks(60);
+  CHECK_THAT(row, p.host.fault == Fault::none && p.host.sample.buttons == 1);
+  CHECK_THAT(row, same_bits(p.host.sample.X_BH, {}) && !same_bits(left.X_BH, {}));
   p.host.device.release(SteadyClock::now());
   p.host.device.close();
   const std::vector<std::uint8_t> last = p.far.last_taken();

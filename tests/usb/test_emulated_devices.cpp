@@ -131,7 +131,7 @@ TEST_CASE(
   TimePoint t{};
   device.open();
   device.read_newest(now());
-  mouse.push({320, 160, 80, 0, 0, -200});
+  mouse.push({280, 140, 70, 0, 0, -200});
   DeviceSample first, sample;
   for (int i = 0; i < 20; ++i) {
     for (const int before = host.sent; host.sent == before;) mouse.advance_to(t += 1ms, host);
@@ -144,9 +144,12 @@ TEST_CASE(
   const Vector3d way = sample.X_BH.translation_m - first.X_BH.translation_m;
   const Vector3d turn = rotation_vector(sample.X_BH.rotation * first.X_BH.rotation.conjugate());
   CHECK(time_s > 0.0);
-  CHECK((sample.V_BH.linear_m_per_s - 71.0 * 4e-6 * Vector3d(-160, -320, -80)).norm() < 1e-12);
-  CHECK((way - time_s * 71.0 * 4e-6 * Vector3d(-160, -320, -80)).norm() < 1e-6);
-  CHECK((turn - time_s * 11.4 * 2.5e-4 * Vector3d(0, 0, 200)).norm() < 1e-6);
+  const auto firmness = [](double share) { return std::pow((share - 0.08) / 0.92, 2.0); };
+  const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
+  const Vector3d V = 71.0 * 1.4e-3 * firmness(pushed_m.norm() / 1.4e-3) * pushed_m.normalized();
+  CHECK((sample.V_BH.linear_m_per_s - V).norm() < 1e-12);
+  CHECK((way - time_s * V).norm() < 1e-6);
+  CHECK((turn - time_s * 11.4 * 0.0875 * firmness(200 * 2.5e-4 / 0.0875) * Vector3d::UnitZ()).norm() < 1e-6);
   mouse.take_command(t, std::array<std::uint8_t, 2>{4, 1});
   REQUIRE(mouse.led());
   device.release(now());
