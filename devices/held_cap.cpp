@@ -43,7 +43,7 @@ CapCoding cap_coding(const DeviceProfile& profile) {
 
 HeldCap::HeldCap(const DeviceProfile& profile, const SimulationSettings& settings)
     : profile_(profile),
-      path_(settings.hand_path, settings.hand_repeats),
+      path_(settings),
       coding_(cap_coding(profile)),
       mouse_(coding_.format),
       seen_(unmoved()) {}
