@@ -87,7 +87,7 @@ fs::path parent_of(const std::string& name, const Place& place, const std::vecto
 
 }  // namespace
 
-TomlNode read_inherited(const fs::path& file, const SearchPath& search) {
+TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vector<fs::path>* files) {
   std::vector<fs::path> chain = {file};
   TomlNode merged = read_toml_file(file);
   for (;;) {
@@ -109,6 +109,7 @@ TomlNode read_inherited(const fs::path& file, const SearchPath& search) {
     sign(inherited, std::make_shared<const fs::path>(parent));
     lay_over(table, std::move(std::get<TomlNode::Table>(inherited.value)));
   }
+  if (files != nullptr) *files = chain;
   return merged;
 }
 

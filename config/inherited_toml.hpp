@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "config/search_path.hpp"
 #include "config/toml_file.hpp"
@@ -16,6 +17,8 @@ namespace wrenchd {
 /// NAME.toml is looked for beside the file first, then in profiles/ along the search path; a file that is
 /// already part of the chain is passed over, so that /etc/wrenchd/profiles/x.toml may inherit the package's
 /// x. Throws ConfigError: no such parent, a chain that closes on itself, or what read_toml_file() throws.
-TomlNode read_inherited(const std::filesystem::path& file, const SearchPath& search);
+/// chain: where given, is filled with the files it was read from, the nearest first.
+TomlNode read_inherited(const std::filesystem::path& file, const SearchPath& search,
+                        std::vector<std::filesystem::path>* chain = nullptr);
 
 }  // namespace wrenchd

@@ -195,9 +195,13 @@ void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSetting
 }
 
 SceneSettings load_scene(const std::filesystem::path& file) {
+  return load_scene(read_toml_file(file), file);
+}
+
+SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file) {
   SceneSettings scene;
   scene.file = file;
-  read_toml(file, read_scene, scene);
+  read_toml_node(file, tree, read_scene, scene);
   return scene;
 }
 

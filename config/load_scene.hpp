@@ -13,6 +13,8 @@ namespace wrenchd {
 /// be opened from here, and normals as unit vectors; a scene without obstacles is free space. Throws
 /// ConfigError.
 SceneSettings load_scene(const std::filesystem::path& file);
+/// The same of what was read from that file already.
+SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file);
 
 /// Adds an obstacle, given as the table that an [[obstacle]] of a scene file is; its mesh is looked for
 /// beside the scene. source: for messages. Throws ConfigError, also where its name is another's.

@@ -172,10 +172,23 @@ void read_simulation(TomlTable& table, const Lookup& lookup, SimulationSettings&
   table.optional("actuator_max_torque_Nm").number(s.actuator_max_torque_Nm, {0, 20});
   table.optional("report_delay_s").number(s.report_delay_s, {0, 0.05});
   table.optional("command_delay_s").number(s.command_delay_s, {0, 0.05});
+  const TomlValue playback = table.optional("playback");
+  if (playback.path(s.playback) && !s.playback.empty()) find_file(playback, lookup, s.playback);
+  table.optional("playback_mode")
+      .choice(s.playback_mode, {{"open", PlaybackMode::open}, {"closed", PlaybackMode::closed}});
 }
 
+/// A directory is made when it is first written to; it may be there on the machine that runs and not here.
 void read_recording(TomlTable& table, RecordingSettings& recording) {
   table.optional("file").path(recording.file);
+  const TomlValue directory = table.optional("directory");
+  if (directory.path(recording.directory) && !recording.directory.empty() &&
+      !recording.directory.is_absolute())
+    directory.refuse("expected an absolute path, found \"" + printable(recording.directory.string()) +
+                     "\"; a service is started in no directory of its own");
+  table.optional("flight_s").number(recording.flight_s, {0, 120});
+  table.optional("flights_kept").integer(recording.flights_kept, {1, 1000});
+  table.optional("keep_free_MB").number(recording.keep_free_MB, {0, 1e7});
 }
 
 /// Whether the groups exist is asked when the daemon starts: a configuration may be checked on another
@@ -228,9 +241,13 @@ void change_rendering(const TomlNode& changes, const fs::path& source, Settings&
 }
 
 Settings load_settings(const fs::path& file, const SearchPath& search) {
+  return load_settings(read_toml_file(file), file, search);
+}
+
+Settings load_settings(const TomlNode& tree, const fs::path& file, const SearchPath& search) {
   Settings settings;
   settings.file = file;
-  read_toml(file, read_settings, Lookup{search, file}, settings);
+  read_toml_node(file, tree, read_settings, Lookup{search, file}, settings);
   load_hand_script(settings.simulation.hand_script, settings.simulation);
   return settings;
 }

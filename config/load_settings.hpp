@@ -13,6 +13,8 @@ namespace wrenchd {
 /// Reads wrenchd.toml; config/wrenchd.toml is the manual of the format. Finds the files it names (scene,
 /// profile, hand script) and reads the hand script. Throws ConfigError.
 Settings load_settings(const std::filesystem::path& file, const SearchPath& search);
+/// The same of what was read from that file already.
+Settings load_settings(const TomlNode& tree, const std::filesystem::path& file, const SearchPath& search);
 
 /// Changes what [rendering] and [wrench] say, given as a table that holds those tables, or parts of them;
 /// what is not in it stays. source: for messages. Throws ConfigError; then nothing is changed.

@@ -74,7 +74,11 @@ struct DeviceSettings {
 
 /// [recording]
 struct RecordingSettings {
-  std::filesystem::path file;  ///< empty: no recording
+  std::filesystem::path file;       ///< of every tick from the first on; empty: none
+  std::filesystem::path directory;  ///< of recordings started later; empty: the usual place
+  double flight_s = 60.0;           ///< what the flight recorder holds; 0: there is none
+  int flights_kept = 10;            ///< of its files, the newest
+  double keep_free_MB = 500.0;      ///< of the disk: below that nothing is recorded
 };
 
 /// [control]

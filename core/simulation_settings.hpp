@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -13,6 +14,18 @@ struct Waypoint {
   double time_s = 0.0;
   Vector3d position_m = Vector3d::Zero();
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
+};
+
+/// Where something was, or shall be, at a time.
+struct TimedPose {
+  double time_s = 0.0;
+  Pose X;
+};
+
+/// What a played-back path is to the simulated hand.
+enum class PlaybackMode : std::uint8_t {
+  open,    ///< the handle is exactly there, whatever the device pushes with
+  closed,  ///< the hand wants the handle there, as with a hand script
 };
 
 /// The body of the simulated device, and the hand that holds it.
@@ -36,6 +49,9 @@ struct SimulationSettings {
   bool hand_repeats = true;  ///< the path starts again after its last waypoint
   std::filesystem::path hand_script = "hands/press_and_rock.toml";  ///< looked up along the search path
   std::vector<Waypoint> hand_path;  ///< read from hand_script; at least one; times strictly rising from 0
+  std::filesystem::path playback;   ///< recording, or CSV of poses; empty: the hand script
+  PlaybackMode playback_mode = PlaybackMode::closed;
+  std::vector<TimedPose> playback_path;  ///< read from playback: X_BH, times strictly rising from 0
 };
 
 }  // namespace wrenchd

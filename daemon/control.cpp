@@ -11,7 +11,7 @@ Control::Control(Station& station, EventFeed& feed)
       feed_(feed),
       lease_(station.loop(), feed),
       methods_(station.plan().settings.control) {
-  add_daemon_methods(methods_, {station_, feed_, lease_});
+  add_daemon_methods(methods_, {station_, feed_, lease_, status_});
 }
 
 void Control::open(const std::filesystem::path& path, const Identify& identify) {

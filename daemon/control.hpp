@@ -6,6 +6,7 @@
 
 #include "daemon/control_methods.hpp"
 #include "daemon/control_socket.hpp"
+#include "daemon/daemon_methods.hpp"
 #include "daemon/event_feed.hpp"
 #include "daemon/lease.hpp"
 #include "daemon/listening_socket.hpp"
@@ -23,6 +24,8 @@ class Control {
 
   /// To add rows to, before open().
   MethodTable& methods() noexcept { return methods_; }
+  /// Likewise, of what `status` answers.
+  StatusRows& status() noexcept { return status_; }
 
   /// Serves from now on. Throws std::runtime_error, which names the path, or the setting of a group that does
   /// not exist, and the cure.
@@ -32,6 +35,7 @@ class Control {
   Station& station_;
   EventFeed& feed_;
   Lease lease_;
+  StatusRows status_;
   MethodTable methods_;
   std::optional<ListeningSocket> listening_;
   std::optional<ControlSocket> socket_;  ///< last: its thread uses all of the above

@@ -178,8 +178,8 @@ Json status_json(const DaemonParts& parts) {
          {"wake_latency", times_json(timing.wake_latency)},
          {"overruns", timing.overruns.load()},
          {"skipped", timing.skipped.load()}}},
-       {"dropped_events", loop.dropped_events()},
-       {"dropped_records", loop.dropped_records()}});
+       {"dropped_events", loop.dropped_events()}});
+  for (const auto& [name, row] : parts.more) status[name] = row();
   return status;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
+#include <map>
 #include <string>
 
 #include "daemon/control_methods.hpp"
@@ -12,11 +14,16 @@ namespace wrenchd {
 
 class Station;
 
+/// What other parts of the daemon add to `status`, by its name there. Each is asked on the control thread,
+/// and must not wait.
+using StatusRows = std::map<std::string, std::function<Json()>>;
+
 /// What the methods of the daemon itself work on.
 struct DaemonParts {
   Station& station;
   EventFeed& feed;
   Lease& lease;
+  const StatusRows& more;
 };
 
 /// The rows of what every daemon answers: describe, status, devices, events, lease, arming and stopping; and

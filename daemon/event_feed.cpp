@@ -15,14 +15,17 @@ namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(10);
 
+/// Whether a fault latches, or lets go of the hand.
+bool is_grave(Fault fault) {
+  const Trigger trigger = fault_row(fault).trigger;
+  return trigger == Trigger::hard_fault || trigger == Trigger::failed || trigger == Trigger::stop ||
+         trigger == Trigger::device_gone;
+}
+
 EventLevel level_of(const Event& event) {
   switch (event.kind) {
-    case Event::Kind::fault: {
-      const Trigger trigger = fault_row(static_cast<Fault>(event.detail)).trigger;
-      const bool latches = trigger == Trigger::hard_fault || trigger == Trigger::failed ||
-                           trigger == Trigger::stop || trigger == Trigger::device_gone;
-      return latches ? EventLevel::error : EventLevel::warning;
-    }
+    case Event::Kind::fault:
+      return is_grave(static_cast<Fault>(event.detail)) ? EventLevel::error : EventLevel::warning;
     case Event::Kind::state:
     case Event::Kind::placing:
     case Event::Kind::placed:
@@ -158,7 +161,7 @@ std::span<const EventRow> feed_events() {
       {"state", "The loop came to another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
        "Something is wrong. fault: name, sentence, cure; value: how much of it, where that says "
-       "something."},
+       "something; recording: the file of the flight recorder, where one is kept of it."},
       {"device", "present: whether there is a device now; again: it has been there before."},
       {"stiffness",
        "share: of the stiffness asked for that the device bears, at the rate and delay "
@@ -253,12 +256,26 @@ void EventFeed::keep(TimePoint at, const std::string& name, EventLevel level, co
   [[maybe_unused]] const ssize_t written = ::write(wake_, &one, sizeof one);  // full is awake
 }
 
+void EventFeed::keep_faults_by(KeptIn kept_in) {
+  const std::scoped_lock draining(draining_);
+  kept_in_ = std::move(kept_in);
+}
+
 void EventFeed::take(const Event& event) {
+  const auto fault = static_cast<Fault>(event.detail);
+  std::string kept_in;
+  if (event.kind == Event::Kind::fault && is_grave(fault) && kept_in_) kept_in = kept_in_(fault, event.at);
   const std::scoped_lock lock(mutex_);
   const JournalFields fields(journal_fields(event));
   const State from = now_.state;
   apply(now_, event);
-  keep(event.at, name_of(event.kind), level_of(event), to_text(event), fields_of(event));
+  Json fields_told = fields_of(event);
+  std::string text = to_text(event);
+  if (!kept_in.empty()) {
+    fields_told["recording"] = kept_in;
+    text += "; what led to it: " + kept_in;
+  }
+  keep(event.at, name_of(event.kind), level_of(event), text, fields_told);
   if (event.kind == Event::Kind::state) keep_device(event, from);
 }
 

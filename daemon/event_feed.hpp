@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <set>
 #include <span>
@@ -57,6 +58,12 @@ class EventFeed {
   void tell(const std::string& name, EventLevel level, const std::string& text,
             const Json& fields = Json::object());
 
+  /// Asked about each fault that latches or lets go of the hand, before it is told: the file that will show
+  /// what led to it, which the event then names; empty: none. From the feed's thread; must not come back
+  /// here.
+  using KeptIn = std::function<std::string(Fault fault, TimePoint at)>;
+  void keep_faults_by(KeptIn kept_in);
+
   /// Takes what is in the servo thread's ring now. Any thread but the servo's.
   void drain();
 
@@ -92,6 +99,7 @@ class EventFeed {
   std::mutex draining_;  ///< the ring has one reader at a time
   std::uint64_t dropped_said_ = 0;
   bool device_was_there_ = false;
+  KeptIn kept_in_;
 
   mutable std::mutex mutex_;  ///< of all that follows
   std::deque<Kept> kept_;     ///< the last is the one of now_.sequence

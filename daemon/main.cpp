@@ -20,9 +20,11 @@
 #include "daemon/journal.hpp"
 #include "daemon/live_line.hpp"
 #include "daemon/option_checks.hpp"
+#include "daemon/playback.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/realtime_watch.hpp"
-#include "daemon/recorder.hpp"
+#include "daemon/record_methods.hpp"
+#include "daemon/recordings.hpp"
 #include "daemon/scene_methods.hpp"
 #include "daemon/service_notify.hpp"
 #include "daemon/state_methods.hpp"
@@ -67,6 +69,8 @@ struct Options {
   std::string realtime;
   std::string record;
   std::string script;
+  std::string playback;
+  std::string playback_mode;
   std::string control;
   double seconds = 0.0;
   int link_fd = -1;  ///< -1: none
@@ -105,6 +109,14 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--loopback-script", options.script,
                  "simulated device only: what shall go wrong with it and when (devices/README.md)")
       ->check(not_empty());
+  app.add_option("--playback", options.playback,
+                 "simulated device only: the hand does what this recording, or CSV file of "
+                 "poses, says\n(time_s,px,py,pz,qx,qy,qz,qw: X_BH), in place of its script")
+      ->check(not_empty());
+  app.add_option("--playback-mode", options.playback_mode,
+                 "instead of the configuration's: open: the handle is there, whatever pushes; closed: the "
+                 "hand wants it\nthere")
+      ->check(CLI::IsMember({"open", "closed"}));
   app.add_option(
          "--link-fd", options.link_fd,
          "inherited SOCK_SEQPACKET socket to a device in another process, which speaks as the profile "
@@ -155,6 +167,18 @@ Plan plan_of(const Options& options) {
   if (options.realtime == "best_effort") plan.settings.servo.realtime = Realtime::best_effort;
   if (options.realtime == "off" || options.virtual_time) plan.settings.servo.realtime = Realtime::off;
   if (!options.record.empty()) plan.settings.recording.file = options.record;
+  SimulationSettings& simulation = plan.settings.simulation;
+  if (options.playback_mode == "open") simulation.playback_mode = PlaybackMode::open;
+  if (options.playback_mode == "closed") simulation.playback_mode = PlaybackMode::closed;
+  if (!options.playback.empty()) {
+    if (!plan.simulated || options.link_fd >= 0)
+      throw std::runtime_error("--playback: a person holds a real device; simulate one, as with --simulate " +
+                               (name.empty() ? "loopback" : name));
+    simulation.playback = std::filesystem::absolute(options.playback).lexically_normal();
+    simulation.playback_path = read_playback(simulation.playback);
+  } else if (!options.playback_mode.empty() && simulation.playback.empty()) {
+    throw std::runtime_error("--playback-mode: nothing is played back; name it with --playback");
+  }
   return plan;
 }
 
@@ -288,8 +312,8 @@ Fault run_in_wall_time(Station& station, const std::string& device, TimePoint en
 }
 
 /// Virtual time: the same ticks one after the other, on this thread.
-Fault run_in_virtual_time(Station& station, TimePoint end, VirtualClock& clock, LiveView& view,
-                          Wishes wishes) {
+Fault run_in_virtual_time(Station& station, Recordings& recordings, TimePoint end, VirtualClock& clock,
+                          LiveView& view, Wishes wishes) {
   const Duration period = from_seconds(1.0 / station.plan().settings.servo.rate_Hz);
   TimePoint next_look = clock.now() + kLook;
   Fault fault = Fault::none;
@@ -300,6 +324,7 @@ Fault run_in_virtual_time(Station& station, TimePoint end, VirtualClock& clock, 
     if (clock.now() < next_look) continue;
     next_look += kLook;
     view.look_at(station.loop());
+    recordings.pump();
   }
   if (fault == Fault::device_lost) return fault;
   fault = fault_of(station.loop(), Fault::none);
@@ -351,7 +376,8 @@ ReloadResult read_again(Station& station, EventFeed& feed, const Options& option
 
 /// The control socket, where one is wanted. The usual place may be another daemon's; one that somebody named
 /// may not.
-std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const Options& options) {
+std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, Recordings& recordings,
+                                      const Options& options) {
   const SocketPlace place = socket_place(options.control, station.plan().settings.control);
   if (place.path.empty() || options.virtual_time) return nullptr;
   auto control = std::make_unique<Control>(station, feed);
@@ -359,6 +385,8 @@ std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, const O
     add_state_methods(control->methods(), station);
     add_scene_methods(control->methods(), station.workbench(),
                       [&] { return read_again(station, feed, options); });
+    add_record_methods(control->methods(), recordings);
+    control->status()["recording"] = [&recordings] { return recording_json(recordings); };
     control->open(place.path);
     spdlog::info("control socket: {}", place.path.string());
     return control;
@@ -389,7 +417,7 @@ class Reloader {
 
 /// Builds the station around its link, and runs it.
 Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
-          const std::function<Fault(Station&, LiveView&)>& run_it) {
+          const std::function<Fault(Station&, Recordings&, LiveView&)>& run_it) {
   Station station(std::move(plan), link, clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread,
                   MeshLoader(cache_directory(), [](const std::string& what) { spdlog::info("{}", what); }));
   const Settings& settings = station.plan().settings;
@@ -398,25 +426,20 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
                station.scene().obstacle_count(), settings.servo.rate_Hz);
-  std::unique_ptr<Recorder> recorder;
-  if (!settings.recording.file.empty())
-    recorder =
-        std::make_unique<Recorder>(station.records(), settings.recording.file, station.recording_header());
   LiveView view(options.live, station.plan().profile);
   const TimePoint start = clock.now();
   Fault fault = Fault::none;
   {
     EventFeed feed(station.loop());
-    const auto control = open_control(station, feed, options);
+    Recordings recordings(station, feed, clock,
+                          options.virtual_time ? Recordings::Pace::by_hand : Recordings::Pace::threads);
+    if (!settings.recording.file.empty()) recordings.start_file(settings.recording.file);
+    const auto control = open_control(station, feed, recordings, options);
     const Reloader reloader(station, feed, options);
-    fault = run_it(station, view);
+    fault = run_it(station, recordings, view);
   }
   view.close(station.loop(), seconds(clock.now() - start));
   the_loop = nullptr;
-  if (recorder && !recorder->error().empty()) spdlog::error("{}", recorder->error());
-  if (station.loop().dropped_records() > 0)
-    spdlog::warn("{} ticks are missing in the recording: the disk fell behind",
-                 station.loop().dropped_records());
   return fault;
 }
 
@@ -446,12 +469,13 @@ Fault run_simulated(Plan plan, const Options& options) {
   LoopbackScript script;
   if (!options.script.empty()) script = load_loopback_script(options.script);
   const auto run_it = [&](auto& clock, auto run_in_time) {
-    return [&clock, &options, &script, run_in_time](Station& station, LiveView& view) {
-      station.open();
-      tell_motors(station.plan().profile);
-      return run_in_time(station, end_of(options, clock), clock, view,
-                         Wishes(options.arm, script.commands, clock.now()));
-    };
+    return
+        [&clock, &options, &script, run_in_time](Station& station, Recordings& recordings, LiveView& view) {
+          station.open();
+          tell_motors(station.plan().profile);
+          return run_in_time(station, recordings, end_of(options, clock), clock, view,
+                             Wishes(options.arm, script.commands, clock.now()));
+        };
   };
   if (options.virtual_time) {
     VirtualClock clock;
@@ -461,7 +485,7 @@ Fault run_simulated(Plan plan, const Options& options) {
   WallClock clock;
   const auto link = link_in_wall_time(plan, script, options, clock);
   log_grants(lock_memory(plan.settings.servo.realtime));
-  const auto in_wall_time = [&](Station& station, auto&&... more) {
+  const auto in_wall_time = [&](Station& station, Recordings&, auto&&... more) {
     return run_in_wall_time(station, station.plan().profile.name + ", simulated", more...);
   };
   return run(std::move(plan), options, *link, clock, run_it(clock, in_wall_time));
@@ -476,7 +500,7 @@ Fault run_real(Plan plan, const Options& options) {
     return Fault::none;
   const auto link = make_plugged_link(plan);
   log_grants(lock_memory(plan.settings.servo.realtime));
-  return run(std::move(plan), options, *link, clock, [&](Station& station, LiveView& view) {
+  return run(std::move(plan), options, *link, clock, [&](Station& station, Recordings&, LiveView& view) {
     return run_with_device(station, *link, options, end, clock, view);
   });
 }

@@ -1,48 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/recorder.hpp"
 
-#include <chrono>
+#include <algorithm>
 
 namespace wrenchd {
 namespace {
 
-constexpr auto kPause = std::chrono::milliseconds(100);
+/// At most so many chunks in a piece: between two the disk is looked at, and other files have their turn.
+constexpr std::size_t kMostChunks = 8;
 
 }  // namespace
 
-Recorder::Recorder(RecordRing& ring, const std::filesystem::path& file, const RecordingHeader& header)
-    : ring_(ring),
-      writer_(file, header),
-      batch_(kRingRecords),
-      thread_([this](const std::stop_token& s) { run(s); }) {}
+Recorder::Recorder(const RecordHistory& history, const std::filesystem::path& file,
+                   const RecordingHeader& header, std::uint64_t first)
+    : history_(history), file_(file), writer_(file, header), next_(first) {}
 
-Recorder::~Recorder() {
-  thread_.request_stop();
-  thread_.join();
-}
-
-std::string Recorder::error() const {
-  return failed_.load(std::memory_order_acquire) ? error_ : std::string();
-}
-
-void Recorder::run(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    drain();
-    std::this_thread::sleep_for(kPause);
-  }
-  drain();
-}
-
-void Recorder::drain() {
-  const std::size_t count = ring_.pop(batch_.data(), batch_.size());
-  if (count == 0 || failed_.load(std::memory_order_relaxed)) return;
-  try {
-    writer_.append(std::span(batch_).first(count));
-    written_.fetch_add(count, std::memory_order_relaxed);
-  } catch (const RecordingError& error) {
-    error_ = error.what();
-    failed_.store(true, std::memory_order_release);
-  }
+bool Recorder::step(std::uint64_t end, bool rest) {
+  const std::uint64_t begin = std::max(next_, history_.held().begin);
+  const std::uint64_t there = end - std::min(begin, end);
+  std::size_t most = std::min<std::uint64_t>(there, kMostChunks * RecordingWriter::kChunkTicks);
+  // A chunk that is begun is written again when it goes on: only the last one is.
+  if (!rest || most < there) most -= (written_ + most) % RecordingWriter::kChunkTicks;
+  if (most == 0 || most > there) return false;
+  const std::uint64_t first = history_.copy(next_, end, most, batch_);
+  lost_ += first - next_;
+  writer_.append(batch_);
+  writer_.flush();
+  written_ += batch_.ticks.size();
+  next_ = first + batch_.ticks.size();
+  return !batch_.ticks.empty();
 }
 
 }  // namespace wrenchd

@@ -2,41 +2,37 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <thread>
-#include <vector>
+#include <filesystem>
 
+#include "daemon/record_history.hpp"
 #include "daemon/recording_file.hpp"
-#include "daemon/servo_loop.hpp"
 
 namespace wrenchd {
 
-/// Carries records from the servo thread to a recording, on a thread of its own.
+/// Carries records from the history to one file, a piece at a time. One thread at a time.
 class Recorder {
  public:
-  /// How many records the ring should hold: two seconds at 8 kHz, so that a slow disk loses nothing.
-  static constexpr std::size_t kRingRecords = 16384;
+  /// first: number of the first record to write. Throws RecordingError.
+  Recorder(const RecordHistory& history, const std::filesystem::path& file, const RecordingHeader& header,
+           std::uint64_t first);
 
-  /// Starts at once. Throws RecordingError.
-  Recorder(RecordRing& ring, const std::filesystem::path& file, const RecordingHeader& header);
-  /// Writes what is still in the ring, and closes the file.
-  ~Recorder();
+  /// Writes the next piece of what is held before that number: whole chunks, which cost least, or, where
+  /// `rest` is set, what is left too. False: there is nothing to write now. Throws RecordingError.
+  bool step(std::uint64_t end, bool rest);
 
-  /// Empty while all went well; otherwise why the recording stopped.
-  std::string error() const;
-  std::uint64_t written() const noexcept { return written_.load(std::memory_order_relaxed); }
+  const std::filesystem::path& file() const noexcept { return file_; }
+  std::uint64_t next() const noexcept { return next_; }        ///< number of the next record to write
+  std::uint64_t written() const noexcept { return written_; }  ///< ticks
+  std::uint64_t lost() const noexcept { return lost_; }  ///< that were held no more when their turn came
 
  private:
-  void drain();
-  void run(const std::stop_token& stop);
-
-  RecordRing& ring_;
+  const RecordHistory& history_;
+  std::filesystem::path file_;
   RecordingWriter writer_;
-  std::vector<TickRecord> batch_;
-  std::atomic<std::uint64_t> written_{0};
-  std::atomic<bool> failed_{false};
-  std::string error_;  ///< written before failed_, read after it
-  std::jthread thread_;
+  std::uint64_t next_;
+  std::uint64_t written_ = 0;
+  std::uint64_t lost_ = 0;
+  RecordBatch batch_;
 };
 
 }  // namespace wrenchd

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/replay.hpp"
 
+#include <array>
 #include <bit>
 #include <span>
 
@@ -97,53 +98,74 @@ std::optional<Difference> compare(std::uint64_t tick, const char* field, std::sp
   return {};
 }
 
+struct Compared {
+  const char* name;
+  double (*of)(const TickRecord&);
+};
+
+/// One number each. What is no double is exact as one, but for a set of faults, of which there are less
+/// than 53.
+#define WRENCHD_COMPARED(member)                                               \
+  Compared {                                                                   \
+#member, [](const TickRecord& r) { return static_cast<double>(r.member); } \
+  }
+constexpr std::array kNumbers = {
+    WRENCHD_COMPARED(energy),          WRENCHD_COMPARED(kkt_residual), WRENCHD_COMPARED(authority),
+    WRENCHD_COMPARED(stiffness_share), WRENCHD_COMPARED(guard_share),  WRENCHD_COMPARED(energy_in_J),
+    WRENCHD_COMPARED(energy_out_J),    WRENCHD_COMPARED(injected_J),   WRENCHD_COMPARED(through),
+    WRENCHD_COMPARED(contacts),        WRENCHD_COMPARED(iterations),   WRENCHD_COMPARED(projection_status),
+    WRENCHD_COMPARED(placing),         WRENCHD_COMPARED(state),        WRENCHD_COMPARED(cause),
+    WRENCHD_COMPARED(motors_told),     WRENCHD_COMPARED(limit_causes), WRENCHD_COMPARED(dropped),
+    WRENCHD_COMPARED(faults),          WRENCHD_COMPARED(released),
+};
+#undef WRENCHD_COMPARED
+static_assert(kFaultCount < 53);
+
 std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
-  const auto whole = [](const TickRecord& r) {
-    return std::array<double, 18>{r.energy,
-                                  r.authority,
-                                  r.stiffness_share,
-                                  r.guard_share,
-                                  r.energy_in_J,
-                                  r.energy_out_J,
-                                  r.injected_J,
-                                  static_cast<double>(r.contacts),
-                                  static_cast<double>(r.iterations),
-                                  static_cast<double>(r.projection_status),
-                                  static_cast<double>(r.placing),
-                                  static_cast<double>(r.state),
-                                  static_cast<double>(r.cause),
-                                  static_cast<double>(r.motors_told),
-                                  static_cast<double>(r.limit_causes),
-                                  static_cast<double>(r.dropped),
-                                  static_cast<double>(r.faults),
-                                  static_cast<double>(r.released)};
-  };
   if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
   if (auto d = compare(then.tick, "X_WQ", then.X_WQ, now.X_WQ)) return d;
   if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
   if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
   if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
-  return compare(then.tick,
-                 "energy, authority, stiffness and guard share, energies, contacts, iterations, status, "
-                 "placing, state, cause, motors, limits, dropped, "
-                 "faults, released",
-                 whole(then), whole(now));
+  for (const Compared& number : kNumbers) {
+    const double a = number.of(then), b = number.of(now);
+    if (std::bit_cast<std::uint64_t>(a) != std::bit_cast<std::uint64_t>(b))
+      return Difference{then.tick, number.name, a, b};
+  }
+  return {};
 }
 
 }  // namespace
 
+const char* compared_fields() {
+  static const std::string names = [] {
+    std::string text = "X_WP, X_WQ, eps, F_T, F_out";
+    for (const Compared& number : kNumbers) text += std::string(", ") + number.name;
+    return text;
+  }();
+  return names.c_str();
+}
+
 std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
   if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
-    throw RecordingError(
-        "the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
-        ": what the loop had in mind by then, and where obstacles that move stood, is not in it; replay the "
-        "whole recording, from tick 0");
+    throw RecordingError("the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
+                         ": what the loop had in mind by then (the stiffness it had measured, how warm the "
+                         "motors were, what was "
+                         "wrong before, where obstacles that move stood) is not in it, and arming does not "
+                         "begin it anew; what is "
+                         "replayed is a recording from the start on, as by wrenchd --record");
   const Scene scene(plan.scene);
   RecordedClock clock;
   RecordedDevice device;
   RecordedPlacer placer;
   ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  std::uint64_t last = 0;  // a release from outside has the number of the tick before
   for (const TickRecord& then : recording.ticks) {
+    if (then.tick != last && then.tick != last + 1)
+      throw RecordingError("ticks " + std::to_string(last + 1) + " to " + std::to_string(then.tick - 1) +
+                           " are missing in the recording, and it is the same bits up to there; record to a "
+                           "disk that keeps up to replay all of it");
+    last = then.tick;
     if (then.changes > 0)
       throw RecordingError(
           "at tick " + std::to_string(then.tick) +

@@ -44,11 +44,10 @@ std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
 }  // namespace
 
 ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
-                     std::unique_ptr<Rendering> rendering, const Clock& clock, RecordRing* records)
+                     std::unique_ptr<Rendering> rendering, const Clock& clock)
     : profile_(profile),
       device_(device),
       clock_(clock),
-      records_(records),
       wrench_point_(profile.wrench_point),
       driven_(driven_dofs(profile)),
       pacing_(settings.servo.pacing),
@@ -67,12 +66,12 @@ ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Dev
 }
 
 ServoLoop::ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
-                     const Scene& scene, Placer& placer, const Clock& clock, RecordRing* records)
+                     const Scene& scene, Placer& placer, const Clock& clock)
     : ServoLoop(settings, profile, device,
                 std::make_unique<Rendering>(0, settings, profile,
                                             std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene),
                                             std::shared_ptr<Placer>(std::shared_ptr<void>(), &placer)),
-                clock, records) {}
+                clock) {}
 
 Fault ServoLoop::run(Clock& clock, const std::atomic<bool>& stop) noexcept {
   TimePoint due = clock.now();
@@ -538,8 +537,6 @@ void ServoLoop::publish() noexcept {
   seen_changing_.store(renderings_.next() != nullptr, std::memory_order_relaxed);
   latest_.write(record_);
   if (shown_ != nullptr) shown_->write(record_, touches());
-  if (records_ != nullptr && !records_->push(record_))
-    dropped_records_.fetch_add(1, std::memory_order_relaxed);
 }
 
 /// The contacts of the tick, for whoever looks.

@@ -5,8 +5,6 @@
 #include <memory>
 #include <optional>
 
-#include <boost/lockfree/spsc_queue.hpp>
-
 #include "collision/scene.hpp"
 #include "config/settings.hpp"
 #include "core/clock.hpp"
@@ -35,9 +33,6 @@ namespace wrenchd {
 /// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
 inline constexpr int kDevicePatience_periods = 4;
 
-/// From the servo thread to the recorder. When it is full, records are counted and dropped.
-using RecordRing = boost::lockfree::spsc_queue<TickRecord>;
-
 /// The servo loop: holds the hand and the virtual body together.
 ///
 /// Frames: W world, B device base, H handle point, M mesh of the tool, T body frame of the tool at its centre
@@ -50,14 +45,14 @@ using RecordRing = boost::lockfree::spsc_queue<TickRecord>;
 class ServoLoop {
  public:
   /// Profile, device and clock are kept by reference; the device is open. rendering: what is felt first.
-  /// records may be null: then nothing is recorded.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device,
-            std::unique_ptr<Rendering> rendering, const Clock& clock, RecordRing* records = nullptr);
+            std::unique_ptr<Rendering> rendering, const Clock& clock);
   /// The same with a rendering of its own, of a scene and a placer that are kept by reference.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
-            Placer& placer, const Clock& clock, RecordRing* records = nullptr);
+            Placer& placer, const Clock& clock);
 
-  /// Shows every tick to other processes from now on. state must outlive this. Before the loop runs.
+  /// Shows every tick to recorders and to other processes from now on. state must outlive this. Before the
+  /// loop runs.
   void show_in(SharedState& state) noexcept { shown_ = &state; }
 
   /// Ticks until stop is set and the force has faded, or the device is gone, and releases the hand on every
@@ -124,7 +119,6 @@ class ServoLoop {
   const LoopTiming& timing() const noexcept { return timing_; }
   LatestValue<TickRecord>& latest() noexcept { return latest_; }
   EventRing& events() noexcept { return events_; }
-  std::uint64_t dropped_records() const noexcept { return dropped_records_.load(std::memory_order_relaxed); }
   std::uint64_t dropped_events() const noexcept { return dropped_events_.load(std::memory_order_relaxed); }
 
  private:
@@ -171,7 +165,6 @@ class ServoLoop {
   const DeviceProfile& profile_;
   Device& device_;
   const Clock& clock_;
-  RecordRing* records_;
   SharedState* shown_ = nullptr;
   WrenchPoint wrench_point_;
   DofMask driven_;
@@ -242,7 +235,6 @@ class ServoLoop {
   LoopTiming timing_;
   LatestValue<TickRecord> latest_;
   EventRing events_;
-  std::atomic<std::uint64_t> dropped_records_{0};
   std::atomic<std::uint64_t> dropped_events_{0};
 };
 

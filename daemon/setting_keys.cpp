@@ -20,6 +20,11 @@ bool equal(const std::vector<Waypoint>& a, const std::vector<Waypoint>& b) {
            x.rotation_vector_rad == y.rotation_vector_rad;
   });
 }
+bool equal(const std::vector<TimedPose>& a, const std::vector<TimedPose>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const TimedPose& x, const TimedPose& y) {
+    return x.time_s == y.time_s && same_bits(x.X, y.X);
+  });
+}
 
 #define WRENCHD_KEY(name, takes, member)                                                \
   SettingKey {                                                                          \
@@ -79,7 +84,14 @@ constexpr std::array kKeys = {
     WRENCHD_KEY("simulation.actuator_max_torque_Nm", restart, simulation.actuator_max_torque_Nm),
     WRENCHD_KEY("simulation.report_delay_s", restart, simulation.report_delay_s),
     WRENCHD_KEY("simulation.command_delay_s", restart, simulation.command_delay_s),
+    WRENCHD_KEY("simulation.playback", restart, simulation.playback),
+    WRENCHD_KEY("simulation.playback (what it says)", restart, simulation.playback_path),
+    WRENCHD_KEY("simulation.playback_mode", restart, simulation.playback_mode),
     WRENCHD_KEY("recording.file", restart, recording.file),
+    WRENCHD_KEY("recording.directory", restart, recording.directory),
+    WRENCHD_KEY("recording.flight_s", restart, recording.flight_s),
+    WRENCHD_KEY("recording.flights_kept", restart, recording.flights_kept),
+    WRENCHD_KEY("recording.keep_free_MB", restart, recording.keep_free_MB),
 };
 #undef WRENCHD_KEY
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/shared_state.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cmath>
@@ -19,6 +20,7 @@
 namespace wrenchd {
 namespace {
 
+static_assert(sizeof(Touch) % 8 == 0 && offsetof(StateRecord, touches) % 8 == 0);
 constexpr std::size_t kWordsPerSlot = SharedState::kSlotBytes / 8;
 
 [[noreturn]] void refuse(const char* what) {
@@ -88,6 +90,22 @@ void SharedState::write(const TickRecord& tick, const Touches& touches) noexcept
   }
   slot[0].store(2 * i + 2, std::memory_order_release);
   header_->written.store(i + 1, std::memory_order_release);
+}
+
+bool SharedState::read(std::uint64_t i, StateRecord& out) const noexcept {
+  const std::atomic<std::uint64_t>* const slot = words_ + (i % slots_) * kWordsPerSlot;
+  if (slot[0].load(std::memory_order_acquire) != 2 * i + 2) return false;
+  auto* const bytes = reinterpret_cast<std::byte*>(&out);
+  const auto copy = [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from / 8; k < to / 8; ++k) {
+      const std::uint64_t word = slot[1 + k].load(std::memory_order_acquire);
+      std::memcpy(bytes + 8 * k, &word, 8);
+    }
+  };
+  copy(0, offsetof(StateRecord, touches));
+  out.touch_count = std::min<std::uint64_t>(out.touch_count, kMostTouches);
+  copy(offsetof(StateRecord, touches), offsetof(StateRecord, touches) + out.touch_count * sizeof(Touch));
+  return slot[0].load(std::memory_order_acquire) == 2 * i + 2;
 }
 
 }  // namespace wrenchd

@@ -64,6 +64,10 @@ class SharedState {
   /// By the servo thread only. RT safe.
   void write(const TickRecord& tick, const Touches& touches) noexcept;
 
+  /// Record i, whole; of `out.touches` the first touch_count. False: it is not written yet, or a newer one
+  /// has its place. Any thread of this process but the writer's; the writer never waits for it.
+  bool read(std::uint64_t i, StateRecord& out) const noexcept;
+
   /// To be handed to readers. Stays open for as long as this is.
   int descriptor() const noexcept { return descriptor_; }
   std::size_t bytes() const noexcept { return kHeaderBytes + slots_ * kSlotBytes; }

@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "daemon/station.hpp"
 
-#include <fstream>
-#include <sstream>
-
 #include "config/config_error.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
 #include "core/watch_limits.hpp"
-#include "daemon/recorder.hpp"
-#include "daemon/version.hpp"
+#include "daemon/playback.hpp"
+#include "daemon/recorded_files.hpp"
 
 namespace wrenchd {
 namespace {
-
-std::string contents(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 std::filesystem::path named_on_command_line(const std::filesystem::path& name, const SearchPath& search) {
   auto given = std::filesystem::absolute(name);
@@ -62,6 +52,8 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
   plan.simulated =
       files.simulate || (!plan.profile.name.empty() && plan.profile.transport == Transport::loopback);
   plan.scene = load_scene(plan.settings.scene);
+  if (SimulationSettings& simulation = plan.settings.simulation; !simulation.playback.empty())
+    simulation.playback_path = read_playback(simulation.playback);
   return plan;
 }
 
@@ -85,14 +77,15 @@ Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, co
 Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& fresh,
                  MeshLoader used)
     : plan_(std::move(plan)),
+      clock_(clock),
       scene_(std::make_shared<const Scene>(plan_.scene, used)),
       mesh_remarks_(used.changes()),
+      texts_(recorded_texts(plan_)),
       device_(plan_.profile, link),
-      records_(Recorder::kRingRecords),
       loop_(plan_.settings, plan_.profile, device_,
             std::make_unique<Rendering>(0, plan_.settings, plan_.profile, scene_,
                                         make_placer(scene_, place_in)),
-            clock, plan_.settings.recording.file.empty() ? nullptr : &records_),
+            clock),
       workbench_(plan_, scene_, loop_, place_in, fresh) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.remarks().begin(), used.remarks().end());
 }
@@ -102,14 +95,18 @@ Station::~Station() {
 }
 
 SharedState& Station::show_state() {
+  if (shared_state_) return *shared_state_;
   shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(plan_));
   loop_.show_in(*shared_state_);
   return *shared_state_;
 }
 
 RecordingHeader Station::recording_header() const {
-  return {kVersion, contents(plan_.settings.file), contents(plan_.scene.file),
-          contents(plan_.settings.device.profile_file)};
+  RecordingHeader header = texts_;
+  header.rate_Hz = tick_rate_Hz(plan_);
+  add_meshes(workbench_.scene(), header);
+  begin_now(clock_, header);
+  return header;
 }
 
 }  // namespace wrenchd

@@ -66,19 +66,20 @@ class Station {
   ServoLoop& loop() noexcept { return loop_; }
   /// Where what is rendered is changed while the loop runs.
   Workbench& workbench() noexcept { return workbench_; }
-  RecordRing& records() noexcept { return records_; }
-  /// Shows every tick to other processes from now on. Before the loop runs, once. Throws std::system_error.
+  /// Shows every tick to recorders and to other processes from now on. First before the loop runs; when
+  /// called again, the same. Throws std::system_error.
   SharedState& show_state();
 
-  /// What a recording of this station must know.
+  /// What a recording of this station must know, that begins now. Reads its mesh files.
   RecordingHeader recording_header() const;
 
  private:
   Plan plan_;
+  const Clock& clock_;
   std::shared_ptr<const Scene> scene_;
   std::vector<std::string> mesh_remarks_;
+  RecordingHeader texts_;  ///< as they were read: files may change while the loop runs
   ProfileDevice device_;
-  RecordRing records_;
   std::unique_ptr<SharedState> shared_state_;
   ServoLoop loop_;
   Workbench workbench_;

@@ -62,7 +62,13 @@ HandPath::HandPath(const std::vector<Waypoint>& waypoints, bool repeats) : repea
   end_ = from_seconds(waypoints.back().time_s);
 }
 
+HandPath::HandPath(const SimulationSettings& settings)
+    : HandPath(settings.hand_path, settings.playback_path.empty() && settings.hand_repeats) {
+  if (!settings.playback_path.empty()) track_.emplace(settings.playback_path);
+}
+
 HandTarget HandPath::at(Duration since_start) const noexcept {
+  if (track_) return track_->at(since_start);
   if (segments_.empty() || (!repeats_ && since_start >= end_)) return last_;
   const Duration t = std::max(since_start, Duration{0}) % end_;
   const auto next = std::upper_bound(segments_.begin(), segments_.end(), t,

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/clock.hpp"
 #include "core/simulation_settings.hpp"
 #include "core/spatial.hpp"
+#include "devices/pose_track.hpp"
 
 namespace wrenchd {
 
-/// Where the hand wants the handle, and how fast it wants it to move. B = device base, G = goal of the hand.
-struct HandTarget {
-  Pose X_BG;
-  Twist V_BG;  ///< of G's origin, in base axes
-};
+/// Whether the handle is where the path is, whatever the device pushes with.
+inline bool is_led(const SimulationSettings& settings) noexcept {
+  return !settings.playback_path.empty() && settings.playback_mode == PlaybackMode::open;
+}
 
 /// The scripted path of the simulated hand: rests at each waypoint, and between two of them moves as people
 /// do, along the line and about the axis that join them, at minimum jerk (Flash and Hogan 1985):
@@ -24,6 +25,9 @@ class HandPath {
   /// Throws std::invalid_argument where there is no waypoint, a number is not finite, the times do not rise
   /// strictly from 0, or a path that repeats does not end where it began (to 1e-9 in each coordinate).
   HandPath(const std::vector<Waypoint>& waypoints, bool repeats);
+  /// What the settings say: the path to be played back where there is one, else the script. Throws as above
+  /// and as PoseTrack does.
+  explicit HandPath(const SimulationSettings& settings);
 
   /// The target this long after the path began. After the last waypoint the path starts again, or the hand
   /// stays there. RT safe.
@@ -42,6 +46,7 @@ class HandPath {
   HandTarget last_;
   Duration end_{};
   bool repeats_;
+  std::optional<PoseTrack> track_;  ///< in the place of all of the above
 };
 
 }  // namespace wrenchd

@@ -29,7 +29,8 @@ HeldArm::HeldArm(const DeviceProfile& profile, const SimulationSettings& setting
       X_EH_(profile.X_EH),
       X_HE_(inverse(profile.X_EH)),
       turns_(profile.kinematics.joints == kMaxJoints),
-      path_(settings.hand_path, settings.hand_repeats),
+      path_(settings),
+      led_(is_led(settings)),
       arm_(std::move(arm)),
       handle_(settings, start(profile.name), seconds(kSubstep)),
       place_(*place_of(handle_.X_BH())) {
@@ -126,7 +127,11 @@ void HeldArm::advance_to(TimePoint t, ReportSink& host) noexcept {
 void HeldArm::substep() noexcept {
   now_ += kSubstep;
   const Pose before = handle_.X_BH();
-  handle_.step(target_at(now_ - power_on_), motor_demand());
+  const HandTarget target = target_at(now_ - power_on_);
+  if (led_)
+    handle_.lead(target, motor_demand());
+  else
+    handle_.step(target, motor_demand());
   if (const std::optional<Place> next = place_of(handle_.X_BH()))
     place_ = *next;
   else

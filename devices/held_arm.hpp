@@ -63,6 +63,7 @@ class HeldArm final : public HeldDevice {
   Pose X_BD_, X_DB_, X_EH_, X_HE_;
   bool turns_;  ///< has a wrist
   HandPath path_;
+  bool led_;  ///< the handle is on the path, whatever pushes
   std::unique_ptr<EmulatedArm> arm_;
   SimulatedHandle handle_;
   Place place_;  ///< of the handle

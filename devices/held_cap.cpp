@@ -43,7 +43,7 @@ CapCoding cap_coding(const DeviceProfile& profile) {
 
 HeldCap::HeldCap(const DeviceProfile& profile, const SimulationSettings& settings)
     : profile_(profile),
-      path_(settings.hand_path, settings.hand_repeats),
+      path_(settings),
       coding_(cap_coding(profile)),
       linear_(*profile.deflection, profile.deflection->linear_gain, profile.deflection->full_m),
       angular_(*profile.deflection, profile.deflection->angular_gain, profile.deflection->full_rad),

@@ -65,7 +65,8 @@ SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationS
       substeps_per_sample_(substeps_per_sample(profile)),
       substeps_per_report_(kSamplesPerReport * substeps_per_sample_),
       substep_(substep_of(profile)),
-      path_(settings.hand_path, settings.hand_repeats),
+      path_(settings),
+      led_(is_led(settings)),
       handle_(settings, path_.at(Duration{0}).X_BG, seconds(substep_)),
       firmware_(profile, settings, substep_ * static_cast<std::int64_t>(substeps_per_sample_)) {
   firmware_.settle(handle_.X_BH());
@@ -94,7 +95,11 @@ void SimulatedDevice::skip_to(TimePoint t) noexcept {
 void SimulatedDevice::substep(ReportSink& host) noexcept {
   now_ += substep_;
   disturb();
-  handle_.step(path_.at(now_ - power_on_), motor_demand());
+  const HandTarget target = path_.at(now_ - power_on_);
+  if (led_)
+    handle_.lead(target, motor_demand());
+  else
+    handle_.step(target, motor_demand());
   ++substeps_;
   if (substeps_ % substeps_per_sample_ == 0) firmware_.sample(handle_.X_BH());
   if (substeps_ % substeps_per_report_ == 0) send_report(host);

@@ -64,6 +64,7 @@ class SimulatedDevice final : public HeldDevice {
   Duration substep_;
 
   HandPath path_;
+  bool led_;  ///< the handle is on the path, whatever pushes
   SimulatedHandle handle_;
   SimulatedFirmware firmware_;
   Pose moving_;  ///< what the encoders said before they got stuck

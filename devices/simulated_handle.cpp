@@ -98,6 +98,27 @@ void SimulatedHandle::step(const HandTarget& target, const Wrench& F_motors) noe
   X_BH_.rotation = turned(X_BH_.rotation, step_s_ * V_BH_.angular_rad_per_s);
 }
 
+/// The hand gives what is missing: its work is the change of the kinetic energy, and what friction took, and
+/// what the motors did against it.
+void SimulatedHandle::lead(const HandTarget& target, const Wrench& F_motors) noexcept {
+  const double before_J = kinetic_energy_J();
+  const SimulatedEnergy sums = energy_;
+  X_BH_ = target.X_BG;
+  V_BH_ = target.V_BG;
+  F_motors_ = {within(F_motors.force_N, translation_.actuator_max),
+               within(F_motors.torque_Nm, rotation_.actuator_max)};
+  F_hand_ = -1.0 * F_motors_;
+  const auto rubbed_W = [](const Motion& motion, double speed) {
+    return speed * (motion.viscous_friction * speed + motion.coulomb_friction);
+  };
+  energy_.motors_J += step_s_ * (F_motors_.force_N.dot(V_BH_.linear_m_per_s) +
+                                 F_motors_.torque_Nm.dot(V_BH_.angular_rad_per_s));
+  energy_.friction_J += step_s_ * (rubbed_W(translation_, V_BH_.linear_m_per_s.norm()) +
+                                   rubbed_W(rotation_, V_BH_.angular_rad_per_s.norm()));
+  energy_.hand_J += kinetic_energy_J() - before_J + (energy_.friction_J - sums.friction_J) -
+                    (energy_.motors_J - sums.motors_J);
+}
+
 double SimulatedHandle::kinetic_energy_J() const noexcept {
   return 0.5 * (translation_.inertia * V_BH_.linear_m_per_s.squaredNorm() +
                 rotation_.inertia * V_BH_.angular_rad_per_s.squaredNorm());

@@ -34,6 +34,9 @@ class SimulatedHandle {
   /// One substep, semi-implicit: velocities first, friction and damping taken at their end, then the pose.
   /// F_motors: on the hand, about the handle point, in base axes; cut to what the actuators can do. RT safe.
   void step(const HandTarget& target, const Wrench& F_motors) noexcept;
+  /// One substep of a handle that is led: it is where the target is, whatever pushes. What that takes of the
+  /// hand is in the sums of energy. RT safe.
+  void lead(const HandTarget& target, const Wrench& F_motors) noexcept;
   /// Stops the handle where it is. RT safe.
   void rest() noexcept { V_BH_ = {}; }
   /// Puts the handle there, at rest: an end stop. What it takes is in no sum of energy. RT safe.

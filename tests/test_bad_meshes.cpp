@@ -294,8 +294,13 @@ const std::vector<Defect>& defects() {
 /// The file as an obstacle, beside a good tool.
 SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind kind) {
   SceneSettings settings;
-  settings.tool = {tool, 0.01, 0.1};
-  settings.meshes = {{"bad", file, 1.0, Pose{}, kind}};
+  settings.tool.mesh = tool;
+  settings.tool.scale = 0.01;
+  settings.tool.mass_kg = 0.1;
+  MeshObstacleSettings& obstacle = settings.meshes.emplace_back();
+  obstacle.name = "bad";
+  obstacle.mesh = file;
+  obstacle.kind = kind;
   return settings;
 }
 

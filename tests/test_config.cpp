@@ -40,6 +40,7 @@ void print(std::ostream& out, const SimulationSettings& s) {
         s.hand_damping_Nm_s_per_rad}) {
     out << x << '\n';
   }
+  out << s.playback << int(s.playback_mode) << s.playback_path.size() << '\n';
   out << s.hand_repeats << s.hand_script << s.hand_path.size() << '\n';
 }
 
@@ -64,7 +65,8 @@ std::string printed(const Settings& s) {
       << s.limits.max_force_N << ' ' << s.limits.max_torque_Nm << ' ' << s.limits.force_slew_N_per_s << ' '
       << s.limits.torque_slew_Nm_per_s << ' ' << s.limits.soft_start_s << '\n';
   print(out, s.simulation);
-  out << s.recording.file << '\n'
+  out << s.recording.file << s.recording.directory << s.recording.flight_s << ' ' << s.recording.flights_kept
+      << ' ' << s.recording.keep_free_MB << '\n'
       << s.control.socket << '\n'
       << s.control.observers << '\n'
       << s.control.operators << '\n'
@@ -130,7 +132,7 @@ TEST_CASE("deleting any option of wrenchd.toml changes nothing", "[config]") {
     CHECK(printed(settings_from(text.substr(0, start) + text.substr(end))) == expected);
     ++options;
   }
-  CHECK(options == 54);
+  CHECK(options == 60);
 }
 
 TEST_CASE("every shipped file loads", "[config]") {

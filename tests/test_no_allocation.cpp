@@ -38,7 +38,6 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   Plan plan = shipped_plan();
   plan.settings.rendering.method = method;
   plan.settings.limits.max_force_N = 1.0;
-  plan.settings.recording.file = "not-written";  // records go into the ring, until it is full
   VirtualStation s(plan);
   s.station.show_state();
   s.inject(SimulatedFault::Kind::garble, 5.0, 0.002);

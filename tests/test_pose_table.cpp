@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "tools/pose_table.hpp"
+#include "config/pose_table.hpp"
 
 namespace wrenchd {
 namespace {
@@ -138,6 +138,53 @@ TEST_CASE("a bad table is refused at its line and column, with the cure") {
   };
   for (const auto& [text, expected] : bad) {
     const std::string message = refusal(text);
+    INFO(text << "\nexpected " << expected << "\ngot " << message);
+    CHECK(message.find(expected) == 0);
+  }
+}
+
+TEST_CASE("poses with times come back as counted from the first", "[playback]") {
+  std::istringstream in(
+      "time_s,px,py,pz,qx,qy,qz,qw\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,1,0\n");
+  CHECK_THROWS_WITH(read_timed_poses(in, "t.csv"), Catch::Contains("t.csv:5:1: a turn of 3.14"));
+  std::istringstream good(
+      "time_s, "
+      "px,py,pz,qx,qy,qz,qw\r\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,0.5,0."
+      "8660254\n");
+  const auto poses = read_timed_poses(good, "t.csv");
+  REQUIRE(poses.size() == 3);
+  CHECK(poses[0].time_s == 0.0);
+  CHECK(poses[1].time_s == Approx(0.01));
+  CHECK(poses[2].time_s == 0.5);
+  CHECK(poses[1].X.rotation.norm() == Approx(1.0).epsilon(1e-12));
+  CHECK(poses[2].X.translation_m.x() == 0.02);
+}
+
+TEST_CASE("what a hand cannot do, and what is no table of times, is refused with its line", "[playback]") {
+  const std::string header = "time_s,px,py,pz,qx,qy,qz,qw\n", first = "0,0,0,0,0,0,0,1\n";
+  const std::vector<std::pair<std::string, std::string>> bad = {
+      {"", "t.csv:1:1: is empty; expected the header 'time_s,px"},
+      {header, "t.csv:1:1: has no poses"},
+      {"px,py,pz,qx,qy,qz,qw\n", "t.csv:1:1: expected the header 'time_s,px,py,pz,qx,qy,qz,qw'"},
+      {header + first + "0,0,0,0,0,0,0,1\n",
+       "t.csv:3:1: time_s is 0, and 0 in the line before; times must rise"},
+      {header + first + "-1,0,0,0,0,0,0,1\n", "t.csv:3:1: time_s is -1, and 0 in the line before"},
+      {header + first + "1.5,0,0,0,0,0,0,1\n", "t.csv:3:1: a gap of 1.5 s; give a pose at least every 1 s"},
+      {header + first + "0.001,0.5,0,0,0,0,0,1\n", "t.csv:3:1: a jump of 0.5 m in 0.001 s"},
+      {header + first + "nan,0,0,0,0,0,0,1\n", "t.csv:3:1: time_s must be a finite number, found 'nan'"},
+      {header + first + "0.1,inf,0,0,0,0,0,1\n", "t.csv:3:5: px must be a finite number, found 'inf'"},
+      {header + first + "0.1,0,0,0,0,0,0,2\n", "t.csv:3:11: the quaternion qx,qy,qz,qw has norm 2"},
+      {header + first + "0.1,0,0,0,0,0,1\n", "t.csv:3:1: expected 8 numbers (time_s,px"},
+      {"\x89HDF\r\n\x1a\n", "t.csv:1:1: expected the header"},
+  };
+  for (const auto& [text, expected] : bad) {
+    std::istringstream in(text);
+    std::string message = "nothing";
+    try {
+      read_timed_poses(in, "t.csv");
+    } catch (const PoseTableError& error) {
+      message = error.what();
+    }
     INFO(text << "\nexpected " << expected << "\ngot " << message);
     CHECK(message.find(expected) == 0);
   }

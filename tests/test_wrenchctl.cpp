@@ -555,8 +555,10 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
     std::string told;
   } const table[] = {
       {{},
-       "A subcommand (status, watch, arm, disarm, stop, acknowledge, reload, describe; solve, check, decode, "
-       "devices, doctor, encode, faults, gallery, mesh, profile, paper, replay or udev-rules) is required"},
+       "A subcommand (status, watch, view, arm, disarm, stop, acknowledge, reload, record, describe; solve, "
+       "check, decode, devices, doctor, encode, export, faults, gallery, mesh, profile, paper, plot, replay "
+       "or "
+       "udev-rules) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <thread>
@@ -109,6 +110,13 @@ std::string status_text(const Json& s) {
   text += fmt::format("ticks      {} at {:g} Hz, {} late, {} left out\n", s["tick"].get<std::uint64_t>(),
                       s["rates"]["rate_Hz"].get<double>(), timing["overruns"].get<std::uint64_t>(),
                       timing["skipped"].get<std::uint64_t>());
+  if (const auto recording = s.find("recording"); recording != s.end()) {
+    if (const Json& running = (*recording)["running"]; running.is_object())
+      text += fmt::format("recording  {}, {} ticks so far\n", running["file"].get<std::string>(),
+                          running["ticks"].get<std::uint64_t>());
+    if (const Json& flight = (*recording)["last_flight"]; flight.is_string())
+      text += fmt::format("last fault {}\n", flight.get<std::string>());
+  }
   return text + fmt::format("a tick     {} (p50 / p99.9 / max)\nwake-up    {} late\n", times(timing["tick"]),
                             times(timing["wake_latency"]));
 }
@@ -170,6 +178,23 @@ void run_request(const std::string& method, const ControlOptions& options) {
   if (!result.contains("asked")) return print(result.empty() ? "done\n" : pretty(result));
   std::this_thread::sleep_for(150ms);  // a fade, and a little for the event
   print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
+}
+
+void run_record(const ControlOptions& options) {
+  if (!options.file.empty() && options.method != "start")
+    throw std::runtime_error("record " + options.method + ": takes no file; only start does");
+  Json params = Json::object();
+  if (!options.file.empty()) {  // a path is meant from here, and the daemon is elsewhere
+    const bool is_name = options.file.find('/') == std::string::npos;
+    params["file"] =
+        is_name ? options.file : std::filesystem::absolute(options.file).lexically_normal().string();
+  }
+  Client client(options.socket, kAnswerWithin);
+  const Json result = call(client, "record." + options.method, params);
+  if (options.json || options.method == "status") return print(pretty(result));
+  if (options.method == "start") return print("recording " + result["file"].get<std::string>() + "\n");
+  print(fmt::format("recorded {}: {} ticks, {} missing\n", result["file"].get<std::string>(),
+                    result["ticks"].get<std::uint64_t>(), result["lost"].get<std::uint64_t>()));
 }
 
 void run_describe(const ControlOptions& options) {

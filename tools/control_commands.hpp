@@ -14,6 +14,7 @@ struct ControlOptions {
   bool json = false;   ///< what the daemon answers, as it is
   std::vector<std::string> events;
   std::string method;
+  std::string file;
   bool from_other = false;
 };
 
@@ -28,6 +29,8 @@ void run_watch(const ControlOptions& options);
 int run_arm(const ControlOptions& options);
 /// One request without parameters, and what follows from it.
 void run_request(const std::string& method, const ControlOptions& options);
+/// options.method: start, stop or status.
+void run_record(const ControlOptions& options);
 void run_describe(const ControlOptions& options);
 
 /// The status for a person.

@@ -2,18 +2,14 @@
 #include "tools/paper_figures.hpp"
 
 #include <array>
-#include <cstring>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 #include <vector>
 
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "tools/csv_row.hpp"
+#include "tools/gnuplot.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_examples.hpp"
 #include "tools/paper_script.hpp"
@@ -68,27 +64,6 @@ std::string over_time_csv(const std::string& name, const Steps& ours, const Step
   return csv.str();
 }
 
-/// Runs gnuplot on figures.gp in the directory.
-void draw(const std::filesystem::path& directory) {
-  std::string program = "gnuplot";
-  std::string script = "figures.gp";
-  std::array<char*, 3> arguments = {program.data(), script.data(), nullptr};
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addchdir_np(&actions, directory.c_str());
-  pid_t child = 0;
-  const int error = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  const std::string there = "; the tables it would draw are in " + directory.string();
-  if (error != 0)
-    throw std::runtime_error("gnuplot: cannot be run (" + std::string(std::strerror(error)) +
-                             "); install the package gnuplot-nox" + there);
-  int status = 0;
-  waitpid(child, &status, 0);
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    throw std::runtime_error("gnuplot: failed on figures.gp; what it said stands above" + there);
-}
-
 }  // namespace
 
 void write_paper_figures(const std::filesystem::path& directory) {
@@ -109,7 +84,7 @@ void write_paper_figures(const std::filesystem::path& directory) {
   write("fig15.csv", over_time_csv("tau_z", ours, traditional,
                                    [](const PaperStep& step) { return step.F_W.torque_Nm.z(); }));
   write("figures.gp", kPaperScript);
-  draw(directory);
+  run_gnuplot(directory, "figures.gp", "; the tables it would draw are in " + directory.string());
 }
 
 }  // namespace wrenchd

@@ -19,13 +19,14 @@
 #include "config/known_profiles.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
+#include "config/pose_table.hpp"
 #include "config/report_bytes.hpp"
 #include "core/finite.hpp"
 #include "core/friction.hpp"
 #include "core/inertia.hpp"
 #include "core/make_mesh.hpp"
 #include "daemon/option_checks.hpp"
-#include "daemon/replay.hpp"
+#include "daemon/recording_file.hpp"
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "tools/calibrate.hpp"
@@ -33,14 +34,16 @@
 #include "tools/control_commands.hpp"
 #include "tools/descriptor_source.hpp"
 #include "tools/doctor.hpp"
+#include "tools/export_recording.hpp"
 #include "tools/fault_text.hpp"
 #include "tools/gallery.hpp"
 #include "tools/list_devices.hpp"
 #include "tools/output_file.hpp"
 #include "tools/paper_figures.hpp"
 #include "tools/paper_tables.hpp"
-#include "tools/pose_table.hpp"
+#include "tools/plot_recording.hpp"
 #include "tools/propose_profile.hpp"
+#include "tools/replay_recording.hpp"
 #include "tools/report_text.hpp"
 #include "tools/solve.hpp"
 #include "tools/udev_rules.hpp"
@@ -185,25 +188,6 @@ int run_mesh(const std::filesystem::path& file, double scale) {
   print("inertia xx yy zz", H.diagonal(), "m^2 (per kg, uniform solid, about the centre of mass)");
   print("inertia xy xz yz", {H(0, 1), H(0, 2), H(1, 2)}, "m^2");
   return 0;
-}
-
-int run_replay(const std::filesystem::path& file, const PlanFiles& files) {
-  const Recording recording = read_recording(file);
-  const Plan plan = read_plan(files, SearchPath());
-  if (plan.profile.name.empty())
-    throw std::runtime_error(
-        "the configuration leaves the profile to the device that is plugged in; name the one of the "
-        "recording "
-        "with --profile");
-  const auto difference = replay(recording, plan);
-  if (!difference) {
-    std::printf("%zu ticks, all the same, bit for bit\n", recording.ticks.size());
-    return 0;
-  }
-  std::printf("tick %llu differs first: %s was %.17g and is %.17g\n",
-              static_cast<unsigned long long>(difference->tick), difference->field.c_str(),
-              difference->recorded, difference->replayed);
-  return kExitDiffers;
 }
 
 void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
@@ -569,6 +553,83 @@ void add_view(CLI::App& app, ViewOptions& options) {
   view->callback([&options] { run_view(options); });
 }
 
+struct RecordingOptions {
+  std::filesystem::path file;
+  PlanFiles files;
+  std::string output;
+  ExportSettings wanted;
+};
+
+void add_replay(CLI::App& app, RecordingOptions& options, int& exit_code) {
+  CLI::App* again = app.add_subcommand("replay",
+                                       "Feeds a recording through the servo loop again, and names the first\n"
+                                       "tick that comes out differently");
+  again->add_option("recording", options.file, "HDF5 file of wrenchd --record")
+      ->required()
+      ->check(not_empty());
+  const std::array named = {
+      again->add_option("-c,--config", options.files.config,
+                        "replay it with this configuration; without any of these three with what is in it"),
+      again->add_option("--scene", options.files.scene, "with this scene instead of the configuration's"),
+      again->add_option("--profile", options.files.profile, "with this profile, likewise")};
+  for (CLI::Option* option : named) option->check(not_empty());
+  again->callback([&options, &exit_code, named] {
+    const bool from_files = std::any_of(named.begin(), named.end(), [](auto* o) { return o->count() > 0; });
+    const bool same = replay_recording(
+        options.file, from_files ? std::optional<PlanFiles>(options.files) : std::optional<PlanFiles>());
+    exit_code = same ? 0 : kExitDiffers;
+  });
+}
+
+void add_export(CLI::App& app, RecordingOptions& options) {
+  CLI::App* exported = app.add_subcommand("export", "A recording as CSV, with units in its headings");
+  exported->add_option("recording", options.file, "HDF5 file")->required()->check(not_empty());
+  exported->add_option("-o,--output", options.output, "CSV to write; without it standard output")
+      ->check(not_empty());
+  exported
+      ->add_option("--columns", options.wanted.columns,
+                   "names, with commas between: F_out,state; without it all")
+      ->delimiter(',');
+  exported->add_option("--every", options.wanted.every, "a row for so many ticks")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000'000}))
+      ->capture_default_str();
+  exported->add_option("--from", options.wanted.from_s, "leave out what was before [s since the first tick]")
+      ->check(number_from(0.0, 1e9));
+  exported->add_option("--to", options.wanted.to_s, "leave out what came after [s, likewise]")
+      ->check(number_from(0.0, 1e9));
+  exported->callback([&options] {
+    const Recording recording = read_recording(options.file);
+    if (options.output.empty()) return write_csv(std::cout, recording, options.wanted);
+    std::ostringstream text;
+    write_csv(text, recording, options.wanted);
+    write_output(options.output, text.str());
+  });
+}
+
+void add_plot(CLI::App& app, RecordingOptions& options) {
+  CLI::App* plot =
+      app.add_subcommand("plot",
+                         "The figures of a recording: force, torque, penetration and energy over\n"
+                         "time, tick times and their tail, and the way of the tool");
+  plot->add_option("recording", options.file, "HDF5 file")->required()->check(not_empty());
+  plot->add_option("-o,--output", options.output,
+                   "a file that ends in .svg, .pdf or .png: all of them in one; else a directory for an SVG\n"
+                   "each, their tables and the script; without it the recording's name, without .h5")
+      ->check(not_empty());
+  plot->callback([&options] {
+    const auto output = options.output.empty() ? std::filesystem::path(options.file).replace_extension()
+                                               : std::filesystem::path(options.output);
+    for (const auto& picture : plot_recording(read_recording(options.file), output))
+      std::printf("%s\n", picture.c_str());
+  });
+}
+
+void add_recordings(CLI::App& app, RecordingOptions& options, int& exit_code) {
+  add_replay(app, options, exit_code);
+  add_export(app, options);
+  add_plot(app, options);
+}
+
 /// What a daemon that runs is asked for.
 void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   const auto add = [&](const char* name, const char* what, auto&& run) {
@@ -594,6 +655,17 @@ void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   add("describe", "What can be asked of it, by whom; and its events", [&] {
     run_describe(options);
   })->add_option("method", options.method, "one method");
+  CLI::App* record = add("record", "Begins or ends a recording of every tick, or says what is recorded",
+                         [&] { run_record(options); });
+  record->add_option("what", options.method, "start, stop or status")
+      ->required()
+      ->check(CLI::IsMember({"start", "stop", "status"}));
+  record
+      ->add_option(
+          "file", options.file,
+          "for start: a name, for the daemon's own directory; or, for administrators, a path. Without\n"
+          "it a name of the time")
+      ->check(not_empty());
   for (const auto& [name, what] : {std::pair{"disarm", "The force fades, whoever armed"},
                                    std::pair{"stop", "Emergency stop; anybody may"},
                                    std::pair{"acknowledge", "Somebody has looked at a fault, or a stop"},
@@ -671,27 +743,18 @@ int main(int argc, char** argv) {
   std::filesystem::path paper_directory = "wrenchd-paper";
   add_paper(app, paper_directory);
 
-  std::filesystem::path recording;
-  PlanFiles files;
-  CLI::App* again = app.add_subcommand("replay",
-                                       "Feeds a recording through the servo loop again, and names the first\n"
-                                       "tick that comes out differently");
-  again->add_option("recording", recording, "HDF5 file of wrenchd --record")->required()->check(not_empty());
-  again->add_option("-c,--config", files.config, "the configuration it was recorded with")
-      ->capture_default_str()
-      ->check(not_empty());
-  again->add_option("--scene", files.scene, "the scene, where the command line named one")
-      ->check(not_empty());
-  again->add_option("--profile", files.profile, "the profile, likewise")->check(not_empty());
-  again->callback([&] { exit_code = run_replay(recording, files); });
+  RecordingOptions recording_options;
+  add_recordings(app, recording_options, exit_code);
 
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty())
       throw CLI::RequiredError(
-          "A subcommand (status, watch, view, arm, disarm, stop, acknowledge, reload, describe; solve, "
-          "check, "
-          "decode, devices, doctor, encode, faults, gallery, mesh, profile, paper, replay or udev-rules)");
+          "A subcommand (status, watch, view, arm, disarm, stop, acknowledge, reload, record, describe; "
+          "solve, "
+          "check, decode, devices, doctor, encode, export, faults, gallery, mesh, profile, paper, plot, "
+          "replay or "
+          "udev-rules)");
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw std::runtime_error("standard output: cannot be written; is the disk full?");
     return exit_code;

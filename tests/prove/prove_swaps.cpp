@@ -59,7 +59,6 @@ Plan plan_of() {
                         SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   plan.settings.servo.realtime = Realtime::best_effort;
   plan.settings.servo.self_test_s = 0.0;
-  plan.settings.recording.file = "ring";  // the records are taken from the ring by this program
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()},
                                         {0.4, {0, 0, 0.065}, Vector3d::Zero()},
                                         {0.8, {0, 0, 0.017}, Vector3d::Zero()},
@@ -155,6 +154,8 @@ int main(int argc, char** argv) {
   test::Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
                                plan.settings.limits.force_slew_N_per_s,
                                plan.settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3});
+  const SharedState& state = station.show_state();
+  std::uint64_t missed = 0;
   std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, loop_faults = 0;
   std::atomic<std::uint64_t> pushed{0};
   std::set<std::uint32_t> felt;     // numbers of the renderings in the records
@@ -175,12 +176,16 @@ int main(int argc, char** argv) {
   });
   std::thread watcher([&] {
     bool first = true;
-    TickRecord r;
-    while (!over.load() || station.records().read_available() > 0) {
-      if (!station.records().pop(r)) {
+    StateRecord seen;
+    for (std::uint64_t next = 0; !over.load() || next < state.written();) {
+      if (!state.read(next, seen)) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        const std::uint64_t oldest = state.written() - std::min(state.written(), state.slots() / 2);
+        if (next + state.slots() <= state.written()) missed += oldest - next, next = oldest;
         continue;
       }
+      ++next;
+      const TickRecord& r = seen.tick;
       if (first) {
         const std::lock_guard lock(sums_mutex);
         sums[0] = r.rendering_sum;
@@ -242,8 +247,7 @@ int main(int argc, char** argv) {
       "%llu "
       "pushed %llu late_or_stopped %llu dropped %llu seed %llu\n",
       changes, applied, refused, felt.size(), number(torn), number(unknown), number(broken + torn + unknown),
-      number(in_contact), number(pushed), number(loop_faults), number(station.loop().dropped_records()),
-      number(seed));
+      number(in_contact), number(pushed), number(loop_faults), number(missed), number(seed));
   with.print("swaps_with");
   without.print("swaps_without");
   return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && refused > 0 && pushed > 0 ? 0 : 1;

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/record_methods.hpp"
+
+namespace wrenchd {
+namespace {
+
+Json written_json(const Recordings::Written& written) {
+  return {{"file", written.file.string()}, {"ticks", written.ticks}, {"lost", written.lost}};
+}
+
+Answer start(Recordings& recordings, const Json& params, const Caller& caller) {
+  if (const auto running = recordings.status().running)
+    throw RpcError(RpcCode::not_now,
+                   "It is recorded already, into " + running->file.string() + "; 'record.stop' ends that.",
+                   {{"file", running->file.string()}});
+  try {
+    const auto file =
+        recordings.start(params.value("file", std::string()), caller.role >= Role::administrator);
+    return Json{{"file", file.string()}};
+  } catch (const RecordingError& error) {
+    throw RpcError(RpcCode::refused, error.what());
+  }
+}
+
+Answer stop(Recordings& recordings) {
+  if (const auto written = recordings.stop()) return written_json(*written);
+  const std::string failed = recordings.status().failed;
+  throw RpcError(RpcCode::not_now, failed.empty() ? "Nothing is recorded; 'record.start' begins."
+                                                  : "Nothing is recorded any more: " + failed + ".");
+}
+
+}  // namespace
+
+Json recording_json(const Recordings& recordings) {
+  const Recordings::Status status = recordings.status();
+  const auto path_or_null = [](const std::filesystem::path& path) {
+    return path.empty() ? Json(nullptr) : Json(path.string());
+  };
+  return {{"running", status.running ? written_json(*status.running) : Json(nullptr)},
+          {"failed", status.failed.empty() ? Json(nullptr) : Json(status.failed)},
+          {"directory", path_or_null(status.directory)},
+          {"flight_s", status.flight_s},
+          {"last_flight", path_or_null(status.last_flight)},
+          {"flights", status.flights}};
+}
+
+void add_record_methods(MethodTable& table, Recordings& recordings) {
+  table.add(EventRow{"recording",
+                     "what: started, ended (ticks, lost: how many are missing), failed (why), flight (fault: "
+                     "the flight recorder has written what led to it). file: which."});
+  table.add(MethodRow{
+      "record.start",
+      Role::operator_,
+      {{"file", ParamType::text, false,
+        "a plain name, which goes into the directory that record.status names; without it "
+        "one of the time. Administrators may give an absolute path"}},
+      "Writes every tick from now on to an HDF5 file. Answers file. One at a time.",
+      [&recordings](const Json& params, const Caller& caller) { return start(recordings, params, caller); },
+      true});
+  table.add(MethodRow{"record.stop",
+                      Role::operator_,
+                      {},
+                      "Ends what record.start began: answers file, ticks, and lost, how many are missing.",
+                      [&recordings](const Json&, const Caller&) { return stop(recordings); },
+                      true});
+  table.add(
+      MethodRow{"record.status",
+                Role::observer,
+                {},
+                "running: file, ticks and lost so far, or null; failed: why the last one ended by "
+                "itself; directory; flight_s: what the flight recorder holds; last_flight: its newest "
+                "file since the start; flights: how many.",
+                [&recordings](const Json&, const Caller&) { return Answer(recording_json(recordings)); }});
+}
+
+}  // namespace wrenchd

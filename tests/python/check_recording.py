@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Opens a recording as a scientist would: with h5py alone, and none of our code. Usage: check_recording.py FILE"""
+import datetime
+import hashlib
+import sys
+
+import h5py
+import numpy as np
+
+UNITS = {
+    "X_WP": "m m m, qx qy qz qw",
+    "F_out": "N x3, N.m x3",
+    "energy_in_J": "J",
+    "now_ns": "ns",
+    "V_BH": "m/s x3, rad/s x3",
+    "eps": "m x3, rad x3",
+    "device_time_s": "s",
+}
+
+
+def check(what, good):
+    if not good:
+        sys.exit("not so: " + what)
+
+
+with h5py.File(sys.argv[1], "r") as file:
+    ticks, touches = file["ticks"], file["touches"]
+    for name, unit in UNITS.items():
+        check(name + " has its unit", ticks.attrs[name + ".unit"] == unit)
+    for table in (ticks, touches):
+        for name in table.dtype.names:
+            check(name + " has a unit", len(table.attrs[name + ".unit"]) > 0)
+            check(name + " has a meaning", len(table.attrs[name + ".doc"]) > 0)
+    check("the frame of F_T", ticks.attrs["F_T.frame"] == "axes of T, about its centre of mass")
+    names = ticks.attrs["state.values"].removeprefix("from 0: ").split(", ")
+    check("states have names", names[5] == "active")
+
+    fields = file["fields"]
+    check("a row a column", len(fields) == len(ticks.dtype.names) + len(touches.dtype.names))
+    rows = {(row["table"].decode(), row["name"].decode()): row for row in fields}
+    check("the table of fields has units", rows[("ticks", "F_out")]["unit"].decode() == UNITS["F_out"])
+    check("and counts", rows[("ticks", "F_out")]["count"] == 6)
+
+    # Columns, as numbers.
+    force = ticks["F_out"]
+    check("six numbers a tick", force.shape == (len(ticks), 6))
+    state = ticks["state"]
+    check("it was active", np.any(state == names.index("active")))
+    check("it pushed", np.max(force[:, 2]) > 0.5)
+    check("every tick is there", np.all(np.diff(ticks["tick"].astype(np.int64)) <= 1))
+    check("times rise", np.all(np.diff(ticks["now_ns"]) >= 0))
+    rate = 1e9 / np.median(np.diff(ticks["now_ns"]))
+    check("the rate is told", abs(rate - file.attrs["rate_Hz"]) < 0.02 * rate)
+
+    # Contacts: those of a tick are rows of the other table, their normals are unit, their shares add up.
+    some = np.flatnonzero(ticks["touch_count"] > 0)
+    check("it touched", len(some) > 100)
+    for row in ticks[some[:: max(len(some) // 50, 1)]]:
+        mine = touches[row["first_touch"] : row["first_touch"] + row["touch_count"]]
+        check("as many as there are", len(mine) == min(row["contacts"], 16))
+        check("unit normals", np.allclose(np.linalg.norm(mine["normal_W"], axis=1), 1.0))
+        carried = np.sum(mine["share"])
+        check("shares add up", carried == 0.0 or abs(carried - 1.0) < 1e-6)
+
+    # What it ran with.
+    check("the settings", "[servo]" in file["config/settings"][()].decode())
+    check("the scene", "[tool]" in file["config/scene"][()].decode())
+    check("the profile", "name" in file["config/profile"][()].decode())
+    mesh = file["meshes/tool"]
+    check("the tool is inside", mesh.attrs["inside"] == 1)
+    check("and is what it says", hashlib.sha256(bytes(mesh[:])).hexdigest() == mesh.attrs["sha256"])
+    for name in ("format", "wrenchd_version", "kernel", "realtime", "clock"):
+        check(name + " is told", len(file.attrs[name]) > 0)
+
+    # UTC of a tick.
+    started = datetime.datetime.fromisoformat(file.attrs["started_utc"].replace("Z", "+00:00"))
+    check("both say the same", abs(started.timestamp() - 1e-9 * file.attrs["started_unix_ns"]) < 1e-5)
+    if file.attrs["clock"] == "CLOCK_MONOTONIC":
+        first = 1e-9 * (file.attrs["started_unix_ns"] + ticks["now_ns"][0] - file.attrs["started_ns"])
+        check("it began just now", 0 <= datetime.datetime.now().timestamp() - first < 600)
+    print(len(ticks), "ticks,", len(touches), "touches")

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include "daemon/recording_file.hpp"
+#include "daemon/station.hpp"
+
+namespace wrenchd::test {
+
+/// Records a station that a test ticks by hand. Begins before the first tick.
+class RunRecorder {
+ public:
+  RunRecorder(Station& station, const std::filesystem::path& file)
+      : state_(station.show_state()), writer_(file, station.recording_header()) {}
+  ~RunRecorder() {
+    take();
+    writer_.append(batch_);
+  }
+  RunRecorder(const RunRecorder&) = delete;
+  RunRecorder& operator=(const RunRecorder&) = delete;
+
+  /// What was ticked since; within two seconds of the loop's time.
+  void take() {
+    for (; state_.read(next_, record_); ++next_)
+      batch_.add(record_.tick, std::span(record_.touches).first(record_.touch_count));
+  }
+  bool has_all() const { return next_ == state_.written(); }
+
+ private:
+  SharedState& state_;
+  RecordingWriter writer_;
+  RecordBatch batch_;
+  StateRecord record_;
+  std::uint64_t next_ = 0;
+};
+
+}  // namespace wrenchd::test
