@@ -7,12 +7,12 @@
 
 #include "config/load_profile.hpp"
 #include "core/finite.hpp"
-#include "daemon/recorder.hpp"
 #include "daemon/replay.hpp"
 #include "devices/deflection_pose.hpp"
 #include "devices/emulated_spacemouse.hpp"
 #include "devices/simulated_link.hpp"
 #include "tests/support/no_allocation.hpp"
+#include "tests/support/run_recorder.hpp"
 #include "tests/support/shipped_plan.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -322,12 +322,11 @@ TEST_CASE("the recentre button brings the tool back through whatever is in betwe
 TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  Plan plan = shipped_plan();
-  plan.settings.recording.file = "set";
-  Steered s(plan);
+  Steered s;
   {
-    Recorder recorder(s.station->records(), file, s.station->recording_header());
+    RunRecorder recorder(*s.station, file);
     s.ticks(300);
+    recorder.take();
     s.station->loop().arm();
     for (const std::array<int, 6>& push :
          {kUp, kDown, {200, 40, 350, 90, 0, -200}, {}, {0, 300, 0, 350, 0, 0}}) {
@@ -336,7 +335,9 @@ TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay
       s.ticks(1200);
       if (push == kDown) s.mouse.press(1);
       s.ticks(100);
+      recorder.take();
     }
+    REQUIRE(recorder.has_all());
   }
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 6800);

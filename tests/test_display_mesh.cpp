@@ -6,9 +6,9 @@
 
 #include <catch2/catch.hpp>
 
+#include "core/make_mesh.hpp"
 #include "core/triangle_mesh.hpp"
 #include "tests/support/sample_meshes.hpp"
-#include "tools/make_mesh.hpp"
 #include "tools/view/display_mesh.hpp"
 
 using namespace wrenchd;

@@ -91,7 +91,8 @@ void check_exhibit(const std::string& name) {
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
   }
 
-  const Recording recording = {{}, run.ticks};
+  Recording recording;
+  recording.ticks = run.ticks;
   const auto difference = replay(recording, run.plan);
   if (difference) FAIL("replay: tick " << difference->tick << ' ' << difference->field);
 

@@ -7,9 +7,9 @@
 #include <unistd.h>
 
 #include "config/load_scene.hpp"
+#include "core/make_mesh.hpp"
 #include "daemon/scene_shapes.hpp"
 #include "tests/support/shipped_plan.hpp"
-#include "tools/make_mesh.hpp"
 #include "tools/view/view_scene.hpp"
 
 using namespace wrenchd;

@@ -400,11 +400,18 @@ Pose resting(const Scene& scene, RandomValues& random) {
 Scene scene_of(bool post) {
   const char* cube = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
   SceneSettings settings;
-  settings.tool = {cube, 0.001, 0.2};
-  if (post)
-    settings.meshes.push_back({"post", cube, 0.0008, {Quaterniond::Identity(), {0.0, 0.0, -0.02}}});
-  else
+  settings.tool.mesh = cube;
+  settings.tool.scale = 0.001;
+  settings.tool.mass_kg = 0.2;
+  if (post) {
+    MeshObstacleSettings& obstacle = settings.meshes.emplace_back();
+    obstacle.name = "post";
+    obstacle.mesh = cube;
+    obstacle.scale = 0.0008;
+    obstacle.X_WM.translation_m = {0.0, 0.0, -0.02};
+  } else {
     settings.half_spaces.push_back({"floor", Vector3d::UnitZ(), 0.0});
+  }
   return Scene(settings);
 }
 

@@ -22,7 +22,9 @@ struct Buried {
     std::ostringstream boulder;
     write_off(boulder, make_mesh({"boulder", triangles}));
     plan.scene.half_spaces.clear();
-    plan.scene.meshes = {{"boulder", files.write("boulder.off", boulder.str()), 1.0, Pose{}}};
+    MeshObstacleSettings& obstacle = plan.scene.meshes.emplace_back();
+    obstacle.name = "boulder";
+    obstacle.mesh = files.write("boulder.off", boulder.str());
     plan.settings.simulation.hand_path = path;
     plan.settings.simulation.hand_repeats = false;
   }
