@@ -16,9 +16,9 @@ namespace wrenchd {
 /// The virtual body in the hand. M is the frame the mesh file is written in.
 struct ToolSettings {
   std::filesystem::path mesh;         ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
-  std::optional<MadeMesh> made = {};  ///< then it is made, and `mesh` is name_of() it instead of a file
   double scale = 1.0;                 ///< metres per mesh unit
   double mass_kg = 1.0;               ///< of the uniform solid; scales T, moves no minimiser
+  std::optional<MadeMesh> made = {};  ///< then it is made, and `mesh` is name_of() it instead of a file
 };
 
 /// Solid where normal_W . x < offset_m.
@@ -32,14 +32,14 @@ struct HalfSpaceSettings {
 struct MeshObstacleSettings {
   std::string name;
   std::filesystem::path mesh;
-  std::optional<MadeMesh> made = {};  ///< as for the tool
-  double scale = 1.0;                 ///< metres per mesh unit
-  Pose X_WM;                          ///< at scene time 0
+  double scale = 1.0;  ///< metres per mesh unit
+  Pose X_WM;           ///< at scene time 0
   /// A surface may be open or cut through itself. It has no inside: nothing pushes a tool out that starts
   /// beyond it, or that it goes through.
   BodyKind kind = BodyKind::solid;
   ObstacleMotion motion = {};  ///< of M; turns are about M's origin
   std::optional<LaterMotion> later = {};
+  std::optional<MadeMesh> made = {};  ///< as for the tool
 };
 
 struct SceneSettings {
