@@ -19,9 +19,9 @@ test(async () => {
     await until("it is armed", async () => {
       const now = await state();
       if (now === "fault") await page.locator("#acknowledge").click();  // a busy machine
-      if (now === "disarmed") await page.locator("#arm").click({ timeout: 1000 }).catch(() => {});
+      if (now === "disarmed") await page.locator("#arm").click({ timeout: 15000 }).catch(() => {});
       return ARMED.includes(now);
-    });
+    }, 120000);
   };
 
   // Armed: force is felt and shown.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/view/view.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <utility>
@@ -45,7 +46,11 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const Plan
   const DeviceSettings& device = plan.settings.device;
   description["shapes"] = 1;
   description["rendering"] = 0;
-  description["scene_time_begins_ns"] = recording.ticks.front().now_ns;
+  // Scene time began with tick 0, which a recording that was started later does not have: ticks are even
+  // enough.
+  const TickRecord& first = recording.ticks.front();
+  description["scene_time_begins_ns"] =
+      first.now_ns - std::llround(1e9 * static_cast<double>(first.tick) / plan.settings.servo.rate_Hz);
   description["X_WB"] = pose_json(pose_of(device.base_in_world));
   description["X_HT"] = pose_json(pose_of(device.tool_in_handle) * scene->tool().X_MT());
   description["wrench_about"] = plan.profile.wrench_point == WrenchPoint::handle ? "handle" : "world origin";

@@ -350,8 +350,8 @@ function draw(now) {
   drawnAt = now;
   if (frame) showFrame(frame);
   showButtons();
-  world.draw();
-  if (now - plotted > PLOTS_EVERY_MS && frame) {
+  world.draw(now);
+  if (now - plotted > PLOTS_EVERY_MS + 4 * (world.slow_ms ?? 0) && frame) {
     plotted = now;
     plots.draw(history, frame.t);
   }

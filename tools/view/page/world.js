@@ -272,9 +272,17 @@ export class World {
     this.changed = true;
   }
 
-  draw() {
-    if (!this.changed) return;
+  /** A frame that took long is followed by as long a pause: where software draws, others have work to do. */
+  draw(now) {
+    if (this.drawnAt !== undefined) {
+      const took = now - this.drawnAt;
+      this.slow_ms = took > 40 ? Math.min(took, 1000) : 0;
+      this.rested = now + this.slow_ms;
+      this.drawnAt = undefined;
+    }
+    if (!this.changed || now < (this.rested ?? 0)) return;
     this.changed = false;
+    this.drawnAt = now;
     this.renderer.render(this.scene, this.camera);
     this.drawn = (this.drawn ?? 0) + 1;
   }
