@@ -31,6 +31,7 @@ Recording pressed() {
     TickRecord tick;
     const double t_s = 1e-3 * i;
     tick.now_ns = 1'000'000 * std::int64_t{i};
+    tick.fresh = 1;
     tick.state = static_cast<std::uint8_t>(State::active);
     tick.F_out = {std::sin(t_s), 0.1, 2.0 + std::cos(3.0 * t_s), 0.0, 0.02 * std::sin(t_s), 0.0};
     if (i == 12345) tick.F_out[2] = 9.75;

@@ -54,6 +54,7 @@ std::string over_time_csv(const Recording& recording) {
   csv << "t,fx,fy,fz,f,tx,ty,tz,torque,depth_mm,turn_deg,in_mJ,out_mJ,injected_mJ,armed,"
          "px,py,pz,qx,qy,qz\n";
   const auto& ticks = recording.ticks;
+  bool seen = false;
   const std::size_t every = (ticks.size() + kMostRows - 1) / kMostRows;
   for (std::size_t i = 0; i < ticks.size(); i += every) {
     const auto begin = ticks.begin() + static_cast<std::ptrdiff_t>(i);
@@ -68,8 +69,9 @@ std::string over_time_csv(const Recording& recording) {
     for (const double x : penetration(tick)) row << x;
     row << 1e3 * tick.energy_in_J << 1e3 * tick.energy_out_J << 1e3 * tick.injected_J
         << (is_driving(static_cast<State>(tick.state)) ? 1.0 : 0.0);
+    seen = seen || tick.fresh != 0;  // before the first sample nobody knows where p is
     for (const auto* X : {&tick.X_WP, &tick.X_WQ})
-      for (std::size_t k = 0; k < 3; ++k) row << 1e3 * (*X)[k];
+      for (std::size_t k = 0; k < 3; ++k) row << (seen ? 1e3 * (*X)[k] : std::nan(""));
   }
   return csv.str();
 }

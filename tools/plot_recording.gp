@@ -107,6 +107,8 @@ across = PY_max - PY_min > PX_max - PX_min ? 'y' : 'x'
 set xlabel across.' of the tool in the world [mm]'
 set ylabel 'z of the tool in the world [mm]'
 set size ratio -1
+span = PX_max - PX_min > PY_max - PY_min ? PX_max - PX_min : PY_max - PY_min
+if (span > 0) { set xtics 10**floor(log10(span)) * (span / 10**floor(log10(span)) > 3 ? 2 : 1) / (span / 10**floor(log10(span)) > 3 ? 1 : 2.0) }
 set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05
 if (placed) {
   plot 'run.csv' using (column('p'.across)):(column('pz')) with lines linestyle 5 title 'p, the hand', \
