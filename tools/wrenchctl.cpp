@@ -541,12 +541,6 @@ void add_view(CLI::App& app, ViewOptions& options) {
   view->add_option("--socket", options.socket, "the daemon's control socket; without it as for status")
       ->check(not_empty());
   view->add_flag("--open", options.open, "open the page in a browser, by xdg-open");
-  view->add_option("-c,--config", options.files.config, "of a recording: the configuration it was made with")
-      ->capture_default_str()
-      ->check(not_empty());
-  view->add_option("--scene", options.files.scene, "the scene, where the command line named one")
-      ->check(not_empty());
-  view->add_option("--profile", options.files.profile, "the profile, likewise")->check(not_empty());
   view->footer(
       "Prints the address, which only works as a whole: it holds a token. The page arms with the rights of\n"
       "whoever runs this, for as long as it is open and seen; anybody's stop works always.");

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { writeFileSync } from "node:fs";
-import { file, finished, open, source, test, text, until, view } from "./browser.mjs";
+import { file, finished, open, test, text, until, view } from "./browser.mjs";
 
 // In virtual time a tick takes no time at all: one is made to have taken long.
 const COLUMNS = `
@@ -38,7 +38,7 @@ test(async () => {
   const columns = JSON.parse(execFileSync("/usr/bin/python3", [script, recording, ...numbers.map(String)]));
   assert.ok(columns.rows.some(({ state, contacts }) => STATES[state] === "active" && contacts > 0));
 
-  const { url } = await view([recording, "--config", `${source}/config/wrenchd.toml`]);
+  const { url } = await view([recording]);
   const page = await open(url);
   await until("the scene is there", () => page.evaluate(() => window.view?.world().ghost && window.view.frame() !== null));
   assert.equal(await page.locator("#stop").isVisible(), false);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <vector>
 
 #include "core/fault.hpp"
@@ -13,15 +12,6 @@ namespace wrenchd {
 namespace {
 
 constexpr double kNs = 1e9;
-
-/// The contacts of a tick, where the recording has them.
-template <class SomeRecording>
-std::span<const Touch> touches_of(const SomeRecording& recording, std::size_t row) {
-  if constexpr (requires { recording.touches_of(row); })
-    return recording.touches_of(row);
-  else
-    return {};
-}
 
 }  // namespace
 
@@ -65,7 +55,7 @@ std::size_t RecordedFeed::number_at(double t_s) const {
 Json RecordedFeed::frame(double t_s) const {
   const std::size_t row = number_at(t_s);
   const TickRecord& record = recording_.ticks[row];
-  return frame_json(view_tick(record), view_words(record, touches_of(recording_, row)), scene_.get(),
+  return frame_json(view_tick(record), view_words(record, recording_.touches_of(row)), scene_.get(),
                     begin_ns());
 }
 

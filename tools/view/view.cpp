@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "collision/mesh_source.hpp"
+#include "daemon/recorded_run.hpp"
 #include "daemon/scene_shapes.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/recorded_feed.hpp"
@@ -36,7 +37,7 @@ Pose pose_of(const PlacementSettings& placed) {
   return {rotation_from(placed.rotation_vector_rad), placed.position_m};
 }
 
-/// The scene of a recording, from the files that it was made with.
+/// The scene of a recording, as it is inside.
 std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const Plan& plan) {
   MeshLoader meshes(cache_directory(),
                     [](const std::string& what) { std::fprintf(stderr, "wrenchctl: %s\n", what.c_str()); });
@@ -70,7 +71,8 @@ void run_view(const ViewOptions& options) {
   std::shared_ptr<const ViewScene> scene;
   std::string why;
   if (!recording.ticks.empty()) try {
-      scene = scene_of(recording, read_plan(options.files, SearchPath()));
+      const RecordedRun run(recording.header);
+      scene = scene_of(recording, run.plan());
     } catch (const std::exception& error) {
       why = error.what();
       std::fprintf(stderr, "wrenchctl: the scene cannot be shown: %s\n", why.c_str());

@@ -5,8 +5,6 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/station.hpp"
-
 namespace wrenchd {
 
 /// wrenchctl view
@@ -15,7 +13,6 @@ struct ViewOptions {
   std::string socket;               ///< of that; empty: the usual places
   std::uint16_t port = 0;           ///< 0: one that is free
   bool open = false;                ///< in a browser, by xdg-open
-  PlanFiles files;                  ///< what was recorded
 };
 
 /// Prints the address of the page, and serves it until a signal ends it. Throws what goes wrong at the start.
