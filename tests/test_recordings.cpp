@@ -173,7 +173,7 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
       s.tick();
       if (i % 500 != 0) continue;
       recordings.pump();
-      if (keep_free_MB > 0.0) std::this_thread::sleep_for(20ms);  // the disk is looked at once a second
+      if (keep_free_MB > 0.0) std::this_thread::sleep_for(100ms);  // the disk is looked at once a second
     }
     failed = recordings.status().failed;
     CHECK_FALSE(recordings.status().running);
