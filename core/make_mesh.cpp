@@ -56,17 +56,19 @@ TriangleMesh geodesic(std::uint32_t f) {
                                              {g, 0, 1},
                                              {-g, 0, -1},
                                              {-g, 0, 1}}};
-  constexpr int kFaces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
-                                 {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-                                 {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
-                                 {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+  constexpr std::size_t kFaces[20][3] = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                         {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                         {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                         {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
   TriangleMesh mesh;
   Welder weld(mesh, 1e-7);
-  for (const auto& [a, b, c] : kFaces) {
+  for (const auto& face : kFaces) {
+    const Vector3d& a = corners[face[0]];
+    const Vector3d& b = corners[face[1]];
+    const Vector3d& c = corners[face[2]];
     const auto at = [&](std::uint32_t i, std::uint32_t j) {
       const double u = static_cast<double>(i) / f, v = static_cast<double>(j) / f;
-      const auto corner = [&](int k) { return corners[static_cast<std::size_t>(k)]; };
-      return weld(((1.0 - u - v) * corner(a) + u * corner(b) + v * corner(c)).normalized());
+      return weld(((1.0 - u - v) * a + u * b + v * c).normalized());
     };
     for (std::uint32_t i = 0; i < f; ++i)
       for (std::uint32_t j = 0; i + j < f; ++j) {
@@ -404,7 +406,8 @@ class Thread {
   Vector3d point(std::uint32_t i, std::uint32_t j) const {
     constexpr std::array<double, kLines> kHeight = {0.0, 0.2, 0.5, 0.7};  // in pitches
     const double turn = static_cast<double>(i) / around_, angle = kTurn * turn;
-    const double z = kPitch_m * (j / kLines + kHeight[j % kLines] + turn - 0.5 * turns_);
+    const std::uint32_t below = j / kLines;  // turns
+    const double z = kPitch_m * (below + kHeight[j % kLines] + turn - 0.5 * turns_);
     const std::uint32_t line = j <= kLines || j >= (turns_ - 1) * kLines ? cut_off_to_ : j % kLines;
     const double r = wider_m_ + (line < kLines / 2 ? kRoot_m : kCrest_m);
     return {r * std::cos(angle), r * std::sin(angle), z};
