@@ -84,7 +84,9 @@ TEST_CASE("a daemon whose servo thread lost its priority says so, and disarms wh
   REQUIRE(servo > 0);
   REQUIRE(give(servo, 0));
   CHECK(program.says("somebody took the servo thread's SCHED_FIFO priority 45"));
-  CHECK(program.says("state: releasing"));
+  CHECK(program.says("; disarmed, as realtime = \"required\""));
+  // Beside other work the ticks of an ordinary thread may be so late that a fault was quicker.
+  CHECK((program.says("state: releasing", 5s) || program.says("state: fault", 1s)));
   REQUIRE(give(servo, 45));
   CHECK(program.says("has its SCHED_FIFO priority 45 again"));
 }
