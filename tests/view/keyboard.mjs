@@ -21,6 +21,7 @@ test(async () => {
     await page.locator("#theme").focus();
     await page.keyboard.press(key);
     await until(`${key} stops`, async () => (await state()) === "stopped");
+    await until(`${key}: the page shows that it is stopped`, async () => (await text(page, "state")) === "stopped");
     assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), "auto");
   }
   await page.keyboard.press("k");

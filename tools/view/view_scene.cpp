@@ -113,11 +113,9 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
   Json sizes = Json::array();
   for (std::size_t i = 0; i < meshes_.size(); ++i)
     sizes.push_back({{"triangles", given_[i]}, {"shown", shown_of(*meshes_[i])}});
-  text_ = Json{{"type", "scene"},
-               {"shapes", shapes_},
-               {"meshes", sizes},
-               {"tool", description.at("tool")},
-               {"obstacles", obstacles}}
+  text_ = Json{{"type", "scene"},        {"shapes", shapes_},
+               {"meshes", sizes},        {"tool", description.at("tool")},
+               {"obstacles", obstacles}, {"view", description.value("view", Json())}}
               .dump(-1, ' ', false, Json::error_handler_t::replace);
 } catch (const nlohmann::json::exception& error) {
   throw std::runtime_error(std::string("the scene is not told as this program knows it: ") + error.what());

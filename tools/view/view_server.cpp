@@ -243,10 +243,20 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     const auto now = std::chrono::steady_clock::now();
     if (!goes_on || now >= times_at_) {
       times_at_ = now + kTimesEvery;
-      const auto [took, late] = feed.times(t_s);
-      send(times_json(took, late));
+      times_timer_.cancel();
+      tell_times(t_s);
+    } else {  // later: the moment at which somebody stops looking about is told of too
+      times_timer_.expires_at(times_at_);
+      times_timer_.async_wait([self = shared_from_this(), t_s](beast::error_code error) {
+        if (!error) self->tell_times(t_s);
+      });
     }
     send(feed.frame(t_s));  // last: the page asks again when it has come
+  }
+
+  void tell_times(double t_s) {
+    const auto [took, late] = server_.recorded->times(t_s);
+    send(times_json(took, late));
   }
 
   void read() {
@@ -294,6 +304,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   std::string why_no_scene_;
   std::uint64_t history_of_ = 0, history_at_ = 0;
   std::chrono::steady_clock::time_point times_at_{};
+  asio::steady_timer times_timer_{socket_.get_executor()};
 };
 
 namespace {

@@ -158,7 +158,8 @@ export class World {
   }
 
   /** Which mesh is whose. */
-  show({ tool, obstacles }) {
+  show({ tool, obstacles, view }) {
+    this.view = view;
     this.bodies.clear();
     const radius = this.meshes.get(tool.mesh).surface.boundingSphere.radius;
     this.size = radius;
@@ -254,6 +255,10 @@ export class World {
     const distance = (0.95 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
     const aside = new THREE.Vector3(-0.62, -0.78, 0.55).normalize();
     this.camera.position.copy(centre).addScaledVector(aside, distance);
+    if (this.view) {  // whoever made the scene knows from where it is seen best
+      this.camera.position.set(...this.view.eye_m);
+      centre.set(...this.view.target_m);
+    }
     this.camera.near = distance / 200;
     this.camera.far = distance * 60;
     this.camera.updateProjectionMatrix();
