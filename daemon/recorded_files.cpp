@@ -139,16 +139,23 @@ TomlNode* table_in(TomlNode& root, const std::string& key) {
   return &made;
 }
 
+/// The mesh that a body of the scene names is where it was unpacked. One that is made is made again.
+void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& role,
+              const fs::path& directory) {
+  TomlEntry* const mesh = find(body, "mesh");
+  if (mesh != nullptr && std::holds_alternative<std::string>(mesh->node.value))
+    mesh->node.value = mesh_at(header, role, directory).string();
+}
+
 SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory) {
   TomlNode tree = read_toml_text(header.scene, header.scene_file);
-  if (TomlEntry* const tool = find(tree, "tool"))
-    set(&tool->node, "mesh", mesh_at(header, "tool", directory).string());
+  if (TomlEntry* const tool = find(tree, "tool")) put_mesh(tool->node, header, "tool", directory);
   int number = 0;
   if (TomlEntry* const obstacles = find(tree, "obstacle"))
     if (auto* list = std::get_if<TomlNode::Array>(&obstacles->node.value))
       for (TomlNode& obstacle : *list)
-        if (TomlEntry* const mesh = find(obstacle, "mesh"))
-          mesh->node.value = mesh_at(header, "obstacle_" + std::to_string(number++), directory).string();
+        if (find(obstacle, "mesh") != nullptr)
+          put_mesh(obstacle, header, "obstacle_" + std::to_string(number++), directory);
   return load_scene(tree, header.scene_file);
 }
 
@@ -205,9 +212,9 @@ void add_meshes(const SceneSettings& scene, RecordingHeader& header) {
     }
     header.files.push_back(std::move(mesh));
   };
-  add("tool", scene.tool.mesh);
+  if (!scene.tool.made) add("tool", scene.tool.mesh);
   for (std::size_t i = 0; i < scene.meshes.size(); ++i)
-    add("obstacle_" + std::to_string(i), scene.meshes[i].mesh);
+    if (!scene.meshes[i].made) add("obstacle_" + std::to_string(i), scene.meshes[i].mesh);
 }
 
 void begin_now(const Clock& clock, RecordingHeader& header) {

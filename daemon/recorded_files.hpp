@@ -21,7 +21,7 @@ inline constexpr std::size_t kMostMeshBytes = std::size_t{32} << 20;
 /// any more is empty. Not RT safe.
 RecordingHeader recorded_texts(const Plan& plan);
 
-/// The mesh files of the scene, as they are now.
+/// The mesh files of the scene, as they are now. Meshes that are made stand in the scene's text.
 void add_meshes(const SceneSettings& scene, RecordingHeader& header);
 
 /// That the recording begins now: by that clock, and by UTC.

@@ -11,6 +11,7 @@
 #include "tests/support/exact_meeting.hpp"
 #include "tests/support/exhibit_run.hpp"
 #include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
 #include "tools/gallery.hpp"
 
 // Every scene of the gallery, felt once through its hand script: no fault, nothing cut through, and what its
@@ -134,6 +135,20 @@ TEST_CASE("gallery: a staircase", "[gallery]") {
 }
 TEST_CASE("gallery: an obstacle that moves", "[gallery]") {
   check_exhibit("moving_obstacle");
+}
+
+TEST_CASE("a recording of a scene whose meshes are made needs nothing but itself", "[gallery][program]") {
+  const TemporaryDirectory files;
+  const std::string file = (files.path() / "run.h5").string();
+  const std::string name = GENERATE("staircase", "peg_in_hole");
+  REQUIRE(run_program("wrenchd", {"--config", "gallery/" + name + ".toml", "--virtual-time", "--arm",
+                                  "--seconds", "3", "--record", file})
+              .exit_code == 0);
+  const ProgramResult again = run_program("wrenchctl", {"replay", file});
+  INFO(again.err);
+  CHECK(again.exit_code == 0);
+  CHECK(again.out.find("with: what is in the recording") != std::string::npos);
+  CHECK(again.out.find("3001 ticks, all the same, bit for bit") != std::string::npos);
 }
 
 TEST_CASE("every scene of the gallery says what it is, repeats, has a camera, and is tested", "[gallery]") {
