@@ -28,7 +28,8 @@ export const file = (name) => join(directory, name);
 
 /** A program that runs beside the test; out: what it has said. */
 export function start(program, words) {
-  const child = spawn(join(binaries, program), words);
+  // Flight recordings go where the test goes.
+  const child = spawn(join(binaries, program), words, { env: { ...process.env, XDG_STATE_HOME: directory } });
   const one = { child, out: "", err: "", ended: new Promise((done) => child.on("close", done)) };
   child.stdout.on("data", (data) => (one.out += data));
   child.stderr.on("data", (data) => (one.err += data));

@@ -27,6 +27,8 @@ test(async () => {
   await page.keyboard.press("k");
   await until("k acknowledges", async () => (await state()) === "disarmed");
 
+  await until("the page shows that it may be armed", () => page.locator("#arm").isEnabled());
+
   // The focus goes where it is seen to go.
   await page.locator("#arm").focus();
   const visited = ["arm"];
