@@ -18,7 +18,6 @@ using namespace std::chrono_literals;
 /// The shared memory holds two seconds.
 constexpr auto kTakeEvery = 20ms;
 constexpr auto kWriteEvery = 100ms;
-constexpr auto kLookAtDiskEvery = 1s;
 /// What the flight recorder writes of the time after a fault.
 constexpr Duration kAfter = 1s;
 /// A loop that has ended, or stands still, gives no more: then what is there is written.
@@ -207,12 +206,11 @@ bool Recordings::write_running(bool rest) {
   return false;
 }
 
-/// A recording ends before it takes the last room that there is.
+/// A recording ends before it takes the last room that there is. After each piece: a disk may fill up in less
+/// than any time one would wait.
 void Recordings::watch_disk() {
   const std::scoped_lock lock(writing_);
-  const TimePoint now = std::chrono::steady_clock::now();
-  if (!running_ || now - looked_at_disk_ < kLookAtDiskEvery) return;
-  looked_at_disk_ = now;
+  if (!running_) return;
   try {
     check_room(std::filesystem::absolute(running_->file()).parent_path(), settings_);
   } catch (const RecordingError& error) {

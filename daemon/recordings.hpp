@@ -111,7 +111,6 @@ class Recordings {
   std::mutex writing_;  ///< of what follows
   std::unique_ptr<Recorder> running_;
   std::uint64_t missed_before_ = 0;  ///< as of its start
-  TimePoint looked_at_disk_{};
 
   mutable std::mutex told_;  ///< of what follows
   std::optional<Flight> flight_;
