@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "daemon/event_feed.hpp"
 #include "daemon/json_rpc.hpp"
+#include "daemon/owned_fd.hpp"
 #include "daemon/role.hpp"
 
 namespace wrenchd {
@@ -50,10 +52,17 @@ struct Caller {
 /// What a method answers.
 struct Answer {
   Json result;
-  int fd = -1;  ///< goes with the reply (SCM_RIGHTS), and stays open here; -1: none
+  int fd = -1;  ///< goes with the reply (SCM_RIGHTS); -1: none
+  std::shared_ptr<const OwnedFd> held;
 
   Answer(Json json) : result(std::move(json)) {}  // NOLINT: a result is an answer
+  /// A descriptor that stays open here.
   Answer(Json json, int descriptor) : result(std::move(json)), fd(descriptor) {}
+  /// One that is for whoever asked alone.
+  Answer(Json json, OwnedFd descriptor)
+      : result(std::move(json)),
+        fd(descriptor.get()),
+        held(std::make_shared<const OwnedFd>(std::move(descriptor))) {}
 };
 
 struct MethodRow {

@@ -74,23 +74,6 @@ void check_directory(const fs::path& directory) {
 
 }  // namespace
 
-OwnedFd& OwnedFd::operator=(OwnedFd&& other) noexcept {
-  if (this != &other) {
-    reset();
-    fd_ = other.release();
-  }
-  return *this;
-}
-
-int OwnedFd::release() noexcept {
-  return std::exchange(fd_, -1);
-}
-
-void OwnedFd::reset() noexcept {
-  if (fd_ >= 0) ::close(fd_);
-  fd_ = -1;
-}
-
 SocketPlace socket_place(const std::string& command_line, const ControlSettings& settings) {
   const std::pair<const char*, std::string> named[] = {{"--control", command_line},
                                                        {"WRENCHD_SOCKET", environment("WRENCHD_SOCKET")},

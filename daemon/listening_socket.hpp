@@ -8,27 +8,10 @@
 #include <sys/types.h>
 
 #include "config/settings.hpp"
+#include "daemon/owned_fd.hpp"
 #include "daemon/role.hpp"
 
 namespace wrenchd {
-
-/// A file descriptor that is closed with this.
-class OwnedFd {
- public:
-  OwnedFd() = default;
-  explicit OwnedFd(int fd) noexcept : fd_(fd) {}
-  OwnedFd(OwnedFd&& other) noexcept : fd_(other.release()) {}
-  OwnedFd& operator=(OwnedFd&& other) noexcept;
-  ~OwnedFd() { reset(); }
-
-  int get() const noexcept { return fd_; }
-  explicit operator bool() const noexcept { return fd_ >= 0; }
-  int release() noexcept;
-  void reset() noexcept;
-
- private:
-  int fd_ = -1;
-};
 
 /// Where the control socket is to be.
 struct SocketPlace {

@@ -29,6 +29,22 @@ Answer stop(Recordings& recordings) {
                                                   : "Nothing is recorded any more: " + failed + ".");
 }
 
+Json list(const Recordings& recordings) {
+  Json all = Json::array();
+  for (const RecordingFound& one : recordings.list())
+    all.push_back({{"name", one.name}, {"bytes", one.bytes}, {"written", stamp(one.changed)}});
+  return {{"directory", recordings.status().directory.string()}, {"recordings", all}};
+}
+
+Answer open(const Recordings& recordings, const Json& params) {
+  try {
+    const auto name = params["name"].get<std::string>();
+    return {Json{{"name", name}}, recordings.open(name)};
+  } catch (const RecordingError& error) {
+    throw RpcError(RpcCode::refused, error.what());
+  }
+}
+
 }  // namespace
 
 Json recording_json(const Recordings& recordings) {
@@ -71,6 +87,20 @@ void add_record_methods(MethodTable& table, Recordings& recordings) {
                 "itself; directory; flight_s: what the flight recorder holds; last_flight: its newest "
                 "file since the start; flights: how many.",
                 [&recordings](const Json&, const Caller&) { return Answer(recording_json(recordings)); }});
+  table.add(
+      MethodRow{"record.list",
+                Role::observer,
+                {},
+                "The recordings of the directory that record.status names, the oldest first: name, bytes, "
+                "and when they were written (UTC). What is being written is not among them.",
+                [&recordings](const Json&, const Caller&) { return Answer(list(recordings)); },
+                true});
+  table.add(MethodRow{"record.open",
+                      Role::observer,
+                      {{"name", ParamType::text, true, "as record.list names it"}},
+                      "Hands over the descriptor of a recording, to be read, beside the answer (SCM_RIGHTS).",
+                      [&recordings](const Json& params, const Caller&) { return open(recordings, params); },
+                      true});
 }
 
 }  // namespace wrenchd

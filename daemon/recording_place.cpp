@@ -4,7 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <tuple>
 #include <vector>
+
+#include <fcntl.h>
+#include <sys/stat.h>
 
 #include "config/calibration_store.hpp"
 #include "config/toml_file.hpp"
@@ -89,6 +93,34 @@ void check_room(const fs::path& directory, const RecordingSettings& settings) {
   throw RecordingError(directory.string() + ": " + std::to_string(static_cast<long>(left_MB)) +
                        " MB are left, and " + to_text(settings.keep_free_MB) +
                        " MB are to stay free; remove old recordings, or lower keep_free_MB in [recording]");
+}
+
+std::vector<RecordingFound> recordings_in(const fs::path& directory) {
+  std::vector<RecordingFound> found;
+  std::error_code error;
+  for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
+    struct stat status {};
+    const std::string name = at->path().filename().string();
+    if (!is_plain(name) || !name.ends_with(".h5")) continue;
+    if (::lstat(at->path().c_str(), &status) != 0 || !S_ISREG(status.st_mode)) continue;
+    found.push_back({name, static_cast<std::uint64_t>(status.st_size), status.st_mtime});
+  }
+  std::sort(found.begin(), found.end(), [](const RecordingFound& a, const RecordingFound& b) {
+    return std::tie(a.changed, a.name) < std::tie(b.changed, b.name);
+  });
+  return found;
+}
+
+OwnedFd open_recording(const fs::path& directory, const std::string& name) {
+  const fs::path file = place_of(name, directory, false);
+  // What somebody may have put there in a file's place is not followed, nor waited for.
+  OwnedFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat status {};
+  if (fd && ::fstat(fd.get(), &status) == 0 && S_ISREG(status.st_mode)) return fd;
+  std::string there;
+  for (const RecordingFound& one : recordings_in(directory)) there += (there.empty() ? "" : ", ") + one.name;
+  throw RecordingError(file.string() +
+                       ": is no recording that can be read; there are: " + (there.empty() ? "none" : there));
 }
 
 fs::path flight_file(const fs::path& directory, std::time_t utc, std::string_view fault) {

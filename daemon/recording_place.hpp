@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <ctime>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "config/settings.hpp"
+#include "daemon/owned_fd.hpp"
 #include "daemon/recording_file.hpp"
 
 namespace wrenchd {
@@ -31,6 +34,17 @@ std::filesystem::path place_of(const std::string& asked, const std::filesystem::
 double free_MB(const std::filesystem::path& directory);
 /// Throws RecordingError where there is less room than the settings keep free.
 void check_room(const std::filesystem::path& directory, const RecordingSettings& settings);
+
+/// A recording that is there.
+struct RecordingFound {
+  std::string name;  ///< "run.h5"
+  std::uint64_t bytes;
+  std::time_t changed;  ///< when it was last written to
+};
+/// Those of a directory, the oldest first. None where there is no such directory.
+std::vector<RecordingFound> recordings_in(const std::filesystem::path& directory);
+/// One of them, to be read. Throws RecordingError.
+OwnedFd open_recording(const std::filesystem::path& directory, const std::string& name);
 
 /// A name for the flight recorder's file, "flight-20261122T141501Z-overspeed.h5", that is not taken.
 std::filesystem::path flight_file(const std::filesystem::path& directory, std::time_t utc,

@@ -153,6 +153,26 @@ Recordings::Status Recordings::status() const {
   return status_;
 }
 
+bool Recordings::is_being_written(const std::filesystem::path& file) const {
+  const std::scoped_lock told(told_);
+  return (status_.running && status_.running->file == file) || (flight_ && flight_->file == file);
+}
+
+std::vector<RecordingFound> Recordings::list() const {
+  std::vector<RecordingFound> found = recordings_in(directory_);
+  std::erase_if(found, [this](const RecordingFound& one) { return is_being_written(directory_ / one.name); });
+  return found;
+}
+
+OwnedFd Recordings::open(const std::string& name) const {
+  const std::filesystem::path file = place_of(name, directory_, false);
+  if (is_being_written(file))
+    throw RecordingError(file.string() +
+                         ": is being written; 'record.stop' ends a recording, and a flight is "
+                         "complete when its event says so");
+  return open_recording(directory_, name);
+}
+
 /// With writing_ held.
 void Recordings::publish() {
   const std::scoped_lock told(told_);

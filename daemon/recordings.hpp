@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "config/settings.hpp"
 #include "core/clock.hpp"
@@ -16,6 +17,7 @@
 #include "daemon/event_feed.hpp"
 #include "daemon/record_history.hpp"
 #include "daemon/recorder.hpp"
+#include "daemon/recording_place.hpp"
 
 namespace wrenchd {
 
@@ -58,6 +60,11 @@ class Recordings {
   /// Writes the rest and closes it. Nothing: none was written.
   std::optional<Written> stop();
 
+  /// What is in directory(), the oldest first; those that are being written are not.
+  std::vector<RecordingFound> list() const;
+  /// One of them, to be read. Throws RecordingError, also for one that is being written.
+  OwnedFd open(const std::string& name) const;
+
   struct Status {
     std::optional<Written> running;  ///< so far
     std::string failed;              ///< why the last one ended by itself; empty: it did not
@@ -93,6 +100,7 @@ class Recordings {
   void end_flight(const std::string& why);
   std::string keep(Fault fault, TimePoint at);
   void publish();
+  bool is_being_written(const std::filesystem::path& file) const;
 
   Station& station_;
   EventFeed& feed_;

@@ -65,6 +65,7 @@ class ShapesKept {
     result["X_WB"] = pose_json(shown.X_WB);
     result["X_HT"] = pose_json(shown.X_HT);
     result["wrench_about"] = shown.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
+    result["view"] = view_json(shown.view);
     return {std::move(result), shapes_->descriptor()};
   }
 

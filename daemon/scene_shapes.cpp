@@ -52,6 +52,12 @@ bool same(const TriangleMesh& a, const TriangleMesh& b) {
 
 }  // namespace
 
+Json view_json(const ViewSettings& view) {
+  if (view.eye_m == view.target_m) return nullptr;
+  return {{"eye_m", {view.eye_m.x(), view.eye_m.y(), view.eye_m.z()}},
+          {"target_m", {view.target_m.x(), view.target_m.y(), view.target_m.z()}}};
+}
+
 Json pose_json(const Pose& X) {
   const Vector3d& p = X.translation_m;
   const Quaterniond& q = X.rotation;

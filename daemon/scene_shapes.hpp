@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "collision/scene.hpp"
+#include "config/settings.hpp"
 #include "daemon/json_rpc.hpp"
 
 namespace wrenchd {
@@ -48,6 +49,9 @@ class SceneShapes {
   int descriptor_ = -1;
   std::byte* memory_ = nullptr;
 };
+
+/// {eye_m, target_m}, or null where nobody has said from where a scene is seen best.
+Json view_json(const ViewSettings& view);
 
 /// A pose as records have it: x y z [m], qx qy qz qw.
 Json pose_json(const Pose& X);

@@ -65,6 +65,8 @@ constexpr std::array kKeys = {
     WRENCHD_KEY("limits.force_slew_N_per_s", limits, limits.force_slew_N_per_s),
     WRENCHD_KEY("limits.torque_slew_Nm_per_s", limits, limits.torque_slew_Nm_per_s),
     WRENCHD_KEY("limits.soft_start_s", limits, limits.soft_start_s),
+    WRENCHD_KEY("view.eye_m", at_once, view.eye_m),
+    WRENCHD_KEY("view.target_m", at_once, view.target_m),
     WRENCHD_KEY("simulation.hand_script", restart, simulation.hand_script),
     WRENCHD_KEY("simulation.hand_script (what it says)", restart, simulation.hand_path),
     WRENCHD_KEY("simulation.hand_stiffness_N_per_m", restart, simulation.hand_stiffness_N_per_m),

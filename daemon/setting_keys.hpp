@@ -12,6 +12,7 @@ namespace wrenchd {
 struct SettingKey {
   enum class Takes : std::uint8_t {
     rendering,  ///< another rendering, which takes the place of the last without a jump
+    at_once,    ///< nothing: it is for whoever asks
     limits,     ///< where it is tighter, nothing; where it is looser, a loop that is disarmed
     restart,    ///< what it is for is built once
   };

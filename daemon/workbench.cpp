@@ -333,7 +333,7 @@ ReloadResult Workbench::reload(const std::function<Plan()>& read) {
         continue;
       }
       limits_changed = true;
-    } else {
+    } else if (key.takes == SettingKey::Takes::rendering) {
       needs_rendering = true;
     }
     settings = wanted;
@@ -395,12 +395,15 @@ Workbench::Shown Workbench::shown() {
     return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
   };
   const DeviceSettings& device = plan_.settings.device;
+  // The view is of the scene that the configuration names: of one that a client has loaded nobody has said.
+  const bool configured = plan_.settings.scene == configured_.scene;
   return {scene_,
           number_,
           seen.at - from_seconds(seen.scene_time_s),
           pose_of(device.base_in_world),
           pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
-          plan_.profile.wrench_point};
+          plan_.profile.wrench_point,
+          configured ? plan_.settings.view : ViewSettings{}};
 }
 
 }  // namespace wrenchd

@@ -94,6 +94,7 @@ class Workbench {
     Pose X_WB;                    ///< device base in the world
     Pose X_HT;                    ///< tool body in the handle
     WrenchPoint wrench_point;     ///< what the wrenches in records are about
+    ViewSettings view;            ///< from where it is seen best
   };
   Shown shown();
 

@@ -3,6 +3,8 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include <catch2/catch.hpp>
@@ -53,6 +55,11 @@ bool is_gapless(const Recording& recording) {
   return true;
 }
 
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
 /// What Debian's Python says; its own, for it is the one with Debian's h5py.
 int run_python(const std::string& arguments, std::string& out) {
   FILE* const pipe = popen(("/usr/bin/python3 -W error " + arguments + " 2>&1").c_str(), "r");
@@ -89,6 +96,31 @@ TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Py
   CHECK(run_python(WRENCHD_SOURCE_DIR "/tests/python/check_recording.py " + file.string(), said) == 0);
   INFO(said);
   CHECK(said.find(" ticks, ") != std::string::npos);
+
+  // Whoever may not read the daemon's files is handed them.
+  CHECK(daemon.ctl({"record", "list"}).out.starts_with("mine.h5 "));
+  const auto copy = daemon.files.path() / "copy.h5";
+  CHECK(daemon.ctl({"record", "get", "mine", "-o", copy.string()}).out == copy.string() + "\n");
+  CHECK(bytes_of(copy) == bytes_of(file));
+  CHECK(bytes_of(copy).size() > 10'000);
+  const auto script = daemon.files.write("rows.py", R"(import sys
+sys.path.insert(0, sys.argv[1])
+import h5py, wrenchd
+with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as file, h5py.File(file) as recording:
+    print(len(recording["ticks"]))
+)");
+  std::string rows;
+  CHECK(run_python(script.string() + " " WRENCHD_SOURCE_DIR "/tools/python " + daemon.socket, rows) == 0);
+  CHECK(rows == std::to_string(read_recording(file).ticks.size()) + "\n");
+  CHECK(daemon.ctl({"record", "get", "yours"}).err.find("there are: mine.h5") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no name for a recording") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get"}).err.find("record list") != std::string::npos);
+  CHECK(daemon.ctl({"record", "list", "-o", "x"}).err.find("takes no -o") != std::string::npos);
+  CHECK(daemon.ctl({"record", "start", "next"}).exit_code == 0);
+  CHECK(daemon.ctl({"record", "list"}).out.find("next") == std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "next"}).err.find("is being written") != std::string::npos);
+  CHECK(daemon.ctl({"record", "stop"}).exit_code == 0);
+  CHECK(daemon.ctl({"record", "list"}).out.find("\nnext.h5 ") != std::string::npos);
 
   // An administrator may name a place, as it is from here.
   const auto elsewhere = daemon.files.path() / "elsewhere.h5";

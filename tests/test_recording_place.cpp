@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <chrono>
 #include <cstdlib>
+#include <ctime>
 
 #include <catch2/catch.hpp>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "daemon/recording_place.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -41,6 +46,36 @@ TEST_CASE("a recording is named by a plain name, or by an administrator's path",
   }
   CHECK_THROWS_WITH(place_of("../x", there, true), Contains("give an absolute path"));
   CHECK_THROWS_AS(place_of(std::string(101, 'a'), there, false), RecordingError);
+}
+
+TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]") {
+  const TemporaryDirectory files;
+  CHECK(recordings_in(files.path() / "none").empty());
+  files.write("there/b.h5", "of b");
+  files.write("there/a.h5", "of a");
+  files.write("there/notes.txt", "x");
+  files.write("secret.h5", "secret");
+  const auto there = files.path() / "there";
+  std::filesystem::create_symlink(files.path() / "secret.h5", there / "link.h5");
+  std::filesystem::create_directory(there / "directory.h5");
+  REQUIRE(::mkfifo((there / "pipe.h5").c_str(), 0600) == 0);
+  std::filesystem::last_write_time(there / "b.h5",
+                                   std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  const auto found = recordings_in(there);
+  REQUIRE(found.size() == 2);
+  CHECK(found[0].name == "b.h5");  // the older one
+  CHECK(found[1].name == "a.h5");
+  CHECK(found[0].bytes == 4);
+  CHECK(std::time(nullptr) - found[0].changed >= 3590);
+  const OwnedFd open = open_recording(there, "a");
+  std::array<char, 8> text{};
+  CHECK(::read(open.get(), text.data(), text.size()) == 4);
+  CHECK(std::string(text.data()) == "of a");
+  CHECK(::write(open.get(), "x", 1) == -1);
+  for (const char* name : {"link", "directory", "pipe", "c"})
+    CHECK_THROWS_WITH(open_recording(there, name), Contains("there are: b.h5, a.h5"));
+  for (const char* name : {"../secret", "/etc/passwd", ""})
+    CHECK_THROWS_WITH(open_recording(there, name), Contains("no name for a recording"));
 }
 
 TEST_CASE("recordings go where the settings say, else where the system keeps state", "[recording]") {

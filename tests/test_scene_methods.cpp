@@ -14,11 +14,11 @@ namespace {
 using namespace test;
 
 struct Asked {
-  VirtualStation s{shipped_plan()};
+  VirtualStation s;
   MethodTable table;
   int reloads = 0;
 
-  Asked() {
+  explicit Asked(const Plan& plan = shipped_plan()) : s(plan) {
     add_scene_methods(table, s.station.workbench(), [this] {
       ++reloads;
       return ReloadResult{{"limits"}, {"servo.rate_Hz"}, {}};
@@ -85,6 +85,17 @@ TEST_CASE("a scene file is looked for, and taken whole", "[scene_methods]") {
   CHECK(none.code() == RpcCode::refused);
   has(none, "scenes/no_such.toml");
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
+}
+
+TEST_CASE("the scene is told with the place from where it is seen best, one that a client loads with none",
+          "[scene_methods][view]") {
+  Plan plan = shipped_plan();
+  plan.settings.view = {{0.1, -0.2, 0.3}, {0.0, 0.0, 0.05}};
+  const Asked a(plan);
+  CHECK(a.ask("scene.shapes")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
+  a.ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
+  CHECK(a.ask("scene.shapes")["view"].is_null());
+  CHECK(Asked().ask("scene.shapes")["view"].is_null());
 }
 
 TEST_CASE("what a scene cannot be is refused with its place, and nothing changes", "[scene_methods]") {

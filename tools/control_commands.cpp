@@ -2,18 +2,24 @@
 #include "tools/control_commands.hpp"
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
+#include <unistd.h>
 #include <wrenchd/client.hpp>
 
 #include "daemon/json_rpc.hpp"
+#include "daemon/owned_fd.hpp"
+#include "tools/output_file.hpp"
 
 namespace wrenchd {
 namespace {
@@ -180,9 +186,46 @@ void run_request(const std::string& method, const ControlOptions& options) {
   print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
 }
 
+void list_recordings(const ControlOptions& options) {
+  Client client(options.socket, kAnswerWithin);
+  const Json result = call(client, "record.list");
+  if (options.json) return print(pretty(result));
+  for (const Json& one : result["recordings"])
+    print(fmt::format("{:<48} {:>10.1f} MB  {}\n", one["name"].get<std::string>(),
+                      1e-6 * one["bytes"].get<double>(), one["written"].get<std::string>()));
+  if (result["recordings"].empty())
+    print("no recordings in " + result["directory"].get<std::string>() + "\n");
+}
+
+/// The daemon's files are its own: it hands over a descriptor, from which a copy is made.
+void get_recording(const ControlOptions& options) {
+  if (options.file.empty())
+    throw std::runtime_error("record get: which one? `wrenchctl record list` names them");
+  Client client(options.socket, kAnswerWithin);
+  int received = -1;
+  client.call("record.open", Json{{"name", options.file}}.dump(), received);
+  const OwnedFd recording(received);
+  const std::string name = options.file.ends_with(".h5") ? options.file : options.file + ".h5";
+  const std::string output = options.output.empty() ? name : options.output;
+  write_output(output, [&recording, &name](std::ostream& out) {
+    std::vector<char> piece(1 << 20);
+    for (;;) {
+      const ssize_t got = ::read(recording.get(), piece.data(), piece.size());
+      if (got == 0 || !out) return;
+      if (got < 0) throw std::runtime_error(name + ": cannot be read: " + std::strerror(errno));
+      out.write(piece.data(), got);
+    }
+  });
+  if (output != "-") print(output + "\n");
+}
+
 void run_record(const ControlOptions& options) {
-  if (!options.file.empty() && options.method != "start")
-    throw std::runtime_error("record " + options.method + ": takes no file; only start does");
+  if (!options.file.empty() && options.method != "start" && options.method != "get")
+    throw std::runtime_error("record " + options.method + ": takes no file; only start and get do");
+  if (!options.output.empty() && options.method != "get")
+    throw std::runtime_error("record " + options.method + ": takes no -o; only get does");
+  if (options.method == "list") return list_recordings(options);
+  if (options.method == "get") return get_recording(options);
   Json params = Json::object();
   if (!options.file.empty()) {  // a path is meant from here, and the daemon is elsewhere
     const bool is_name = options.file.find('/') == std::string::npos;

@@ -15,11 +15,12 @@ struct ControlOptions {
   std::vector<std::string> events;
   std::string method;
   std::string file;
+  std::string output;
   bool from_other = false;
 };
 
-// What `wrenchctl` does with a daemon that runs. Each prints to standard output, and throws what RpcError and
-// ControlClient throw.
+// What `wrenchctl` does with a daemon that runs. Each prints to standard output, and throws what Client
+// throws.
 
 void run_status(const ControlOptions& options);
 /// Prints events until the daemon ends, or a signal comes.
@@ -29,7 +30,7 @@ void run_watch(const ControlOptions& options);
 int run_arm(const ControlOptions& options);
 /// One request without parameters, and what follows from it.
 void run_request(const std::string& method, const ControlOptions& options);
-/// options.method: start, stop or status.
+/// options.method: start, stop, status, list or get.
 void run_record(const ControlOptions& options);
 void run_describe(const ControlOptions& options);
 

@@ -11,15 +11,17 @@
 namespace wrenchd {
 namespace {
 
+using Write = std::function<void(std::ostream&)>;
+
 /// A file is written whole or not at all: beside its place first, then put there. A symbolic link keeps
 /// pointing.
-bool replace_file(const std::filesystem::path& file, const std::string& text) {
+bool replace_file(const std::filesystem::path& file, const Write& write) {
   std::error_code error;
   const auto place =
       std::filesystem::is_symlink(file, error) ? std::filesystem::weakly_canonical(file, error) : file;
   const std::filesystem::path beside = place.string() + "." + std::to_string(getpid()) + ".part";
   std::ofstream out(beside, std::ios::binary);
-  out << text;
+  write(out);
   out.close();
   if (out) std::filesystem::rename(beside, place, error);
   if (out && !error) return true;
@@ -28,9 +30,9 @@ bool replace_file(const std::filesystem::path& file, const std::string& text) {
 }
 
 /// A pipe, a terminal or /dev/null cannot be replaced, only written to.
-bool write_into(const std::filesystem::path& file, const std::string& text) {
+bool write_into(const std::filesystem::path& file, const Write& write) {
   std::ofstream out(file, std::ios::binary);
-  out << text;
+  write(out);
   out.close();
   return !out.fail();
 }
@@ -38,14 +40,15 @@ bool write_into(const std::filesystem::path& file, const std::string& text) {
 }  // namespace
 
 void write_output(const std::string& name, const std::string& text) {
-  if (name == "-") {
-    std::cout << text;
-    return;
-  }
+  write_output(name, [&text](std::ostream& out) { out << text; });
+}
+
+void write_output(const std::string& name, const std::function<void(std::ostream&)>& write) {
+  if (name == "-") return write(std::cout);
   std::error_code ignored;
   const auto status = std::filesystem::status(name, ignored);
   const bool replaceable = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
-  if (!(replaceable ? replace_file(name, text) : write_into(name, text)))
+  if (!(replaceable ? replace_file(name, write) : write_into(name, write)))
     throw std::runtime_error(
         name + ": cannot be written; name a file in a directory that exists and may be written to");
 }

@@ -649,16 +649,20 @@ void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   add("describe", "What can be asked of it, by whom; and its events", [&] {
     run_describe(options);
   })->add_option("method", options.method, "one method");
-  CLI::App* record = add("record", "Begins or ends a recording of every tick, or says what is recorded",
+  CLI::App* record = add("record",
+                         "Begins or ends a recording of every tick, says what is recorded, lists\n"
+                         "recordings and fetches them",
                          [&] { run_record(options); });
-  record->add_option("what", options.method, "start, stop or status")
+  record->add_option("what", options.method, "start, stop, status, list or get")
       ->required()
-      ->check(CLI::IsMember({"start", "stop", "status"}));
+      ->check(CLI::IsMember({"start", "stop", "status", "list", "get"}));
   record
       ->add_option(
           "file", options.file,
           "for start: a name, for the daemon's own directory; or, for administrators, a path. Without\n"
-          "it a name of the time")
+          "it a name of the time. For get: a name of the list")
+      ->check(not_empty());
+  record->add_option("-o,--output", options.output, "for get: where to; without it the same name here")
       ->check(not_empty());
   for (const auto& [name, what] : {std::pair{"disarm", "The force fades, whoever armed"},
                                    std::pair{"stop", "Emergency stop; anybody may"},

@@ -119,6 +119,7 @@ void LiveFeed::read(Client& client, StateReader& reader, const std::stop_token& 
     ClientEvent event;
     while (client.poll_event(event, 0ms)) {
       news = news || event.name != "log";
+      if (event.name == "reload") ++reloads_;
       const std::scoped_lock lock(mutex_);
       if (events_.size() < kMostEvents) events_.push_back(event.json);
     }
@@ -138,14 +139,17 @@ void LiveFeed::ask_status(Client& client) {
   ++link_.told;
 }
 
-/// The scene is fetched with each connection, and whenever the ticks are of another rendering.
+/// The scene is fetched with each connection, whenever the ticks are of another rendering, and after a
+/// reload, which may have changed from where it is looked at.
 void LiveFeed::follow_scene(const std::stop_token& stop) {
   std::uint64_t of_connection = 0;
-  std::uint32_t of_rendering = 0;
+  std::uint32_t of_rendering = 0, of_reload = 0;
   for (; !stop.stop_requested(); std::this_thread::sleep_for(30ms)) {
     const std::uint64_t connection = connection_.load();
     const std::uint32_t rendering = rendering_.load();
-    if (connection == 0 || (connection == of_connection && rendering == of_rendering)) continue;
+    const std::uint32_t reload = reloads_.load();
+    if (connection == 0 || (connection == of_connection && rendering == of_rendering && reload == of_reload))
+      continue;
     try {
       if (connection != of_connection) {
         const std::scoped_lock lock(mutex_);
@@ -155,6 +159,7 @@ void LiveFeed::follow_scene(const std::stop_token& stop) {
       fetch_scene(client);
       of_connection = connection;
       of_rendering = rendering;
+      of_reload = reload;
     } catch (const std::exception& error) {
       {
         const std::scoped_lock lock(mutex_);

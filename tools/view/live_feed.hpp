@@ -79,6 +79,7 @@ class LiveFeed {
   std::string socket_;
   std::atomic<bool> watched_{false};
   std::atomic<std::uint32_t> rendering_{0};
+  std::atomic<std::uint32_t> reloads_{0};     ///< that were told
   std::atomic<std::uint64_t> connection_{0};  ///< 0: none
 
   mutable std::mutex mutex_;  ///< of what follows

@@ -55,10 +55,7 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const Plan
   description["X_WB"] = pose_json(pose_of(device.base_in_world));
   description["X_HT"] = pose_json(pose_of(device.tool_in_handle) * scene->tool().X_MT());
   description["wrench_about"] = plan.profile.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
-  const ViewSettings& view = plan.settings.view;
-  if (view.eye_m != view.target_m)
-    description["view"] = {{"eye_m", {view.eye_m.x(), view.eye_m.y(), view.eye_m.z()}},
-                           {"target_m", {view.target_m.x(), view.target_m.y(), view.target_m.z()}}};
+  description["view"] = view_json(plan.settings.view);
   return std::make_shared<const ViewScene>(description, shapes.bytes());
 }
 

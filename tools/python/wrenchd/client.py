@@ -121,6 +121,13 @@ class Client:
             raise ProtocolError("wrenchd handed no shared memory over; see its log")
         return State(answer["layout"], descriptor, self.is_there)
 
+    def open_recording(self, name):
+        """A recording of the daemon's (call("record.list")), as a file to read: h5py.File(client.open_recording(...))."""
+        _, descriptor = self._call("record.open", {"name": name}, True)
+        if descriptor is None:
+            raise ProtocolError("wrenchd handed no recording over; see its log")
+        return os.fdopen(descriptor, "rb")
+
     # Events
 
     def subscribe(self, *names):

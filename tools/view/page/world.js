@@ -159,7 +159,9 @@ export class World {
 
   /** Which mesh is whose. */
   show({ tool, obstacles, view }) {
+    const elsewhere = JSON.stringify(view) !== JSON.stringify(this.view);
     this.view = view;
+    this.told = (this.told ?? 0) + 1;
     this.bodies.clear();
     const radius = this.meshes.get(tool.mesh).surface.boundingSphere.radius;
     this.size = radius;
@@ -174,7 +176,8 @@ export class World {
       this.bodies.add(body);
       return body;
     });
-    this.fitted = false;
+    // Who has turned the scene keeps his place when something in it changes.
+    if (elsewhere || !this.touched) this.fitted = false;
     this.changed = true;
   }
 
@@ -259,12 +262,14 @@ export class World {
       this.camera.position.set(...this.view.eye_m);
       centre.set(...this.view.target_m);
     }
-    this.camera.near = distance / 200;
-    this.camera.far = distance * 60;
+    const chosen = this.camera.position.distanceTo(centre);
+    this.camera.near = Math.min(chosen, distance) / 200;
+    this.camera.far = Math.max(chosen, distance) * 60;
     this.camera.updateProjectionMatrix();
     this.controls.target.copy(centre);
     this.controls.update();
     this.fitted = true;
+    this.touched = false;
     this.changed = true;
   }
 
@@ -301,6 +306,9 @@ export class World {
       obstacles: this.obstacles.map(pose),
       contacts: this.contacts.filter(({ point }) => point.visible).map(({ point }) => point.position.toArray()),
       force: this.force.visible ? new THREE.Vector3(0, 1, 0).applyQuaternion(this.force.quaternion).toArray() : null,
+      told: this.told,
+      eye: this.camera.position.toArray(),
+      target: this.controls.target.toArray(),
       triangles: this.renderer.info.render.triangles,
       drawn: this.drawn ?? 0,
     };
