@@ -427,8 +427,8 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
                station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
                station.scene().obstacle_count(), settings.servo.rate_Hz);
   LiveView view(options.live, station.plan().profile);
-  const TimePoint start = clock.now();
   Fault fault = Fault::none;
+  double ran_s = 0.0;
   {
     EventFeed feed(station.loop());
     Recordings recordings(station, feed, clock,
@@ -436,9 +436,11 @@ Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
     if (!settings.recording.file.empty()) recordings.start_file(settings.recording.file);
     const auto control = open_control(station, feed, recordings, options);
     const Reloader reloader(station, feed, options);
+    const TimePoint start = clock.now();
     fault = run_it(station, recordings, view);
+    ran_s = seconds(clock.now() - start);
   }
-  view.close(station.loop(), seconds(clock.now() - start));
+  view.close(station.loop(), ran_s);
   the_loop = nullptr;
   return fault;
 }
