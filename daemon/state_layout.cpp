@@ -31,7 +31,7 @@ json described(std::span<const RecordField> fields, std::size_t base) {
 
 }  // namespace
 
-json state_layout(const SharedState& state, const Scene& scene) {
+json state_layout(const SharedState& state, const Workbench::ObstacleNames& obstacles) {
   json fields = described(tick_fields(), offsetof(StateRecord, tick));
   fields.push_back(
       {{"name", "touch_count"},
@@ -41,8 +41,6 @@ json state_layout(const SharedState& state, const Scene& scene) {
        {"unit", "1"},
        {"frame", ""},
        {"doc", "contacts told of in this record, those that carry most; `contacts` counts all"}});
-  json obstacles = json::array();
-  for (std::uint32_t i = 0; i < scene.obstacle_count(); ++i) obstacles.push_back(obstacle_name(scene, i));
   return {{"version", SharedState::kVersion},
           {"magic", std::string(SharedState::kMagic.begin(), SharedState::kMagic.end())},
           {"bytes", state.bytes()},
@@ -60,11 +58,13 @@ json state_layout(const SharedState& state, const Scene& scene) {
             {"bytes", sizeof(Touch)},
             {"most", kMostTouches},
             {"fields", described(touch_fields(), 0)}}},
-          {"obstacles", obstacles}};
+          {"obstacles", obstacles.names},
+          {"rendering", obstacles.rendering}};
 }
 
-void open_state(const SharedState& state, const Scene& scene, const SendWithDescriptor& send) {
-  send({{"layout", state_layout(state, scene)}}, state.descriptor());
+void open_state(const SharedState& state, const Workbench::ObstacleNames& obstacles,
+                const SendWithDescriptor& send) {
+  send({{"layout", state_layout(state, obstacles)}}, state.descriptor());
 }
 
 }  // namespace wrenchd

@@ -5,20 +5,21 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "collision/scene.hpp"
 #include "daemon/shared_state.hpp"
+#include "daemon/workbench.hpp"
 
 namespace wrenchd {
 
 /// What a program has to know to read the shared memory: every field with its place, type, unit, frame,
-/// names of its values and meaning. The obstacles' names are those of the scene at that moment. Not RT safe.
-nlohmann::json state_layout(const SharedState& state, const Scene& scene);
+/// names of its values and meaning. The obstacles' names are those of one rendering. Not RT safe.
+nlohmann::json state_layout(const SharedState& state, const Workbench::ObstacleNames& obstacles);
 
 /// Sends a reply with a file descriptor beside it.
 using SendWithDescriptor = std::function<void(const nlohmann::json& result, int descriptor)>;
 
 /// The method `state.open`: answers {"layout": ...} with the memory's descriptor as ancillary data
 /// (SCM_RIGHTS) of that line's first byte. Not RT safe.
-void open_state(const SharedState& state, const Scene& scene, const SendWithDescriptor& send);
+void open_state(const SharedState& state, const Workbench::ObstacleNames& obstacles,
+                const SendWithDescriptor& send);
 
 }  // namespace wrenchd

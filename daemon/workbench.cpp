@@ -8,6 +8,7 @@
 #include <sstream>
 #include <thread>
 
+#include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
 #include "core/finite.hpp"
@@ -66,6 +67,12 @@ double least_time_s(const ObstacleMotion& motion) {
                   motion.angular_rad_per_s.norm() / ObstacleMotion::kMaxAngularSpeed_rad_per_s);
 }
 
+std::vector<std::string> names_of(const Scene& scene) {
+  std::vector<std::string> names;
+  for (std::uint32_t i = 0; i < scene.obstacle_count(); ++i) names.push_back(obstacle_name(scene, i));
+  return names;
+}
+
 double value_of(const Settings& settings, const char* name) {
   const LimitSettings& limits = settings.limits;
   const std::string_view key(name);
@@ -87,7 +94,8 @@ Workbench::Workbench(Plan plan, std::shared_ptr<const Scene> scene, ServoLoop& l
       scene_(std::move(scene)),
       loop_(loop),
       place_in_(place_in),
-      loader_(std::move(loader)) {}
+      loader_(std::move(loader)),
+      names_{0, names_of(*scene_)} {}
 
 /// By which it is seen that one of its files was written since.
 std::string Workbench::files_text(const SceneSettings& scene) const {
@@ -127,6 +135,10 @@ void Workbench::hand_over(std::unique_ptr<Rendering> rendering, const Settings& 
   scene_ = std::move(built);
   number_ = rendering->number();
   sum_ = rendering->sum();
+  {
+    const std::lock_guard told(told_);
+    names_ = {number_, names_of(*scene_)};
+  }
   loop_.exchange().offer(std::move(rendering));
 }
 
@@ -386,6 +398,11 @@ WorkspaceWish Workbench::workspace() const {
 Workbench::HandedOver Workbench::handed_over() const {
   const std::lock_guard lock(mutex_);
   return {number_, sum_};
+}
+
+Workbench::ObstacleNames Workbench::obstacle_names() const {
+  const std::lock_guard told(told_);
+  return names_;
 }
 
 Workbench::Shown Workbench::shown() {

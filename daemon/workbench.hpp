@@ -98,6 +98,14 @@ class Workbench {
   };
   Shown shown();
 
+  /// Names of the obstacles, by their numbers.
+  struct ObstacleNames {
+    std::uint32_t rendering;  ///< number of the one they are of
+    std::vector<std::string> names;
+  };
+  /// Waits for no change that is under way.
+  ObstacleNames obstacle_names() const;
+
   static constexpr double kSetsOutAfter_s = 0.200;
 
  private:
@@ -125,6 +133,9 @@ class Workbench {
   std::uint64_t sum_ = 0;
   WorkspaceWish workspace_;
   LocalModelSet models_;
+
+  mutable std::mutex told_;  ///< of what is told while a change is under way
+  ObstacleNames names_;
 };
 
 }  // namespace wrenchd

@@ -25,14 +25,12 @@ using namespace wrenchd::test;
 
 namespace {
 
-Scene table_scene() {
-  return Scene(shipped_plan().scene);
-}
+const Workbench::ObstacleNames kTable{3, {"table"}};
 
-StateReader reader_of(const SharedState& state, const Scene& scene) {
+StateReader reader_of(const SharedState& state, const Workbench::ObstacleNames& obstacles = kTable) {
   std::string layout;
   int descriptor = -1;
-  open_state(state, scene, [&](const nlohmann::json& result, int handed_over) {
+  open_state(state, obstacles, [&](const nlohmann::json& result, int handed_over) {
     layout = result.at("layout").dump();
     descriptor = fcntl(handed_over, F_DUPFD_CLOEXEC, 0);
   });
@@ -91,11 +89,10 @@ bool whole(const TickState& state) {
 }  // namespace
 
 TEST_CASE("what is written is read, every field, in order, each once", "[shared_state]") {
-  const Scene scene = table_scene();
   SharedState state(100.0);
   REQUIRE(state.slots() == 256);
   state.write(record_of(999), {});
-  StateReader reader = reader_of(state, scene);
+  StateReader reader = reader_of(state);
   TickState tick;
   CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));  // what was there before is not the next
   REQUIRE(reader.latest(tick));
@@ -114,10 +111,9 @@ TEST_CASE("what is written is read, every field, in order, each once", "[shared_
 TEST_CASE(
     "a reader that slept for two seconds of ticks has missed none; one that slept longer is told how many",
     "[shared_state]") {
-  const Scene scene = table_scene();
   SharedState state(4000.0);
   REQUIRE(state.slots() >= 8000);
-  StateReader reader = reader_of(state, scene);
+  StateReader reader = reader_of(state);
   TickState tick;
   std::uint64_t written = 0;
   for (; written < 8000; ++written) state.write(record_of(written), {});
@@ -138,14 +134,13 @@ TEST_CASE(
 
 TEST_CASE("readers beside a writer at full speed never see a torn record, however often they are overrun",
           "[shared_state]") {
-  const Scene scene = table_scene();
   SharedState state(4.0);  // 8 records: overrun all the time
   std::atomic<bool> stop{false};
   std::array<std::uint64_t, 2> seen{}, torn{}, back{}, missed{};
   std::vector<std::thread> readers;
   for (std::size_t r = 0; r < 2; ++r)
     readers.emplace_back([&, r] {
-      StateReader reader = reader_of(state, scene);
+      StateReader reader = reader_of(state);
       TickState tick;
       std::uint64_t last = 0;
       while (!stop.load()) {
@@ -210,7 +205,7 @@ TEST_CASE("writing neither allocates nor locks, and touches no page for the firs
 
 TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][servo]") {
   VirtualStation s;
-  StateReader reader = reader_of(s.station.show_state(), s.station.scene());
+  StateReader reader = reader_of(s.station.show_state(), s.station.workbench().obstacle_names());
   s.station.loop().arm();
   TickState tick;
   for (int i = 0; i < 2400; ++i) {
@@ -245,7 +240,7 @@ TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][
 TEST_CASE("the layout describes every field, within a line of the protocol", "[shared_state]") {
   SharedState state(8000.0);
   CHECK(state.slots() >= 16'000);
-  const nlohmann::json layout = state_layout(state, table_scene());
+  const nlohmann::json layout = state_layout(state, kTable);
   CHECK(layout.dump().size() < 32 * 1024);
   for (const nlohmann::json& list : {layout["fields"], layout["touches"]["fields"]})
     for (const nlohmann::json& field : list) {
@@ -258,11 +253,50 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
           for (const std::string name : field[names]) CHECK((!name.empty() && name != "unknown"));
     }
   CHECK(layout["obstacles"] == nlohmann::json({"table"}));
+  CHECK(layout["rendering"] == 3);
+}
+
+TEST_CASE(
+    "contacts have the names of their own rendering's obstacles, and the daemon is asked once a rendering",
+    "[shared_state]") {
+  SharedState state(4.0);
+  int asked = 0;
+  std::string answer = R"({"rendering": 4, "obstacles": ["bolt"]})";
+  StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
+                     [&] {
+                       ++asked;
+                       if (answer.empty()) throw ClientError(ClientError::kGone, "gone");
+                       return answer;
+                     });
+  const auto touched_in = [&](std::uint32_t rendering) {
+    TickRecord record;
+    record.rendering = rendering;
+    Touches touches;
+    touches.add(Touch{});
+    state.write(record, touches);
+    TickState tick;
+    REQUIRE(reader.latest(tick));
+    return tick.touches().at(0).obstacle;
+  };
+  CHECK(touched_in(3) == "table");
+  CHECK(asked == 0);
+  CHECK(touched_in(4) == "bolt");
+  CHECK(touched_in(4) == "bolt");
+  CHECK(touched_in(3) == "table");  // looked at late
+  CHECK(asked == 1);
+  CHECK(touched_in(5) == "obstacle 0");  // that is not known yet
+  answer = R"({"rendering": 7, "obstacles": ["nut"]})";
+  CHECK(touched_in(6) == "obstacle 0");  // that is known no more
+  CHECK(touched_in(7) == "nut");
+  for (const char* bad : {"", "no JSON", "{}", R"({"rendering": 8, "obstacles": 1})"}) {
+    answer = bad;
+    CHECK(touched_in(8) == "obstacle 0");
+  }
 }
 
 TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") {
   SharedState state(4.0);
-  const nlohmann::json good = state_layout(state, table_scene());
+  const nlohmann::json good = state_layout(state, kTable);
   const auto open = [&](const nlohmann::json& layout) {
     return StateReader(layout.dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0));
   };

@@ -208,6 +208,28 @@ class ReadsState(unittest.TestCase):
         numpy.testing.assert_allclose(numpy.linalg.norm(array["X_WP"][:, 3:], axis=1), 1.0)
 
 
+class Names(unittest.TestCase):
+    def test_each_rendering_has_its_own_and_the_daemon_is_asked_once(self):
+        answers = [{"rendering": 4, "obstacles": ["bolt"]}, wrenchd.Gone("gone"), {"rendering": 7, "obstacles": []}]
+        asked = []
+
+        def ask():
+            asked.append(answers.pop(0))
+            if isinstance(asked[-1], Exception):
+                raise asked[-1]
+            return asked[-1]
+
+        names = wrenchd.state._Names({"rendering": 3, "obstacles": ["table", "nut"]}, ask)
+        self.assertEqual(names.of(3, 1), "nut")
+        self.assertEqual(asked, [])
+        self.assertEqual([names.of(4, 0), names.of(4, 1), names.of(3, 0)], ["bolt", "obstacle 1", "table"])
+        self.assertEqual(len(asked), 1)
+        self.assertEqual([names.of(5, 0), names.of(7, 0), names.of(6, 0)], ["obstacle 0"] * 3)
+        self.assertEqual(answers, [])
+        with self.assertRaises(wrenchd.ProtocolError):
+            wrenchd.state._Names({"rendering": 3}, ask)
+
+
 class Unhappy(unittest.TestCase):
     def test_no_daemon(self):
         with self.assertRaisesRegex(wrenchd.NoDaemon, "/nowhere/s: No such file.*start it"):

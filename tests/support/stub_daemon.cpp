@@ -225,10 +225,11 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   if (method == "start_over") return ask(kStartOver);
   if (method == "state.open") {
     json answer;
-    open_state(state_, simulated_.station.scene(), [&](const json& result, int handed_over) {
-      answer = result;
-      descriptor = handed_over;
-    });
+    open_state(state_, simulated_.station.workbench().obstacle_names(),
+               [&](const json& result, int handed_over) {
+                 answer = result;
+                 descriptor = handed_over;
+               });
     return answer;
   }
   throw Refusal{-32601, "there is no method '" + method + "'; describe lists them"};

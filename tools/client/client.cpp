@@ -118,8 +118,9 @@ StateReader Client::open_state() {
   const json answer = connection_->call("state.open", json::object(), &descriptor);
   if (descriptor < 0 || !answer.contains("layout"))
     throw ClientError(ClientError::kProtocol, "wrenchd handed no shared memory over; see its log");
-  return StateReader(answer["layout"].dump(), descriptor,
-                     [connection = connection_] { return connection->is_there(); });
+  return StateReader(
+      answer["layout"].dump(), descriptor, [connection = connection_] { return connection->is_there(); },
+      [connection = connection_] { return connection->call("state.names", json::object(), nullptr).dump(); });
 }
 
 }  // namespace wrenchd

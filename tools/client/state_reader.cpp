@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 #include <map>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -118,7 +119,6 @@ struct TickState::Layout {
   Fields fields;
   std::size_t touches_offset, touch_bytes, most_touches;
   Fields touch_fields;
-  std::vector<std::string> obstacles;
 
   explicit Layout(const json& from) {
     if (from.at("version").get<std::uint64_t>() != kVersion)
@@ -147,8 +147,38 @@ struct TickState::Layout {
         most_touches > (record_bytes - touches_offset) / touch_bytes)
       not_understood("the contacts lie outside of the record");
     touch_fields = read_fields(touches.at("fields"), touch_bytes);
-    obstacles = from.at("obstacles").get<std::vector<std::string>>();
   }
+};
+
+/// Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more.
+class TickState::Names {
+ public:
+  Names(const json& layout, std::function<std::string()> ask) : ask_(std::move(ask)) { keep(layout); }
+
+  std::string of(std::uint32_t rendering, std::uint32_t number) {
+    const std::scoped_lock lock(mutex_);
+    if (rendering > known_.rbegin()->first && ask_) {
+      try {
+        keep(json::parse(ask_()));
+      } catch (const std::exception&) {  // the daemon is gone, or busy: a number tells which one, too
+      }
+    }
+    const auto found = known_.find(rendering);
+    return found != known_.end() && number < found->second.size() ? found->second[number]
+                                                                  : "obstacle " + std::to_string(number);
+  }
+
+ private:
+  void keep(const json& from) {
+    known_[from.at("rendering")] = from.at("obstacles").get<std::vector<std::string>>();
+    while (known_.size() > kMostKept) known_.erase(known_.begin());
+  }
+
+  static constexpr std::size_t kMostKept = 8;
+
+  std::mutex mutex_;
+  std::function<std::string()> ask_;
+  std::map<std::uint32_t, std::vector<std::string>> known_;
 };
 
 double TickState::number(std::string_view field, std::size_t i) const {
@@ -173,6 +203,7 @@ std::vector<TouchState> TickState::touches() const {
   const auto count =
       std::min<std::size_t>(static_cast<std::size_t>(integer("touch_count")), layout_->most_touches);
   std::vector<TouchState> out(count);
+  const auto rendering = static_cast<std::uint32_t>(integer("rendering"));
   for (std::size_t k = 0; k < count; ++k) {
     const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->touches_offset +
                             k * layout_->touch_bytes;
@@ -196,23 +227,24 @@ std::vector<TouchState> TickState::touches() const {
     touch.share = get("share");
     touch.multiplier_kg_m = get("multiplier_kg_m");
     touch.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
-    touch.obstacle = touch.obstacle_number < layout_->obstacles.size()
-                         ? layout_->obstacles[touch.obstacle_number]
-                         : "obstacle " + std::to_string(touch.obstacle_number);
+    touch.obstacle = names_->of(rendering, touch.obstacle_number);
     touch.tool_feature = feature("tool");
     touch.obstacle_feature = feature("obstacle");
   }
   return out;
 }
 
-StateReader::StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there)
+StateReader::StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there,
+                         std::function<std::string()> ask_names)
     : is_there_(std::move(is_there)) {
   const struct Closed {
     int descriptor;
     ~Closed() { close(descriptor); }
   } closed{descriptor};
   try {
-    layout_ = std::make_shared<const TickState::Layout>(json::parse(layout));
+    const json described = json::parse(layout);
+    layout_ = std::make_shared<const TickState::Layout>(described);
+    names_ = std::make_shared<TickState::Names>(described, std::move(ask_names));
   } catch (const json::exception& error) {
     not_understood(error.what());
   }
@@ -239,6 +271,7 @@ StateReader::~StateReader() {
 
 StateReader::StateReader(StateReader&& other) noexcept
     : layout_(std::move(other.layout_)),
+      names_(std::move(other.names_)),
       is_there_(std::move(other.is_there_)),
       memory_(std::exchange(other.memory_, nullptr)),
       bytes_(other.bytes_),
@@ -249,6 +282,7 @@ StateReader& StateReader::operator=(StateReader&& other) noexcept {
   if (this == &other) return *this;
   unmap();
   layout_ = std::move(other.layout_);
+  names_ = std::move(other.names_);
   is_there_ = std::move(other.is_there_);
   memory_ = std::exchange(other.memory_, nullptr);
   bytes_ = other.bytes_;
@@ -283,6 +317,7 @@ StateReader::Copied StateReader::copy(std::uint64_t i, TickState& out) const {
   const std::uint64_t whole = 2 * i + 2;
   if (load(slot, std::memory_order_acquire) != whole) return Copied::overrun;
   out.layout_ = layout_;
+  out.names_ = names_;
   out.words_.resize(layout_->record_bytes / 8);
   for (std::size_t k = 0; k < out.words_.size(); ++k)
     out.words_[k] = load(slot + layout_->record_offset + 8 * k, std::memory_order_acquire);

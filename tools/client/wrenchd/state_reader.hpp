@@ -22,7 +22,7 @@ struct TouchState {
   double share = 0.0;                 ///< of what all contacts carry, 0 to 1
   double multiplier_kg_m = 0.0;       ///< the sum of multiplier times normal is 2 m (x_q - x_p)
   std::uint32_t obstacle_number = 0;
-  std::string obstacle;          ///< as the scene names it
+  std::string obstacle;          ///< as the scene of that tick names it, or "obstacle 2"
   std::string tool_feature;      ///< "vertex 12", "edge 3-7", "face 5", "hull vertex 1"
   std::string obstacle_feature;  ///< likewise, or "plane"
 };
@@ -37,7 +37,9 @@ class TickState {
   std::array<double, 7> hand_pose() const { return numbers<7>("X_WP"); }   ///< p: what the hand asks for
   std::array<double, 7> proxy_pose() const { return numbers<7>("X_WQ"); }  ///< q: what the world allows
   std::array<double, 6> wrench() const { return numbers<6>("F_out"); }     ///< told to the device
-  std::vector<TouchState> touches() const;  ///< the contacts that carry most first
+  /// The contacts that carry most first. Where the scene was changed the daemon is asked once for the names
+  /// of its obstacles.
+  std::vector<TouchState> touches() const;
 
   /// The i-th number of a field. Throws ClientError where there is none of that name.
   double number(std::string_view field, std::size_t i = 0) const;
@@ -54,8 +56,10 @@ class TickState {
  private:
   friend class StateReader;
   struct Layout;
+  class Names;
 
   std::shared_ptr<const Layout> layout_;
+  std::shared_ptr<Names> names_;
   std::vector<std::uint64_t> words_;
 };
 
@@ -65,9 +69,10 @@ class TickState {
 class StateReader {
  public:
   /// layout: the text of the layout in the answer to `state.open`; descriptor: that came with it, and is
-  /// closed here. is_there: whether the daemon is there still. Client::open_state() fills all in. Throws
-  /// ClientError.
-  StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there = {});
+  /// closed here. is_there: whether the daemon is there still. ask_names: what it answers to `state.names`.
+  /// Client::open_state() fills all in. Throws ClientError.
+  StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there = {},
+              std::function<std::string()> ask_names = {});
   ~StateReader();
   StateReader(StateReader&& other) noexcept;
   StateReader& operator=(StateReader&& other) noexcept;
@@ -97,6 +102,7 @@ class StateReader {
   void unmap() noexcept;
 
   std::shared_ptr<const TickState::Layout> layout_;
+  std::shared_ptr<TickState::Names> names_;
   std::function<bool()> is_there_;
   const std::byte* memory_ = nullptr;
   std::size_t bytes_ = 0;

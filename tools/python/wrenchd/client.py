@@ -119,7 +119,7 @@ class Client:
         answer, descriptor = self._call("state.open", {}, True)
         if descriptor is None or "layout" not in answer:
             raise ProtocolError("wrenchd handed no shared memory over; see its log")
-        return State(answer["layout"], descriptor, self.is_there)
+        return State(answer["layout"], descriptor, self.is_there, lambda: self.call("state.names"))
 
     def open_recording(self, name):
         """A recording of the daemon's (call("record.list")), as a file to read: h5py.File(client.open_recording(...))."""

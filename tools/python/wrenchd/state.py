@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 
-from .errors import Gone, ProtocolError
+from .errors import Gone, ProtocolError, WrenchdError
 
 _VERSION = 1
 _F_GET_SEALS = 1034
@@ -80,7 +80,6 @@ class _Layout:
             if self.touches_offset + self.most_touches * self.touch_bytes > self.record_bytes:
                 raise ProtocolError("the contacts lie outside of the record")
             self.touch_fields = {f["name"]: _Field(f, self.touch_bytes) for f in touches["fields"]}
-            self.obstacles = described["obstacles"]
         except (KeyError, TypeError) as error:
             raise ProtocolError(f"the state's layout cannot be understood ({error!r}); use the package of the daemon's "
                                 "version") from error
@@ -98,17 +97,46 @@ class _Layout:
         return of(self.fields, self.record_bytes, [("touches", (touch, (self.most_touches,)), self.touches_offset)])
 
 
+class _Names:
+    """Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more."""
+
+    _MOST_KEPT = 8
+
+    def __init__(self, described, ask):
+        self._ask = ask
+        self._known = {}
+        self._keep(described)
+
+    def of(self, rendering, number):
+        if rendering > max(self._known):
+            try:
+                self._keep(self._ask())
+            except WrenchdError:
+                pass  # gone, or busy: a number tells which one, too
+        names = self._known.get(rendering, ())
+        return names[number] if number < len(names) else f"obstacle {number}"
+
+    def _keep(self, described):
+        try:
+            self._known[described["rendering"]] = described["obstacles"]
+        except (KeyError, TypeError) as error:
+            raise ProtocolError(f"the names of obstacles cannot be understood ({error!r}); use the package of the "
+                                "daemon's version") from error
+        while len(self._known) > self._MOST_KEPT:
+            del self._known[min(self._known)]
+
+
 class Touch:
     """A contact that holds the proxy: point_W_m, normal_W, share, multiplier_kg_m; and by name obstacle,
-    tool_feature, obstacle_feature."""
+    tool_feature, obstacle_feature. Where the scene was changed the daemon is asked once for the names of its
+    obstacles."""
 
-    def __init__(self, layout, record, base):
+    def __init__(self, layout, names, record, base):
         for name in ("point_W_m", "normal_W", "share", "multiplier_kg_m"):
             setattr(self, name, layout.touch_fields[name].value(record, base))
         self.kind = layout.touch_fields["contact_kind"].value(record, base)
         self.obstacle_number = layout.touch_fields["obstacle"].value(record, base)
-        known = self.obstacle_number < len(layout.obstacles)
-        self.obstacle = layout.obstacles[self.obstacle_number] if known else f"obstacle {self.obstacle_number}"
+        self.obstacle = names.of(layout.fields["rendering"].value(record), self.obstacle_number)
         self.tool_feature = self._feature(layout, record, base, "tool")
         self.obstacle_feature = self._feature(layout, record, base, "obstacle")
 
@@ -134,10 +162,11 @@ class Tick:
     for states, faults and the like their name; for bits a list of names. touches: the contacts, those that carry
     most first. tick["state"] is the bare number."""
 
-    __slots__ = ("_layout", "_record")
+    __slots__ = ("_layout", "_names", "_record")
 
-    def __init__(self, layout, record):
+    def __init__(self, layout, names, record):
         self._layout = layout
+        self._names = names
         self._record = record
 
     def __getattr__(self, name):
@@ -157,7 +186,7 @@ class Tick:
     def touches(self):
         layout = self._layout
         count = min(self.touch_count, layout.most_touches)
-        return [Touch(layout, self._record, layout.touches_offset + i * layout.touch_bytes) for i in range(count)]
+        return [Touch(layout, self._names, self._record, layout.touches_offset + i * layout.touch_bytes) for i in range(count)]
 
     def __repr__(self):
         return f"<tick {self.tick}: {self.state}>"
@@ -167,9 +196,10 @@ class State:
     """Reads the ticks. The daemon knows nothing of readers: one that is slow misses ticks, and is told how many.
     Client.open_state() makes one; an object serves one thread."""
 
-    def __init__(self, layout, descriptor, is_there=lambda: True):
+    def __init__(self, layout, descriptor, is_there=lambda: True, ask_names=lambda: {}):
         try:
             self._layout = _Layout(layout)
+            self._names = _Names(layout, ask_names)
             seals = fcntl.fcntl(descriptor, _F_GET_SEALS)
             if not seals & _F_SEAL_SHRINK or os.fstat(descriptor).st_size < self._layout.bytes:
                 raise ProtocolError("the state's memory is not sealed, or too small")
@@ -214,13 +244,13 @@ class State:
                 return None
             record = self._copy(written - 1)
             if record is not None:
-                return Tick(self._layout, record)
+                return Tick(self._layout, self._names, record)
 
     def next(self, timeout_s=1.0):
         """Waits for the tick after the last one taken. None where none came in time. One that was overrun goes on
         with newer ones, and `missed` grows. Raises Gone where the daemon is gone."""
         record = self._next_record(timeout_s)
-        return None if record is None else Tick(self._layout, record)
+        return None if record is None else Tick(self._layout, self._names, record)
 
     def ticks(self, count=None):
         """The next ticks one after the other: so many, or until the daemon is gone, which raises Gone."""
