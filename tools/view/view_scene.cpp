@@ -40,22 +40,19 @@ std::vector<T> part(std::span<const std::byte> bytes, std::size_t offset, std::s
   return out;
 }
 
-std::string message_of(std::uint32_t number, const DisplayMesh& mesh) {
+enum class Detail : std::uint32_t { fine = 1, coarse = 3 };
+
+std::string message_of(Detail detail, std::uint32_t number, const DisplayMesh& mesh) {
   const auto count = [](std::size_t numbers) { return static_cast<std::uint32_t>(numbers / 3); };
-  const std::array<std::uint32_t, 5> head = {1, number, count(mesh.positions.size()),
-                                             count(mesh.corners.size()), count(mesh.lines.size())};
+  const std::array<std::uint32_t, 5> head = {static_cast<std::uint32_t>(detail), number,
+                                             count(mesh.positions.size()), count(mesh.corners.size()),
+                                             count(mesh.lines.size())};
   std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
   for (const std::vector<float>* part : {&mesh.positions, &mesh.normals})
     out.append(reinterpret_cast<const char*>(part->data()), part->size() * sizeof(float));
   out.append(reinterpret_cast<const char*>(mesh.corners.data()), mesh.corners.size() * sizeof(std::uint32_t));
   out.append(reinterpret_cast<const char*>(mesh.lines.data()), mesh.lines.size() * sizeof(float));
   return out;
-}
-
-std::size_t shown_of(const std::string& message) {
-  std::uint32_t triangles = 0;
-  std::memcpy(&triangles, message.data() + 12, 4);
-  return triangles;
 }
 
 }  // namespace
@@ -74,22 +71,25 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
   if (known != nullptr && known->shapes_ == shapes_) {
     meshes_ = known->meshes_;
   } else {
-    std::uint32_t number = 0;
-    for (const Json& mesh : meshes) {
-      // Each mesh gets its share, and none is made too coarse to be known again.
-      constexpr double kLeast = 2'000.0;
-      const auto triangles = static_cast<double>(given_[number]);
-      const double share = static_cast<double>(kMostTriangles) * triangles /
-                           static_cast<double>(std::max(all, kMostTriangles));
-      const auto vertices = part<float>(bytes, mesh.at("vertices_offset").get<std::size_t>(),
-                                        3 * mesh.at("vertices").get<std::size_t>());
-      const auto corners = part<std::array<std::uint32_t, 3>>(
-          bytes, mesh.at("triangles_offset").get<std::size_t>(), given_[number]);
-      const DisplayMesh drawn =
-          display_mesh(vertices, corners, static_cast<std::size_t>(std::max(share, kLeast)));
-      meshes_.push_back(std::make_shared<const std::string>(message_of(number, drawn)));
-      ++number;
-    }
+    const auto add_all = [&](Detail detail, std::size_t most) {
+      std::uint32_t number = 0;
+      for (const Json& mesh : meshes) {
+        // Each mesh gets its share, and none is made too coarse to be known again.
+        constexpr double kLeast = 2'000.0;
+        const auto triangles = static_cast<double>(given_[number]);
+        const double share = static_cast<double>(most) * triangles / static_cast<double>(std::max(all, most));
+        const auto vertices = part<float>(bytes, mesh.at("vertices_offset").get<std::size_t>(),
+                                          3 * mesh.at("vertices").get<std::size_t>());
+        const auto corners = part<std::array<std::uint32_t, 3>>(
+            bytes, mesh.at("triangles_offset").get<std::size_t>(), given_[number]);
+        const DisplayMesh drawn =
+            display_mesh(vertices, corners, static_cast<std::size_t>(std::max(share, kLeast)));
+        meshes_.push_back(std::make_shared<const std::string>(message_of(detail, number, drawn)));
+        ++number;
+      }
+    };
+    add_all(Detail::fine, kMostTriangles);
+    if (all > kFewTriangles) add_all(Detail::coarse, kFewTriangles);
   }
   Json obstacles = Json::array();
   std::uint32_t number = 0;
@@ -111,8 +111,7 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     ++number;
   }
   Json sizes = Json::array();
-  for (std::size_t i = 0; i < meshes_.size(); ++i)
-    sizes.push_back({{"triangles", given_[i]}, {"shown", shown_of(*meshes_[i])}});
+  for (const std::size_t triangles : given_) sizes.push_back({{"triangles", triangles}});
   text_ = Json{{"type", "scene"},        {"shapes", shapes_},
                {"meshes", sizes},        {"tool", description.at("tool")},
                {"obstacles", obstacles}, {"view", description.value("view", Json())}}

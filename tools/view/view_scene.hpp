@@ -21,6 +21,8 @@ class ViewScene {
  public:
   /// Triangles of all meshes together; what has more is made coarser.
   static constexpr std::size_t kMostTriangles = 150'000;
+  /// Of the same, for machines that draw slowly, while something moves.
+  static constexpr std::size_t kFewTriangles = 15'000;
 
   /// description, bytes: of SceneShapes. known: one whose meshes are these, if any. Throws
   /// std::runtime_error where the two do not fit to each other.
@@ -31,9 +33,9 @@ class ViewScene {
 
   /// {type: "scene", tool, obstacles, ...}: which mesh is whose, and where it stands.
   const std::string& text() const noexcept { return text_; }
-  /// A binary message for each mesh: u32 1, number, how many corners, triangles, points of lines; then
-  /// floats: positions and normals of the corners; u32: corners of the triangles; floats: points of the
-  /// lines.
+  /// A binary message for each mesh, and where that is much, after them another for each that is coarser: u32
+  /// 1 or 3, number, how many corners, triangles, points of lines; then floats: positions and normals of the
+  /// corners; u32: corners of the triangles; floats: points of the lines.
   const std::vector<std::shared_ptr<const std::string>>& meshes() const noexcept { return meshes_; }
 
   /// Where the obstacles that move stand at this time (CLOCK_MONOTONIC): [[number, pose], ...].

@@ -3,13 +3,15 @@
 
 const KIND_MESH = 1;
 const KIND_HISTORY = 2;
+const KIND_COARSE = 3;
 
 /** A mesh: its number, corners with normals, which of them are triangles, and lines; metres. */
 function meshOf(buffer) {
-  const [, number, corners, triangles, points] = new Uint32Array(buffer, 0, 5);
+  const [kind, number, corners, triangles, points] = new Uint32Array(buffer, 0, 5);
   const floats = 20, indices = floats + 24 * corners, lines = indices + 12 * triangles;
   return {
     number,
+    coarse: kind === KIND_COARSE,
     positions: new Float32Array(buffer, floats, 3 * corners),
     normals: new Float32Array(buffer, floats + 12 * corners, 3 * corners),
     triangles: new Uint32Array(buffer, indices, 3 * triangles),
@@ -45,7 +47,7 @@ export class Connection {
   take(data) {
     if (typeof data !== "string") {
       const kind = new Uint32Array(data, 0, 1)[0];
-      if (kind === KIND_MESH) this.hear.mesh(meshOf(data));
+      if (kind === KIND_MESH || kind === KIND_COARSE) this.hear.mesh(meshOf(data));
       if (kind === KIND_HISTORY) this.hear.history(historyOf(data));
       return;
     }

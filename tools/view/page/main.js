@@ -25,6 +25,7 @@ let rate_Hz = 0;
 let lastFault = null;
 let times = null;
 let connected = false;
+let given = 0;
 
 const set = (id, text) => {
   const element = $(id);
@@ -151,6 +152,12 @@ function showTimes() {
   plots.drawTimes(times, rate_Hz > 0 ? 1e6 / rate_Hz : 0);
 }
 
+function showGiven() {
+  if (given === 0) return;
+  const shown = world.triangles();
+  set("note", shown < given ? `${given.toLocaleString("en")} triangles, drawn with ${shown.toLocaleString("en")}` : "");
+}
+
 let toastEnds = 0;
 function toast(text) {
   $("toast").hidden = false;
@@ -230,13 +237,13 @@ const connection = new Connection({
   mesh: (mesh) => world.mesh(mesh),
   scene(scene) {
     world.show(scene);
-    const sum = (key) => scene.meshes.reduce((all, mesh) => all + mesh[key], 0);
+    given = scene.meshes.reduce((all, { triangles }) => all + triangles, 0);
     $("note").className = "";
-    set("note", sum("shown") < sum("triangles")
-      ? `${sum("triangles").toLocaleString("en")} triangles, drawn with ${sum("shown").toLocaleString("en")}` : "");
+    showGiven();
     if (frame) world.take(frame);
   },
   no_scene({ why }) {
+    given = 0;
     $("note").className = why === "" ? "" : "problem";
     set("note", why === "" ? "" : `The scene cannot be shown: ${why}`);
   },
@@ -351,6 +358,7 @@ function draw(now) {
   if (frame) showFrame(frame);
   showButtons();
   world.draw(now);
+  showGiven();
   if (now - plotted > PLOTS_EVERY_MS + 4 * (world.slow_ms ?? 0) && frame) {
     plotted = now;
     plots.draw(history, frame.t);
@@ -376,4 +384,5 @@ window.view = {
   history: () => history,
   times: () => times,
   player,
+  slow: () => (world.slow = true),
 };

@@ -21,6 +21,13 @@ function round125(x) {
   return decade * (x / decade >= 5 ? 5 : x / decade >= 2 ? 2 : 1);
 }
 
+/**
+ * A machine is slow when its frames usually take longer than this: the mean over some, for they are drawn elsewhere, and
+ * only every other is waited for. What has not moved for a while is at rest.
+ */
+const SLOW_MS = 60, OVER_FRAMES = 8, AT_REST_MS = 400;
+const MOST_MS = 150;  // the first frames wait for shaders everywhere
+
 const UP = new THREE.Vector3(0, 1, 0);
 
 /** An arrow of any length and thickness, along +Y before it is turned. */
@@ -138,8 +145,8 @@ export class World {
   }
 
   /** A mesh of the scene that comes next. */
-  mesh({ number, positions, normals, triangles, lines }) {
-    if (number === 0) this.meshes.clear();
+  mesh({ number, coarse, positions, normals, triangles, lines }) {
+    if (number === 0 && !coarse) this.meshes.clear();
     const surface = new THREE.BufferGeometry();
     surface.setAttribute("position", new THREE.BufferAttribute(positions, 3));
     surface.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
@@ -147,13 +154,35 @@ export class World {
     surface.computeBoundingSphere();
     const edges = new THREE.BufferGeometry();
     edges.setAttribute("position", new THREE.BufferAttribute(lines, 3));
-    this.meshes.set(number, { surface, edges });
+    if (coarse) this.meshes.get(number).coarse = { surface, edges };
+    else this.meshes.set(number, { surface, edges });
+  }
+
+  /** Whether bodies are drawn with few triangles, where there are such. */
+  drawCoarsely(coarse) {
+    if (coarse === this.coarse) return;
+    this.coarse = coarse;
+    for (const body of this.bodies.children) {
+      const mesh = this.meshes.get(body.userData.mesh);
+      if (!mesh?.coarse) continue;
+      const { surface, edges } = coarse ? mesh.coarse : mesh;
+      body.children[0].geometry = surface;
+      body.children[1].geometry = edges;
+    }
+  }
+
+  /** Of all meshes, each once, as they are drawn now. */
+  triangles() {
+    let all = 0;
+    for (const mesh of this.meshes.values()) all += ((this.coarse && mesh.coarse) || mesh).surface.index.count / 3;
+    return all;
   }
 
   body(number, material, edge) {
     const { surface, edges } = this.meshes.get(number);
     const body = new THREE.Group();
     body.add(new THREE.Mesh(surface, material), new THREE.LineSegments(edges, edge));
+    body.userData.mesh = number;
     return body;
   }
 
@@ -161,6 +190,7 @@ export class World {
   show({ tool, obstacles, view }) {
     const elsewhere = JSON.stringify(view) !== JSON.stringify(this.view);
     this.view = view;
+    this.coarse = false;
     this.told = (this.told ?? 0) + 1;
     this.bodies.clear();
     const radius = this.meshes.get(tool.mesh).surface.boundingSphere.radius;
@@ -282,15 +312,23 @@ export class World {
     this.changed = true;
   }
 
-  /** A frame that took long is followed by as long a pause: where software draws, others have work to do. */
+  /**
+   * A frame that took long is followed by as long a pause: where software draws, others have work to do. Where all
+   * take long, bodies are drawn coarsely while something moves.
+   */
   draw(now) {
     if (this.drawnAt !== undefined) {
       const took = now - this.drawnAt;
       this.slow_ms = took > 40 ? Math.min(took, 1000) : 0;
       this.rested = now + this.slow_ms;
+      if (!this.coarse) this.usual_ms = (this.usual_ms ?? 0) + (Math.min(took, MOST_MS) - (this.usual_ms ?? 0)) / OVER_FRAMES;
+      this.slow = this.slow || this.usual_ms > SLOW_MS;
       this.drawnAt = undefined;
     }
-    if (!this.changed || now < (this.rested ?? 0)) return;
+    if (this.changed) this.changedAt = now;
+    const atRest = this.coarse && now - this.changedAt > AT_REST_MS;
+    if ((!this.changed && !atRest) || now < (this.rested ?? 0)) return;
+    this.drawCoarsely(this.slow === true && !atRest);
     this.changed = false;
     this.drawnAt = now;
     this.renderer.render(this.scene, this.camera);
@@ -307,6 +345,7 @@ export class World {
       contacts: this.contacts.filter(({ point }) => point.visible).map(({ point }) => point.position.toArray()),
       force: this.force.visible ? new THREE.Vector3(0, 1, 0).applyQuaternion(this.force.quaternion).toArray() : null,
       told: this.told,
+      coarse: this.coarse === true,
       eye: this.camera.position.toArray(),
       target: this.controls.target.toArray(),
       triangles: this.renderer.info.render.triangles,
