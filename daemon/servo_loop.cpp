@@ -359,12 +359,8 @@ void ServoLoop::let_through() noexcept {
 /// Lines 2 to 6: p from the sample, and its projection q, which follows the hand from last tick's as a proxy.
 /// One that is caught between obstacles that move has lost its place.
 void ServoLoop::project(const DeviceSample& sample) noexcept {
-  const double scale = workspace_.scale();
   const Pose X_WH = workspace_.follow(sample.X_BH, dt_s_);
-  if (workspace_.scale() != scale) {
-    steady_.set_workspace_scale(workspace_.scale());
-    scale_renderings();
-  }
+  if (steady_.take_workspace_scale(workspace_.scale())) scale_renderings();
   if (!renderings_.project(X_WH, now_, scene_time_s_)) lose_place();
   device_.hold(held());
   whereabouts_.write({X_WH, scene_time_s_, now_});

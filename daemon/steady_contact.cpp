@@ -48,9 +48,11 @@ void SteadyContact::change(const Stability& stability) noexcept {
   share_ = bearable(stability_);
 }
 
-void SteadyContact::set_workspace_scale(double scale) noexcept {
+bool SteadyContact::take_workspace_scale(double scale) noexcept {
+  if (scale == workspace_scale_) return false;
   workspace_scale_ = scale;
   share_ = bearable(stability_);
+  return true;
 }
 
 Wrench SteadyContact::steadied(const Wrench& asked, const DeviceSample& sample,

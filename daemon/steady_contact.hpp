@@ -31,8 +31,9 @@ class SteadyContact {
   }
   /// These are the walls from here on.
   void change(const Stability& stability) noexcept;
-  /// Metres that the tool goes for a metre of the handle, from here on.
-  void set_workspace_scale(double scale) noexcept;
+  /// Metres that the tool goes for a metre of the handle, from here on. Whether that is another than before:
+  /// then it bears another share().
+  bool take_workspace_scale(double scale) noexcept;
 
   // --- the contact ---
   struct Moment {

@@ -43,7 +43,10 @@ TEST_CASE("the history holds the newest ticks with their contacts", "[recording]
   CHECK(batch.ticks.size() == 7);
   CHECK(history.copy(200, 203, 7, batch) == 200);
   CHECK(batch.ticks.size() == 3);
-  CHECK(history.first_since(199'500'000) == 200);
+  for (std::int64_t i = 150; i < 250; ++i) {
+    REQUIRE(history.first_since(i * 1'000'000) == static_cast<std::uint64_t>(i));
+    REQUIRE(history.first_since(i * 1'000'000 - 500'000) == static_cast<std::uint64_t>(i));
+  }
   CHECK(history.first_since(0) == 150);
   CHECK(history.first_since(1'000'000'000) == 250);
 }

@@ -105,6 +105,9 @@ TEST_CASE("a directory for recordings is made, or refused with a cure", "[record
   const TemporaryDirectory files;
   make_recordings_directory(files.path() / "a/b");
   CHECK(std::filesystem::is_directory(files.path() / "a/b"));
+  using std::filesystem::perms;
+  CHECK(std::filesystem::status(files.path() / "a/b").permissions() ==
+        (perms::owner_all | perms::group_read | perms::group_exec));  // nothing for others
   const auto file = files.write("file", "");
   CHECK_THROWS_WITH(make_recordings_directory(file / "below"),
                     Contains("cannot be made") && Contains("set directory in [recording]"));

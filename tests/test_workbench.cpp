@@ -335,6 +335,30 @@ TEST_CASE("the scale of the workspace changes without moving the tool, and what 
   CHECK(s.last.X_WP[2] == Approx(2.0 * s.last.X_BH[2]).margin(1e-9));
 }
 
+TEST_CASE("a scale that is there at once, for it was asked with the tool called back, is borne like any",
+          "[workbench][workspace]") {
+  const auto share_of = [](bool recentred) {
+    Plan plan = pressing_plan();
+    plan.settings.servo.self_test_s = 0.5;  // in which is measured what the device bears
+    for (std::size_t i = 1; i < plan.settings.simulation.hand_path.size(); ++i)
+      plan.settings.simulation.hand_path[i].time_s += 0.6;
+    Bench s(plan);
+    s.go_for(0.6);
+    s.press();
+    if (recentred) s.bench().set_clutch(true);
+    s.bench().set_scale(8.0);
+    if (recentred) {
+      s.bench().recentre();
+      s.bench().set_clutch(false);
+    }
+    s.go_for(0.5);
+    return s.last.stiffness_share;
+  };
+  const double gradually = share_of(false);
+  CHECK(gradually < 0.9);
+  CHECK(share_of(true) == gradually);
+}
+
 TEST_CASE("a local model pushes, and fades out when its client is silent", "[workbench][models]") {
   Plan plan = pressing_plan();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()}};

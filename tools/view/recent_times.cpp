@@ -17,7 +17,8 @@ double RecentTimes::edge_us(std::size_t bin) {
 
 void RecentTimes::add(std::int64_t time_ns, std::int64_t took_ns) {
   const std::int64_t number = time_ns / kSecond_ns;
-  newest_ = number < newest_ - kSeconds ? number : std::max(newest_, number);  // a clock that began anew
+  if (number < newest_ - kSeconds) *this = {};  // a clock that began anew
+  newest_ = std::max(newest_, number);
   Second& second = seconds_[static_cast<std::size_t>(number % kSeconds)];
   if (second.number != number) {
     second = Second{};
