@@ -79,9 +79,9 @@ void MeshContacts::start_at(const Pose& X_WT, double time_s) noexcept {
   start_s_ = time_s;
 }
 
-void MeshContacts::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget,
-                              double time_s) noexcept {
-  pairs_.look_ahead(X_WT, X_WP, budget, time_s);
+void MeshContacts::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s,
+                              std::uint32_t to_spare) noexcept {
+  pairs_.look_ahead(X_WT, X_WP, budget, time_s, to_spare);
   in_doubt_ = false;
   looking_ = 0;
 }

@@ -59,8 +59,9 @@ class MeshContacts {
   Findings look(const Pose& X_WT, double clearance_m, WalkBudget& budget, double time_s = 0.0) noexcept;
 
   /// Once a tick, when the tool has come to X_WT, following a hand that has come to X_WP: prepares for where
-  /// it will be. RT safe.
-  void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0) noexcept;
+  /// it will be. to_spare: visits that may as well be spent on that, if it does not need as many. RT safe.
+  void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0,
+                  std::uint32_t to_spare = 0) noexcept;
 
   /// The share of the way from the start to X_WT that can be looked at now, in a scene where nothing moves.
   /// RT safe.

@@ -15,7 +15,7 @@ constexpr double kFirstReach = 1e-3;
 /// What a list made at once holds for beside its way, as a share of it.
 constexpr double kReach = 0.08;
 /// The same for a list made ahead, beside the way expected.
-constexpr double kReachAhead = 0.04;
+constexpr double kReachAhead = 0.08;
 /// One that leads where the tool is expected holds for so many ticks.
 constexpr double kTicksAtOnce = 4.0;
 /// The longest way that a list is made for ahead, and the widest reach, in units of the tool's size: it
@@ -23,7 +23,7 @@ constexpr double kTicksAtOnce = 4.0;
 constexpr double kFarthestAhead = 0.2;
 constexpr double kWidestAhead = 0.02;
 /// A list made ahead is to serve for so many ticks, at most and at least.
-constexpr double kMostTicksAhead = 10.0;
+constexpr double kMostTicksAhead = 7.0;
 constexpr double kLeastTicksAhead = 3.0;
 /// It is made while the one before it serves, evenly, and a little sooner than it is needed; it holds from
 /// half way there on.
@@ -159,7 +159,8 @@ double PairsAhead::share_of(const NearPairs& list, const Pose& X_start, const Po
   return share;
 }
 
-void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s) noexcept {
+void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s,
+                            std::uint32_t to_spare) noexcept {
   if (std::exchange(late_tick_, false))
     motion_.learn_late(X_WP);
   else
@@ -171,19 +172,29 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
   const double soon_s = time_s + soon * tick_s_;
   const bool astray = std::exchange(astray_, false) && !ahead_->will_cover(X_soon, soon_s);
   if (!ahead_->under_way() || astray) {
-    if (listed_->covers(X_soon, soon_s) || ahead_->covers(X_soon, soon_s)) return;
+    if (provided(X_WT, soon, time_s, to_spare > 0)) return;
     const NearPairs::Way way = way_ahead(kFrom * soon, kTo * soon);
     if (!goes_slowly(way)) return;
     if (ahead_->covers(X_WT, time_s)) serve(ahead_);  // it holds for longer than the one that serves
     ahead_->set_out(way);
   }
-  const std::uint32_t visits = portion(X_soon, soon);
+  const std::uint32_t visits = std::max(portion(X_soon, soon), to_spare);
   if (go_on(*ahead_, budget.kept > 0 ? std::min(visits, most_visits(budget)) : visits, budget)) weigh();
   if (ticks_ahead_ > kLeastTicksAhead && static_cast<double>(ahead_->pairs().size()) >
                                              kFarMore * static_cast<double>(listed().pairs().size()) + kFew) {
     ticks_ahead_ = std::max(kFarFewer * ticks_ahead_, kLeastTicksAhead);
     ahead_->clear();
   }
+}
+
+/// Is there no list to be begun now? With work to spare the next is begun as soon as the last is made, if it
+/// leads on: the younger a list, the better the motion was known.
+bool PairsAhead::provided(const Pose& X_WT, double soon, double time_s, bool to_spare) const noexcept {
+  const auto covers = [&](const NearPairs& list, double ticks) {
+    return list.covers(motion_.after(ticks), time_s + ticks * tick_s_);
+  };
+  if (!to_spare) return covers(*listed_, soon) || covers(*ahead_, soon);
+  return covers(*listed_, kTo * soon) || (covers(*ahead_, soon) && !ahead_->covers(X_WT, time_s));
 }
 
 /// What is to be done of the list ahead with this tick, in visits, so that it is done when the one that

@@ -44,12 +44,14 @@ class PairsAhead {
   double share_listed(const Pose& X_start, const Pose& X_end) const noexcept {
     return share_of(*listed_, X_start, X_end);
   }
-  /// What a list takes for every tick that it serves, in visits; 0: none was made yet.
+  /// What a list takes for every tick that it is made for, in visits; 0: none was made yet.
   double visits_per_tick() const noexcept { return listed().visits() / ticks_ahead_; }
 
   /// Once a tick, when the tool has come to X_WT at this scene time, following a hand that has come to X_WP:
-  /// goes on with the list for where it will be. RT safe.
-  void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0) noexcept;
+  /// goes on with the list for where it will be. to_spare: visits that may as well be spent on it, if it does
+  /// not need as many. RT safe.
+  void look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s = 0.0,
+                  std::uint32_t to_spare = 0) noexcept;
 
   /// The tool is elsewhere now: what was, says nothing about what will be. RT safe.
   void forget() noexcept;
@@ -66,6 +68,7 @@ class PairsAhead {
   double share_of(const NearPairs& list, const Pose& X_start, const Pose& X_end) const noexcept;
   NearPairs::Way way_ahead(double from_ticks, double to_ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
+  bool provided(const Pose& X_WT, double soon, double time_s, bool to_spare) const noexcept;
   double ticks_to_serve() const noexcept;
   std::uint32_t portion(const Pose& X_soon, double soon) const noexcept;
   void weigh() noexcept;

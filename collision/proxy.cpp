@@ -31,8 +31,8 @@ constexpr double kGrowth = 1.5;
 /// A hand that moves by no more than this in a tick, in units of the tool's size, can wait for a tool that is
 /// some ticks late.
 constexpr double kPatientWay = 0.005;
-/// What is made ahead may fill a tick up to so many times what ticks usually take.
-constexpr double kAheadUpTo = 1.5;
+/// What is made ahead may fill a tick up to so many times what ticks are brought up to.
+constexpr double kAheadUpTo = 1.2;
 /// A look, the step before it included, takes the time of so many visits beside those that it counts.
 constexpr std::uint32_t kVisitsPerLook = 18;
 /// So many looks are always taken.
@@ -97,15 +97,17 @@ void Proxy::set_budget(double hand_m) noexcept {
   budget_.kept = effort_.visits - std::min(effort_.visits, for_lists);
 }
 
-/// A tick that had much to do leaves more of what is made ahead to others.
+/// A tick that had much to do leaves what is made ahead to others, which had little.
 void Proxy::look_ahead(const Pose& X_WT, const Pose& X_WP) noexcept {
+  std::uint32_t to_spare = 0;
   if (budget_.kept > 0) {
-    const double most = kAheadUpTo * even_.usual();
-    const auto for_all = static_cast<std::uint32_t>(std::min<double>(most, effort_.visits));
+    const double even = even_.even();
+    const auto for_all = static_cast<std::uint32_t>(std::min<double>(kAheadUpTo * even, effort_.visits));
     budget_.kept = std::max(budget_.kept, effort_.visits - for_all);
+    to_spare = static_cast<std::uint32_t>(std::max(even - visits(), 0.0));
   }
   const std::uint32_t looking = meshes_.looking() + looks_ * kVisitsPerLook;
-  meshes_.look_ahead(X_WT, X_WP, budget_, seen_s_);
+  meshes_.look_ahead(X_WT, X_WP, budget_, seen_s_, to_spare);
   even_.learn(looking, meshes_.visits_per_tick(), late_);
 }
 

@@ -27,7 +27,8 @@ namespace wrenchd {
 /// However deep p is and however fast it moves, q is an admissible pose at any time, and the work is bounded:
 /// when it is used up, q is as far as it came. Ticks are kept much alike: what would make one take several
 /// times what most take, a list of pairs that has to be made at once above all, is spread over two or three,
-/// which go as far as what is known to be free allows (even_work.hpp). Where obstacles move nothing waits.
+/// which go as far as what is known to be free allows; and one that has little to do makes more ahead
+/// (even_work.hpp). Where obstacles move nothing waits.
 ///
 /// All memory is taken at construction. One object serves one thread.
 class Proxy {

@@ -69,6 +69,35 @@ TEST_CASE("the work for lists ahead is spread over the ticks", "[pairs_ahead]") 
   CHECK(most < 3 * all / 100);
 }
 
+TEST_CASE("with work to spare lists are younger, and what is spent is no more than that", "[pairs_ahead]") {
+  const auto lists = [](std::uint32_t to_spare) {
+    PairsAhead pairs(bumpy_bodies());
+    int changes = 0;
+    for (int i = 1; i < 200; ++i) {
+      const NearPairs* before = &pairs.listed();
+      WalkBudget budget = {kPlenty};
+      REQUIRE(pairs.list(along(i - 1), along(i), budget));
+      const std::uint32_t left = budget.visits;
+      pairs.look_ahead(along(i), along(i), budget, 0.0, to_spare);
+      changes += i >= 60 && &pairs.listed() != before ? 1 : 0;
+      if (i >= 60 && to_spare >= 1000) CHECK(left - budget.visits <= to_spare);
+    }
+    return changes;
+  };
+  CHECK(lists(1000) > 1.5 * lists(0));
+}
+
+TEST_CASE("at rest nothing is listed, whatever there is to spare", "[pairs_ahead]") {
+  PairsAhead pairs(bumpy_bodies());
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
+  for (int i = 0; i < 100; ++i) {
+    WalkBudget budget = {kPlenty};
+    REQUIRE(pairs.list(along(59), along(59), budget));
+    pairs.look_ahead(along(59), along(59), budget, 0.0, 1000);
+    if (i >= 50) CHECK(budget.visits == kPlenty);
+  }
+}
+
 TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pairs_ahead]") {
   PairsAhead pairs(bumpy_bodies());
   int i = 1;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tests/bench/mesh_pair.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -29,6 +30,14 @@ double touching(MeetingPairs& pairs, double free, double overlapping, const Pose
   return free;
 }
 
+constexpr int kTicksBefore = 100;
+
+/// The parameter of a path at pose i, in seconds: from rest, evenly faster until pose 0, and even from there.
+double path_s(int i) {
+  const double before = std::max(0.0, 1.0 + static_cast<double>(i) / kTicksBefore);
+  return i >= 0 ? i / 1000.0 : 0.5 * kTicksBefore / 1000.0 * (before * before - 1.0);
+}
+
 }  // namespace
 
 std::size_t MeetingPairs::count(const Pose& X_WT) {
@@ -55,8 +64,8 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
   MeshPair pair{"", scene_of({"bumpy", tool_triangles, 1}, {"boulder", obstacle_triangles, 2}), {}, {}};
   MeetingPairs pairs(pair.scene);
   double last_m = 0.13;
-  for (std::size_t i = 0; i < poses; ++i) {
-    const double t = static_cast<double>(i) / 1000.0;
+  for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
+    const double t = path_s(i);
     const Vector3d out =
         Vector3d(std::cos(t + 0.3), std::sin(t + 0.3) * std::cos(0.7 * t), 0.4 * std::sin(1.7 * t) + 0.2)
             .normalized();
@@ -69,8 +78,8 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
       overlapping_m -= 0.0005;
     }
     last_m = touching(pairs, free_m, overlapping_m, at);
-    if (i == 0) pair.X_start = at(last_m + 1e-4);
-    pair.X_WP.push_back(at(last_m - 0.00025 - 0.0002 * std::sin(25.0 * t)));
+    if (i == -kTicksBefore) pair.X_start = at(last_m + 1e-4);
+    (i < 0 ? pair.X_WP_before : pair.X_WP).push_back(at(last_m - 0.00025 - 0.0002 * std::sin(25.0 * t)));
   }
   return pair;
 }
@@ -78,8 +87,8 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
   MeshPair pair{"", scene_of({"peg", tool_triangles}, {"hole", obstacle_triangles}), {}, {}};
   MeetingPairs pairs(pair.scene);
-  for (std::size_t i = 0; i < poses; ++i) {
-    const double t = static_cast<double>(i) / 1000.0;
+  for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
+    const double t = path_s(i);
     const Quaterniond R =
         rotation_from(0.0015 * std::sin(6.0 * t) * Vector3d(std::cos(3.0 * t), std::sin(3.0 * t), 0.0)) *
         rotation_from(Vector3d(0.0, 0.0, 0.8 * t));
@@ -91,9 +100,9 @@ MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles,
       free_m = overlapping_m;
       overlapping_m += 2e-5;
     }
-    if (i == 0) pair.X_start = at(0.0);
-    pair.X_WP.push_back(
-        at(touching(pairs, free_m, overlapping_m, at) + 0.00005 + 0.00003 * std::sin(25.0 * t)));
+    if (i == -kTicksBefore) pair.X_start = at(0.0);
+    (i < 0 ? pair.X_WP_before : pair.X_WP)
+        .push_back(at(touching(pairs, free_m, overlapping_m, at) + 0.00005 + 0.00003 * std::sin(25.0 * t)));
   }
   return pair;
 }

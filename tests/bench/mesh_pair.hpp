@@ -14,8 +14,9 @@ namespace wrenchd::bench {
 struct MeshPair {
   std::string name;
   Scene scene;
-  std::vector<Pose> X_WP;  ///< overlapping by some tenths of a millimetre
-  Pose X_start;            ///< admissible, near the first of them
+  std::vector<Pose> X_WP;         ///< overlapping by some tenths of a millimetre
+  std::vector<Pose> X_WP_before;  ///< leading there: a hand comes to speed in a tenth of a second
+  Pose X_start;                   ///< admissible, near the first of these
 };
 
 /// A bumpy body of 40 mm slides and turns on a boulder of 60 mm, about 100 mm/s and 1 rad/s, 0.05 to 0.45 mm
