@@ -103,14 +103,16 @@ TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pa
   int i = 1;
   for (; i < 60; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
   const std::uint32_t before = pairs.made_at_once();
-  const NearPairs* first = &pairs.listed();
-  for (; i < 90 && &pairs.listed() == first; ++i) {
+  int changes = 0;
+  for (; i < 90 && changes < 2; ++i) {
+    const NearPairs* last = &pairs.listed();
     WalkBudget budget = {kPlenty}, starved = {1};
     REQUIRE(pairs.list(along(i - 1), along(i), budget));
-    if (&pairs.listed() != first) CHECK(budget.visits < kPlenty);  // it was not done yet
+    changes += &pairs.listed() != last ? 1 : 0;
+    if (changes == 2) CHECK(budget.visits < kPlenty);  // the first may have been done, not this one
     pairs.look_ahead(along(i), along(i), starved);
   }
-  REQUIRE(&pairs.listed() != first);
+  REQUIRE(changes == 2);
   CHECK(pairs.made_at_once() == before);
 }
 

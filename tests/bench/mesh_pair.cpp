@@ -61,7 +61,7 @@ std::size_t MeetingPairs::count(const Pose& X_WT) {
 }
 
 MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
-  MeshPair pair{"", scene_of({"bumpy", tool_triangles, 1}, {"boulder", obstacle_triangles, 2}), {}, {}};
+  MeshPair pair{"", scene_of({"bumpy", tool_triangles, 1}, {"boulder", obstacle_triangles, 2}), {}, {}, {}};
   MeetingPairs pairs(pair.scene);
   double last_m = 0.13;
   for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
@@ -85,7 +85,7 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
 }
 
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
-  MeshPair pair{"", scene_of({"peg", tool_triangles}, {"hole", obstacle_triangles}), {}, {}};
+  MeshPair pair{"", scene_of({"peg", tool_triangles}, {"hole", obstacle_triangles}), {}, {}, {}};
   MeetingPairs pairs(pair.scene);
   for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
     const double t = path_s(i);
