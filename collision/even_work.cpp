@@ -8,21 +8,22 @@ namespace {
 
 /// How much the last tick counts among those before it, at least: for looks, which come and go, and for
 /// lists.
-constexpr double kNewest = 1.0 / 256.0;
+constexpr double kNewest = 1.0 / 1024.0;
 constexpr double kNewestList = 1.0 / 64.0;
 /// Ticks are brought up to so many times what looks and what lists usually take: one tick looks once, another
 /// several times, while lists are made evenly.
-constexpr double kEvenLooks = 2.2;
+constexpr double kEvenLooks = 2.5;
 constexpr double kEvenLists = 0.9;
-/// What a tick may take, as a multiple of the usual. With less, lists are late so often that they cost more.
-constexpr double kMost = 4.0;
+/// What a tick may take, as a multiple of what all are brought up to. With less, lists are late so often that
+/// they cost more.
+constexpr double kMost = 2.0;
 /// No tick is kept from so many visits, which take some fifty microseconds.
 constexpr double kAlways = 400.0;
 /// The same as long as nothing is known: a share of a millisecond.
 constexpr double kAtFirst = 3000.0;
 /// For every tick that was late the next may take so much more, as a share, and with every one that was not
 /// that is so much less: what is not soon done while the hand goes on has to be done for ever longer ways.
-constexpr double kAfterLate = 0.35;
+constexpr double kAfterLate = 0.5;
 constexpr double kMostLate = 8.0;
 constexpr double kForgotten = 0.8;
 constexpr double kFarTooMuch = 1e9;
@@ -43,7 +44,7 @@ double EvenWork::even() const noexcept {
 
 std::uint32_t EvenWork::most(double haste) const noexcept {
   const double least = learned_ > 0.0 ? kAlways : kAtFirst;
-  const double most = std::max(kMost * usual(), least) * (1.0 + kAfterLate * lateness_) * haste;
+  const double most = std::max(kMost * even(), least) * (1.0 + kAfterLate * lateness_) * haste;
   return static_cast<std::uint32_t>(std::min(most, kFarTooMuch));
 }
 

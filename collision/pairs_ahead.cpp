@@ -14,10 +14,13 @@ constexpr double kLeastReach = 1e-4;
 constexpr double kFirstReach = 1e-3;
 /// What a list made at once holds for beside its way, as a share of it.
 constexpr double kReach = 0.08;
-/// The same for a list made ahead, beside the way expected.
+/// The same for a list made ahead, beside the way expected. One that takes more visits than this, as close
+/// fits do, holds for less: there it is the reach that makes it long.
 constexpr double kReachAhead = 0.08;
+constexpr double kReachAheadOfDear = 0.04;
+constexpr std::uint32_t kDear = 4000;
 /// One that leads where the tool is expected holds for so many ticks.
-constexpr double kTicksAtOnce = 4.0;
+constexpr double kTicksAtOnce = 2.0;
 /// The longest way that a list is made for ahead, and the widest reach, in units of the tool's size: it
 /// serves for fewer ticks where the hand is faster. A hand that is faster still is followed at once.
 constexpr double kFarthestAhead = 0.2;
@@ -244,7 +247,8 @@ NearPairs::Way PairsAhead::way_ahead(double from_ticks, double to_ticks) const n
   const double r_m = scene_.tool_radius_m(), ticks = to_ticks - from_ticks;
   const Pose X_near = motion_.after(from_ticks), X_far = motion_.after(to_ticks);
   const double way_m = listed().way_m(motion_.after(0.0), X_far);  // what is expected may be wrong all along
-  const double reach_m = std::max(kReachAhead * way_m + motion_.bend_m(ticks, r_m), kLeastReach * r_m);
+  const double reach = visits_of_list_ < kDear ? kReachAhead : kReachAheadOfDear;
+  const double reach_m = std::max(reach * way_m + motion_.bend_m(ticks, r_m), kLeastReach * r_m);
   return {X_near, X_far, reach_m, last_s_ + from_ticks * tick_s_, last_s_ + to_ticks * tick_s_};
 }
 

