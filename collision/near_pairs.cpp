@@ -4,12 +4,6 @@
 #include <algorithm>
 
 namespace wrenchd {
-namespace {
-
-/// So many pairs are taken over in the time of a visit, and more where the meshes are small.
-constexpr std::size_t kPairsTakenPerVisit = 5;
-
-}  // namespace
 
 NearPairs::NearPairs(const Scene& scene)
     : scene_(scene), sieve_(TreeWalk::kCapacity, scene.meshes().size(), scene.tool_radius_m()) {
@@ -62,7 +56,7 @@ bool NearPairs::go_on(WalkBudget& budget) noexcept {
   bool ended = true;
   while (under_way() && ended) {
     ended = walk_.go_on(budget);
-    if (!take_over(budget)) {
+    if (!take_over()) {
       state_ = State::failed;
     } else if (ended) {
       if (++next_ == near_by_.size()) state_ = State::complete;
@@ -74,9 +68,8 @@ bool NearPairs::go_on(WalkBudget& budget) noexcept {
 }
 
 /// What the walk has found since. False where there is no room for it.
-bool NearPairs::take_over(WalkBudget& budget) noexcept {
+bool NearPairs::take_over() noexcept {
   const std::size_t found = walk_.size() - taken_;
-  budget.visits -= std::min(budget.visits, static_cast<std::uint32_t>(found / kPairsTakenPerVisit));
   if (!walk_.complete() || pairs_.size() + found > pairs_.capacity()) return false;
   const std::uint32_t obstacle = near_by_[next_];
   const MeshSurface& tool = scene_.tool_mesh()->surface;

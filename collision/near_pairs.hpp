@@ -80,7 +80,7 @@ class NearPairs {
   void find_near_by() noexcept;
   void find_moving_near_by() noexcept;
   void set_out_for_next() noexcept;
-  bool take_over(WalkBudget& budget) noexcept;
+  bool take_over() noexcept;
 
   const Scene& scene_;
   TreeWalk walk_;

@@ -186,7 +186,7 @@ TEST_CASE("a list that waits is given up where the way leads elsewhere", "[pairs
     return Pose{along(59).rotation, along(59).translation_m + s * Vector3d(0, 0, 2e-3)};
   };
   for (const double side : {1.0, -1.0, 1.0, -1.0}) {
-    WalkBudget budget = {kPlenty, kPlenty - 50};
+    WalkBudget budget = {kPlenty, kPlenty - 33};
     CHECK_FALSE(pairs.list(along(59), aside(side), budget));
   }
   WalkBudget budget = {kPlenty};
