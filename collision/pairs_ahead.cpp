@@ -19,6 +19,11 @@ constexpr double kReach = 0.08;
 constexpr double kReachAhead = 0.08;
 constexpr double kReachAheadOfDear = 0.04;
 constexpr std::uint32_t kDear = 4000;
+/// A tool that was not where it was expected is expected less surely: with every time lists ahead hold for so
+/// much more beside the way, up to so many times, and with every tick that it was there for a little less.
+constexpr double kLessSurely = 1.5;
+constexpr double kLeastSurely = 8.0;
+constexpr double kMoreSurely = 0.98;
 /// One that leads where the tool is expected holds for so many ticks.
 constexpr double kTicksAtOnce = 2.0;
 /// The longest way that a list is made for ahead, and the widest reach, in units of the tool's size: it
@@ -173,6 +178,7 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
   const double soon = ticks_to_serve();
   const Pose X_soon = motion_.after(soon);
   const double soon_s = time_s + soon * tick_s_;
+  unsure_ = astray_ ? std::min(kLessSurely * unsure_, kLeastSurely) : std::max(kMoreSurely * unsure_, 1.0);
   const bool astray = std::exchange(astray_, false) && !ahead_->will_cover(X_soon, soon_s);
   if (!ahead_->under_way() || astray) {
     if (provided(X_WT, soon, time_s, to_spare > 0)) return;
@@ -220,6 +226,7 @@ void PairsAhead::forget() noexcept {
   astray_ = late_ = late_tick_ = false;
   visits_of_list_ = 0;
   ticks_ahead_ = kMostTicksAhead;
+  unsure_ = 1.0;
 }
 
 /// How long the next list is to serve, by what this one took to make and takes to sieve.
@@ -247,8 +254,10 @@ NearPairs::Way PairsAhead::way_ahead(double from_ticks, double to_ticks) const n
   const double r_m = scene_.tool_radius_m(), ticks = to_ticks - from_ticks;
   const Pose X_near = motion_.after(from_ticks), X_far = motion_.after(to_ticks);
   const double way_m = listed().way_m(motion_.after(0.0), X_far);  // what is expected may be wrong all along
-  const double reach = visits_of_list_ < kDear ? kReachAhead : kReachAheadOfDear;
-  const double reach_m = std::max(reach * way_m + motion_.bend_m(ticks, r_m), kLeastReach * r_m);
+  const bool dear = visits_of_list_ >= kDear;
+  double reach_m = (dear ? kReachAheadOfDear : kReachAhead) * way_m + motion_.bend_m(ticks, r_m);
+  if (!dear) reach_m = std::max(reach_m, std::min(unsure_ * reach_m, kWidestAhead * r_m));
+  reach_m = std::max(reach_m, unsure_ * kLeastReach * r_m);
   return {X_near, X_far, reach_m, last_s_ + from_ticks * tick_s_, last_s_ + to_ticks * tick_s_};
 }
 

@@ -87,6 +87,7 @@ class PairsAhead {
   double last_s_ = 0.0, tick_s_ = 0.0;  ///< scene time of the last tick, and how long it was
   std::uint32_t visits_of_list_ = 0;    ///< that the last one made ahead took
   double ticks_ahead_;                  ///< that the next is to serve
+  double unsure_ = 1.0;                 ///< as a multiple of its reach where all goes as expected
 };
 
 }  // namespace wrenchd
