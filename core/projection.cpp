@@ -22,6 +22,8 @@ constexpr double kTouching = 1e-9;
 /// is taken.
 constexpr double kShortStep = 1e-7;
 constexpr double kSmallResidual = 2e-10;
+/// Where a short step no longer halves the residual, what is left is rounding, if it is no more than this.
+constexpr double kRoundedResidual = 1e-8;
 /// Curvature of the Lagrangian, relative to the metric's, that a step may count on where there is less.
 constexpr double kLeastCurvature = 1e-3;
 /// The gradient of a penetration of half a millionth of L: below it, the residual is measured against this.
@@ -622,11 +624,13 @@ bool ExactProjection::lift_turning(State& state) noexcept {
 /// scene has been asked about this state, and is about every next. A proxy begins without: the contacts that
 /// held it are taken for all there are until they have an answer, or one of them lets go.
 ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexcept {
+  double before_short_step = std::numeric_limits<double>::infinity();  // the residual
   for (;;) {
     linearise(state);
     const Vector6d g = gradient(state);
     residual_ = residual(g);
-    const bool converged = residual_ <= kSmallResidual;
+    const bool rounding = residual_ > 0.5 * before_short_step && residual_ <= kRoundedResidual;
+    const bool converged = residual_ <= kSmallResidual || rounding;
     if (converged || iterations_ == iteration_limit_ || at_end_of_leash_) {
       const Local local = converged ? Local::converged : Local::budget_spent;
       if (asked || (all_open() && meet_touching(state))) return local;
@@ -642,6 +646,8 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     const bool ask = asked || some_contact_idle();       // another has to take its place
     const Advance moved = stepped ? advance(state, dy, promised, ask) : Advance::stuck;
     if (moved == Advance::fell) asked = ask;
+    const bool short_step = moved == Advance::fell && dy.norm() < kShortStep;
+    before_short_step = short_step ? residual_ : std::numeric_limits<double>::infinity();
     if (moved != Advance::stuck) continue;  // contacts met: the same state, with a model that knows them
     if (at_end_of_leash_) continue;
     if (!asked) {

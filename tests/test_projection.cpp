@@ -308,6 +308,48 @@ TEST_CASE("on a leash the way to the optimum is gone in parts, and only falls", 
   }
 }
 
+// A peg of 0.1 kg wedged in its hole, a few micrometres from its own optimum: short steps that change nothing
+// but the last digits once took all iterations of every look of a tick.
+TEST_CASE("where only rounding is left between a step and the next, it has converged", "[projection]") {
+  Inertia M;
+  M.mass_kg = 0.1;
+  M.H_kg_m2 = Vector3d(3.2385630792490916e-05, 3.2385630792490916e-05, 4.7712615571153614e-06).asDiagonal();
+  const Pose X_WP = {
+      {0.99822427505494826, 0.00054135875248338954, 0.00022088457081877641, 0.059564711295619889},
+      {0.00012910555943592143, 8.7569800207081236e-05, 0.0067797181045571491}};
+  const Pose X_WT = {
+      {0.99822085862906185, 0.00043937281808227694, 0.00035483276671892475, 0.059622130480997057},
+      {0.00011041140835353479, 7.0032908039778239e-05, 0.0067797300022461949}};
+  Contact on_face;
+  on_face.p_TA_m = {0.0096106140468828743, 0.0019116699920376679, 0.029999999999999999};
+  on_face.p_WB_m = {0.0094502496392558158, 0.0028741318137598987, -1.6047026989022393e-05};
+  on_face.n_W = {-0.95672987638471518, -0.29097303032816207, 0.0016245782633905709};
+  on_face.offset_m = -0.0098776570822334507;
+  Contact edges;
+  edges.kind = ContactKind::edge_edge;
+  edges.p_TA_m = {0.0090687523687773778, 0.0037564002249507226, -0.012580645161290323};
+  edges.p_WB_m = {0.0092228253057413077, 0.0038202193250358365, -0.0038709677419354852};
+  edges.d_T = {0.00087203711252448039, 0.00036120959889981069, 0.99999955453935074};
+  edges.d_W = {-0.4652742741224028, 0.88516656615569866, 0.0};
+  edges.n_W = {-0.88516589822310499, -0.46527392303384546, 0.0012284818186439515};
+  Contact other_edges = edges;
+  other_edges.p_TA_m = {0.0069386711296257064, 0.0069386711296257047, -0.0048387096774193542};
+  other_edges.p_WB_m = {0.0070617127911089782, 0.0070617127911089764, 0.0038709677419354804};
+  other_edges.d_T = {0.00017067915382291445, 0.00017067915382291445, 0.99999997086862613};
+  other_edges.d_W = {-0.77465953089864248, 0.63237853473050087, 0.0};
+  other_edges.n_W = {-0.63237853289367196, -0.77465952864853926, 7.6218568983923827e-05};
+  const std::vector<ActiveContact> known = {{on_face, 1.502097730081543e-07},
+                                            {edges, 1.5189875077011699e-06},
+                                            {other_edges, 3.5588875652134989e-06}};
+  constexpr double kClearance_m = 1e-9;
+  ExactProjection exact(M, {}, kClearance_m);
+  const Projection q = exact.step(X_WP, X_WT, known, {0.01, 0.05});
+  CHECK(q.status == ProjectionStatus::converged);
+  CHECK(q.iterations < 10);
+  CHECK(q.kkt_residual < 1e-8);
+  for (const ActiveContact& active : known) CHECK(gap_m(active.contact, q.X_WQ) > 0.99 * kClearance_m);
+}
+
 TEST_CASE("a spent budget still answers with an admissible pose, no worse than translation", "[projection]") {
   RandomValues random(9);
   for (int i = 0; i < 50; ++i) {
