@@ -18,13 +18,15 @@ constexpr double kEvenLists = 0.9;
 /// they cost more.
 constexpr double kMost = 2.0;
 /// No tick is kept from so many visits, which take some fifty microseconds.
-constexpr double kAlways = 400.0;
+constexpr double kAlways = 250.0;
 /// The same as long as nothing is known: a share of a millisecond.
 constexpr double kAtFirst = 3000.0;
-/// For every tick that was late the next may take so much more, as a share, and with every one that was not
-/// that is so much less: what is not soon done while the hand goes on has to be done for ever longer ways.
+/// What is not done after so many late ticks has to be done for ever longer ways while the hand goes on: for
+/// every further one the next may take so much more, as a share, and with every one that is not late that is
+/// so much less.
+constexpr double kFewLate = 4.0;
 constexpr double kAfterLate = 0.5;
-constexpr double kMostLate = 8.0;
+constexpr double kMostLate = 10.0;
 constexpr double kForgotten = 0.8;
 constexpr double kFarTooMuch = 1e9;
 
@@ -44,7 +46,8 @@ double EvenWork::even() const noexcept {
 
 std::uint32_t EvenWork::most(double haste) const noexcept {
   const double least = learned_ > 0.0 ? kAlways : kAtFirst;
-  const double most = std::max(kMost * even(), least) * (1.0 + kAfterLate * lateness_) * haste;
+  const double more = 1.0 + kAfterLate * std::max(lateness_ - kFewLate, 0.0);
+  const double most = std::max(kMost * even(), least) * more * haste;
   return static_cast<std::uint32_t>(std::min(most, kFarTooMuch));
 }
 

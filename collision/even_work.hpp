@@ -17,9 +17,8 @@ class EvenWork {
   /// The tool is elsewhere now. RT safe.
   void forget() noexcept { *this = EvenWork(); }
 
-  /// What looks take in most ticks, and all work. RT safe.
+  /// What looks take in most ticks. RT safe.
   double usual_of_looks() const noexcept { return looks_; }
-  double usual() const noexcept { return looks_ + list_; }
   /// What every tick is brought up to, so that few need twice as much. RT safe.
   double even() const noexcept;
   /// What the next tick may take. haste: how many times faster the hand moves than one that can wait; at

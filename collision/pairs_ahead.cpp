@@ -14,11 +14,11 @@ constexpr double kLeastReach = 1e-4;
 constexpr double kFirstReach = 1e-3;
 /// What a list made at once holds for beside its way, as a share of it.
 constexpr double kReach = 0.08;
-/// The same for a list made ahead, beside the way expected. One that takes more visits than this, as close
-/// fits do, holds for less: there it is the reach that makes it long.
-constexpr double kReachAhead = 0.08;
-constexpr double kReachAheadOfDear = 0.04;
-constexpr std::uint32_t kDear = 4000;
+/// The same for a list made ahead, beside the way expected. One that takes more than so many visits holds for
+/// less, by their square root, down to the least: there it is the reach that makes it long.
+constexpr double kReachAhead = 0.12;
+constexpr double kLeastReachAhead = 0.04;
+constexpr double kDear = 2500.0;
 /// A tool that was not where it was expected is expected less surely: with every time lists ahead hold for so
 /// much more beside the way, up to so many times, and with every tick that it was there for a little less.
 constexpr double kLessSurely = 1.5;
@@ -34,10 +34,12 @@ constexpr double kWidestAhead = 0.02;
 constexpr double kMostTicksAhead = 7.0;
 constexpr double kLeastTicksAhead = 3.0;
 /// It is made while the one before it serves, evenly, and a little sooner than it is needed; it holds from
-/// half way there on.
+/// half way there on, or from where that one no longer does.
 constexpr double kHaste = 1.1;
 /// It may take more than the one before: so much more is still to do where that is done, as a share of it.
 constexpr double kUnforeseen = 0.2;
+/// One made at once is taken to need this share of what the one that serves took, before any was made.
+constexpr double kAtOnce = 0.5;
 constexpr double kFrom = 0.5;
 constexpr double kTo = 2.0;
 /// A long list is dear to sieve, more than once in a tick where contacts change; a short one is often to be
@@ -92,19 +94,35 @@ bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times
   };
   late_ = false;
   if (holds(*listed_)) return true;
-  if (ahead_->under_way() && will_hold(*ahead_)) {
+  if (ahead_->under_way() && will_hold(*ahead_) && is_sooner_made(most_visits(budget))) {
     if (go_on(*ahead_, most_visits(budget), budget)) weigh();
     if (ahead_->under_way() && budget.kept > 0) return late();
   }
   if (holds(*ahead_)) {
     serve(ahead_);
+    ahead_->clear();  // it has served
     return true;
   }
   if (!list_at_once(X_start, X_end, times, budget)) return false;
   ++made_at_once_;
+  visits_at_once_ = spare_->visits();
   serve(spare_);
-  astray_ = true;
+  const bool ahead_is_there = ahead_->under_way() || ahead_->complete();
+  astray_ = astray_ || (ahead_is_there && !ahead_->will_cover(X_end, times.end_s));
   return holds(*listed_);  // one that was late was made for where the tool was to go then
+}
+
+/// Is what is left of the list ahead sooner made than another at once? Not where it would take more than so
+/// many visits, and the other would not.
+bool PairsAhead::is_sooner_made(std::uint32_t most) const noexcept {
+  const double at_once = visits_at_once_ > 0 ? visits_at_once_ : kAtOnce * listed().visits();
+  return to_do() <= most || at_once > most;
+}
+
+/// What the list ahead takes yet, in visits.
+double PairsAhead::to_do() const noexcept {
+  const double expected = std::max(visits_of_list_, listed().visits());
+  return std::max(expected - ahead_->visits(), kUnforeseen * expected);
 }
 
 bool PairsAhead::late() noexcept {
@@ -182,7 +200,7 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
   const bool astray = std::exchange(astray_, false) && !ahead_->will_cover(X_soon, soon_s);
   if (!ahead_->under_way() || astray) {
     if (provided(X_WT, soon, time_s, to_spare > 0)) return;
-    const NearPairs::Way way = way_ahead(kFrom * soon, kTo * soon);
+    const NearPairs::Way way = way_ahead(holds_for_ticks(kFrom * soon, time_s), kTo * soon);
     if (!goes_slowly(way)) return;
     if (ahead_->covers(X_WT, time_s)) serve(ahead_);  // it holds for longer than the one that serves
     ahead_->set_out(way);
@@ -194,6 +212,14 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
     ticks_ahead_ = std::max(kFarFewer * ticks_ahead_, kLeastTicksAhead);
     ahead_->clear();
   }
+}
+
+/// For so many ticks, or as many more as the one that serves holds for, if they are fewer.
+double PairsAhead::holds_for_ticks(double most, double time_s) const noexcept {
+  double ticks = 0.0;
+  while (ticks < most && listed_->covers(motion_.after(ticks + 1.0), time_s + (ticks + 1.0) * tick_s_))
+    ++ticks;
+  return std::min(ticks, most);
 }
 
 /// Is there no list to be begun now? With work to spare the next is begun as soon as the last is made, if it
@@ -215,16 +241,14 @@ std::uint32_t PairsAhead::portion(const Pose& X_soon, double soon) const noexcep
     const double beyond_m = std::max(-listed().room_m(X_soon), 0.0);
     left = std::max(1.0, tick_m > 0.0 ? soon - beyond_m / tick_m : soon);
   }
-  const double expected = std::max(visits_of_list_, listed().visits());
-  const double to_do = std::max(expected - ahead_->visits(), kUnforeseen * expected);
-  return static_cast<std::uint32_t>(std::max(kHaste * to_do / left, kLeastPortion));
+  return static_cast<std::uint32_t>(std::max(kHaste * to_do() / left, kLeastPortion));
 }
 
 void PairsAhead::forget() noexcept {
   motion_.forget();
   for (NearPairs& list : lists_) list.clear();
   astray_ = late_ = late_tick_ = false;
-  visits_of_list_ = 0;
+  visits_of_list_ = visits_at_once_ = 0;
   ticks_ahead_ = kMostTicksAhead;
   unsure_ = 1.0;
 }
@@ -254,8 +278,9 @@ NearPairs::Way PairsAhead::way_ahead(double from_ticks, double to_ticks) const n
   const double r_m = scene_.tool_radius_m(), ticks = to_ticks - from_ticks;
   const Pose X_near = motion_.after(from_ticks), X_far = motion_.after(to_ticks);
   const double way_m = listed().way_m(motion_.after(0.0), X_far);  // what is expected may be wrong all along
-  const bool dear = visits_of_list_ >= kDear;
-  double reach_m = (dear ? kReachAheadOfDear : kReachAhead) * way_m + motion_.bend_m(ticks, r_m);
+  const bool dear = visits_of_list_ > kDear;
+  const double less = dear ? std::sqrt(kDear / visits_of_list_) : 1.0;
+  double reach_m = std::max(less * kReachAhead, kLeastReachAhead) * way_m + motion_.bend_m(ticks, r_m);
   if (!dear) reach_m = std::max(reach_m, std::min(unsure_ * reach_m, kWidestAhead * r_m));
   reach_m = std::max(reach_m, unsure_ * kLeastReach * r_m);
   return {X_near, X_far, reach_m, last_s_ + from_ticks * tick_s_, last_s_ + to_ticks * tick_s_};

@@ -62,6 +62,7 @@ class PairsAhead {
 
  private:
   bool late() noexcept;
+  bool is_sooner_made(std::uint32_t most) const noexcept;
   bool list_at_once(const Pose& X_start, const Pose& X_end, const Times& times, WalkBudget& budget) noexcept;
   NearPairs::Way way_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
                              double wait_ticks) const noexcept;
@@ -69,7 +70,9 @@ class PairsAhead {
   NearPairs::Way way_ahead(double from_ticks, double to_ticks) const noexcept;
   bool goes_slowly(const NearPairs::Way& way) const noexcept;
   bool provided(const Pose& X_WT, double soon, double time_s, bool to_spare) const noexcept;
+  double holds_for_ticks(double most, double time_s) const noexcept;
   double ticks_to_serve() const noexcept;
+  double to_do() const noexcept;
   std::uint32_t portion(const Pose& X_soon, double soon) const noexcept;
   void weigh() noexcept;
   void serve(NearPairs*& list) noexcept;
@@ -86,6 +89,7 @@ class PairsAhead {
   ExpectedMotion motion_;
   double last_s_ = 0.0, tick_s_ = 0.0;  ///< scene time of the last tick, and how long it was
   std::uint32_t visits_of_list_ = 0;    ///< that the last one made ahead took
+  std::uint32_t visits_at_once_ = 0;    ///< that the last one made at once took
   double ticks_ahead_;                  ///< that the next is to serve
   double unsure_ = 1.0;                 ///< as a multiple of its reach where all goes as expected
 };

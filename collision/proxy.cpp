@@ -32,7 +32,7 @@ constexpr double kGrowth = 1.5;
 /// some ticks late.
 constexpr double kPatientWay = 0.005;
 /// What is made ahead may fill a tick up to so many times what ticks are brought up to.
-constexpr double kAheadUpTo = 1.2;
+constexpr double kAheadUpTo = 1.35;
 /// A look, the step before it included, takes the time of so many visits beside those that it counts.
 constexpr std::uint32_t kVisitsPerLook = 18;
 /// So many looks are always taken.
@@ -144,6 +144,7 @@ Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
     const bool whole = q.status == ProjectionStatus::converged || q.status == ProjectionStatus::free;
     const Way way = look_along(q.X_WQ, seen_s_);
     if (way == Way::met_contacts) {
+      if (late_ && looks_ >= kFewLooks && worked_enough()) break;
       share = 1.0;
       continue;
     }

@@ -14,7 +14,6 @@ EvenWork after(int ticks, std::uint32_t looks, double list) {
 
 TEST_CASE("a tick may take a few times what ticks usually take, and no more", "[even_work]") {
   const EvenWork work = after(200, 300, 700.0);
-  CHECK(work.usual() == Approx(1000.0));
   CHECK(work.usual_of_looks() == Approx(300.0));
   CHECK(work.most(1.0) > 1500);
   CHECK(work.most(1.0) <= 4000);
@@ -29,8 +28,10 @@ TEST_CASE("one tick that takes far more changes little", "[even_work]") {
 
 TEST_CASE("what becomes dearer for good is the usual soon", "[even_work]") {
   EvenWork work = after(200, 100, 100.0);
+  const double before = work.even();
   for (int i = 0; i < 1000; ++i) work.learn(500, 1000.0, false);
-  CHECK(work.usual() > 1400.0);
+  CHECK(work.even() > 5.0 * before);
+  CHECK(work.usual_of_looks() > 300.0);
 }
 
 TEST_CASE("a tool that rested may move as soon as it is moved: lists count, not what rest took",
@@ -45,15 +46,17 @@ TEST_CASE("small work is never cut, and nor is a fast hand", "[even_work]") {
   CHECK(work.most(1e30) > 1'000'000);
 }
 
-TEST_CASE("after a tick that was late the next may take more, after others it is as before", "[even_work]") {
+TEST_CASE("where tick after tick is late the next may take more, and after others it is as before",
+          "[even_work]") {
   EvenWork work = after(200, 300, 700.0);
   const std::uint32_t before = work.most(1.0);
-  work.learn(300, 700.0, true);
-  const std::uint32_t after_one = work.most(1.0);
-  CHECK(after_one > 1.2 * before);
-  CHECK(after_one < 2.0 * before);
+  for (int i = 0; i < 3; ++i) work.learn(300, 700.0, true);
+  CHECK(work.most(1.0) <= 1.01 * before);  // the hand can wait so long
+  for (int i = 0; i < 4; ++i) work.learn(300, 700.0, true);
+  const std::uint32_t after_some = work.most(1.0);
+  CHECK(after_some > 1.2 * before);
   for (int i = 0; i < 100; ++i) work.learn(300, 700.0, true);
-  CHECK(work.most(1.0) > 2.0 * after_one);  // it does not fall behind for good
+  CHECK(work.most(1.0) > 1.5 * after_some);  // it does not fall behind for good
   CHECK(work.most(1.0) < 6.0 * before);
   for (int i = 0; i < 50; ++i) work.learn(300, 700.0, false);
   CHECK(work.most(1.0) <= 1.01 * before);
@@ -66,7 +69,7 @@ TEST_CASE("ticks are brought up to what few need twice of: looks come and go, li
   CHECK(2.0 * work.even() > 260.0 + 50.0);
   CHECK(2.0 * work.even() <= work.most(1.0) + 1.0);
   const EvenWork listing = after(1000, 100, 3000.0);
-  CHECK(listing.even() < 1.1 * listing.usual());
+  CHECK(listing.even() < 1.1 * (100.0 + 3000.0));
   CHECK(EvenWork().even() == 0.0);  // nothing is known
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -114,6 +116,81 @@ TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pa
   }
   REQUIRE(changes == 2);
   CHECK(pairs.made_at_once() == before);
+}
+
+// A look may go farther than the tool comes in the end: what was left for it is not gone back to.
+TEST_CASE("a list that has served does not come back", "[pairs_ahead]") {
+  PairsAhead pairs(bumpy_bodies());
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
+  int changes = 0;
+  for (int i = 60; i < 160; ++i) {
+    const NearPairs* before = &pairs.listed();
+    WalkBudget budget = {kPlenty};
+    REQUIRE(pairs.list(along(i - 1), along(i + 2), budget));
+    const bool changed = &pairs.listed() != before;
+    pairs.look_ahead(along(i), along(i), budget, 0.0, changed ? 1000 : 0);
+    CHECK(pairs.listed().covers(along(i + 2)));
+    changes += changed ? 1 : 0;
+  }
+  CHECK(changes > 5);
+}
+
+// For some ticks no work is left for the list ahead, until the one that serves holds no longer.
+TEST_CASE("what can be made at once goes before a list ahead that cannot be ended in time", "[pairs_ahead]") {
+  const Scene scene = scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, Motion::slide, {}});
+  const auto round = [](int i) {
+    const double angle = 2e-3 * i;
+    return Pose{rotation_from(Vector3d(0, 0, -angle)), 0.1 * Vector3d(std::cos(angle), std::sin(angle), 0)};
+  };
+  const auto made_at_once = [&](std::uint32_t part) {
+    PairsAhead pairs(scene);
+    int i = -60;
+    double widest_m = 0.0;
+    const auto go_to = [&](int last) {
+      for (; i < last; ++i) {
+        REQUIRE(tick(pairs, round(i - 1), round(i)));
+        if (i >= -20) widest_m = std::max(widest_m, pairs.listed().room_m(round(i)));
+      }
+    };
+    go_to(0);
+    const std::uint32_t before = pairs.made_at_once();
+    for (WalkBudget budget; budget.visits == 0 || budget.visits == kPlenty; ++i) {
+      REQUIRE(i < 100);
+      budget = {kPlenty, kPlenty - part};
+      const bool listed = pairs.list(round(i - 1), round(i), budget);
+      CHECK(listed != pairs.waits());
+      CHECK(kPlenty - budget.visits <= part + 1);
+      WalkBudget starved = {2};
+      pairs.look_ahead(round(i), round(i), starved);
+    }
+    const bool made = pairs.made_at_once() > before;
+    // The tool was where it was expected: the lists to come need not hold for more.
+    const double usual_m = std::exchange(widest_m, 0.0);
+    go_to(i + 20);
+    CHECK(widest_m < 1.2 * usual_m);
+    return made;
+  };
+  CHECK_FALSE(made_at_once(2000));  // the list ahead is ended
+  CHECK(made_at_once(600));
+  CHECK_FALSE(made_at_once(100));  // the list ahead is gone on with
+}
+
+TEST_CASE("after a list made at once the next leads on from where it ends", "[pairs_ahead]") {
+  PairsAhead pairs(bumpy_bodies());
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, along(i - 1), along(i)));
+  const std::uint32_t before = pairs.made_at_once();
+  const auto aside = [&](int i) {
+    return Pose{along(i).rotation, along(i).translation_m + Vector3d(0, 0, 3e-4)};
+  };
+  WalkBudget budget = {kPlenty};
+  REQUIRE(pairs.list(along(59), aside(60), budget));
+  pairs.look_ahead(aside(60), along(60), budget);
+  for (int i = 61; i < 90; ++i) {
+    budget = {kPlenty};
+    REQUIRE(pairs.list(aside(i - 1), aside(i), budget));
+    pairs.look_ahead(aside(i), along(i), budget);
+  }
+  CHECK(pairs.made_at_once() == before + 1);
 }
 
 TEST_CASE("what turns round is listed at once", "[pairs_ahead]") {
