@@ -17,7 +17,7 @@ constexpr double kEvenLists = 0.9;
 /// What a tick may take, as a multiple of what all are brought up to. With less, lists are late so often that
 /// they cost more.
 constexpr double kMost = 2.0;
-/// No tick is kept from so many visits, which take some fifty microseconds.
+/// No tick is kept from so many visits, which take some thirty microseconds.
 constexpr double kAlways = 250.0;
 /// The same as long as nothing is known: a share of a millisecond.
 constexpr double kAtFirst = 3000.0;
