@@ -33,15 +33,15 @@ constexpr double kWidestAhead = 0.02;
 /// A list made ahead is to serve for so many ticks, at most and at least.
 constexpr double kMostTicksAhead = 7.0;
 constexpr double kLeastTicksAhead = 3.0;
-/// It is made while the one before it serves, evenly, and a little sooner than it is needed; it holds from
-/// half way there on, or from where that one no longer does.
+/// It is made while the one before it serves, evenly, and a little sooner than it is needed.
 constexpr double kHaste = 1.1;
 /// It may take more than the one before: so much more is still to do where that is done, as a share of it.
 constexpr double kUnforeseen = 0.2;
-/// One made at once is taken to need this share of what the one that serves took, before any was made.
-constexpr double kAtOnce = 0.5;
+/// It holds from half way there on, or from where the one before it no longer does, to twice as far as there.
 constexpr double kFrom = 0.5;
 constexpr double kTo = 2.0;
+/// One made at once is taken to need this share of what the one that serves took, before any was made.
+constexpr double kAtOnce = 0.5;
 /// A long list is dear to sieve, more than once in a tick where contacts change; a short one is often to be
 /// made: where one costs so many times the other, the next is made for fewer ticks or for more.
 constexpr double kSieved = 2.0;
@@ -214,7 +214,7 @@ void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budg
   }
 }
 
-/// For so many ticks, or as many more as the one that serves holds for, if they are fewer.
+/// For how many ticks yet the list that serves holds, if the tool goes where it is expected; so many at most.
 double PairsAhead::holds_for_ticks(double most, double time_s) const noexcept {
   double ticks = 0.0;
   while (ticks < most && listed_->covers(motion_.after(ticks + 1.0), time_s + (ticks + 1.0) * tick_s_))

@@ -112,7 +112,7 @@ void Proxy::look_ahead(const Pose& X_WT, const Pose& X_WP) noexcept {
 }
 
 bool Proxy::worked_enough() const noexcept {
-  return budget_.visits <= least_left_;
+  return looks_ >= kFewLooks && budget_.visits <= least_left_;
 }
 
 void Proxy::forget(double time_s) noexcept {
@@ -144,7 +144,7 @@ Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
     const bool whole = q.status == ProjectionStatus::converged || q.status == ProjectionStatus::free;
     const Way way = look_along(q.X_WQ, seen_s_);
     if (way == Way::met_contacts) {
-      if (late_ && looks_ >= kFewLooks && worked_enough()) break;
+      if (late_ && worked_enough()) break;  // they are known in the next tick
       share = 1.0;
       continue;
     }
@@ -167,7 +167,7 @@ Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
     if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
     const bool all_hold = !let_go(q);
     share = all_hold ? std::min(1.0, kLonger * share) : kWary;
-    if (!all_hold && looks_ >= kFewLooks && worked_enough()) {
+    if (!all_hold && worked_enough()) {
       late_ = true;
       break;
     }

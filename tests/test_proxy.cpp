@@ -430,7 +430,7 @@ TEST_CASE("a tool that is not where it was expected is late now and then, not al
   const auto late = std::count_if(
       all.begin(), all.end(), [](const Projection& q) { return q.status == ProjectionStatus::budget_spent; });
   CHECK(late < 40);
-  CHECK(*std::max_element(visits.begin(), visits.end()) < 3000);
+  CHECK(*std::max_element(visits.begin(), visits.end()) < 1300);
 }
 
 TEST_CASE("following a hand through meshes neither allocates nor locks", "[realtime][proxy]") {
