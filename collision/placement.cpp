@@ -68,21 +68,6 @@ Proxy::Effort all_at_once() noexcept {
 
 Placement::Placement(const Scene& scene) : scene_(scene), half_spaces_(scene), proxy_(scene, all_at_once()) {}
 
-bool Placement::meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept {
-  const TreedMesh& tool = *scene_.tool_mesh();
-  WalkBudget budget = {std::numeric_limits<std::uint32_t>::max()};
-  if (!walk_.find(tool.tree, obstacle.mesh->tree, {X_OT, X_OT}, budget))
-    return true;  // far too much to be free
-  return std::any_of(walk_.begin(), walk_.end(), [&](const TrianglePair& pair) {
-    Triangle a, b;
-    for (int i = 0; i < 3; ++i) {
-      a[static_cast<std::size_t>(i)] = X_OT * tool.surface.corner_m(pair.a, i);
-      b[static_cast<std::size_t>(i)] = obstacle.mesh->surface.corner_m(pair.b, i);
-    }
-    return triangles_meet(a, b);
-  });
-}
-
 /// Two surfaces that do not meet are apart, or one body holds the other.
 bool Placement::admissible(const Pose& X_WT, double time_s) noexcept {
   if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
@@ -91,7 +76,8 @@ bool Placement::admissible(const Pose& X_WT, double time_s) noexcept {
     const double centres_m = (X_WO * obstacle.centre_O_m - X_WT.translation_m).norm();
     if (centres_m > obstacle.radius_m + scene_.tool_radius_m()) continue;
     const Pose X_OT = inverse(X_WO) * X_WT;
-    if (meets(obstacle, X_OT)) return false;
+    if (!meeting_.find(*scene_.tool_mesh(), *obstacle.mesh, X_OT)) return false;  // far too much to be free
+    if (!meeting_.pairs().empty()) return false;
     const MeshSurface& tool = scene_.tool_mesh()->surface;
     const MeshSurface& solid = obstacle.mesh->surface;
     if (inside(tool, inverse(X_OT) * solid.corner_m(0, 0))) return false;

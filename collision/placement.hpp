@@ -3,9 +3,9 @@
 
 #include <stop_token>
 
+#include "collision/meeting_pairs.hpp"
 #include "collision/proxy.hpp"
 #include "collision/scene.hpp"
-#include "collision/tree_walk.hpp"
 
 namespace wrenchd {
 
@@ -32,13 +32,12 @@ class Placement {
   Projection nearest(const Pose& X_WP, const std::stop_token& stop = {}, double time_s = 0.0) noexcept;
 
  private:
-  bool meets(const MeshObstacle& obstacle, const Pose& X_OT) noexcept;
   Projection settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop,
                      double time_s) noexcept;
 
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;
-  TreeWalk walk_;
+  MeetingPairs meeting_;
   Proxy proxy_;
 };
 

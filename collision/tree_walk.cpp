@@ -21,7 +21,7 @@ walk::Transform travel(const Pose& from, const Pose& to) noexcept {
 /// angle^2 r / 8, and the line's middle lies as far from where the pose half way takes it.
 walk::Motion motion_of(const Sweep& sweep, double least_radius_a_m, double extent_m) noexcept {
   const double radius_a_m = std::sqrt(3.0) * least_radius_a_m;
-  const auto& [start, end, reach_m, all_pairs] = sweep;
+  const auto& [start, end, reach_m, all_pairs, settle] = sweep;
   walk::Motion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
@@ -46,6 +46,7 @@ walk::Motion motion_of(const Sweep& sweep, double least_radius_a_m, double exten
   motion.centre_way = static_cast<float>((end.translation_m - start.translation_m).norm());
   motion.moving =
       start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
+  motion.settle = settle && all_pairs && !motion.moving && reach_m == 0.0;
   return motion;
 }
 

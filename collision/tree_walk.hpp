@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "collision/single_precision.hpp"
@@ -26,6 +27,8 @@ struct Sweep {
   double reach_m = 0.0;
   /// False: list only pairs with features that can meet first, a vertex in one of them or an edge in each.
   bool all_pairs = true;
+  /// For a single pose without reach, all pairs: which meet there is told as far as single precision can.
+  bool settle = false;
 };
 
 /// How much work a walk may do, and did: it is counted in work and not in time, so that a replay does the
@@ -51,6 +54,7 @@ struct Motion {
   float centre_way;   ///< how far the centre has come [m]
   bool moving;
   bool all_pairs;
+  bool settle;
 };
 struct Tree {
   const TriangleTree::Box* boxes;
@@ -61,13 +65,13 @@ struct Tree {
 struct Job {
   Tree a, b;
   Motion motion;
-  TrianglePair* pairs;  ///< room for pairs
+  TrianglePair* pairs;  ///< room for pairs: listed from the front, those that surely meet from the back
   std::uint32_t capacity;
   std::uint32_t* stack;  ///< room for kStack pairs of box numbers
   void* moved_leaves;    ///< room for kMovedLeavesBytes, aligned to 64
   std::uint32_t visits_allowed = 0;
   // How far it has come:
-  std::uint32_t visits = 0, pair_count = 0, stack_top = 0;
+  std::uint32_t visits = 0, pair_count = 0, meeting_count = 0, stack_top = 0;
   bool begun = false;
   bool overflow = false;  ///< there was no room for all
 };
@@ -111,6 +115,12 @@ class TreeWalk {
   bool go_on(WalkBudget& budget) noexcept;
   /// Was there room for all pairs, as far as it came?
   bool complete() const noexcept { return !job_.overflow; }
+
+  /// Of a walk that settles: pairs that meet for sure. What is listed besides is in doubt, what is not
+  /// listed is apart.
+  std::span<const TrianglePair> meeting() const noexcept {
+    return std::span(pairs_).last(job_.meeting_count);
+  }
 
   const TrianglePair* begin() const noexcept { return pairs_.data(); }
   const TrianglePair* end() const noexcept { return pairs_.data() + job_.pair_count; }

@@ -224,6 +224,90 @@ WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleTree::Leaf
   return bits(apart) ^ 255U;
 }
 
+/// Heights of the corners of eight triangles, or of one over eight planes.
+struct Heights {
+  Float8 h[3];
+
+  WRENCHD_INLINE Mask8 one_side(float margin) const noexcept {
+    const Mask8 above = smaller(smaller(h[0], h[1]), h[2]) > margin;
+    return above | (larger(larger(h[0], h[1]), h[2]) < -margin);
+  }
+  WRENCHD_INLINE Float8 least() const noexcept {
+    return smaller(smaller(magnitude(h[0]), magnitude(h[1])), magnitude(h[2]));
+  }
+};
+
+/// Where triangles that planes cut meet them, along the line of the cut, and what the ends may be wrong by.
+struct Cuts {
+  Float8 low = all(3e38F), high = all(-3e38F), wrong = all(0.0F);
+
+  /// x: the corners' coordinates along the line. A side whose ends lie on two sides of the plane is cut where
+  /// its height is zero; heights that are wrong by `margin` shift that place along the side.
+  WRENCHD_INLINE Cuts(const Float8 (&x)[3], const Heights& above, float margin) noexcept {
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3;
+      const Float8 drop = above.h[i] - above.h[j], along = x[j] - x[i];
+      const Float8 cut = x[i] + along * (above.h[i] / drop);
+      const Float8 shift = magnitude(along) * margin / (magnitude(drop) - 2.0F * margin);
+      const Mask8 crosses = (above.h[i] > 0.0F) != (above.h[j] > 0.0F);
+      low = crosses ? smaller(low, cut) : low;
+      high = crosses ? larger(high, cut) : high;
+      wrong = crosses ? larger(wrong, shift) : wrong;
+    }
+  }
+};
+
+struct Settled {
+  unsigned meet, doubtful;
+};
+
+/// Triangle i of a leaf of A against the eight of a leaf of B, at one pose, heights and coordinates wrong by
+/// `margin` at most: two triangles meet where each cuts the other's plane, and the cuts overlap on the line
+/// where the planes meet. The line has the length of the sine of the planes' angle: where that is so small
+/// that rounding could turn it, what overlaps along it is within `margin` too.
+WRENCHD_INLINE Settled settle(const MovedLeaf& a, int i, const TriangleTree::Leaf& b, Mask8 apart,
+                              float margin) noexcept {
+  for (int d = 0; d < 3; ++d) {
+    apart |= load(b.low[d]) > a.high[d][i];
+    apart |= load(b.high[d]) < a.low[d][i];
+  }
+  if (bits(apart) == 255) return {0, 0};
+  const float(&corner)[3][3][kWidth] = a.corner[1];
+  const float(&normal)[3][kWidth] = a.normal[1];
+  const Float8 m[3] = {load(b.normal[0]), load(b.normal[1]), load(b.normal[2])};
+  const Float8 offset = load(b.offset);
+  Heights a_above, b_above;
+  for (int k = 0; k < 3; ++k)
+    a_above.h[k] = m[0] * corner[k][0][i] + m[1] * corner[k][1][i] + m[2] * corner[k][2][i] - offset;
+  apart |= a_above.one_side(margin);
+  if (bits(apart) == 255) return {0, 0};
+  Float8 q[3][3];
+  for (int k = 0; k < 3; ++k) {
+    for (int d = 0; d < 3; ++d) q[k][d] = load(b.corner[k][d]);
+    b_above.h[k] = q[k][0] * normal[0][i] + q[k][1] * normal[1][i] + q[k][2] * normal[2][i] - a.offset[1][i];
+  }
+  apart |= b_above.one_side(margin);
+  if (bits(apart) == 255) return {0, 0};
+  const float n[3] = {normal[0][i], normal[1][i], normal[2][i]};
+  const Float8 line[3] = {m[2] * n[1] - m[1] * n[2], m[0] * n[2] - m[2] * n[0], m[1] * n[0] - m[0] * n[1]};
+  // From a corner of A, so that a place far from the origin costs no digits.
+  Float8 x_a[3], x_b[3];
+  for (int k = 0; k < 3; ++k) {
+    x_a[k] = x_b[k] = all(0.0F);
+    for (int d = 0; d < 3; ++d) {
+      x_a[k] += line[d] * (corner[k][d][i] - corner[0][d][i]);
+      x_b[k] += line[d] * (q[k][d] - corner[0][d][i]);
+    }
+  }
+  const Cuts in_a(x_a, a_above, margin), in_b(x_b, b_above, margin);
+  const Float8 overlap = smaller(in_a.high, in_b.high) - larger(in_a.low, in_b.low);
+  const Float8 wrong = in_a.wrong + in_b.wrong + 2.0F * margin;
+  Mask8 clear = smaller(a_above.least(), b_above.least()) > margin;
+  clear &= magnitude(overlap) > wrong;
+  const unsigned sure = bits(clear), left = bits(apart) ^ 255U;
+  return {left & sure & bits(overlap > 0.0F), left & ~sure};
+}
+
 /// How far the boxed part of B may be from this place.
 WRENCHD_INLINE float distance_bound(const TriangleTree::Box& box, const float* centre) noexcept {
   float sum = box.half[0] + box.half[1] + box.half[2];
@@ -323,6 +407,10 @@ class Walk {
     unsigned rows = (1U << box_a.count) - 1;
     rows &= ~bits(beside(a.low, a.high, b.low_of_all, b.high_of_all));
     if (rows == 0) return;
+    if (m.settle) {
+      settle_leaves(box_a, a, b, rows & ~bits(miss(a, standing(box_b), m.rounding, false)), apart);
+      return;
+    }
     const float far = (distance_bound(box_b, m.centre_B) + m.centre_way) / m.radius;
     const float margin_of_plane = m.rounding + m.reach * (far > 1.0F ? far : 1.0F);
     for (rows &= ~bits(miss(a, standing(box_b), margin_of_plane, m.moving)); rows != 0; rows &= rows - 1) {
@@ -340,6 +428,23 @@ class Walk {
         }
         job_.pairs[job_.pair_count++] = {ta, b.triangle[__builtin_ctz(hits)]};
       }
+    }
+  }
+
+  void settle_leaves(const TriangleTree::Box& box_a, const MovedLeaf& a, const TriangleTree::Leaf& b,
+                     unsigned rows, Mask8 apart) noexcept {
+    const std::uint32_t* triangle_a = job_.a.leaves[box_a.child].triangle;
+    for (; rows != 0; rows &= rows - 1) {
+      const int i = __builtin_ctz(rows);
+      const auto [meet, doubtful] = settle(a, i, b, apart, job_.motion.margin);
+      if (job_.pair_count + job_.meeting_count + kWidth > job_.capacity) {
+        job_.overflow = true;
+        return;
+      }
+      for (unsigned hits = meet; hits != 0; hits &= hits - 1)
+        job_.pairs[job_.capacity - ++job_.meeting_count] = {triangle_a[i], b.triangle[__builtin_ctz(hits)]};
+      for (unsigned hits = doubtful; hits != 0; hits &= hits - 1)
+        job_.pairs[job_.pair_count++] = {triangle_a[i], b.triangle[__builtin_ctz(hits)]};
     }
   }
 

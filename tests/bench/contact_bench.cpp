@@ -20,9 +20,11 @@ constexpr int kTicksAtRest = 20;
 
 /// The value is the number of pairs of triangles that meet.
 Runner pairs_runner(const MeshPair& pair) {
-  const auto pairs = std::make_shared<MeetingPairs>(pair.scene);
+  const auto pairs = std::make_shared<MeetingPairs>();
   return {"wrenchd all pairs", [] {},
-          [pairs, &pair](std::size_t i) { return Answer{static_cast<double>(pairs->count(pair.X_WP[i]))}; }};
+          [pairs, &pair](std::size_t i) {
+            return Answer{static_cast<double>(meeting(*pairs, pair.scene, pair.X_WP[i]))};
+          }};
 }
 
 /// The whole tick: contacts, projection, verification and wrench. The value is the energy.

@@ -3,11 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "collision/tree_walk.hpp"
-#include "collision/triangle_pair.hpp"
-#include "core/frame.hpp"
 #include "tests/support/handling.hpp"
 
 namespace wrenchd::bench {
@@ -19,13 +15,13 @@ Scene scene_of(const MadeMesh& tool, const MadeMesh& obstacle) {
   return Scene(test::mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
 }
 
-/// Where on a line the bodies begin to overlap, between a free place and one where they do. pose(x): where.
-template <class PoseAt>
-double touching(MeetingPairs& pairs, double free, double overlapping, const PoseAt& pose) {
+/// Where on a line the bodies begin to overlap, between a free place and one where they do.
+template <class Overlap>
+double touching(double free, double overlapping, const Overlap& overlap) {
   constexpr int kHalvings = 40;
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (free + overlapping);
-    (pairs.count(pose(middle)) > 0 ? overlapping : free) = middle;
+    (overlap(middle) ? overlapping : free) = middle;
   }
   return free;
 }
@@ -40,29 +36,14 @@ double path_s(int i) {
 
 }  // namespace
 
-std::size_t MeetingPairs::count(const Pose& X_WT) {
-  const MeshSurface& a = scene_.tool_mesh()->surface;
-  const MeshSurface& b = scene_.meshes()[0].mesh->surface;
-  WalkBudget budget = {std::numeric_limits<std::uint32_t>::max()};
-  walk_.find(scene_.tool_mesh()->tree, scene_.meshes()[0].mesh->tree, {X_WT, X_WT}, budget);
-  const Frame X(X_WT);
-  std::size_t meeting = 0;
-  std::uint32_t moved_number = MeshSurface::kNone;
-  Triangle moved;
-  for (const TrianglePair& pair : walk_) {
-    if (pair.a != moved_number) {
-      moved = {X * a.corner_m(pair.a, 0), X * a.corner_m(pair.a, 1), X * a.corner_m(pair.a, 2)};
-      moved_number = pair.a;
-    }
-    meeting +=
-        triangles_meet(moved, {b.corner_m(pair.b, 0), b.corner_m(pair.b, 1), b.corner_m(pair.b, 2)}) ? 1 : 0;
-  }
-  return meeting;
+std::size_t meeting(MeetingPairs& pairs, const Scene& scene, const Pose& X_WT) {
+  pairs.find(*scene.tool_mesh(), *scene.meshes()[0].mesh, X_WT);
+  return pairs.pairs().size();
 }
 
 MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
   MeshPair pair{"", scene_of({"bumpy", tool_triangles, 1}, {"boulder", obstacle_triangles, 2}), {}, {}, {}};
-  MeetingPairs pairs(pair.scene);
+  MeetingPairs pairs;
   double last_m = 0.13;
   for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
     const double t = path_s(i);
@@ -72,12 +53,13 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
     const Vector3d axis = Vector3d(0.3 + 0.2 * std::sin(t), 1.0, 0.5 * std::cos(t)).normalized();
     const Quaterniond R = rotation_from((t + 0.15 * std::sin(9.0 * t)) * axis);
     const auto at = [&](double away_m) { return Pose{R, away_m * out}; };
+    const auto overlap = [&](double away_m) { return meeting(pairs, pair.scene, at(away_m)) > 0; };
     double free_m = last_m + 0.002, overlapping_m = free_m;
-    while (pairs.count(at(overlapping_m)) == 0) {
+    while (!overlap(overlapping_m)) {
       free_m = overlapping_m;
       overlapping_m -= 0.0005;
     }
-    last_m = touching(pairs, free_m, overlapping_m, at);
+    last_m = touching(free_m, overlapping_m, overlap);
     if (i == -kTicksBefore) pair.X_start = at(last_m + 1e-4);
     (i < 0 ? pair.X_WP_before : pair.X_WP).push_back(at(last_m - 0.00025 - 0.0002 * std::sin(25.0 * t)));
   }
@@ -86,7 +68,7 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
 
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
   MeshPair pair{"", scene_of({"peg", tool_triangles}, {"hole", obstacle_triangles}), {}, {}, {}};
-  MeetingPairs pairs(pair.scene);
+  MeetingPairs pairs;
   for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
     const double t = path_s(i);
     const Quaterniond R =
@@ -95,14 +77,15 @@ MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles,
     const auto at = [&](double aside_m) {
       return Pose{R, {aside_m * std::cos(4.0 * t), aside_m * std::sin(4.0 * t), 0.010 * std::sin(5.0 * t)}};
     };
+    const auto overlap = [&](double aside_m) { return meeting(pairs, pair.scene, at(aside_m)) > 0; };
     double free_m = 0.0, overlapping_m = 0.0;
-    while (pairs.count(at(overlapping_m)) == 0) {
+    while (!overlap(overlapping_m)) {
       free_m = overlapping_m;
       overlapping_m += 2e-5;
     }
     if (i == -kTicksBefore) pair.X_start = at(0.0);
     (i < 0 ? pair.X_WP_before : pair.X_WP)
-        .push_back(at(touching(pairs, free_m, overlapping_m, at) + 0.00005 + 0.00003 * std::sin(25.0 * t)));
+        .push_back(at(touching(free_m, overlapping_m, overlap) + 0.00005 + 0.00003 * std::sin(25.0 * t)));
   }
   return pair;
 }

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "collision/meeting_pairs.hpp"
 #include "collision/scene.hpp"
-#include "collision/tree_walk.hpp"
 #include "core/make_mesh.hpp"
 
 namespace wrenchd::bench {
@@ -27,16 +27,7 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
 /// 20 to 80 um deep. Tens of thousands of triangles are near each other all the time.
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses);
 
-/// All pairs of triangles that meet, found anew at each pose.
-class MeetingPairs {
- public:
-  explicit MeetingPairs(const Scene& scene) : scene_(scene) {}
-
-  std::size_t count(const Pose& X_WT);
-
- private:
-  const Scene& scene_;
-  TreeWalk walk_;
-};
+/// How many pairs of triangles of tool and obstacle meet, found anew at each pose.
+std::size_t meeting(MeetingPairs& pairs, const Scene& scene, const Pose& X_WT);
 
 }  // namespace wrenchd::bench
