@@ -79,7 +79,7 @@ TEST_CASE("wrenchctl tells that a device without motors is not felt", "[control_
 }
 
 TEST_CASE("wrenchctl arm holds the hand until it is interrupted, and everybody can watch",
-          "[control_commands]") {
+          "[control_commands][wall_time]") {
   const Daemon daemon;
   RunningProgram watch("wrenchctl", {"watch", "--socket", daemon.socket, "--json"});
   for (int i = 0; i < 500 && watch.out().empty(); ++i)
@@ -123,7 +123,7 @@ TEST_CASE("wrenchctl arm holds the hand until it is interrupted, and everybody c
   has(states, "waiting ramping active releasing disarmed waiting ramping active releasing disarmed ");
 }
 
-TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands]") {
+TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wall_time]") {
   const Daemon daemon;
   RunningProgram arm("wrenchctl", {"arm", "--socket", daemon.socket});
   REQUIRE(daemon.comes_to("active"));

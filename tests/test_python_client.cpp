@@ -54,7 +54,8 @@ TEST_CASE("the Python package does what it says", "[python]") {
   CHECK(ran.out.find("Ran ") != std::string::npos);
 }
 
-TEST_CASE("the Python client reads 1,000 consecutive ticks while the machine is loaded", "[python]") {
+TEST_CASE("the Python client reads 1,000 consecutive ticks while the machine is loaded",
+          "[python][wall_time]") {
   StubDaemon daemon;
   const Ran ran = run_python(daemon.socket(), "tests/python/consecutive_ticks.py");
   INFO(ran.out);
@@ -71,7 +72,7 @@ TEST_CASE("the Python example works as printed", "[python]") {
   CHECK(ran.out.find("\nticks missed: 0\n") != std::string::npos);
 }
 
-TEST_CASE("all of them work with wrenchd itself", "[python][program]") {
+TEST_CASE("all of them work with wrenchd itself", "[python][program][wall_time]") {
   const TemporaryDirectory directory;
   const std::string socket = (directory.path() / "control.sock").string();
   RunningProgram wrenchd("wrenchd", {"--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--control",

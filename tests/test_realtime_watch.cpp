@@ -72,7 +72,7 @@ pid_t thread_named(pid_t process, const std::string& name) {
 }
 
 TEST_CASE("a daemon whose servo thread lost its priority says so, and disarms where it is required",
-          "[realtime_watch][program]") {
+          "[realtime_watch][program][wall_time]") {
   const TemporaryDirectory files;
   const RunningProgram program(
       "wrenchd", {"--arm", "--realtime", "required", "--control", (files.path() / "s").string()});

@@ -74,7 +74,7 @@ int run_python(const std::string& arguments, std::string& out) {
 }  // namespace
 
 TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Python",
-          "[recording][program]") {
+          "[recording][program][wall_time]") {
   const Daemon daemon;
   CHECK(daemon.ctl({"record", "stop"}).err.find("Nothing is recorded; 'record.start' begins.") !=
         std::string::npos);
@@ -151,7 +151,7 @@ TEST_CASE("an emergency stop leaves a flight recording, which status and the eve
 }
 
 TEST_CASE("a recording can be read after its daemon was killed, but for the last seconds",
-          "[recording][program]") {
+          "[recording][program][wall_time]") {
   RandomValues random(7);
   for (int i = 0; i < 4; ++i) {
     Daemon daemon({}, "flight_s = 0\n");

@@ -179,7 +179,8 @@ TEST_CASE("nobody asked: nothing is said and no thread runs", "[service_notify]"
   CHECK_FALSE(asked);
 }
 
-TEST_CASE("wrenchd tells its manager: ready after the self-test, alive, stopping", "[service_notify]") {
+TEST_CASE("wrenchd tells its manager: ready after the self-test, alive, stopping",
+          "[service_notify][wall_time]") {
   Manager manager;
   RunningProgram wrenchd("wrenchd", {"--simulate", "loopback", "--realtime", "best_effort"});
   CHECK(manager.hears("READY=1\n"));

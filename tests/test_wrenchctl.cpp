@@ -625,6 +625,16 @@ TEST_CASE("wrenchctl paper prints the paper's examples and draws its figures") {
   CHECK(refused.err.find("wrenchctl: /dev/null/figures: is no directory") == 0);
 }
 
+/// Without what is told of large meshes that nobody has kept yet.
+std::string without_progress(const std::string& err) {
+  std::string rest;
+  for (const std::string& line : split(err, '\n'))
+    if (line.find(" triangles, checking") == std::string::npos &&
+        line.find(" triangles, finding its ") == std::string::npos)
+      rest += line + "\n";
+  return rest;
+}
+
 TEST_CASE("wrenchctl check accepts every file that is shipped") {
   int count = 0;
   for (const fs::path& file : fs::recursive_directory_iterator(fs::path(WRENCHD_SOURCE_DIR) / "config")) {
@@ -633,7 +643,7 @@ TEST_CASE("wrenchctl check accepts every file that is shipped") {
     const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
     INFO(file << "\n" << result.err);
     CHECK(result.exit_code == 0);
-    CHECK(result.err == "");
+    CHECK(without_progress(result.err) == "");
     CHECK(result.out.find(file.string() + ": a good ") == 0);
   }
   CHECK(count >= 5);  // configuration, scene, two profiles, hand script
