@@ -126,6 +126,7 @@ function showLink() {
     showBanner("bad", "No connection to wrenchd", link.why, frame ? "What is shown is the last that was heard." : "");
     set("about", "");
   }
+  showButtons();  // now, and not with the next picture
   const status = link.status;
   if (!status) return;
   const percent = status.limits.authority < 1 ? `, ${Math.round(100 * status.limits.authority)} % of them: no watchdog` : "";
