@@ -73,11 +73,16 @@ test(async () => {
   // A daemon that ends is told, and one that comes back is shown again.
   const again = await open(server.url, small);
   await until("the page shows the daemon", async () => (await text(again, "state")) === "disarmed");
+  const armAsItIsTold = again.evaluate(() => new Promise((seen) => {  // before any further picture
+    const shown = document.getElementById("state");
+    new MutationObserver(() => shown.textContent === "connection lost" && seen(document.getElementById("arm").disabled))
+      .observe(shown, { childList: true, characterData: true, subtree: true });
+  }));
   wrenchd.child.kill("SIGTERM");
   await wrenchd.ended;
   await until("the page says that it is gone", async () => (await text(again, "state")) === "connection lost");
   assert.match(await text(again, "banner-what"), /No connection to wrenchd/);
-  assert.equal(await again.locator("#arm").isDisabled(), true);
+  assert.equal(await armAsItIsTold, true);
   await daemon();
   await until("it is back", async () => (await text(again, "state")) === "disarmed");
   assert.equal(await again.locator("#banner").isVisible(), false);
