@@ -6,11 +6,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "collision/pairs_ahead.hpp"
+#include "collision/pairs/pairs_ahead.hpp"
+#include "collision/pairs/separating_axes.hpp"
+#include "collision/pairs/tree_walk.hpp"
+#include "collision/pairs/triangle_pair.hpp"
 #include "collision/scene.hpp"
-#include "collision/separating_axes.hpp"
-#include "collision/tree_walk.hpp"
-#include "collision/triangle_pair.hpp"
 #include "core/contact.hpp"
 #include "core/fixed_list.hpp"
 #include "core/frame.hpp"

@@ -3,7 +3,7 @@
 
 #include <stop_token>
 
-#include "collision/meeting_pairs.hpp"
+#include "collision/pairs/meeting_pairs.hpp"
 #include "collision/proxy.hpp"
 #include "collision/scene.hpp"
 

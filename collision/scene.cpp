@@ -10,8 +10,8 @@
 #include <tuple>
 #include <utility>
 
-#include "collision/convex_hull.hpp"
-#include "collision/mesh_solid.hpp"
+#include "collision/meshes/convex_hull.hpp"
+#include "collision/meshes/mesh_solid.hpp"
 
 namespace wrenchd {
 namespace {

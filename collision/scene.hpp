@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "collision/mesh_loader.hpp"
+#include "collision/meshes/mesh_loader.hpp"
+#include "collision/meshes/treed_mesh.hpp"
 #include "collision/tool_body.hpp"
-#include "collision/treed_mesh.hpp"
 #include "core/convex_body.hpp"
 #include "core/obstacle_motion.hpp"
 #include "core/scene_settings.hpp"

@@ -5,9 +5,9 @@
 #include <sstream>
 #include <utility>
 
-#include "collision/convex_hull.hpp"
-#include "collision/mesh_file.hpp"
-#include "collision/mesh_size.hpp"
+#include "collision/meshes/convex_hull.hpp"
+#include "collision/meshes/mesh_file.hpp"
+#include "collision/meshes/mesh_size.hpp"
 #include "core/finite.hpp"
 
 namespace wrenchd {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "collision/mesh_loader.hpp"
+#include "collision/meshes/mesh_loader.hpp"
 #include "core/convex_body.hpp"
 #include "core/inertia.hpp"
 #include "core/scene_settings.hpp"

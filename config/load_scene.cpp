@@ -7,7 +7,7 @@
 
 #include "config/nearest_key.hpp"
 #include "config/toml_reader.hpp"
-#include "core/make_mesh.hpp"
+#include "core/generated_mesh.hpp"
 
 namespace wrenchd {
 namespace {

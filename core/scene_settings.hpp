@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/make_mesh.hpp"
+#include "core/generated_mesh.hpp"
 #include "core/obstacle_motion.hpp"
 #include "core/pose.hpp"
 #include "core/triangle_mesh.hpp"

@@ -4,8 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include "config/known_profiles.hpp"
-#include "devices/choose_device.hpp"
 #include "devices/device_homing.hpp"
+#include "devices/discovery/choose_device.hpp"
 
 namespace wrenchd {
 namespace {

@@ -4,7 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include "core/clock.hpp"
-#include "devices/usb_devices.hpp"
+#include "devices/discovery/usb_devices.hpp"
 
 namespace wrenchd {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "daemon/event.hpp"
 #include "daemon/journal.hpp"
+#include "daemon/servo/event.hpp"
 
 namespace wrenchd {
 

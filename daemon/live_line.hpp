@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "daemon/loop_timing.hpp"
-#include "daemon/tick_record.hpp"
+#include "daemon/servo/loop_timing.hpp"
+#include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd {
 

@@ -6,8 +6,8 @@
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
 #include "core/watch_limits.hpp"
-#include "daemon/playback.hpp"
-#include "daemon/recorded_files.hpp"
+#include "daemon/recording/playback.hpp"
+#include "daemon/recording/recorded_files.hpp"
 
 namespace wrenchd {
 namespace {

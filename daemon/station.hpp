@@ -12,14 +12,14 @@
 #include "config/settings.hpp"
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
-#include "daemon/placer.hpp"
+#include "daemon/control/workbench.hpp"
 #include "daemon/plan.hpp"
-#include "daemon/recording_file.hpp"
-#include "daemon/servo_loop.hpp"
-#include "daemon/workbench.hpp"
-#include "devices/plugged_link.hpp"
+#include "daemon/recording/recording_file.hpp"
+#include "daemon/servo/placer.hpp"
+#include "daemon/servo/servo_loop.hpp"
+#include "devices/links/plugged_link.hpp"
+#include "devices/links/report_link.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/report_link.hpp"
 
 namespace wrenchd {
 

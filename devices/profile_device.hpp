@@ -10,8 +10,8 @@
 #include "devices/deflection_pose.hpp"
 #include "devices/device.hpp"
 #include "devices/kinematics.hpp"
+#include "devices/links/report_link.hpp"
 #include "devices/report_codec.hpp"
-#include "devices/report_link.hpp"
 
 namespace wrenchd {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/profile_reports.hpp"
 
-#include "devices/match_profile.hpp"
+#include "devices/discovery/match_profile.hpp"
 
 namespace wrenchd {
 namespace {

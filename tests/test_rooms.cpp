@@ -31,7 +31,7 @@ struct Include {
 std::vector<Include> includes_of(const std::string& room) {
   std::vector<Include> found;
   const std::regex line(R"re(^\s*#include\s+["<]([^">]+)[">])re");
-  for (const auto& entry : fs::directory_iterator(fs::path(WRENCHD_SOURCE_DIR) / room)) {
+  for (const auto& entry : fs::recursive_directory_iterator(fs::path(WRENCHD_SOURCE_DIR) / room)) {
     const std::string extension = entry.path().extension();
     if (extension != ".hpp" && extension != ".cpp") continue;
     std::ifstream in(entry.path());

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "collision/mesh_loader.hpp"
+#include "collision/meshes/mesh_loader.hpp"
 #include "tools/descriptor_source.hpp"
 
 namespace wrenchd {

@@ -17,8 +17,8 @@
 #include <unistd.h>
 #include <wrenchd/client.hpp>
 
-#include "daemon/json_rpc.hpp"
-#include "daemon/owned_fd.hpp"
+#include "daemon/control/json_rpc.hpp"
+#include "daemon/control/owned_fd.hpp"
 #include "tools/output_file.hpp"
 
 namespace wrenchd {

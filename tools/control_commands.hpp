@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/json_rpc.hpp"
+#include "daemon/control/json_rpc.hpp"
 
 namespace wrenchd {
 

@@ -19,13 +19,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "daemon/loop_timing.hpp"
 #include "daemon/realtime.hpp"
+#include "daemon/servo/loop_timing.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
-#include "devices/match_profile.hpp"
-#include "devices/plugged_device.hpp"
-#include "devices/usb_devices.hpp"
+#include "devices/discovery/match_profile.hpp"
+#include "devices/discovery/plugged_device.hpp"
+#include "devices/discovery/usb_devices.hpp"
 #include "tools/udev_rules.hpp"
 
 namespace wrenchd {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/recording_file.hpp"
+#include "daemon/recording/recording_file.hpp"
 
 namespace wrenchd {
 

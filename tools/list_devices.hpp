@@ -6,7 +6,7 @@
 #include <string>
 
 #include "config/known_profiles.hpp"
-#include "devices/usb_devices.hpp"
+#include "devices/discovery/usb_devices.hpp"
 
 namespace wrenchd {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "daemon/recording_file.hpp"
+#include "daemon/recording/recording_file.hpp"
 
 namespace wrenchd {
 

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "daemon/recorded_run.hpp"
-#include "daemon/replay.hpp"
+#include "daemon/recording/recorded_run.hpp"
+#include "daemon/recording/replay.hpp"
 #include "daemon/version.hpp"
 
 namespace wrenchd {

@@ -13,8 +13,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "collision/mesh_check.hpp"
-#include "collision/mesh_source.hpp"
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/mesh_source.hpp"
 #include "collision/tool_body.hpp"
 #include "config/known_profiles.hpp"
 #include "config/load_profile.hpp"
@@ -24,9 +25,8 @@
 #include "core/finite.hpp"
 #include "core/friction.hpp"
 #include "core/inertia.hpp"
-#include "core/make_mesh.hpp"
 #include "daemon/option_checks.hpp"
-#include "daemon/recording_file.hpp"
+#include "daemon/recording/recording_file.hpp"
 #include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "tools/calibrate.hpp"

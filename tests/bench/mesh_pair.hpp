@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "collision/meeting_pairs.hpp"
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/pairs/meeting_pairs.hpp"
 #include "collision/scene.hpp"
-#include "core/make_mesh.hpp"
 
 namespace wrenchd::bench {
 

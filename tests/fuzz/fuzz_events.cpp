@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under test: core/state_machine.cpp core/transitions.cpp daemon/watches.cpp daemon/link_watch.cpp
-// daemon/pose_watch.cpp daemon/motor_watch.cpp daemon/write_watch.cpp daemon/pace_watch.cpp
-// daemon/pinned_watch.cpp daemon/client_watch.cpp daemon/self_test.cpp
+// Under test: core/state_machine.cpp core/transitions.cpp daemon/servo/watches.cpp
+// daemon/servo/link_watch.cpp daemon/servo/pose_watch.cpp daemon/servo/motor_watch.cpp
+// daemon/servo/write_watch.cpp daemon/servo/pace_watch.cpp daemon/servo/pinned_watch.cpp
+// daemon/servo/client_watch.cpp daemon/servo/self_test.cpp
 #include <bit>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 
 #include "core/state_machine.hpp"
-#include "daemon/self_test.hpp"
-#include "daemon/watches.hpp"
+#include "daemon/servo/self_test.hpp"
+#include "daemon/servo/watches.hpp"
 
 // Sequences of events: each tick takes a few bytes for what the device says and what is asked, the watches
 // find what they find, the machine follows. Whatever the sequence, force is in four states, rises in one, and

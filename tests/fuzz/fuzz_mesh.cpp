@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under test: collision/mesh_file.cpp collision/mesh_guard.cpp collision/ply_guard.cpp
-// collision/mesh_source.cpp collision/mesh_repair.cpp collision/mesh_check.cpp collision/soup_sides.cpp
+// Under test: collision/meshes/mesh_file.cpp collision/meshes/mesh_guard.cpp collision/meshes/ply_guard.cpp
+// collision/meshes/mesh_source.cpp collision/meshes/mesh_repair.cpp collision/meshes/mesh_check.cpp
+// collision/meshes/soup_sides.cpp
 #include "tests/fuzz/fuzz_mesh.hpp"
 
 #include <string>
 
-#include "collision/mesh_check.hpp"
-#include "collision/mesh_file.hpp"
-#include "collision/mesh_source.hpp"
+#include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/mesh_file.hpp"
+#include "collision/meshes/mesh_source.hpp"
 #include "core/finite.hpp"
 #include "tests/fuzz/feed.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under test: daemon/json_rpc.cpp daemon/control_methods.cpp config/nearest_key.cpp
+// Under test: daemon/control/json_rpc.cpp daemon/control/control_methods.cpp config/nearest_key.cpp
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -7,8 +7,8 @@
 #include <string_view>
 #include <variant>
 
-#include "daemon/control_methods.hpp"
-#include "daemon/json_rpc.hpp"
+#include "daemon/control/control_methods.hpp"
+#include "daemon/control/json_rpc.hpp"
 #include "tests/fuzz/feed.hpp"
 
 // Any bytes as lines of the control socket, from somebody of any role: refused with a reply that is one line

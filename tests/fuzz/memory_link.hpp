@@ -4,8 +4,8 @@
 #include <array>
 #include <span>
 
-#include "devices/packet_queue.hpp"
-#include "devices/report_link.hpp"
+#include "devices/links/packet_queue.hpp"
+#include "devices/links/report_link.hpp"
 
 namespace wrenchd::test {
 

@@ -27,9 +27,9 @@
 #include <unistd.h>
 #include <wrenchd/client.hpp>
 
-#include "daemon/json_rpc.hpp"
-#include "daemon/listening_socket.hpp"
-#include "daemon/recording_file.hpp"
+#include "daemon/control/json_rpc.hpp"
+#include "daemon/control/listening_socket.hpp"
+#include "daemon/recording/recording_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // What abuse of the control socket costs the servo loop. The real daemon runs, armed by a client that keeps

@@ -27,7 +27,7 @@
 #include <unistd.h>
 
 #include "config/load_profile.hpp"
-#include "devices/simulated_device.hpp"
+#include "devices/simulation/simulated_device.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // A device outlives the daemon that drives it. Here the device is emulated in this process and the real

@@ -20,8 +20,8 @@
 #include "core/passivity.hpp"
 #include "core/stability_bound.hpp"
 #include "core/wrench_law.hpp"
-#include "devices/hand_path.hpp"
-#include "devices/simulated_handle.hpp"
+#include "devices/simulation/hand_path.hpp"
+#include "devices/simulation/simulated_handle.hpp"
 #include "tests/support/random_values.hpp"
 
 // Does contact ever give energy to the hand? The ledger is kept on the continuous plant, not on what the

@@ -8,9 +8,9 @@
 #include <CLI/CLI.hpp>
 #include <sys/resource.h>
 
-#include "devices/hand_path.hpp"
 #include "devices/report_codec.hpp"
-#include "devices/simulated_firmware.hpp"
+#include "devices/simulation/hand_path.hpp"
+#include "devices/simulation/simulated_firmware.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/shipped_plan.hpp"

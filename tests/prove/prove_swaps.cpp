@@ -20,8 +20,8 @@
 #include "daemon/realtime.hpp"
 #include "daemon/station.hpp"
 #include "daemon/wall_clock.hpp"
-#include "devices/loopback_link.hpp"
-#include "devices/simulated_device.hpp"
+#include "devices/links/loopback_link.hpp"
+#include "devices/simulation/simulated_device.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/temporary_directory.hpp"
 

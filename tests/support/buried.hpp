@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/make_mesh.hpp"
+#include "collision/meshes/make_mesh.hpp"
 #include "tests/support/shipped_plan.hpp"
 #include "tests/support/temporary_directory.hpp"
 

@@ -16,7 +16,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "daemon/control.hpp"
+#include "daemon/control/control.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/wall_clock.hpp"
 #include "tests/support/shipped_plan.hpp"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/servo/tick_record.hpp"
 #include "daemon/station.hpp"
-#include "daemon/tick_record.hpp"
 
 namespace wrenchd::test {
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "collision/scene.hpp"
-#include "daemon/servo_loop.hpp"
-#include "devices/loopback_link.hpp"
+#include "daemon/servo/servo_loop.hpp"
+#include "devices/links/loopback_link.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/simulated_device.hpp"
+#include "devices/simulation/simulated_device.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/shipped_plan.hpp"
 

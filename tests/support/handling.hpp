@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "collision/meshes/make_mesh.hpp"
 #include "collision/scene.hpp"
-#include "core/make_mesh.hpp"
 #include "tests/support/random_values.hpp"
 
 namespace wrenchd::test {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/tick_record.hpp"
+#include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd::test {
 

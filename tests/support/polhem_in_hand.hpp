@@ -7,10 +7,10 @@
 
 #include "config/load_profile.hpp"
 #include "devices/calibrated_profile.hpp"
-#include "devices/emulated_polhem.hpp"
 #include "devices/homing.hpp"
-#include "devices/loopback_link.hpp"
+#include "devices/links/loopback_link.hpp"
 #include "devices/profile_device.hpp"
+#include "devices/simulation/emulated_polhem.hpp"
 
 namespace wrenchd::test {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "collision/convex_hull.hpp"
+#include "collision/meshes/convex_hull.hpp"
 #include "collision/scene.hpp"
 #include "collision/scene_contacts.hpp"
 #include "core/inertia.hpp"

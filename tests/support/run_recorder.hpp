@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <span>
 
-#include "daemon/recording_file.hpp"
+#include "daemon/recording/recording_file.hpp"
 #include "daemon/station.hpp"
 
 namespace wrenchd::test {

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <string>
 
-#include "collision/mesh_file.hpp"
+#include "collision/meshes/mesh_file.hpp"
 
 namespace wrenchd::test {
 

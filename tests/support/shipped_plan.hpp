@@ -2,8 +2,8 @@
 #pragma once
 
 #include "daemon/station.hpp"
-#include "devices/loopback_link.hpp"
-#include "devices/simulated_device.hpp"
+#include "devices/links/loopback_link.hpp"
+#include "devices/simulation/simulated_device.hpp"
 
 namespace wrenchd::test {
 

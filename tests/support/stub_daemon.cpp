@@ -13,9 +13,9 @@
 #include <unistd.h>
 
 #include "core/fault.hpp"
+#include "daemon/control/state_layout.hpp"
 #include "daemon/realtime.hpp"
-#include "daemon/shared_state.hpp"
-#include "daemon/state_layout.hpp"
+#include "daemon/servo/shared_state.hpp"
 
 namespace wrenchd::test {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <exception>
 
-#include "devices/reference_layout.hpp"
-#include "devices/simulated_device.hpp"
+#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/simulated_device.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/system/usbip_emulator.hpp"
 

@@ -13,8 +13,8 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include "devices/hidraw_link.hpp"
-#include "devices/usb_link.hpp"
+#include "devices/links/hidraw_link.hpp"
+#include "devices/links/usb_link.hpp"
 
 namespace wrenchd::test {
 namespace {

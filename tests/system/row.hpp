@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/clock.hpp"
-#include "devices/link_settings.hpp"
-#include "devices/report_link.hpp"
-#include "devices/usb_devices.hpp"
+#include "devices/discovery/usb_devices.hpp"
+#include "devices/links/link_settings.hpp"
+#include "devices/links/report_link.hpp"
 #include "tests/system/usbip_port.hpp"
 
 namespace wrenchd::test {

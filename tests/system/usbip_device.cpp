@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "devices/reference_layout.hpp"
+#include "devices/simulation/reference_layout.hpp"
 
 namespace wrenchd::test {
 namespace {

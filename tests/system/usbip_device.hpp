@@ -10,7 +10,7 @@
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "devices/report_codec.hpp"
-#include "devices/simulated_firmware.hpp"
+#include "devices/simulation/simulated_firmware.hpp"
 #include "tests/system/usbip_port.hpp"
 
 namespace wrenchd::test {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "devices/emulated_device.hpp"
 #include "devices/falcon_start.hpp"
+#include "devices/simulation/emulated_device.hpp"
 #include "tests/system/usbip_port.hpp"
 
 namespace wrenchd::test {

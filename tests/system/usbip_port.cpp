@@ -17,8 +17,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "devices/latest_writer.hpp"
-#include "devices/wake_up.hpp"
+#include "devices/links/latest_writer.hpp"
+#include "devices/links/wake_up.hpp"
 
 namespace wrenchd::test {
 namespace {

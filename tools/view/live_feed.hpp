@@ -14,7 +14,7 @@
 
 #include <wrenchd/client.hpp>
 
-#include "daemon/json_rpc.hpp"
+#include "daemon/control/json_rpc.hpp"
 #include "tools/view/extremes.hpp"
 #include "tools/view/recent_times.hpp"
 #include "tools/view/view_scene.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "daemon/recording_file.hpp"
+#include "daemon/recording/recording_file.hpp"
 #include "tools/view/extremes.hpp"
 #include "tools/view/recent_times.hpp"
 #include "tools/view/view_scene.hpp"

@@ -9,9 +9,9 @@
 #include <spawn.h>
 #include <unistd.h>
 
-#include "collision/mesh_source.hpp"
-#include "daemon/recorded_run.hpp"
-#include "daemon/scene_shapes.hpp"
+#include "collision/meshes/mesh_source.hpp"
+#include "daemon/control/scene_shapes.hpp"
+#include "daemon/recording/recorded_run.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/recorded_feed.hpp"
 #include "tools/view/view_server.hpp"

@@ -11,7 +11,7 @@
 
 #include "core/obstacle_motion.hpp"
 #include "core/pose.hpp"
-#include "daemon/json_rpc.hpp"
+#include "daemon/control/json_rpc.hpp"
 
 namespace wrenchd {
 

@@ -9,9 +9,9 @@
 
 #include <wrenchd/state_reader.hpp>
 
-#include "collision/touch.hpp"
-#include "daemon/json_rpc.hpp"
-#include "daemon/tick_record.hpp"
+#include "collision/pairs/touch.hpp"
+#include "daemon/control/json_rpc.hpp"
+#include "daemon/servo/tick_record.hpp"
 #include "tools/view/extremes.hpp"
 #include "tools/view/view_scene.hpp"
 

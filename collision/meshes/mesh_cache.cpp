@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/meshes/mesh_cache.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <system_error>
+
+#include <fcntl.h>
+#include <openssl/evp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kMagic = "wrenchd mesh cache 1\n";
+constexpr std::string_view kSuffix = ".mesh";
+constexpr std::size_t kHash = 32;  // SHA-256: nobody can make a file that passes for another
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{2} << 30;
+constexpr std::size_t kHeader = kMagic.size() + 3 * kHash;
+
+std::string sha256(const std::vector<std::string_view>& parts) {
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
+  std::string hash(kHash, '\0');
+  bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
+  for (const std::string_view part : parts) {
+    const std::uint64_t size = part.size();  // so that "ab", "c" is not "a", "bc"
+    good = good && EVP_DigestUpdate(context.get(), &size, sizeof size) == 1 &&
+           EVP_DigestUpdate(context.get(), part.data(), part.size()) == 1;
+  }
+  if (!good || EVP_DigestFinal_ex(context.get(), reinterpret_cast<unsigned char*>(hash.data()), nullptr) != 1)
+    throw std::runtime_error("OpenSSL has no SHA-256");
+  return hash;
+}
+
+/// A descriptor that is closed at the end.
+class File {
+ public:
+  explicit File(int descriptor) : descriptor_(descriptor) {}
+  ~File() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  int get() const noexcept { return descriptor_; }
+
+  bool read(char* to, std::size_t size) const {
+    while (size > 0) {
+      const ssize_t n = ::read(descriptor_, to, size);
+      if (n <= 0 && !(n < 0 && errno == EINTR)) return false;
+      if (n > 0) to += n, size -= static_cast<std::size_t>(n);
+    }
+    return true;
+  }
+  bool write(std::string_view bytes) const {
+    while (!bytes.empty()) {
+      const ssize_t n = ::write(descriptor_, bytes.data(), bytes.size());
+      if (n < 0 && errno != EINTR) return false;
+      if (n > 0) bytes.remove_prefix(static_cast<std::size_t>(n));
+    }
+    return true;
+  }
+
+ private:
+  int descriptor_;
+};
+
+std::string hexadecimal(std::string_view bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+/// The header: magic, key, hash of the bytes that follow, and a hash of these three.
+std::string header(const std::string& key, std::string_view bytes) {
+  const std::string content = sha256({bytes});
+  return std::string(kMagic) + key + content + sha256({kMagic, key, content});
+}
+
+}  // namespace
+
+std::string MeshCache::key(const std::vector<std::string_view>& made_from) {
+  std::vector<std::string_view> parts = made_from;
+  parts.push_back(WRENCHD_MESH_SOURCES);
+  return sha256(parts);
+}
+
+fs::path MeshCache::file_of(const std::string& key) const {
+  return directory_ / (hexadecimal(key) + std::string(kSuffix));
+}
+
+std::optional<std::string> MeshCache::read(const std::string& key) const {
+  if (off()) return {};
+  const fs::path name = file_of(key);
+  const File file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat status {};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return {};
+  const bool ours =
+      S_ISREG(status.st_mode) && status.st_uid == ::geteuid() && (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
+  if (!ours || status.st_size < static_cast<off_t>(kHeader) ||
+      static_cast<std::uintmax_t>(status.st_size) > kMostBytes)
+    return {};
+  std::string head(kHeader, '\0');
+  if (!file.read(head.data(), head.size())) return {};
+  std::string bytes(static_cast<std::size_t>(status.st_size) - kHeader, '\0');
+  if (!file.read(bytes.data(), bytes.size()) || head != header(key, bytes)) return {};
+  ::futimens(file.get(), nullptr);  // it was of use: others are older now
+  return bytes;
+}
+
+bool MeshCache::refuse(const std::string& why) {
+  why_ = directory_.string() + ": " + why + "; what is made of large meshes is not kept";
+  return false;
+}
+
+// Written beside its place and renamed: whoever reads finds all of it or nothing.
+bool MeshCache::write(const std::string& key, std::string_view bytes) {
+  if (off()) return false;
+  std::error_code error;
+  fs::create_directories(directory_, error);
+  if (error) return refuse("cannot be made (" + error.message() + ")");
+  std::string name = (directory_ / ("new-XXXXXX" + std::string(kSuffix))).string();
+  const File file(::mkostemps(name.data(), static_cast<int>(kSuffix.size()), O_CLOEXEC));
+  if (file.get() < 0) return refuse(std::string("cannot be written to (") + std::strerror(errno) + ")");
+  if (!file.write(header(key, bytes)) || !file.write(bytes) ||
+      ::rename(name.c_str(), file_of(key).c_str()) != 0) {
+    const std::string reason = std::strerror(errno);
+    ::unlink(name.c_str());
+    return refuse("cannot be written to (" + reason + ")");
+  }
+  drop_oldest();
+  return true;
+}
+
+void MeshCache::drop_oldest() const {
+  struct Kept {
+    fs::file_time_type time;
+    std::uintmax_t size;
+    fs::path file;
+  };
+  std::vector<Kept> all;
+  std::uintmax_t bytes = 0;
+  std::error_code error;
+  for (fs::directory_iterator at(directory_, error), end; !error && at != end; at.increment(error)) {
+    if (at->path().extension() != kSuffix) continue;
+    std::error_code gone;
+    const Kept kept{at->last_write_time(gone), at->file_size(gone), at->path()};
+    if (gone) continue;
+    bytes += kept.size;
+    all.push_back(kept);
+  }
+  std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.time < b.time; });
+  for (const Kept& kept : all) {
+    if (bytes <= kMostBytes) return;
+    bytes -= kept.size;
+    fs::remove(kept.file, error);
+  }
+}
+
+fs::path cache_directory() {
+  const auto from = [](const char* variable) -> fs::path {
+    const char* value = std::getenv(variable);
+    const std::string text = value == nullptr ? "" : value;
+    const fs::path path = text.substr(0, text.find(':'));  // systemd gives a list
+    return path.is_absolute() ? path : fs::path();
+  };
+  if (const fs::path given = from("CACHE_DIRECTORY"); !given.empty()) return given;
+  if (const fs::path base = from("XDG_CACHE_HOME"); !base.empty()) return base / "wrenchd";
+  if (const fs::path home = from("HOME"); !home.empty()) return home / ".cache" / "wrenchd";
+  return {};
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/meshes/mesh_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <set>
+#include <sstream>
+#include <utility>
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_2_algorithms.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Projection_traits_3.h>
+#include <CGAL/Surface_mesh.h>
+
+#include "collision/meshes/mesh_repair.hpp"
+#include "collision/meshes/soup_sides.hpp"
+#include "collision/meshes/tally.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace PMP = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
+
+std::string edge_place(const PolygonSoup& soup, const Edge& e) {
+  return place(soup.vertices[e.first]) + " to " + place(soup.vertices[e.second]);
+}
+
+/// A negative index of the file has wrapped around; it is told as it was written.
+std::string index_text(std::size_t v) {
+  return v > std::numeric_limits<std::size_t>::max() / 2 ? "-" + std::to_string(0 - v) : std::to_string(v);
+}
+
+/// Where everything cuts through everything, pairs grow with the square of the faces.
+constexpr std::size_t kMostIntersections = 1000;
+
+std::string face_name(const PolygonSoup& soup, std::size_t f) {
+  return "face " + std::to_string(soup.face_in_file(f));
+}
+
+bool uses_a_vertex_twice(const std::vector<std::size_t>& face) {
+  if (face.size() == 3) return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
+  return std::set<std::size_t>(face.begin(), face.end()).size() != face.size();
+}
+
+/// Without numbers and indices right, nothing else can be asked.
+void check_numbers(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  Tally not_finite, out_of_range;
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v)
+    if (!soup.vertices[v].allFinite())
+      not_finite.found([&] {
+        return "vertex " + std::to_string(soup.vertex_in_file(v)) +
+               " is not a number: " + place(soup.vertices[v]);
+      });
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    for (const std::size_t v : soup.faces[f])
+      if (v >= soup.vertices.size())
+        out_of_range.found([&] {
+          return face_name(soup, f) + " uses vertex " + index_text(v) + ", but there are only " +
+                 std::to_string(soup.vertices.size());
+        });
+  }
+  not_finite.report(defects, "export the mesh again");
+  out_of_range.report(defects, "vertex numbers start at 0; export the mesh again");
+}
+
+/// Faces that are no polygons.
+void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  check_numbers(soup, defects);
+  Tally too_few, repeated;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    const auto& face = soup.faces[f];
+    if (face.size() < 3)
+      too_few.found([&] { return face_name(soup, f) + " has " + std::to_string(face.size()) + " vertices"; });
+    if (uses_a_vertex_twice(face))
+      repeated.found([&] { return face_name(soup, f) + " uses a vertex twice"; });
+  }
+  too_few.report(defects, "remove it");
+  repeated.report(defects, "remove degenerate faces in the modeller");
+}
+
+double area_of(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
+  Vector3d twice = Vector3d::Zero();
+  for (std::size_t i = 1; i + 1 < face.size(); ++i)
+    twice += (soup.vertices[face[i]] - soup.vertices[face[0]])
+                 .cross(soup.vertices[face[i + 1]] - soup.vertices[face[0]]);
+  return 0.5 * twice.norm();
+}
+
+void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
+  Tally flat;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f)
+    if (!(area_of(soup, soup.faces[f]) > 0.0))
+      flat.found([&] {
+        return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area";
+      });
+  flat.report(defects, "remove degenerate faces in the modeller");
+}
+
+/// Closed and consistently oriented: every edge runs once in each direction.
+void check_edges(const PolygonSoup& soup, MeshReport& report) {
+  Tally open, crowded, same_way;
+  for_each_edge(sides_of(soup), [&](std::span<const Side> sides) {
+    const auto where = [&] {
+      const Edge& e = sides[0].edge;
+      const bool as_stored = sides[0].forward || sides.size() > 2;
+      return "the edge from " + edge_place(soup, as_stored ? e : Edge(e.second, e.first));
+    };
+    const auto face = [&](std::size_t k) { return std::to_string(soup.face_in_file(sides[k].face)); };
+    if (sides.size() == 1)
+      open.found([&] { return where() + " belongs to face " + face(0) + " only: the surface is open"; });
+    else if (sides.size() > 2)
+      crowded.found([&] { return where() + " belongs to " + std::to_string(sides.size()) + " faces"; });
+    else if (sides[0].forward == sides[1].forward)
+      same_way.found([&] {
+        return "faces " + face(0) + " and " + face(1) + " are oriented against each other along " + where();
+      });
+  });
+  open.report(report.defects, "close the hole in the modeller");
+  crowded.report(report.defects, "a solid has two faces at every edge: split or remove the extra ones");
+  same_way.report(report.defects, "make all faces counter-clockwise seen from outside");
+  report.closed = !open.any() && !crowded.any();
+  report.consistent = !same_way.any();
+}
+
+/// Every edge has two faces here, so the faces around a vertex form rings: the face that leaves the vertex
+/// towards n is followed by the one that comes in from n. A vertex with more than one ring joins parts of the
+/// surface in a point.
+void check_vertices(const PolygonSoup& soup, MeshReport& report) {
+  struct Turn {
+    std::size_t vertex, from, to;  ///< a face comes in from `from` and leaves towards `to`
+  };
+  std::vector<Turn> turns;
+  for (const auto& face : soup.faces)
+    for (std::size_t i = 0; i < face.size(); ++i)
+      turns.push_back(
+          {face[i], face[i > 0 ? i - 1 : face.size() - 1], face[i + 1 < face.size() ? i + 1 : 0]});
+  const auto before = [](const Turn& a, const Turn& b) {
+    return a.vertex != b.vertex ? a.vertex < b.vertex : a.from < b.from;
+  };
+  std::sort(turns.begin(), turns.end(), before);
+  Tally pinched;
+  for (auto begin = turns.begin(); begin != turns.end();) {
+    const auto end =
+        std::find_if(begin, turns.end(), [&](const Turn& t) { return t.vertex != begin->vertex; });
+    std::ptrdiff_t ring = 0;
+    auto at = begin;
+    do {
+      at = std::lower_bound(begin, end, Turn{begin->vertex, at->to, 0}, before);
+    } while (++ring < end - begin && at != begin);
+    if (ring < end - begin)
+      pinched.found([&] {
+        return "parts of the surface meet only in vertex " +
+               std::to_string(soup.vertex_in_file(begin->vertex)) + " at " +
+               place(soup.vertices[begin->vertex]);
+      });
+    begin = end;
+  }
+  pinched.report(report.defects, "separate them in the modeller");
+}
+
+SurfaceMesh surface_mesh(const PolygonSoup& soup) {
+  std::vector<Kernel::Point_3> points;
+  points.reserve(soup.vertices.size());
+  for (const Vector3d& p : soup.vertices) points.emplace_back(p.x(), p.y(), p.z());
+  auto faces = soup.faces;
+  PMP::remove_isolated_points_in_polygon_soup(points, faces);  // does_bound_a_volume() falls over them
+  SurfaceMesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(points, faces, mesh);
+  return mesh;
+}
+
+/// Whether a face, seen along its normal, neither crosses nor touches itself. CGAL cuts others with more than
+/// four corners into triangles too, and falls over some of them.
+bool is_simple(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
+  Vector3d normal = Vector3d::Zero();
+  std::vector<Kernel::Point_3> points;
+  for (std::size_t i = 0; i < face.size(); ++i) {
+    const Vector3d &p = soup.vertices[face[i]], &next = soup.vertices[face[(i + 1) % face.size()]];
+    normal += p.cross(next);
+    points.emplace_back(p.x(), p.y(), p.z());
+  }
+  if (!normal.allFinite() || normal.isZero(0.0)) return false;
+  const CGAL::Projection_traits_3<Kernel> along({normal.x(), normal.y(), normal.z()});
+  return CGAL::is_simple_2(points.begin(), points.end(), along);
+}
+
+/// Cuts every face of a mesh made of the soup into triangles. Returns for each triangle its face's number in
+/// the file.
+std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh, MeshReport& report) {
+  std::vector<std::size_t> face_of(soup.faces.size());
+  Tally uncut;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    face_of[f] = soup.face_in_file(f);  // its first triangle keeps the index
+    const std::size_t corners = soup.faces[f].size();
+    if ((corners > 4 && !is_simple(soup, soup.faces[f])) ||
+        (corners > 3 && !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh)))
+      uncut.found([&] {
+        return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
+               " cannot be cut into triangles";
+      });
+    face_of.resize(mesh.number_of_faces(), soup.face_in_file(f));
+  }
+  uncut.report(report.defects, "make it flat, or cut it in the modeller");
+  return face_of;
+}
+
+void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::size_t>& face_of,
+                             MeshReport& report) {
+  std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
+  PMP::self_intersections(mesh, std::back_inserter(pairs),
+                          CGAL::parameters::maximum_number(kMostIntersections));
+  report.self_intersecting = !pairs.empty();
+  if (pairs.empty()) return;
+  const auto corner = mesh.point(mesh.target(mesh.halfedge(pairs[0].first)));
+  const std::size_t a = face_of[pairs[0].first], b = face_of[pairs[0].second];
+  report.defects.push_back(
+      (a == b ? "two halves of face " + std::to_string(a)
+              : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
+      " near " + place({corner.x(), corner.y(), corner.z()}) + " cut through each other" +
+      (pairs.size() < kMostIntersections ? in_all(pairs.size()) : " (1000 or more in all)") +
+      "; unite the parts in the modeller");
+}
+
+void check_volume(const SurfaceMesh& mesh, MeshReport& report) {
+  report.volume = CGAL::to_double(PMP::volume(mesh));
+  report.outward = !report.self_intersecting && report.volume > 0.0 && PMP::does_bound_a_volume(mesh);
+  if (report.outward || report.self_intersecting) return;
+  report.defects.push_back(
+      report.volume < 0.0
+          ? "all faces look inwards (the volume is negative); flip the faces in the modeller"
+          : "its shells do not bound a volume: one looks the wrong way, or nothing is inside; "
+            "make outer shells look outwards and cavities inwards");
+}
+
+/// The faces side by side, with nothing shared: what is no manifold can be cut into triangles so. The corners
+/// of the mesh are those of the faces, one after the other.
+SurfaceMesh separate_faces(const PolygonSoup& soup) {
+  PolygonSoup apart;
+  for (const auto& face : soup.faces) {
+    auto& copy = apart.faces.emplace_back();
+    for (const std::size_t v : face) {
+      copy.push_back(apart.vertices.size());
+      apart.vertices.push_back(soup.vertices[v]);
+    }
+  }
+  return surface_mesh(apart);
+}
+
+TriangleMesh triangles_of(const SurfaceMesh& mesh) {
+  TriangleMesh out;
+  for (const auto v : mesh.vertices())
+    out.vertices_m.emplace_back(mesh.point(v).x(), mesh.point(v).y(), mesh.point(v).z());
+  for (const auto f : mesh.faces()) {
+    std::array<std::uint32_t, 3> triangle{};
+    std::size_t k = 0;
+    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) triangle[k++ % 3] = v;
+    out.triangles.push_back(triangle);
+  }
+  return out;
+}
+
+MeshReport report_on(const PolygonSoup& soup) {
+  MeshReport report;
+  report.vertices = soup.vertices.size();
+  report.faces = soup.faces.size();
+  report.volume = std::numeric_limits<double>::quiet_NaN();
+  check_elements(soup, report.defects);
+  return report;
+}
+
+}  // namespace
+
+std::vector<std::string> wrong_numbers(const PolygonSoup& soup) {
+  std::vector<std::string> defects;
+  check_numbers(soup, defects);
+  return defects;
+}
+
+MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles) {
+  MeshReport report = report_on(soup);
+  if (soup.faces.empty())
+    report.defects.push_back(
+        "there is no face that has an area; look for a vertex that is much too far away");
+  if (!report.defects.empty()) return report;
+  check_areas(soup, report.defects);
+  if (!report.defects.empty()) return report;
+  SurfaceMesh mesh = separate_faces(soup);
+  triangulate(soup, mesh, report);
+  if (triangles == nullptr || !report.defects.empty()) return report;
+  std::vector<std::uint32_t> vertex;  // of the soup, for each of the mesh
+  for (const auto& face : soup.faces) vertex.insert(vertex.end(), face.begin(), face.end());
+  *triangles = triangles_of(mesh);
+  triangles->vertices_m = soup.vertices;
+  for (auto& corners : triangles->triangles)
+    for (std::uint32_t& v : corners) v = vertex[v];
+  return report;
+}
+
+MeshReport repair_and_check_solid(PolygonSoup& soup, TriangleMesh* triangles) {
+  std::vector<std::string> changes = repair(soup);
+  MeshReport report = check_solid(soup, triangles);
+  report.changes = std::move(changes);
+  return report;
+}
+
+MeshReport repair_and_check_surface(PolygonSoup& soup, TriangleMesh* triangles) {
+  std::vector<std::string> changes = repair(soup);
+  MeshReport report = check_surface(soup, triangles);
+  report.changes = std::move(changes);
+  return report;
+}
+
+MeshReport check_solid(const PolygonSoup& soup, TriangleMesh* triangles) {
+  MeshReport report = report_on(soup);
+  if (!report.defects.empty()) return report;
+  check_areas(soup, report.defects);
+  check_edges(soup, report);
+  if (!report.defects.empty()) return report;
+  check_vertices(soup, report);
+  if (!report.defects.empty()) return report;
+  SurfaceMesh mesh = surface_mesh(soup);
+  const std::vector<std::size_t> face_of = triangulate(soup, mesh, report);
+  if (!report.defects.empty()) return report;
+  check_self_intersection(mesh, face_of, report);
+  check_volume(mesh, report);
+  if (triangles != nullptr && report.solid()) *triangles = triangles_of(mesh);
+  return report;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/meshes/mesh_size.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <locale>
+#include <sstream>
+
+#include <Eigen/Geometry>
+
+#include "collision/meshes/mesh_file.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// A thousand clearances of the proxy.
+constexpr double kLeast_m = 1e-6;
+/// Here a coordinate is rounded by a thousandth of the clearance.
+constexpr double kFarthest_m = 1e4;
+
+double largest_side(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : mesh.vertices_m) box.extend(p);
+  return box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
+}
+
+std::string size_text(double side_m, double scale) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text.precision(3);
+  text << "its largest side is " << side_m << " m at scale " << scale;
+  return text.str();
+}
+
+/// The scale that would make the size a likely one: a unit beside the one that was taken.
+std::string cure(double side_m, double scale, LikelySize likely) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  const double factor = side_m > likely.largest_m ? 1e-3 : 1e3;
+  const double other_m = side_m * factor;
+  if (other_m < likely.least_m || other_m > likely.largest_m) return "give 'scale' in metres per mesh unit";
+  text << (factor < 1.0 ? "were millimetres taken for metres? 'scale' would be "
+                        : "were metres taken for millimetres? 'scale' would be ")
+       << scale * factor;
+  return text.str();
+}
+
+}  // namespace
+
+std::optional<std::string> unlikely_size(const TriangleMesh& mesh, double scale, LikelySize likely) {
+  const double side_m = scale * largest_side(mesh);
+  if (side_m >= likely.least_m && side_m <= likely.largest_m) return {};
+  return size_text(side_m, scale) + ": " + cure(side_m, scale, likely);
+}
+
+void require_size_for_contacts(const TriangleMesh& mesh, double scale, const std::filesystem::path& file) {
+  const double side_m = scale * largest_side(mesh);
+  double farthest = 0.0;
+  for (const Vector3d& p : mesh.vertices_m) farthest = std::max(farthest, p.lpNorm<Eigen::Infinity>());
+  if (!(side_m >= kLeast_m && side_m <= kFarthest_m))
+    throw MeshError(file.string() + ": " + size_text(side_m, scale) +
+                    ", and contacts between meshes can be found from 1e-06 to 10000 m; give 'scale' in "
+                    "metres per mesh unit");
+  if (!(scale * farthest <= kFarthest_m)) {
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << file.string() << ": lies up to " << scale * farthest
+         << " m from its own origin, where a contact is rounded away; move it to within 10000 m in the "
+            "modeller";
+    throw MeshError(text.str());
+  }
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/meshes/mesh_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "core/least_distance.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Triangles whose corners lie this near to one plane lie in it: in units of the mesh's size, and never more
+/// than a tenth of the clearance that a proxy keeps [m].
+constexpr double kFlat = 1e-10;
+constexpr double kFlat_m = 1e-10;
+/// Neighbours that fall away from a vertex by less than this [rad] do not point it.
+constexpr double kBlunt = 1e-7;
+
+constexpr int next(int i) noexcept {
+  return i == 2 ? 0 : i + 1;
+}
+
+/// Is there a direction n with n . e < 0 for all of these? The one that all fall away from the most, by the
+/// least-distance problem  min |z|  s.t.  -e . z >= 1,  met a few rows at a time, for a vertex may have any
+/// number of neighbours.
+bool all_fall_away(const std::vector<Vector3d>& directions, const Vector3d& first_guess) {
+  const auto worst_of = [&](const Vector3d& n) {
+    return *std::max_element(directions.begin(), directions.end(),
+                             [&](const Vector3d& a, const Vector3d& b) { return n.dot(a) < n.dot(b); });
+  };
+  if (first_guess.dot(worst_of(first_guess)) < -kBlunt) return true;
+  constexpr std::size_t kRows = 32;
+  LeastDistance<3, kRows> problem;
+  Vector3d n = first_guess;
+  for (std::size_t row = 0; row < kRows; ++row) {
+    const Vector3d worst = worst_of(n);
+    if (row > 0 && n.dot(worst) < -kBlunt) return true;
+    problem.add_unit(-worst, 1.0);
+    if (problem.solve(Vector3d::Zero(), 1e-12) != decltype(problem)::Status::optimal) return false;
+    const double length = problem.z().norm();
+    if (length * kBlunt > 1.0) return false;
+    n = problem.z() / length;
+  }
+  return false;
+}
+
+}  // namespace
+
+MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)), kind_(kind) {
+  for (const Vector3d& p : mesh_.vertices_m) radius_m_ = std::max(radius_m_, p.norm());
+  features_.assign(mesh_.triangles.size(), {{kNone, kNone, kNone}, {kNone, kNone, kNone}});
+  find_neighbours();
+  find_planes();
+  find_edges();
+  find_pointed_vertices();
+}
+
+/// Pairs the sides of the triangles: a side that runs from a to b meets one that runs from b to a. Where
+/// there is not exactly one of each, nothing is paired.
+void MeshSurface::find_neighbours() {
+  struct Side {
+    std::uint64_t key;  ///< both vertices, the smaller first
+    std::uint32_t triangle;
+    std::uint8_t side;
+    bool forward;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh_.triangles.size());
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const std::uint64_t a = mesh_.triangles[t][static_cast<std::size_t>(i)];
+      const std::uint64_t b = mesh_.triangles[t][static_cast<std::size_t>(next(i))];
+      sides.push_back({std::min(a, b) << 32 | std::max(a, b), t, static_cast<std::uint8_t>(i), a < b});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::pair(a.key, a.triangle) < std::pair(b.key, b.triangle);
+  });
+  neighbours_.assign(mesh_.triangles.size(), {kNone, kNone, kNone});
+  for (std::size_t i = 0; i < sides.size();) {
+    std::size_t end = i + 1;
+    while (end < sides.size() && sides[end].key == sides[i].key) ++end;
+    if (end - i == 2 && sides[i].forward != sides[i + 1].forward) {
+      neighbours_[sides[i].triangle][sides[i].side] = sides[i + 1].triangle;
+      neighbours_[sides[i + 1].triangle][sides[i + 1].side] = sides[i].triangle;
+    }
+    i = end;
+  }
+}
+
+/// Grows flat regions from the largest triangle left: each takes the plane of the triangle that it began
+/// with.
+void MeshSurface::find_planes() {
+  const std::size_t count = mesh_.triangles.size();
+  std::vector<Vector3d> area_normals(count);
+  std::vector<double> area(count);
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const Vector3d& a = corner_m(t, 0);
+    area_normals[t] = (corner_m(t, 1) - a).cross(corner_m(t, 2) - a);
+    area[t] = area_normals[t].norm();
+  }
+  std::vector<std::uint32_t> largest_first(count);
+  std::iota(largest_first.begin(), largest_first.end(), 0U);
+  std::stable_sort(largest_first.begin(), largest_first.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return area[a] > area[b]; });
+
+  const double flat_m = std::min(kFlat * radius_m_, kFlat_m);
+  planes_.resize(count);
+  region_.assign(count, kNone);
+  std::vector<std::uint32_t> front;
+  for (const std::uint32_t seed : largest_first) {
+    if (region_[seed] != kNone) continue;
+    const Vector3d normal = area_normals[seed].normalized();
+    const Plane plane = {normal, normal.dot(corner_m(seed, 0))};
+    const auto lies_in_plane = [&](std::uint32_t t) {
+      for (int i = 0; i < 3; ++i)
+        if (!(std::abs(normal.dot(corner_m(t, i)) - plane.offset_m) <= flat_m)) return false;
+      return normal.dot(area_normals[t]) >= 0.0;
+    };
+    region_[seed] = seed;
+    front.assign(1, seed);
+    while (!front.empty()) {
+      const std::uint32_t t = front.back();
+      front.pop_back();
+      planes_[t] = plane;
+      for (const std::uint32_t u : neighbours_[t]) {
+        if (u == kNone || region_[u] != kNone || !lies_in_plane(u)) continue;
+        region_[u] = seed;
+        front.push_back(u);
+      }
+    }
+  }
+}
+
+/// Does the face across this side fall away? Its far corner then lies below the plane.
+bool MeshSurface::sharp(std::uint32_t triangle, int side) const noexcept {
+  const std::uint32_t other = neighbours_[triangle][static_cast<std::size_t>(side)];
+  if (other == kNone) return true;
+  if (region_[other] == region_[triangle]) return false;
+  if (kind_ == Kind::surface) return true;
+  const Plane& plane = planes_[triangle];
+  double height_m = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double h = plane.normal.dot(corner_m(other, i)) - plane.offset_m;
+    if (std::abs(h) > std::abs(height_m)) height_m = h;
+  }
+  return height_m < 0.0;
+}
+
+void MeshSurface::find_edges() {
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const auto side = static_cast<std::size_t>(i);
+      const std::uint32_t other = neighbours_[t][side];
+      if (other < t || !sharp(t, i)) continue;  // the lower number speaks for the edge
+      features_[t].edges[side] = static_cast<std::uint32_t>(edges_.size());
+      const Corners& corners = mesh_.triangles[t];
+      edges_.push_back({{corners[side], corners[static_cast<std::size_t>(next(i))]}, {t, other}});
+    }
+}
+
+/// At a pointed vertex at least three sharp edges meet: the corners of the cone that its neighbours span.
+void MeshSurface::find_pointed_vertices() {
+  const std::size_t count = mesh_.vertices_m.size();
+  std::vector<std::uint32_t> sharp_edges(count, 0);
+  for (const Edge& edge : edges_)
+    for (const std::uint32_t v : edge.vertices) ++sharp_edges[v];
+
+  // The triangles around each vertex, one list after the other.
+  std::vector<std::uint32_t> begin(count + 1, 0), at(3 * mesh_.triangles.size());
+  for (const Corners& corners : mesh_.triangles)
+    for (const std::uint32_t v : corners) ++begin[v + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<std::uint32_t> fill(begin.begin(), begin.end() - 1);
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+    for (const std::uint32_t v : mesh_.triangles[t]) at[fill[v]++] = t;
+
+  ring_begin_.assign(count + 1, 0);
+  std::vector<std::uint32_t> neighbours;
+  std::vector<Vector3d> directions;
+  for (std::uint32_t v = 0; v < count; ++v) {
+    ring_begin_[v + 1] = ring_begin_[v];
+    if (begin[v] == begin[v + 1] || (kind_ == Kind::solid && sharp_edges[v] < 3)) continue;
+    if (sharp_edges[v] == 0) continue;
+    neighbours.clear();
+    Vector3d mean_normal = Vector3d::Zero();
+    for (std::uint32_t k = begin[v]; k < begin[v + 1]; ++k) {
+      mean_normal += planes_[at[k]].normal;
+      for (const std::uint32_t corner : mesh_.triangles[at[k]])
+        if (corner != v) neighbours.push_back(corner);
+    }
+    std::sort(neighbours.begin(), neighbours.end());
+    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
+    directions.clear();
+    for (const std::uint32_t n : neighbours)
+      directions.push_back((mesh_.vertices_m[n] - mesh_.vertices_m[v]).normalized());
+    if (kind_ == Kind::solid && !all_fall_away(directions, mean_normal.normalized())) continue;
+    const std::uint32_t speaker = at[begin[v]];
+    for (std::size_t i = 0; i < 3; ++i)
+      if (mesh_.triangles[speaker][i] == v) features_[speaker].vertices[i] = v;
+    ring_.insert(ring_.end(), neighbours.begin(), neighbours.end());
+    ring_begin_[v + 1] = static_cast<std::uint32_t>(ring_.size());
+    ++pointed_count_;
+  }
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "collision/meshes/mesh_source.hpp"
+
+// PLY: a header that declares elements and their properties, then the values, as text or binary.
+
+namespace wrenchd {
+namespace {
+
+enum class PlyType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+struct PlyTypeName {
+  std::string_view name;
+  PlyType type;
+};
+constexpr std::array<PlyTypeName, 16> kTypes = {{{"char", PlyType::int8},
+                                                 {"int8", PlyType::int8},
+                                                 {"uchar", PlyType::uint8},
+                                                 {"uint8", PlyType::uint8},
+                                                 {"short", PlyType::int16},
+                                                 {"int16", PlyType::int16},
+                                                 {"ushort", PlyType::uint16},
+                                                 {"uint16", PlyType::uint16},
+                                                 {"int", PlyType::int32},
+                                                 {"int32", PlyType::int32},
+                                                 {"uint", PlyType::uint32},
+                                                 {"uint32", PlyType::uint32},
+                                                 {"float", PlyType::float32},
+                                                 {"float32", PlyType::float32},
+                                                 {"double", PlyType::float64},
+                                                 {"float64", PlyType::float64}}};
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::float32;
+  std::optional<PlyType> size;  ///< of a list: type of its length
+};
+
+struct PlyElement {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<PlyProperty> properties;
+};
+
+struct PlyHeader {
+  bool text = true;
+  bool swapped = false;  ///< bytes in another order than this machine's
+  std::vector<PlyElement> elements;
+};
+
+bool whole(PlyType type) {
+  return type != PlyType::float32 && type != PlyType::float64;
+}
+
+template <typename T>
+bool fits(double x) {
+  return x >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
+         x <= static_cast<double>(std::numeric_limits<T>::max());
+}
+
+/// Calls use(T{}) with the C++ type.
+template <typename Use>
+auto with_type(PlyType type, Use use) {
+  switch (type) {
+    case PlyType::int8:
+      return use(std::int8_t{});
+    case PlyType::uint8:
+      return use(std::uint8_t{});
+    case PlyType::int16:
+      return use(std::int16_t{});
+    case PlyType::uint16:
+      return use(std::uint16_t{});
+    case PlyType::int32:
+      return use(std::int32_t{});
+    case PlyType::uint32:
+      return use(std::uint32_t{});
+    case PlyType::float32:
+      return use(float{});
+    case PlyType::float64:
+      break;
+  }
+  return use(double{});
+}
+
+PlyType type_of(const MeshSource& source, std::size_t line, std::string_view word) {
+  for (const auto& [name, type] : kTypes)
+    if (name == word) return type;
+  source.refuse(line, in_quotes(word) + " is no type of PLY; export the mesh again");
+}
+
+void read_format(const MeshSource& source, std::size_t line, const std::vector<std::string_view>& words,
+                 PlyHeader& header) {
+  const std::string_view format = words.size() == 3 && words[0] == "format" ? words[1] : std::string_view();
+  const bool little = format == "binary_little_endian";
+  if (format != "ascii" && !little && format != "binary_big_endian")
+    source.refuse(
+        line,
+        "expected 'format ascii 1.0', 'binary_little_endian' or 'binary_big_endian'; export the mesh again");
+  header.text = format == "ascii";
+  header.swapped = little != (std::endian::native == std::endian::little);
+}
+
+void read_element(const MeshSource& source, std::size_t line, const std::vector<std::string_view>& words,
+                  PlyHeader& header) {
+  const auto count = words.size() == 3 ? whole_number_of(words[2]) : std::nullopt;
+  if (!count || *count < 0) source.refuse(line, "expected 'element NAME COUNT'; export the mesh again");
+  header.elements.push_back({std::string(words[1]), static_cast<std::size_t>(*count), {}});
+}
+
+void read_property(const MeshSource& source, std::size_t line, const std::vector<std::string_view>& words,
+                   PlyHeader& header) {
+  const bool list = words.size() == 5 && words[1] == "list";
+  if ((!list && words.size() != 3) || header.elements.empty())
+    source.refuse(
+        line,
+        "expected 'property TYPE NAME' or 'property list TYPE TYPE NAME' below an element; export the "
+        "mesh again");
+  PlyProperty property{std::string(words.back()), type_of(source, line, words[words.size() - 2]), {}};
+  if (list) property.size = type_of(source, line, words[2]);
+  if (list && !whole(*property.size))
+    source.refuse(line,
+                  "the length of a list cannot be a " + std::string(words[2]) + "; export the mesh again");
+  header.elements.back().properties.push_back(property);
+}
+
+PlyHeader read_header(const MeshSource& source, Lines& lines) {
+  PlyHeader header;
+  std::string_view line;
+  if (!lines.next(line) || words_of(line) != std::vector<std::string_view>{"ply"})
+    source.refuse(
+        1, "expected 'ply', found " + in_quotes(line) + "; save the mesh as PLY, or correct the extension");
+  lines.next(line);
+  read_format(source, lines.number(), words_of(line), header);
+  while (lines.next(line)) {
+    const auto words = words_of(line);
+    const std::string_view keyword = words.empty() ? std::string_view() : words[0];
+    if (keyword == "end_header") return header;
+    if (keyword == "element")
+      read_element(source, lines.number(), words, header);
+    else if (keyword == "property")
+      read_property(source, lines.number(), words, header);
+    else if (keyword != "comment" && keyword != "obj_info")
+      source.refuse(lines.number(), in_quotes(line) + " is no line of a PLY header; export the mesh again");
+  }
+  source.refuse(lines.number(), "the header has no 'end_header'; export the mesh again");
+}
+
+const PlyProperty* find(const PlyElement& element, std::string_view name) {
+  const auto same = [&](const PlyProperty& property) { return property.name == name; };
+  const auto found = std::find_if(element.properties.begin(), element.properties.end(), same);
+  return found == element.properties.end() ? nullptr : &*found;
+}
+
+/// CGAL takes a property of these names for a colour where one of them is an uchar, and then trusts that all
+/// are.
+void require_colours_alike(const MeshSource& source, const PlyElement& element) {
+  const PlyProperty* first = nullptr;
+  for (const char* name : {"red", "green", "blue", "r", "g", "b"}) {
+    const PlyProperty* colour = find(element, name);
+    if (colour == nullptr) continue;
+    if (first == nullptr) first = colour;
+    if (colour->type != first->type || colour->size || first->size)
+      source.refuse(
+          0, "the colours of element '" + element.name + "' differ in type; save the mesh without colours");
+  }
+}
+
+void require_vertices(const MeshSource& source, const PlyElement& element) {
+  for (const char* name : {"x", "y", "z"}) {
+    const PlyProperty* property = find(element, name);
+    if (property == nullptr || property->size || whole(property->type))
+      source.refuse(0, std::string("element 'vertex' needs a property '") + name +
+                           "' of type float or double; save the mesh with such coordinates");
+  }
+}
+
+void require_faces(const MeshSource& source, const PlyElement& element) {
+  for (const char* name : {"vertex_indices", "vertex_index"}) {
+    const PlyProperty* property = find(element, name);
+    if (property != nullptr && property->size &&
+        (property->type == PlyType::int32 || property->type == PlyType::uint32))
+      return;
+  }
+  source.refuse(
+      0, "element 'face' needs a property list 'vertex_indices' of type int or uint; save the mesh so");
+}
+
+void check_elements(const MeshSource& source, const PlyHeader& header) {
+  for (const PlyElement& element : header.elements) {
+    if (element.properties.empty())
+      source.refuse(0, "element " + in_quotes(element.name) + " has no properties; export the mesh again");
+    require_colours_alike(source, element);
+    if (element.name == "vertex" || element.name == "vertices") require_vertices(source, element);
+    if (element.name == "face" || element.name == "faces") require_faces(source, element);
+    if (element.name == "halfedge")
+      source.refuse(0, "holds half-edges; save the mesh with vertices and faces only");
+  }
+}
+
+/// Walks the values behind the header.
+class Values {
+ public:
+  Values(std::string_view rest, const PlyHeader& header)
+      : rest_(rest), text_(header.text), swapped_(header.swapped) {}
+
+  /// The next value; nothing where the file ends, or where it is no number of that type.
+  std::optional<double> next(PlyType type) { return text_ ? next_word(type) : next_bytes(type); }
+
+  /// True when a property was there whole.
+  bool pass(const PlyProperty& property) {
+    if (!property.size) return next(property.type).has_value();
+    const auto length = next(*property.size);
+    if (!length || *length < 0.0 || *length > static_cast<double>(rest_.size())) return false;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(*length); ++i)
+      if (!next(property.type)) return false;
+    return true;
+  }
+
+  bool at_end() const { return rest_.find_first_not_of(" \t\r\n") == std::string_view::npos; }
+
+ private:
+  std::optional<double> next_word(PlyType type) {
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
+    const std::string_view word = rest_.substr(0, rest_.find_first_of(" \t\r\n"));
+    rest_.remove_prefix(word.size());
+    std::optional<double> x = number_of(word);
+    if (whole(type) && !whole_number_of(word)) x.reset();
+    if (x && !with_type(type, [&](auto t) { return fits<decltype(t)>(*x); })) x.reset();
+    return x;
+  }
+
+  std::optional<double> next_bytes(PlyType type) {
+    return with_type(type, [&](auto t) -> std::optional<double> {
+      if (rest_.size() < sizeof t) return {};
+      std::array<char, sizeof t> bytes;
+      std::memcpy(bytes.data(), rest_.data(), sizeof t);
+      if (swapped_) std::reverse(bytes.begin(), bytes.end());
+      std::memcpy(&t, bytes.data(), sizeof t);
+      rest_.remove_prefix(sizeof t);
+      return static_cast<double>(t);
+    });
+  }
+
+  std::string_view rest_;
+  bool text_;
+  bool swapped_;
+};
+
+}  // namespace
+
+std::string guarded_ply(MeshSource source) {
+  Lines lines(source.bytes);
+  const PlyHeader header = read_header(source, lines);
+  check_elements(source, header);
+  Values values(lines.rest(), header);
+  for (const PlyElement& element : header.elements) {
+    for (std::size_t i = 0; i < element.count; ++i) {
+      for (const PlyProperty& property : element.properties) {
+        if (values.pass(property)) continue;
+        source.refuse(0, element.name + " " + std::to_string(i) + " of " + std::to_string(element.count) +
+                             " is cut short, or its '" + property.name +
+                             "' is no number of the type declared; export the mesh again");
+      }
+    }
+  }
+  if (!values.at_end())
+    source.refuse(0, "goes on behind the elements that its header counts; correct the counts");
+  const auto header_end = source.bytes.end() - static_cast<std::ptrdiff_t>(lines.rest().size());
+  source.bytes.erase(std::remove(source.bytes.begin(), header_end, '\r'), header_end);
+  return std::move(source.bytes);
+}
+
+}  // namespace wrenchd

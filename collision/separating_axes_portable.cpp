@@ -1,4 +1,0 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// For every processor.
-#define WRENCHD_APART apart_portable
-#include "collision/separating_axes_kernel.hpp"

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "daemon/control/control_methods.hpp"
+#include "daemon/control/control_socket.hpp"
+#include "daemon/control/daemon_methods.hpp"
+#include "daemon/control/event_feed.hpp"
+#include "daemon/control/lease.hpp"
+#include "daemon/control/listening_socket.hpp"
+
+namespace wrenchd {
+
+class Station;
+
+/// The control socket of a running station, and what is behind it: the methods, the lease, the events. Parts
+/// of the daemon add their methods, then it opens.
+class Control {
+ public:
+  /// Station and feed must outlive this.
+  Control(Station& station, EventFeed& feed);
+
+  /// To add rows to, before open().
+  MethodTable& methods() noexcept { return methods_; }
+  /// Likewise, of what `status` answers.
+  StatusRows& status() noexcept { return status_; }
+
+  /// Serves from now on. Throws std::runtime_error, which names the path, or the setting of a group that does
+  /// not exist, and the cure.
+  void open(const std::filesystem::path& path, const Identify& identify = peer_of);
+
+ private:
+  Station& station_;
+  EventFeed& feed_;
+  Lease lease_;
+  StatusRows status_;
+  MethodTable methods_;
+  std::optional<ListeningSocket> listening_;
+  std::optional<ControlSocket> socket_;  ///< last: its thread uses all of the above
+};
+
+}  // namespace wrenchd

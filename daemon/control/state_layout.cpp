@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/control/state_layout.hpp"
+
+#include <bit>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/recording/record_fields.hpp"
+
+namespace wrenchd {
+namespace {
+
+using nlohmann::json;
+
+json described(const RecordField& field, std::size_t base) {
+  json out = {{"name", field.name},       {"offset", base + field.offset},
+              {"type", name(field.type)}, {"count", field.count},
+              {"unit", field.unit},       {"frame", field.frame},
+              {"doc", field.doc}};
+  if (field.values != ValueNames::none && field.values != ValueNames::flag)
+    out[is_bits(field.values) ? "bits" : "values"] = value_names(field.values);
+  return out;
+}
+
+json described(std::span<const RecordField> fields, std::size_t base) {
+  json out = json::array();
+  for (const RecordField& field : fields) out.push_back(described(field, base));
+  return out;
+}
+
+}  // namespace
+
+json state_layout(const SharedState& state, const Workbench::ObstacleNames& obstacles) {
+  json fields = described(tick_fields(), offsetof(StateRecord, tick));
+  fields.push_back(
+      {{"name", "touch_count"},
+       {"offset", offsetof(StateRecord, touch_count)},
+       {"type", "u64"},
+       {"count", 1},
+       {"unit", "1"},
+       {"frame", ""},
+       {"doc", "contacts told of in this record, those that carry most; `contacts` counts all"}});
+  return {{"version", SharedState::kVersion},
+          {"magic", std::string(SharedState::kMagic.begin(), SharedState::kMagic.end())},
+          {"bytes", state.bytes()},
+          {"header_bytes", SharedState::kHeaderBytes},
+          {"written_offset", offsetof(SharedState::Header, written)},
+          {"slots", state.slots()},
+          {"slot_bytes", SharedState::kSlotBytes},
+          {"record_offset", 8},
+          {"record_bytes", sizeof(StateRecord)},
+          {"rate_Hz", state.rate_Hz()},
+          {"byte_order", std::endian::native == std::endian::little ? "little" : "big"},
+          {"fields", fields},
+          {"touches",
+           {{"offset", offsetof(StateRecord, touches)},
+            {"bytes", sizeof(Touch)},
+            {"most", kMostTouches},
+            {"fields", described(touch_fields(), 0)}}},
+          {"obstacles", obstacles.names},
+          {"rendering", obstacles.rendering}};
+}
+
+void open_state(const SharedState& state, const Workbench::ObstacleNames& obstacles,
+                const SendWithDescriptor& send) {
+  send({{"layout", state_layout(state, obstacles)}}, state.descriptor());
+}
+
+}  // namespace wrenchd

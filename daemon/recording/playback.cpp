@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/playback.hpp"
+
+#include <array>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "config/config_error.hpp"
+#include "config/pose_table.hpp"
+#include "config/toml_file.hpp"
+#include "daemon/recording/recording_file.hpp"
+
+namespace wrenchd {
+namespace {
+
+Pose pose_of(const std::array<double, 7>& x) {
+  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
+}
+
+bool is_good(const TickRecord& tick) {
+  return tick.fresh != 0 && tick.sample_fault == 0 && tick.released == 0;
+}
+
+std::vector<TimedPose> of_recording(const std::filesystem::path& file) {
+  const Recording recording = read_recording(file);
+  bool device_time_rises = true;
+  double last_s = 0.0;
+  bool first = true;
+  for (const TickRecord& tick : recording.ticks) {
+    if (!is_good(tick)) continue;
+    device_time_rises = device_time_rises && (first || tick.device_time_s > last_s);
+    last_s = tick.device_time_s;
+    first = false;
+  }
+  std::vector<TimedPose> poses;
+  for (const TickRecord& tick : recording.ticks) {
+    if (!is_good(tick)) continue;
+    const double time_s =
+        device_time_rises ? tick.device_time_s : 1e-9 * static_cast<double>(tick.arrived_ns);
+    if (!poses.empty() && !(time_s > poses.back().time_s)) continue;
+    if (!poses.empty() && time_s - poses.back().time_s > kLongestGap_s)
+      throw RecordingError(file.string() + ": before tick " + std::to_string(tick.tick) +
+                           " there is a gap of " + to_text(time_s - poses.back().time_s) +
+                           " s without a pose, which nobody can play; export what is wanted of it, with "
+                           "--from and --to");
+    poses.push_back({time_s, pose_of(tick.X_BH)});
+  }
+  if (poses.empty())
+    throw RecordingError(file.string() +
+                         ": has no good sample of the device, so there is nothing to play back");
+  const double start_s = poses.front().time_s;
+  for (TimedPose& pose : poses) pose.time_s -= start_s;
+  return poses;
+}
+
+}  // namespace
+
+std::vector<TimedPose> read_playback(const std::filesystem::path& file) {
+  constexpr std::string_view kHdf5 = "\x89HDF";
+  std::error_code error;
+  std::ifstream in(file, std::ios::binary);
+  if (!in || !std::filesystem::is_regular_file(file, error))
+    throw PoseTableError(file.string() +
+                         ": cannot be read; name a recording, or a CSV file of poses with times");
+  std::array<char, 4> begin{};
+  in.read(begin.data(), begin.size());
+  if (in.gcount() == 4 && std::string_view(begin.data(), 4) == kHdf5) return of_recording(file);
+  in.clear();
+  in.seekg(0);
+  return read_timed_poses(in, file.string());
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/record_history.hpp"
+
+#include <algorithm>
+#include <array>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+namespace wrenchd {
+
+/// Where memory is locked a limit may refuse what a machine would have.
+RecordHistory::RecordHistory(std::size_t ticks) try
+    : ticks_(std::max<std::size_t>(ticks, 1)),
+      ranges_(ticks_.size()),
+      touches_(std::max(kTouchesPerTick * ticks_.size(), kMostTouches)) {
+} catch (const std::bad_alloc&) {
+  throw std::runtime_error("the last " + std::to_string(ticks) + " ticks take " +
+                           std::to_string(ticks * kBytesPerTick / 1'000'000) +
+                           " MB of memory, and there is not so much; lower flight_s in [recording], or raise "
+                           "the limit of locked memory (ulimit -l, LimitMEMLOCK=)");
+}
+
+void RecordHistory::append(const StateRecord& record) {
+  const std::scoped_lock lock(mutex_);
+  const std::size_t place = end_ % ticks_.size();
+  ticks_[place] = record.tick;
+  ranges_[place] = {touch_end_, static_cast<std::uint32_t>(record.touch_count)};
+  for (std::uint64_t i = 0; i < record.touch_count; ++i)
+    touches_[(touch_end_ + i) % touches_.size()] = record.touches[i];
+  touch_end_ += record.touch_count;
+  ++end_;
+}
+
+RecordHistory::Held RecordHistory::held() const {
+  const std::scoped_lock lock(mutex_);
+  return {begin(), end_};
+}
+
+std::int64_t RecordHistory::newest_ns() const {
+  const std::scoped_lock lock(mutex_);
+  return end_ == 0 ? 0 : tick(end_ - 1).now_ns;
+}
+
+std::uint64_t RecordHistory::first_since(std::int64_t now_ns) const {
+  const std::scoped_lock lock(mutex_);
+  std::uint64_t low = begin(), high = end_;  // the times of ticks rise
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (tick(middle).now_ns < now_ns)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+std::uint64_t RecordHistory::copy(std::uint64_t from, std::uint64_t end, std::size_t most,
+                                  RecordBatch& out) const {
+  out.clear();
+  const std::scoped_lock lock(mutex_);
+  const std::uint64_t first = std::max(from, begin());
+  const std::uint64_t last = std::min({first + most, end, end_});
+  const std::uint64_t touches_begin = touch_end_ - std::min<std::uint64_t>(touch_end_, touches_.size());
+  for (std::uint64_t number = first; number < last; ++number) {
+    const TouchRange& range = ranges_[number % ranges_.size()];
+    const bool there = range.first >= touches_begin;
+    std::array<Touch, kMostTouches> its;
+    for (std::uint32_t i = 0; there && i < range.count; ++i)
+      its[i] = touches_[(range.first + i) % touches_.size()];
+    out.add(tick(number), std::span(its).first(there ? range.count : 0));
+  }
+  return first;
+}
+
+}  // namespace wrenchd

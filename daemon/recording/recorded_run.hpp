@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "daemon/plan.hpp"
+#include "daemon/recording/recording_file.hpp"
+
+namespace wrenchd {
+
+/// What a recording ran with, made of what is in it. Its files are unpacked into a directory of their own,
+/// which goes with this.
+class RecordedRun {
+ public:
+  /// Throws RecordingError as recorded_plan(), and std::system_error where nothing can be unpacked.
+  explicit RecordedRun(const RecordingHeader& header);
+  ~RecordedRun();
+  RecordedRun(const RecordedRun&) = delete;
+  RecordedRun& operator=(const RecordedRun&) = delete;
+
+  const Plan& plan() const noexcept { return plan_; }
+
+ private:
+  std::filesystem::path directory_;
+  Plan plan_;
+};
+
+}  // namespace wrenchd

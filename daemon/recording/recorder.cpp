@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/recorder.hpp"
+
+#include <algorithm>
+
+namespace wrenchd {
+namespace {
+
+/// At most so many chunks in a piece: between two the disk is looked at, and other files have their turn.
+constexpr std::size_t kMostChunks = 8;
+
+}  // namespace
+
+Recorder::Recorder(const RecordHistory& history, const std::filesystem::path& file,
+                   const RecordingHeader& header, std::uint64_t first)
+    : history_(history), file_(file), writer_(file, header), next_(first) {}
+
+bool Recorder::step(std::uint64_t end, bool rest) {
+  const std::uint64_t begin = std::max(next_, history_.held().begin);
+  const std::uint64_t there = end - std::min(begin, end);
+  std::size_t most = std::min<std::uint64_t>(there, kMostChunks * RecordingWriter::kChunkTicks);
+  // A chunk that is begun is written again when it goes on: only the last one is.
+  if (!rest || most < there) most -= (written_ + most) % RecordingWriter::kChunkTicks;
+  if (most == 0 || most > there) return false;
+  const std::uint64_t first = history_.copy(next_, end, most, batch_);
+  lost_ += first - next_;
+  writer_.append(batch_);
+  writer_.flush();
+  written_ += batch_.ticks.size();
+  next_ = first + batch_.ticks.size();
+  return !batch_.ticks.empty();
+}
+
+}  // namespace wrenchd

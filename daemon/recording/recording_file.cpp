@@ -1,0 +1,589 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/recording_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <ctime>
+#include <type_traits>
+
+#include <hdf5.h>
+
+#include "daemon/recording/record_fields.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
+/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults; 5: what was
+/// changed while the loop ran; 6: contacts, texts and meshes in places of their own.
+constexpr const char* kFormat = "6";
+constexpr hsize_t kChunkTouches = 1024;
+constexpr unsigned kDeflateLevel = 1;
+/// The most that DEFLATE makes of a byte: a table that says it holds more than its file could is a bad one.
+constexpr std::uint64_t kMostDeflated = 1032;
+/// Of any one text or mesh.
+constexpr hsize_t kMostBytes = hsize_t{1} << 31;
+
+/// A row of /ticks.
+struct TickRow {
+  TickRecord tick;
+  std::uint64_t first_touch = 0;
+  std::uint32_t touch_count = 0;
+  std::uint32_t padding = 0;
+};
+static_assert(std::is_trivially_copyable_v<TickRow> && std::is_trivially_copyable_v<Touch>);
+
+constexpr std::array kRangeFields = {
+    RecordField{"first_touch", FieldType::u64, 1, offsetof(TickRow, first_touch), "1", "",
+                "row of /touches with the first contact of the tick", ValueNames::none},
+    RecordField{"touch_count", FieldType::u32, 1, offsetof(TickRow, touch_count), "1", "",
+                "contacts of the tick in /touches: at most 16, those that carry most; `contacts` counts all",
+                ValueNames::none},
+};
+
+/// One of the two tables.
+struct TableKind {
+  const char* path;
+  const char* word;  ///< for messages
+  std::size_t row_bytes;
+  std::vector<RecordField> fields;
+  hsize_t chunk_rows;
+};
+
+const TableKind& tick_table() {
+  static const TableKind kind = [] {
+    const auto fields = tick_fields();
+    TableKind made{
+        "/ticks", "ticks", sizeof(TickRow), {fields.begin(), fields.end()}, RecordingWriter::kChunkTicks};
+    made.fields.insert(made.fields.end(), kRangeFields.begin(), kRangeFields.end());
+    return made;
+  }();
+  return kind;
+}
+
+const TableKind& touch_table() {
+  static const TableKind kind = [] {
+    const auto fields = touch_fields();
+    TableKind made{"/touches", "touches", sizeof(Touch), {}, kChunkTouches};
+    for (const RecordField& field : fields)
+      if (std::string(field.name) != "padding") made.fields.push_back(field);
+    return made;
+  }();
+  return kind;
+}
+
+hid_t type_of(FieldType type) {
+  switch (type) {
+    case FieldType::u8:
+      return H5T_NATIVE_UINT8;
+    case FieldType::u16:
+      return H5T_NATIVE_UINT16;
+    case FieldType::u32:
+      return H5T_NATIVE_UINT32;
+    case FieldType::u64:
+      return H5T_NATIVE_UINT64;
+    case FieldType::i64:
+      return H5T_NATIVE_INT64;
+    case FieldType::f64:
+      break;
+  }
+  return H5T_NATIVE_DOUBLE;
+}
+
+/// Owns an HDF5 identifier.
+class Handle {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Handle(hid_t id, Close close) : id_(id), close_(close) {}
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  operator hid_t() const { return id_; }  // NOLINT(google-explicit-constructor): HDF5 takes plain identifiers
+  bool ok() const { return id_ >= 0; }
+
+ private:
+  hid_t id_;
+  Close close_;
+};
+
+/// HDF5 prints its error stack unless told not to; our errors say what matters.
+void quiet() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+hid_t row_type(const TableKind& table) {
+  const hid_t row = H5Tcreate(H5T_COMPOUND, table.row_bytes);
+  for (const RecordField& field : table.fields) {
+    if (field.count == 1) {
+      H5Tinsert(row, field.name, field.offset, type_of(field.type));
+      continue;
+    }
+    const hsize_t count = field.count;
+    const Handle array(H5Tarray_create2(type_of(field.type), 1, &count), H5Tclose);
+    H5Tinsert(row, field.name, field.offset, array);
+  }
+  return row;
+}
+
+// ------------------------------------------------------------------------------------------------ Writing
+
+hid_t text_type(std::size_t bytes) {
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(bytes, 1));
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  return type;
+}
+
+/// Of variable length, for what is of fixed length comes to Python as bytes.
+void write_text(hid_t object, const char* name, const std::string& text) {
+  const Handle type(text_type(H5T_VARIABLE), H5Tclose);
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  const char* const bytes = text.c_str();
+  H5Awrite(attribute, type, &bytes);
+}
+
+void write_number(hid_t object, const char* name, hid_t type, const void* number) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  H5Awrite(attribute, type, number);
+}
+
+std::string values_of(const RecordField& field) {
+  std::string text;
+  for (const std::string& name : value_names(field.values)) text += (text.empty() ? "" : ", ") + name;
+  if (!text.empty()) text = (is_bits(field.values) ? "bits from the lowest: " : "from 0: ") + text;
+  return text;
+}
+
+hid_t create_table(hid_t file, const TableKind& table, hid_t row) {
+  const hsize_t none = 0;
+  const hsize_t unlimited = H5S_UNLIMITED;
+  const Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
+  const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_chunk(layout, 1, &table.chunk_rows);
+  H5Pset_shuffle(layout);
+  H5Pset_deflate(layout, kDeflateLevel);
+  const hid_t made = H5Dcreate2(file, table.path, row, space, H5P_DEFAULT, layout, H5P_DEFAULT);
+  if (made < 0) return made;
+  for (const RecordField& field : table.fields) {
+    const std::string column = field.name;
+    write_text(made, (column + ".unit").c_str(), field.unit);
+    if (*field.frame != '\0') write_text(made, (column + ".frame").c_str(), field.frame);
+    write_text(made, (column + ".doc").c_str(), field.doc);
+    if (const std::string values = values_of(field); !values.empty())
+      write_text(made, (column + ".values").c_str(), values);
+  }
+  return made;
+}
+
+/// The same again as a table, for whoever would rather read it so.
+struct FieldRow {
+  const char *table, *name, *type;
+  std::uint32_t count;
+  const char *unit, *frame, *doc, *values;
+};
+
+void write_fields(hid_t file) {
+  std::vector<std::string> values;
+  std::vector<FieldRow> rows;
+  std::size_t all = 0;
+  for (const TableKind* table : {&tick_table(), &touch_table()}) all += table->fields.size();
+  values.reserve(all);  // rows point into it
+  for (const TableKind* table : {&tick_table(), &touch_table()})
+    for (const RecordField& field : table->fields) {
+      values.push_back(values_of(field));
+      rows.push_back({table->word, field.name, name(field.type), field.count, field.unit, field.frame,
+                      field.doc, values.back().c_str()});
+    }
+  const Handle text(text_type(H5T_VARIABLE), H5Tclose);
+  const Handle type(H5Tcreate(H5T_COMPOUND, sizeof(FieldRow)), H5Tclose);
+  H5Tinsert(type, "table", offsetof(FieldRow, table), text);
+  H5Tinsert(type, "name", offsetof(FieldRow, name), text);
+  H5Tinsert(type, "type", offsetof(FieldRow, type), text);
+  H5Tinsert(type, "count", offsetof(FieldRow, count), H5T_NATIVE_UINT32);
+  H5Tinsert(type, "unit", offsetof(FieldRow, unit), text);
+  H5Tinsert(type, "frame", offsetof(FieldRow, frame), text);
+  H5Tinsert(type, "doc", offsetof(FieldRow, doc), text);
+  H5Tinsert(type, "values", offsetof(FieldRow, values), text);
+  const hsize_t count = rows.size();
+  const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const Handle made(H5Dcreate2(file, "/fields", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                    H5Dclose);
+  H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data());
+}
+
+/// A text of a file that it ran with.
+void write_config(hid_t group, const std::string& name, const std::filesystem::path& at,
+                  const std::string& text) {
+  const Handle type(text_type(text.size()), H5Tclose);
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle made(H5Dcreate2(group, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                    H5Dclose);
+  H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str());
+  write_text(made, "file", at.string());
+}
+
+void write_mesh(hid_t group, const RecordedFile& mesh) {
+  constexpr hsize_t kMeshChunk = hsize_t{1} << 16;
+  const hsize_t count = mesh.inside ? mesh.bytes.size() : 0;
+  const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  if (count > 0) {
+    const hsize_t chunk = std::min(count, kMeshChunk);
+    H5Pset_chunk(layout, 1, &chunk);
+    H5Pset_deflate(layout, kDeflateLevel);
+  }
+  const Handle made(
+      H5Dcreate2(group, mesh.role.c_str(), H5T_NATIVE_UINT8, space, H5P_DEFAULT, layout, H5P_DEFAULT),
+      H5Dclose);
+  if (count > 0) H5Dwrite(made, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data());
+  write_text(made, "file", mesh.at.string());
+  write_text(made, "sha256", mesh.sha256);
+  const std::uint8_t inside = mesh.inside ? 1 : 0;
+  write_number(made, "inside", H5T_NATIVE_UINT8, &inside);
+}
+
+bool is_mesh(const std::string& role) {
+  return role == "tool" || role.starts_with("obstacle_");
+}
+
+std::string utc(std::int64_t unix_ns) {
+  const std::time_t whole_s = unix_ns / 1'000'000'000;
+  std::tm parts{};
+  gmtime_r(&whole_s, &parts);
+  std::array<char, 40> day{};
+  const std::size_t length = std::strftime(day.data(), day.size(), "%Y-%m-%dT%H:%M:%S", &parts);
+  std::string us = std::to_string(unix_ns / 1000 % 1'000'000);
+  us.insert(0, 6 - std::min<std::size_t>(us.size(), 6), '0');
+  return std::string(day.data(), length) + "." + us + "Z";
+}
+
+void write_header(hid_t file, const RecordingHeader& header) {
+  write_text(file, "format", kFormat);
+  write_text(file, "wrenchd_version", header.version);
+  write_text(file, "kernel", header.kernel);
+  write_text(file, "realtime", header.realtime);
+  write_text(file, "clock", header.virtual_time ? "virtual" : "CLOCK_MONOTONIC");
+  write_number(file, "rate_Hz", H5T_NATIVE_DOUBLE, &header.rate_Hz);
+  write_text(file, "started_utc", utc(header.started_unix_ns));
+  write_number(file, "started_unix_ns", H5T_NATIVE_INT64, &header.started_unix_ns);
+  write_number(file, "started_ns", H5T_NATIVE_INT64, &header.started_ns);
+  write_text(file, "time", "UTC of a tick, as ns since 1970: started_unix_ns + (now_ns - started_ns)");
+  const Handle config(H5Gcreate2(file, "/config", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  write_config(config, "settings", header.settings_file, header.settings);
+  write_config(config, "scene", header.scene_file, header.scene);
+  write_config(config, "profile", header.profile_file, header.profile);
+  const Handle meshes(H5Gcreate2(file, "/meshes", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  for (const RecordedFile& one : header.files) {
+    if (is_mesh(one.role))
+      write_mesh(meshes, one);
+    else
+      write_config(config, one.role, one.at, one.bytes);
+  }
+}
+
+}  // namespace
+
+void RecordBatch::clear() {
+  ticks.clear();
+  ranges.clear();
+  touches.clear();
+}
+
+void RecordBatch::add(const TickRecord& tick, std::span<const Touch> its) {
+  ticks.push_back(tick);
+  ranges.push_back({touches.size(), static_cast<std::uint32_t>(its.size())});
+  touches.insert(touches.end(), its.begin(), its.end());
+}
+
+struct RecordingWriter::File {
+  std::filesystem::path path;
+  Handle file;
+  Handle tick_row;
+  Handle touch_row;
+  Handle ticks;
+  Handle touches;
+  hsize_t tick_rows = 0;
+  hsize_t touch_rows = 0;
+  std::vector<TickRow> rows = {};
+
+  void append(const Handle& table, const Handle& row, hsize_t& rows_so_far, const void* from, hsize_t count) {
+    if (count == 0) return;
+    const hsize_t start = rows_so_far;
+    const hsize_t total = start + count;
+    const bool grown = H5Dset_extent(table, &total) >= 0;
+    const Handle in_file(H5Dget_space(table), H5Sclose);
+    H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &start, nullptr, &count, nullptr);
+    const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+    if (!grown || H5Dwrite(table, row, in_memory, in_file, H5P_DEFAULT, from) < 0) refuse();
+    rows_so_far = total;
+  }
+  [[noreturn]] void refuse() const {
+    throw RecordingError(path.string() +
+                         ": the recording cannot be written; is the disk full, or was it taken away?");
+  }
+};
+
+RecordingWriter::RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header) {
+  quiet();
+  std::error_code ignored;
+  if (std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
+    throw RecordingError(file.string() +
+                         ": exists already, and a recording is never overwritten; choose another name");
+  const hid_t id = H5Fcreate(file.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT);
+  if (id < 0)
+    throw RecordingError(file.string() +
+                         ": cannot be created; check that the directory exists and may be written to");
+  const hid_t tick_row = row_type(tick_table());
+  const hid_t touch_row = row_type(touch_table());
+  file_.reset(new File{file, Handle(id, H5Fclose), Handle(tick_row, H5Tclose), Handle(touch_row, H5Tclose),
+                       Handle(create_table(id, tick_table(), tick_row), H5Dclose),
+                       Handle(create_table(id, touch_table(), touch_row), H5Dclose)});
+  if (!file_->ticks.ok() || !file_->touches.ok())
+    throw RecordingError(file.string() + ": the tables cannot be created; is the disk full?");
+  write_fields(id);
+  write_header(id, header);
+  flush();
+}
+
+RecordingWriter::~RecordingWriter() = default;
+
+void RecordingWriter::append(std::span<const TickRecord> records) {
+  append(records, {}, {});
+}
+
+/// The contacts first: no row of /ticks ever names one that is not there.
+void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const TouchRange> ranges,
+                             std::span<const Touch> touches) {
+  const hsize_t first = file_->touch_rows;
+  file_->rows.assign(ticks.size(), TickRow{});
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    file_->rows[i].tick = ticks[i];
+    file_->rows[i].first_touch = first;
+    if (ranges.empty()) continue;
+    file_->rows[i].first_touch = first + ranges[i].first;
+    file_->rows[i].touch_count = ranges[i].count;
+  }
+  file_->append(file_->touches, file_->touch_row, file_->touch_rows, touches.data(), touches.size());
+  file_->append(file_->ticks, file_->tick_row, file_->tick_rows, file_->rows.data(), ticks.size());
+}
+
+void RecordingWriter::flush() {
+  if (H5Fflush(file_->file, H5F_SCOPE_LOCAL) < 0) file_->refuse();
+}
+
+// ------------------------------------------------------------------------------------------------ Reading
+
+namespace {
+
+/// What stands in an attribute or data set of a text; empty where there is none.
+template <class Read>
+std::string text_of(const Handle& type, const Read& read) {
+  if (!type.ok() || H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) return {};
+  const std::size_t size = H5Tget_size(type);
+  if (size > kMostBytes) return {};
+  std::string text(size, '\0');
+  if (read(text.data()) < 0) return {};
+  text.resize(std::min(text.size(), text.find('\0')));  // a text of no bytes takes one, a zero
+  return text;
+}
+
+std::string read_text(hid_t object, const char* name) {
+  const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.ok()) return {};
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  if (H5Sget_simple_extent_npoints(space) != 1) return {};
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) <= 0)
+    return text_of(type, [&](char* to) { return H5Aread(attribute, type, to); });
+  char* bytes = nullptr;
+  if (H5Aread(attribute, type, &bytes) < 0 || bytes == nullptr) return {};
+  const std::string text = bytes;
+  H5Dvlen_reclaim(type, space, H5P_DEFAULT, &bytes);
+  return text;
+}
+
+template <class T>
+T read_number(hid_t object, const char* name, hid_t type, T otherwise) {
+  const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.ok()) return otherwise;
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  T number = otherwise;
+  if (H5Sget_simple_extent_npoints(space) != 1 || H5Aread(attribute, type, &number) < 0) return otherwise;
+  return number;
+}
+
+std::string read_config(hid_t set, std::filesystem::path& at) {
+  const Handle space(H5Dget_space(set), H5Sclose);
+  if (H5Sget_simple_extent_npoints(space) != 1) return {};
+  const Handle type(H5Dget_type(set), H5Tclose);
+  at = read_text(set, "file");
+  return text_of(type, [&](char* to) { return H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to); });
+}
+
+/// A file that is open, and what is said of it.
+struct Opened {
+  const std::filesystem::path& path;
+  hid_t file;
+  std::uint64_t bytes;  ///< of the file
+
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw RecordingError(path.string() + ": " + what);
+  }
+};
+
+std::vector<std::string> names_in(hid_t group) {
+  std::vector<std::string> names;
+  H5Literate(
+      group, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr,
+      [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
+        static_cast<std::vector<std::string>*>(list)->emplace_back(name);
+        return 0;
+      },
+      &names);
+  return names;
+}
+
+RecordedFile read_mesh(const Opened& opened, hid_t set, const std::string& role) {
+  RecordedFile mesh{role,
+                    read_text(set, "file"),
+                    read_text(set, "sha256"),
+                    read_number<std::uint8_t>(set, "inside", H5T_NATIVE_UINT8, 0) != 0,
+                    {}};
+  const Handle space(H5Dget_space(set), H5Sclose);
+  const hssize_t count = H5Sget_simple_extent_npoints(space);
+  if (!mesh.inside || count <= 0) return mesh;
+  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMostBytes, opened.bytes * kMostDeflated))
+    opened.refuse("the mesh '" + role + "' in it cannot be as large as it says; the file is damaged");
+  mesh.bytes.resize(static_cast<std::size_t>(count));
+  if (H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data()) < 0)
+    opened.refuse("the mesh '" + role + "' in it cannot be read; the file is damaged");
+  return mesh;
+}
+
+void read_files(const Opened& opened, RecordingHeader& header) {
+  for (const char* place : {"/config", "/meshes"}) {
+    const Handle group(H5Gopen2(opened.file, place, H5P_DEFAULT), H5Gclose);
+    if (!group.ok()) continue;
+    for (const std::string& name : names_in(group)) {
+      const Handle set(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose);
+      if (!set.ok()) continue;
+      if (is_mesh(name)) {
+        header.files.push_back(read_mesh(opened, set, name));
+        continue;
+      }
+      std::filesystem::path at;
+      std::string text = read_config(set, at);
+      if (name == "settings")
+        header.settings = text, header.settings_file = at;
+      else if (name == "scene")
+        header.scene = text, header.scene_file = at;
+      else if (name == "profile")
+        header.profile = text, header.profile_file = at;
+      else
+        header.files.push_back({name, at, {}, true, text});
+    }
+  }
+}
+
+RecordingHeader read_header(const Opened& opened) {
+  RecordingHeader header;
+  header.version = read_text(opened.file, "wrenchd_version");
+  header.kernel = read_text(opened.file, "kernel");
+  header.realtime = read_text(opened.file, "realtime");
+  header.virtual_time = read_text(opened.file, "clock") == "virtual";
+  header.rate_Hz = read_number(opened.file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
+  header.started_ns = read_number<std::int64_t>(opened.file, "started_ns", H5T_NATIVE_INT64, 0);
+  header.started_unix_ns = read_number<std::int64_t>(opened.file, "started_unix_ns", H5T_NATIVE_INT64, 0);
+  read_files(opened, header);
+  return header;
+}
+
+/// Before anything is read by it: older formats have other columns.
+void check_format(const Opened& opened) {
+  std::string format = read_text(opened.file, "format");
+  std::string version = read_text(opened.file, "wrenchd_version");
+  if (format.empty()) {  // up to 5 it stood at the table
+    const Handle table(H5Dopen2(opened.file, "/ticks", H5P_DEFAULT), H5Dclose);
+    if (!table.ok()) opened.refuse("has no table 'ticks'; name a recording of wrenchd");
+    format = read_text(table, "format");
+    version = read_text(table, "wrenchd_version");
+    if (format.empty()) format = "1";
+  }
+  if (format != kFormat)
+    opened.refuse("is of format " + format + ", and format " + kFormat +
+                  " is what can be read; replay it with the wrenchd that wrote it (" + version + ")");
+}
+
+/// That the columns are those that we know, of a class that converts.
+void check_columns(const Opened& opened, const TableKind& table, hid_t set) {
+  const Handle type(H5Dget_type(set), H5Tclose);
+  if (H5Tget_class(type) != H5T_COMPOUND)
+    opened.refuse("its table '" + std::string(table.word) + "' has no columns; name a recording of wrenchd");
+  for (const RecordField& field : table.fields)
+    if (H5Tget_member_index(type, field.name) < 0)
+      opened.refuse("column '" + std::string(field.name) + "' of its table '" + table.word +
+                    "' is missing; the file was changed, take it as it was recorded");
+}
+
+template <class Row>
+std::vector<Row> read_table(const Opened& opened, const TableKind& table) {
+  const Handle set(H5Dopen2(opened.file, table.path, H5P_DEFAULT), H5Dclose);
+  if (!set.ok()) opened.refuse("has no table '" + std::string(table.word) + "'; name a recording of wrenchd");
+  check_columns(opened, table, set);
+  const Handle space(H5Dget_space(set), H5Sclose);
+  hsize_t rows = 0;
+  if (H5Sget_simple_extent_ndims(space) != 1 || H5Sget_simple_extent_dims(space, &rows, nullptr) != 1)
+    opened.refuse("its table '" + std::string(table.word) + "' is no list of rows; the file is damaged");
+  if (rows > opened.bytes * kMostDeflated / table.row_bytes + 1)
+    opened.refuse("its table '" + std::string(table.word) + "' cannot have the " + std::to_string(rows) +
+                  " rows that it says; the file is damaged");
+  std::vector<Row> read(rows);
+  const Handle row(row_type(table), H5Tclose);
+  if (rows > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()) < 0)
+    opened.refuse("its table '" + std::string(table.word) +
+                  "' cannot be read; the file is damaged, or cut short");
+  return read;
+}
+
+/// Rows whose numbers were not written yet when the process died: HDF5 reads them as zeros.
+bool is_unwritten(const TickRow& row) {
+  return row.tick.now_ns == 0 && row.tick.answered_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& file) {
+  quiet();
+  std::error_code error;
+  const std::uint64_t bytes = std::filesystem::file_size(file, error);
+  if (error) throw RecordingError(file.string() + ": is not there; name a recording of wrenchd");
+  const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  const Opened opened{file, id, bytes};
+  if (!id.ok())
+    opened.refuse(
+        H5Fis_hdf5(file.c_str()) > 0
+            ? "is cut short or damaged; take a whole copy, or name a recording of wrenchd that is whole"
+            : "is not an HDF5 file; name a recording of wrenchd");
+  check_format(opened);
+  Recording recording;
+  recording.header = read_header(opened);
+  std::vector<TickRow> rows = read_table<TickRow>(opened, tick_table());
+  recording.touches = read_table<Touch>(opened, touch_table());
+  while (rows.size() > 1 && is_unwritten(rows.back())) rows.pop_back();
+  recording.ticks.reserve(rows.size());
+  recording.ranges.reserve(rows.size());
+  const std::uint64_t touches = recording.touches.size();
+  for (const TickRow& row : rows) {
+    const bool there = row.first_touch <= touches && row.touch_count <= touches - row.first_touch;
+    recording.ticks.push_back(row.tick);
+    recording.ranges.push_back(there ? TouchRange{row.first_touch, row.touch_count} : TouchRange{});
+  }
+  return recording;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/replay.hpp"
+
+#include <array>
+#include <bit>
+#include <span>
+
+namespace wrenchd {
+namespace {
+
+Pose pose_of(const std::array<double, 7>& x) noexcept {
+  Pose X;
+  X.translation_m = {x[0], x[1], x[2]};
+  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
+  return X;
+}
+
+/// A device whose samples come out of a recording, one a tick.
+class RecordedDevice final : public Device {
+ public:
+  void play(const TickRecord& record) noexcept { record_ = &record; }
+
+  void open() override {}
+  DeviceSample read_newest(TimePoint) noexcept override;
+  Fault write(TimePoint, const Wrench&, bool) noexcept override {
+    return static_cast<Fault>(record_->write_fault);
+  }
+  std::uint64_t commands_sent() const noexcept override { return record_->commanded; }
+  void release(TimePoint) noexcept override {}
+  void wait_readable(TimePoint) noexcept override {}
+  void close() noexcept override {}
+
+ private:
+  const TickRecord* record_ = nullptr;
+};
+
+/// The clock of a recording: when a wrench was ready, and how long the machine had slept.
+class RecordedClock final : public Clock {
+ public:
+  void play(const TickRecord& record) noexcept { record_ = &record; }
+
+  TimePoint now() const noexcept override {
+    return TimePoint(Duration(record_ == nullptr ? 0 : record_->answered_ns));
+  }
+  void sleep_until(TimePoint) noexcept override {}
+  Duration slept() const noexcept override { return Duration(record_->slept_ns); }
+
+ private:
+  const TickRecord* record_ = nullptr;
+};
+
+/// A placer whose answers come out of a recording, at the ticks at which they came then.
+class RecordedPlacer final : public Placer {
+ public:
+  void play(const TickRecord& record) noexcept { record_ = &record; }
+
+  void ask(const PlacementQuestion& question) noexcept override { question_ = question; }
+  bool answer(PlacementAnswer& answer) noexcept override {
+    const auto placing = static_cast<Placing>(record_->placing);
+    answer = {question_.number, placing == Placing::placed, pose_of(record_->X_WQ), question_.scene_time_s};
+    return placing == Placing::placed || placing == Placing::nowhere;
+  }
+
+ private:
+  const TickRecord* record_ = nullptr;
+  PlacementQuestion question_;
+};
+
+DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
+  const TickRecord& r = *record_;
+  DeviceSample sample;
+  sample.X_BH = pose_of(r.X_BH);
+  sample.V_BH.linear_m_per_s = {r.V_BH[0], r.V_BH[1], r.V_BH[2]};
+  sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
+  sample.device_time_s = r.device_time_s;
+  sample.sequence = r.sequence;
+  sample.acknowledged = r.acknowledged;
+  sample.arrived = TimePoint(Duration(r.arrived_ns));
+  sample.skipped = r.skipped;
+  sample.missing = r.missing;
+  sample.rejected = r.rejected;
+  sample.repeated = r.repeated;
+  sample.buttons = r.buttons;
+  sample.fresh = r.fresh != 0;
+  sample.motors_on = r.motors_on != 0;
+  sample.watchdog_tripped = r.watchdog_tripped != 0;
+  sample.homed = r.homed != 0;
+  sample.fault = static_cast<Fault>(r.sample_fault);
+  return sample;
+}
+
+/// Compares two runs of numbers by their bits, so that NaN equals itself and -0 is not 0.
+std::optional<Difference> compare(std::uint64_t tick, const char* field, std::span<const double> recorded,
+                                  std::span<const double> replayed) {
+  for (std::size_t i = 0; i < recorded.size(); ++i)
+    if (std::bit_cast<std::uint64_t>(recorded[i]) != std::bit_cast<std::uint64_t>(replayed[i]))
+      return Difference{tick, std::string(field) + '[' + std::to_string(i) + ']', recorded[i], replayed[i]};
+  return {};
+}
+
+struct Compared {
+  const char* name;
+  double (*of)(const TickRecord&);
+};
+
+/// One number each. What is no double is exact as one, but for a set of faults, of which there are less
+/// than 53.
+#define WRENCHD_COMPARED(member)                                               \
+  Compared {                                                                   \
+#member, [](const TickRecord& r) { return static_cast<double>(r.member); } \
+  }
+constexpr std::array kNumbers = {
+    WRENCHD_COMPARED(energy),          WRENCHD_COMPARED(kkt_residual), WRENCHD_COMPARED(authority),
+    WRENCHD_COMPARED(stiffness_share), WRENCHD_COMPARED(guard_share),  WRENCHD_COMPARED(energy_in_J),
+    WRENCHD_COMPARED(energy_out_J),    WRENCHD_COMPARED(injected_J),   WRENCHD_COMPARED(through),
+    WRENCHD_COMPARED(contacts),        WRENCHD_COMPARED(iterations),   WRENCHD_COMPARED(projection_status),
+    WRENCHD_COMPARED(placing),         WRENCHD_COMPARED(state),        WRENCHD_COMPARED(cause),
+    WRENCHD_COMPARED(motors_told),     WRENCHD_COMPARED(limit_causes), WRENCHD_COMPARED(dropped),
+    WRENCHD_COMPARED(faults),          WRENCHD_COMPARED(released),
+};
+#undef WRENCHD_COMPARED
+static_assert(kFaultCount < 53);
+
+std::optional<Difference> compare(const TickRecord& then, const TickRecord& now) {
+  if (auto d = compare(then.tick, "X_WP", then.X_WP, now.X_WP)) return d;
+  if (auto d = compare(then.tick, "X_WQ", then.X_WQ, now.X_WQ)) return d;
+  if (auto d = compare(then.tick, "eps", then.eps, now.eps)) return d;
+  if (auto d = compare(then.tick, "F_T", then.F_T, now.F_T)) return d;
+  if (auto d = compare(then.tick, "F_out", then.F_out, now.F_out)) return d;
+  for (const Compared& number : kNumbers) {
+    const double a = number.of(then), b = number.of(now);
+    if (std::bit_cast<std::uint64_t>(a) != std::bit_cast<std::uint64_t>(b))
+      return Difference{then.tick, number.name, a, b};
+  }
+  return {};
+}
+
+}  // namespace
+
+const char* compared_fields() {
+  static const std::string names = [] {
+    std::string text = "X_WP, X_WQ, eps, F_T, F_out";
+    for (const Compared& number : kNumbers) text += std::string(", ") + number.name;
+    return text;
+  }();
+  return names.c_str();
+}
+
+std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
+  if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
+    throw RecordingError("the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
+                         ": what the loop had in mind by then (the stiffness it had measured, how warm the "
+                         "motors were, what was "
+                         "wrong before, where obstacles that move stood) is not in it, and arming does not "
+                         "begin it anew; what is "
+                         "replayed is a recording from the start on, as by wrenchd --record");
+  const Scene scene(plan.scene);
+  RecordedClock clock;
+  RecordedDevice device;
+  RecordedPlacer placer;
+  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  std::uint64_t last = 0;  // a release from outside has the number of the tick before
+  for (const TickRecord& then : recording.ticks) {
+    if (then.tick != last && then.tick != last + 1)
+      throw RecordingError("ticks " + std::to_string(last + 1) + " to " + std::to_string(then.tick - 1) +
+                           " are missing in the recording, and it is the same bits up to there; record to a "
+                           "disk that keeps up to replay all of it");
+    last = then.tick;
+    if (then.changes > 0)
+      throw RecordingError(
+          "at tick " + std::to_string(then.tick) +
+          " the scene, the workspace or a limit was changed while the loop ran, and to what is not in the "
+          "recording: it can be replayed up to there, and is the same bits so far; record a run without "
+          "changes to replay all of it");
+    clock.play(then);
+    device.play(then);
+    placer.play(then);
+    const TimePoint now{Duration(then.now_ns)};
+    // The record of a release from outside is the last tick's, with zero wrench and `released` set.
+    if ((then.commands & kLetGo) != 0) {
+      loop.release(now);
+    } else {
+      loop.ask(then.commands);
+      loop.tick(now, now);
+    }
+    TickRecord replayed;
+    loop.latest().read(replayed);
+    if (auto difference = compare(then, replayed)) return difference;
+  }
+  return {};
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/servo/pose_watch.hpp"
+
+#include <limits>
+
+#include "core/finite.hpp"
+#include "core/watch_limits.hpp"
+
+namespace wrenchd {
+namespace {
+
+constexpr int kNoRotations = 3;
+constexpr double kFarOutside = 1.5;
+/// What a twist may have gone without a bit of the pose changing: ten steps of the coarsest encoder that is
+/// of use.
+constexpr double kUnseenWay_m = 1e-3;
+constexpr double kUnseenTurn_rad = 2e-2;
+/// A twist below this is noise, or rest.
+constexpr double kRest_m_per_s = 0.02;
+constexpr double kRest_rad_per_s = 0.2;
+
+}  // namespace
+
+PoseWatch::PoseWatch(const DeviceProfile& profile) noexcept
+    : centre_m_(profile.workspace_centre_m),
+      farthest_m_(is_finite(profile.workspace_radius_m) ? kFarOutside * profile.workspace_radius_m
+                                                        : std::numeric_limits<double>::infinity()) {}
+
+FaultSet PoseWatch::look(const DeviceSample& sample) noexcept {
+  if (!sample.fresh) return 0;
+  FaultSet found = 0;
+  no_rotations_ = sample.fault == Fault::pose_not_a_rotation ? no_rotations_ + 1 : 0;
+  if (no_rotations_ >= kNoRotations) found |= bit(Fault::pose_not_a_rotation);
+  if (sample.fault != Fault::none) return found;
+  if ((sample.X_BH.translation_m - centre_m_).norm() > farthest_m_) found |= bit(Fault::pose_outside);
+  if (stuck(sample)) found |= bit(Fault::pose_stuck);
+  return found;
+}
+
+bool PoseWatch::stuck(const DeviceSample& sample) noexcept {
+  const double now_s = sample.device_time_s;
+  const double v_m_per_s = sample.V_BH.linear_m_per_s.norm(),
+               w_rad_per_s = sample.V_BH.angular_rad_per_s.norm();
+  const bool rests = v_m_per_s < kRest_m_per_s && w_rad_per_s < kRest_rad_per_s;
+  if (!moved_ || rests || !same_bits(sample.X_BH, X_BH_) || now_s < last_s_) {
+    X_BH_ = sample.X_BH;
+    moved_ = true;
+    stuck_at_s_ = now_s;
+    way_m_ = turn_rad_ = 0.0;
+  } else {
+    way_m_ += v_m_per_s * (now_s - last_s_);
+    turn_rad_ += w_rad_per_s * (now_s - last_s_);
+  }
+  last_s_ = now_s;
+  return now_s - stuck_at_s_ >= seconds(kStuckPose) && (way_m_ > kUnseenWay_m || turn_rad_ > kUnseenTurn_rad);
+}
+
+void PoseWatch::forget() noexcept {
+  no_rotations_ = 0;
+  moved_ = false;
+}
+
+}  // namespace wrenchd

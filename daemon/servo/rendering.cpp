@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/servo/rendering.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include "collision/obstacle_work.hpp"
+#include "core/energy_law.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Where the placer found no room it is asked again after so long: a search without end would keep a
+/// processor busy, and a hand does not go far in that time.
+constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
+/// What a warm-up may take, and how many ticks it tries.
+constexpr auto kWarmUp = std::chrono::milliseconds(50);
+constexpr int kWarmTicks = 30;
+
+Pose pose_of(const PlacementSettings& placement) noexcept {
+  return {rotation_from(placement.rotation_vector_rad), placement.position_m};
+}
+
+/// FNV-1a, a word at a time.
+class Sum {
+ public:
+  void add(std::uint64_t word) noexcept { sum_ = (sum_ ^ word) * 0x100000001b3U; }
+  void add(double x) noexcept { add(std::bit_cast<std::uint64_t>(x)); }
+  void add(const Vector3d& v) noexcept { add(v.x()), add(v.y()), add(v.z()); }
+  void add(const Pose& X) noexcept {
+    add(X.translation_m), add(Vector3d(X.rotation.vec())), add(X.rotation.w());
+  }
+  void add(const Matrix6d& K) noexcept {
+    for (Eigen::Index i = 0; i < K.size(); ++i) add(K.data()[i]);
+  }
+  std::uint64_t value() const noexcept { return sum_; }
+
+ private:
+  std::uint64_t sum_ = 0xcbf29ce484222325U;
+};
+
+}  // namespace
+
+Rendering::Rendering(std::uint32_t number, const Settings& settings, const DeviceProfile& profile,
+                     std::shared_ptr<const Scene> scene, std::shared_ptr<Placer> placer)
+    : number_(number),
+      scene_(std::move(scene)),
+      placer_(std::move(placer)),
+      X_HT_(pose_of(settings.device.tool_in_handle) * scene_->tool().X_MT()),
+      M_(scene_->tool().solid.inertia),
+      spring_(settings.wrench.law),
+      energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
+      gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
+      stability_(settings, profile, M_, X_HT_),
+      penetration_(*scene_,
+                   {settings.rendering.method, settings.rendering.planes, 0.0, settings.rendering.friction}),
+      law_(gains_) {
+  lose_place();
+}
+
+void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
+  std::stop_source stop;
+  const std::jthread patience([&stop](const std::stop_token& done) {
+    const auto end = std::chrono::steady_clock::now() + kWarmUp;
+    while (!done.stop_requested() && std::chrono::steady_clock::now() < end)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    stop.request_stop();
+  });
+  const Pose X_WP = X_WH * X_HT_;
+  Pose X_WQ = penetration_.query(X_WP, stop.get_token(), scene_time_s).projection.X_WQ;
+  penetration_.forget(scene_time_s);
+  for (int tick = 0; tick < kWarmTicks && !stop.stop_requested(); ++tick) {
+    const Penetration depth = penetration_.follow(X_WP, X_WQ, scene_time_s);
+    X_WQ = depth.projection.X_WQ;
+    law_.update(depth.drive, depth.contacts > 0, 1e-3);
+  }
+  sum();
+  lose_place();
+}
+
+bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept {
+  X_WP_ = X_WH * X_HT_;
+  if (!has_place()) {
+    place(now, scene_time_s);
+    return true;
+  }
+  const double since_s = placing_ == Placing::following ? scene_time_s_ : scene_time_s;
+  pushed_T_ = 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
+  depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s);
+  if (scene_->moves() && depth_.projection.status == ProjectionStatus::infeasible) return false;
+  X_WQ_ = depth_.projection.X_WQ;
+  pushed_T_ += 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
+  scene_time_s_ = scene_time_s;
+  placing_ = Placing::following;
+  return true;
+}
+
+/// There is no q to follow from. The search for one may take seconds, so another thread does it, whatever the
+/// scene: asked at one tick, it answers at a later one, with a pose near to where the hand was then. That is
+/// this tick's q, and the next follows from it, and makes up for what obstacles have moved since.
+void Rendering::place(TimePoint now, double scene_time_s) noexcept {
+  if (!asked_) {
+    if (placing_ == Placing::nowhere && now < ask_again_) return;
+    placing_ = Placing::seeking;
+    placer_->ask({++question_, seeks_near_ ? X_near_ : X_WP_, scene_time_s});
+    asked_ = true;
+    return;
+  }
+  PlacementAnswer answer;
+  if (!placer_->answer(answer) || answer.number != question_)
+    return;  // one that was asked before we started over
+  asked_ = false;
+  begins_ = seeks_near_;
+  seeks_near_ = false;
+  placing_ = answer.found ? Placing::placed : Placing::nowhere;
+  X_WQ_ = answer.X_WQ;
+  penetration_.forget(answer.scene_time_s);
+  ask_again_ = now + kAskAgainAfter;
+}
+
+void Rendering::press(double dt_s) noexcept {
+  constexpr double kLongAgo_s = 1e9;
+  if (placing_ == Placing::following && std::exchange(begins_, false))
+    law_.update_damping({}, depth_.drive, in_contact(), kLongAgo_s);
+  F_T_ = spring_ == SpringLaw::pid
+             ? law_.update(depth_.drive, in_contact(), dt_s)
+             : law_.update_damping(energy_wrench(M_, spring_share_ * energy_stiffness_per_s2_, X_WP_, X_WQ_),
+                                   depth_.drive, in_contact(), dt_s);
+}
+
+void Rendering::lose_place() noexcept {
+  placing_ = Placing::seeking;
+  asked_ = false;
+  seeks_near_ = begins_ = false;
+  penetration_.forget();
+  depth_ = Penetration{};
+  depth_.projection.status = ProjectionStatus::infeasible;
+  F_T_ = Wrench{};
+  law_.reset();
+}
+
+void Rendering::seek_near(const Pose& X_WT) noexcept {
+  seeks_near_ = true;
+  X_near_ = X_WT;
+}
+
+void Rendering::scale(const StiffnessShare& share) noexcept {
+  law_.scale(share.spring, share.damper);
+  spring_share_ = share.spring;
+}
+
+Touches Rendering::touches() const noexcept {
+  return in_contact() ? wrenchd::touches(depth_.projection, *scene_, penetration_.knows_mesh_features())
+                      : Touches{};
+}
+
+double Rendering::wound_up_J() const noexcept {
+  if (!in_contact()) return 0.0;
+  return 0.5 * (F_T_.force_N.dot(depth_.drive.head<3>()) + F_T_.torque_Nm.dot(depth_.drive.tail<3>()));
+}
+
+/// Half of force times way is wound_up_J() where T is what it is: the spring is that many J for a kg m^2.
+double Rendering::pushed_J() const noexcept {
+  const double T = depth_.projection.energy;
+  return placing_ == Placing::following && T > 0.0 ? wound_up_J() / T * pushed_T_ : 0.0;
+}
+
+std::uint64_t Rendering::sum() const noexcept {
+  constexpr std::size_t kObstacles = 16;  // of each kind: a tick must not take longer for more
+  Sum sum;
+  sum.add(std::uint64_t{number_});
+  sum.add(X_HT_);
+  sum.add(M_.mass_kg);
+  sum.add(energy_stiffness_per_s2_);
+  sum.add(gains_.stiffness);
+  sum.add(gains_.damping);
+  const auto& half_spaces = scene_->half_spaces();
+  sum.add(std::uint64_t{half_spaces.size()});
+  for (std::size_t i = 0; i < std::min(kObstacles, half_spaces.size()); ++i) {
+    sum.add(half_spaces[i].normal_W);
+    sum.add(half_spaces[i].offset_m);
+  }
+  const auto& meshes = scene_->meshes();
+  sum.add(std::uint64_t{meshes.size()});
+  for (std::size_t i = 0; i < std::min(kObstacles, meshes.size()); ++i) {
+    sum.add(meshes[i].X_WO);
+    sum.add(meshes[i].motion.linear_m_per_s);
+    sum.add(meshes[i].radius_m);
+    sum.add(std::uint64_t{meshes[i].mesh->surface.triangles().size()});
+  }
+  return sum.value();
+}
+
+}  // namespace wrenchd

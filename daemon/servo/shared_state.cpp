@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/servo/shared_state.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <new>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "daemon/recording/record_fields.hpp"
+
+namespace wrenchd {
+namespace {
+
+static_assert(sizeof(Touch) % 8 == 0 && offsetof(StateRecord, touches) % 8 == 0);
+constexpr std::size_t kWordsPerSlot = SharedState::kSlotBytes / 8;
+
+[[noreturn]] void refuse(const char* what) {
+  throw std::system_error(errno, std::generic_category(),
+                          std::string("the memory that shows the state to other programs: ") + what);
+}
+
+/// Closes what a constructor that throws leaves open.
+struct Opened {
+  int descriptor = -1;
+  ~Opened() {
+    if (descriptor >= 0) close(descriptor);
+  }
+};
+
+void copy_fields(std::span<const RecordField> fields, const void* from, std::byte* to) noexcept {
+  for (const RecordField& field : fields)
+    std::memcpy(to + field.offset, static_cast<const std::byte*>(from) + field.offset, field.bytes());
+}
+
+}  // namespace
+
+SharedState::SharedState(double rate_Hz)
+    : rate_Hz_(rate_Hz), slots_(std::bit_ceil(static_cast<std::uint64_t>(std::ceil(kKept_s * rate_Hz)))) {
+  Opened opened{memfd_create("wrenchd-state", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
+  if (opened.descriptor < 0) refuse("memfd_create");
+  if (ftruncate(opened.descriptor, static_cast<off_t>(bytes())) != 0) refuse("ftruncate");
+  memory_ = mmap(nullptr, bytes(), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, opened.descriptor, 0);
+  if (memory_ == MAP_FAILED) refuse("mmap; is the limit of locked memory (LimitMEMLOCK) too small?");
+  // Seals last: the mapping that is there already remains writable, and no other will be.
+  if (fcntl(opened.descriptor, F_ADD_SEALS,
+            F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) != 0) {
+    munmap(memory_, bytes());
+    refuse("seals, which need Linux 5.1");
+  }
+  std::memset(memory_, 0, bytes());
+  header_ = new (memory_) Header;
+  header_->slots = slots_;
+  words_ = new (static_cast<std::byte*>(memory_) + kHeaderBytes)
+      std::atomic<std::uint64_t>[slots_ * kWordsPerSlot] {};
+  descriptor_ = std::exchange(opened.descriptor, -1);
+}
+
+SharedState::~SharedState() {
+  munmap(memory_, bytes());
+  close(descriptor_);
+}
+
+void SharedState::write(const TickRecord& tick, const Touches& touches) noexcept {
+  copy_fields(tick_fields(), &tick, next_.data() + offsetof(StateRecord, tick));
+  const std::uint64_t count = touches.size();
+  std::memcpy(next_.data() + offsetof(StateRecord, touch_count), &count, sizeof(count));
+  std::byte* const told = next_.data() + offsetof(StateRecord, touches);
+  for (std::size_t i = 0; i < touches.size(); ++i)
+    std::memcpy(told + i * sizeof(Touch), &touches[i], sizeof(Touch));
+  if (touches.size() < touched_)
+    std::memset(told + touches.size() * sizeof(Touch), 0, (touched_ - touches.size()) * sizeof(Touch));
+  touched_ = touches.size();
+
+  const std::uint64_t i = header_->written.load(std::memory_order_relaxed);
+  std::atomic<std::uint64_t>* const slot = words_ + (i % slots_) * kWordsPerSlot;
+  slot[0].store(2 * i + 1, std::memory_order_relaxed);
+  for (std::size_t k = 0; k < kWords; ++k) {
+    std::uint64_t word;
+    std::memcpy(&word, next_.data() + 8 * k, 8);
+    slot[1 + k].store(word, std::memory_order_release);
+  }
+  slot[0].store(2 * i + 2, std::memory_order_release);
+  header_->written.store(i + 1, std::memory_order_release);
+}
+
+bool SharedState::read(std::uint64_t i, StateRecord& out) const noexcept {
+  const std::atomic<std::uint64_t>* const slot = words_ + (i % slots_) * kWordsPerSlot;
+  if (slot[0].load(std::memory_order_acquire) != 2 * i + 2) return false;
+  auto* const bytes = reinterpret_cast<std::byte*>(&out);
+  const auto copy = [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from / 8; k < to / 8; ++k) {
+      const std::uint64_t word = slot[1 + k].load(std::memory_order_acquire);
+      std::memcpy(bytes + 8 * k, &word, 8);
+    }
+  };
+  copy(0, offsetof(StateRecord, touches));
+  out.touch_count = std::min<std::uint64_t>(out.touch_count, kMostTouches);
+  copy(offsetof(StateRecord, touches), offsetof(StateRecord, touches) + out.touch_count * sizeof(Touch));
+  return slot[0].load(std::memory_order_acquire) == 2 * i + 2;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/discovery/usb_devices.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <tuple>
+
+#include <libudev.h>
+#include <unistd.h>
+
+namespace wrenchd {
+namespace {
+
+struct Release {
+  void operator()(udev* u) const noexcept { udev_unref(u); }
+  void operator()(udev_enumerate* e) const noexcept { udev_enumerate_unref(e); }
+  void operator()(udev_device* d) const noexcept { udev_device_unref(d); }
+};
+using Udev = std::unique_ptr<udev, Release>;
+using Device = std::unique_ptr<udev_device, Release>;
+
+constexpr int kHubClass = 9;
+
+std::string text(const char* s) {
+  return s == nullptr ? std::string() : std::string(s);
+}
+
+std::string attribute(udev_device* device, const char* name) {
+  return text(udev_device_get_sysattr_value(device, name));
+}
+
+int number(std::string_view digits, int base) {
+  int value = 0;
+  std::from_chars(digits.data(), digits.data() + digits.size(), value, base);
+  return value;
+}
+
+/// All devices of a subsystem, in no order.
+std::vector<Device> devices_of(udev* context, const char* subsystem) {
+  const std::unique_ptr<udev_enumerate, Release> found(udev_enumerate_new(context));
+  udev_enumerate_add_match_subsystem(found.get(), subsystem);
+  if (udev_enumerate_scan_devices(found.get()) < 0)
+    throw std::runtime_error(std::string("udev cannot list the devices of subsystem ") + subsystem +
+                             "; is /sys mounted?");
+  std::vector<Device> devices;
+  for (udev_list_entry* entry = udev_enumerate_get_list_entry(found.get()); entry != nullptr;
+       entry = udev_list_entry_get_next(entry)) {
+    // One that was unplugged in the meantime is no longer there to be asked.
+    if (Device device(udev_device_new_from_syspath(context, udev_list_entry_get_name(entry))); device)
+      devices.push_back(std::move(device));
+  }
+  return devices;
+}
+
+// --- report descriptor ------------------------------------------------------------------------------------
+
+/// What the list needs of a report descriptor; whoever needs more parses it.
+///
+/// HID 1.11, section 6.2.2: an item is a prefix byte - size in bits 0 and 1, type in 2 and 3, tag in 4 to 7 -
+/// and 0, 1, 2 or 4 bytes of data. Prefix 0xFE begins a long item: its size follows, then its tag.
+void read_descriptor(UsbDevice& device) {
+  constexpr std::uint8_t usage_page = 0x04, report_id = 0x84, usage = 0x08, collection = 0xA0,
+                         long_item = 0xFE;
+  bool in_collection = false;
+  std::span<const std::uint8_t> rest(device.report_descriptor);
+  while (!rest.empty()) {
+    const std::uint8_t prefix = rest[0];
+    const bool is_long = prefix == long_item;
+    const std::size_t head = is_long ? 3 : 1;
+    if (rest.size() < head) return;
+    constexpr std::array<std::size_t, 4> sizes{0, 1, 2, 4};
+    const std::size_t size = is_long ? rest[1] : sizes[prefix & 3U];
+    if (rest.size() < head + size) return;
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < std::min<std::size_t>(size, 4); ++i)
+      value |= static_cast<std::uint32_t>(rest[head + i]) << (8 * i);
+    const std::uint8_t item = is_long ? std::uint8_t{0} : static_cast<std::uint8_t>(prefix & 0xFCU);
+    if (item == report_id) device.numbered_reports = true;
+    if (item == collection) in_collection = true;
+    if (item == usage_page && !in_collection) device.usage_page = static_cast<std::uint16_t>(value);
+    if (item == usage && !in_collection) {
+      device.usage = static_cast<std::uint16_t>(value);
+      if (size == 4) device.usage_page = static_cast<std::uint16_t>(value >> 16U);
+    }
+    rest = rest.subspan(head + size);
+  }
+}
+
+std::vector<std::uint8_t> bytes_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// --- one device -------------------------------------------------------------------------------------------
+
+void take_usb_strings(UsbDevice& device, udev_device* usb) {
+  device.place = text(udev_device_get_sysname(usb));
+  device.usb_node = text(udev_device_get_devnode(usb));
+  device.vendor = static_cast<std::uint16_t>(number(attribute(usb, "idVendor"), 16));
+  device.product = static_cast<std::uint16_t>(number(attribute(usb, "idProduct"), 16));
+  device.serial = attribute(usb, "serial");
+  device.manufacturer = attribute(usb, "manufacturer");
+  device.product_name = attribute(usb, "product");
+}
+
+/// A HID device that is not on USB says who it is in its uevent: HID_ID=0005:00001209:00006D0F.
+void take_hid_strings(UsbDevice& device, udev_device* hid) {
+  const std::string id = text(udev_device_get_property_value(hid, "HID_ID"));
+  const std::size_t first = id.find(':');
+  const std::size_t second = first == std::string::npos ? first : id.find(':', first + 1);
+  if (second != std::string::npos) {
+    device.vendor = static_cast<std::uint16_t>(number(std::string_view(id).substr(first + 1, 8), 16));
+    device.product = static_cast<std::uint16_t>(number(std::string_view(id).substr(second + 1, 8), 16));
+  }
+  device.serial = text(udev_device_get_property_value(hid, "HID_UNIQ"));
+  device.product_name = text(udev_device_get_property_value(hid, "HID_NAME"));
+}
+
+UsbDevice from_hidraw(udev_device* hidraw, udev_device* hid) {
+  UsbDevice device;
+  device.hidraw_node = text(udev_device_get_devnode(hidraw));
+  device.report_descriptor = bytes_of(text(udev_device_get_syspath(hid)) + "/report_descriptor");
+  read_descriptor(device);
+  return device;
+}
+
+/// The numbers in "/dev/hidraw12" or "3-1.10", to sort by.
+std::vector<int> numbers_in(std::string_view s) {
+  std::vector<int> numbers;
+  for (std::size_t i = 0; i < s.size();) {
+    if (std::isdigit(static_cast<unsigned char>(s[i])) == 0) {
+      ++i;
+      continue;
+    }
+    int value = 0;
+    const auto [end, error] = std::from_chars(s.data() + i, s.data() + s.size(), value);
+    numbers.push_back(error == std::errc() ? value : 0);
+    i = static_cast<std::size_t>(end - s.data());
+  }
+  return numbers;
+}
+
+std::string hex4(std::uint16_t value) {
+  std::array<char, 8> digits{};
+  std::snprintf(digits.data(), digits.size(), "%04x", value);
+  return digits.data();
+}
+
+std::string udev_rule(const UsbDevice& device, const std::string& node) {
+  const bool hidraw = node == device.hidraw_node;
+  return std::string(R"(SUBSYSTEM==")") + (hidraw ? "hidraw" : "usb") + R"(", ATTR)" + (hidraw ? "S" : "") +
+         R"({idVendor}==")" + hex4(device.vendor) + R"(", ATTR)" + (hidraw ? "S" : "") + R"({idProduct}==")" +
+         hex4(device.product) + R"(", GROUP="wrenchd", MODE="0660")";
+}
+
+}  // namespace
+
+bool UsbDevice::same_device(const UsbDevice& other) const {
+  return vendor == other.vendor && product == other.product && serial == other.serial &&
+         interface == other.interface && report_descriptor == other.report_descriptor;
+}
+
+std::vector<UsbDevice> list_usb_devices() {
+  const Udev context(udev_new());
+  if (!context) throw std::runtime_error("udev cannot be asked what is plugged in: out of memory");
+  std::vector<UsbDevice> found;
+
+  // HID interfaces first: what is known of them by the path of their USB interface.
+  std::map<std::string, std::vector<UsbDevice>> on_usb;
+  for (const Device& hidraw : devices_of(context.get(), "hidraw")) {
+    udev_device* const hid = udev_device_get_parent_with_subsystem_devtype(hidraw.get(), "hid", nullptr);
+    if (hid == nullptr) continue;
+    UsbDevice device = from_hidraw(hidraw.get(), hid);
+    udev_device* const interface =
+        udev_device_get_parent_with_subsystem_devtype(hidraw.get(), "usb", "usb_interface");
+    if (interface != nullptr) {
+      on_usb[text(udev_device_get_syspath(interface))].push_back(std::move(device));
+    } else {
+      take_hid_strings(device, hid);
+      found.push_back(std::move(device));
+    }
+  }
+
+  for (const Device& interface : devices_of(context.get(), "usb")) {
+    if (text(udev_device_get_devtype(interface.get())) != "usb_interface") continue;
+    if (number(attribute(interface.get(), "bInterfaceClass"), 16) == kHubClass) continue;
+    udev_device* const usb =
+        udev_device_get_parent_with_subsystem_devtype(interface.get(), "usb", "usb_device");
+    if (usb == nullptr) continue;
+    std::vector<UsbDevice>& here = on_usb[text(udev_device_get_syspath(interface.get()))];
+    if (here.empty()) here.emplace_back();
+    for (UsbDevice& device : here) {
+      device.interface = number(attribute(interface.get(), "bInterfaceNumber"), 16);
+      take_usb_strings(device, usb);
+      found.push_back(std::move(device));
+    }
+  }
+
+  std::sort(found.begin(), found.end(), [](const UsbDevice& a, const UsbDevice& b) {
+    return std::tuple(numbers_in(a.place), a.interface, numbers_in(a.hidraw_node)) <
+           std::tuple(numbers_in(b.place), b.interface, numbers_in(b.hidraw_node));
+  });
+  return found;
+}
+
+std::string plain(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
+
+std::string describe(const UsbDevice& device) {
+  std::string s = hex4(device.vendor) + ":" + hex4(device.product);
+  if (!device.serial.empty()) s += " serial " + plain(device.serial);
+  if (!device.place.empty()) s += " in " + device.place;
+  if (device.interface >= 0) s += ", interface " + std::to_string(device.interface);
+  return s;
+}
+
+std::string why_not_open(const UsbDevice& device, const std::string& node) {
+  if (access(node.c_str(), R_OK | W_OK) == 0) return {};
+  return why_not_open(device, node, errno);
+}
+
+std::string why_not_open(const UsbDevice& device, const std::string& node, int error) {
+  const std::string what = "cannot open " + node + " (" + describe(device) + "): " + std::strerror(error);
+  switch (error) {
+    case EACCES:
+    case EPERM:
+      return what + "; add to /etc/udev/rules.d/70-wrenchd.rules the line\n  " + udev_rule(device, node) +
+             "\nand be in the group wrenchd; then unplug it and plug it in again";
+    case ENOENT:
+    case ENODEV:
+    case ENXIO:
+      return what + "; it is not plugged in any more";
+    case EBUSY:
+      return what + "; another program holds it: end that one";
+    default:
+      return what + "; unplug it and plug it in again, and look at what the kernel says (dmesg)";
+  }
+}
+
+std::string place_in(std::string_view sys_path) {
+  std::string place;
+  while (!sys_path.empty()) {
+    const std::size_t end = std::min(sys_path.find('/'), sys_path.size());
+    const std::string_view part = sys_path.substr(0, end);
+    const std::size_t dash = part.find('-');
+    const auto digits = [](std::string_view s, std::string_view more) {
+      return !s.empty() && std::all_of(s.begin(), s.end(), [&](char c) {
+        return std::isdigit(static_cast<unsigned char>(c)) != 0 || more.find(c) != std::string_view::npos;
+      });
+    };
+    if (dash != std::string_view::npos && digits(part.substr(0, dash), "") &&
+        digits(part.substr(dash + 1), "."))
+      place = part;
+    sys_path.remove_prefix(std::min(end + 1, sys_path.size()));
+  }
+  return place;
+}
+
+}  // namespace wrenchd

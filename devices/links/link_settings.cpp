@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/links/link_settings.hpp"
+
+#include <algorithm>
+#include <string>
+
+namespace wrenchd {
+namespace {
+
+/// The byte that a report always has there; 0 where it has none.
+std::uint8_t constant_at(const ReportFrame& report, std::size_t byte) {
+  for (const ReportConstant& constant : report.constants)
+    if (constant.byte == byte) return constant.value;
+  return 0;
+}
+
+}  // namespace
+
+LinkSettings link_settings(const DeviceProfile& profile, Duration silent_after) {
+  LinkSettings settings;
+  settings.last_word = LastWord(profile, silent_after);
+  settings.longest_report = profile.pose_report.length;
+  for (const PoseReportLayout& report : profile.more_reports)
+    settings.longest_report = std::max(settings.longest_report, report.length);
+  if (profile.transport != Transport::libusb) return settings;
+  const UsbEndpoints& endpoints = profile.endpoints;
+  settings.in = endpoints.in;
+  settings.out = endpoints.out;
+  settings.prefix_bytes = endpoints.prefix_bytes;
+  settings.longest_report += endpoints.prefix_bytes;
+  if (!endpoints.serial_chip) return settings;
+  const PoseReportLayout& report = profile.pose_report;
+  settings.frame = {report.length, constant_at(report, 0), constant_at(report, report.length - 1)};
+  settings.start_serial = [file = endpoints.firmware](SerialChip& chip) { falcon_open(chip, file); };
+  return settings;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "core/clock.hpp"
+#include "core/device_profile.hpp"
+#include "core/simulation_settings.hpp"
+#include "devices/links/loopback_link.hpp"
+#include "devices/links/report_link.hpp"
+#include "devices/simulation/held_device.hpp"
+
+namespace wrenchd {
+
+/// A link with an emulated device in a simulated hand at its other end, and nothing plugged in.
+class SimulatedLink final : public ReportLink {
+ public:
+  /// The clock must outlive the link.
+  SimulatedLink(std::unique_ptr<HeldDevice> device, Clock& clock, const SimulationSettings& settings)
+      : device_(std::move(device)), clock_(clock), wire_(*device_, clock, settings) {}
+
+  /// Throws std::runtime_error while the device is unplugged.
+  void open() override {
+    wire_.open();
+    device_->open(clock_.now());
+  }
+  LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
+    return wire_.read(now, buffer);
+  }
+  LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override {
+    return wire_.write(now, report);
+  }
+  void wait_readable(TimePoint deadline) noexcept override { wire_.wait_readable(deadline); }
+  void show(TimePoint now, const Pose& X_BH) noexcept override { device_->see(now, X_BH); }
+  void close() noexcept override { wire_.close(); }
+
+  /// For faults on request, and for the truth.
+  HeldDevice& device() noexcept { return *device_; }
+  std::uint64_t dropped() const noexcept { return wire_.dropped(); }
+
+ private:
+  std::unique_ptr<HeldDevice> device_;
+  Clock& clock_;
+  LoopbackLink wire_;
+};
+
+/// The device that a profile describes, emulated and held by the hand of the settings: whole poses by the
+/// simulated device, encoder counts by a Polhem or a Falcon, the deflection of a cap by a SpaceMouse. Throws
+/// std::invalid_argument, with the cure, where the settings make no sense or no emulator speaks as the
+/// profile says. The clock must outlive the link. Not RT safe; the link is, but for open().
+std::unique_ptr<SimulatedLink> make_simulated_link(const DeviceProfile& profile,
+                                                   const SimulationSettings& settings, Clock& clock);
+
+}  // namespace wrenchd

@@ -1,0 +1,558 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/links/usb_link.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <boost/lockfree/spsc_queue.hpp>
+#include <libusb-1.0/libusb.h>
+#include <poll.h>
+
+#include "devices/links/ftdi_serial.hpp"
+#include "devices/links/latest_writer.hpp"
+#include "devices/links/packet_queue.hpp"
+#include "devices/links/wake_up.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// IN transfers that wait at the device: at 8 kHz the link's thread may be 1 ms late before a frame is
+/// missed.
+constexpr std::size_t kTransfersInFlight = 8;
+/// Reports between the link's thread and the servo thread, as many as hidraw has.
+constexpr std::size_t kRing = 64;
+/// Between an endpoint's error and the next attempt, so that a device that always fails does not keep a
+/// processor busy.
+constexpr Duration kRetryAfter = std::chrono::milliseconds(5);
+
+std::runtime_error refusal(const UsbDevice& device, const std::string& doing, int error) {
+  if (error == LIBUSB_ERROR_ACCESS || error == LIBUSB_ERROR_NO_DEVICE || error == LIBUSB_ERROR_BUSY) {
+    const int number = error == LIBUSB_ERROR_ACCESS ? EACCES : error == LIBUSB_ERROR_BUSY ? EBUSY : ENODEV;
+    return std::runtime_error(why_not_open(device, device.usb_node, number));
+  }
+  return std::runtime_error(describe(device) + ": " + doing + ": " + libusb_strerror(error) +
+                            "; unplug it and plug it in again");
+}
+
+/// Bus and ports as the kernel names them: "3-1.2".
+std::string place_of(libusb_device* device) {
+  std::array<std::uint8_t, 8> ports{};
+  const int n = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
+  std::string place = std::to_string(libusb_get_bus_number(device));
+  for (int i = 0; i < n; ++i)
+    place += (i == 0 ? "-" : ".") + std::to_string(ports[static_cast<std::size_t>(i)]);
+  return place;
+}
+
+/// The kernel hangs up when the device leaves its socket, and says so by an error only when it has forgotten
+/// it. It needs an ordinary thread in between, which a real-time one that asks again and again keeps from
+/// running.
+bool is_cut_off(const pollfd& file) noexcept {
+  return (file.revents & (POLLHUP | POLLERR)) != 0;
+}
+
+struct Endpoint {
+  std::uint8_t address = 0;
+  std::uint8_t type = LIBUSB_TRANSFER_TYPE_INTERRUPT;
+  std::size_t packet_bytes = 0;
+};
+
+/// The first interrupt endpoint of that direction, else the first bulk one. `address`: only that one; 0: any.
+std::optional<Endpoint> find_endpoint(const libusb_interface_descriptor& setting, std::uint8_t direction,
+                                      std::uint8_t address) {
+  for (const std::uint8_t type : {LIBUSB_TRANSFER_TYPE_INTERRUPT, LIBUSB_TRANSFER_TYPE_BULK})
+    for (int i = 0; i < setting.bNumEndpoints; ++i) {
+      const libusb_endpoint_descriptor& e = setting.endpoint[i];
+      if ((e.bmAttributes & LIBUSB_TRANSFER_TYPE_MASK) == type &&
+          (e.bEndpointAddress & LIBUSB_ENDPOINT_DIR_MASK) == direction &&
+          (address == 0 || e.bEndpointAddress == address))
+        return Endpoint{e.bEndpointAddress, type, static_cast<std::size_t>(e.wMaxPacketSize & 0x7FFU)};
+    }
+  return std::nullopt;
+}
+
+}  // namespace
+
+/// Everything that speaks with libusb. Built and destroyed by an ordinary thread, run by the link's own.
+struct UsbLink::Engine {
+  Engine(const UsbDevice& device, const LinkSettings& settings);
+  ~Engine();
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  /// One IN transfer and its buffer.
+  struct In {
+    Engine* engine = nullptr;
+    libusb_transfer* transfer = nullptr;
+    std::vector<std::uint8_t> bytes;
+    bool flying = false;
+  };
+
+  void find_and_open(const UsbDevice& device);
+  void check_identity(const UsbDevice& device) const;
+  void find_endpoints(const UsbDevice& device, const LinkSettings& settings);
+  void claim(const UsbDevice& device);
+  void start_serial(const UsbDevice& device, const LinkSettings& settings);
+  void prepare_in(const LinkSettings& settings);
+  void prepare_out();
+  void release() noexcept;
+
+  void run() noexcept;
+  void gather_files();
+  void sleep() noexcept;
+  bool flying() const noexcept;
+  void submit(In& in) noexcept;
+  void take_packet(const libusb_transfer& transfer) noexcept;
+  void take_report(std::span<const std::uint8_t> bytes) noexcept;
+  void retry_failed() noexcept;
+  void write_newest() noexcept;
+  void write_request() noexcept;
+  void cancel_overdue() noexcept;
+  bool finish() noexcept;
+  void lose() noexcept;
+
+  static void LIBUSB_CALL on_in(libusb_transfer* transfer);
+  static void LIBUSB_CALL on_out(libusb_transfer* transfer);
+
+  libusb_context* context = nullptr;
+  libusb_device_handle* handle = nullptr;
+  int interface = 0;
+  bool numbered_reports;
+  bool is_hid = false;
+  bool claimed = false;
+  bool priority_granted = true;
+  Endpoint in_endpoint;
+  std::optional<Endpoint> out_endpoint;
+
+  // Between the two threads.
+  boost::lockfree::spsc_queue<Packet, boost::lockfree::capacity<kRing>> ring;
+  WriteSlot slot;
+  WakeUp readable;  ///< a report waits, or the device is gone
+  WakeUp writable;  ///< a command waits, or it is the end
+  std::atomic<bool> gone{false};
+  std::atomic<bool> closing{false};
+  std::atomic<std::uint64_t> dropped{0}, stalls{0}, errors{0};
+
+  // The link's thread only.
+  std::array<In, kTransfersInFlight> ins;
+  std::size_t prefix_bytes;
+  bool cut;  ///< packets are a stream of bytes, out of which reports are cut
+  StreamFramer framer;
+  LastWord last_word;
+  libusb_transfer* out = nullptr;
+  Packet out_packet;
+  std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE + kMaxReportBytes> out_request{};
+  bool out_flying = false, out_cancelled = false;
+  TimePoint out_until{};  ///< when a command that is not taken is called back
+  bool in_halted = false, out_halted = false;
+  bool in_failed = false;
+  TimePoint retry_at{};  ///< not before
+  Duration write_deadline;
+  Duration close_within;
+  std::optional<TimePoint> close_at;
+  bool ending = false;  ///< transfers are cancelled, none is submitted any more
+  std::vector<pollfd> files;
+
+  std::thread thread;
+};
+
+// --- opening ----------------------------------------------------------------------------------------------
+
+UsbLink::Engine::Engine(const UsbDevice& device, const LinkSettings& settings)
+    : interface(std::max(device.interface, 0)),
+      numbered_reports(device.numbered_reports),
+      slot(settings.write_deadline),
+      prefix_bytes(settings.prefix_bytes),
+      cut(settings.frame.length > 0),
+      framer(settings.frame),
+      last_word(settings.last_word),
+      write_deadline(settings.write_deadline),
+      close_within(settings.close_within) {
+  try {
+    if (const int error = libusb_init(&context); error != 0) throw refusal(device, "libusb", error);
+    find_and_open(device);
+    check_identity(device);
+    find_endpoints(device, settings);
+    claim(device);
+    start_serial(device, settings);
+    prepare_in(settings);
+    prepare_out();
+    gather_files();
+    thread = std::thread([this] { run(); });
+    priority_granted = raise_priority(thread, settings.priority);
+  } catch (...) {
+    release();
+    throw;
+  }
+}
+
+void UsbLink::Engine::find_and_open(const UsbDevice& device) {
+  libusb_device** list = nullptr;
+  const ssize_t n = libusb_get_device_list(context, &list);
+  if (n < 0) throw refusal(device, "list of devices", static_cast<int>(n));
+  int error = LIBUSB_ERROR_NO_DEVICE;
+  for (ssize_t i = 0; i < n; ++i)
+    if (place_of(list[i]) == device.place) error = libusb_open(list[i], &handle);
+  libusb_free_device_list(list, 1);
+  if (error != 0) throw refusal(device, "open", error);
+}
+
+void UsbLink::Engine::check_identity(const UsbDevice& device) const {
+  libusb_device_descriptor descriptor{};
+  libusb_get_device_descriptor(libusb_get_device(handle), &descriptor);
+  UsbDevice found = device;
+  found.vendor = descriptor.idVendor;
+  found.product = descriptor.idProduct;
+  if (found.same_device(device) && !device.serial.empty()) {
+    std::array<unsigned char, 256> text{};
+    const int n = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(),
+                                                     static_cast<int>(text.size()));
+    found.serial.assign(text.begin(), text.begin() + std::max(n, 0));
+  }
+  if (!found.same_device(device))
+    throw std::runtime_error("in " + device.place + " is " + describe(found) + ", not " + describe(device) +
+                             ": nothing was written to it; look for the device anew");
+}
+
+void UsbLink::Engine::find_endpoints(const UsbDevice& device, const LinkSettings& settings) {
+  libusb_config_descriptor* configuration = nullptr;
+  if (const int error = libusb_get_active_config_descriptor(libusb_get_device(handle), &configuration);
+      error != 0)
+    throw refusal(device, "configuration", error);
+  std::optional<Endpoint> in;
+  for (int i = 0; i < configuration->bNumInterfaces; ++i) {
+    const libusb_interface& candidate = configuration->interface[i];
+    if (candidate.num_altsetting < 1 || candidate.altsetting[0].bInterfaceNumber != interface) continue;
+    is_hid = candidate.altsetting[0].bInterfaceClass == LIBUSB_CLASS_HID;
+    in = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_IN, settings.in);
+    out_endpoint = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_OUT, settings.out);
+  }
+  libusb_free_config_descriptor(configuration);
+  if (!in || in->packet_bytes == 0)
+    throw std::runtime_error(
+        describe(device) + " has no interrupt or bulk IN endpoint to read from; is it the right interface?");
+  in_endpoint = *in;
+}
+
+void UsbLink::Engine::claim(const UsbDevice& device) {
+  libusb_set_auto_detach_kernel_driver(handle, 1);
+  if (const int error = libusb_claim_interface(handle, interface); error != 0)
+    throw refusal(device, "claim of the interface", error);
+  claimed = true;
+}
+
+void UsbLink::Engine::start_serial(const UsbDevice& device, const LinkSettings& settings) {
+  if (!settings.start_serial) return;
+  if (!out_endpoint)
+    throw std::runtime_error(describe(device) + " has no OUT endpoint, so it is no serial chip");
+  FtdiSerial chip(handle, in_endpoint.address, out_endpoint->address, in_endpoint.packet_bytes);
+  settings.start_serial(chip);
+}
+
+/// A transfer is as long as the longest report, in whole packets: a shorter packet ends it, a longer one
+/// could not be told from the next report.
+void UsbLink::Engine::prepare_in(const LinkSettings& settings) {
+  const std::size_t packet = in_endpoint.packet_bytes;
+  const std::size_t longest = std::max(settings.longest_report, packet);
+  const std::size_t bytes = (longest + packet - 1) / packet * packet;
+  for (In& in : ins) {
+    in.engine = this;
+    in.bytes.resize(bytes);
+    in.transfer = libusb_alloc_transfer(0);
+    if (in.transfer == nullptr) throw std::bad_alloc();
+    libusb_fill_interrupt_transfer(in.transfer, handle, in_endpoint.address, in.bytes.data(),
+                                   static_cast<int>(bytes), on_in, &in, 0);
+    in.transfer->type = in_endpoint.type;
+  }
+}
+
+/// A HID device without an OUT endpoint takes its reports as SET_REPORT requests (HID 1.11 section 7.2.2):
+/// slower, and as good for what comes once in a while.
+void UsbLink::Engine::prepare_out() {
+  if (!out_endpoint && !is_hid) return;
+  out = libusb_alloc_transfer(0);
+  if (out == nullptr) throw std::bad_alloc();
+  if (out_endpoint) {
+    libusb_fill_interrupt_transfer(out, handle, out_endpoint->address, out_packet.bytes.data(), 0, on_out,
+                                   this, 0);
+    out->type = out_endpoint->type;
+  } else {
+    libusb_fill_control_transfer(out, handle, out_request.data(), on_out, this, 0);
+  }
+}
+
+/// The request that carries the report in out_packet.
+void UsbLink::Engine::write_request() noexcept {
+  constexpr std::uint8_t kToInterface = 0x21, kSetReport = 9;
+  constexpr unsigned kOutput = 2;
+  const unsigned id = numbered_reports ? out_packet.bytes[0] : 0;
+  libusb_fill_control_setup(
+      out_request.data(), kToInterface, kSetReport, static_cast<std::uint16_t>(kOutput << 8U | id),
+      static_cast<std::uint16_t>(interface), static_cast<std::uint16_t>(out_packet.length));
+  std::copy_n(out_packet.bytes.begin(), out_packet.length, out_request.begin() + LIBUSB_CONTROL_SETUP_SIZE);
+}
+
+UsbLink::Engine::~Engine() {
+  closing.store(true, std::memory_order_release);
+  writable.wake();
+  thread.join();
+  release();
+}
+
+void UsbLink::Engine::release() noexcept {
+  for (In& in : ins) libusb_free_transfer(in.transfer);
+  libusb_free_transfer(out);
+  if (claimed) libusb_release_interface(handle, interface);  // the kernel's driver is attached again
+  if (handle != nullptr) libusb_close(handle);
+  if (context != nullptr) libusb_exit(context);
+}
+
+// --- the link's thread ------------------------------------------------------------------------------------
+
+void UsbLink::Engine::run() noexcept {
+  for (In& in : ins) submit(in);
+  while (!finish()) {
+    sleep();
+    retry_failed();
+    cancel_overdue();
+    write_newest();
+  }
+}
+
+/// The files to sleep on: the servo thread's wake-ups first, then libusb's. They stay the same while the
+/// device is open.
+void UsbLink::Engine::gather_files() {
+  files.push_back({writable.file(), POLLIN, 0});
+  const libusb_pollfd** const of_libusb = libusb_get_pollfds(context);
+  for (const libusb_pollfd** file = of_libusb; file != nullptr && *file != nullptr; ++file)
+    files.push_back({(*file)->fd, (*file)->events, 0});
+  libusb_free_pollfds(of_libusb);
+}
+
+/// Until libusb has something to do, a command waits, or something is due.
+void UsbLink::Engine::sleep() noexcept {
+  constexpr Duration kUnasked = std::chrono::milliseconds(100);  // if all else fails
+  constexpr Duration kLookAgainAfter = std::chrono::milliseconds(2);
+  const TimePoint now = std::chrono::steady_clock::now();
+  Duration wait = kUnasked;
+  if (in_failed || in_halted || out_halted) wait = std::min<Duration>(wait, retry_at - now);
+  if (out_flying && !out_cancelled) wait = std::min<Duration>(wait, out_until - now);
+  if (close_at) wait = std::min<Duration>(wait, *close_at - now);
+  if (last_word.due() != TimePoint::max()) wait = std::min<Duration>(wait, last_word.due() - now);
+  wait = std::max(wait, Duration::zero());
+  timespec timeout{};
+  timeout.tv_nsec = wait.count();
+  // libusb's files of a device that is gone are always ready, so they are looked at now and then only.
+  const bool lost = gone.load(std::memory_order_relaxed);
+  if (lost) timeout.tv_nsec = std::min<long>(timeout.tv_nsec, Duration(kLookAgainAfter).count());
+  const int ready = ppoll(files.data(), lost ? 1 : files.size(), &timeout, nullptr);
+  const bool written = ready > 0 && files[0].revents != 0;
+  if (written) writable.sleep();
+  if (ready > 0 && !lost && std::any_of(files.begin() + 1, files.end(), is_cut_off)) lose();
+  if (ready == (written ? 1 : 0) && ready > 0) return;
+  timeval none{0, 0};
+  libusb_handle_events_timeout_completed(context, &none, nullptr);
+}
+
+bool UsbLink::Engine::flying() const noexcept {
+  return out_flying || std::any_of(ins.begin(), ins.end(), [](const In& in) { return in.flying; });
+}
+
+void UsbLink::Engine::submit(In& in) noexcept {
+  if (ending || gone.load(std::memory_order_relaxed)) return;
+  const int error = libusb_submit_transfer(in.transfer);
+  in.flying = error == 0;
+  if (error == LIBUSB_ERROR_NO_DEVICE) lose();
+  if (error != 0) in_failed = true;
+}
+
+void UsbLink::Engine::on_in(libusb_transfer* transfer) {
+  In& in = *static_cast<In*>(transfer->user_data);
+  Engine& engine = *in.engine;
+  in.flying = false;
+  switch (transfer->status) {
+    case LIBUSB_TRANSFER_COMPLETED:
+      engine.take_packet(*transfer);
+      engine.submit(in);
+      return;
+    case LIBUSB_TRANSFER_CANCELLED:
+      return;
+    case LIBUSB_TRANSFER_NO_DEVICE:
+      engine.lose();
+      return;
+    case LIBUSB_TRANSFER_STALL:
+      engine.in_halted = true;
+      break;
+    default:
+      engine.errors.fetch_add(1, std::memory_order_relaxed);
+  }
+  engine.in_failed = true;
+}
+
+void UsbLink::Engine::take_packet(const libusb_transfer& transfer) noexcept {
+  if (transfer.actual_length <= static_cast<int>(prefix_bytes)) return;
+  const auto bytes =
+      std::span<const std::uint8_t>(transfer.buffer, static_cast<std::size_t>(transfer.actual_length))
+          .subspan(prefix_bytes);
+  if (cut)
+    framer.take(bytes, [this](auto report) { take_report(report); });
+  else
+    take_report(bytes);
+}
+
+void UsbLink::Engine::take_report(std::span<const std::uint8_t> bytes) noexcept {
+  Packet packet;
+  packet.length = bytes.size();
+  std::copy_n(bytes.begin(), std::min(packet.length, packet.bytes.size()), packet.bytes.begin());
+  packet.arrives = std::chrono::steady_clock::now();
+  if (!ring.push(packet)) dropped.fetch_add(1, std::memory_order_relaxed);
+  readable.wake();
+}
+
+/// Endpoints that were halted are cleared, and transfers that failed are sent again: the first time at once,
+/// but not for ever at full speed.
+void UsbLink::Engine::retry_failed() noexcept {
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (ending || !(in_failed || out_halted) || now < retry_at) return;
+  retry_at = now + kRetryAfter;
+  for (bool* const halted : {&in_halted, &out_halted}) {
+    if (!*halted) continue;
+    *halted = false;
+    stalls.fetch_add(1, std::memory_order_relaxed);
+    const std::uint8_t address = halted == &in_halted ? in_endpoint.address : out_endpoint->address;
+    if (libusb_clear_halt(handle, address) == LIBUSB_ERROR_NO_DEVICE) lose();
+  }
+  in_failed = false;
+  for (In& in : ins)
+    if (!in.flying) submit(in);
+}
+
+void UsbLink::Engine::write_newest() noexcept {
+  if (out == nullptr || out_flying || out_halted || ending || gone.load(std::memory_order_relaxed)) return;
+  const bool heard = slot.take(out_packet);
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (heard) last_word.heard(now, out_packet);
+  if (!heard && !last_word.speak(now, out_packet)) return;
+  out->length = static_cast<int>(out_packet.length);
+  if (!out_endpoint) {
+    write_request();
+    out->length += LIBUSB_CONTROL_SETUP_SIZE;
+  }
+  const int error = libusb_submit_transfer(out);
+  out_flying = error == 0;
+  out_cancelled = false;
+  out_until = now + write_deadline;
+  if (error == LIBUSB_ERROR_NO_DEVICE) lose();
+  if (error != 0) slot.end(error == LIBUSB_ERROR_NO_DEVICE ? LinkStatus::gone : LinkStatus::empty);
+}
+
+/// A command that the device does not take is old by then: the newest goes in its place. libusb's own
+/// timeouts would do the same, for two more system calls with each command.
+void UsbLink::Engine::cancel_overdue() noexcept {
+  if (!out_flying || out_cancelled || std::chrono::steady_clock::now() < out_until) return;
+  libusb_cancel_transfer(out);
+  out_cancelled = true;
+}
+
+void UsbLink::Engine::on_out(libusb_transfer* transfer) {
+  Engine& engine = *static_cast<Engine*>(transfer->user_data);
+  engine.out_flying = false;
+  const bool whole = transfer->status == LIBUSB_TRANSFER_COMPLETED &&
+                     transfer->actual_length == static_cast<int>(engine.out_packet.length);
+  if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) engine.lose();
+  if (transfer->status == LIBUSB_TRANSFER_STALL)
+    engine.out_halted = engine.out_endpoint.has_value();  // a request that is refused halts nothing
+  engine.slot.end(whole                                           ? LinkStatus::ok
+                  : transfer->status == LIBUSB_TRANSFER_NO_DEVICE ? LinkStatus::gone
+                                                                  : LinkStatus::empty);
+}
+
+/// The end, step by step: what waits is written, in its time; then all transfers are called back. True when
+/// none is left.
+bool UsbLink::Engine::finish() noexcept {
+  if (!closing.load(std::memory_order_acquire)) return false;
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (!ending) {
+    if (!close_at) close_at = now + close_within;
+    write_newest();
+    if (out_flying && now < *close_at) return false;
+    ending = true;
+    if (out_flying) libusb_cancel_transfer(out);
+    for (In& in : ins)
+      if (in.flying) libusb_cancel_transfer(in.transfer);
+    close_at.reset();
+  }
+  return !flying();
+}
+
+void UsbLink::Engine::lose() noexcept {
+  gone.store(true, std::memory_order_release);
+  readable.wake();
+}
+
+// --- the servo thread -------------------------------------------------------------------------------------
+
+UsbLink::UsbLink(UsbDevice device, LinkSettings settings)
+    : device_(std::move(device)), settings_(std::move(settings)) {}
+
+UsbLink::~UsbLink() {
+  close();
+}
+
+void UsbLink::open() {
+  close();
+  if (device_.place.empty()) throw std::runtime_error(describe(device_) + " is not on USB; use hidraw");
+  engine_ = std::make_unique<Engine>(device_, settings_);
+}
+
+LinkRead UsbLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
+  if (!engine_ || engine_->gone.load(std::memory_order_acquire)) return {LinkStatus::gone, 0, now};
+  Packet packet;
+  if (!engine_->ring.pop(packet)) return {LinkStatus::empty, 0, now};
+  std::copy_n(packet.bytes.begin(), std::min({packet.length, packet.bytes.size(), buffer.size()}),
+              buffer.begin());
+  return {LinkStatus::ok, packet.length, packet.arrives};
+}
+
+LinkStatus UsbLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  if (!engine_ || engine_->gone.load(std::memory_order_relaxed)) return LinkStatus::gone;
+  if (engine_->out == nullptr) return LinkStatus::empty;
+  const LinkStatus status = engine_->slot.hand_over(now, report);
+  if (status != LinkStatus::gone) engine_->writable.wake();
+  return status;
+}
+
+void UsbLink::wait_readable(TimePoint deadline) noexcept {
+  while (engine_ && !engine_->gone.load(std::memory_order_acquire) && engine_->ring.read_available() == 0) {
+    if (wait_for_file(engine_->readable.file(), POLLIN, deadline) == 0) return;
+    engine_->readable.sleep();  // before the ring is looked at again, so that no wake-up is lost
+  }
+}
+
+void UsbLink::close() noexcept {
+  engine_.reset();
+}
+
+UsbLinkCounts UsbLink::counts() const noexcept {
+  if (!engine_) return {};
+  return {engine_->dropped.load(std::memory_order_relaxed), engine_->stalls.load(std::memory_order_relaxed),
+          engine_->errors.load(std::memory_order_relaxed)};
+}
+
+bool UsbLink::priority_granted() const noexcept {
+  return !engine_ || engine_->priority_granted;
+}
+
+const WriteSlot* UsbLink::slot() const noexcept {
+  return engine_ ? &engine_->slot : nullptr;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/links/write_slot.hpp"
+
+#include <algorithm>
+
+namespace wrenchd {
+
+LinkStatus WriteSlot::hand_over(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  if (gone()) return LinkStatus::gone;
+  if (report.size() > kMaxReportBytes) return LinkStatus::empty;
+
+  const std::uint64_t ended = ended_.load(std::memory_order_acquire);
+  if (ended == handed_ || ended != ended_seen_) waiting_since_ = now;
+  ended_seen_ = ended;
+  const std::uint64_t failed_so_far = failed();
+  const bool failed_now = failed_so_far != failed_seen_;
+  failed_seen_ = failed_so_far;
+
+  Numbered next;
+  std::copy(report.begin(), report.end(), next.packet.bytes.begin());
+  next.packet.length = report.size();
+  next.packet.arrives = now;
+  next.number = ++handed_;
+  slot_.write(next);
+  return failed_now || overdue(now) ? LinkStatus::empty : LinkStatus::ok;
+}
+
+bool WriteSlot::overdue(TimePoint now) const noexcept {
+  return ended_.load(std::memory_order_acquire) != handed_ && now - waiting_since_ > deadline_;
+}
+
+bool WriteSlot::take(Packet& packet) noexcept {
+  Numbered next;
+  if (!slot_.read(next)) return false;
+  packet = next.packet;
+  replaced_.fetch_add(next.number - taken_ - 1, std::memory_order_relaxed);
+  taken_ = next.number;
+  return true;
+}
+
+void WriteSlot::end(LinkStatus status) noexcept {
+  if (status == LinkStatus::gone) gone_.store(true, std::memory_order_relaxed);
+  (status == LinkStatus::ok ? written_ : failed_).fetch_add(1, std::memory_order_relaxed);
+  ended_.store(taken_, std::memory_order_release);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/simulation/emulated_spacemouse.hpp"
+
+#include <algorithm>
+
+namespace wrenchd {
+namespace {
+
+constexpr Duration kSplitPeriod = std::chrono::milliseconds(8);
+constexpr Duration kCombinedPeriod = std::chrono::milliseconds(16);
+constexpr int kZeroPackets = 3;
+
+void put(std::span<std::uint8_t> bytes, std::span<const int> counts) noexcept {
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const auto word = static_cast<std::uint16_t>(counts[i]);
+    bytes[2 * i] = static_cast<std::uint8_t>(word & 0xffu);
+    bytes[2 * i + 1] = static_cast<std::uint8_t>(word >> 8);
+  }
+}
+
+}  // namespace
+
+void EmulatedSpaceMouse::push(const std::array<int, 6>& counts) noexcept {
+  for (std::size_t i = 0; i < counts.size(); ++i) counts_[i] = std::clamp(counts[i], -kFullScale, kFullScale);
+  zeros_left_ = kZeroPackets;
+}
+
+void EmulatedSpaceMouse::advance_to(TimePoint t, ReportSink& host) noexcept {
+  const Duration period = format_ == Format::split ? kSplitPeriod : kCombinedPeriod;
+  if (!powered_) {
+    powered_ = true;
+    faults_.power_on(t);
+    next_ = t + period;
+  }
+  for (; next_ <= t; next_ += period) send(host);
+}
+
+void EmulatedSpaceMouse::send(ReportSink& host) noexcept {
+  if (silent_) return;
+  if (buttons_ != buttons_sent_) {
+    buttons_sent_ = buttons_;
+    const std::array<std::uint8_t, 3> report = {3, static_cast<std::uint8_t>(buttons_ & 0xffu),
+                                                static_cast<std::uint8_t>(buttons_ >> 8 & 0xffu)};
+    host.take_report(next_, report);
+  }
+  const bool at_rest = std::all_of(counts_.begin(), counts_.end(), [](int c) { return c == 0; });
+  if (at_rest && zeros_left_ == 0) return;
+  if (at_rest) --zeros_left_;
+  const std::span<const int> counts(counts_);
+  if (format_ == Format::combined) {
+    std::array<std::uint8_t, 13> report = {1};
+    put(std::span(report).subspan(1), counts);
+    host.take_report(next_, report);
+    return;
+  }
+  std::array<std::uint8_t, 7> report = {static_cast<std::uint8_t>(rotation_next_ ? 2 : 1)};
+  put(std::span(report).subspan(1), counts.subspan(rotation_next_ ? 3 : 0, 3));
+  rotation_next_ = !rotation_next_;
+  host.take_report(next_, report);
+}
+
+bool EmulatedSpaceMouse::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != 2 || bytes[0] != 4) return false;
+  led_ = (bytes[1] & 1u) != 0;
+  return true;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/simulation/hand_path.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+
+#include "core/finite.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// How well the two ends of a repeating path must meet, in each coordinate [m, rad]. Wide enough for decimal
+/// fractions, far below what an encoder sees.
+constexpr double kClosure = 1e-9;
+
+Pose pose_of(const Waypoint& w) {
+  return {rotation_from(w.rotation_vector_rad), w.position_m};
+}
+
+[[noreturn]] void refuse(std::size_t index, const std::string& why) {
+  throw std::invalid_argument("hand path, waypoint " + std::to_string(index + 1) + ": " + why);
+}
+
+void check_each(const std::vector<Waypoint>& waypoints) {
+  if (waypoints.empty()) throw std::invalid_argument("hand path: needs at least one waypoint");
+  for (std::size_t i = 0; i < waypoints.size(); ++i) {
+    const Waypoint& w = waypoints[i];
+    if (!is_finite(w.time_s) || !is_finite(w.position_m) || !is_finite(w.rotation_vector_rad))
+      refuse(i, "a number is not finite");
+    if (i == 0 && w.time_s != 0.0) refuse(i, "the first waypoint must be at time 0");
+    if (i > 0 && from_seconds(w.time_s) <= from_seconds(waypoints[i - 1].time_s))
+      refuse(i, "its time must be later than that of the waypoint before it");
+  }
+}
+
+void check_closed(const std::vector<Waypoint>& waypoints) {
+  const Waypoint& first = waypoints.front();
+  const Waypoint& last = waypoints.back();
+  const double gap = std::max((last.position_m - first.position_m).cwiseAbs().maxCoeff(),
+                              (last.rotation_vector_rad - first.rotation_vector_rad).cwiseAbs().maxCoeff());
+  if (gap > kClosure)
+    refuse(waypoints.size() - 1,
+           "a path that repeats must end where it began; repeat the first position and rotation here");
+}
+
+}  // namespace
+
+HandPath::HandPath(const std::vector<Waypoint>& waypoints, bool repeats) : repeats_(repeats) {
+  check_each(waypoints);
+  if (repeats) check_closed(waypoints);
+  for (std::size_t i = 0; i + 1 < waypoints.size(); ++i) {
+    const Pose from = pose_of(waypoints[i]);
+    const Pose to = pose_of(waypoints[i + 1]);
+    const Duration start = from_seconds(waypoints[i].time_s);
+    segments_.push_back({start, from_seconds(waypoints[i + 1].time_s) - start, from,
+                         to.translation_m - from.translation_m,
+                         rotation_vector(to.rotation * from.rotation.conjugate())});
+  }
+  last_.X_BG = pose_of(waypoints.back());
+  end_ = from_seconds(waypoints.back().time_s);
+}
+
+HandPath::HandPath(const SimulationSettings& settings)
+    : HandPath(settings.hand_path, settings.playback_path.empty() && settings.hand_repeats) {
+  if (!settings.playback_path.empty()) track_.emplace(settings.playback_path);
+}
+
+HandTarget HandPath::at(Duration since_start) const noexcept {
+  if (track_) return track_->at(since_start);
+  if (segments_.empty() || (!repeats_ && since_start >= end_)) return last_;
+  const Duration t = std::max(since_start, Duration{0}) % end_;
+  const auto next = std::upper_bound(segments_.begin(), segments_.end(), t,
+                                     [](Duration time, const Segment& s) { return time < s.start; });
+  const Segment& segment = *std::prev(next);
+
+  const double u = seconds(t - segment.start) / seconds(segment.length);
+  const double s = u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
+  const double s_rate_Hz = 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds(segment.length);
+  return {{rotation_from(s * segment.turn_rad) * segment.X_BG.rotation,
+           segment.X_BG.translation_m + s * segment.way_m},
+          {s_rate_Hz * segment.way_m, s_rate_Hz * segment.turn_rad}};
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/simulation/simulated_device.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include "core/finite.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// Encoder samples a report: enough for the velocity filter to smooth over quanta.
+constexpr std::uint64_t kSamplesPerReport = 8;
+/// Longest substep [s]: a tenth of the fastest time constant of a stiff hand on a light handle.
+constexpr double kMaxSubstep_s = 1.0 / 16000.0;
+
+constexpr double kTeleport_m = 0.1;
+constexpr double kRunAway_m_per_s = 3.0;
+constexpr double kShake_m = 1e-3;
+constexpr double kShake_Hz = 80.0;
+constexpr double kBadQuaternionLength = 0.5;
+
+double report_period(const DeviceProfile& profile) {
+  if (!is_finite(profile.report_rate_Hz) || profile.report_rate_Hz <= 0.0)
+    throw std::invalid_argument("device profile " + profile.name + ": report_rate_Hz must be above 0");
+  return 1.0 / profile.report_rate_Hz;
+}
+
+std::uint64_t substeps_per_sample(const DeviceProfile& profile) {
+  const double sample_period_s = report_period(profile) / static_cast<double>(kSamplesPerReport);
+  return static_cast<std::uint64_t>(std::ceil(sample_period_s / kMaxSubstep_s - 1e-9));
+}
+
+/// Whole nanoseconds, so a report period may be off by half a nanosecond a substep.
+Duration substep_of(const DeviceProfile& profile) {
+  const double substeps = static_cast<double>(kSamplesPerReport * substeps_per_sample(profile));
+  return Duration{std::max(std::llround(1e9 * report_period(profile) / substeps), 1LL)};
+}
+
+/// It has a handle with six degrees of freedom, and a firmware that sends whole poses and takes wrenches.
+const PoseReportLayout& checked(const DeviceProfile& profile) {
+  if (pose_source(profile) != PoseSource::pose || sensed_dofs(profile) != kAllDofs ||
+      driven_dofs(profile) != kAllDofs)
+    throw std::invalid_argument(
+        "device profile " + profile.name +
+        ": the simulated device sends whole poses and takes wrenches, this one does not; "
+        "choose a profile that inherits loopback");
+  check(profile.pose_report);
+  check(profile.wrench_report);
+  return profile.pose_report;
+}
+
+}  // namespace
+
+SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationSettings& settings)
+    : pose_layout_(checked(profile)),
+      wrench_point_(profile.wrench_point),
+      X_BD_(profile.X_BD),
+      X_HE_(inverse(profile.X_EH)),
+      same_frames_(same_bits(profile.X_BD, {}) && same_bits(profile.X_EH, {})),
+      substeps_per_sample_(substeps_per_sample(profile)),
+      substeps_per_report_(kSamplesPerReport * substeps_per_sample_),
+      substep_(substep_of(profile)),
+      path_(settings),
+      led_(is_led(settings)),
+      handle_(settings, path_.at(Duration{0}).X_BG, seconds(substep_)),
+      firmware_(profile, settings, substep_ * static_cast<std::int64_t>(substeps_per_sample_)) {
+  firmware_.settle(handle_.X_BH());
+}
+
+void SimulatedDevice::advance_to(TimePoint t, ReportSink& host) noexcept {
+  if (!powered_) {
+    powered_ = true;
+    power_on_ = now_ = t;
+    faults_.power_on(t);
+  }
+  if (t - now_ > kMaxCatchUp) skip_to(t);
+  while (now_ + substep_ <= t) substep(host);
+}
+
+void SimulatedDevice::skip_to(TimePoint t) noexcept {
+  const Duration period = substep_ * static_cast<std::int64_t>(substeps_per_report_);
+  const std::int64_t periods = (t - now_) / period;
+  now_ += periods * period;
+  firmware_.miss_reports(static_cast<std::uint32_t>(periods));
+  firmware_.trip_watchdog();
+  handle_.rest();
+  firmware_.settle(handle_.X_BH());
+}
+
+void SimulatedDevice::substep(ReportSink& host) noexcept {
+  now_ += substep_;
+  disturb();
+  const HandTarget target = path_.at(now_ - power_on_);
+  if (led_)
+    handle_.lead(target, motor_demand());
+  else
+    handle_.step(target, motor_demand());
+  ++substeps_;
+  if (substeps_ % substeps_per_sample_ == 0) firmware_.sample(handle_.X_BH());
+  if (substeps_ % substeps_per_report_ == 0) send_report(host);
+}
+
+/// What the firmware tells the motors, about the handle point.
+Wrench SimulatedDevice::motor_demand() noexcept {
+  Wrench F = firmware_.motors(now_);
+  const Pose& X_BH = handle_.X_BH();
+  if (!same_frames_) F = shifted(expressed(X_BD_.rotation, F), -(X_BH.rotation * X_HE_.translation_m));
+  return wrench_point_ == WrenchPoint::handle ? F : shifted(F, X_BH.translation_m);
+}
+
+/// From the handle in the base to the device's end in its own axes.
+void SimulatedDevice::into_own_frames(PoseReport& report) const noexcept {
+  const Twist V_BE = shifted(report.V_BH, report.X_BH.rotation * X_HE_.translation_m);
+  report.V_BH = expressed(X_BD_.rotation.conjugate(), V_BE);
+  report.X_BH = inverse(X_BD_) * report.X_BH * X_HE_;
+}
+
+void SimulatedDevice::send_report(ReportSink& host) noexcept {
+  using Kind = SimulatedFault::Kind;
+  PoseReport report = firmware_.report(now_ - power_on_);
+  if (!same_frames_) into_own_frames(report);
+  spoil(report);
+  if (shows(Kind::bad_quaternion, now_, now_)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
+  std::array<std::uint8_t, kMaxReportBytes> bytes;
+  host.take_report(now_, std::span(bytes).first(encode(pose_layout_, report, bytes)));
+}
+
+bool SimulatedDevice::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
+  return firmware_.take_command(now_, bytes);
+}
+
+/// What is wrong with what the device says.
+void SimulatedDevice::spoil(PoseReport& report) noexcept {
+  using Kind = SimulatedFault::Kind;
+  const auto value = [](const SimulatedFault& fault, double usual) {
+    return fault.value > 0.0 ? fault.value : usual;
+  };
+  Vector3d& p_m = report.X_BH.translation_m;
+  if (const SimulatedFault* f = faults_.at(Kind::teleport, now_)) p_m.x() += value(*f, kTeleport_m);
+  if (const SimulatedFault* f = faults_.at(Kind::run_away, now_)) {
+    const double way_m = value(*f, kRunAway_m_per_s) * seconds(now_ - faults_.start_of(*f));
+    p_m.x() += kTeleport_m - std::abs(std::fmod(way_m, 2.0 * kTeleport_m) - kTeleport_m);
+  }
+  if (const SimulatedFault* f = faults_.at(Kind::shake, now_)) {
+    const double swing_m = value(*f, kShake_m), w_per_s = 2.0 * std::numbers::pi * kShake_Hz;
+    const double phase = w_per_s * seconds(now_ - faults_.start_of(*f));
+    p_m.z() += swing_m * std::sin(phase);
+    report.V_BH.linear_m_per_s.z() += swing_m * w_per_s * std::cos(phase);
+  }
+  if (const SimulatedFault* f = faults_.at(Kind::press, now_))
+    report.buttons |= std::uint32_t{1} << (static_cast<unsigned>(f->value) & 31U);
+  if (!shows(Kind::stick, now_, now_)) moving_ = report.X_BH;
+  report.X_BH = moving_;
+}
+
+/// What is wrong with the firmware, from before a command or a look at its motors.
+void SimulatedDevice::disturb() noexcept {
+  using Kind = SimulatedFault::Kind;
+  firmware_.keep_awake(!shows(Kind::sleepy, now_, now_));
+  if (shows(Kind::trip, now_, now_)) firmware_.trip_watchdog();
+  if (shows(Kind::dead_motors, now_, now_)) firmware_.switch_off();
+}
+
+TimePoint SimulatedDevice::next_event() const noexcept {
+  const std::uint64_t left = substeps_per_report_ - substeps_ % substeps_per_report_;
+  return now_ + substep_ * static_cast<std::int64_t>(left);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "collision/meshes/mesh_check.hpp"
+#include "core/inertia.hpp"
+#include "tests/support/sample_meshes.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+const PolygonSoup kBox = box({0, 0, 0}, {2, 3, 5});
+
+std::string defects(const PolygonSoup& soup) {
+  TriangleMesh mesh;
+  const MeshReport report = check_solid(soup, &mesh);
+  CHECK(mesh.triangles.empty() != report.solid());
+  std::string text;
+  for (const std::string& defect : report.defects) text += defect + "\n";
+  return text;
+}
+
+/// Exactly these defects, one a line.
+void check_defects(const PolygonSoup& soup, const std::vector<std::string>& expected) {
+  std::string text;
+  for (const std::string& defect : expected) text += defect + "\n";
+  CHECK(defects(soup) == text);
+}
+
+/// One defect that holds all of these words.
+void check_defect_with(const PolygonSoup& soup, const std::vector<std::string>& words) {
+  const std::string text = defects(soup);
+  INFO(text);
+  CHECK(std::count(text.begin(), text.end(), '\n') == 1);
+  for (const std::string& word : words) CHECK(text.find(word) != std::string::npos);
+}
+
+void check_good(const PolygonSoup& soup, double volume) {
+  TriangleMesh mesh;
+  const MeshReport report = check_solid(soup, &mesh);
+  INFO((report.defects.empty() ? "" : report.defects[0]));
+  REQUIRE(report.solid());
+  CHECK(report.closed);
+  CHECK(report.consistent);
+  CHECK(report.outward);
+  CHECK_FALSE(report.self_intersecting);
+  CHECK(report.volume == Approx(volume).epsilon(1e-12));
+  CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(volume).epsilon(1e-12));
+}
+
+TEST_CASE("a closed box is a solid") {
+  check_good(kBox, 30);
+  check_good(triangulated(kBox), 30);
+  const MeshReport report = check_solid(kBox);
+  CHECK(report.vertices == 8);
+  CHECK(report.faces == 6);
+}
+
+TEST_CASE("a solid may have concave faces, corners on an edge, several shells and cavities") {
+  // An L of three unit squares, two high.
+  PolygonSoup ell{{}, {{5, 4, 3, 2, 1, 0}, {6, 7, 8, 9, 10, 11}}};
+  for (const double z : {0.0, 2.0})
+    for (const auto& [x, y] : {std::pair{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}})
+      ell.vertices.emplace_back(x, y, z);
+  for (std::size_t i = 0; i < 6; ++i) ell.faces.push_back({i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6});
+  check_good(ell, 6);
+
+  // A vertex half-way along the edge from 0 to 1, in both faces there.
+  PolygonSoup corner = kBox;
+  corner.vertices.emplace_back(1, 0, 0);
+  corner.faces[2] = {0, 8, 1, 5, 4};
+  corner.faces[4] = {0, 2, 3, 1, 8};
+  check_good(corner, 30);
+
+  check_good(both(kBox, box({10, 0, 0}, {11, 1, 1})), 31);
+  check_good(both(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))), 29);
+  check_good(both(both(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 2.5, 4.5}))),
+                  box({0.9, 0.9, 0.9}, {1.1, 1.1, 1.1})),
+             30 - 8 + 0.008);
+}
+
+TEST_CASE("a quad that is not flat is cut into triangles") {
+  PolygonSoup soup = kBox;
+  soup.vertices[7] += Vector3d(0.1, 0.2, 0.3);
+  TriangleMesh mesh;
+  const MeshReport report = check_solid(soup, &mesh);
+  REQUIRE(report.solid());
+  CHECK(mesh.triangles.size() == 12);
+  CHECK(report.volume > 30);
+}
+
+TEST_CASE("a face of five corners that crosses itself cannot be cut, and is told") {
+  const PolygonSoup star{{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {3, 1, 0}, {1, 1, 3}},
+                         {{0, 2, 1, 3, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}}};
+  check_defect_with(star, {"face 0", "cannot be cut into triangles"});
+}
+
+TEST_CASE("vertices that no face uses do not count") {
+  PolygonSoup soup = kBox;
+  soup.vertices.insert(soup.vertices.begin(), Vector3d(1000, 0, 0));
+  soup.vertices.emplace_back(0, 1000, 0);
+  for (auto& face : soup.faces)
+    for (std::size_t& v : face) ++v;
+  check_good(soup, 30);
+  TriangleMesh mesh;
+  check_solid(soup, &mesh);
+  CHECK(mesh.vertices_m.size() == 8);
+}
+
+TEST_CASE("scale and place of a solid do not matter") {
+  for (const double scale : {1e-6, 1e-3, 1.0, 1e3, 1e6}) {
+    for (const double offset : {0.0, 1e3}) {
+      PolygonSoup soup = kBox;
+      for (Vector3d& p : soup.vertices) p = scale * (p + Vector3d::Constant(offset));
+      const MeshReport report = check_solid(soup);
+      INFO(scale << " " << offset);
+      CHECK(report.solid());
+      CHECK(report.volume == Approx(30 * scale * scale * scale).epsilon(1e-6));
+    }
+  }
+}
+
+TEST_CASE("numbers that are none are found") {
+  PolygonSoup soup = kBox;
+  soup.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
+  check_defects(soup, {"vertex 3 is not a number: (2, nan, 0); export the mesh again"});
+  soup.vertices[5].x() = -std::numeric_limits<double>::infinity();
+  check_defects(soup, {"vertex 3 is not a number: (2, nan, 0) (2 in all); export the mesh again"});
+}
+
+TEST_CASE("faces that are none are found") {
+  PolygonSoup soup = kBox;
+  soup.faces[1][2] = 8;
+  check_defects(
+      soup, {"face 1 uses vertex 8, but there are only 8; vertex numbers start at 0; export the mesh again"});
+
+  soup = kBox;
+  soup.faces[1][2] = static_cast<std::size_t>(-2);
+  check_defects(
+      soup,
+      {"face 1 uses vertex -2, but there are only 8; vertex numbers start at 0; export the mesh again"});
+
+  soup = kBox;
+  soup.faces.push_back({0, 1});
+  soup.faces.push_back({});
+  check_defects(soup, {"face 6 has 2 vertices (2 in all); remove it"});
+
+  soup = kBox;
+  soup.faces[0] = {0, 4, 6, 4};
+  check_defects(soup, {"face 0 uses a vertex twice; remove degenerate faces in the modeller"});
+
+  // All of them are told at once.
+  soup.vertices[0].z() = std::numeric_limits<double>::infinity();
+  soup.faces[5][0] = 100;
+  CHECK(defects(soup).find("vertex 0 ") != std::string::npos);
+  CHECK(defects(soup).find("face 5 ") != std::string::npos);
+  CHECK(defects(soup).find("face 0 ") != std::string::npos);
+}
+
+TEST_CASE("a face without area is found") {
+  PolygonSoup soup = triangulated(kBox);
+  soup.vertices.emplace_back(1, 0, 0);  // on the edge from 0 to 1
+  soup.faces.push_back({0, 1, 8});
+  soup.faces.push_back({8, 1, 0});
+  const std::string text = defects(soup);
+  CHECK(text.find("face 12 near (0, 0, 0) has no area (2 in all); remove degenerate faces") == 0);
+}
+
+TEST_CASE("a hole is found") {
+  PolygonSoup soup = kBox;
+  soup.faces.erase(soup.faces.begin() + 5);  // z = 5
+  check_defects(
+      soup,
+      {"the edge from (2, 0, 5) to (0, 0, 5) belongs to face 2 only: the surface is open (4 in all); close "
+       "the hole in the modeller"});
+  const MeshReport report = check_solid(soup);
+  CHECK_FALSE(report.closed);
+  CHECK(report.consistent);
+  CHECK(std::isnan(report.volume));
+
+  soup.faces.erase(soup.faces.begin() + 4);  // z = 0
+  check_defect_with(soup, {"the surface is open (8 in all)"});
+  check_defect_with({kBox.vertices, {kBox.faces[0]}}, {"belongs to face 0 only", "(4 in all)"});
+}
+
+TEST_CASE("a face that looks the wrong way is found") {
+  PolygonSoup soup = kBox;
+  std::reverse(soup.faces[0].begin(), soup.faces[0].end());
+  check_defect_with(soup, {"faces 0 and ", "oriented against each other along the edge from (0, ",
+                           "(4 in all)", "make all faces counter-clockwise seen from outside"});
+  CHECK(check_solid(soup).closed);
+  CHECK_FALSE(check_solid(soup).consistent);
+}
+
+TEST_CASE("a solid that is inside out is found") {
+  check_defects(inside_out(kBox),
+                {"all faces look inwards (the volume is negative); flip the faces in the modeller"});
+  check_defect_with(both(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})),
+                    {"make outer shells look outwards and cavities inwards"});
+  check_defect_with(both(kBox, inside_out(box({10, 0, 0}, {11, 1, 1}))), {"make outer shells look outwards"});
+  check_defect_with(both(inside_out(kBox), inside_out(box({10, 0, 0}, {11, 1, 1}))),
+                    {"all faces look inwards"});
+}
+
+TEST_CASE("an edge with more than two faces is found") {
+  PolygonSoup fin = triangulated(kBox);
+  fin.vertices.emplace_back(1, -1, 0);
+  fin.faces.push_back({0, 1, 8});
+  const std::string text = defects(fin);
+  CHECK(text.find(
+            "the edge from (0, 0, 0) to (2, 0, 0) belongs to 3 faces; a solid has two faces at every edge") !=
+        std::string::npos);
+  CHECK(text.find("belongs to face 12 only") != std::string::npos);
+
+  // Two boxes that share the edge from vertex 1 to 5 (x = 2, y = 0).
+  PolygonSoup edge = both(kBox, box({2, -3, 0}, {4, 0, 5}));
+  for (auto& face : edge.faces)
+    for (std::size_t& v : face) v = v == 8 + 2 ? 1 : v == 8 + 6 ? 5 : v;
+  check_defect_with(edge, {"the edge from (2, 0, 0) to (2, 0, 5) belongs to 4 faces"});
+  CHECK_FALSE(check_solid(edge).closed);
+
+  PolygonSoup twice = kBox;
+  twice.faces.push_back(twice.faces[3]);
+  check_defect_with(twice, {"belongs to 3 faces (4 in all)"});
+}
+
+TEST_CASE("parts that meet in one vertex are found") {
+  PolygonSoup soup = both(kBox, box({2, 3, 5}, {4, 4, 6}));
+  for (auto& face : soup.faces)
+    for (std::size_t& v : face) v = v == 8 ? 7 : v;
+  check_defects(soup,
+                {"parts of the surface meet only in vertex 7 at (2, 3, 5); separate them in the modeller"});
+  // The same where the file has the vertex twice: the surfaces touch.
+  CHECK_FALSE(check_solid(both(kBox, box({2, 3, 5}, {4, 4, 6}))).solid());
+}
+
+TEST_CASE("faces that cut through each other are found") {
+  const PolygonSoup soup = both(kBox, box({1, 1, 1}, {3, 2, 2}));
+  check_defect_with(soup, {" near (", "cut through each other", " in all); unite the parts in the modeller"});
+  CHECK(check_solid(soup).self_intersecting);
+  // A spike through the lid alone; numbers are the file's, not those of the triangles it is cut into.
+  const PolygonSoup spike{{{1, 1, 6}, {1.5, 1, 6}, {1, 1.5, 6}, {1.1, 1.1, 4}},
+                          {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}}};
+  REQUIRE(check_solid(spike).solid());
+  check_defect_with(both(kBox, spike), {"faces 5 and ", "cut through each other"});
+  check_defect_with(both(kBox, kBox), {"cut through each other"});
+  check_defect_with(both(kBox, box({2, 0, 0}, {4, 3, 5})), {"cut through each other"});  // face on face
+}
+
+TEST_CASE("a mesh in which everything cuts through everything is refused in good time") {
+  PolygonSoup soup;
+  for (int i = 0; i < 300; ++i)
+    soup = both(soup, box(Vector3d::Constant(1e-4 * i), Vector3d::Constant(1 + 1e-4 * i)));
+  check_defect_with(soup, {"cut through each other (1000 or more in all)"});
+}
+
+TEST_CASE("a face that cannot be cut into triangles is found") {
+  PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
+  for (Vector3d& p : soup.vertices) p *= 1e110;  // beyond what the plane of a face can be computed with
+  check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be cut into triangles (6 in all); make it flat"});
+}
+
+TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must have numbers and areas") {
+  const auto triangles_of = [](const PolygonSoup& soup) {
+    TriangleMesh mesh;
+    const MeshReport report = check_surface(soup, &mesh);
+    CHECK(report.defects.empty());
+    CHECK(mesh.vertices_m == soup.vertices);
+    return mesh.triangles.size();
+  };
+  CHECK(triangles_of(kBox) == 12);
+  CHECK(triangles_of(inside_out(kBox)) == 12);
+  CHECK(triangles_of({kBox.vertices, {kBox.faces[0], kBox.faces[3]}}) == 4);
+  CHECK(triangles_of(both(kBox, box({1, 1, 1}, {3, 2, 2}))) == 24);
+  PolygonSoup fin = triangulated(kBox);
+  fin.vertices.emplace_back(1, -1, 0);
+  fin.faces.push_back({0, 1, 8});
+  fin.faces.push_back({0, 1, 8});
+  CHECK(triangles_of(fin) == 14);
+
+  const auto refused_with = [](const PolygonSoup& soup, const std::string& words) {
+    TriangleMesh mesh;
+    const MeshReport report = check_surface(soup, &mesh);
+    CHECK(mesh.triangles.empty());
+    REQUIRE(report.defects.size() == 1);
+    CHECK(report.defects[0].find(words) != std::string::npos);
+  };
+  PolygonSoup bad = kBox;
+  bad.vertices[2].x() = std::numeric_limits<double>::quiet_NaN();
+  refused_with(bad, "vertex 2 is not a number");
+  bad = kBox;
+  bad.faces[4][1] = 9;
+  refused_with(bad, "face 4 uses vertex 9");
+  bad = kBox;
+  bad.vertices.emplace_back(1, 0, 0);
+  bad.faces.push_back({0, 1, 8});
+  refused_with(bad, "face 6 near (0, 0, 0) has no area");
+  refused_with({kBox.vertices, {}}, "no face that has an area");
+}
+
+TEST_CASE("a surface of which the repair leaves nothing is refused") {
+  PolygonSoup far = triangulated(kBox);
+  far.vertices[5].x() = 1e126;  // beside it all other points are one
+  TriangleMesh mesh;
+  const MeshReport report = repair_and_check_surface(far, &mesh);
+  CHECK(mesh.triangles.empty());
+  REQUIRE(report.defects.size() == 1);
+  CHECK(report.defects[0].find("a vertex that is much too far away") != std::string::npos);
+}
+
+TEST_CASE("what has no inside is refused") {
+  CHECK_FALSE(check_solid({}).solid());
+  CHECK_FALSE(check_solid({kBox.vertices, {}}).solid());
+  const PolygonSoup leaf{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}}};
+  CHECK_FALSE(check_solid(leaf).solid());
+  const PolygonSoup flat{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}},
+                         {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+  CHECK_FALSE(check_solid(flat).solid());
+}
+
+TEST_CASE("numbers at the end of their range crash nothing") {
+  for (const double scale : {1e-320, 1e-200, 1e-110, 1e110, 1e200, 1e307}) {
+    PolygonSoup soup = kBox;
+    for (Vector3d& p : soup.vertices) p *= scale;
+    const MeshReport report = check_solid(soup);
+    INFO(scale);
+    CHECK((report.solid() || !report.defects.empty()));
+  }
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "collision/meshes/convex_hull.hpp"
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_file.hpp"
+#include "collision/meshes/mesh_loader.hpp"
+#include "collision/scene.hpp"
+#include "tests/support/sample_meshes.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+
+const PolygonSoup kBox = box({0, 0, 0}, {0.2, 0.3, 0.5});
+
+std::string refusal_of(MeshLoader& loader, const fs::path& file, BodyKind kind) {
+  try {
+    loader.load(file, kind);
+  } catch (const MeshError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("what a loader changed is told once, with the file", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  PolygonSoup soup = inside_out(kBox);
+  soup.faces.push_back(soup.faces[0]);
+  const fs::path file = dir.write("box.ply", as_ascii_ply(soup));
+  MeshLoader loader;
+  const auto loaded = loader.load(file, BodyKind::solid);
+  CHECK(loader.load(file, BodyKind::solid) == loaded);
+  CHECK(loader.load(dir.path() / "." / "box.ply", BodyKind::solid) == loaded);
+  CHECK(loader.changes() ==
+        std::vector<std::string>{file.string() + ": removed 1 duplicate face: face 6 near (0, 0.3, 0)",
+                                 file.string() + ": turned 6 faces round, first face 0 near (0, 0.3, 0)"});
+  CHECK(loader.remarks().empty());
+  loader.look_at_size(*loaded, 1000.0, kToolSize);
+  loader.look_at_size(*loaded, 1000.0, kToolSize);
+  REQUIRE(loader.remarks().size() == 1);
+  CHECK(loader.remarks()[0].find(file.string() + ": its largest side is 500 m") == 0);
+}
+
+TEST_CASE("an open mesh is refused with the key that makes it a surface, and is one with it",
+          "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  PolygonSoup open = kBox;
+  open.faces.pop_back();
+  std::reverse(open.faces[0].begin(), open.faces[0].end());
+  const fs::path file = dir.write("open.obj", as_obj(open));
+  MeshLoader loader;
+  const std::string told = refusal_of(loader, file, BodyKind::solid);
+  CHECK(told.find(file.string() + ": is not a closed, consistently oriented solid:\n  the edge from (") == 0);
+  CHECK(told.find("\n  (after a repair: turned 1 face round: face 0 near ") != std::string::npos);
+  CHECK(told.find("kind = \"surface\"") != std::string::npos);
+  CHECK(loader.load(file, BodyKind::surface)->mesh.triangles.size() == 10);
+  REQUIRE(loader.changes().size() == 2);
+  CHECK(loader.changes()[1].find("taken as a surface: it has two sides and no inside") != std::string::npos);
+
+  const fs::path none = dir.write("none.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3 4\n");
+  const std::string hopeless = refusal_of(loader, none, BodyKind::solid);
+  CHECK(hopeless.find("kind = \"surface\"") == std::string::npos);
+  CHECK(refusal_of(loader, none, BodyKind::surface)
+            .find(none.string() + ": cannot be used, not even as a surface:\n  face 0 near ") == 0);
+}
+
+std::string off_of(const TriangleMesh& mesh) {
+  PolygonSoup soup{mesh.vertices_m, {}};
+  for (const auto& [a, b, c] : mesh.triangles) soup.faces.push_back({a, b, c});
+  return as_off(soup);
+}
+
+template <class T>
+std::string bytes_of(const std::vector<T>& list) {
+  return {reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T)};
+}
+
+void check_same(const TreedMesh& a, const TreedMesh& b) {
+  CHECK(a.surface.mesh().triangles == b.surface.mesh().triangles);
+  CHECK(a.surface.vertices_m() == b.surface.vertices_m());
+  CHECK(bytes_of(a.surface.planes()) == bytes_of(b.surface.planes()));
+  CHECK(bytes_of(a.surface.features()) == bytes_of(b.surface.features()));
+  CHECK(bytes_of(a.surface.edges()) == bytes_of(b.surface.edges()));
+  CHECK(a.surface.radius_m() == b.surface.radius_m());
+  CHECK(a.surface.pointed_count() == b.surface.pointed_count());
+  for (std::uint32_t v = 0; v < a.surface.vertices_m().size(); v += 97) {
+    const auto x = a.surface.around(v), y = b.surface.around(v);
+    CHECK(std::equal(x.begin(), x.end(), y.begin(), y.end()));
+  }
+  CHECK(bytes_of(a.tree.boxes()) == bytes_of(b.tree.boxes()));
+  CHECK(a.tree.nodes().size() == b.tree.nodes().size());
+  CHECK(a.tree.leaves().size() == b.tree.leaves().size());
+  CHECK(a.tree.extent_m() == b.tree.extent_m());
+}
+
+std::vector<std::string> files_of(const fs::path& directory) {
+  std::vector<std::string> files;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(directory, none)) files.push_back(entry.path().string());
+  return files;
+}
+
+TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const fs::path cache = dir.path() / "cache";
+  const TriangleMesh made = make_mesh({"bumpy", 60000});
+  const fs::path file = dir.write("bumpy.off", off_of(made));
+  std::vector<std::string> told;
+  const auto load = [&] {
+    told.clear();
+    MeshLoader loader(cache, [&](const std::string& what) { told.push_back(what); });
+    const auto loaded = loader.load(file, BodyKind::solid);
+    const ConvexBody hull = loader.hull(*loaded);
+    CHECK(loader.remarks().empty());
+    CHECK(loader.changes().empty());
+    return std::tuple(loaded, hull, loader.treed(loaded->mesh, BodyKind::solid, file));
+  };
+  const auto [cold, cold_hull, cold_tree] = load();
+  const std::string size = grouped(made.triangles.size());
+  REQUIRE(told.size() == 4);
+  CHECK(told[0] == "bumpy.off: reading 3 MB");
+  CHECK(told[1] == "bumpy.off: " + size + " triangles, checking");
+  CHECK(told[2] == "bumpy.off: " + size + " triangles, finding its convex hull");
+  CHECK(told[3] == "bumpy.off: " + size + " triangles, finding its edges and building its tree");
+  REQUIRE(files_of(cache).size() == 3);
+
+  const auto [warm, warm_hull, warm_tree] = load();
+  CHECK(told == std::vector<std::string>{"bumpy.off: reading 3 MB"});
+  CHECK(warm->mesh.vertices_m == made.vertices_m);
+  CHECK(warm->mesh.triangles == made.triangles);
+  CHECK(warm_hull.vertices_T_m == cold_hull.vertices_T_m);
+  CHECK(warm_hull.ring == cold_hull.ring);
+  check_same(*warm_tree, *cold_tree);
+  check_same(*warm_tree, TreedMesh(made));
+
+  SECTION("another file is another key") {
+    dir.write("bumpy.off", off_of(make_mesh({"bumpy", 60000, 2})));
+    load();
+    CHECK(told.size() == 4);
+    CHECK(files_of(cache).size() == 6);
+  }
+  SECTION("spoilt files are made again") {
+    for (const std::string& kept : files_of(cache)) fs::resize_file(kept, fs::file_size(kept) / 2);
+    const auto [again, again_hull, again_tree] = load();
+    CHECK(told.size() == 4);
+    check_same(*again_tree, *cold_tree);
+    load();
+    CHECK(told.size() == 1);
+  }
+}
+
+TEST_CASE("a mesh that is made is checked and kept like one of a file", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const fs::path cache = dir.path() / "cache";
+  const MadeMesh bumpy = {"bumpy", 60000};
+  const std::string name = name_of(bumpy), size = grouped(make_mesh(bumpy).triangles.size());
+  std::vector<std::string> told;
+  const auto load = [&] {
+    told.clear();
+    MeshLoader loader(cache, [&](const std::string& what) { told.push_back(what); });
+    const auto loaded = loader.load(name, BodyKind::solid, bumpy);
+    CHECK(loader.load(name, BodyKind::solid, bumpy) == loaded);
+    CHECK(loader.changes().empty());
+    CHECK(loaded->file == name);
+    return loaded->mesh;
+  };
+  CHECK(load().vertices_m == make_mesh(bumpy).vertices_m);
+  CHECK(told == std::vector<std::string>{name + ": " + size + " triangles, checking"});
+  CHECK(files_of(cache).size() == 1);
+  CHECK(load().triangles == make_mesh(bumpy).triangles);
+  CHECK(told.empty());
+}
+
+TEST_CASE("a cache that cannot be written is a remark", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const fs::path file = dir.write("bumpy.off", off_of(make_mesh({"bumpy", 60000})));
+  MeshLoader loader(dir.write("no_directory", "") / "cache", {});
+  loader.hull(*loader.load(file, BodyKind::solid));
+  REQUIRE(loader.remarks().size() == 1);
+  CHECK(loader.remarks()[0].find("cannot be made") != std::string::npos);
+  CHECK(loader.remarks()[0].find("; what is made of large meshes is not kept") != std::string::npos);
+}
+
+TEST_CASE("nothing is told of a small mesh, and nothing kept", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const fs::path file = dir.write("box.off", as_off(kBox)), cache = dir.path() / "cache";
+  MeshLoader loader(cache, [](const std::string& what) { FAIL(what); });
+  const auto loaded = loader.load(file, BodyKind::solid);
+  loader.treed(loaded->mesh, BodyKind::solid, file);
+  CHECK_FALSE(fs::exists(cache));
+}
+
+template <class T>
+std::size_t size_of_members(T thing) {
+  std::size_t sum = 0;
+  thing.each_member([&](const auto& member) { sum += (sizeof member + 7) / 8 * 8; });
+  return sum;
+}
+
+TEST_CASE("no member of what is kept is forgotten", "[mesh_loader]") {
+  CHECK(size_of_members(MeshSurface()) == sizeof(MeshSurface));
+  CHECK(size_of_members(TriangleTree()) == sizeof(TriangleTree));
+}
+
+TEST_CASE("numbers are grouped for people", "[mesh_loader]") {
+  CHECK(grouped(0) == "0");
+  CHECK(grouped(999) == "999");
+  CHECK(grouped(1000) == "1,000");
+  CHECK(grouped(1003520) == "1,003,520");
+  CHECK(grouped(12345678901) == "12,345,678,901");
+}
+
+}  // namespace
+}  // namespace wrenchd

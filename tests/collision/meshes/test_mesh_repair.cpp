@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/mesh_repair.hpp"
+#include "core/inertia.hpp"
+#include "tests/support/random_values.hpp"
+#include "tests/support/sample_meshes.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+const PolygonSoup kBox = box({0, 0, 0}, {2, 3, 5});
+constexpr double kVolume = 30;
+
+PolygonSoup soup_of(const TriangleMesh& mesh) {
+  PolygonSoup soup{mesh.vertices_m, {}};
+  for (const auto& [a, b, c] : mesh.triangles) soup.faces.push_back({a, b, c});
+  return soup;
+}
+
+/// Repairs it, and is told exactly these changes; what comes out is a solid of this volume.
+void check_repaired(PolygonSoup soup, const std::vector<std::string>& changes, double volume = kVolume) {
+  CHECK(repair(soup) == changes);
+  TriangleMesh mesh;
+  const MeshReport report = check_solid(soup, &mesh);
+  INFO((report.defects.empty() ? "" : report.defects[0]));
+  REQUIRE(report.solid());
+  CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(volume).epsilon(1e-5));
+  CHECK(repair(soup).empty());  // once is enough
+}
+
+TEST_CASE("a good mesh is left as it is", "[mesh_repair]") {
+  for (const PolygonSoup& good :
+       {kBox, triangulated(kBox), both(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))),
+        soup_of(make_mesh({"gear", 2000}))}) {
+    PolygonSoup soup = good;
+    CHECK(repair(soup).empty());
+    CHECK(soup.vertices == good.vertices);
+    CHECK(soup.faces == good.faces);
+    CHECK(soup.face_in_file(3) == 3);
+  }
+}
+
+TEST_CASE("points that no face uses are left out", "[mesh_repair]") {
+  PolygonSoup soup = kBox;
+  soup.vertices.insert(soup.vertices.begin() + 1, Vector3d(1000, 0, 0));
+  soup.vertices.emplace_back(0, 1000, 0);
+  for (auto& face : soup.faces)
+    for (std::size_t& v : face) v += v > 0 ? 1 : 0;
+  check_repaired(soup, {"left out 2 points that no face uses, first vertex 1 at (1000, 0, 0)"});
+  repair(soup);
+  CHECK(soup.vertices == kBox.vertices);
+  CHECK(soup.vertex_in_file(1) == 2);
+}
+
+TEST_CASE("points at the same place are merged", "[mesh_repair]") {
+  PolygonSoup soup{{}, {}};  // every face has corners of its own, as STL has them
+  for (const auto& face : kBox.faces) {
+    soup.faces.emplace_back();
+    for (const std::size_t v : face) {
+      soup.faces.back().push_back(soup.vertices.size());
+      soup.vertices.push_back(kBox.vertices[v]);
+    }
+  }
+  check_repaired(soup, {"merged 16 duplicate points, first vertex 8 at (0, 0, 0)"});
+}
+
+TEST_CASE("repeated corners and faces of two corners go", "[mesh_repair]") {
+  PolygonSoup soup = kBox;
+  soup.faces[2] = {0, 1, 1, 5, 4, 0};
+  check_repaired(soup, {"left out repeated corners of 1 face: face 2 near (0, 0, 0)"});
+  soup = kBox;
+  soup.faces.insert(soup.faces.begin() + 1, {0, 1});
+  soup.faces.push_back({3, 3, 3});
+  soup.faces.push_back({});
+  check_repaired(soup,
+                 {"removed 3 faces with fewer than three different corners, first face 1 near (0, 0, 0)"});
+  repair(soup);
+  CHECK(soup.face_in_file(0) == 0);
+  CHECK(soup.face_in_file(1) == 2);
+}
+
+TEST_CASE("a face without area goes, and leaves no hole", "[mesh_repair]") {
+  // A corner on an edge that only one side knows: a cap fills the gap.
+  PolygonSoup soup = triangulated(kBox);
+  const auto edge = std::find(soup.faces.begin(), soup.faces.end(), std::vector<std::size_t>{0, 1, 5});
+  REQUIRE(edge != soup.faces.end());
+  soup.vertices.emplace_back(1, 0, 0);
+  *edge = {0, 8, 5};
+  soup.faces.push_back({8, 1, 5});
+  soup.faces.push_back({0, 1, 8});
+  check_repaired(soup, {"removed 1 face without area: face 13 near (0, 0, 0)"});
+
+  // Several on one edge, one cap upon the other.
+  soup.vertices.emplace_back(0.5, 0, 0);
+  *std::find(soup.faces.begin(), soup.faces.end(), std::vector<std::size_t>{0, 8, 5}) = {0, 9, 5};
+  soup.faces.push_back({9, 8, 5});
+  soup.faces.push_back({0, 8, 9});
+  check_repaired(soup, {"removed 2 faces without area, first face 13 near (0, 0, 0)"});
+
+  // One that hangs on an edge, both ways up.
+  soup = triangulated(kBox);
+  soup.vertices.emplace_back(1, 0, 0);
+  soup.faces.push_back({0, 1, 8});
+  soup.faces.push_back({8, 1, 0});
+  check_repaired(soup, {"removed 1 duplicate face: face 13 near (1, 0, 0)",
+                        "removed 1 face without area: face 12 near (0, 0, 0)"});
+}
+
+TEST_CASE("a needle is closed", "[mesh_repair]") {
+  // Corner 0 is split into two that lie nearly at one place, with two needles between them.
+  PolygonSoup soup = triangulated(kBox);
+  soup.vertices.emplace_back(1e-12, 0, 0);
+  std::size_t count = 0;
+  for (auto& face : soup.faces)
+    for (std::size_t& v : face)
+      if (v == 0 && count++ < 2) v = 8;
+  // Whatever was torn is joined: the two are one.
+  repair(soup);
+  CHECK(check_solid(soup).solid());
+  CHECK(soup.vertices.size() == 8);
+}
+
+TEST_CASE("faces given twice are kept once, either way up", "[mesh_repair]") {
+  PolygonSoup soup = kBox;
+  soup.faces.push_back({7, 3, 2, 6});
+  check_repaired(soup, {"removed 1 duplicate face: face 6 near (2, 3, 5)"});
+  soup.faces.push_back({4, 6, 7, 5});
+  check_repaired(soup, {"removed 2 duplicate faces, first face 6 near (2, 3, 5)"});
+  soup = kBox;  // all of it
+  for (const auto& face : kBox.faces) soup.faces.push_back(face);
+  check_repaired(soup, {"removed 6 duplicate faces, first face 6 near (0, 0, 0)"});
+  soup = kBox;  // with a lining
+  for (const auto& face : inside_out(kBox).faces) soup.faces.push_back(face);
+  check_repaired(soup, {"removed 6 duplicate faces, first face 6 near (0, 3, 0)"});
+}
+
+TEST_CASE("cracks of single precision are closed, wider ones are not", "[mesh_repair]") {
+  for (const double scale : {1e-3, 1.0, 1e3}) {
+    PolygonSoup soup = triangulated(kBox);
+    RandomValues random(3);
+    PolygonSoup torn{{}, {}};
+    const auto tear = [&](double width) {
+      torn = {{}, {}};
+      for (const auto& face : soup.faces) {
+        torn.faces.emplace_back();
+        for (const std::size_t v : face) {
+          torn.faces.back().push_back(torn.vertices.size());
+          torn.vertices.push_back(scale * (soup.vertices[v] + width * random.unit<3>()));
+        }
+      }
+    };
+    tear(1e-7);
+    const std::vector<std::string> changes = repair(torn);
+    REQUIRE(changes.size() == 1);
+    CHECK(changes[0].find("merged 28 points along cracks no wider than single precision, first (") == 0);
+    CHECK(check_solid(torn).solid());
+    CHECK(check_solid(torn).volume == Approx(kVolume * std::pow(scale, 3)).epsilon(1e-5));
+    tear(1e-4);
+    repair(torn);
+    CHECK_FALSE(check_solid(torn).closed);
+  }
+}
+
+TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[mesh_repair]") {
+  PolygonSoup soup = kBox;
+  std::reverse(soup.faces[3].begin(), soup.faces[3].end());
+  check_repaired(soup, {"turned 1 face round: face 3 near (2, 3, 0)"});
+  const PolygonSoup gear = soup_of(make_mesh({"gear", 2000}));
+  const double volume = check_solid(gear).volume;
+  RandomValues random(1);
+  for (const double share : {0.01, 0.3, 0.9}) {
+    PolygonSoup some = gear;
+    for (auto& face : some.faces)
+      if (random.chance(share)) std::reverse(face.begin(), face.end());
+    CHECK(repair(some).size() == 1);
+    CHECK(check_solid(some).solid());
+    CHECK(check_solid(some).volume == Approx(volume));
+  }
+}
+
+TEST_CASE("a solid that is inside out is turned, with its cavities", "[mesh_repair]") {
+  const PolygonSoup cavity = inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}));
+  const PolygonSoup beside = box({10, 0, 0}, {11, 1, 1});
+  check_repaired(inside_out(kBox), {"turned 6 faces round, first face 0 near (0, 3, 0)"});
+  check_repaired(inside_out(both(kBox, cavity)), {"turned 12 faces round, first face 0 near (0, 3, 0)"},
+                 kVolume - 1);
+  check_repaired(both(inside_out(kBox), beside), {"turned 6 faces round, first face 0 near (0, 3, 0)"},
+                 kVolume + 1);
+  check_repaired(both(both(kBox, cavity), inside_out(beside)),
+                 {"turned 6 faces round, first face 12 near (10, 1, 0)"}, kVolume);
+}
+
+TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {
+  const auto left = [](PolygonSoup soup) {
+    CHECK(repair(soup).empty());
+    return !check_solid(soup).solid();
+  };
+  PolygonSoup hole = kBox;
+  hole.faces.pop_back();
+  CHECK(left(hole));
+  CHECK(left(both(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))));  // a cavity, or a body in a body?
+  CHECK(left(both(kBox, box({1, 1, 1}, {3, 2, 2}))));
+  PolygonSoup fin = triangulated(kBox);
+  fin.vertices.emplace_back(1, -1, 0);
+  fin.faces.push_back({0, 1, 8});
+  CHECK(left(fin));
+  PolygonSoup bow = kBox;
+  bow.faces[0] = {0, 4, 6, 4};
+  CHECK(left(bow));
+  PolygonSoup no_number = kBox;
+  no_number.vertices[0].x() = std::numeric_limits<double>::quiet_NaN();
+  CHECK(left(no_number));
+  PolygonSoup out_of_range = kBox;
+  out_of_range.faces[0][0] = 8;
+  CHECK(left(out_of_range));
+  CHECK(left({}));
+  // A band with half a twist has one side.
+  PolygonSoup band;
+  for (std::size_t i = 0; i < 12; ++i) {
+    const double turn = std::numbers::pi * static_cast<double>(i) / 12, around = 2 * turn;
+    const Vector3d out(std::cos(around), std::sin(around), 0);
+    for (const double side : {-0.2, 0.2})
+      band.vertices.push_back(out + side * (std::cos(turn) * out + std::sin(turn) * Vector3d::UnitZ()));
+    const std::size_t a = 2 * i, b = i < 11 ? a + 2 : 1, c = i < 11 ? a + 3 : 0;
+    band.faces.push_back({a, b, c, a + 1});
+  }
+  CHECK(left(band));
+}
+
+}  // namespace
+}  // namespace wrenchd

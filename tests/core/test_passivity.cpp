@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "core/passivity.hpp"
+#include "devices/simulation/simulated_handle.hpp"
+#include "tests/support/no_allocation.hpp"
+#include "tests/support/random_values.hpp"
+
+using namespace wrenchd;
+using test::RandomValues;
+
+namespace {
+
+constexpr double kTick_s = 1e-3;
+constexpr DeviceDamping kDevice{0.5, 0.002};
+constexpr DeviceDamping kFrictionless{0.0, 0.0};
+
+PassivityCaps with_delay(std::size_t ticks) {
+  PassivityCaps caps;
+  caps.delay_ticks = ticks;
+  return caps;
+}
+
+Pose at_x(double x_m) {
+  return {Quaterniond::Identity(), {x_m, 0.0, 0.0}};
+}
+Wrench along_x(double f_N) {
+  return {{f_N, 0.0, 0.0}, Vector3d::Zero()};
+}
+
+/// A handle that taps a wall at x < 0 whose wrench comes `delay` ticks late, with or without a guard.
+struct Tapped {
+  double net_J = 0.0;       ///< the most that the motors gave, net of the device's friction
+  double injected_J = 0.0;  ///< as the guard saw it
+  double asked_N = 0.0;     ///< the most
+  bool acted = false;
+  bool out_of_hand = false;
+};
+Tapped tap(double K_N_per_m, std::size_t delay, bool guarded, double speed_m_per_s) {
+  constexpr int kSubsteps = 16;
+  SimulationSettings s;
+  s.viscous_friction_N_s_per_m = 0.5;
+  s.viscous_friction_Nm_s_per_rad = 0.002;
+  s.hand_stiffness_N_per_m = 20.0;
+  s.hand_damping_N_s_per_m = 0.0;
+  s.actuator_max_force_N = 1000.0;
+  SimulatedHandle handle(s, at_x(1e-9), kTick_s / kSubsteps);
+  for (int i = 0; handle.V_BH().linear_m_per_s.x() > -speed_m_per_s && i < 10000; ++i) {
+    handle.step({at_x(-1000.0), {}}, {});  // a blow
+    if (handle.X_BH().translation_m.x() < 0.0) handle.step({at_x(0.0), {}}, {});
+  }
+  PassivityGuard guard(kDevice, with_delay(delay));
+  std::array<Wrench, 64> sent{};
+  Tapped out;
+  const SimulatedEnergy start = handle.energy();
+  for (std::size_t tick = 0; tick < 300; ++tick) {
+    const double x_m = handle.X_BH().translation_m.x();
+    Wrench F = along_x(x_m < 0.0 ? -K_N_per_m * x_m : 0.0);
+    out.asked_N = std::max(out.asked_N, F.force_N.x());
+    if (guarded) F = guard.guard(F, handle.X_BH(), tick == 0 ? 0.0 : kTick_s, x_m < 0.0);
+    sent[tick % sent.size()] = F;
+    const Wrench acting = tick < delay ? Wrench{} : sent[(tick - delay) % sent.size()];
+    for (int i = 0; i < kSubsteps; ++i) {
+      handle.step({at_x(0.0), {}}, acting);
+      out.net_J = std::max(out.net_J, handle.energy().motors_J - start.motors_J -
+                                          (handle.energy().friction_J - start.friction_J));
+    }
+    out.acted = out.acted || guard.acted();
+    out.injected_J = std::max(out.injected_J, guard.injected_J());
+    out.out_of_hand = out.out_of_hand || guard.out_of_hand();
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("the guard's account is work done by the wrench that acted", "[passivity]") {
+  for (const std::size_t delay : {0u, 1u, 3u, 48u}) {
+    INFO("delay " << delay);
+    RandomValues random(21);
+    PassivityGuard guard(kFrictionless, with_delay(delay));
+    std::vector<Wrench> sent;
+    Pose X;
+    double in_J = 0.0, out_J = 0.0;
+    guard.guard({}, X, 0.0, false);
+    sent.emplace_back();
+    for (int n = 0; n < 300; ++n) {
+      const Vector3d way = random.vector<3>(1e-4), turn = random.vector<3>(1e-3);
+      X.translation_m += way;
+      X.rotation = (rotation_from(turn) * X.rotation).normalized();
+      if (sent.size() > delay) {
+        const Wrench& F = sent[sent.size() - 1 - delay];
+        const double work_J = F.force_N.dot(way) + F.torque_Nm.dot(turn);
+        (work_J > 0.0 ? out_J : in_J) += std::abs(work_J);
+      }
+      const Wrench asked = random.wrench();
+      guard.guard(asked, X, kTick_s, false);
+      // What the limits made of it is what counts.
+      sent.push_back({0.5 * asked.force_N, 0.5 * asked.torque_Nm});
+      guard.told(sent.back());
+    }
+    CHECK(guard.energy_in_J() == Approx(in_J).epsilon(1e-6));
+    CHECK(guard.energy_out_J() == Approx(out_J).epsilon(1e-6));
+    CHECK(out_J > 0.0);
+  }
+}
+
+TEST_CASE("a spring that gives back what it took is left alone", "[passivity]") {
+  PassivityGuard guard(kFrictionless, with_delay(0));
+  constexpr double K = 500.0;
+  double x = 0.0;
+  for (int n = 0; n <= 2000; ++n) {
+    // The mean force over each interval, so that the account is exact to rounding.
+    const double next =
+        -0.01 * std::sin(3.14159265358979 * (n + 1) / 1000.0) * std::sin(3.14159265358979 * (n + 1) / 1000.0);
+    const Wrench asked = along_x(-0.5 * K * (x + next));
+    const Wrench out = guard.guard(asked, at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    CHECK((out.force_N - asked.force_N).norm() <= 1e-9);
+    x = next;
+  }
+  CHECK(guard.energy_in_J() == Approx(2.0 * 0.5 * K * 0.01 * 0.01).epsilon(1e-3));
+  CHECK(guard.energy_out_J() == Approx(guard.energy_in_J()).epsilon(1e-6));
+  CHECK(guard.injected_J() < 1e-9);
+}
+
+TEST_CASE("a force that pushes along is damped, then cut to nothing", "[passivity]") {
+  PassivityGuard guard(kDevice, with_delay(0));
+  double x = 0.0, most_J = 0.0;
+  Wrench out;
+  for (int n = 0; n < 500; ++n) {
+    out = guard.guard(along_x(2.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    if (out.force_N.x() > 0.0) x += 0.1 * kTick_s;  // the hand follows where it is pushed
+    most_J = std::max(most_J, guard.injected_J());
+  }
+  CHECK(guard.acted());
+  CHECK(most_J > 0.5e-3);
+  CHECK(most_J < 2.0e-3 + 2.0 * 0.1 * kTick_s);
+  CHECK(out.force_N.norm() < 0.2);
+  CHECK_FALSE(guard.out_of_hand());
+}
+
+TEST_CASE("what is earned in one contact does not pay for the next, and debts stay", "[passivity]") {
+  PassivityGuard guard(kFrictionless, with_delay(0));
+  double x = 0.0;
+  double dt_s = 0.0;
+  const auto push = [&](double f_N, double step_m, bool contact) {
+    const Wrench out = guard.guard(along_x(f_N), at_x(x), dt_s, contact);
+    x += step_m;
+    dt_s = kTick_s;
+    return out;
+  };
+  for (int n = 0; n < 20; ++n) push(5.0, -1e-3, true);  // the hand pays 0.1 J
+  for (int n = 0; n < 3; ++n) push(0.0, 0.0, false);
+  for (int n = 0; n < 4; ++n) push(1.0, 0.25e-3, true);
+  push(0.0, 0.0, false);
+  CHECK(guard.injected_J() > 0.5e-3);  // and nobody paid for that
+  const double debt_J = guard.injected_J();
+  for (int n = 0; n < 3; ++n) push(0.0, 0.0, false);
+  CHECK(guard.injected_J() <= debt_J);
+  CHECK(guard.injected_J() > 0.99 * debt_J);
+  CHECK(push(1.0, 0.0, true).force_N.x() < 1.0);
+  guard.reset();
+  dt_s = 0.0;
+  CHECK(guard.injected_J() == 0.0);
+  CHECK(push(1.0, 0.0, true).force_N.x() == 1.0);
+}
+
+TEST_CASE("a wall three times too stiff gives far less through the guard", "[passivity]") {
+  // At 4 ms of delay 0.5 N.s/m bear 111 N/m.
+  const Tapped bare = tap(333.0, 4, false, 0.5), guarded = tap(333.0, 4, true, 0.5);
+  CHECK(bare.net_J > 3e-3);
+  CHECK(guarded.net_J < bare.net_J / 3.0);
+  CHECK(guarded.acted);
+}
+
+TEST_CASE("a wall within the bound is not touched by the guard", "[passivity]") {
+  for (const double speed : {0.05, 0.2, 0.5}) {
+    const Tapped tapped = tap(100.0, 4, true, speed);
+    INFO("at " << speed << " m/s");
+    CHECK(tapped.net_J <= 1e-9);
+    CHECK(tapped.injected_J == 0.0);
+    CHECK_FALSE(tapped.out_of_hand);
+    CHECK(tapped.asked_N > 0.0);
+  }
+}
+
+TEST_CASE("20 mJ from nowhere within 100 ms are out of hand, within a second they are not", "[passivity]") {
+  for (const double watts : {0.4, 0.1}) {
+    PassivityGuard guard(kFrictionless, with_delay(0));
+    double x = 0.0;
+    bool out_of_hand = false;
+    for (int n = 0; n < 300; ++n) {
+      guard.guard(along_x(1.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+      guard.told(along_x(1.0));  // somebody sends it all the same
+      x += watts * kTick_s;
+      out_of_hand = out_of_hand || guard.out_of_hand();
+    }
+    INFO(watts << " W");
+    CHECK(out_of_hand == (watts > 0.2));
+  }
+}
+
+TEST_CASE("letting go of a pressed spring is not out of hand", "[passivity]") {
+  PassivityGuard guard(kDevice, with_delay(0));
+  double x = 0.0;
+  for (int n = 0; n < 100; ++n) {
+    guard.guard(along_x(-1000.0 * x), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    x -= 1e-4;
+  }
+  while (x < 0.0) {  // 50 mJ in 20 ms
+    guard.guard(along_x(-1000.0 * x), at_x(x), kTick_s, true);
+    CHECK_FALSE(guard.out_of_hand());
+    x += 5e-4;
+  }
+  CHECK(guard.energy_out_J() > 40e-3);
+}
+
+TEST_CASE("the guard's damping is never more than the device's own, nor than its cap", "[passivity]") {
+  for (const double cap : {1e9, 0.1, 0.0}) {
+    PassivityCaps caps = with_delay(0);
+    caps.damping_N_s_per_m = cap;
+    caps.unseen_J = 1.0;  // damping only
+    caps.most_J = 2.0;
+    PassivityGuard guard(kDevice, caps);
+    RandomValues random(22);
+    double x = 0.0, last = 0.0, before = 0.0, most = 0.0;
+    for (int n = 0; n < 200; ++n) {
+      const Wrench out = guard.guard(along_x(3.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+      const double v = std::abs(x - before) / (2.0 * kTick_s);
+      most = std::max(most, std::abs(out.force_N.x() - 3.0));
+      if (n > 1) CHECK(std::abs(out.force_N.x() - 3.0) <= std::min(0.5, cap) * v + 1e-12);
+      before = last;
+      last = x;
+      x += random.uniform(0.0, 1e-3);
+    }
+    CHECK((most > 0.0) == (cap > 0.0));
+  }
+}
+
+TEST_CASE("a sample that is missed is made up for by the next", "[passivity]") {
+  PassivityGuard guard(kFrictionless, with_delay(0));
+  double x = 0.0;
+  for (int n = 0; n < 100; ++n) {
+    const bool fresh = n % 3 != 1;
+    if (fresh)
+      guard.guard(along_x(2.0), at_x(x), n == 0 ? 0.0 : (n % 3 == 2 ? 2.0 : 1.0) * kTick_s, false);
+    else
+      guard.guard(along_x(2.0), at_x(x - 1e-4), 0.0, false);
+    x += 1e-4;
+  }
+  CHECK(guard.energy_out_J() == Approx(2.0 * 99e-4).epsilon(1e-9));
+}
+
+TEST_CASE("what is not finite neither harms the guard nor is hidden by it", "[passivity]") {
+  PassivityGuard guard(kDevice, with_delay(0));
+  guard.guard({}, at_x(0.0), 0.0, true);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK(std::isnan(guard.guard(along_x(nan), at_x(0.0), kTick_s, true).force_N.x()));
+  guard.told(along_x(nan));
+  guard.guard(along_x(1.0), at_x(nan), kTick_s, true);
+  guard.guard(along_x(1.0), at_x(1e-3), nan, true);
+  CHECK(guard.guard(along_x(1.0), at_x(0.0), kTick_s, true).force_N.x() == 1.0);
+  CHECK(guard.energy_out_J() == 0.0);
+}
+
+TEST_CASE("the guard refuses caps that cannot be", "[passivity]") {
+  const auto refused = [](const std::function<void(PassivityCaps&)>& spoil) {
+    PassivityCaps caps;
+    spoil(caps);
+    CHECK_THROWS_AS(PassivityGuard(kDevice, caps), std::invalid_argument);
+  };
+  refused([](auto& c) { c.damping_N_s_per_m = -1.0; });
+  refused([](auto& c) { c.damping_Nm_s_per_rad = std::nan(""); });
+  refused([](auto& c) { c.most_J = c.unseen_J; });
+  refused([](auto& c) { c.unseen_J = -1.0; });
+  refused([](auto& c) { c.delay_ticks = PassivityGuard::kMaxDelay_ticks + 1; });
+}
+
+TEST_CASE("the guard allocates nothing", "[passivity][rt]") {
+  PassivityGuard guard(kDevice, with_delay(3));
+  RandomValues random(23);
+  const test::RealtimeGuard realtime;
+  for (int n = 0; n < 1000; ++n) {
+    guard.guard(along_x(1.0), at_x(1e-4 * n), kTick_s, n % 10 != 0);
+    guard.told(along_x(0.5));
+  }
+  guard.reset();
+  CHECK(realtime.allocations() + realtime.locks() == 0);
+}

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "core/energy_law.hpp"
+#include "core/stability_bound.hpp"
+#include "core/wrench_law.hpp"
+#include "devices/simulation/simulated_handle.hpp"
+#include "tests/support/random_values.hpp"
+
+using namespace wrenchd;
+using test::RandomValues;
+
+namespace {
+
+constexpr DeviceDamping kDevice{0.5, 0.002};
+
+Coupling spring(double linear, double angular) {
+  return {WrenchGains::blockwise(linear, angular), Matrix6d::Zero()};
+}
+
+/// A handle of 0.15 kg with 0.5 N.s/m of friction on a sampled, delayed spring along x, in nobody's hand:
+/// what is left of its energy after 4 s, in that of the start.
+double swing_left(double K_N_per_m, const LoopDelay& loop) {
+  constexpr int kSubsteps = 100;
+  SimulationSettings s;
+  s.viscous_friction_N_s_per_m = 0.5;
+  s.viscous_friction_Nm_s_per_rad = 0.002;
+  s.hand_stiffness_N_per_m = s.hand_stiffness_Nm_per_rad = 0.0;
+  s.hand_damping_N_s_per_m = s.hand_damping_Nm_s_per_rad = 0.0;
+  s.actuator_max_force_N = 1e300;
+  const double h = loop.period_s / kSubsteps;
+  SimulatedHandle handle(s, {Quaterniond::Identity(), {1e-3, 0.0, 0.0}}, h);
+  std::deque<double> under_way(static_cast<std::size_t>(std::lround(loop.delay_s / h)), 0.0);
+  Wrench motors;
+  double held = 0.0;
+  const auto energy = [&] {
+    return handle.kinetic_energy_J() + 0.5 * K_N_per_m * handle.X_BH().translation_m.squaredNorm();
+  };
+  const double start_J = energy();
+  for (long i = 0; i < std::lround(4.0 / h) && energy() < 1e6 * start_J; ++i) {
+    if (i % kSubsteps == 0) held = -K_N_per_m * handle.X_BH().translation_m.x();
+    under_way.push_back(held);
+    motors.force_N.x() = under_way.front();
+    under_way.pop_front();
+    handle.step({}, motors);
+  }
+  return energy() / start_J;
+}
+
+}  // namespace
+
+TEST_CASE("the bound on stiffness is that of a swinging handle, for any rate and delay",
+          "[stability_bound]") {
+  struct Case {
+    LoopDelay loop;
+    double most_N_per_m;
+  };
+  for (const auto& [loop, most] :
+       {Case{{1e-3, 0.0}, 1000.0}, Case{{1e-3, 1e-3}, 1000.0 / 3.0}, Case{{1e-3, 2e-3}, 200.0},
+        Case{{1e-3, 3e-3}, 1000.0 / 7.0}, Case{{0.25e-3, 0.5e-3}, 800.0}}) {
+    INFO("T " << loop.period_s << " s, tau " << loop.delay_s << " s");
+    const StabilityBound bound = stability_bound(kDevice, loop, spring(0.0, 0.0), {});
+    CHECK(bound.max_stiffness_N_per_m == Approx(most).epsilon(1e-12));
+    CHECK(bound.max_stiffness_Nm_per_rad == Approx(most * 0.002 / 0.5).epsilon(1e-12));
+    // What is stable and what is not lies 3 % to either side of it; the plant's own substeps make 1 % of
+    // that.
+    CHECK(swing_left(0.97 * most, loop) < 1.0);
+    CHECK(swing_left(1.03 * most, loop) > 1.0);
+  }
+}
+
+TEST_CASE("a spring and damper are scaled until they just fit", "[stability_bound]") {
+  const LoopDelay loop{1e-3, 1e-3};  // T/2 + tau = 1.5 ms
+  SECTION("within the bound nothing is scaled") {
+    CHECK(stability_bound(kDevice, loop, spring(300.0, 1.0), {}).scale == 1.0);
+  }
+  SECTION("the linear half decides") {
+    CHECK(stability_bound(kDevice, loop, spring(1000.0, 0.5), {}).scale == Approx(1.0 / 3.0));
+  }
+  SECTION("the angular half decides") {
+    CHECK(stability_bound(kDevice, loop, spring(100.0, 4.0), {}).scale == Approx(1.0 / 3.0));
+  }
+  SECTION("virtual damping counts against it") {
+    Coupling coupling = spring(200.0, 0.1);
+    coupling.damping = WrenchGains::blockwise(0.7, 0.0);
+    const StabilityBound bound = stability_bound(kDevice, loop, coupling, {});
+    CHECK(bound.scale == Approx(0.5 / (0.3 + 0.7)));
+    CHECK(bound.scale_undamped == 1.0);
+    CHECK(bound.max_stiffness_N_per_m == 0.0);  // the damper alone is too much
+    coupling.damping = WrenchGains::blockwise(0.2, 0.0);
+    CHECK(stability_bound(kDevice, loop, coupling, {}).max_stiffness_N_per_m == Approx(0.3 / 1.5e-3));
+  }
+  SECTION("a device without friction bears nothing") {
+    CHECK(stability_bound({0.0, 0.002}, loop, spring(1.0, 0.0), {}).scale == 0.0);
+    CHECK(stability_bound({0.0, 0.002}, loop, spring(0.0, 1.0), {}).scale == 1.0);
+  }
+}
+
+TEST_CASE("a tool held by a lever is stiffer to turn", "[stability_bound]") {
+  // A linear spring at the end of a lever l: K l^2 against turning. b_rot / (K l^2) decides here, and the
+  // coupling of both halves makes it a little less.
+  const LoopDelay loop{1e-3, 0.5e-3};  // T/2 + tau = 1 ms
+  const double l = 0.1, K = 300.0;
+  const Pose X_HT{Quaterniond::Identity(), {l, 0.0, 0.0}};
+  // In the plane of the lever: B^-1/2 K (1, l)(1, l)' B^-1/2 has one eigenvalue, K (1/b + l^2/b_rot).
+  CHECK(stability_bound(kDevice, loop, spring(K, 0.0), X_HT).scale ==
+        Approx(1.0 / (1e-3 * K * (1.0 / 0.5 + l * l / 0.002))));
+}
+
+TEST_CASE("the scaled coupling just passes the inequality, wherever the tool is held", "[stability_bound]") {
+  RandomValues random(11);
+  for (int n = 0; n < 50; ++n) {
+    const Pose X_HT = random.pose(0.05);
+    const Matrix6d A = 30.0 * Matrix6d::NullaryExpr([&] { return random.normal(); });
+    const Matrix6d C = Matrix6d::NullaryExpr([&] { return random.normal(); });
+    const Coupling coupling{A * A.transpose(), 0.1 * C * C.transpose()};
+    const LoopDelay loop{1e-3, random.uniform(0.0, 3e-3)};
+    const double s = stability_bound(kDevice, loop, coupling, X_HT).scale;
+    REQUIRE(s > 0.0);
+    REQUIRE(s < 1.0);
+    // Held against powers of random twists of the handle, with the tool's twist worked out on its own.
+    const double lag_s = 0.5 * loop.period_s + loop.delay_s;
+    const auto taken = [&](const Twist& V_H) {
+      return 0.5 * V_H.linear_m_per_s.squaredNorm() + 0.002 * V_H.angular_rad_per_s.squaredNorm();
+    };
+    const auto given = [&](const Twist& V_H) {
+      const Twist V_T = expressed(X_HT.rotation.conjugate(), shifted(V_H, X_HT.translation_m));
+      Vector6d v;
+      v << V_T.linear_m_per_s, V_T.angular_rad_per_s;
+      return s * (lag_s * v.dot(coupling.stiffness * v) + v.dot(coupling.damping * v));
+    };
+    double nearest = 0.0;
+    for (int m = 0; m < 200; ++m) {
+      const Twist V_H{random.vector<3>(), random.decades(0.1, 100.0) * random.unit<3>()};
+      CHECK(given(V_H) <= taken(V_H) * (1.0 + 1e-9));
+      nearest = std::max(nearest, given(V_H) / taken(V_H));
+    }
+    CHECK(nearest > 0.2);
+  }
+}
+
+TEST_CASE("what has no motors is not asked about", "[stability_bound]") {
+  const LoopDelay loop{1e-3, 1e-3};
+  const DeviceDamping force_only{0.5, DeviceProfile::kNotStated};
+  const StabilityBound bound = stability_bound(force_only, loop, spring(200.0, 1e6), {}, kLinearDofs);
+  CHECK(bound.scale == 1.0);
+  CHECK(bound.max_stiffness_Nm_per_rad == std::numeric_limits<double>::infinity());
+  CHECK_THROWS_WITH(stability_bound(force_only, loop, spring(200.0, 1.0), {}),
+                    Catch::Contains("damping_Nm_s_per_rad"));
+}
+
+TEST_CASE("a coarse encoder bounds a wall that rate and delay would bear", "[stability_bound]") {
+  const LoopDelay loop{0.5e-3, 0.0};
+  const DeviceDamping much{50.0, 0.5};
+  const StabilityBound fine = stability_bound(much, loop, spring(5000.0, 5.0), {});
+  CHECK(fine.scale == 1.0);
+  // K step^2 / 4 is what an edge may give: 200 N/m at 100 um.
+  const StabilityBound coarse =
+      stability_bound(much, loop, spring(5000.0, 5.0), {}, kAllDofs, {100e-6, 1e-3});
+  CHECK(coarse.max_stiffness_N_per_m == Approx(200.0));
+  CHECK(coarse.max_stiffness_Nm_per_rad == Approx(2.0));
+  CHECK(coarse.scale == Approx(0.04));
+  CHECK(coarse.scale_undamped == Approx(0.04));
+  // Of what is not driven no step counts.
+  const StabilityBound turned =
+      stability_bound(much, loop, spring(5000.0, 5.0), {}, kAngularDofs, {100e-6, 1e-3});
+  CHECK(turned.scale == Approx(0.4));
+  CHECK_THROWS_WITH(stability_bound(much, loop, spring(1.0, 1.0), {}, kAllDofs, {-1e-6, 0.0}),
+                    Catch::Contains("encoder's step"));
+}
+
+TEST_CASE("the bound refuses what cannot be, and names it", "[stability_bound]") {
+  const LoopDelay loop{1e-3, 1e-3};
+  CHECK_THROWS_WITH(stability_bound({}, loop, spring(1.0, 1.0), {}), Catch::Contains("damping_N_s_per_m"));
+  CHECK_THROWS_WITH(stability_bound({-0.1, 0.1}, loop, spring(1.0, 1.0), {}), Catch::Contains("0 or more"));
+  CHECK_THROWS_WITH(stability_bound(kDevice, {0.0, 0.0}, spring(1.0, 1.0), {}), Catch::Contains("period"));
+  CHECK_THROWS_WITH(stability_bound(kDevice, {1e-3, -1e-3}, spring(1.0, 1.0), {}), Catch::Contains("delay"));
+  CHECK_THROWS_WITH(stability_bound(kDevice, loop, spring(-1.0, 1.0), {}), Catch::Contains("stiffness"));
+  CHECK_THROWS_WITH(stability_bound(kDevice, loop, spring(std::nan(""), 1.0), {}),
+                    Catch::Contains("not finite"));
+  Coupling coupling = spring(1.0, 1.0);
+  coupling.damping(4, 4) = -1.0;
+  CHECK_THROWS_WITH(stability_bound(kDevice, loop, coupling, {}), Catch::Contains("damping"));
+}
+
+TEST_CASE("the energy law's stiffness is its derivative where it rests", "[stability_bound]") {
+  RandomValues random(12);
+  for (int n = 0; n < 20; ++n) {
+    const Inertia M = random.inertia(0.1);
+    const Matrix6d K = energy_stiffness(M, 3000.0);
+    const Vector6d xi = 1e-6 * random.vector<6>();
+    const Wrench F = energy_wrench(M, 3000.0, {}, exp(xi));
+    Vector6d numbers;
+    numbers << F.force_N, F.torque_Nm;
+    CHECK((numbers - K * xi).norm() <= 1e-5 * numbers.norm());
+  }
+}

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "daemon/control/json_rpc.hpp"
+
+namespace wrenchd {
+namespace {
+
+RpcRequest request_of(const std::string& line) {
+  auto read = read_request(line);
+  if (const auto* refused = std::get_if<RefusedLine>(&read)) FAIL(line << ": " << refused->error.what());
+  return std::get<RpcRequest>(std::move(read));
+}
+
+std::string nested(std::size_t depth) {
+  return R"({"jsonrpc":"2.0","method":"stop","params":{"a":)" + std::string(depth, '[') +
+         std::string(depth, ']') + "}}";
+}
+
+TEST_CASE("a line is a request: method, named parameters, and an id where a reply is wanted", "[json_rpc]") {
+  const RpcRequest full =
+      request_of(R"( {"jsonrpc":"2.0","id":7,"method":"scene.move","params":{"name":"a"}} )");
+  CHECK(full.method == "scene.move");
+  CHECK(full.params == Json{{"name", "a"}});
+  CHECK(full.id == 7);
+  CHECK(full.wants_reply);
+
+  const RpcRequest notification = request_of("{\"method\":\"beat\",\"jsonrpc\":\"2.0\"}\r");
+  CHECK_FALSE(notification.wants_reply);
+  CHECK(notification.params == Json::object());
+
+  for (const char* id : {"\"text\"", "0", "-3", "9007199254740992", "\"\""})
+    CHECK(request_of(std::string(R"({"jsonrpc":"2.0","method":"stop","id":)") + id + "}").id ==
+          Json::parse(id));
+  CHECK(request_of(nested(kMaxDepth - 2)).method == "stop");
+}
+
+TEST_CASE("what is no request is refused, with what is wrong and its id where it has one", "[json_rpc]") {
+  const std::string head = R"({"jsonrpc":"2.0","id":5,"method":"stop")";
+  struct {
+    std::string line;
+    RpcCode code;
+    std::string told;
+    bool has_id = false;
+  } const table[] = {
+      {"", RpcCode::no_json, "it is empty; send one object a line"},
+      {" \t\r", RpcCode::no_json, "it is empty"},
+      {"{", RpcCode::no_json, "it is no JSON"},
+      {head, RpcCode::no_json, "it is no JSON"},
+      {head + "}}", RpcCode::no_json, "at byte 41"},
+      {head + "} {}", RpcCode::no_json, "it is no JSON"},
+      {"{'jsonrpc':'2.0'}", RpcCode::no_json, "at byte 2"},
+      {head + ",}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":NaN}}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":1e999}}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":01}}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\xff\xfe\"}}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\xc0\x80\"}}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\\ud800\"}}", RpcCode::no_json, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\t\"}}", RpcCode::no_json, "it is no JSON"},
+      {head + std::string("}\0", 2), RpcCode::no_json, "it holds a zero byte"},
+      {head + ",\"params\":{\"a\":\"x\\u0000y\"}}", RpcCode::no_json, "holds the character zero"},
+      {head + ",\"params\":{\"a\\u0000\":1}}", RpcCode::no_json, "holds the character zero"},
+      {head + ",\"id\":6}", RpcCode::no_json, "the name 'id' stands twice in one object"},
+      {head + ",\"params\":{\"a\":[{\"b\":1,\"b\":2}]}}", RpcCode::no_json, "the name 'b' stands twice"},
+      {nested(kMaxDepth - 1), RpcCode::no_json, "deeper than 16"},
+      {nested(30000), RpcCode::no_json, "deeper than 16"},
+      {head + ",\"params\":{\"a\":\"" + std::string(kMaxLineBytes, 'x') + "\"}}", RpcCode::no_json,
+       "longer than 65536 bytes"},
+      {"[" + head + "}]", RpcCode::no_request, "Batches are not taken"},
+      {"[]", RpcCode::no_request, "Batches are not taken"},
+      {"1", RpcCode::no_request, "A request is an object"},
+      {"\"stop\"", RpcCode::no_request, "A request is an object"},
+      {"null", RpcCode::no_request, "A request is an object"},
+      {"{}", RpcCode::no_request, "This is JSON-RPC 2.0"},
+      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::no_request, "This is JSON-RPC 2.0", true},
+      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::no_request, "This is JSON-RPC 2.0", true},
+      {R"({"jsonrpc":"2.0","id":5})", RpcCode::no_request, "names no method", true},
+      {R"({"jsonrpc":"2.0","id":5,"method":5})", RpcCode::no_request, "names no method", true},
+      {head + ",\"parms\":{}}", RpcCode::no_request, "no member 'parms'; did you mean 'params'?", true},
+      {head + ",\"params\":[1]}", RpcCode::wrong_params, "Parameters have names", true},
+      {head + ",\"params\":null}", RpcCode::wrong_params, "Parameters have names", true},
+      {R"({"jsonrpc":"2.0","id":1.5,"method":"stop"})", RpcCode::no_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":null,"method":"stop"})", RpcCode::no_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":{},"method":"stop"})", RpcCode::no_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":true,"method":"stop"})", RpcCode::no_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":9007199254740993,"method":"stop"})", RpcCode::no_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":-9007199254740993,"method":"stop"})", RpcCode::no_request,
+       "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":99999999999999999999,"method":"stop"})", RpcCode::no_request,
+       "The id has to be"},
+      {R"({"jsonrpc":"2.0","method":"stop","id":")" + std::string(kMaxIdBytes + 1, 'i') + "\"}",
+       RpcCode::no_request, "The id has to be"},
+  };
+  for (const auto& [line, code, told, has_id] : table) {
+    INFO(line.substr(0, 200));
+    const auto read = read_request(line);
+    const auto* refused = std::get_if<RefusedLine>(&read);
+    REQUIRE(refused);
+    CHECK(refused->error.code() == code);
+    INFO(refused->error.what());
+    CHECK(std::string(refused->error.what()).find(told) != std::string::npos);
+    CHECK(refused->id == (has_id ? Json(5) : Json(nullptr)));
+  }
+}
+
+TEST_CASE("replies are one line of JSON-RPC each, whatever stands in them", "[json_rpc]") {
+  CHECK(reply_line(3, {{"state", "disarmed"}}) ==
+        "{\"jsonrpc\":\"2.0\",\"id\":3,\"result\":{\"state\":\"disarmed\"}}\n");
+  CHECK(error_line(nullptr, RpcError(RpcCode::taken, "Two\nlines.")) ==
+        "{\"jsonrpc\":\"2.0\",\"id\":null,\"error\":{\"code\":-32003,\"message\":\"Two\\nlines.\"}}\n");
+  CHECK(
+      error_line("a", RpcError(RpcCode::not_now, "No.", {{"state", "fault"}})).find("\"data\":{\"state\"") !=
+      std::string::npos);
+  const std::string broken = notification_line("event", {{"text", "\xff\n"}});
+  CHECK(Json::parse(broken)["params"]["text"] == "\xef\xbf\xbd\n");
+  CHECK(std::count(broken.begin(), broken.end(), '\n') == 1);
+  const RpcRequest back = request_of([] {
+    std::string line = request_line(1, "beat", Json::object());
+    line.pop_back();
+    return line;
+  }());
+  CHECK(back.method == "beat");
+}
+
+}  // namespace
+}  // namespace wrenchd

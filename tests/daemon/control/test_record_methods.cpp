@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "daemon/recording/recording_file.hpp"
+#include "tests/support/random_values.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// wrenchd with a hand that presses, and its own places for socket and recordings.
+struct Daemon {
+  TemporaryDirectory files;
+  std::string socket = (files.path() / "control.sock").string();
+  std::filesystem::path recordings = files.path() / "recordings";
+  RunningProgram wrenchd;
+
+  explicit Daemon(std::vector<std::string> more = {}, const std::string& settings = {})
+      : wrenchd("wrenchd", words(std::move(more), settings)) {
+    REQUIRE(wrenchd.says("state: active"));
+  }
+  std::vector<std::string> words(std::vector<std::string> more, const std::string& settings) {
+    const auto config =
+        files.write("config/wrenchd.toml", "[servo]\nself_test_s = 0\n[recording]\ndirectory = \"" +
+                                               recordings.string() + "\"\n" + settings);
+    for (const std::string& word :
+         {std::string("--config"), config.string(), std::string("--control"), socket,
+          std::string("--realtime"), std::string("best_effort"), std::string("--arm")})
+      more.push_back(word);
+    return more;
+  }
+  ProgramResult ctl(std::vector<std::string> words) const {
+    words.insert(words.end(), {"--socket", socket});
+    return run_program("wrenchctl", words);
+  }
+};
+
+bool is_gapless(const Recording& recording) {
+  for (std::size_t i = 1; i < recording.ticks.size(); ++i)
+    if (recording.ticks[i].tick > recording.ticks[i - 1].tick + 1) return false;
+  return true;
+}
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// What Debian's Python says; its own, for it is the one with Debian's h5py.
+int run_python(const std::string& arguments, std::string& out) {
+  FILE* const pipe = popen(("/usr/bin/python3 -W error " + arguments + " 2>&1").c_str(), "r");
+  REQUIRE(pipe != nullptr);
+  std::array<char, 4096> bytes;
+  for (std::size_t got; (got = fread(bytes.data(), 1, bytes.size(), pipe)) > 0;)
+    out.append(bytes.data(), got);
+  const int status = pclose(pipe);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+}  // namespace
+
+TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Python",
+          "[recording][program][wall_time]") {
+  const Daemon daemon;
+  CHECK(daemon.ctl({"record", "stop"}).err.find("Nothing is recorded; 'record.start' begins.") !=
+        std::string::npos);
+  const ProgramResult started = daemon.ctl({"record", "start", "mine"});
+  INFO(started.err);
+  REQUIRE(started.exit_code == 0);
+  const auto file = daemon.recordings / "mine.h5";
+  CHECK(started.out == "recording " + file.string() + "\n");
+  CHECK(daemon.ctl({"record", "start"}).err.find("It is recorded already, into " + file.string()) !=
+        std::string::npos);
+  CHECK(daemon.ctl({"status"}).out.find("recording  " + file.string()) != std::string::npos);
+  std::this_thread::sleep_for(4s);
+  const ProgramResult ended = daemon.ctl({"record", "stop"});
+  CHECK(ended.out.starts_with("recorded " + file.string()));
+  CHECK(ended.out.ends_with(" ticks, 0 missing\n"));
+  CHECK(read_recording(file).ticks.size() > 3500);
+  CHECK(is_gapless(read_recording(file)));
+  std::string said;
+  CHECK(run_python(WRENCHD_SOURCE_DIR "/tests/python/check_recording.py " + file.string(), said) == 0);
+  INFO(said);
+  CHECK(said.find(" ticks, ") != std::string::npos);
+
+  // Whoever may not read the daemon's files is handed them.
+  CHECK(daemon.ctl({"record", "list"}).out.starts_with("mine.h5 "));
+  const auto copy = daemon.files.path() / "copy.h5";
+  CHECK(daemon.ctl({"record", "get", "mine", "-o", copy.string()}).out == copy.string() + "\n");
+  CHECK(bytes_of(copy) == bytes_of(file));
+  CHECK(bytes_of(copy).size() > 10'000);
+  const auto script = daemon.files.write("rows.py", R"(import sys
+sys.path.insert(0, sys.argv[1])
+import h5py, wrenchd
+with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as file, h5py.File(file) as recording:
+    print(len(recording["ticks"]))
+)");
+  std::string rows;
+  CHECK(run_python(script.string() + " " WRENCHD_SOURCE_DIR "/tools/python " + daemon.socket, rows) == 0);
+  CHECK(rows == std::to_string(read_recording(file).ticks.size()) + "\n");
+  CHECK(daemon.ctl({"record", "get", "yours"}).err.find("there are: mine.h5") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no name for a recording") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get"}).err.find("record list") != std::string::npos);
+  CHECK(daemon.ctl({"record", "list", "-o", "x"}).err.find("takes no -o") != std::string::npos);
+  CHECK(daemon.ctl({"record", "start", "next"}).exit_code == 0);
+  CHECK(daemon.ctl({"record", "list"}).out.find("next") == std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "next"}).err.find("is being written") != std::string::npos);
+  CHECK(daemon.ctl({"record", "stop"}).exit_code == 0);
+  CHECK(daemon.ctl({"record", "list"}).out.find("\nnext.h5 ") != std::string::npos);
+
+  // An administrator may name a place, as it is from here.
+  const auto elsewhere = daemon.files.path() / "elsewhere.h5";
+  CHECK(daemon.ctl({"record", "start", elsewhere.string()}).exit_code == 0);
+  CHECK(daemon.ctl({"record", "stop"}).exit_code == 0);
+  CHECK(std::filesystem::exists(elsewhere));
+  CHECK(daemon.ctl({"record", "start", "no/such/directory/x.h5"}).err.find("cannot be created") !=
+        std::string::npos);
+  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is no name for a recording") != std::string::npos);
+  CHECK(daemon.ctl({"record", "stop", "x"}).err.find("takes no file") != std::string::npos);
+}
+
+TEST_CASE("an emergency stop leaves a flight recording, which status and the event name",
+          "[recording][flight][program]") {
+  const Daemon daemon;
+  CHECK(daemon.ctl({"stop"}).exit_code == 0);
+  REQUIRE(daemon.wrenchd.says("what led to stop_asked is in "));
+  const std::string err = daemon.wrenchd.err();
+  CHECK(err.find("; what led to it: " + (daemon.recordings / "flight-").string()) != std::string::npos);
+  const ProgramResult status = daemon.ctl({"status", "--json"});
+  const auto last = nlohmann::json::parse(status.out)["recording"]["last_flight"].get<std::string>();
+  CHECK(last.starts_with((daemon.recordings / "flight-").string()));
+  CHECK(last.ends_with("-stop_asked.h5"));
+  CHECK(daemon.ctl({"status"}).out.find("last fault " + last) != std::string::npos);
+  const Recording recording = read_recording(last);
+  CHECK(recording.ticks.front().tick == 0);  // it had not run for a minute
+  CHECK(is_gapless(recording));
+}
+
+TEST_CASE("a recording can be read after its daemon was killed, but for the last seconds",
+          "[recording][program][wall_time]") {
+  RandomValues random(7);
+  for (int i = 0; i < 4; ++i) {
+    Daemon daemon({}, "flight_s = 0\n");
+    const auto file = daemon.recordings / "mine.h5";
+    REQUIRE(daemon.ctl({"record", "start", "mine"}).exit_code == 0);
+    const auto begun = std::chrono::steady_clock::now();
+    std::this_thread::sleep_for(2500ms + std::chrono::milliseconds(random.bits() % 700));
+    daemon.wrenchd.signal(SIGKILL);
+    const double ran_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    daemon.wrenchd.wait();
+    const Recording recording = read_recording(file);
+    REQUIRE(recording.ticks.size() > 500);
+    const double has_s =
+        1e-9 * static_cast<double>(recording.ticks.back().now_ns - recording.ticks.front().now_ns);
+    INFO("ran " << ran_s << " s, has " << has_s);
+    CHECK(has_s > ran_s - 2.0);
+    CHECK(is_gapless(recording));
+    CHECK(recording.touches.size() > 100);
+  }
+}
+
+TEST_CASE("a recording of wrenchd is replayed, exported and drawn by wrenchctl", "[recording][program]") {
+  const TemporaryDirectory files;
+  const std::string file = (files.path() / "run.h5").string();
+  const ProgramResult run =
+      run_program("wrenchd", {"--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--virtual-time",
+                              "--seconds", "6", "--arm", "--record", file});
+  INFO(run.err);
+  REQUIRE(run.exit_code == 0);
+  CHECK(run.err.find("recorded: " + file + ", 6001 ticks") != std::string::npos);
+  const ProgramResult replayed = run_program("wrenchctl", {"replay", file});
+  INFO(replayed.out << replayed.err);
+  CHECK(replayed.exit_code == 0);
+  CHECK(replayed.out.find("compared: X_WP, X_WQ, eps, F_T, F_out, energy, ") != std::string::npos);
+  CHECK(replayed.out.find("6001 ticks, all the same, bit for bit") != std::string::npos);
+  const ProgramResult other = run_program(
+      "wrenchctl", {"replay", file, "--scene", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"});
+  CHECK(other.exit_code == 4);
+  CHECK(other.out.find(" differs first: ") != std::string::npos);
+
+  const ProgramResult csv =
+      run_program("wrenchctl", {"export", file, "--columns", "state,F_out", "--every", "1000"});
+  CHECK(csv.exit_code == 0);
+  CHECK(csv.out.starts_with("time_s [s],state [enum],F_out.fx [N]"));
+  CHECK(std::count(csv.out.begin(), csv.out.end(), '\n') == 8);
+  const ProgramResult wrong = run_program("wrenchctl", {"export", file, "--columns", "force"});
+  CHECK(wrong.exit_code == 1);
+  CHECK(wrong.err.find("there is no column 'force'") != std::string::npos);
+  const ProgramResult plot = run_program("wrenchctl", {"plot", file});
+  INFO(plot.err);
+  CHECK(plot.exit_code == 0);
+  CHECK(std::filesystem::exists(files.path() / "run/force.svg"));
+  const ProgramResult none = run_program("wrenchctl", {"plot", (files.path() / "none.h5").string()});
+  CHECK(none.exit_code == 1);
+  CHECK(none.err.find("none.h5: is not there") != std::string::npos);
+}

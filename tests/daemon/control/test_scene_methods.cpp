@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/control/scene_methods.hpp"
+#include "tests/support/shipped_plan.hpp"
+
+// What is rendered, asked for and changed as a client does: looked up in the table, by a role, with JSON.
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+struct Asked {
+  VirtualStation s;
+  MethodTable table;
+  int reloads = 0;
+
+  explicit Asked(const Plan& plan = shipped_plan()) : s(plan) {
+    add_scene_methods(table, s.station.workbench(), [this] {
+      ++reloads;
+      return ReloadResult{{"limits"}, {"servo.rate_Hz"}, {}};
+    });
+  }
+
+  Json ask(const std::string& method, const Json& params = Json::object(),
+           Role role = Role::administrator) const {
+    const RpcRequest request{method, params, 1, true};
+    return MethodTable::run(table.look_up(request, role), params, {}).result;
+  }
+  /// What was answered in the place of a result.
+  RpcError refused(const std::string& method, const Json& params, Role role = Role::administrator) const {
+    try {
+      const Json result = ask(method, params, role);
+      FAIL(method << " takes " << params.dump() << " and answers " << result.dump());
+    } catch (const RpcError& error) {
+      return error;
+    }
+    throw std::logic_error("not reached");
+  }
+  std::vector<std::string> obstacles() const {
+    std::vector<std::string> names;
+    const Json scene = ask("scene.get");
+    for (const Json& obstacle : scene["obstacles"]) names.push_back(obstacle["name"]);
+    return names;
+  }
+};
+
+void has(const RpcError& error, const std::string& part) {
+  INFO(error.what());
+  CHECK(std::string(error.what()).find(part) != std::string::npos);
+}
+
+Json a_block() {
+  return {{"name", "block"},
+          {"mesh", WRENCHD_SOURCE_DIR "/config/meshes/cube.off"},
+          {"scale", 0.001},
+          {"position_m", {0.0, 0.2, 0.0}}};
+}
+
+TEST_CASE("obstacles are added, listed, moved and removed by name", "[scene_methods]") {
+  const Asked a;
+  CHECK(a.obstacles() == std::vector<std::string>{"table"});
+  const Json added = a.ask("scene.add", {{"obstacle", a_block()}});
+  CHECK(added["name"] == "block");
+  CHECK(added["rendering"] == 1);
+  CHECK(a.obstacles() == std::vector<std::string>{"table", "block"});
+  const Json scene = a.ask("scene.get");
+  CHECK(scene["obstacles"][0]["half_space"]["normal"] == Json({0.0, 0.0, 1.0}));
+  CHECK(scene["obstacles"][1]["position_m"] == Json({0.0, 0.2, 0.0}));
+  CHECK(scene["obstacles"][1]["moves"] == false);
+  CHECK(scene["tool"]["mass"] == 0.2);
+  a.ask("scene.remove", {{"name", "block"}});
+  CHECK(a.obstacles() == std::vector<std::string>{"table"});
+}
+
+TEST_CASE("a scene file is looked for, and taken whole", "[scene_methods]") {
+  const Asked a;
+  CHECK(a.ask("scene.load",
+              {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering"] == 1);
+  CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
+  const RpcError none = a.refused("scene.load", {{"file", "scenes/no_such.toml"}});
+  CHECK(none.code() == RpcCode::refused);
+  has(none, "scenes/no_such.toml");
+  CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
+}
+
+TEST_CASE("the scene is told with the place from where it is seen best, one that a client loads with none",
+          "[scene_methods][view]") {
+  Plan plan = shipped_plan();
+  plan.settings.view = {{0.1, -0.2, 0.3}, {0.0, 0.0, 0.05}};
+  const Asked a(plan);
+  CHECK(a.ask("scene.shapes")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
+  a.ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
+  CHECK(a.ask("scene.shapes")["view"].is_null());
+  CHECK(Asked().ask("scene.shapes")["view"].is_null());
+}
+
+TEST_CASE("what a scene cannot be is refused with its place, and nothing changes", "[scene_methods]") {
+  const Asked a;
+  const Json before = a.ask("scene.get");
+  const auto add = [&](const char* key, const Json& value) {
+    Json block = a_block();
+    block[key] = value;
+    const RpcError error = a.refused("scene.add", {{"obstacle", block}});
+    CHECK(error.code() == RpcCode::refused);
+    return error;
+  };
+  has(add("positon_m", {0, 0, 0}), "position_m");  // the nearest key
+  has(add("scale", -1.0), "scale");
+  has(add("scale", "large"), "scale");
+  has(add("mesh", "no_such.off"), "no_such.off");
+  has(add("name", "table"), "already");
+  Json null = a_block();
+  null["scale"] = nullptr;
+  CHECK(a.refused("scene.add", {{"obstacle", null}}).code() == RpcCode::wrong_params);
+  has(a.refused("scene.remove", {{"name", "tabel"}}), "'tabel'");
+  has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"over_s", 1.0}}), "half_space");
+  CHECK(a.refused("scene.move", {{"name", "table"}, {"over_s", 1.0}}).code() == RpcCode::wrong_params);
+  has(a.refused("rendering.set", {{"wrench", {{"law", "hooke"}}}}), "law");
+  has(a.refused("rendering.set", {{"wrench", {{"stiffnes", 1.0}}}}), "stiffness");
+  has(a.refused("rendering.set", {{"rendering", {{"method", "planar"}, {"friction", {{"static", 0.5}}}}}}),
+      "exact");
+  CHECK(a.ask("scene.get") == before);
+}
+
+TEST_CASE("a workspace is changed all at once or not at all", "[scene_methods]") {
+  const Asked a;
+  const Json as_it_is = a.ask("workspace.set");
+  CHECK(as_it_is == Json({{"scale", 1.0}, {"clutched", false}}));
+  const RpcError error = a.refused("workspace.set", {{"scale", 100.0}, {"clutched", true}});
+  CHECK(error.code() == RpcCode::refused);
+  has(error, "0.1 to 10");
+  CHECK(a.ask("workspace.set") == as_it_is);
+  CHECK(a.ask("workspace.set", {{"scale", 2.0}, {"clutched", true}}) ==
+        Json({{"scale", 2.0}, {"clutched", true}}));
+}
+
+TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
+  const Asked a;
+  const Json plane = {{"id", 7},           {"kind", "plane"},
+                      {"expires_s", 1.0},  {"normal", {0, 0, 1}},
+                      {"offset_m", 0.005}, {"stiffness_N_per_m", 200.0}};
+  CHECK(a.ask("model.set", plane) == Json::object());
+  CHECK(a.ask("model.remove", {{"id", 7}}) == Json::object());
+  const auto with = [&](const char* key, const Json& value) {
+    Json other = plane;
+    if (value.is_null())
+      other.erase(key);
+    else
+      other[key] = value;
+    return a.refused("model.set", other);
+  };
+  has(with("kind", "plan"), "plane, spring, damping");
+  has(with("normal", nullptr), "'normal'");
+  has(with("kind", "spring"), "'position_m'");
+  has(with("id", -1), "0 to 4294967295");
+  has(with("expires_s", 11.0), "expires_s");
+  has(with("normal", {0, 0, 0}), "normal");
+  has(with("stiffness_N_per_m", -5.0), "stiffness_N_per_m");
+  CHECK(with("expires_s", nullptr).code() == RpcCode::wrong_params);
+}
+
+TEST_CASE("who only looks on changes nothing, and only an administrator reloads", "[scene_methods]") {
+  Asked a;
+  for (const auto& [name, row] : a.table.methods()) {
+    if (row.least == Role::observer) continue;
+    INFO(name);
+    CHECK(a.refused(name, Json::object(), Role::observer).code() == RpcCode::not_allowed);
+  }
+  CHECK(a.refused("reload", Json::object(), Role::operator_).code() == RpcCode::not_allowed);
+  CHECK(a.reloads == 0);
+  const Json answer = a.ask("reload");
+  CHECK(a.reloads == 1);
+  CHECK(answer["applied"] == Json({"limits"}));
+  CHECK(answer["not_applied"] == Json({"servo.rate_Hz"}));
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/control/scene_methods.hpp"
+#include "daemon/control/state_methods.hpp"
+#include "tests/support/shipped_plan.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+TEST_CASE("obstacles are named by the rendering that they are of, also when the scene has changed",
+          "[state_methods]") {
+  VirtualStation s(shipped_plan());
+  MethodTable table;
+  add_state_methods(table, s.station);
+  add_scene_methods(table, s.station.workbench(), [] { return ReloadResult{}; });
+  const auto ask = [&](const std::string& method, const Json& params = Json::object()) {
+    return MethodTable::run(table.look_up({method, params, 1, true}, Role::administrator), params, {});
+  };
+  CHECK(ask("state.names").result == Json({{"obstacles", {"table"}}, {"rendering", 0}}));
+  const Answer first = ask("state.open");
+  CHECK(first.fd >= 0);
+  CHECK(first.result["layout"]["rendering"] == 0);
+  CHECK(first.result["layout"]["obstacles"] == Json::array({"table"}));
+
+  ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
+  CHECK(ask("state.names").result == Json({{"obstacles", {"table", "plunger"}}, {"rendering", 1}}));
+  CHECK(ask("state.open").result["layout"]["obstacles"] == Json({"table", "plunger"}));
+  CHECK(ask("state.open").result["layout"]["rendering"] == 1);
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cmath>
+
+#include <catch2/catch.hpp>
+
+#include "config/pose_table.hpp"
+#include "daemon/recording/playback.hpp"
+#include "daemon/recording/recording_file.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/run_recorder.hpp"
+#include "tests/support/shipped_plan.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const std::string kHeader = "time_s,px,py,pz,qx,qy,qz,qw\n";
+
+/// From above the table down into it, 5 mm deep.
+std::string pressing() {
+  std::string text = kHeader;
+  for (int i = 0; i <= 300; ++i) {
+    const double t_s = 0.01 * i, s = t_s < 1.0 ? 0.0 : std::min(t_s - 1.0, 1.0);
+    text += std::to_string(t_s) + ",0,0," + std::to_string(0.065 - 0.045 * s) + ",0,0,0,1\n";
+  }
+  return text;
+}
+
+/// The shipped station with that path, in the mode given.
+Plan plan_of(const std::filesystem::path& file, PlaybackMode mode) {
+  Plan plan = shipped_plan();
+  SimulationSettings& simulation = plan.settings.simulation;
+  simulation.playback = file;
+  simulation.playback_mode = mode;
+  simulation.playback_path = read_playback(file);
+  return plan;
+}
+
+/// Armed from the first tick on; returns how far the handle was from the path at most [m], once it pushed.
+double farthest_m(const Plan& plan, double& pushed_N) {
+  VirtualStation s(plan);
+  double farthest = 0.0;
+  pushed_N = 0.0;
+  for (int i = 0; i < 3500; ++i) {
+    if (i == 5) s.station.loop().arm();
+    REQUIRE(s.tick() == Fault::none);
+    pushed_N = std::max(pushed_N, s.force_N());
+    const Pose goal = s.simulated.hand_target().X_BG;
+    farthest = std::max(farthest, (s.simulated.X_BH().translation_m - goal.translation_m).norm());
+  }
+  return farthest;
+}
+
+}  // namespace
+
+TEST_CASE("led by a table of poses the handle is on it, whatever pushes; else the hand wants it there",
+          "[playback]") {
+  const TemporaryDirectory files;
+  const auto file = files.write("pressing.csv", pressing());
+  double pushed_N = 0.0;
+  CHECK(farthest_m(plan_of(file, PlaybackMode::open), pushed_N) < 1e-12);
+  CHECK(pushed_N > 2.0);
+  CHECK(farthest_m(plan_of(file, PlaybackMode::closed), pushed_N) > 1e-3);
+  CHECK(pushed_N > 0.5);
+}
+
+TEST_CASE("a led handle takes from the hand what the motors and friction take", "[playback]") {
+  const TemporaryDirectory files;
+  VirtualStation s(plan_of(files.write("pressing.csv", pressing()), PlaybackMode::open));
+  const SimulatedEnergy& energy = s.simulated.handle().energy();
+  double most_kinetic_J = 0.0;
+  for (int i = 0; i < 2500; ++i) {
+    if (i == 5) s.station.loop().arm();
+    s.tick();
+    const double kinetic_J = s.simulated.handle().kinetic_energy_J();
+    most_kinetic_J = std::max(most_kinetic_J, kinetic_J);
+    REQUIRE(energy.motors_J + energy.hand_J - energy.friction_J == Approx(kinetic_J).margin(1e-12));
+  }
+  CHECK(most_kinetic_J > 1e-6);
+  CHECK(energy.motors_J < -1e-3);  // pushed in against them
+  CHECK(energy.hand_J > 1e-3);
+}
+
+TEST_CASE("a recording is played back: the hand does again what it did", "[playback]") {
+  const TemporaryDirectory files;
+  const auto file = files.path() / "run.h5";
+  {
+    VirtualStation s(shipped_plan());
+    RunRecorder recorder(s.station, file);
+    for (int i = 0; i < 5000; ++i) {
+      if (i == 50) s.station.loop().arm();
+      s.tick();
+      recorder.take();
+    }
+  }
+  const Recording before = read_recording(file);
+  VirtualStation s(plan_of(file, PlaybackMode::open));
+  double farthest_m = 0.0;
+  std::size_t compared = 0;
+  double start_s = 0.0;
+  for (const TickRecord& tick : before.ticks) {
+    if (tick.fresh == 0) continue;
+    if (compared++ == 0) start_s = tick.device_time_s;
+    const Duration since = from_seconds(tick.device_time_s - start_s);
+    const Pose X = HandPath(s.station.plan().settings.simulation).at(since).X_BG;
+    farthest_m =
+        std::max(farthest_m, (X.translation_m - Vector3d(tick.X_BH[0], tick.X_BH[1], tick.X_BH[2])).norm());
+    if (compared > 200) break;
+  }
+  CHECK(compared > 200);
+  CHECK(farthest_m < 1e-8);
+
+  // The same contact force again, as nearly as the encoders tell where the hand was.
+  double then_N = 0.0, now_N = 0.0;
+  for (const TickRecord& tick : before.ticks) then_N = std::max(then_N, std::abs(tick.F_T[2]));
+  for (int i = 0; i < 5000; ++i) {
+    if (i == 50) s.station.loop().arm();
+    s.tick();
+    now_N = std::max(now_N, std::abs(s.last.F_T[2]));
+  }
+  CHECK(then_N > 1.0);
+  CHECK(now_N == Approx(then_N).epsilon(0.05));
+}
+
+TEST_CASE("what cannot be played back is refused", "[playback]") {
+  const TemporaryDirectory files;
+  CHECK_THROWS_WITH(read_playback(files.path() / "none.csv"), Contains("cannot be read; name a recording"));
+  CHECK_THROWS_WITH(read_playback(files.path()), Contains("cannot be read"));
+  CHECK_THROWS_WITH(read_playback(files.write("bad.csv", "garbage")),
+                    Contains("bad.csv:1:1: expected the header"));
+  CHECK_THROWS_WITH(read_playback(files.write("bad.h5", "\x89HDF\r\n\x1a\n garbage")),
+                    Contains("bad.h5: is"));
+  std::vector<TickRecord> ticks(10);
+  const auto recorded = [&](const char* name) {
+    const auto file = files.path() / name;
+    RecordingWriter writer(file, {});
+    writer.append(ticks);
+    return file;
+  };
+  CHECK_THROWS_WITH(read_playback(recorded("still.h5")), Contains("has no good sample"));
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    ticks[i].tick = i;
+    ticks[i].now_ns = 1;
+    ticks[i].fresh = 1;
+    ticks[i].device_time_s = 0.001 * static_cast<double>(i) + (i > 5 ? 3.0 : 0.0);
+    ticks[i].X_BH[6] = 1.0;
+  }
+  CHECK_THROWS_WITH(read_playback(recorded("gap.h5")), Contains("before tick 6 there is a gap of 3.00"));
+}
+
+TEST_CASE("wrenchd plays back what its command line names", "[playback][program]") {
+  const TemporaryDirectory files;
+  const auto csv = files.write("pressing.csv", pressing());
+  const std::vector<std::string> run = {
+      "--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--virtual-time", "--seconds", "3.5", "--arm",
+      "--live"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), run.begin(), run.end());
+    return run_program("wrenchd", more);
+  };
+  const ProgramResult open = with({"--playback", csv.string(), "--playback-mode", "open"});
+  INFO(open.err);
+  CHECK(open.exit_code == 0);
+  CHECK(open.out.find("tool   +0.0   +0.0  +20.0 mm") != std::string::npos);
+  const ProgramResult closed = with({"--playback", csv.string()});
+  CHECK(closed.exit_code == 0);
+  CHECK(closed.out.find("+20.0 mm") == std::string::npos);
+  const ProgramResult bad = with({"--playback", files.write("bad.csv", kHeader + "0,0,0\n").string()});
+  CHECK(bad.exit_code == 1);
+  CHECK(bad.err.find("bad.csv:2:1: expected 8 numbers") != std::string::npos);
+  const ProgramResult alone = with({"--playback-mode", "open"});
+  CHECK(alone.exit_code == 1);
+  CHECK(alone.err.find("nothing is played back; name it with --playback") != std::string::npos);
+  const ProgramResult real = run_program("wrenchd", {"--profile", "polhem", "--playback", csv.string()});
+  CHECK(real.exit_code == 1);
+  CHECK(real.err.find("--playback: a person holds a real device") != std::string::npos);
+}

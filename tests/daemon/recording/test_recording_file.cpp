@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstring>
+#include <fstream>
+#include <limits>
+
+#include <catch2/catch.hpp>
+#include <hdf5.h>
+
+#include "daemon/recording/recording_file.hpp"
+#include "tests/support/random_values.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+namespace {
+
+/// A record with random bits in every field, padding left zero.
+TickRecord random_record(RandomValues& random) {
+  TickRecord r;
+  const auto any = [&](auto& field) {
+    field = static_cast<std::remove_reference_t<decltype(field)>>(random.bits());
+  };
+  any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged), any(r.skipped);
+  any(r.missing), any(r.rejected), any(r.buttons), any(r.fresh), any(r.motors_on), any(r.watchdog_tripped);
+  any(r.commands), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.state), any(r.cause),
+      any(r.faults);
+  any(r.limit_causes), any(r.dropped), any(r.sample_fault), any(r.write_fault), any(r.motors_told),
+      any(r.homed), any(r.slept_ns), any(r.answered_ns), any(r.repeated), any(r.commanded),
+      any(r.stiffness_share), any(r.guard_share), any(r.energy_in_J), any(r.energy_out_J), any(r.injected_J),
+      any(r.released), any(r.placing), any(r.rendering), any(r.changes), any(r.rendering_sum);
+  r.next_share = random.normal(), r.through = random.normal();
+  any(r.wake_latency_ns);
+  for (auto& ns : r.stage_ns) any(ns);
+  for (auto* list : {&r.X_BH, &r.X_WP, &r.X_WQ})
+    for (double& x : *list) x = random.normal();
+  for (auto* list : {&r.V_BH, &r.eps, &r.F_T, &r.F_out})
+    for (double& x : *list) x = random.normal();
+  r.device_time_s = random.normal();
+  r.energy = -0.0;
+  r.kkt_residual = std::numeric_limits<double>::denorm_min();
+  r.authority = std::numeric_limits<double>::infinity();
+  return r;
+}
+
+}  // namespace
+
+TEST_CASE("a recording reads back as it was written, bit for bit", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RandomValues random(1);
+  std::vector<TickRecord> records;
+  for (int i = 0; i < 3000; ++i) records.push_back(random_record(random));
+  {
+    RecordingHeader header;
+    header.version = "1.2.3";
+    header.settings = "settings text";
+    RecordingWriter writer(file, header);
+    writer.append(std::span(records).first(1));
+    writer.append(RecordBatch{});
+    writer.append(std::span(records).subspan(1));
+  }
+  const Recording recording = read_recording(file);
+  CHECK(recording.header.version == "1.2.3");
+  CHECK(recording.header.settings == "settings text");
+  CHECK(recording.header.profile.empty());
+  REQUIRE(recording.ticks.size() == records.size());
+  for (std::size_t i = 0; i < records.size(); ++i)
+    REQUIRE(std::memcmp(&recording.ticks[i], &records[i], sizeof(TickRecord)) == 0);
+}
+
+TEST_CASE("a recording of another format is refused, with its version", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RecordingHeader header;
+  header.version = "0.0.9";
+  { const RecordingWriter writer(file, header); }
+  const std::string named = GENERATE(std::string("1"), std::string("5"), std::string("7"));
+  {
+    const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t table = H5Dopen2(opened, "/ticks", H5P_DEFAULT);
+    const auto put = [](hid_t object, const char* name, const std::string& text) {
+      const hid_t type = H5Tcopy(H5T_C_S1);
+      H5Tset_size(type, text.size());
+      const hid_t space = H5Screate(H5S_SCALAR);
+      const hid_t attribute = H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+      H5Awrite(attribute, type, text.data());
+      H5Aclose(attribute), H5Sclose(space), H5Tclose(type);
+    };
+    H5Adelete(opened, "format");
+    if (named == "7") {
+      put(opened, "format", named);
+    } else {  // up to 5 it stood at the table, and the first had none
+      if (named != "1") put(table, "format", named);
+      put(table, "wrenchd_version", "0.0.9");
+    }
+    H5Dclose(table);
+    H5Fclose(opened);
+  }
+  CHECK_THROWS_WITH(read_recording(file),
+                    Catch::Contains(file.string() + ": is of format " + named) &&
+                        Catch::Contains("replay it with the wrenchd that wrote it (0.0.9)"));
+}
+
+TEST_CASE("the contacts of each tick are in a recording, whatever pieces it was written in", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RandomValues random(2);
+  RecordBatch all;
+  std::vector<RecordBatch> pieces(1);
+  for (int i = 0; i < 3000; ++i) {
+    std::vector<Touch> touches(random.bits() % 5);
+    for (Touch& touch : touches) {
+      for (double& x : touch.point_W_m) x = random.normal();
+      touch.share = random.normal();
+      touch.obstacle = static_cast<std::uint32_t>(random.bits());
+      touch.obstacle_feature_kind = 7;
+    }
+    const TickRecord tick = random_record(random);
+    all.add(tick, touches);
+    if (i % 7 == 0) pieces.emplace_back();
+    pieces.back().add(tick, touches);
+  }
+  {
+    RecordingWriter writer(file, {});
+    for (const RecordBatch& piece : pieces) writer.append(piece);
+  }
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 3000);
+  REQUIRE(recording.touches.size() == all.touches.size());
+  for (std::size_t i = 0; i < 3000; ++i) {
+    const auto touches = recording.touches_of(i);
+    REQUIRE(touches.size() == all.ranges[i].count);
+    for (std::size_t k = 0; k < touches.size(); ++k)
+      REQUIRE(std::memcmp(&touches[k], &all.touches[all.ranges[i].first + k], sizeof(Touch)) == 0);
+  }
+}
+
+TEST_CASE("what a recording says of itself reads back", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RecordingHeader header;
+  header.version = "1.2.3";
+  header.settings = std::string(100'000, 'x') + "\xC3\xA4";  // more than an attribute can hold
+  header.scene_file = "/some/scene.toml";
+  header.realtime = "off";
+  header.rate_Hz = 4000.0;
+  header.kernel = "Linux 6.1";
+  header.virtual_time = true;
+  header.started_ns = 12;
+  header.started_unix_ns = 1'000'000'000'000'000'345;
+  header.files = {{"hand_script", "/some/hand.toml", {}, true, "repeats = true"},
+                  {"obstacle_0", "/some/large.off", "abcd", false, {}},
+                  {"tool", "/some/cube.off", "ef01", true, std::string("OFF\0\1", 5)}};
+  { const RecordingWriter writer(file, header); }
+  const RecordingHeader read = read_recording(file).header;
+  CHECK(read.version == header.version);
+  CHECK(read.settings == header.settings);
+  CHECK(read.scene_file == header.scene_file);
+  CHECK(read.realtime == "off");
+  CHECK(read.rate_Hz == 4000.0);
+  CHECK(read.kernel == "Linux 6.1");
+  CHECK(read.virtual_time);
+  CHECK(read.started_ns == 12);
+  CHECK(read.started_unix_ns == header.started_unix_ns);
+  REQUIRE(read.files.size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(read.files[i].role == header.files[i].role);
+    CHECK(read.files[i].at == header.files[i].at);
+    CHECK(read.files[i].sha256 == header.files[i].sha256);
+    CHECK(read.files[i].inside == header.files[i].inside);
+    CHECK(read.files[i].bytes == header.files[i].bytes);
+  }
+}
+
+TEST_CASE("a recording that is cut short anywhere, or lacks a column, is refused and never read wrong",
+          "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RandomValues random(3);
+  std::vector<TickRecord> records;
+  for (int i = 0; i < 2000; ++i) records.push_back(random_record(random));
+  {
+    RecordingWriter writer(file, {});
+    writer.append(records);
+  }
+  const auto whole = std::filesystem::file_size(file);
+  for (int i = 0; i < 40; ++i) {
+    const auto cut = directory.path() / ("cut" + std::to_string(i) + ".h5");
+    std::filesystem::copy_file(file, cut);
+    std::filesystem::resize_file(cut, random.bits() % whole);
+    CHECK_THROWS_WITH(read_recording(cut), Catch::Contains(cut.string()));
+  }
+
+  const auto other = directory.path() / "other.h5";
+  const hid_t id = H5Fcreate(other.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT);
+  H5Fclose(id);
+  CHECK_THROWS_WITH(read_recording(other), Catch::Contains("has no table 'ticks'"));
+
+  // A column renamed: all others are as they were.
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const auto at = bytes.find("kkt_residual");
+  REQUIRE(at != std::string::npos);
+  bytes[at] = 'q';
+  const auto renamed = directory.write("renamed.h5", bytes);
+  CHECK_THROWS_WITH(read_recording(renamed),
+                    Catch::Contains("column 'kkt_residual' of its table 'ticks' is"));
+}
+
+TEST_CASE("a recording with wrong bytes is read or refused, and no more", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  RandomValues random(6);
+  std::vector<TickRecord> records;
+  for (int i = 0; i < 300; ++i) records.push_back(random_record(random));
+  {
+    RecordingWriter writer(file, {});
+    writer.append(records);
+  }
+  std::ifstream in(file, std::ios::binary);
+  const std::string good{std::istreambuf_iterator<char>(in), {}};
+  int refused = 0;
+  for (int i = 0; i < 400; ++i) {
+    std::string bytes = good;
+    for (std::uint64_t k = 0; k <= random.bits() % 8; ++k)
+      bytes[random.bits() % bytes.size()] = static_cast<char>(random.bits());
+    const auto mutant = directory.write("mutant.h5", bytes);
+    try {
+      const Recording recording = read_recording(mutant);
+      for (std::size_t row = 0; row < recording.ticks.size(); ++row)
+        REQUIRE(recording.touches_of(row).size() <= recording.touches.size());
+    } catch (const RecordingError& error) {
+      ++refused;
+      REQUIRE(std::string(error.what()).find(mutant.string()) == 0);
+    }
+  }
+  CHECK(refused > 20);
+}
+
+TEST_CASE("recordings are refused with the file and the cure", "[recording]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  { const RecordingWriter writer(file, {}); }
+  CHECK(read_recording(file).ticks.empty());
+  CHECK_THROWS_WITH(RecordingWriter(file, {}), Catch::Contains("never overwritten"));
+  CHECK_THROWS_WITH(RecordingWriter(directory.path() / "no" / "run.h5", {}),
+                    Catch::Contains("cannot be created"));
+  std::filesystem::create_symlink(directory.path() / "nowhere.h5", directory.path() / "link.h5");
+  CHECK_THROWS_WITH(RecordingWriter(directory.path() / "link.h5", {}), Catch::Contains("never overwritten"));
+  CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("is not there"));
+  std::ofstream(directory.path() / "text.h5") << "not HDF5";
+  CHECK_THROWS_WITH(read_recording(directory.path() / "text.h5"), Catch::Contains("is not an HDF5 file"));
+}

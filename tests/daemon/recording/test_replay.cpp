@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/recording/recorded_files.hpp"
+#include "daemon/recording/replay.hpp"
+#include "tests/support/buried.hpp"
+#include "tests/support/run_recorder.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+namespace {
+
+/// A run of the shipped station with everything in it that a tick can do, recorded to a file.
+void record_run(const Plan& plan, const std::filesystem::path& file, double duration_s) {
+  VirtualStation s(plan);
+  s.inject(SimulatedFault::Kind::garble, 3.0, 0.003);
+  s.inject(SimulatedFault::Kind::silence, 3.5, 0.006);
+  s.inject(SimulatedFault::Kind::unplug, duration_s - 0.01, 1.0);
+  RunRecorder recorder(s.station, file);
+  for (int i = 0; i < static_cast<int>(1000 * duration_s); ++i) {
+    if (i == 50 || i == 4500) s.station.loop().arm();
+    if (i == 4200) s.station.loop().disarm();
+    const bool lost = s.tick() == Fault::device_lost;
+    recorder.take();
+    if (lost) break;
+  }
+  REQUIRE(recorder.has_all());
+}
+
+Plan recording_plan(Method method) {
+  Plan plan = shipped_plan();
+  plan.settings.rendering.method = method;
+  plan.settings.wrench.gains.integral = WrenchGains::blockwise(100.0, 0.3);
+  plan.settings.limits.max_force_N = 1.2;
+  return plan;
+}
+
+}  // namespace
+
+TEST_CASE("a replayed recording gives the same bits", "[replay]") {
+  const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const Plan plan = recording_plan(method);
+  record_run(plan, file, 6.0);
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() > 5900);
+  CHECK(recording.ticks.back().faults == bit(Fault::device_lost));
+  const auto difference = replay(recording, plan);
+  if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
+  CHECK_FALSE(difference.has_value());
+}
+
+TEST_CASE("a replay rubs as the loop did", "[replay][friction]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  Plan plan = recording_plan(Method::exact);
+  plan.settings.rendering.friction = {0.6, 0.4};
+  record_run(plan, file, 6.0);
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() > 5900);
+  int stuck = 0;
+  for (std::size_t i = 1; i < recording.ticks.size(); ++i) {
+    const TickRecord& tick = recording.ticks[i];
+    stuck += tick.contacts > 0 && tick.X_WQ == recording.ticks[i - 1].X_WQ ? 1 : 0;
+  }
+  CHECK(stuck > 100);
+  CHECK_FALSE(replay(recording, plan).has_value());
+  // The configuration that it is replayed with says how it rubs.
+  plan.settings.rendering.friction = {0.5, 0.4};
+  CHECK(replay(recording, plan).has_value());
+}
+
+TEST_CASE("a replay places the proxy at the ticks at which it was placed, where it was placed",
+          "[replay][placing]") {
+  // Inside, out, and back against the boulder; started over on the way.
+  Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  int seeking = 0;
+  int placed = 0;
+  {
+    VirtualStation s(buried.plan, PlaceIn::thread);  // a thread's answers come when they come
+    RunRecorder recorder(s.station, file);
+    for (int i = 0; i < 4000; ++i) {
+      if (i == 5) s.station.loop().arm();
+      if (i == 20 || i == 3500) s.station.loop().start_over();
+      let_placer_work(s);
+      REQUIRE(s.tick() == Fault::none);
+      recorder.take();
+      seeking += placing(s) == Placing::seeking ? 1 : 0;
+      placed += placing(s) == Placing::placed ? 1 : 0;
+    }
+    s.station.loop().release(s.clock.now());
+  }
+  CHECK(seeking > 2);
+  CHECK(placed >= 2);
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 4001);
+  auto difference = replay(recording, buried.plan);
+  if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
+  CHECK_FALSE(difference.has_value());
+
+  // Another answer, and all that follows is another.
+  Recording changed = recording;
+  for (TickRecord& tick : changed.ticks)
+    if (static_cast<Placing>(tick.placing) == Placing::placed) tick.X_WQ[0] += 1e-4;
+  difference = replay(changed, buried.plan);
+  REQUIRE(difference.has_value());
+  CHECK(difference->field.rfind("X_WQ[", 0) == 0);
+}
+
+TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]") {
+  Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
+  buried.plan.scene.meshes[0].motion = {{0.0, 0.0, 0.01}, {0.0, 0.3, 0.0}, 0.7};
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  {
+    VirtualStation s(buried.plan, PlaceIn::thread);
+    s.clock.sleep_until(TimePoint{from_seconds(77777.7)});  // the loop's own time begins later
+    RunRecorder recorder(s.station, file);
+    for (int i = 0; i < 3000; ++i) {
+      if (i == 5) s.station.loop().arm();
+      if (i == 2500) s.station.loop().start_over();
+      let_placer_work(s);
+      REQUIRE(s.tick() == Fault::none);
+      recorder.take();
+    }
+  }
+  const Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 3000);
+  const auto difference = replay(recording, buried.plan);
+  if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
+  CHECK_FALSE(difference.has_value());
+}
+
+TEST_CASE("a recording without its beginning is refused", "[replay]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const Plan plan = recording_plan(Method::exact);
+  record_run(plan, file, 0.5);
+  Recording recording = read_recording(file);
+  recording.ticks.erase(recording.ticks.begin(), recording.ticks.begin() + 100);
+  std::string why;
+  try {
+    replay(recording, plan);
+  } catch (const RecordingError& error) {
+    why = error.what();
+  }
+  CHECK(why.find("begins at tick 100") != std::string::npos);
+  CHECK(why.find("wrenchd --record") != std::string::npos);
+  recording.ticks.clear();
+  CHECK_FALSE(replay(recording, plan).has_value());
+}
+
+TEST_CASE("where there was no place, there is none in the replay", "[replay][placing]") {
+  Plan plan = recording_plan(Method::exact);
+  plan.scene.half_spaces = closed_box(0.02);
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  record_run(plan, file, 4.0);
+  CHECK_FALSE(replay(read_recording(file), plan).has_value());
+}
+
+TEST_CASE("a replay names the first tick and field that differ", "[replay]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  Plan plan = recording_plan(Method::exact);
+  plan.settings.wrench.law = SpringLaw::pid;
+  record_run(plan, file, 3.0);
+  Recording recording = read_recording(file);
+  recording.ticks[2500].F_out[2] = std::nextafter(recording.ticks[2500].F_out[2], 1.0);
+  auto difference = replay(recording, plan);
+  REQUIRE(difference.has_value());
+  CHECK(difference->tick == 2500);
+  CHECK(difference->field == "F_out[2]");
+
+  recording = read_recording(file);
+  plan.settings.wrench.gains.stiffness *= 1.0000001;
+  difference = replay(recording, plan);
+  REQUIRE(difference.has_value());
+  CHECK(difference->field.rfind("F_T[", 0) == 0);
+}
+
+TEST_CASE("a recording in which something was changed from outside is replayed up to there, and says so",
+          "[replay]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const Plan plan = recording_plan(Method::exact);
+  {
+    VirtualStation s(plan);
+    RunRecorder recorder(s.station, file);
+    for (int i = 0; i < 3000; ++i) {
+      if (i == 50) s.station.loop().arm();
+      if (i == 2000)
+        s.station.workbench().set_rendering(read_toml_text("[wrench]\nlaw = \"energy\"", "here"), "here");
+      REQUIRE(s.tick() == Fault::none);
+      recorder.take();
+    }
+  }
+  Recording recording = read_recording(file);
+  REQUIRE(recording.ticks.size() == 3000);
+  CHECK_THROWS_WITH(replay(recording, plan), Catch::Contains("at tick 2000 the scene"));
+  recording.ticks.resize(2000);
+  CHECK_FALSE(replay(recording, plan).has_value());
+}
+
+TEST_CASE("a recording in which ticks are missing is replayed up to there, and says so", "[replay]") {
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const Plan plan = recording_plan(Method::exact);
+  record_run(plan, file, 1.0);
+  Recording recording = read_recording(file);
+  recording.ticks.erase(recording.ticks.begin() + 500, recording.ticks.begin() + 510);
+  CHECK_THROWS_WITH(replay(recording, plan), Catch::Contains("ticks 500 to 509 are missing"));
+  recording.ticks.resize(500);
+  CHECK_FALSE(replay(recording, plan).has_value());
+}
+
+TEST_CASE("a recording is replayed with what is in it alone", "[replay]") {
+  // Copies of all files, which are gone afterwards; the scene has a mesh obstacle, the profile a parent.
+  const TemporaryDirectory directory;
+  const auto file = directory.path() / "run.h5";
+  const auto there = std::filesystem::path(WRENCHD_SOURCE_DIR) / "config";
+  const auto copies = directory.path() / "copies";
+  std::filesystem::create_directories(copies);
+  for (const char* name : {"meshes", "scenes", "hands", "profiles"})
+    std::filesystem::copy(there / name, copies / name, std::filesystem::copy_options::recursive);
+  directory.write("copies/profiles/heir.toml", "inherits = \"loopback\"\nname = \"heir\"\n");
+  directory.write("copies/mine.toml",
+                  "scene = \"scenes/cube_over_plunger.toml\"\n[device]\nprofile = \"heir\"\n"
+                  "[servo]\nself_test_s = 0\n[wrench]\nlaw = \"pid\"\n");
+  {
+    const Plan plan = read_plan({copies / "mine.toml", {}, {}, false}, SearchPath({copies}));
+    record_run(plan, file, 4.0);
+  }
+  std::filesystem::remove_all(copies);
+  const Recording recording = read_recording(file);
+  const Plan plan = recorded_plan(recording.header, directory.path() / "unpacked");
+  CHECK(plan.profile.name == "heir");
+  CHECK(plan.settings.wrench.law == SpringLaw::pid);
+  CHECK(plan.scene.meshes.size() == 1);
+  int touching = 0;
+  for (std::size_t i = 0; i < recording.ticks.size(); ++i)
+    touching += recording.touches_of(i).empty() ? 0 : 1;
+  CHECK(touching > 500);
+  CHECK_FALSE(replay(recording, plan).has_value());
+
+  RecordingHeader lacking = recording.header;
+  std::erase_if(lacking.files, [](const RecordedFile& f) { return f.role == "tool"; });
+  CHECK_THROWS_WITH(recorded_plan(lacking, directory.path() / "lacking"),
+                    Catch::Contains("has no mesh 'tool'") && Catch::Contains("--scene"));
+  RecordingHeader outside = recording.header;
+  for (RecordedFile& f : outside.files)
+    if (f.role == "tool") f.inside = false;
+  CHECK_THROWS_WITH(recorded_plan(outside, directory.path() / "outside"),
+                    Catch::Contains("is not there") && Catch::Contains("SHA-256"));
+}

@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+#include <fcntl.h>
+#include <nlohmann/json.hpp>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <wrenchd/state_reader.hpp>
+
+#include "daemon/control/state_layout.hpp"
+#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/shared_state.hpp"
+#include "tests/support/no_allocation.hpp"
+#include "tests/support/random_values.hpp"
+#include "tests/support/shipped_plan.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+namespace {
+
+const Workbench::ObstacleNames kTable{3, {"table"}};
+
+StateReader reader_of(const SharedState& state, const Workbench::ObstacleNames& obstacles = kTable) {
+  std::string layout;
+  int descriptor = -1;
+  open_state(state, obstacles, [&](const nlohmann::json& result, int handed_over) {
+    layout = result.at("layout").dump();
+    descriptor = fcntl(handed_over, F_DUPFD_CLOEXEC, 0);
+  });
+  return StateReader(layout, descriptor);
+}
+
+/// A record whose every number follows from one: whoever has parts of two sees it.
+TickRecord record_of(std::uint64_t number) {
+  TickRecord r;
+  auto* const bytes = reinterpret_cast<std::byte*>(&r);
+  for (const RecordField& field : tick_fields())
+    for (std::size_t i = 0; i < field.count; ++i) {
+      const double x = static_cast<double>(number) + static_cast<double>(i);
+      if (field.type == FieldType::f64)
+        std::memcpy(bytes + field.offset + i * 8, &x, 8);
+      else
+        std::memcpy(bytes + field.offset + i * size_of(field.type), &number, size_of(field.type));
+    }
+  return r;
+}
+
+Touches touches_of(std::uint64_t number) {
+  Touches touches;
+  for (std::uint64_t i = 0; i < number % (kMostTouches + 1); ++i) {
+    Touch touch;
+    touch.point_W_m.fill(static_cast<double>(number));
+    touch.share = static_cast<double>(i);
+    touches.add(touch);
+  }
+  return touches;
+}
+
+/// Is this record_of() and touches_of() its own number, in every bit of every field?
+bool whole(const TickState& state) {
+  const std::uint64_t number = state.tick();
+  const TickRecord wanted = record_of(number);
+  const auto* const bytes = reinterpret_cast<const std::byte*>(&wanted);
+  for (const RecordField& field : tick_fields())
+    for (std::size_t i = 0; i < field.count; ++i) {
+      if (field.type == FieldType::f64) {
+        if (state.number(field.name, i) != static_cast<double>(number) + static_cast<double>(i)) return false;
+        continue;
+      }
+      std::int64_t expected = 0;
+      std::memcpy(&expected, bytes + field.offset + i * size_of(field.type), size_of(field.type));
+      if (state.integer(field.name, i) != expected) return false;
+    }
+  const std::vector<TouchState> told = state.touches();
+  if (told.size() != number % (kMostTouches + 1)) return false;
+  for (std::size_t i = 0; i < told.size(); ++i)
+    if (told[i].point_W_m[2] != static_cast<double>(number) || told[i].share != static_cast<double>(i))
+      return false;
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("what is written is read, every field, in order, each once", "[shared_state]") {
+  SharedState state(100.0);
+  REQUIRE(state.slots() == 256);
+  state.write(record_of(999), {});
+  StateReader reader = reader_of(state);
+  TickState tick;
+  CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));  // what was there before is not the next
+  REQUIRE(reader.latest(tick));
+  CHECK(tick.tick() == 999);
+  for (std::uint64_t i = 1000; i < 3000; ++i) {
+    state.write(record_of(i), touches_of(i));
+    REQUIRE(reader.next(tick));
+    REQUIRE(tick.tick() == i);
+    REQUIRE(whole(tick));
+    CHECK(reader.behind() == 0);
+  }
+  CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));
+  CHECK(reader.missed() == 0);
+}
+
+TEST_CASE(
+    "a reader that slept for two seconds of ticks has missed none; one that slept longer is told how many",
+    "[shared_state]") {
+  SharedState state(4000.0);
+  REQUIRE(state.slots() >= 8000);
+  StateReader reader = reader_of(state);
+  TickState tick;
+  std::uint64_t written = 0;
+  for (; written < 8000; ++written) state.write(record_of(written), {});
+  REQUIRE(reader.next(tick));
+  CHECK(tick.tick() == 0);
+  for (; written < 30'000; ++written) state.write(record_of(written), {});
+  std::uint64_t taken = 1;
+  std::uint64_t last = 0;
+  while (reader.next(tick, std::chrono::milliseconds(1))) {
+    CHECK(tick.tick() > last);
+    last = tick.tick();
+    ++taken;
+  }
+  CHECK(last == 29'999);
+  CHECK(reader.missed() > 30'000 - 8192);
+  CHECK(taken + reader.missed() == written);
+}
+
+TEST_CASE("readers beside a writer at full speed never see a torn record, however often they are overrun",
+          "[shared_state]") {
+  SharedState state(4.0);  // 8 records: overrun all the time
+  std::atomic<bool> stop{false};
+  std::array<std::uint64_t, 2> seen{}, torn{}, back{}, missed{};
+  std::vector<std::thread> readers;
+  for (std::size_t r = 0; r < 2; ++r)
+    readers.emplace_back([&, r] {
+      StateReader reader = reader_of(state);
+      TickState tick;
+      std::uint64_t last = 0;
+      while (!stop.load()) {
+        if (r == 0 ? !reader.next(tick, std::chrono::milliseconds(1)) : !reader.latest(tick)) continue;
+        ++seen[r];
+        if (!whole(tick)) ++torn[r];
+        if (tick.tick() < last) ++back[r];
+        last = tick.tick();
+      }
+      missed[r] = reader.missed();
+    });
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+  for (std::uint64_t i = 0; std::chrono::steady_clock::now() < end; ++i)
+    state.write(record_of(i), touches_of(i));
+  stop.store(true);
+  for (std::thread& reader : readers) reader.join();
+  for (std::size_t r = 0; r < 2; ++r) {
+    CHECK(seen[r] > 100);
+    CHECK(torn[r] == 0);
+    CHECK(back[r] == 0);
+  }
+  CHECK(missed[0] > 100);
+}
+
+TEST_CASE("who has the descriptor can read the memory, and nothing else", "[shared_state]") {
+  SharedState state(100.0);
+  const int fd = state.descriptor();
+  const auto size = static_cast<off_t>(state.bytes());
+  void* const readable = mmap(nullptr, state.bytes(), PROT_READ, MAP_SHARED, fd, 0);
+  REQUIRE(readable != MAP_FAILED);
+  CHECK(mprotect(readable, state.bytes(), PROT_READ | PROT_WRITE) != 0);
+  munmap(readable, state.bytes());
+  CHECK(mmap(nullptr, state.bytes(), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0) == MAP_FAILED);
+  CHECK(pwrite(fd, "x", 1, 0) < 0);
+  CHECK(ftruncate(fd, size / 2) != 0);
+  CHECK(ftruncate(fd, size * 2) != 0);
+  CHECK(fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, size) != 0);
+  CHECK(fcntl(fd, F_ADD_SEALS, F_SEAL_WRITE) != 0);
+  state.write(record_of(1), {});
+  CHECK(state.written() == 1);
+}
+
+TEST_CASE("writing neither allocates nor locks, and touches no page for the first time",
+          "[shared_state][realtime]") {
+  SharedState state(1000.0);
+  const TickRecord record = record_of(5);
+  const Touches touches = touches_of(16);
+  state.write(record, touches);
+  rusage before{}, after{};
+  getrusage(RUSAGE_THREAD, &before);
+  const RealtimeGuard guard;
+  for (std::uint64_t i = 0; i < 2 * state.slots(); ++i) state.write(record, touches);
+  const std::uint64_t allocations = guard.allocations();
+  const std::uint64_t locks = guard.locks();
+  getrusage(RUSAGE_THREAD, &after);
+  CHECK(allocations == 0);
+  CHECK(locks == 0);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  CHECK(after.ru_minflt - before.ru_minflt + after.ru_majflt - before.ru_majflt <= 2);
+#endif
+}
+
+TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][servo]") {
+  VirtualStation s;
+  StateReader reader = reader_of(s.station.show_state(), s.station.workbench().obstacle_names());
+  s.station.loop().arm();
+  TickState tick;
+  for (int i = 0; i < 2400; ++i) {
+    REQUIRE(s.tick() == Fault::none);
+    REQUIRE(reader.next(tick));
+    REQUIRE(tick.tick() == s.last.tick);
+    REQUIRE(tick.integer("contacts") == s.last.contacts);
+    REQUIRE(tick.wrench() == s.last.F_out);
+  }
+  CHECK(tick.state() == "active");
+  CHECK(tick.text("projection_status") == "converged");
+  CHECK(tick.text("faults").empty());
+  const std::vector<TouchState> touches = tick.touches();
+  REQUIRE(touches.size() == 4);
+  double share = 0.0;
+  for (const TouchState& touch : touches) {
+    CHECK(touch.obstacle == "table");
+    CHECK(touch.obstacle_feature == "plane");
+    CHECK(touch.tool_feature.starts_with("hull vertex "));
+    CHECK(touch.normal_W == std::array<double, 3>{0.0, 0.0, 1.0});
+    CHECK(std::abs(touch.point_W_m[2]) < 1e-8);
+    CHECK(std::abs(std::abs(touch.point_W_m[0] - tick.proxy_pose()[0]) - 0.025) < 1e-6);
+    share += touch.share;
+  }
+  CHECK(share == Approx(1.0));
+  s.station.loop().release(s.clock.now());
+  REQUIRE(reader.next(tick));
+  CHECK(tick.integer("released") == 1);
+  CHECK(tick.text("commands") == "let go");
+}
+
+TEST_CASE("the layout describes every field, within a line of the protocol", "[shared_state]") {
+  SharedState state(8000.0);
+  CHECK(state.slots() >= 16'000);
+  const nlohmann::json layout = state_layout(state, kTable);
+  CHECK(layout.dump().size() < 32 * 1024);
+  for (const nlohmann::json& list : {layout["fields"], layout["touches"]["fields"]})
+    for (const nlohmann::json& field : list) {
+      INFO(field);
+      CHECK_FALSE(field["unit"].get<std::string>().empty());
+      CHECK_FALSE(field["doc"].get<std::string>().empty());
+      if (field["unit"] == "enum") CHECK(field["values"].size() > 1);
+      for (const std::string names : {"values", "bits"})
+        if (field.contains(names))
+          for (const std::string name : field[names]) CHECK((!name.empty() && name != "unknown"));
+    }
+  CHECK(layout["obstacles"] == nlohmann::json({"table"}));
+  CHECK(layout["rendering"] == 3);
+}
+
+TEST_CASE(
+    "contacts have the names of their own rendering's obstacles, and the daemon is asked once a rendering",
+    "[shared_state]") {
+  SharedState state(4.0);
+  int asked = 0;
+  std::string answer = R"({"rendering": 4, "obstacles": ["bolt"]})";
+  StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
+                     [&] {
+                       ++asked;
+                       if (answer.empty()) throw ClientError(ClientError::kGone, "gone");
+                       return answer;
+                     });
+  const auto touched_in = [&](std::uint32_t rendering) {
+    TickRecord record;
+    record.rendering = rendering;
+    Touches touches;
+    touches.add(Touch{});
+    state.write(record, touches);
+    TickState tick;
+    REQUIRE(reader.latest(tick));
+    return tick.touches().at(0).obstacle;
+  };
+  CHECK(touched_in(3) == "table");
+  CHECK(asked == 0);
+  CHECK(touched_in(4) == "bolt");
+  CHECK(touched_in(4) == "bolt");
+  CHECK(touched_in(3) == "table");  // looked at late
+  CHECK(asked == 1);
+  CHECK(touched_in(5) == "obstacle 0");  // that is not known yet
+  answer = R"({"rendering": 7, "obstacles": ["nut"]})";
+  CHECK(touched_in(6) == "obstacle 0");  // that is known no more
+  CHECK(touched_in(7) == "nut");
+  for (const char* bad : {"", "no JSON", "{}", R"({"rendering": 8, "obstacles": 1})"}) {
+    answer = bad;
+    CHECK(touched_in(8) == "obstacle 0");
+  }
+}
+
+TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") {
+  SharedState state(4.0);
+  const nlohmann::json good = state_layout(state, kTable);
+  const auto open = [&](const nlohmann::json& layout) {
+    return StateReader(layout.dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0));
+  };
+  CHECK_NOTHROW(open(good));
+  const auto refused = [&](const char* where, const nlohmann::json& value) {
+    nlohmann::json layout = good;
+    layout[nlohmann::json::json_pointer(where)] = value;
+    INFO(where << " = " << value);
+    CHECK_THROWS_AS(open(layout), ClientError);
+  };
+  refused("/version", 2);
+  refused("/bytes", state.bytes() + 1);
+  refused("/slots", state.slots() + 1);
+  refused("/slots", 0);
+  refused("/slot_bytes", SharedState::kSlotBytes + 8);
+  refused("/record_bytes", SharedState::kSlotBytes);
+  refused("/written_offset", 4096);
+  refused("/byte_order", "big");
+  refused("/fields/3/offset", sizeof(StateRecord));
+  refused("/fields/3/count", 1'000'000);
+  refused("/fields/3/type", "f16");
+  refused("/touches/most", 1000);
+  refused("/touches/fields/0/offset", 87);
+  refused("/fields", nullptr);
+  const int unsealed = memfd_create("unsealed", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  REQUIRE(ftruncate(unsealed, static_cast<off_t>(state.bytes())) == 0);
+  CHECK_THROWS_WITH(StateReader(good.dump(), unsealed), Catch::Contains("not sealed"));
+  CHECK_THROWS_AS(StateReader("no JSON", fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0)), ClientError);
+}

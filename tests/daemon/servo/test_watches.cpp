@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "core/watch_limits.hpp"
+#include "daemon/servo/watches.hpp"
+
+// What tests/daemon/servo/test_fault_reactions.cpp does not see of the watches: where they must not find
+// anything.
+
+using namespace wrenchd;
+using namespace std::chrono_literals;
+
+namespace {
+
+DeviceSample sample_at(TimePoint now, double device_time_s) {
+  DeviceSample sample;
+  sample.arrived = now;
+  sample.device_time_s = device_time_s;
+  sample.fresh = true;
+  return sample;
+}
+
+}  // namespace
+
+TEST_CASE("a third of all reports may be bad for ever, and more may not", "[watches]") {
+  for (const int one_in : {4, 2}) {
+    LinkWatch watch(1000.0);
+    FaultSet found = 0;
+    for (int i = 1; i < 5000; ++i) {
+      DeviceSample sample = sample_at(TimePoint{} + i * 1ms, 1e-3 * i);
+      if (i % one_in == 0) {
+        sample.rejected = 1;
+        sample.fresh = false;
+      }
+      found |= watch.look(sample, sample.arrived);
+    }
+    CHECK(((found & bit(Fault::link_lossy)) != 0) == (one_in == 2));
+    CHECK((found & bit(Fault::report_malformed)) != 0);
+  }
+}
+
+TEST_CASE("two clocks that differ are no lag, and reports that wait somewhere are", "[watches]") {
+  LinkWatch watch(1000.0);
+  const auto look = [&](int i, double lag_s, double rate) {
+    const TimePoint now = TimePoint{} + i * 1ms;
+    return watch.look(sample_at(now, rate * 1e-3 * i - lag_s), now) & bit(Fault::sample_late);
+  };
+  for (int i = 1; i < 100000; ++i) REQUIRE(look(i, 0.0, 1.0 - 1e-4) == 0);
+  for (int i = 100000; i < 100100; ++i) REQUIRE(look(i, 0.002, 1.0 - 1e-4) == 0);
+  CHECK(look(100100, 0.004, 1.0 - 1e-4) != 0);
+}
+
+TEST_CASE("a device that reports seldom may be silent for three of its periods", "[watches]") {
+  LinkWatch watch(125.0);
+  const TimePoint start{1s};
+  CHECK(watch.look(sample_at(start, 0.0), start) == 0);
+  DeviceSample old = sample_at(start, 0.0);
+  old.fresh = false;
+  CHECK(watch.look(old, start + 20ms) == 0);
+  CHECK(watch.look(old, start + 25ms) == bit(Fault::sample_late));
+}
+
+TEST_CASE("a handle that rests is not stuck, nor one whose twist is noise", "[watches]") {
+  PoseWatch watch{DeviceProfile{}};
+  for (int i = 0; i < 5000; ++i) {
+    DeviceSample sample = sample_at(TimePoint{} + i * 1ms, 1e-3 * i);
+    sample.V_BH.linear_m_per_s.x() = i < 2500 ? 0.0 : 1e-6;
+    REQUIRE(watch.look(sample) == 0);
+  }
+}
+
+TEST_CASE("two orientations that are none are dropped, and no fault yet", "[watches]") {
+  PoseWatch watch{DeviceProfile{}};
+  for (int i = 0; i < 30; ++i) {
+    DeviceSample sample = sample_at(TimePoint{} + i * 1ms, 1e-3 * i);
+    if (i % 3 != 0) sample.fault = Fault::pose_not_a_rotation;
+    REQUIRE(watch.look(sample) == 0);
+  }
+}
+
+TEST_CASE("flags of a watchdog that tripped before the motors were driven are no fault", "[watches]") {
+  MotorWatch watch;
+  DeviceSample sample = sample_at(TimePoint{}, 0.0);
+  sample.watchdog_tripped = true;
+  for (int i = 0; i < 100; ++i) REQUIRE(watch.look(sample, false, TimePoint{} + i * 1ms) == 0);
+  for (int i = 100; i < 110; ++i) REQUIRE(watch.look(sample, true, TimePoint{} + i * 1ms) == 0);
+  sample.watchdog_tripped = false;
+  sample.motors_on = true;
+  CHECK(watch.look(sample, true, TimePoint{} + 110ms) == 0);
+  sample.motors_on = false;
+  sample.watchdog_tripped = true;
+  CHECK(watch.look(sample, true, TimePoint{} + 111ms) == bit(Fault::watchdog_tripped));
+}
+
+TEST_CASE("a write that is refused for a moment is no fault", "[watches]") {
+  WriteWatch watch;
+  TimePoint now{};
+  for (int i = 0; i < 100; ++i, now += 1ms)
+    REQUIRE(watch.look(i % 2 == 0 ? Fault::write_failed : Fault::none, now) == 0);
+  for (; now < TimePoint{} + 102ms; now += 1ms) watch.look(Fault::write_failed, now);
+  CHECK(watch.look(Fault::write_failed, now) == bit(Fault::write_blocked));
+  CHECK(watch.look(Fault::write_failed, now + 25ms) == bit(Fault::write_failed));
+}
+
+TEST_CASE("ticks that come when they should, and a little late, are no fault; a gap counts for two periods",
+          "[watches]") {
+  PaceWatch watch(1ms, 20ms);
+  TimePoint now{5s};
+  CHECK(watch.look(now, 0ns) == 0);
+  CHECK(watch.dt_s() == Approx(1e-3));
+  CHECK(watch.look(now += 6ms, 0ns) == 0);
+  CHECK(watch.dt_s() == Approx(2e-3));
+  CHECK(watch.look(now += 7ms, 0ns) == bit(Fault::tick_late));
+  CHECK(watch.look(now += 22ms, 0ns) == bit(Fault::loop_stopped));
+  CHECK(watch.look(now += 1ms, 50ms) == 0);  // no sleep takes so little
+  CHECK(watch.look(now += 1ms, 1h) == bit(Fault::suspended));
+  CHECK(watch.look(now - 1ns, 1h) == bit(Fault::clock_back));
+  CHECK(watch.dt_s() == 0.0);
+}
+
+TEST_CASE("full force on a hand that moves is no pinning, nor is a moment of it", "[watches]") {
+  PinnedWatch watch(10.0, 0.5);
+  const Wrench F{{0, 0, 9.9}, {0, 0, 0}};
+  Pose X_BH;
+  TimePoint now{};
+  for (int i = 0; i < 5000; ++i, now += 1ms) {
+    X_BH.translation_m.x() = 2e-6 * i;
+    REQUIRE(watch.look(F, X_BH, now) == 0);
+  }
+  for (int i = 0; i < 400; ++i, now += 1ms) REQUIRE(watch.look(F, X_BH, now) == 0);
+  CHECK(watch.look(Wrench{}, X_BH, now) == 0);
+  for (int i = 0; i < 1000; ++i, now += 1ms) REQUIRE(watch.look({{0, 0, 0}, {0, 0.49, 0}}, X_BH, now) == 0);
+  CHECK(watch.look({{0, 0, 0}, {0, 0.49, 0}}, X_BH, now + 1ms) == bit(Fault::pinned));
+}
+
+TEST_CASE("a client that lives is heard, whoever armed without a lease is not asked", "[watches]") {
+  ClientWatch watch;
+  CHECK(watch.look(TimePoint{1h}) == 0);
+  watch.begin(TimePoint{});
+  for (int i = 0; i < 50; ++i) {
+    watch.beat(TimePoint{} + i * 90ms);
+    REQUIRE(watch.look(TimePoint{} + i * 90ms + 89ms) == 0);
+  }
+  CHECK(watch.look(TimePoint{} + 50 * 90ms + 20ms) == bit(Fault::client_gone));
+  watch.begin(TimePoint{1min});
+  CHECK(watch.look(TimePoint{1min} + 101ms) == bit(Fault::client_silent));
+  watch.end();
+  CHECK(watch.look(TimePoint{1h}) == 0);
+}
+
+TEST_CASE("a client that hangs up is gone at once, where it had promised to live", "[watches]") {
+  ClientWatch watch;
+  watch.hang_up();
+  CHECK(watch.look(TimePoint{1s}) == 0);  // whoever armed without a lease is not meant
+  watch.begin(TimePoint{1s});
+  watch.beat(TimePoint{1s});
+  CHECK(watch.look(TimePoint{1s}) == 0);
+  watch.hang_up();
+  CHECK(watch.look(TimePoint{1s}) == bit(Fault::client_gone));
+  watch.end();
+  CHECK(watch.look(TimePoint{1s}) == 0);
+  watch.begin(TimePoint{2s});  // the next one is another
+  CHECK(watch.look(TimePoint{2s}) == 0);
+}

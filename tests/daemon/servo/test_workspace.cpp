@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "daemon/servo/workspace.hpp"
+#include "tests/support/random_values.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+constexpr double kTick_s = 1e-3;
+
+double distance(const Pose& a, const Pose& b) {
+  return (a.translation_m - b.translation_m).norm() + a.rotation.angularDistance(b.rotation);
+}
+
+TEST_CASE("a workspace that nobody touched is the pose of the base", "[workspace]") {
+  RandomValues random(1);
+  const Pose X_WB = random.pose();
+  Workspace workspace(X_WB);
+  for (int i = 0; i < 100; ++i) {
+    const Pose X_BH = random.pose();
+    CHECK(same_bits(workspace.follow(X_BH, kTick_s), X_WB * X_BH));
+  }
+}
+
+TEST_CASE("the scale changes over a tenth of a second, and moves nothing by itself", "[workspace]") {
+  RandomValues random(2);
+  const double to = GENERATE(0.3, 3.0);
+  Workspace workspace(random.pose());
+  const Pose X_BH = random.pose();
+  const Pose X_WH = workspace.follow(X_BH, kTick_s);
+  workspace.set_scale(to);
+  int ticks = 0;
+  for (; workspace.scale() != to && ticks < 1000; ++ticks)
+    CHECK(distance(workspace.follow(X_BH, kTick_s), X_WH) < 1e-12);
+  CHECK(ticks >= 99);
+  CHECK(ticks <= 101);
+  // From there on a way of the handle is so many times as long.
+  const Pose further = {X_BH.rotation, X_BH.translation_m + Vector3d(0.01, 0.02, -0.01)};
+  CHECK((workspace.follow(further, kTick_s).translation_m - X_WH.translation_m).norm() ==
+        Approx(to * Vector3d(0.01, 0.02, -0.01).norm()));
+}
+
+TEST_CASE("the wrench has the same power on the hand as in the world, whatever the scale", "[workspace]") {
+  RandomValues random(3);
+  for (int i = 0; i < 200; ++i) {
+    Workspace workspace(random.pose());
+    workspace.set_scale(random.uniform(0.1, 10.0));
+    const Pose X_BH = random.pose();
+    for (int k = 0; k < 200; ++k) workspace.follow(X_BH, kTick_s);
+    const Wrench F_W = random.wrench();
+    const Twist V_BH = random.velocity();
+    const Twist V_W = workspace.in_world(V_BH);
+    const Wrench F_B = workspace.on_the_hand(F_W);
+    CHECK(F_B.force_N.dot(V_BH.linear_m_per_s) + F_B.torque_Nm.dot(V_BH.angular_rad_per_s) ==
+          Approx(F_W.force_N.dot(V_W.linear_m_per_s) + F_W.torque_Nm.dot(V_W.angular_rad_per_s)));
+    // And the twist is that of follow().
+    const double dt = 1e-7;
+    const Pose now = workspace.follow(X_BH, 0.0);
+    const Pose then = workspace.follow({X_BH.rotation, X_BH.translation_m + dt * V_BH.linear_m_per_s}, 0.0);
+    CHECK((then.translation_m - now.translation_m - dt * V_W.linear_m_per_s).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("the clutch holds the tool, and lets it go on from where it is told", "[workspace]") {
+  RandomValues random(4);
+  Workspace workspace(random.pose());
+  workspace.set_scale(2.0);
+  const Pose X_WH = workspace.follow(random.pose(), kTick_s);
+  workspace.clutch_in();
+  for (int i = 0; i < 10; ++i) CHECK(same_bits(workspace.follow(random.pose(), kTick_s), X_WH));
+  const Pose X_on = random.pose();
+  workspace.clutch_out(X_on);
+  const Pose X_BH = random.pose();
+  CHECK(distance(workspace.follow(X_BH, kTick_s), X_on) < 1e-12);
+  const Pose turned = {X_BH.rotation * rotation_from({0.0, 0.1, 0.0}), X_BH.translation_m};
+  CHECK(distance(workspace.follow(turned, kTick_s),
+                 {X_on.rotation * rotation_from({0.0, 0.1, 0.0}), workspace.X_WH().translation_m}) < 1e-9);
+}
+
+TEST_CASE("recentred, the base is where the configuration has it", "[workspace]") {
+  RandomValues random(5);
+  const Pose X_WB = random.pose();
+  Workspace workspace(X_WB);
+  workspace.clutch_in();
+  workspace.clutch_out(random.pose());
+  workspace.follow(random.pose(), kTick_s);
+  workspace.recentre();
+  const Pose X_BH = random.pose();
+  CHECK(distance(workspace.follow(X_BH, kTick_s), X_WB * X_BH) < 1e-15);
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "config/known_profiles.hpp"
+#include "devices/discovery/choose_device.hpp"
+#include "tests/support/sample_descriptors.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+using Catch::Contains;
+
+const std::vector<DeviceProfile> kShipped =
+    known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"})).profiles;
+
+UsbDevice reference(const std::string& serial) {
+  UsbDevice device;
+  device.place = "3-1";
+  device.hidraw_node = "/dev/hidraw1";
+  device.usb_node = "/dev/bus/usb/003/001";
+  device.interface = 0;
+  device.vendor = 0x1209;
+  device.product = 0x0001;
+  device.serial = serial;
+  device.report_descriptor = reference_descriptor();
+  device.usage_page = 0xff00;
+  device.usage = 1;
+  return device;
+}
+
+UsbDevice falcon() {
+  UsbDevice device;
+  device.place = "3-2";
+  device.usb_node = "/dev/bus/usb/003/002";
+  device.interface = 0;
+  device.vendor = 0x0403;
+  device.product = 0xcb48;
+  return device;
+}
+
+DeviceChoice choose(const std::vector<UsbDevice>& plugged, const WantedDevice& wanted) {
+  return choose_device(plugged, kShipped, wanted);
+}
+
+std::string picked(const DeviceChoice& choice) {
+  return choice.pick ? kShipped[choice.pick->profile].name : "none";
+}
+
+}  // namespace
+
+TEST_CASE("the device of the profile that is named is picked", "[choose_device]") {
+  const DeviceChoice choice = choose({falcon(), reference("A")}, {.profile = "reference_full_speed"});
+  REQUIRE(picked(choice) == "reference_full_speed");
+  CHECK(choice.pick->device == 1);
+  CHECK_THAT(choice.why_not[0], Contains("reference_full_speed") && Contains("0403:cb48"));
+  CHECK(choice.why_not[1].empty());
+}
+
+TEST_CASE("without a name any device is picked that has a profile", "[choose_device]") {
+  CHECK(picked(choose({falcon()}, {})) == "falcon");
+  CHECK(picked(choose({reference("A")}, {})) == "reference_full_speed");
+  CHECK(picked(choose({}, {})) == "none");
+}
+
+TEST_CASE("what no profile is for is told where to look", "[choose_device]") {
+  UsbDevice stranger = reference("A");
+  stranger.vendor = 0x1234;
+  const DeviceChoice choice = choose({stranger}, {});
+  CHECK_FALSE(choice.pick);
+  CHECK_THAT(choice.why_not[0], Contains("wrenchctl devices"));
+}
+
+TEST_CASE("two equal devices are told apart by serial number alone", "[choose_device]") {
+  const std::vector<UsbDevice> two = {reference("A"), reference("B")};
+  const DeviceChoice either = choose(two, {.profile = "reference_full_speed"});
+  CHECK_FALSE(either.pick);
+  CHECK_THAT(either.why_not[0], Contains("serial number A") && Contains("not alone"));
+  CHECK_THAT(either.why_not[1], Contains("serial number B"));
+  const DeviceChoice second = choose(two, {.profile = "reference_full_speed", .serial = "B"});
+  REQUIRE(second.pick);
+  CHECK(second.pick->device == 1);
+  CHECK_THAT(second.why_not[0], Contains("wants serial number B"));
+  CHECK_FALSE(choose(two, {.profile = "reference_full_speed", .serial = "C"}).pick);
+}
+
+TEST_CASE("after an unplugging only the same device is picked", "[choose_device]") {
+  const WantedDevice wanted = {.profile = "reference_full_speed", .serial = {}, .before = reference("A")};
+  UsbDevice elsewhere = reference("A");
+  elsewhere.place = "1-7";
+  elsewhere.hidraw_node = "/dev/hidraw9";
+  CHECK(choose({elsewhere}, wanted).pick);
+  const DeviceChoice other = choose({reference("B")}, wanted);
+  CHECK_FALSE(other.pick);
+  CHECK_THAT(other.why_not[0],
+             Contains("not the device that was unplugged") && Contains("start wrenchd anew"));
+}
+
+TEST_CASE("a device whose reports are not those of its profile is not picked", "[choose_device]") {
+  UsbDevice other_reports = reference("A");
+  other_reports.report_descriptor = from_hex(
+      "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 0f 91 02 c0");
+  const DeviceChoice choice = choose({other_reports}, {.profile = "reference_full_speed"});
+  CHECK_FALSE(choice.pick);
+  CHECK_THAT(choice.why_not[0], Contains("disagrees") && Contains("output report"));
+  other_reports.report_descriptor = {0x75};
+  CHECK_THAT(choose({other_reports}, {.profile = "reference_full_speed"}).why_not[0], Contains("is refused"));
+}
+
+TEST_CASE("a profile for endpoints takes the interface it names and no other", "[choose_device]") {
+  UsbDevice second = falcon();
+  second.interface = 1;
+  const DeviceChoice choice = choose({second, falcon()}, {.profile = "falcon"});
+  REQUIRE(choice.pick);
+  CHECK(choice.pick->device == 1);
+  CHECK_THAT(choice.why_not[0], Contains("interface 0 of the device, this is 1"));
+}
+
+TEST_CASE("a closed device is refused by name, whatever is wanted", "[choose_device]") {
+  UsbDevice touch = reference("A");
+  touch.vendor = 0x2988;
+  touch.product = 0x0302;
+  const DeviceChoice choice = choose({touch}, {});
+  CHECK_FALSE(choice.pick);
+  CHECK_FALSE(choice.why_not[0].empty());
+}
+
+}  // namespace wrenchd

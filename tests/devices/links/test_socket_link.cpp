@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <chrono>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "devices/links/socket_link.hpp"
+#include "tests/support/no_allocation.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr TimePoint kNow = TimePoint{} + std::chrono::seconds(5);
+
+/// A link and the device at its other end.
+struct Pair {
+  explicit Pair(int type = SOCK_SEQPACKET) {
+    std::array<int, 2> ends{};
+    REQUIRE(socketpair(AF_UNIX, type, 0, ends.data()) == 0);
+    far = ends[0];
+    near = ends[1];
+  }
+  ~Pair() { hang_up(); }
+  void hang_up() {
+    if (far >= 0) ::close(far);
+    far = -1;
+  }
+  void say(const Bytes& report) const {
+    REQUIRE(send(far, report.data(), report.size(), MSG_DONTWAIT) == static_cast<ssize_t>(report.size()));
+  }
+  /// What the link's thread has written, or nothing after a while.
+  Bytes hear() const {
+    constexpr int kPatience_ms = 2000;
+    pollfd waits{far, POLLIN, 0};
+    poll(&waits, 1, kPatience_ms);
+    return hear_now();
+  }
+  Bytes hear_now() const {
+    Bytes report(100);
+    const ssize_t length = recv(far, report.data(), report.size(), MSG_DONTWAIT);
+    report.resize(length > 0 ? static_cast<std::size_t>(length) : 0);
+    return report;
+  }
+  int far = -1, near = -1;
+};
+
+/// The link's thread finds out what a write came to; the next ones are told.
+bool written_until(SocketLink& link, const Bytes& report, LinkStatus wanted) {
+  for (int i = 0; i < 20'000; ++i) {
+    if (link.write(kNow, report) == wanted) return true;
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  return false;
+}
+
+TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_link]") {
+  const Pair pair;
+  SocketLink link(pair.near);
+  link.open();
+  std::array<std::uint8_t, 4> buffer{};
+  CHECK(link.read(kNow, buffer).status == LinkStatus::empty);
+  pair.say({1, 2, 3});
+  pair.say({4, 5, 6, 7, 8, 9});
+  pair.say({});
+  pair.say({10});
+
+  LinkRead read = link.read(kNow, buffer);
+  CHECK(read.status == LinkStatus::ok);
+  CHECK(read.length == 3);
+  CHECK(read.arrived == kNow);
+  CHECK(buffer[2] == 3);
+  read = link.read(kNow, buffer);
+  CHECK(read.length == 6);  // cut to what fits, and its length told
+  CHECK(buffer[3] == 7);
+  read = link.read(kNow, buffer);
+  CHECK(read.status == LinkStatus::ok);  // a report of no bytes is no end
+  CHECK(read.length == 0);
+  CHECK(link.read(kNow, buffer).length == 1);
+  CHECK(link.read(kNow, buffer).status == LinkStatus::empty);
+
+  CHECK(link.write(kNow, Bytes{7, 8}) == LinkStatus::ok);
+  CHECK(pair.hear() == Bytes{7, 8});
+  CHECK(link.write(kNow, Bytes{9}) == LinkStatus::ok);
+  CHECK(pair.hear() == Bytes{9});
+}
+
+TEST_CASE("a device that does not read makes a write fail and not wait", "[socket_link]") {
+  const Pair pair;
+  SocketLink link(pair.near);
+  link.open();
+  const Bytes report(32, 1);
+  CHECK(written_until(link, report, LinkStatus::empty));
+  CHECK(pair.hear() == report);
+  CHECK(written_until(link, report, LinkStatus::ok));  // there is room again
+}
+
+TEST_CASE("when the other end of a socket is gone, so is the device", "[socket_link]") {
+  Pair pair;
+  SocketLink link(pair.near);
+  link.open();
+  std::array<std::uint8_t, 4> buffer{};
+  pair.say({1});
+  pair.hang_up();
+  CHECK(link.read(kNow, buffer).status == LinkStatus::ok);  // what it said before
+  CHECK(link.read(kNow, buffer).status == LinkStatus::gone);
+  CHECK(written_until(link, Bytes{1}, LinkStatus::gone));
+  CHECK_THROWS_WITH(link.open(), Catch::Contains("nobody is at its other end"));
+}
+
+TEST_CASE("a closed socket link is silent, and speaks again when it is opened", "[socket_link]") {
+  const Pair pair;
+  SocketLink link(pair.near);
+  std::array<std::uint8_t, 4> buffer{};
+  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::gone);
+  link.open();
+  link.close();
+  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::gone);
+  CHECK(link.read(kNow, buffer).status == LinkStatus::gone);
+  CHECK(pair.hear_now().empty());
+  link.open();
+  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::ok);
+  CHECK(pair.hear() == Bytes{1});
+}
+
+TEST_CASE("what is no socket of packets is refused with the cure", "[socket_link]") {
+  const Pair stream(SOCK_STREAM);
+  SocketLink of_stream(stream.near);
+  CHECK_THROWS_WITH(of_stream.open(),
+                    Catch::Contains("no SOCK_SEQPACKET socket") && Catch::Contains("socketpair"));
+  SocketLink of_file(::open("/dev/null", O_RDWR | O_CLOEXEC));
+  CHECK_THROWS_WITH(of_file.open(), Catch::Contains("no SOCK_SEQPACKET socket"));
+  SocketLink of_nothing(-1);
+  CHECK_THROWS_WITH(of_nothing.open(), Catch::Contains("device socket -1"));
+}
+
+TEST_CASE("waiting on a socket ends with a report, and with the deadline", "[socket_link]") {
+  const Pair pair;
+  SocketLink link(pair.near);
+  link.open();
+  const TimePoint start = std::chrono::steady_clock::now();
+  link.wait_readable(start + std::chrono::milliseconds(20));
+  CHECK(std::chrono::steady_clock::now() - start >= std::chrono::milliseconds(20));
+  pair.say({1});
+  link.wait_readable(std::chrono::steady_clock::now() + std::chrono::hours(1));  // or this test never ends
+}
+
+TEST_CASE("a socket is read and written without allocating or locking", "[socket_link]") {
+  const Pair pair;
+  SocketLink link(pair.near);
+  link.open();
+  pair.say({1, 2, 3});
+  std::array<std::uint8_t, 64> buffer{};
+  std::uint64_t allocations = 0, locks = 0;
+  {
+    const RealtimeGuard guard;
+    link.read(kNow, buffer);
+    link.read(kNow, buffer);
+    link.write(kNow, std::span(buffer).first(3));
+    link.wait_readable(kNow);
+    allocations = guard.allocations(), locks = guard.locks();
+  }
+  CHECK(allocations == 0);
+  CHECK(locks == 0);
+}
+
+}  // namespace
+}  // namespace wrenchd

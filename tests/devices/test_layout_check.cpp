@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "config/load_profile.hpp"
+#include "devices/layout_check.hpp"
+#include "devices/profile_reports.hpp"
+#include "devices/simulation/reference_layout.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/sample_descriptors.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+using Lines = std::vector<std::string>;
+
+ReportDescriptor parsed(const Bytes& bytes) {
+  return parse_report_descriptor(bytes);
+}
+
+/// The descriptor that devices/README.md gives to makers.
+const std::string kReference =
+    "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0";
+ReportDescriptor reference_device() {
+  return parsed(from_hex(kReference));
+}
+
+/// Six axes as a profile of a SpaceMouse would have them, with what is to be wrong.
+ExpectedReport combined(std::vector<ExpectedField> fields, std::size_t length = 13) {
+  return {ReportKind::input, 1, length, std::move(fields)};
+}
+
+TEST_CASE("the reference layout agrees with the descriptor its page gives", "[layout_check]") {
+  const auto expected = expected_reports(reference_profile());
+  REQUIRE(expected.size() == 2);
+  CHECK(expected[0].fields.size() == 11);
+  CHECK(expected[1].fields.size() == 6);
+  CHECK(differences(reference_device(), expected) == Lines{});
+}
+
+TEST_CASE("a profile for another device is told apart, line by line", "[layout_check]") {
+  const Lines lines = differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
+  REQUIRE(lines.size() == 13);  // no field agrees
+  CHECK(lines[0] == "input report 0x01: the profile says 64 bytes, the device 13");
+  CHECK(lines[1] ==
+        "input report 0x01, checksum: the profile says 16 bits, unsigned, from byte 62; the device's report "
+        "ends with byte 12");
+  CHECK(lines[2] ==
+        "input report 0x01, motors_on: the profile says 1 bit, unsigned, at byte 1; there the device has "
+        "01:30 (X), 16 bits, signed, from byte 1");
+  CHECK(lines[6] ==
+        "input report 0x01, position[0]: the profile says 32 bits, signed, from byte 8; there the device has "
+        "01:33 (Rx), 16 bits, signed, from byte 7; 01:34 (Ry), 16 bits, signed, from byte 9; 01:35 (Rz), "
+        "16 bits, signed, from byte 11");
+  CHECK(lines.back() == "output report 0x02: the device has none such; its output reports: 0x04");
+}
+
+TEST_CASE("fields of a device agree where they are, as wide as they are, with their sign", "[layout_check]") {
+  const ReportDescriptor device = parsed(space_mouse_wireless());
+  const auto lines = [&](const ExpectedField& field) { return differences(device, {combined({field})}); };
+  CHECK(lines({"translation", 8, 16, 3, true}).empty());
+  CHECK(lines({"all six", 8, 16, 6, true}).empty());
+  CHECK(lines({"too many", 8, 16, 7, true}).size() == 1);
+  CHECK(lines({"unsigned", 8, 16, 1, false}).size() == 1);
+  CHECK(lines({"half", 8, 8, 1, true}).size() == 1);
+  CHECK(lines({"a bit of it", 8, 1, 1, false}).size() == 1);
+  CHECK(lines({"off by one byte", 16, 16, 1, true}).size() == 1);
+  CHECK(lines({"off by one bit", 9, 16, 1, true}).size() == 1);
+  CHECK(lines({"twice as wide", 8, 32, 1, true}).size() == 1);
+  CHECK(lines({"the report id", 0, 8, 1, false}).size() == 1);
+}
+
+TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them", "[layout_check]") {
+  const ReportDescriptor device = parsed(space_navigator());
+  const auto agrees = [&](std::size_t bit, unsigned bits) {
+    return differences(device, {{ReportKind::input, 3, 3, {{"buttons", bit, bits, 1, false}}}}).empty();
+  };
+  CHECK(agrees(8, 1));
+  CHECK(agrees(9, 1));
+  CHECK(agrees(8, 2));
+  CHECK(agrees(8, 8));
+  CHECK(agrees(8, 16));
+  CHECK_FALSE(agrees(10, 1));
+  CHECK_FALSE(agrees(16, 8));
+  CHECK_FALSE(agrees(8, 17));
+
+  // Two axes of a byte each are two values, not one of two bytes.
+  const ReportDescriptor mouse =
+      parsed(from_hex("05 01 09 02 a1 01 15 81 25 7f 75 08 95 02 09 30 09 31 81 06 c0"));
+  CHECK(differences(mouse, {{ReportKind::input, {}, 2, {{"axis", 0, 8, 2, true}}}}).empty());
+  CHECK(differences(mouse, {{ReportKind::input, {}, 2, {{"both", 0, 16, 1, true}}}}).size() == 1);
+}
+
+TEST_CASE("bytes of the maker's own agree with all that lies within them", "[layout_check]") {
+  const ReportDescriptor device = parsed(teensy_rawhid());
+  const auto agrees = [&](const ExpectedField& field) {
+    return differences(device, {{ReportKind::input, {}, 64, {field}}}).empty();
+  };
+  CHECK(agrees({"encoders", 0, 16, 6, true}));
+  CHECK(agrees({"a bit", 77, 1, 1, false}));
+  CHECK(agrees({"a nibble and more", 4, 12, 1, true}));
+  CHECK(agrees({"all", 0, 64, 8, false}));
+  CHECK_FALSE(agrees({"one more", 0, 8, 65, false}));
+}
+
+TEST_CASE("words of the maker's own may be taken by bits, but not across their ends", "[layout_check]") {
+  const ReportDescriptor device =
+      parsed(from_hex("06 00 ff 09 01 a1 01 16 00 80 26 ff 7f 75 10 95 04 09 02 81 02 c0"));
+  const auto agrees = [&](const ExpectedField& field) {
+    return differences(device, {{ReportKind::input, {}, 8, {field}}}).empty();
+  };
+  CHECK(agrees({"word", 16, 16, 3, true}));
+  CHECK(agrees({"flag", 19, 1, 1, false}));
+  CHECK_FALSE(agrees({"sign", 16, 16, 1, false}));
+  CHECK_FALSE(agrees({"across", 8, 16, 1, true}));
+  CHECK_FALSE(agrees({"two", 0, 32, 1, true}));
+}
+
+TEST_CASE("report ids that the other side does not have are told", "[layout_check]") {
+  const ExpectedReport with{ReportKind::input, 1, 65, {}}, without{ReportKind::input, {}, 64, {}};
+  CHECK(differences(parsed(teensy_rawhid()), {without}).empty());
+  CHECK(differences(parsed(teensy_rawhid()), {with}) ==
+        Lines{"input report 0x01: the device has none such; its input reports: without an id"});
+  CHECK(differences(parsed(space_navigator()), {without}) ==
+        Lines{"input report without an id: the device has none such; its input reports: 0x01, 0x02, 0x03"});
+  CHECK(differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
+        Lines{"output report without an id: the device has none such; it has no output report"});
+}
+
+TEST_CASE("a report may be as short as is allowed, and one that need not be there may be absent",
+          "[layout_check]") {
+  const ReportDescriptor device = parsed(space_navigator());  // report 3 has 3 bytes, with 2 buttons
+  const ExpectedField buttons{"buttons", 8, 32, 1, false};
+  ExpectedReport report{ReportKind::input, 3, 7, {buttons}};
+  CHECK(differences(device, {report}).size() == 2);  // its length, and the field beyond its end
+  report.least_length = 3;
+  CHECK(differences(device, {report}) == Lines{});
+  report.least_length = 4;
+  CHECK(differences(device, {report}).size() == 2);
+  const ExpectedField axis{"axis", 8, 16, 6, false};  // what is there has to agree as ever
+  CHECK(differences(device, {{ReportKind::input, 1, 13, {axis}, 7, false}}).size() == 1);
+
+  report.id = 0x17;
+  CHECK(differences(device, {report}).size() == 1);
+  report.may_be_absent = true;
+  CHECK(differences(device, {report}) == Lines{});
+}
+
+TEST_CASE("a profile without report ids expects a device without them", "[layout_check]") {
+  DeviceProfile profile = reference_profile();
+  profile.pose_report.has_id = false;
+  profile.wrench_report.has_id = false;
+  const auto expected = expected_reports(profile);
+  CHECK_FALSE(expected[0].id);
+  CHECK(expected[0].length == 64);
+  const ReportDescriptor device =
+      parsed(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 40 09 01 81 02 95 20 09 02 91 02 c0"));
+  CHECK(differences(device, expected) == Lines{});
+}
+
+TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layout_check]") {
+  const auto differ = [&](const char* name, const Bytes& descriptor) {
+    return differences(
+        parsed(descriptor),
+        expected_reports(load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name))));
+  };
+  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == Lines{});
+  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == Lines{});
+  CHECK(differ("polhem.toml", teensy_rawhid()) == Lines{});
+  // Buttons of two bytes where the profile takes up to six, no battery, and a battery where there is one.
+  CHECK(differ("spacemouse_split.toml", space_navigator()) == Lines{});
+  CHECK(differ("spacemouse_split.toml", home_made_split()) == Lines{});
+  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == Lines{});
+  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == Lines{});
+  CHECK_FALSE(differ("spacemouse_combined.toml", space_navigator()).empty());
+  CHECK_FALSE(differ("spacemouse_split.toml", space_mouse_wireless()).empty());
+}
+
+TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_check]") {
+  const std::string profile = WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml";
+  const TemporaryDirectory dir;
+  const auto check = [&](const std::string& file, const std::string& descriptor) {
+    const auto source = dir.write("descriptor.txt", descriptor);
+    return run_program("wrenchctl", {"check", file, "--against", source.string()});
+  };
+  const std::string source = (dir.path() / "descriptor.txt").string();
+  const ProgramResult good = check(profile, kReference);
+  CHECK(good.exit_code == 0);
+  CHECK(good.err.empty());
+  CHECK(good.out.find(profile + ": agrees with the report descriptor of " + source + "\n") !=
+        std::string::npos);
+
+  std::string shorter = kReference;
+  shorter.replace(shorter.find("95 3f"), 5, "95 3e");
+  const ProgramResult bad = check(profile, shorter);
+  CHECK(bad.exit_code == 1);
+  CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with what " + source +
+                       " says of its reports; change the profile, or name the device it is for:\n"
+                       "  input report 0x01: the profile says 64 bytes, the device 63\n"
+                       "  input report 0x01, checksum: the profile says 16 bits, unsigned, from byte 62; the "
+                       "device's report ends with byte 62\n");
+
+  const ProgramResult scene = check(WRENCHD_SOURCE_DIR "/config/scenes/cube_on_table.toml", kReference);
+  CHECK(scene.exit_code == 1);
+  CHECK(scene.err.find("cube_on_table.toml") != std::string::npos);
+  const ProgramResult broken = check(profile, "05 01 c0");
+  CHECK(broken.exit_code == 1);
+  CHECK(broken.err ==
+        "wrenchctl: " + source + ": report descriptor, byte 2: ends a collection, and none is open\n");
+}
+
+}  // namespace
+}  // namespace wrenchd

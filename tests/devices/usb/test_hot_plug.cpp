@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <atomic>
+#include <optional>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "config/calibration_store.hpp"
+#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/simulated_device.hpp"
+#include "tests/devices/usb/mock_device.hpp"
+#include "tests/support/run_program.hpp"
+
+// The whole daemon, a process of its own, with a device that is plugged in and out.
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using namespace std::chrono_literals;
+using Catch::Contains;
+
+namespace {
+
+/// The reference device behind a mock hidraw node, alive on a thread: what it reports goes to the host, what
+/// the host writes comes to it. The far end of the node is a stream, which runs reports together that wait,
+/// so no more than one in 2 ms is sent.
+class LiveHandle : ReportSink {
+ public:
+  LiveHandle(MockMachine& machine, const MockIdentity& identity)
+      : mock_(machine, identity), device_(reference_profile(), settings()), thread_([this] { live(); }) {}
+  ~LiveHandle() { stop(); }
+
+  void unplug() {
+    stop();
+    mock_.unplug();
+  }
+  bool was_pushed() const { return pushed_.load(); }
+  int commands() const { return commands_.load(); }
+
+ private:
+  static SimulationSettings settings() {
+    SimulationSettings settings;
+    settings.hand_path = {{0.0, {0, 0, 0.03}, {0, 0, 0}}};
+    return settings;
+  }
+
+  void take_report(TimePoint, std::span<const std::uint8_t> report) noexcept override {
+    newest_.assign(report.begin(), report.end());
+  }
+  void live() {
+    while (!stop_.load()) {
+      device_.advance_to(std::chrono::steady_clock::now(), *this);
+      send();
+      while (mock_.anything_received()) {
+        device_.take_command(std::chrono::steady_clock::now(), mock_.receive(32));
+        ++commands_;
+      }
+      if (device_.firmware().motors_on()) pushed_.store(true);
+      std::this_thread::sleep_for(2ms);
+    }
+  }
+  /// What a host does not read in time is lost.
+  void send() {
+    try {
+      if (!newest_.empty()) mock_.send(newest_);
+    } catch (const std::runtime_error&) {
+    }
+  }
+  void stop() {
+    stop_.store(true);
+    if (thread_.joinable()) thread_.join();
+  }
+
+  MockHidraw mock_;
+  SimulatedDevice device_;
+  Bytes newest_;
+  std::atomic<bool> stop_{false}, pushed_{false};
+  std::atomic<int> commands_{0};
+  std::thread thread_;
+};
+
+template <class Condition>
+bool soon(const Condition& condition) {
+  for (const auto end = std::chrono::steady_clock::now() + 60s; std::chrono::steady_clock::now() < end;
+       std::this_thread::sleep_for(5ms))
+    if (condition()) return true;
+  return false;
+}
+
+/// A profile that minds no silence of this machine's.
+const char* const kPatient = R"(inherits = "reference_full_speed"
+name = "patient"
+stale_fault_s = 1.0
+[match]
+usb = ["1209:6d0f"]
+[pose_report]
+sequence = "none"
+)";
+/// Nor asks for what a mock on a busy machine cannot do.
+const char* const kLenient = "[servo]\nself_test_s = 0\n";
+
+}  // namespace
+
+TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unplugging", "[usb]") {
+  MockMachine machine;
+  const TemporaryDirectory files;
+  const std::string profile = files.write("patient.toml", kPatient).string();
+  const std::string config = files.write("lenient.toml", kLenient).string();
+  RunningProgram wrenchd("wrenchd",
+                         {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
+  REQUIRE(wrenchd.says("no device of profile patient is plugged in; waiting for it"));
+
+  std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
+  REQUIRE(wrenchd.says("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
+  REQUIRE(soon([&] { return handle->was_pushed(); }));  // --arm armed it
+  handle->unplug();
+  REQUIRE(wrenchd.says("device_lost: "));
+  handle.reset();
+
+  handle.emplace(machine, MockIdentity{.place = "1-3", .number = 4, .serial = "B2"});
+  REQUIRE(wrenchd.says("serial B2 in 1-3, interface 0: it is not the device that was unplugged"));
+  CHECK(handle->commands() == 0);
+  handle->unplug();
+  handle.reset();
+
+  handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
+  REQUIRE(wrenchd.says("the device is back, disarmed: 1209:6d0f serial A1 in 1-4"));
+  REQUIRE(soon([&] { return handle->commands() > 300; }));
+  CHECK_FALSE(handle->was_pushed());
+
+  wrenchd.signal(SIGTERM);
+  const ProgramResult result = wrenchd.wait();
+  INFO(result.err);
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.err, Contains("the hand is released"));
+}
+
+TEST_CASE("without a profile's name wrenchd takes the one that the device has", "[usb]") {
+  MockMachine machine;
+  const LiveHandle handle(machine, {.vendor = "1209", .product = "0001"});
+  RunningProgram wrenchd("wrenchd", {"--profile", "auto", "--realtime", "best_effort"});
+  CHECK(wrenchd.says("device reference_full_speed"));
+  CHECK(soon([&] { return handle.commands() > 10; }));
+  wrenchd.signal(SIGTERM);
+  CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
+}
+
+TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]") {
+  MockMachine machine;
+  const TemporaryDirectory files;
+  const std::string profile =
+      files.write("patient.toml", std::string(kPatient) + "[homing]\ncheck_axes = true\n").string();
+  const std::string config = files.write("lenient.toml", kLenient).string();
+  const CalibrationStore store(files.path() / "calibration");
+  const bool calibrated = GENERATE(false, true);
+  if (calibrated) store.write({"patient", "A1", {}});
+  setenv("STATE_DIRECTORY", files.path().c_str(), 1);
+  const LiveHandle handle(machine, {});
+  RunningProgram wrenchd("wrenchd",
+                         {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
+  unsetenv("STATE_DIRECTORY");
+  if (calibrated) {
+    CHECK(soon([&] { return handle.was_pushed(); }));
+  } else {
+    CHECK(wrenchd.says("may not be armed: it was never calibrated; run wrenchctl calibrate patient"));
+    CHECK(soon([&] { return handle.commands() > 300; }));
+    CHECK_FALSE(handle.was_pushed());
+  }
+  wrenchd.signal(SIGTERM);
+  CHECK(wrenchd.wait().exit_code == 0);
+}
+
+TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing", "[usb]") {
+  MockMachine machine;
+  const TemporaryDirectory files;
+  const std::string profile = files.write("patient.toml", kPatient).string();
+  setenv("STATE_DIRECTORY", files.path().c_str(), 1);
+  const LiveHandle handle(machine, {});
+  RunningProgram wrenchctl("wrenchctl", {"calibrate", profile});
+  unsetenv("STATE_DIRECTORY");
+  CHECK(soon(
+      [&] { return wrenchctl.out().find("Push the handle straight away from you.") != std::string::npos; }));
+  wrenchctl.signal(SIGINT);
+  const ProgramResult result = wrenchctl.wait();
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.err, Contains("stopped; nothing was stored"));
+  CHECK_FALSE(std::filesystem::exists(files.path() / "calibration"));
+  CHECK_FALSE(handle.was_pushed());
+}

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <csignal>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/control/json_rpc.hpp"
+#include "tests/support/run_program.hpp"
+
+// wrenchctl and the daemon, as two programs.
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+constexpr const char* kStillHand =
+    "repeats = false\n[[waypoint]]\ntime_s = 0.0\nposition_m = [0.0, 0.0, 0.065]\n";
+
+bool has(const std::string& text, const std::string& part) {
+  INFO(text);
+  CHECK(text.find(part) != std::string::npos);
+  return text.find(part) != std::string::npos;
+}
+
+/// A daemon whose simulated hand rests above the table, ready to be armed.
+struct Daemon {
+  TemporaryDirectory dir;
+  std::string socket = (dir.path() / "control.sock").string();
+  RunningProgram program;
+
+  explicit Daemon(const std::string& profile = "loopback") : program("wrenchd", arguments(profile)) {
+    const bool runs = program.says("control socket: " + socket) && program.says("state: disarmed");
+    INFO(program.err());
+    REQUIRE(runs);
+  }
+
+  ProgramResult ctl(std::vector<std::string> words) const {
+    words.insert(words.begin() + 1, {"--socket", socket});
+    return run_program("wrenchctl", words);
+  }
+  std::string state() const { return Json::parse(ctl({"status", "--json"}).out)["state"]; }
+  bool comes_to(const std::string& state) const {
+    for (int i = 0; i < 200; ++i) {
+      if (this->state() == state) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return false;
+  }
+
+ private:
+  std::vector<std::string> arguments(const std::string& profile) const {
+    dir.write("hand.toml", kStillHand);
+    const auto config = dir.write(
+        "wrenchd.toml", "[limits]\nsoft_start_s = 0.25\n[simulation]\nhand_script = \"hand.toml\"\n");
+    return {"--realtime", "best_effort", "--config",   config.string(),
+            "--control",  socket,        "--simulate", profile};
+  }
+};
+
+TEST_CASE("wrenchctl tells the status of a daemon, for a person and for a program", "[control_commands]") {
+  const Daemon daemon;
+  const ProgramResult text = daemon.ctl({"status"});
+  CHECK(text.exit_code == 0);
+  for (const char* part :
+       {"state      disarmed\n", "device     loopback (simulated), present\n", "armed by   nobody\n",
+        "lease      nobody has it\n", "limits     10 N, 0.5 N.m\n", "at 1000 Hz", "(p50 / p99.9 / max)"})
+    has(text.out, part);
+  const ProgramResult json = daemon.ctl({"status", "--json"});
+  CHECK(json.exit_code == 0);
+  const Json status = Json::parse(json.out);
+  CHECK(status["state"] == "disarmed");
+  CHECK(status["device"]["profile"] == "loopback");
+  CHECK(status["tick"] > 0);
+}
+
+TEST_CASE("wrenchctl tells that a device without motors is not felt", "[control_commands]") {
+  const Daemon daemon("spacemouse_split");
+  has(daemon.ctl({"status"}).out, "limits     0 N, 0 N.m: it has no motors, and nothing is felt\n");
+}
+
+TEST_CASE("wrenchctl arm holds the hand until it is interrupted, and everybody can watch",
+          "[control_commands][wall_time]") {
+  const Daemon daemon;
+  RunningProgram watch("wrenchctl", {"watch", "--socket", daemon.socket, "--json"});
+  for (int i = 0; i < 500 && watch.out().empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  RunningProgram arm("wrenchctl", {"arm", "--socket", daemon.socket});
+  REQUIRE(daemon.comes_to("active"));
+  const Json status = Json::parse(daemon.ctl({"status", "--json"}).out);
+  has(status["armed_by"], "process ");
+
+  const ProgramResult second = daemon.ctl({"disarm"});
+  CHECK(second.exit_code == 0);
+  const ProgramResult taken = arm.wait();
+  CHECK(taken.exit_code == 1);
+  has(taken.err, "the daemon has disarmed");
+
+  RunningProgram again("wrenchctl", {"arm", "--socket", daemon.socket});
+  REQUIRE(daemon.comes_to("active"));
+  const ProgramResult other = daemon.ctl({"arm"});
+  CHECK(other.exit_code == 1);
+  has(other.err, "wrenchctl: The lease is held by process ");
+  again.signal(SIGINT);
+  const ProgramResult result = again.wait();
+  CHECK(result.exit_code == 0);
+  has(result.out, "state: releasing");
+  has(result.out, "state: disarmed");
+  CHECK(daemon.state() == "disarmed");
+
+  watch.signal(SIGTERM);
+  const ProgramResult seen = watch.wait();
+  CHECK(seen.exit_code == 0);
+  std::istringstream lines(seen.out);
+  std::string line;
+  REQUIRE(std::getline(lines, line));
+  auto last = Json::parse(line)["sequence"].get<std::uint64_t>();
+  std::string states;
+  while (std::getline(lines, line)) {
+    const Json event = Json::parse(line);
+    CHECK(event["sequence"] == ++last);
+    if (event["name"] == "state") states += event["state"].get<std::string>() + " ";
+  }
+  has(states, "waiting ramping active releasing disarmed waiting ramping active releasing disarmed ");
+}
+
+TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wall_time]") {
+  const Daemon daemon;
+  RunningProgram arm("wrenchctl", {"arm", "--socket", daemon.socket});
+  REQUIRE(daemon.comes_to("active"));
+  SECTION("killed") {
+    arm.signal(SIGKILL);
+    CHECK(daemon.program.says("hung up", std::chrono::seconds(5)));
+  }
+  SECTION("stopped") {
+    arm.signal(SIGSTOP);
+    CHECK(daemon.program.says("gives no sign of life", std::chrono::seconds(5)));
+  }
+  CHECK(daemon.program.says("client_gone: ", std::chrono::seconds(5)));
+  CHECK(daemon.comes_to("disarmed"));
+}
+
+TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
+  const Daemon daemon;
+  CHECK(daemon.ctl({"acknowledge"}).exit_code == 1);
+  const ProgramResult stop = daemon.ctl({"stop"});
+  CHECK(stop.exit_code == 0);
+  has(stop.out, "asked: stop; state stopped");
+  has(daemon.ctl({"status"}).out, "cause      stop_asked: ");
+  const ProgramResult arm = daemon.ctl({"arm"});
+  CHECK(arm.exit_code == 1);
+  has(arm.err, "It cannot be armed in state 'stopped': acknowledge what happened first.");
+  CHECK(daemon.ctl({"acknowledge"}).exit_code == 0);
+  CHECK(daemon.comes_to("disarmed"));
+}
+
+TEST_CASE("wrenchctl describe shows what can be asked, by whom", "[control_commands]") {
+  const Daemon daemon;
+  const ProgramResult all = daemon.ctl({"describe"});
+  CHECK(all.exit_code == 0);
+  for (const char* part : {"lease.take  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
+                           "from_other: true or false, may be left out; "})
+    has(all.out, part);
+  const ProgramResult one = daemon.ctl({"describe", "arm"});
+  CHECK(one.out.find("arm  (operator)\n") == 0);
+  CHECK(one.out.find("stop") == std::string::npos);
+  const ProgramResult none = daemon.ctl({"describe", "dance"});
+  CHECK(none.exit_code == 1);
+  has(none.err, "there is no method 'dance'; wrenchctl describe, without a name, lists them");
+}
+
+TEST_CASE("wrenchctl says where it looked for a daemon, and what to do", "[control_commands]") {
+  const TemporaryDirectory dir;
+  const std::string socket = (dir.path() / "control.sock").string();
+  const ProgramResult gone = run_program("wrenchctl", {"status", "--socket", socket});
+  CHECK(gone.exit_code == 1);
+  CHECK(gone.out == "");
+  has(gone.err, "wrenchctl: no wrenchd answers (" + socket + ": No such file or directory); start it");
+  const ProgramResult usual = run_program("wrenchctl", {"arm"});  // tests have $WRENCHD_SOCKET set to none
+  CHECK(usual.exit_code == 1);
+  has(usual.err, "no wrenchd answers (none: ");
+}
+
+TEST_CASE("beside a daemon that has the socket no second one starts, and what it finds is told",
+          "[control_commands]") {
+  const Daemon daemon;
+  const ProgramResult second =
+      run_program("wrenchd", {"--realtime", "off", "--seconds", "0.1", "--control", daemon.socket});
+  CHECK(second.exit_code == 1);
+  has(second.err, "another wrenchd listens there; stop it, or name another path with --control");
+  CHECK(daemon.state() == "disarmed");
+  has(run_program("wrenchd", {"--realtime", "off", "--seconds", "0.1", "--control", "here.sock"}).err,
+      "wrenchd: --control: expected an absolute path, or \"none\", found \"here.sock\"");
+  const TemporaryDirectory dir;
+  const auto config = dir.write("wrenchd.toml", "[control]\noperators = \"no-such-group-here\"\n");
+  const ProgramResult group = run_program("wrenchd", {"--realtime", "off", "--seconds", "0.1", "--config",
+                                                      config.string(), "--control", daemon.socket + "2"});
+  CHECK(group.exit_code == 1);
+  has(group.err, "key 'control.operators': this machine has no group 'no-such-group-here'; make it with");
+}
+
+TEST_CASE("a daemon armed by its command line can be disarmed by anybody who operates",
+          "[control_commands]") {
+  const TemporaryDirectory dir;
+  const std::string socket = (dir.path() / "control.sock").string();
+  const RunningProgram program("wrenchd", {"--realtime", "off", "--arm", "--control", socket});
+  REQUIRE(program.says("state: waiting"));
+  const Json status = Json::parse(run_program("wrenchctl", {"status", "--json", "--socket", socket}).out);
+  CHECK(status["armed_by"] == "command line");
+  CHECK(run_program("wrenchctl", {"disarm", "--socket", socket}).exit_code == 0);
+  CHECK(program.says("state: disarmed"));
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/recording/replay.hpp"
+#include "tests/support/exact_meeting.hpp"
+#include "tests/support/exhibit_run.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tools/gallery.hpp"
+
+// Every scene of the gallery, felt once through its hand script: no fault, nothing cut through, and what its
+// paragraph says is so in figures.
+
+namespace wrenchd::test {
+namespace {
+
+/// Under sanitizers everything takes many times as long: only as much of a script then.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr double kSeconds = 2.0;
+#else
+constexpr double kSeconds = 0.0;  // all of it
+#endif
+
+Pose pose_of(const std::array<double, 7>& x) {
+  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
+}
+
+/// That the tool has nothing in common with any obstacle, looked at in exact arithmetic.
+class Admissible {
+ public:
+  explicit Admissible(const SceneSettings& settings) : scene_(settings) {
+    for (const MeshObstacle& obstacle : scene_.meshes())
+      meetings_.push_back(
+          std::make_unique<ExactMeeting>(scene_.tool_mesh()->surface.mesh(), obstacle.mesh->surface.mesh()));
+  }
+
+  bool at(const Pose& X_WT, double scene_time_s) const {
+    for (std::size_t k = 0; k < meetings_.size(); ++k)
+      if (meetings_[k]->meet(inverse(scene_.meshes()[k].X_WO_at(scene_time_s)) * X_WT)) return false;
+    for (const HalfSpaceSettings& half_space : scene_.half_spaces())
+      for (const Vector3d& p : scene_.tool().hull.vertices_T_m)
+        if (half_space.normal_W.dot(X_WT * p) < half_space.offset_m - kRounding_m) return false;
+    return true;
+  }
+
+ private:
+  static constexpr double kRounding_m = 1e-12;  ///< half-spaces are touched, and not kept clear of
+  Scene scene_;
+  std::vector<std::unique_ptr<ExactMeeting>> meetings_;
+};
+
+std::vector<std::string> names() {
+  std::vector<std::string> all;
+  for (const Exhibit& exhibit : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"})))
+    all.push_back(exhibit.name);
+  return all;
+}
+
+/// So many poses of a run are looked at: meshes of a hundred thousand triangles take exact arithmetic a
+/// while.
+std::size_t poses_of(const Scene& scene) {
+  std::size_t triangles = scene.tool().mesh.triangles.size();
+  for (const MeshObstacle& obstacle : scene.meshes()) triangles += obstacle.mesh->surface.triangles().size();
+  return triangles > 50'000 ? 60 : 400;
+}
+
+void check_exhibit(const std::string& name) {
+  INFO(name);
+  const ExhibitRun run = run_exhibit(name, kSeconds);
+
+  std::size_t placed = 0;
+  for (const TickRecord& tick : run.ticks) {
+    if (tick.faults != 0) FAIL("tick " << tick.tick << ": faults " << tick.faults);
+    placed += static_cast<Placing>(tick.placing) == Placing::following ? 1 : 0;
+  }
+  CHECK(placed + 10 > run.ticks.size());
+  CHECK(static_cast<State>(run.ticks.back().state) == State::active);
+
+  const Admissible admissible(run.plan.scene);
+  const std::size_t step = std::max<std::size_t>(1, run.ticks.size() / poses_of(Scene(run.plan.scene)));
+  std::size_t touching = 0;
+  for (std::size_t i = step / 2; i < run.ticks.size(); i += step) {
+    if (static_cast<Placing>(run.ticks[i].placing) != Placing::following) continue;
+    INFO("tick " << i);
+    CHECK(admissible.at(pose_of(run.ticks[i].X_WQ), run.scene_time_s[i]));
+    touching += run.ticks[i].contacts > 0 ? 1 : 0;
+  }
+
+  Recording recording;
+  recording.ticks = run.ticks;
+  const auto difference = replay(recording, run.plan);
+  if (difference) FAIL("replay: tick " << difference->tick << ' ' << difference->field);
+
+  if (kSeconds > 0.0) return;
+  CHECK(touching > 10);
+  const std::vector<ExpectedFigure> expected = expected_figures(name);
+  CHECK(expected.size() >= 6);
+  for (const ExpectedFigure& e : expected) {
+    INFO(e.quantity << (e.time_s >= 0.0 ? " at " + std::to_string(e.time_s) + " s" : std::string()));
+    const double found = figure(run, e.quantity, e.time_s);
+    CHECK(found >= e.least);
+    CHECK(found <= e.most);
+  }
+}
+
+TEST_CASE("gallery: the cube of the paper", "[gallery]") {
+  check_exhibit("paper_cube");
+}
+TEST_CASE("gallery: a peg in its hole", "[gallery]") {
+  check_exhibit("peg_in_hole");
+}
+TEST_CASE("gallery: a key in its lock", "[gallery]") {
+  check_exhibit("key_in_lock");
+}
+TEST_CASE("gallery: a pair of gears", "[gallery]") {
+  check_exhibit("gear_pair");
+}
+TEST_CASE("gallery: a bolt and its nut", "[gallery]") {
+  check_exhibit("bolt_and_nut");
+}
+TEST_CASE("gallery: two hares", "[gallery]") {
+  check_exhibit("hares");
+}
+TEST_CASE("gallery: a thin plate", "[gallery]") {
+  check_exhibit("thin_plate");
+}
+TEST_CASE("gallery: a staircase", "[gallery]") {
+  check_exhibit("staircase");
+}
+TEST_CASE("gallery: an obstacle that moves", "[gallery]") {
+  check_exhibit("moving_obstacle");
+}
+
+TEST_CASE("a recording of a scene whose meshes are made needs nothing but itself", "[gallery][program]") {
+  const TemporaryDirectory files;
+  const std::string file = (files.path() / "run.h5").string();
+  const std::string name = GENERATE("staircase", "peg_in_hole");
+  REQUIRE(run_program("wrenchd", {"--config", "gallery/" + name + ".toml", "--virtual-time", "--arm",
+                                  "--seconds", "3", "--record", file})
+              .exit_code == 0);
+  const ProgramResult again = run_program("wrenchctl", {"replay", file});
+  INFO(again.err);
+  CHECK(again.exit_code == 0);
+  CHECK(again.out.find("with: what is in the recording") != std::string::npos);
+  CHECK(again.out.find("3001 ticks, all the same, bit for bit") != std::string::npos);
+}
+
+TEST_CASE("every scene of the gallery says what it is, repeats, has a camera, and is tested", "[gallery]") {
+  const std::vector<std::string> all = names();
+  CHECK(all == std::vector<std::string>{"bolt_and_nut", "gear_pair", "hares", "key_in_lock",
+                                        "moving_obstacle", "paper_cube", "peg_in_hole", "staircase",
+                                        "thin_plate"});
+  for (const std::string& name : all) {
+    INFO(name);
+    const Plan plan = exhibit_plan(name);
+    CHECK(plan.settings.description.size() > 200);
+    CHECK(plan.settings.simulation.hand_repeats);
+    CHECK(plan.settings.wrench.law == SpringLaw::energy);
+    CHECK((plan.settings.view.eye_m - plan.settings.view.target_m).norm() > 0.05);
+    CHECK_FALSE(expected_figures(name).empty());
+  }
+}
+
+TEST_CASE("wrenchctl gallery lists the scenes, and shows one", "[gallery][wrenchctl]") {
+  const ProgramResult list = run_program("wrenchctl", {"gallery"});
+  CHECK(list.exit_code == 0);
+  for (const std::string& name : names()) CHECK_THAT(list.out, Catch::Contains(name + " "));
+  CHECK_THAT(list.out, Catch::Contains("peg_in_hole      A peg of 19.8 mm for a hole of 20 mm.\n"));
+
+  const ProgramResult one = run_program("wrenchctl", {"gallery", "staircase"});
+  CHECK(one.exit_code == 0);
+  CHECK_THAT(one.out, Catch::Contains("wrenchd --arm --live --config gallery/staircase.toml"));
+  CHECK_THAT(one.out, Catch::Contains("tools/run staircase"));
+
+  const ProgramResult near = run_program("wrenchctl", {"gallery", "stair_case"});
+  CHECK(near.exit_code == 1);
+  CHECK_THAT(near.err, Catch::Contains("there is no 'stair_case'; did you mean 'staircase'?"));
+  const ProgramResult none = run_program("wrenchctl", {"gallery", "teapot"});
+  CHECK(none.exit_code == 1);
+  CHECK_THAT(none.err, Catch::Contains("there are bolt_and_nut, gear_pair"));
+}
+
+TEST_CASE("tools/run refuses a name that is not in the gallery, with those there are", "[gallery]") {
+  const ProgramResult result = run_program("../../../tools/run", {"teapot"});
+  CHECK(result.exit_code == 1);
+  CHECK_THAT(result.err, Catch::Contains("there is no 'teapot' in the gallery; there are bolt_and_nut"));
+}
+
+}  // namespace
+}  // namespace wrenchd::test
