@@ -6,14 +6,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "collision/pairs/pairs_ahead.hpp"
+#include "collision/pairs/bvh_traversal.hpp"
+#include "collision/pairs/predictive_candidate_list.hpp"
 #include "collision/pairs/separating_axes.hpp"
-#include "collision/pairs/tree_walk.hpp"
-#include "collision/pairs/triangle_pair.hpp"
+#include "collision/pairs/triangle_intersection.hpp"
 #include "collision/scene.hpp"
 #include "core/contact.hpp"
-#include "core/fixed_list.hpp"
 #include "core/frame.hpp"
+#include "core/static_vector.hpp"
 
 namespace wrenchd {
 

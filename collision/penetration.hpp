@@ -7,7 +7,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "collision/placement.hpp"
+#include "collision/feasible_pose_search.hpp"
 #include "collision/proxy.hpp"
 #include "collision/scene_contacts.hpp"
 #include "core/contact.hpp"

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "collision/even_work.hpp"
 #include "collision/half_space_contacts.hpp"
 #include "collision/mesh_contacts.hpp"
+#include "collision/work_balancer.hpp"
 #include "core/projection.hpp"
 
 namespace wrenchd {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "collision/meshes/convex_hull.hpp"
-#include "collision/meshes/mesh_solid.hpp"
+#include "collision/meshes/mesh_convexity.hpp"
 
 namespace wrenchd {
 namespace {

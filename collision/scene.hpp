@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "collision/meshes/mesh_bvh.hpp"
 #include "collision/meshes/mesh_loader.hpp"
-#include "collision/meshes/treed_mesh.hpp"
 #include "collision/tool_body.hpp"
 #include "core/convex_body.hpp"
 #include "core/obstacle_motion.hpp"

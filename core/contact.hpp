@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/fixed_list.hpp"
 #include "core/pose.hpp"
+#include "core/static_vector.hpp"
 
 namespace wrenchd {
 

@@ -6,7 +6,7 @@
 
 #include "config/calibration_store.hpp"
 #include "daemon/device_wait.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 
 namespace wrenchd {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "devices/discovery/plug_monitor.hpp"
+#include "devices/discovery/hotplug_monitor.hpp"
 
 namespace wrenchd {
 

@@ -11,7 +11,7 @@
 #include "core/fault.hpp"
 #include "core/pose.hpp"
 #include "core/state.hpp"
-#include "daemon/servo/placer.hpp"
+#include "daemon/servo/proxy_initializer.hpp"
 
 namespace wrenchd {
 namespace {

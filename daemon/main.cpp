@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #include "config/load_loopback_script.hpp"
-#include "daemon/control/control.hpp"
+#include "daemon/control/control_interface.hpp"
 #include "daemon/control/event_feed.hpp"
 #include "daemon/control/record_methods.hpp"
 #include "daemon/control/scene_methods.hpp"
@@ -26,12 +26,12 @@
 #include "daemon/realtime.hpp"
 #include "daemon/recording/playback.hpp"
 #include "daemon/recording/recordings.hpp"
+#include "daemon/runtime.hpp"
 #include "daemon/service_notify.hpp"
 #include "daemon/servo/realtime_watch.hpp"
-#include "daemon/station.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
-#include "devices/links/plugged_link.hpp"
+#include "devices/links/reconnecting_link.hpp"
 #include "devices/links/simulated_link.hpp"
 #include "devices/links/socket_link.hpp"
 

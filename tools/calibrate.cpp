@@ -15,7 +15,7 @@
 #include "config/settings.hpp"
 #include "daemon/wall_clock.hpp"
 #include "devices/device_homing.hpp"
-#include "devices/links/plugged_link.hpp"
+#include "devices/links/reconnecting_link.hpp"
 
 namespace wrenchd {
 namespace {

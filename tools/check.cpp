@@ -10,7 +10,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/toml_file.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 #include "devices/profile_reports.hpp"
 
 namespace wrenchd {

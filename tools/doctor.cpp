@@ -23,8 +23,8 @@
 #include "daemon/servo/loop_timing.hpp"
 #include "daemon/version.hpp"
 #include "daemon/wall_clock.hpp"
+#include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
-#include "devices/discovery/plugged_device.hpp"
 #include "devices/discovery/usb_devices.hpp"
 #include "tools/udev_rules.hpp"
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "config/config_error.hpp"
-#include "devices/discovery/known_devices.hpp"
-#include "devices/discovery/plugged_device.hpp"
+#include "devices/discovery/inspected_device.hpp"
+#include "devices/discovery/unusable_devices.hpp"
 #include "devices/profile_reports.hpp"
 
 namespace wrenchd {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 
 namespace wrenchd {
 

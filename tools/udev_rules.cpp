@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "daemon/version.hpp"
-#include "devices/discovery/known_devices.hpp"
+#include "devices/discovery/unusable_devices.hpp"
 
 namespace wrenchd {
 namespace {

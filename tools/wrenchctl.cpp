@@ -27,7 +27,7 @@
 #include "core/inertia.hpp"
 #include "daemon/option_checks.hpp"
 #include "daemon/recording/recording_file.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 #include "daemon/version.hpp"
 #include "tools/calibrate.hpp"
 #include "tools/check.hpp"

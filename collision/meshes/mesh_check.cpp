@@ -21,9 +21,9 @@
 #include <CGAL/Projection_traits_3.h>
 #include <CGAL/Surface_mesh.h>
 
+#include "collision/meshes/defect_count.hpp"
+#include "collision/meshes/half_edges.hpp"
 #include "collision/meshes/mesh_repair.hpp"
-#include "collision/meshes/soup_sides.hpp"
-#include "collision/meshes/tally.hpp"
 
 namespace wrenchd {
 namespace {

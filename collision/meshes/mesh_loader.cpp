@@ -11,7 +11,7 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/meshes/mesh_repair.hpp"
 #include "collision/meshes/mesh_source.hpp"
-#include "collision/pairs/pack.hpp"
+#include "collision/meshes/packer.hpp"
 
 namespace wrenchd {
 namespace {

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_bvh.hpp"
 #include "collision/meshes/mesh_cache.hpp"
 #include "collision/meshes/mesh_check.hpp"
 #include "collision/meshes/mesh_size.hpp"
-#include "collision/meshes/treed_mesh.hpp"
 #include "core/convex_body.hpp"
 #include "core/triangle_mesh.hpp"
 

@@ -13,9 +13,9 @@
 
 #include <Eigen/Geometry>
 
+#include "collision/meshes/defect_count.hpp"
+#include "collision/meshes/half_edges.hpp"
 #include "collision/meshes/mesh_check.hpp"
-#include "collision/meshes/soup_sides.hpp"
-#include "collision/meshes/tally.hpp"
 
 namespace wrenchd {
 namespace {

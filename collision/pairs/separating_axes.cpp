@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "collision/pairs/bvh_traversal.hpp"
 #include "collision/pairs/single_precision.hpp"
-#include "collision/pairs/tree_walk.hpp"
 
 namespace wrenchd {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "collision/pairs/triangle_pair.hpp"
+#include "collision/pairs/triangle_intersection.hpp"
 
 namespace wrenchd {
 

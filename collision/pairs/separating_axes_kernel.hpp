@@ -2,7 +2,7 @@
 // No #pragma once: compiled once for every kind of processor, each in a namespace of its own, and included
 // nowhere else. WRENCHD_APART names the function.
 
-#include "collision/pairs/eight_wide.hpp"
+#include "collision/pairs/float8.hpp"
 #include "collision/pairs/separating_axes.hpp"
 
 namespace wrenchd::walk {

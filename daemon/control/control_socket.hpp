@@ -17,7 +17,7 @@
 #include "daemon/control/lease.hpp"
 #include "daemon/control/listening_socket.hpp"
 #include "daemon/control/role.hpp"
-#include "daemon/control/slow_work.hpp"
+#include "daemon/control/worker_queue.hpp"
 
 namespace wrenchd {
 

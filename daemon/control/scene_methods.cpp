@@ -9,7 +9,7 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "config/config_error.hpp"
 #include "config/search_path.hpp"
-#include "daemon/control/scene_shapes.hpp"
+#include "daemon/control/scene_geometry.hpp"
 
 namespace wrenchd {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "daemon/control/control_methods.hpp"
 #include "daemon/control/event_feed.hpp"
-#include "daemon/control/workbench.hpp"
+#include "daemon/control/reconfigurator.hpp"
 
 namespace wrenchd {
 

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "daemon/control/workbench.hpp"
+#include "daemon/control/reconfigurator.hpp"
 #include "daemon/servo/shared_state.hpp"
 
 namespace wrenchd {

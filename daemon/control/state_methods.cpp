@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "daemon/control/state_layout.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 
 namespace wrenchd {
 

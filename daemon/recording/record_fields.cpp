@@ -5,12 +5,12 @@
 #include <bit>
 #include <type_traits>
 
-#include "collision/pairs/touch.hpp"
+#include "collision/touch.hpp"
 #include "core/command.hpp"
 #include "core/fault.hpp"
 #include "core/limits.hpp"
 #include "core/state.hpp"
-#include "daemon/servo/placer.hpp"
+#include "daemon/servo/proxy_initializer.hpp"
 #include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd {

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "collision/pairs/touch.hpp"
+#include "collision/touch.hpp"
 #include "daemon/recording/recording_file.hpp"
 #include "daemon/servo/shared_state.hpp"
 #include "daemon/servo/tick_record.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <system_error>
 
-#include "daemon/recording/recorded_files.hpp"
+#include "daemon/recording/recorded_inputs.hpp"
 
 namespace wrenchd {
 namespace {

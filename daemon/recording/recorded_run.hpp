@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "daemon/plan.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "daemon/run_config.hpp"
 
 namespace wrenchd {
 

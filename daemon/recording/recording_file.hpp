@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/pairs/touch.hpp"
+#include "collision/touch.hpp"
 #include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd {

@@ -7,8 +7,8 @@
 
 #include <pthread.h>
 
-#include "daemon/recording/recording_place.hpp"
-#include "daemon/station.hpp"
+#include "daemon/recording/recording_directory.hpp"
+#include "daemon/runtime.hpp"
 
 namespace wrenchd {
 namespace {

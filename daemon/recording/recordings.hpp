@@ -17,7 +17,7 @@
 #include "daemon/control/event_feed.hpp"
 #include "daemon/recording/record_history.hpp"
 #include "daemon/recording/recorder.hpp"
-#include "daemon/recording/recording_place.hpp"
+#include "daemon/recording/recording_directory.hpp"
 
 namespace wrenchd {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "daemon/recording/recording_file.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 
 namespace wrenchd {
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 
 #include "core/clock.hpp"
-#include "core/fixed_list.hpp"
 #include "core/pose.hpp"
 #include "core/spatial.hpp"
+#include "core/static_vector.hpp"
 
 namespace wrenchd {
 

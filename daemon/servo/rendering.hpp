@@ -4,15 +4,15 @@
 #include <cstdint>
 #include <memory>
 
-#include "collision/pairs/touch.hpp"
 #include "collision/penetration.hpp"
 #include "collision/scene.hpp"
+#include "collision/touch.hpp"
 #include "config/settings.hpp"
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "core/wrench_law.hpp"
-#include "daemon/servo/placer.hpp"
-#include "daemon/servo/stability.hpp"
+#include "daemon/servo/proxy_initializer.hpp"
+#include "daemon/servo/stability_analysis.hpp"
 
 namespace wrenchd {
 

@@ -15,14 +15,14 @@
 #include "core/limits.hpp"
 #include "core/state_machine.hpp"
 #include "core/thermal.hpp"
+#include "daemon/servo/contact_stabilizer.hpp"
 #include "daemon/servo/event.hpp"
 #include "daemon/servo/local_models.hpp"
 #include "daemon/servo/loop_timing.hpp"
-#include "daemon/servo/placer.hpp"
-#include "daemon/servo/renderings.hpp"
+#include "daemon/servo/proxy_initializer.hpp"
+#include "daemon/servo/rendering_crossfade.hpp"
 #include "daemon/servo/self_test.hpp"
 #include "daemon/servo/shared_state.hpp"
-#include "daemon/servo/steady_contact.hpp"
 #include "daemon/servo/tick_record.hpp"
 #include "daemon/servo/watches.hpp"
 #include "daemon/servo/workspace.hpp"
@@ -88,7 +88,7 @@ class ServoLoop {
   void start_over() noexcept { ask(kStartOver); }
 
   /// Where another rendering is handed over, to be felt from one of the next ticks on without a jump
-  /// (daemon/servo/renderings.hpp). One thread.
+  /// (daemon/servo/rendering_crossfade.hpp). One thread.
   RenderingExchange& exchange() noexcept { return renderings_.exchange(); }
   /// Another workspace (daemon/servo/workspace.hpp), from the next tick on and without a jump. One thread.
   void set_workspace(const WorkspaceWish& wish) noexcept { wishes_.write(wish); }

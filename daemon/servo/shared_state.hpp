@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "collision/pairs/touch.hpp"
+#include "collision/touch.hpp"
 #include "daemon/servo/tick_record.hpp"
 
 namespace wrenchd {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "devices/discovery/choose_device.hpp"
 
+#include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
-#include "devices/discovery/plugged_device.hpp"
 #include "devices/profile_reports.hpp"
 
 namespace wrenchd {

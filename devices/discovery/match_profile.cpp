@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdio>
 
-#include "devices/discovery/known_devices.hpp"
+#include "devices/discovery/unusable_devices.hpp"
 
 namespace wrenchd {
 namespace {

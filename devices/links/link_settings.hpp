@@ -9,7 +9,7 @@
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
 #include "devices/falcon_start.hpp"
-#include "devices/links/last_word.hpp"
+#include "devices/links/host_watchdog.hpp"
 #include "devices/links/stream_framer.hpp"
 
 namespace wrenchd {

@@ -11,9 +11,9 @@
 #include "devices/simulation/emulated_falcon.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
-#include "devices/simulation/held_arm.hpp"
-#include "devices/simulation/held_cap.hpp"
+#include "devices/simulation/simulated_arm.hpp"
 #include "devices/simulation/simulated_device.hpp"
+#include "devices/simulation/simulated_puck.hpp"
 
 namespace wrenchd {
 namespace {

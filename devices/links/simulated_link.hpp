@@ -9,7 +9,7 @@
 #include "core/simulation_settings.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/links/report_link.hpp"
-#include "devices/simulation/held_device.hpp"
+#include "devices/simulation/device_in_hand.hpp"
 
 namespace wrenchd {
 

@@ -7,7 +7,7 @@
 #include "core/clock.hpp"
 #include "core/simulation_settings.hpp"
 #include "core/spatial.hpp"
-#include "devices/pose_track.hpp"
+#include "devices/pose_spline.hpp"
 
 namespace wrenchd {
 

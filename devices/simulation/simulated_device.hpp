@@ -8,8 +8,8 @@
 #include "core/device_profile.hpp"
 #include "core/simulation_settings.hpp"
 #include "devices/report_codec.hpp"
+#include "devices/simulation/device_in_hand.hpp"
 #include "devices/simulation/hand_path.hpp"
-#include "devices/simulation/held_device.hpp"
 #include "devices/simulation/simulated_firmware.hpp"
 #include "devices/simulation/simulated_handle.hpp"
 

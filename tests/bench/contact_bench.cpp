@@ -8,7 +8,7 @@
 #include "collision/proxy.hpp"
 #include "core/energy_law.hpp"
 #include "tests/bench/mesh_pair.hpp"
-#include "tests/support/exact_meeting.hpp"
+#include "tests/support/exact_intersection.hpp"
 
 namespace wrenchd::bench {
 namespace {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "tests/bench/method_timing.hpp"
 #include "tests/bench/peer.hpp"
-#include "tests/bench/race.hpp"
 #include "tests/bench/table.hpp"
 
 namespace wrenchd::bench {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "tests/bench/race.hpp"
+#include "tests/bench/method_timing.hpp"
 #include "tests/bench/table.hpp"
 
 namespace wrenchd::bench {

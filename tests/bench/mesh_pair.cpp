@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/support/handling.hpp"
+#include "tests/support/manipulation_case.hpp"
 
 namespace wrenchd::bench {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "collision/meshes/make_mesh.hpp"
-#include "collision/pairs/meeting_pairs.hpp"
+#include "collision/pairs/intersecting_pairs.hpp"
 #include "collision/scene.hpp"
 
 namespace wrenchd::bench {

@@ -12,8 +12,8 @@
 
 #include "collision/proxy.hpp"
 #include "tests/bench/statistics.hpp"
-#include "tests/support/exact_meeting.hpp"
-#include "tests/support/handling.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/manipulation_case.hpp"
 
 // Twenty scenes handled roughly, every pose of the proxy looked at in exact arithmetic. Minutes to hours; a
 // test does the same for a few hundred poses. With --moving the obstacles move too, as fast as hands do.

@@ -3,9 +3,9 @@
 
 #include "collision/mesh_contacts.hpp"
 #include "collision/proxy.hpp"
-#include "tests/support/exact_meeting.hpp"
-#include "tests/support/handling.hpp"
-#include "tests/support/repeats.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/manipulation_case.hpp"
 
 namespace wrenchd {
 namespace {

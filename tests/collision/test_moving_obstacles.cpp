@@ -7,10 +7,10 @@
 #include "collision/penetration.hpp"
 #include "collision/proxy.hpp"
 #include "core/metric.hpp"
-#include "tests/support/exact_meeting.hpp"
-#include "tests/support/handling.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/manipulation_case.hpp"
 #include "tests/support/no_allocation.hpp"
-#include "tests/support/repeats.hpp"
 
 // Obstacles that move push the proxy, which stays admissible and passes through none of them.
 

@@ -5,7 +5,7 @@
 
 #include "collision/obstacle_work.hpp"
 #include "collision/penetration.hpp"
-#include "tests/support/handling.hpp"
+#include "tests/support/manipulation_case.hpp"
 
 // What obstacles that move put into the spring is what T rises by around a hand that stands still.
 

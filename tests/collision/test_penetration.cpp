@@ -14,8 +14,8 @@
 #include "collision/penetration.hpp"
 #include "core/metric.hpp"
 #include "core/wrench_law.hpp"
-#include "tests/support/pressed.hpp"
-#include "tests/support/repeats.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/overlapping_scene.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

@@ -5,16 +5,16 @@
 
 #include <catch2/catch.hpp>
 
+#include "collision/feasible_pose_search.hpp"
 #include "collision/meshes/convex_hull.hpp"
 #include "collision/penetration.hpp"
-#include "collision/placement.hpp"
 #include "collision/proxy.hpp"
 #include "core/energy_law.hpp"
 #include "core/metric.hpp"
-#include "tests/support/exact_meeting.hpp"
-#include "tests/support/handling.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/manipulation_case.hpp"
 #include "tests/support/no_allocation.hpp"
-#include "tests/support/repeats.hpp"
 
 namespace wrenchd {
 namespace {

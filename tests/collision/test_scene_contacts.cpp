@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "collision/scene_contacts.hpp"
-#include "tests/support/pressed.hpp"
+#include "tests/support/overlapping_scene.hpp"
 
 namespace wrenchd {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/finite.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/report_codec.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;

@@ -11,11 +11,11 @@
 #include "core/friction.hpp"
 #include "core/metric.hpp"
 #include "core/wrench_law.hpp"
-#include "tests/support/exact_meeting.hpp"
-#include "tests/support/handling.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/manipulation_case.hpp"
 #include "tests/support/no_allocation.hpp"
-#include "tests/support/pressed.hpp"
-#include "tests/support/repeats.hpp"
+#include "tests/support/overlapping_scene.hpp"
 
 namespace wrenchd {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "core/metric.hpp"
 #include "core/projection.hpp"
-#include "tests/support/pressed.hpp"
+#include "tests/support/overlapping_scene.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

@@ -3,7 +3,7 @@
 
 #include "devices/homing.hpp"
 #include "devices/links/loopback_link.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "tests/support/polhem_in_hand.hpp"
 #include "tests/support/random_values.hpp"
 

@@ -13,7 +13,7 @@
 #include "devices/simulation/emulated_spacemouse.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/run_recorder.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;

@@ -8,7 +8,7 @@
 #include "devices/homing.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"

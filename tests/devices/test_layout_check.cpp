@@ -4,7 +4,7 @@
 #include "config/load_profile.hpp"
 #include "devices/layout_check.hpp"
 #include "devices/profile_reports.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/sample_descriptors.hpp"
 

@@ -12,7 +12,7 @@
 
 #include "devices/profile_device.hpp"
 #include "devices/report_codec.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 
 using namespace wrenchd;
 using namespace std::chrono_literals;

@@ -15,7 +15,7 @@
 #include <catch2/catch.hpp>
 
 #include "devices/report_codec.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 
 using namespace wrenchd;
 

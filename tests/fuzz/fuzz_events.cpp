@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Under test: core/state_machine.cpp core/transitions.cpp daemon/servo/watches.cpp
 // daemon/servo/link_watch.cpp daemon/servo/pose_watch.cpp daemon/servo/motor_watch.cpp
-// daemon/servo/write_watch.cpp daemon/servo/pace_watch.cpp daemon/servo/pinned_watch.cpp
+// daemon/servo/write_watch.cpp daemon/servo/pace_watch.cpp daemon/servo/motor_stall_watch.cpp
 // daemon/servo/client_watch.cpp daemon/servo/self_test.cpp
 #include <bit>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under test: collision/meshes/mesh_file.cpp collision/meshes/mesh_guard.cpp collision/meshes/ply_guard.cpp
-// collision/meshes/mesh_source.cpp collision/meshes/mesh_repair.cpp collision/meshes/mesh_check.cpp
-// collision/meshes/soup_sides.cpp
+// Under test: collision/meshes/mesh_file.cpp collision/meshes/mesh_validation.cpp
+// collision/meshes/ply_validation.cpp collision/meshes/mesh_source.cpp collision/meshes/mesh_repair.cpp
+// collision/meshes/mesh_check.cpp collision/meshes/half_edges.cpp
 #include "tests/fuzz/fuzz_mesh.hpp"
 
 #include <string>

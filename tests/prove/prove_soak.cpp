@@ -13,7 +13,7 @@
 #include "devices/simulation/simulated_firmware.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/no_allocation.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 
 // Hours of the shipped scene in virtual time, armed, the hand pressing and rocking again and again: nothing
 // drifts, nothing grows, no counter's end is noticed. The device's sequence (16 bits) wraps every 66 seconds,

@@ -18,7 +18,7 @@
 #include "config/load_settings.hpp"
 #include "config/toml_file.hpp"
 #include "daemon/realtime.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 #include "daemon/wall_clock.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/simulation/simulated_device.hpp"

@@ -16,10 +16,10 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "daemon/control/control.hpp"
+#include "daemon/control/control_interface.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/wall_clock.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd::test {

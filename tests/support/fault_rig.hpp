@@ -12,7 +12,7 @@
 #include "devices/profile_device.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/invariants.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 
 namespace wrenchd::test {
 

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "daemon/recording/recording_file.hpp"
-#include "daemon/station.hpp"
+#include "daemon/runtime.hpp"
 
 namespace wrenchd::test {
 

@@ -13,7 +13,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "daemon/wall_clock.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd::test {

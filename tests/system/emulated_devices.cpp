@@ -11,15 +11,15 @@
 #include <utility>
 
 #include "config/load_profile.hpp"
+#include "devices/discovery/inspected_device.hpp"
 #include "devices/discovery/match_profile.hpp"
-#include "devices/discovery/plugged_device.hpp"
 #include "devices/links/link_settings.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/profile_reports.hpp"
 #include "devices/simulation/emulated_falcon.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
-#include "tests/support/polhem_place.hpp"
+#include "tests/support/polhem_pose.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/system/usbip_emulator.hpp"
 

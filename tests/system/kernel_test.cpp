@@ -26,10 +26,10 @@
 #include <sys/mman.h>
 
 #include "core/fault.hpp"
-#include "devices/discovery/plug_monitor.hpp"
+#include "devices/discovery/hotplug_monitor.hpp"
 #include "devices/discovery/usb_devices.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/system/emulated_devices.hpp"
 #include "tests/system/row.hpp"

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/sample_descriptors.hpp"
 #include "tests/system/usbip_emulator.hpp"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 
 namespace wrenchd::test {
 namespace {

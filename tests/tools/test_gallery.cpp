@@ -8,8 +8,8 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/recording/replay.hpp"
-#include "tests/support/exact_meeting.hpp"
-#include "tests/support/exhibit_run.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/gallery_run.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tools/gallery.hpp"

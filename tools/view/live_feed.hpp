@@ -15,8 +15,8 @@
 #include <wrenchd/client.hpp>
 
 #include "daemon/control/json_rpc.hpp"
-#include "tools/view/extremes.hpp"
-#include "tools/view/recent_times.hpp"
+#include "tools/view/min_max_history.hpp"
+#include "tools/view/rolling_histogram.hpp"
 #include "tools/view/view_scene.hpp"
 #include "tools/view/view_tick.hpp"
 

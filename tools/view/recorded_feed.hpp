@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "daemon/recording/recording_file.hpp"
-#include "tools/view/extremes.hpp"
-#include "tools/view/recent_times.hpp"
+#include "tools/view/min_max_history.hpp"
+#include "tools/view/rolling_histogram.hpp"
 #include "tools/view/view_scene.hpp"
 #include "tools/view/view_tick.hpp"
 

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "collision/meshes/mesh_source.hpp"
-#include "daemon/control/scene_shapes.hpp"
+#include "daemon/control/scene_geometry.hpp"
 #include "daemon/recording/recorded_run.hpp"
 #include "tools/view/live_feed.hpp"
 #include "tools/view/recorded_feed.hpp"

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "daemon/control/scene_shapes.hpp"
+#include "daemon/control/scene_geometry.hpp"
 #include "tools/view/display_mesh.hpp"
 
 namespace wrenchd {

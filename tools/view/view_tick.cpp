@@ -8,9 +8,9 @@
 #include "core/limits.hpp"
 #include "core/spatial.hpp"
 #include "core/state.hpp"
-#include "daemon/control/scene_shapes.hpp"
+#include "daemon/control/scene_geometry.hpp"
 #include "daemon/recording/record_fields.hpp"
-#include "daemon/servo/placer.hpp"
+#include "daemon/servo/proxy_initializer.hpp"
 
 namespace wrenchd {
 namespace {

@@ -9,10 +9,10 @@
 
 #include <wrenchd/state_reader.hpp>
 
-#include "collision/pairs/touch.hpp"
+#include "collision/touch.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/servo/tick_record.hpp"
-#include "tools/view/extremes.hpp"
+#include "tools/view/min_max_history.hpp"
 #include "tools/view/view_scene.hpp"
 
 namespace wrenchd {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <catch2/catch.hpp>
 
+#include "collision/pairs/bvh_traversal.hpp"
 #include "collision/pairs/separating_axes.hpp"
-#include "collision/pairs/tree_walk.hpp"
+#include "tests/support/case_count.hpp"
 #include "tests/support/random_values.hpp"
-#include "tests/support/repeats.hpp"
 
 namespace wrenchd {
 namespace {

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/scene_methods.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 
 // What is rendered, asked for and changed as a client does: looked up in the table, by a role, with JSON.
 

@@ -5,7 +5,7 @@
 
 #include "daemon/control/scene_methods.hpp"
 #include "daemon/control/state_methods.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 
 namespace wrenchd {
 namespace {

@@ -8,7 +8,7 @@
 #include "daemon/recording/recording_file.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/run_recorder.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;

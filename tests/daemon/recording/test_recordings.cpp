@@ -10,7 +10,7 @@
 #include "daemon/realtime.hpp"
 #include "daemon/recording/recordings.hpp"
 #include "daemon/wall_clock.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;

@@ -3,9 +3,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/recording/recorded_files.hpp"
+#include "daemon/recording/recorded_inputs.hpp"
 #include "daemon/recording/replay.hpp"
-#include "tests/support/buried.hpp"
+#include "tests/support/buried_tool.hpp"
 #include "tests/support/run_recorder.hpp"
 #include "tests/support/temporary_directory.hpp"
 

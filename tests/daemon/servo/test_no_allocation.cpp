@@ -9,7 +9,7 @@
 #include <sys/resource.h>
 
 #include "collision/penetration.hpp"
-#include "tests/support/buried.hpp"
+#include "tests/support/buried_tool.hpp"
 #include "tests/support/fault_rig.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_body.hpp"

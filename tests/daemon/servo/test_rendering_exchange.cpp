@@ -5,7 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/servo/rendering_exchange.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 
 namespace wrenchd {
 namespace {

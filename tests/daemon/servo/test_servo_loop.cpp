@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "collision/placement.hpp"
+#include "collision/feasible_pose_search.hpp"
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "core/wrench_law.hpp"
@@ -14,7 +14,7 @@
 #include "daemon/live_line.hpp"
 #include "daemon/wall_clock.hpp"
 #include "devices/links/simulated_link.hpp"
-#include "tests/support/buried.hpp"
+#include "tests/support/buried_tool.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

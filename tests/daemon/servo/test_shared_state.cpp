@@ -18,7 +18,7 @@
 #include "daemon/servo/shared_state.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"
-#include "tests/support/shipped_plan.hpp"
+#include "tests/support/shipped_config.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

@@ -5,8 +5,8 @@
 #include <catch2/catch.hpp>
 
 #include "config/load_profile.hpp"
-#include "devices/discovery/known_devices.hpp"
 #include "devices/discovery/match_profile.hpp"
+#include "devices/discovery/unusable_devices.hpp"
 
 using namespace wrenchd;
 using Catch::Contains;

@@ -14,7 +14,7 @@
 #include "devices/simulation/emulated_falcon.hpp"
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
-#include "tests/support/polhem_place.hpp"
+#include "tests/support/polhem_pose.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 using namespace wrenchd;

@@ -9,7 +9,7 @@
 
 #include "devices/links/loopback_link.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 
 using namespace wrenchd;

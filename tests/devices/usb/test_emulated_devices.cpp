@@ -18,7 +18,7 @@
 #include "devices/simulation/emulated_polhem.hpp"
 #include "devices/simulation/emulated_spacemouse.hpp"
 #include "tests/devices/usb/mock_device.hpp"
-#include "tests/support/polhem_place.hpp"
+#include "tests/support/polhem_pose.hpp"
 
 using namespace wrenchd;
 using namespace wrenchd::test;

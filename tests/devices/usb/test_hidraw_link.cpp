@@ -7,7 +7,7 @@
 
 #include "devices/links/hidraw_link.hpp"
 #include "devices/profile_device.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/no_allocation.hpp"
 

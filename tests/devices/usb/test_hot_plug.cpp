@@ -6,7 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/calibration_store.hpp"
-#include "devices/simulation/reference_layout.hpp"
+#include "devices/simulation/reference_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/run_program.hpp"

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <utility>
+
+#include "collision/meshes/mesh_surface.hpp"
+#include "collision/meshes/triangle_bvh.hpp"
+#include "core/triangle_mesh.hpp"
+
+namespace wrenchd {
+
+/// The surface of a body of any shape, and the tree over its triangles.
+struct TreedMesh {
+  TreedMesh() = default;  ///< of nothing, to be filled in
+  explicit TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid)
+      : surface(std::move(mesh), kind), tree(surface) {}
+
+  MeshSurface surface;
+  TriangleTree tree;
+};
+
+}  // namespace wrenchd

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/meshes/triangle_bvh.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+
+namespace wrenchd {
+namespace {
+
+constexpr std::size_t kWidth = TriangleTree::kWidth;
+/// Boxes grow by this share of the mesh's extent: what rounding to single precision may take from them.
+constexpr double kRounding = 4e-7;
+
+/// A box in double precision, and the mean of the surface in it.
+struct Fitted {
+  Vector3d centre_m;
+  Matrix3d axes;  ///< rows, the widest first
+  Vector3d half_m;
+  Vector3d mean_m;
+
+  double half_area() const noexcept {
+    return half_m[0] * half_m[1] + half_m[1] * half_m[2] + half_m[2] * half_m[0];
+  }
+};
+
+/// A binary tree first: it is folded into nodes of eight afterwards.
+struct Branch {
+  Fitted box;
+  std::uint32_t begin, end;   ///< in the order of the triangles
+  std::uint32_t left, right;  ///< 0: a leaf
+};
+
+std::uint16_t features_of(const MeshSurface::Features& features) {
+  const auto some = [](const std::array<std::uint32_t, 3>& list) {
+    return std::any_of(list.begin(), list.end(), [](std::uint32_t f) { return f != MeshSurface::kNone; });
+  };
+  return static_cast<std::uint16_t>((some(features.vertices) ? TriangleTree::kVertices : 0) |
+                                    (some(features.edges) ? TriangleTree::kEdges : 0));
+}
+
+class Builder {
+ public:
+  explicit Builder(const MeshSurface& surface)
+      : surface_(surface), mesh_(surface.mesh()), order_(mesh_.triangles.size()) {
+    std::iota(order_.begin(), order_.end(), 0U);
+    middle_.reserve(order_.size());
+    for (std::uint32_t t = 0; t < order_.size(); ++t)
+      middle_.push_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3.0);
+    for (const Vector3d& p : mesh_.vertices_m) extent_m_ = std::max(extent_m_, p.lpNorm<Eigen::Infinity>());
+    branches_.reserve(order_.size() / 2 + 1);
+    split();
+  }
+
+  double extent_m() const noexcept { return extent_m_; }
+  const std::vector<Branch>& branches() const noexcept { return branches_; }
+
+  TriangleTree::Leaf leaf(const Branch& branch) const;
+  /// Of all triangles under a branch.
+  std::uint16_t features(const Branch& branch) const;
+
+ private:
+  const Vector3d& corner(std::uint32_t triangle, std::size_t i) const {
+    return mesh_.vertices_m[mesh_.triangles[triangle][i]];
+  }
+  Fitted fit(std::uint32_t begin, std::uint32_t end) const;
+  void split();
+
+  const MeshSurface& surface_;
+  const TriangleMesh& mesh_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Vector3d> middle_;
+  std::vector<Branch> branches_;
+  double extent_m_ = 0.0;
+};
+
+/// The axes are those of the covariance of the surface: for a triangle with corners p, middle g and area A
+/// that is  A/12 (9 g g' + sum p p').
+Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
+  constexpr double kLeastArea = 1e-30;  // so that nothing divides by zero
+  const Vector3d origin = middle_[order_[begin]];
+  double area = 0.0;
+  Vector3d first = Vector3d::Zero();
+  Matrix3d second = Matrix3d::Zero();
+  for (std::uint32_t k = begin; k < end; ++k) {
+    const std::uint32_t t = order_[k];
+    const Vector3d a = corner(t, 0) - origin, b = corner(t, 1) - origin, c = corner(t, 2) - origin;
+    const double A = 0.5 * (b - a).cross(c - a).norm() + kLeastArea;
+    const Vector3d g = middle_[t] - origin;
+    area += A;
+    first += A * g;
+    second +=
+        A / 12.0 * (9.0 * g * g.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
+  }
+  const Vector3d mean = first / area;
+  Eigen::SelfAdjointEigenSolver<Matrix3d> eigen;
+  eigen.computeDirect(second / area - mean * mean.transpose());
+
+  Fitted box;
+  box.mean_m = origin + mean;
+  box.axes.row(0) = eigen.eigenvectors().col(2).normalized();
+  // computeDirect is quick, not orthogonal to the last digit.
+  const Vector3d second_axis = eigen.eigenvectors().col(1);
+  box.axes.row(1) =
+      (second_axis - box.axes.row(0).dot(second_axis) * box.axes.row(0).transpose()).normalized();
+  box.axes.row(2) = box.axes.row(0).cross(box.axes.row(1));
+  Vector3d low = Vector3d::Constant(1e300), high = -low;
+  for (std::uint32_t k = begin; k < end; ++k)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector3d p = box.axes * (corner(order_[k], i) - origin);
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+  box.centre_m = origin + box.axes.transpose() * (0.5 * (low + high));
+  box.half_m = 0.5 * (high - low);
+  return box;
+}
+
+/// Cuts near the mean across the widest axis until eight triangles or fewer are left.
+void Builder::split() {
+  const auto add = [&](std::uint32_t begin, std::uint32_t end) {
+    branches_.push_back({fit(begin, end), begin, end, 0, 0});
+    return static_cast<std::uint32_t>(branches_.size() - 1);
+  };
+  add(0, static_cast<std::uint32_t>(order_.size()));
+  for (std::uint32_t at = 0; at < branches_.size(); ++at) {
+    const auto [box, begin, end, left, right] = branches_[at];
+    if (end - begin <= kWidth) continue;
+    const Vector3d along = box.axes.row(0);
+    const double cut = along.dot(box.mean_m);
+    const auto first = order_.begin() + begin, last = order_.begin() + end;
+    const auto below = [&](std::uint32_t t) { return along.dot(middle_[t]); };
+    const auto at_mean = std::count_if(first, last, [&](std::uint32_t t) { return below(t) < cut; });
+    // Leaves are to be full: whole eights go to the lower side.
+    const std::ptrdiff_t eights = std::clamp<std::ptrdiff_t>((at_mean + 4) / 8, 1, (last - first - 1) / 8);
+    const auto middle = first + 8 * eights;
+    std::nth_element(first, middle, last, [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(below(a), a) < std::pair(below(b), b);
+    });
+    const auto half = static_cast<std::uint32_t>(middle - order_.begin());
+    const std::uint32_t a = add(begin, half), b = add(half, end);
+    branches_[at].left = a;
+    branches_[at].right = b;
+  }
+}
+
+TriangleTree::Leaf Builder::leaf(const Branch& branch) const {
+  TriangleTree::Leaf leaf;
+  leaf.has_vertices = leaf.has_edges = 0;
+  std::fill_n(leaf.low_of_all, 3, 3e38F);
+  std::fill_n(leaf.high_of_all, 3, -3e38F);
+  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+    const bool used = lane < branch.end - branch.begin;
+    const std::uint32_t t = order_[used ? branch.begin + lane : branch.begin];
+    leaf.triangle[lane] = t;
+    const std::uint16_t features = used ? features_of(surface_.features()[t]) : std::uint16_t{0};
+    if ((features & TriangleTree::kVertices) != 0) leaf.has_vertices |= 1U << lane;
+    if ((features & TriangleTree::kEdges) != 0) leaf.has_edges |= 1U << lane;
+    const Vector3d& a = corner(t, 0);
+    const Vector3d n = (corner(t, 1) - a).cross(corner(t, 2) - a).normalized();
+    for (int d = 0; d < 3; ++d) {
+      float low = 3e38F, high = -3e38F;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto x = static_cast<float>(corner(t, i)[d]);
+        leaf.corner[i][d][lane] = x;
+        low = std::min(low, x);
+        high = std::max(high, x);
+      }
+      leaf.low[d][lane] = used ? low : 3e38F;
+      leaf.high[d][lane] = used ? high : -3e38F;
+      leaf.normal[d][lane] = static_cast<float>(n[d]);
+      leaf.low_of_all[d] = std::min(leaf.low_of_all[d], low);
+      leaf.high_of_all[d] = std::max(leaf.high_of_all[d], high);
+    }
+    leaf.offset[lane] = static_cast<float>(n.dot(a));
+  }
+  return leaf;
+}
+
+std::uint16_t Builder::features(const Branch& branch) const {
+  std::uint16_t out = 0;
+  for (std::uint32_t k = branch.begin; k < branch.end && out != 3; ++k)
+    out = static_cast<std::uint16_t>(out | features_of(surface_.features()[order_[k]]));
+  return out;
+}
+
+TriangleTree::Box single(const Fitted& fitted, double rounding_m) {
+  TriangleTree::Box box{};
+  for (int d = 0; d < 3; ++d) {
+    box.centre[d] = static_cast<float>(fitted.centre_m[d]);
+    box.axis[0][d] = static_cast<float>(fitted.axes(0, d));
+    box.axis[1][d] = static_cast<float>(fitted.axes(1, d));
+    box.half[d] = static_cast<float>(fitted.half_m[d] + rounding_m);
+  }
+  box.size = static_cast<float>(fitted.half_area());
+  return box;
+}
+
+/// A box far away that has no size: nothing meets it.
+TriangleTree::Box nothing() {
+  TriangleTree::Box box{};
+  box.centre[0] = box.centre[1] = box.centre[2] = 1e18F;
+  box.axis[0][0] = box.axis[1][1] = 1.0F;
+  box.count = -1;
+  return box;
+}
+
+TriangleTree::Node side_by_side(const TriangleTree::Box* boxes) {
+  TriangleTree::Node node;
+  node.has_vertices = node.has_edges = 0;
+  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+    const auto& [centre, axis, half, size, child, count, features] = boxes[lane];
+    if ((features & TriangleTree::kVertices) != 0) node.has_vertices |= 1U << lane;
+    if ((features & TriangleTree::kEdges) != 0) node.has_edges |= 1U << lane;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
+      node.centre[d][lane] = centre[d];
+      node.half[d][lane] = half[d];
+      node.axis[0][d][lane] = axis[0][d];
+      node.axis[1][d][lane] = axis[1][d];
+      node.axis[2][d][lane] = axis[0][e] * axis[1][f] - axis[0][f] * axis[1][e];
+    }
+  }
+  return node;
+}
+
+/// The up to eight boxes that stand under one. What has more than eight leaves is opened first; then what
+/// still fits is dissolved into its leaves: few nodes, and full ones.
+std::vector<std::uint32_t> opened(const std::vector<Branch>& branches, std::uint32_t top) {
+  const auto leaves = [&](std::uint32_t i) {
+    return (branches[i].end - branches[i].begin + kWidth - 1) / kWidth;
+  };
+  std::vector<std::uint32_t> under = {top};
+  const auto open = [&](std::size_t i) {
+    const Branch& branch = branches[under[i]];
+    under[i] = branch.left;
+    under.push_back(branch.right);
+  };
+  const auto most = [&] {
+    return static_cast<std::size_t>(
+        std::max_element(under.begin(), under.end(),
+                         [&](std::uint32_t a, std::uint32_t b) { return leaves(a) < leaves(b); }) -
+        under.begin());
+  };
+  while (under.size() < kWidth && (leaves(under[most()]) > kWidth || under.size() == 1)) {
+    if (branches[under[most()]].left == 0) break;
+    open(most());
+  }
+  for (std::size_t i = 0; i < under.size();) {
+    const bool fits = under.size() + leaves(under[i]) - 1 <= kWidth;
+    if (branches[under[i]].left != 0 && fits)
+      open(i);
+    else
+      ++i;
+  }
+  return under;
+}
+
+}  // namespace
+
+TriangleTree::TriangleTree(const MeshSurface& surface) {
+  if (surface.triangles().empty()) return;
+  const Builder builder(surface);
+  const std::vector<Branch>& branches = builder.branches();
+  extent_m_ = static_cast<float>(builder.extent_m());
+  const double rounding_m = kRounding * builder.extent_m();
+  std::vector<std::uint32_t> tops = {0};  // the branch that each node stands under
+  for (std::size_t n = 0; n < tops.size(); ++n) {
+    const std::vector<std::uint32_t> under = opened(branches, tops[n]);
+    std::array<Box, kWidth> boxes;
+    boxes.fill(nothing());
+    for (std::size_t i = 0; i < under.size(); ++i) {
+      const Branch& branch = branches[under[i]];
+      boxes[i] = single(branch.box, rounding_m);
+      boxes[i].features = builder.features(branch);
+      if (branch.left == 0) {
+        boxes[i].child = static_cast<std::uint32_t>(leaves_.size());
+        boxes[i].count = static_cast<std::int16_t>(branch.end - branch.begin);
+        leaves_.push_back(builder.leaf(branch));
+      } else {
+        boxes[i].child = static_cast<std::uint32_t>(tops.size());
+        tops.push_back(under[i]);
+      }
+    }
+    nodes_.push_back(side_by_side(boxes.data()));
+    boxes_.insert(boxes_.end(), boxes.begin(), boxes.end());
+  }
+}
+
+std::size_t TriangleTree::bytes() const noexcept {
+  return boxes_.size() * sizeof(Box) + nodes_.size() * sizeof(Node) + leaves_.size() * sizeof(Leaf);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// For every processor.
+#define WRENCHD_WALK walk_portable
+#include "collision/pairs/bvh_traversal_kernel.hpp"
+
+namespace wrenchd::walk {
+
+bool has_avx2() noexcept {
+#if defined(__x86_64__)
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+  return false;
+#endif
+}
+
+}  // namespace wrenchd::walk

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/pairs/intersecting_pairs.hpp"
+
+#include <limits>
+
+#include "collision/pairs/triangle_intersection.hpp"
+#include "core/frame.hpp"
+
+namespace wrenchd {
+namespace {
+
+Triangle triangle(const MeshSurface& surface, std::uint32_t t) noexcept {
+  return {surface.corner_m(t, 0), surface.corner_m(t, 1), surface.corner_m(t, 2)};
+}
+
+}  // namespace
+
+MeetingPairs::MeetingPairs(walk::Kernel kernel) : walk_(kernel) {
+  pairs_.reserve(TreeWalk::kCapacity);
+}
+
+bool MeetingPairs::find(const TreedMesh& a, const TreedMesh& b, const Pose& X_BA) noexcept {
+  WalkBudget unlimited = {std::numeric_limits<std::uint32_t>::max()};
+  Sweep here = {X_BA, X_BA};
+  here.settle = true;
+  const bool all = walk_.find(a.tree, b.tree, here, unlimited);
+  const std::span<const TrianglePair> sure = walk_.meeting();
+  pairs_.assign(sure.begin(), sure.end());
+  const Frame X(X_BA);
+  for (const TrianglePair& pair : walk_) {
+    Triangle moved = triangle(a.surface, pair.a);
+    for (Vector3d& corner : moved) corner = X * corner;
+    if (triangles_meet(moved, triangle(b.surface, pair.b))) pairs_.push_back(pair);
+  }
+  return all;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/touch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wrenchd {
+namespace {
+
+constexpr std::array<const char*, kFeatureKindCount> kNames = {
+    "none", "vertex", "edge", "face", "hull vertex", "hull edge", "hull face", "plane"};
+
+/// Directions closer than this are the same [1 - cosine].
+constexpr double kSameDirection = 1e-9;
+
+/// The edge of a hull that starts or ends at a vertex and runs along d; its vertex, where none does.
+Feature hull_edge(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& d) noexcept {
+  for (const std::uint32_t e : hull.edges_of(vertex)) {
+    const ConvexBody::Edge& edge = hull.edges[e];
+    if (std::abs(edge.d.dot(d)) >= 1.0 - kSameDirection)
+      return {FeatureKind::hull_edge, std::min(edge.from, edge.to), std::max(edge.from, edge.to)};
+  }
+  return {FeatureKind::hull_vertex, vertex, 0};
+}
+
+/// The face of a hull at a vertex whose outward normal is n. A plane between two convex bodies may touch one
+/// of them in that vertex alone: then it is the vertex.
+Feature hull_face(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& n) noexcept {
+  for (const std::uint32_t f : hull.faces_of(vertex))
+    if (hull.faces[f].n.dot(n) >= 1.0 - kSameDirection) return {FeatureKind::hull_face, f, 0};
+  return {FeatureKind::hull_vertex, vertex, 0};
+}
+
+Feature mesh_edge(const MeshSurface& surface, std::uint32_t edge) noexcept {
+  const auto& [a, b] = surface.edges()[edge].vertices;
+  return {FeatureKind::edge, std::min(a, b), std::max(a, b)};
+}
+
+/// Where a contact is. A plane along two edges may have come to touch a hull in a vertex that is no end of
+/// its edge: then it is there.
+Vector3d point_W(const Contact& contact, FeatureKind tool, FeatureKind obstacle, const Pose& X_WQ) noexcept {
+  if (contact.kind != ContactKind::edge_edge) return contact_point_W(contact, X_WQ);
+  if (tool == FeatureKind::hull_vertex) return X_WQ * contact.p_TA_m;
+  if (obstacle == FeatureKind::hull_vertex) return contact.p_WB_m;
+  return contact_point_W(contact, X_WQ);
+}
+
+std::array<double, 3> numbers(const Vector3d& v) noexcept {
+  return {v.x(), v.y(), v.z()};
+}
+
+std::string or_number(const std::string& name, std::uint32_t number) {
+  return name.empty() ? "obstacle " + std::to_string(number) : name;
+}
+
+}  // namespace
+
+const char* name(FeatureKind kind) noexcept {
+  const auto i = static_cast<std::size_t>(kind);
+  return i < kNames.size() ? kNames[i] : "unknown";
+}
+
+std::string text(const Feature& feature) {
+  const std::string kind = name(feature.kind);
+  switch (feature.kind) {
+    case FeatureKind::none:
+    case FeatureKind::plane:
+      return kind;
+    case FeatureKind::edge:
+    case FeatureKind::hull_edge:
+      return kind + " " + std::to_string(feature.first) + "-" + std::to_string(feature.second);
+    default:
+      return kind + " " + std::to_string(feature.first);
+  }
+}
+
+Feature tool_feature(const Contact& contact, const Scene& scene, bool of_meshes) noexcept {
+  const bool mesh = of_meshes && contact.obstacle >= scene.first_mesh();
+  switch (contact.kind) {
+    case ContactKind::vertex_face:
+      return {mesh ? FeatureKind::vertex : FeatureKind::hull_vertex, contact.tool_feature, 0};
+    case ContactKind::face_vertex:
+      if (mesh) return {FeatureKind::face, contact.tool_feature, 0};
+      return hull_face(scene.tool().hull, contact.tool_feature, -contact.d_T);
+    case ContactKind::edge_edge:
+      break;
+  }
+  return mesh ? mesh_edge(scene.tool_mesh()->surface, contact.tool_feature)
+              : hull_edge(scene.tool().hull, contact.tool_feature, contact.d_T);
+}
+
+Feature obstacle_feature(const Contact& contact, const Scene& scene, bool of_meshes) noexcept {
+  if (contact.obstacle < scene.half_spaces().size()) return {FeatureKind::plane, 0, 0};
+  const std::size_t k = contact.obstacle - scene.half_spaces().size();
+  const std::uint32_t feature = contact.obstacle_feature;
+  if (of_meshes && contact.obstacle >= scene.first_mesh()) {
+    if (contact.kind == ContactKind::vertex_face) return {FeatureKind::face, feature, 0};
+    if (contact.kind == ContactKind::face_vertex) return {FeatureKind::vertex, feature, 0};
+    return mesh_edge(scene.meshes()[k].mesh->surface, feature);
+  }
+  const ConvexBody& hull = scene.convex()[k].body;
+  if (contact.kind == ContactKind::vertex_face) return hull_face(hull, feature, contact.n_W);
+  if (contact.kind == ContactKind::face_vertex) return {FeatureKind::hull_vertex, feature, 0};
+  return hull_edge(hull, feature, contact.d_W);
+}
+
+Touches touches(const Projection& projection, const Scene& scene, bool of_meshes) noexcept {
+  const auto& active = projection.active;
+  std::array<std::uint8_t, ContactSet::kCapacity> order{};  // the one that carries most first
+  double sum = 0.0;
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    sum += active[i].multiplier;
+    order[i] = static_cast<std::uint8_t>(i);
+  }
+  const auto place = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
+  const std::size_t told = std::min(kMostTouches, active.size());
+  std::partial_sort(order.begin(), place(told), place(active.size()), [&](std::uint8_t a, std::uint8_t b) {
+    const double difference = active[a].multiplier - active[b].multiplier;
+    return difference != 0.0 ? difference > 0.0 : a < b;
+  });
+  Touches out;
+  for (std::size_t i = 0; i < told; ++i) {
+    const auto& [contact, multiplier] = active[order[i]];
+    const Feature tool = tool_feature(contact, scene, of_meshes);
+    const Feature obstacle = obstacle_feature(contact, scene, of_meshes);
+    Touch touch;
+    touch.point_W_m = numbers(point_W(contact, tool.kind, obstacle.kind, projection.X_WQ));
+    touch.normal_W = numbers(normal_W(contact, projection.X_WQ));
+    touch.multiplier_kg_m = multiplier;
+    touch.share = sum > 0.0 ? multiplier / sum : 0.0;
+    touch.obstacle = contact.obstacle;
+    touch.tool_first = tool.first;
+    touch.tool_second = tool.second;
+    touch.obstacle_first = obstacle.first;
+    touch.obstacle_second = obstacle.second;
+    touch.contact_kind = static_cast<std::uint8_t>(contact.kind);
+    touch.tool_feature_kind = static_cast<std::uint8_t>(tool.kind);
+    touch.obstacle_feature_kind = static_cast<std::uint8_t>(obstacle.kind);
+    out.add(touch);
+  }
+  return out;
+}
+
+std::string obstacle_name(const Scene& scene, std::uint32_t number) {
+  const std::size_t half_spaces = scene.half_spaces().size();
+  if (number < half_spaces) return or_number(scene.half_spaces()[number].name, number);
+  const std::size_t k = number - half_spaces;
+  if (k < scene.meshes().size()) return or_number(scene.meshes()[k].name, number);
+  if (k < scene.convex().size()) return or_number(scene.convex()[k].name, number);
+  return or_number({}, number);
+}
+
+}  // namespace wrenchd

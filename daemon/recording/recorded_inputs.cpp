@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/recorded_inputs.hpp"
+
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+
+#include <openssl/evp.h>
+#include <sys/utsname.h>
+
+#include "config/inherited_toml.hpp"
+#include "config/load_profile.hpp"
+#include "config/load_scene.hpp"
+#include "config/load_settings.hpp"
+#include "daemon/version.hpp"
+#include "daemon/wall_clock.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Nothing where it cannot be read.
+std::optional<std::string> contents(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return {};
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  if (in.bad()) return {};
+  return bytes;
+}
+
+std::string sha256(const std::string& bytes) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
+  unsigned length = 0;
+  if (EVP_Digest(bytes.data(), bytes.size(), hash.data(), &length, EVP_sha256(), nullptr) != 1)
+    throw RecordingError("OpenSSL has no SHA-256");
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (unsigned i = 0; i < length; ++i) {
+    text += kDigits[hash[i] >> 4];
+    text += kDigits[hash[i] & 15];
+  }
+  return text;
+}
+
+/// The profiles that the profile inherits, the nearest first.
+std::vector<fs::path> parents_of(const fs::path& profile) {
+  std::vector<fs::path> chain;
+  try {
+    read_inherited(profile, SearchPath(), &chain);
+  } catch (const ConfigError&) {  // it was read before; what became of it since is told when it is replayed
+    return {};
+  }
+  chain.erase(chain.begin());
+  return chain;
+}
+
+const char* word(Realtime realtime) {
+  switch (realtime) {
+    case Realtime::required:
+      return "required";
+    case Realtime::best_effort:
+      return "best_effort";
+    case Realtime::off:
+      break;
+  }
+  return "off";
+}
+
+const RecordedFile* find(const RecordingHeader& header, const std::string& role) {
+  for (const RecordedFile& file : header.files)
+    if (file.role == role) return &file;
+  return nullptr;
+}
+
+void write(const fs::path& file, const std::string& bytes) {
+  fs::create_directories(file.parent_path());
+  std::ofstream out(file, std::ios::binary);
+  out << bytes;
+  out.close();
+  if (!out)
+    throw RecordingError(file.string() + ": what is in the recording cannot be put there; is the disk full?");
+}
+
+/// Where a mesh can be read from now.
+fs::path mesh_at(const RecordingHeader& header, const std::string& role, const fs::path& directory) {
+  const RecordedFile* const mesh = find(header, role);
+  if (mesh == nullptr)
+    throw RecordingError("the recording has no mesh '" + role +
+                         "', which its scene names: it cannot be replayed from itself; name the scene with "
+                         "--scene and the configuration with --config");
+  if (mesh->inside) {
+    const fs::path file = directory / "meshes" / (role + mesh->at.extension().string());
+    write(file, mesh->bytes);
+    return file;
+  }
+  const auto bytes = contents(mesh->at);
+  if (!bytes || sha256(*bytes) != mesh->sha256)
+    throw RecordingError(mesh->at.string() + ": " + (bytes ? "is another file" : "is not there") +
+                         " than when this was recorded (SHA-256 " + mesh->sha256 +
+                         "), and was too large to be in the recording; put it back");
+  return mesh->at;
+}
+
+TomlEntry* find(TomlNode& table, const std::string& key) {
+  auto* entries = std::get_if<TomlNode::Table>(&table.value);
+  if (entries == nullptr) return nullptr;
+  for (TomlEntry& entry : *entries)
+    if (entry.key == key) return &entry;
+  return nullptr;
+}
+
+TomlNode& add(TomlNode::Table& table, const std::string& key) {
+  table.emplace_back().key = key;
+  return table.back().node;
+}
+
+/// key = value in a table, in the place of what stood there. Where `table` is none there is nothing to set.
+void set(TomlNode* table, const std::string& key, const std::string& value) {
+  if (table == nullptr) return;
+  if (TomlEntry* const entry = find(*table, key)) {
+    entry->node.value = value;
+    return;
+  }
+  if (auto* entries = std::get_if<TomlNode::Table>(&table->value)) add(*entries, key).value = value;
+}
+
+/// A table in a table; made where there is none.
+TomlNode* table_in(TomlNode& root, const std::string& key) {
+  if (TomlEntry* const entry = find(root, key)) return &entry->node;
+  auto* entries = std::get_if<TomlNode::Table>(&root.value);
+  if (entries == nullptr) return nullptr;
+  TomlNode& made = add(*entries, key);
+  made.value = TomlNode::Table{};
+  return &made;
+}
+
+/// The mesh that a body of the scene names is where it was unpacked. One that is made is made again.
+void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& role,
+              const fs::path& directory) {
+  TomlEntry* const mesh = find(body, "mesh");
+  if (mesh != nullptr && std::holds_alternative<std::string>(mesh->node.value))
+    mesh->node.value = mesh_at(header, role, directory).string();
+}
+
+SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory) {
+  TomlNode tree = read_toml_text(header.scene, header.scene_file);
+  if (TomlEntry* const tool = find(tree, "tool")) put_mesh(tool->node, header, "tool", directory);
+  int number = 0;
+  if (TomlEntry* const obstacles = find(tree, "obstacle"))
+    if (auto* list = std::get_if<TomlNode::Array>(&obstacles->node.value))
+      for (TomlNode& obstacle : *list)
+        if (find(obstacle, "mesh") != nullptr)
+          put_mesh(obstacle, header, "obstacle_" + std::to_string(number++), directory);
+  return load_scene(tree, header.scene_file);
+}
+
+/// A directory for each profile of the chain: two of them may have the same name.
+DeviceProfile profile_of(const RecordingHeader& header, const fs::path& directory) {
+  std::vector<fs::path> places;
+  const auto put = [&](const fs::path& at, const std::string& text) {
+    places.push_back(directory / ("chain_" + std::to_string(places.size())));
+    const fs::path file = places.back() / "profiles" / at.filename();
+    write(file, text);
+    return file;
+  };
+  const fs::path nearest = put(header.profile_file, header.profile);
+  for (int i = 1;; ++i) {
+    const RecordedFile* const parent = find(header, "profile_" + std::to_string(i));
+    if (parent == nullptr) break;
+    put(parent->at, parent->bytes);
+  }
+  return load_profile(nearest, SearchPath(places));
+}
+
+}  // namespace
+
+RecordingHeader recorded_texts(const Plan& plan) {
+  RecordingHeader header;
+  header.version = kVersion;
+  header.settings_file = plan.settings.file;
+  header.scene_file = plan.scene.file;
+  header.profile_file = plan.settings.device.profile_file;
+  header.settings = contents(header.settings_file).value_or("");
+  header.scene = contents(header.scene_file).value_or("");
+  header.profile = contents(header.profile_file).value_or("");
+  int number = 0;
+  for (const fs::path& parent : parents_of(header.profile_file))
+    header.files.push_back(
+        {"profile_" + std::to_string(++number), parent, {}, true, contents(parent).value_or("")});
+  const fs::path& script = plan.settings.simulation.hand_script;
+  header.files.push_back({"hand_script", script, {}, true, contents(script).value_or("")});
+  header.realtime = word(plan.settings.servo.realtime);
+  utsname system{};
+  if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
+  return header;
+}
+
+void add_meshes(const SceneSettings& scene, RecordingHeader& header) {
+  std::size_t inside = 0;
+  const auto add = [&](const std::string& role, const fs::path& at) {
+    std::string bytes = contents(at).value_or("");
+    RecordedFile mesh{role, fs::absolute(at).lexically_normal(), sha256(bytes), true, {}};
+    mesh.inside = inside + bytes.size() <= kMostMeshBytes;
+    if (mesh.inside) {
+      inside += bytes.size();
+      mesh.bytes = std::move(bytes);
+    }
+    header.files.push_back(std::move(mesh));
+  };
+  if (!scene.tool.made) add("tool", scene.tool.mesh);
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i)
+    if (!scene.meshes[i].made) add("obstacle_" + std::to_string(i), scene.meshes[i].mesh);
+}
+
+void begin_now(const Clock& clock, RecordingHeader& header) {
+  header.started_ns = clock.now().time_since_epoch().count();
+  header.started_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                               std::chrono::system_clock::now().time_since_epoch())
+                               .count();
+  header.virtual_time = dynamic_cast<const WallClock*>(&clock) == nullptr;
+}
+
+Plan recorded_plan(const RecordingHeader& header, const fs::path& directory) {
+  if (header.settings.empty() || header.scene.empty() || header.profile.empty())
+    throw RecordingError(
+        "the recording lacks the texts of its configuration, scene or profile; name them with --config, "
+        "--scene and --profile");
+  const RecordedFile* const script = find(header, "hand_script");
+  const fs::path hand = directory / "hand.toml";
+  write(hand, script == nullptr ? "" : script->bytes);
+  Plan plan;
+  plan.profile = profile_of(header, directory);
+  plan.scene = scene_of(header, directory);
+  TomlNode tree = read_toml_text(header.settings, header.settings_file);
+  write(directory / "scene.toml", header.scene);
+  set(&tree, "scene", (directory / "scene.toml").string());
+  set(table_in(tree, "device"), "profile",
+      (directory / "chain_0" / "profiles" / header.profile_file.filename()).string());
+  TomlNode* const simulation = table_in(tree, "simulation");
+  set(simulation, "hand_script", hand.string());
+  set(simulation, "playback", "");
+  set(table_in(tree, "servo"), "realtime", header.realtime.empty() ? "required" : header.realtime);
+  plan.settings = load_settings(tree, header.settings_file, SearchPath({directory}));
+  plan.simulated = plan.profile.transport == Transport::loopback;
+  return plan;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/recording/recording_directory.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <tuple>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include "config/calibration_store.hpp"
+#include "config/toml_file.hpp"
+
+namespace wrenchd {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFlight = "flight-";
+constexpr std::size_t kLongestName = 100;
+
+bool is_set(const char* variable) {
+  const char* const value = std::getenv(variable);
+  return value != nullptr && *value != '\0';
+}
+
+bool is_plain(const std::string& name) {
+  const auto good = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  return !name.empty() && name.size() <= kLongestName && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), good);
+}
+
+}  // namespace
+
+fs::path recordings_directory(const RecordingSettings& settings) {
+  if (!settings.directory.empty()) return settings.directory;
+  if (is_set("STATE_DIRECTORY")) return state_directory() / "recordings";
+  if (is_set("XDG_STATE_HOME")) return fs::path(std::getenv("XDG_STATE_HOME")) / "wrenchd/recordings";
+  if (is_set("HOME")) return fs::path(std::getenv("HOME")) / ".local/state/wrenchd/recordings";
+  return {};
+}
+
+void make_recordings_directory(const fs::path& directory) {
+  if (directory.empty())
+    throw RecordingError(
+        "there is no place for recordings: neither STATE_DIRECTORY nor HOME is set; set directory in "
+        "[recording]");
+  std::error_code error;
+  if (fs::is_directory(directory, error)) return;
+  fs::create_directories(directory, error);
+  if (!fs::is_directory(directory))
+    throw RecordingError(directory.string() + ": cannot be made (" + error.message() +
+                         "); make it, or set directory in [recording] to one that may be written to");
+  fs::permissions(directory, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec, error);
+}
+
+std::string stamp(std::time_t utc) {
+  std::tm parts{};
+  gmtime_r(&utc, &parts);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y%m%dT%H%M%SZ", &parts)};
+}
+
+fs::path place_of(const std::string& asked, const fs::path& directory, bool anywhere) {
+  fs::path name = asked;
+  if (anywhere && name.is_absolute()) return name.lexically_normal();
+  if (!is_plain(asked))
+    throw RecordingError("'" + printable(asked, 60) +
+                         "' is no name for a recording: give letters, digits, -, _ " +
+                         "and dots, and no directory; it goes into " + directory.string() +
+                         (anywhere ? "; or give an absolute path" : "; only administrators name another"));
+  if (name.extension() != ".h5") name += ".h5";
+  return directory / name;
+}
+
+double free_MB(const fs::path& directory) {
+  std::error_code error;
+  const fs::space_info space = fs::space(directory, error);
+  if (error)
+    throw RecordingError(directory.string() + ": how much room is left cannot be told (" + error.message() +
+                         ")");
+  return 1e-6 * static_cast<double>(space.available);
+}
+
+void check_room(const fs::path& directory, const RecordingSettings& settings) {
+  const double left_MB = free_MB(directory);
+  if (left_MB > settings.keep_free_MB) return;
+  throw RecordingError(directory.string() + ": " + std::to_string(static_cast<long>(left_MB)) +
+                       " MB are left, and " + to_text(settings.keep_free_MB) +
+                       " MB are to stay free; remove old recordings, or lower keep_free_MB in [recording]");
+}
+
+std::vector<RecordingFound> recordings_in(const fs::path& directory) {
+  std::vector<RecordingFound> found;
+  std::error_code error;
+  for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
+    struct stat status {};
+    const std::string name = at->path().filename().string();
+    if (!is_plain(name) || !name.ends_with(".h5")) continue;
+    if (::lstat(at->path().c_str(), &status) != 0 || !S_ISREG(status.st_mode)) continue;
+    found.push_back({name, static_cast<std::uint64_t>(status.st_size), status.st_mtime});
+  }
+  std::sort(found.begin(), found.end(), [](const RecordingFound& a, const RecordingFound& b) {
+    return std::tie(a.changed, a.name) < std::tie(b.changed, b.name);
+  });
+  return found;
+}
+
+OwnedFd open_recording(const fs::path& directory, const std::string& name) {
+  const fs::path file = place_of(name, directory, false);
+  // What somebody may have put there in a file's place is not followed, nor waited for.
+  OwnedFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat status {};
+  if (fd && ::fstat(fd.get(), &status) == 0 && S_ISREG(status.st_mode)) return fd;
+  std::string there;
+  for (const RecordingFound& one : recordings_in(directory)) there += (there.empty() ? "" : ", ") + one.name;
+  throw RecordingError(file.string() +
+                       ": is no recording that can be read; there are: " + (there.empty() ? "none" : there));
+}
+
+fs::path flight_file(const fs::path& directory, std::time_t utc, std::string_view fault) {
+  const std::string name = kFlight + stamp(utc) + "-" + std::string(fault);
+  std::error_code ignored;
+  fs::path file = directory / (name + ".h5");
+  for (int i = 2; fs::exists(file, ignored); ++i) file = directory / (name + "-" + std::to_string(i) + ".h5");
+  return file;
+}
+
+void keep_newest_flights(const fs::path& directory, std::size_t most) {
+  std::vector<fs::path> flights;
+  std::error_code error;
+  for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (name.starts_with(kFlight) && name.ends_with(".h5") && at->is_regular_file(error))
+      flights.push_back(at->path());
+  }
+  std::sort(flights.begin(), flights.end());  // their names begin with the time
+  for (std::size_t i = 0; i + most < flights.size(); ++i) fs::remove(flights[i], error);
+}
+
+}  // namespace wrenchd

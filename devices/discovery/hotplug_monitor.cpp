@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/discovery/hotplug_monitor.hpp"
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include <libudev.h>
+#include <poll.h>
+
+#include "devices/discovery/usb_devices.hpp"
+#include "devices/links/wake_up.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// udev's own sign of life: its control socket.
+bool udev_runs() {
+  std::error_code ignored;
+  return std::filesystem::exists("/run/udev/control", ignored);
+}
+
+const char* name_of(PlugMonitor::Source source) {
+  if (source == PlugMonitor::Source::automatic)
+    source = udev_runs() ? PlugMonitor::Source::udev : PlugMonitor::Source::kernel;
+  return source == PlugMonitor::Source::udev ? "udev" : "kernel";
+}
+
+std::string text(const char* s) {
+  return s == nullptr ? std::string() : std::string(s);
+}
+
+}  // namespace
+
+struct PlugMonitor::Watch {
+  Watch(Listener to, const char* source) : listener(std::move(to)) {
+    context = udev_new();
+    monitor = context == nullptr ? nullptr : udev_monitor_new_from_netlink(context, source);
+    if (monitor == nullptr ||
+        udev_monitor_filter_add_match_subsystem_devtype(monitor, "hidraw", nullptr) < 0 ||
+        udev_monitor_filter_add_match_subsystem_devtype(monitor, "usb", "usb_device") < 0 ||
+        udev_monitor_enable_receiving(monitor) < 0) {
+      release();
+      throw std::runtime_error(
+          "cannot hear of devices that are plugged in (udev monitor); allow AF_NETLINK sockets "
+          "(RestrictAddressFamilies=)");
+    }
+  }
+  ~Watch() { release(); }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  void release() noexcept {
+    if (monitor != nullptr) udev_monitor_unref(monitor);
+    if (context != nullptr) udev_unref(context);
+  }
+
+  void run() noexcept {
+    std::array<pollfd, 2> files{pollfd{udev_monitor_get_fd(monitor), POLLIN, 0},
+                                pollfd{ending.file(), POLLIN, 0}};
+    for (;;) {
+      if (poll(files.data(), files.size(), -1) < 0) continue;
+      if (files[1].revents != 0) return;
+      if (udev_device* const device = udev_monitor_receive_device(monitor); device != nullptr) {
+        tell(device);
+        udev_device_unref(device);
+      }
+    }
+  }
+
+  void tell(udev_device* device) noexcept {
+    const std::string_view action = udev_device_get_action(device);
+    if (action != "add" && action != "remove") return;
+    listener({action == "add" ? PlugEvent::Kind::plugged : PlugEvent::Kind::unplugged,
+              text(udev_device_get_subsystem(device)), text(udev_device_get_devnode(device)),
+              place_in(text(udev_device_get_devpath(device)))});
+  }
+
+  Listener listener;
+  udev* context = nullptr;
+  udev_monitor* monitor = nullptr;
+  WakeUp ending;
+};
+
+PlugMonitor::PlugMonitor(Listener listener, Source source)
+    : watch_(std::make_unique<Watch>(std::move(listener), name_of(source))),
+      thread_([watch = watch_.get()] { watch->run(); }) {}
+
+PlugMonitor::~PlugMonitor() {
+  watch_->ending.wake();
+  thread_.join();
+}
+
+}  // namespace wrenchd

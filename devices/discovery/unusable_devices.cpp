@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/discovery/unusable_devices.hpp"
+
+#include <array>
+
+namespace wrenchd {
+namespace {
+
+constexpr std::string_view kClosed =
+    "its protocol is not public; use it with its maker's driver, or ask the maker to publish the reports";
+constexpr std::string_view kNotSixAxes =
+    "it is no six-axis device, though its maker's id is that of the SpaceMouse family; nothing to do";
+constexpr std::string_view kUnclear =
+    "sources disagree on whether it has six axes; if yours has, send its report descriptor to wrenchd";
+
+/// Ids from udev rules and drivers in public repositories: spacenavd (src/dev.c), jhu-saw/sawSensablePhantom,
+/// MXHsj/ros_geomagic_touch_hid, libdhd's rules.
+constexpr std::array kKnown = {
+    KnownDevice{0x2988, 0x0302, 0x0302, "3D Systems Touch (USB)", kClosed},
+    KnownDevice{0x0301, 0x2988, 0x2988, "3D Systems Touch (USB)", kClosed},
+    KnownDevice{0x2988, 0x0304, 0x0304, "3D Systems Touch (HID)", kClosed},
+    KnownDevice{0x1451, 0x0000, 0xffff, "a Force Dimension device", kClosed},
+    KnownDevice{0x16c0, 0x0483, 0x0483, "a Teensy serial device, as Haply Inverse3 is one", kClosed},
+    KnownDevice{0x2fe3, 0x0100, 0x0100, "Haply VerseGrip dongle", kClosed},
+    KnownDevice{0x256f, 0xc62c, 0xc62c, "a 3Dconnexion device without six axes", kNotSixAxes},
+    KnownDevice{0x256f, 0xc641, 0xc641, "3Dconnexion c641", kUnclear},
+    KnownDevice{0x256f, 0xc650, 0xc651, "a 3Dconnexion device without six axes", kNotSixAxes},
+    KnownDevice{0x256f, 0xc654, 0xc658, "a 3Dconnexion device without six axes", kNotSixAxes},
+    KnownDevice{0x256f, 0xc664, 0xc665, "a 3Dconnexion device without six axes", kNotSixAxes},
+    KnownDevice{0x256f, 0xc668, 0xc668, "a 3Dconnexion device without six axes", kNotSixAxes},
+};
+
+}  // namespace
+
+const KnownDevice* known_unusable(UsbId id) noexcept {
+  for (const KnownDevice& known : kKnown) {
+    if (known.vendor == id.vendor && known.first_product <= id.product && id.product <= known.last_product)
+      return &known;
+  }
+  return nullptr;
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/simulation/simulated_arm.hpp"
+
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include <Eigen/LU>
+
+#include "core/finite.hpp"
+
+namespace wrenchd {
+namespace {
+
+/// As of the simulated device: a tenth of the fastest time constant of a stiff hand on a light handle.
+constexpr Duration kSubstep = std::chrono::nanoseconds(62'500);
+constexpr double kTeleport_m = 0.1;
+constexpr double kLeastTeleport_m = 0.01;
+/// Of the way from home to a first waypoint that is out of reach.
+constexpr int kStartSteps = 100;
+
+}  // namespace
+
+HeldArm::HeldArm(const DeviceProfile& profile, const SimulationSettings& settings,
+                 std::unique_ptr<EmulatedArm> arm)
+    : kinematics_(profile.kinematics),
+      X_BD_(profile.X_BD),
+      X_DB_(inverse(profile.X_BD)),
+      X_EH_(profile.X_EH),
+      X_HE_(inverse(profile.X_EH)),
+      turns_(profile.kinematics.joints == kMaxJoints),
+      path_(settings),
+      led_(is_led(settings)),
+      arm_(std::move(arm)),
+      handle_(settings, start(profile.name), seconds(kSubstep)),
+      place_(*place_of(handle_.X_BH())) {
+  stand_at(handle_.X_BH());
+}
+
+/// The last place within reach on the way from home to the first waypoint.
+Pose HeldArm::start(const std::string& profile) const {
+  const std::optional<Pose> X_DE_home = home(kinematics_);
+  if (!X_DE_home)
+    throw std::invalid_argument(
+        "device profile " + profile +
+        " cannot be simulated: no pose belongs to its home_counts; check [kinematics]");
+  const Pose X_BH_home = X_BD_ * *X_DE_home * X_EH_;
+  const Pose wanted = target_at(Duration{0}).X_BG;
+  Pose reached = X_BH_home;
+  for (int i = 0; i <= kStartSteps; ++i) {
+    const double s = static_cast<double>(i) / kStartSteps;
+    const Pose X_BH{X_BH_home.rotation.slerp(s, wanted.rotation),
+                    (1.0 - s) * X_BH_home.translation_m + s * wanted.translation_m};
+    if (!place_of(X_BH)) break;
+    reached = X_BH;
+  }
+  return reached;
+}
+
+void HeldArm::inject(const SimulatedFault& fault) {
+  if (fault.kind == SimulatedFault::Kind::bad_quaternion)
+    throw std::invalid_argument("an arm sends encoder counts, and no quaternion that could be bad");
+  if (!is_of_the_wire(fault.kind) && fault.kind != SimulatedFault::Kind::teleport)
+    throw std::invalid_argument("an emulated arm has no such fault; the loopback device has");
+  faults_.add(fault);
+}
+
+HandTarget HeldArm::target_at(Duration since_start) const noexcept {
+  HandTarget target = path_.at(since_start);
+  if (turns_) return target;
+  target.X_BG.rotation = X_BD_.rotation * X_EH_.rotation;
+  target.V_BG.angular_rad_per_s.setZero();
+  return target;
+}
+
+std::optional<HeldArm::Place> HeldArm::place_of(const Pose& X_BH) const noexcept {
+  const Pose X_DE = X_DB_ * X_BH * X_HE_;
+  const std::optional<JointAngles> angles = wrenchd::inverse(kinematics_, X_DE);
+  if (!angles) return {};
+  return Place{X_DE, *angles};
+}
+
+/// About the handle point, in the base. Where the arm is stretched out its motors hold nothing.
+Wrench HeldArm::motor_demand() const noexcept {
+  const Matrix3d J = jacobian(kinematics_, place_.angles, place_.X_DE);
+  Matrix3d J_inverse;
+  bool invertible = false;
+  J.computeInverseWithCheck(J_inverse, invertible);
+  const Vector3d tau_Nm = joint_torques(kinematics_, arm_->motors());
+  if (!invertible || !is_finite(tau_Nm)) return {};
+  const Wrench F_D = shifted(Wrench{J_inverse.transpose() * tau_Nm, Vector3d::Zero()},
+                             place_.X_DE.rotation * X_EH_.translation_m);
+  Wrench F_B = expressed(X_BD_.rotation, F_D);
+  if (!turns_) F_B.torque_Nm.setZero();  // its bearings take it
+  return F_B;
+}
+
+/// Turns the encoders. What a fault adds is halved until the arm could be there.
+void HeldArm::stand_at(const Pose& X_BH) noexcept {
+  Place seen = place_;
+  if (shows(SimulatedFault::Kind::teleport, now_, now_)) {
+    std::optional<Place> elsewhere;
+    for (double off_m = kTeleport_m; !elsewhere && off_m > kLeastTeleport_m; off_m *= 0.5)
+      elsewhere = place_of({X_BH.rotation, X_BH.translation_m + off_m * Vector3d::UnitX()});
+    seen = elsewhere.value_or(seen);
+  }
+  arm_->set_counts(joint_counts(kinematics_, seen.angles));
+}
+
+void HeldArm::advance_to(TimePoint t, ReportSink& host) noexcept {
+  if (!powered_) {
+    powered_ = true;
+    power_on_ = now_ = t;
+    faults_.power_on(t);
+    arm_->advance_to(t, host);
+  }
+  if (t - now_ > kMaxCatchUp) {
+    now_ += (t - now_) / kSubstep * kSubstep;
+    handle_.rest();
+  }
+  for (; now_ + kSubstep <= t;) {
+    substep();
+    arm_->advance_to(now_, host);
+  }
+}
+
+void HeldArm::substep() noexcept {
+  now_ += kSubstep;
+  const Pose before = handle_.X_BH();
+  const HandTarget target = target_at(now_ - power_on_);
+  if (led_)
+    handle_.lead(target, motor_demand());
+  else
+    handle_.step(target, motor_demand());
+  if (const std::optional<Place> next = place_of(handle_.X_BH()))
+    place_ = *next;
+  else
+    handle_.stop_at(before);
+  stand_at(handle_.X_BH());
+  asked_for_homing_ = arm_->wants_homing() ? asked_for_homing_ + kSubstep : Duration{};
+  if (asked_for_homing_ >= kHomingTakes) arm_->home();
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "devices/simulation/simulated_puck.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace wrenchd {
+namespace {
+
+constexpr Duration kStep = std::chrono::milliseconds(1);
+/// As HeldArm::kMaxCatchUp: after a longer gap the hand takes the cap anew.
+constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
+
+const PoseReportLayout& layout(const DeviceProfile& profile, std::size_t index) noexcept {
+  return index == 0 ? profile.pose_report : profile.more_reports[index - 1];
+}
+
+/// Three counts, cut to how far the cap goes with their direction kept.
+void put(const Vector3d& wanted, std::span<int> counts) noexcept {
+  const double most = wanted.cwiseAbs().maxCoeff();
+  const double cut = most > EmulatedSpaceMouse::kFullScale ? EmulatedSpaceMouse::kFullScale / most : 1.0;
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    counts[i] = static_cast<int>(std::lround(cut * wanted[static_cast<Eigen::Index>(i)]));
+}
+
+}  // namespace
+
+CapCoding cap_coding(const DeviceProfile& profile) {
+  const bool combined = profile.pose_report.translation.present && profile.pose_report.rotation.present;
+  CapCoding coding{combined ? EmulatedSpaceMouse::Format::combined : EmulatedSpaceMouse::Format::split};
+  for (std::size_t i = 0; i <= profile.more_reports.size(); ++i) {
+    const PoseReportLayout& report = layout(profile, i);
+    if (report.translation.present) coding.translation_step_m = report.translation.step;
+    if (report.rotation.present) coding.rotation_step_rad = report.rotation.step;
+  }
+  if (!profile.deflection || coding.translation_step_m == 0.0 || coding.rotation_step_rad == 0.0)
+    throw std::invalid_argument("device profile " + profile.name +
+                                " cannot be simulated: its reports do not carry both the translation and the "
+                                "rotation of a cap; simulate a profile that inherits spacemouse_split");
+  return coding;
+}
+
+HeldCap::HeldCap(const DeviceProfile& profile, const SimulationSettings& settings)
+    : profile_(profile),
+      path_(settings),
+      coding_(cap_coding(profile)),
+      linear_(*profile.deflection, profile.deflection->linear_gain, profile.deflection->full_m),
+      angular_(*profile.deflection, profile.deflection->angular_gain, profile.deflection->full_rad),
+      mouse_(coding_.format),
+      seen_(unmoved()) {}
+
+DeflectionPose HeldCap::unmoved() const noexcept {
+  return DeflectionPose(*profile_.deflection, profile_.max_linear_speed_m_per_s,
+                        profile_.max_angular_speed_rad_per_s);
+}
+
+void HeldCap::open(TimePoint now) {
+  seen_ = unmoved();
+  seen_at_ = now;
+  grasped_at_ = now + kGraspTakes;
+  said_ = {};
+}
+
+void HeldCap::inject(const SimulatedFault& fault) {
+  using Kind = SimulatedFault::Kind;
+  if (fault.kind == Kind::bad_quaternion || fault.kind == Kind::teleport)
+    throw std::invalid_argument("a cap sends how far it is pushed, and no pose that could be bad");
+  if (!is_of_the_wire(fault.kind))
+    throw std::invalid_argument("an emulated cap has no such fault; the loopback device has");
+  faults_.add(fault);
+}
+
+void HeldCap::advance_to(TimePoint t, ReportSink& host) noexcept {
+  host_ = &host;
+  if (!powered_) {
+    powered_ = true;
+    power_on_ = now_ = seen_at_ = t;
+    grasped_at_ = t + kGraspTakes;
+    faults_.power_on(t);
+    mouse_.advance_to(t, *this);
+  }
+  if (t - now_ > kMaxCatchUp) {
+    now_ += (t - now_) / kStep * kStep;
+    grasped_at_ = now_ + kGraspTakes;
+  }
+  while (now_ + kStep <= t) {
+    now_ += kStep;
+    mouse_.advance_to(now_, *this);
+    push();
+  }
+}
+
+/// What the device says moves the tool, and goes on to the host.
+void HeldCap::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
+  for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
+    const PoseReportLayout& known = layout(profile_, i);
+    if (decode_into(known, report, said_) != Decoding::ok) continue;
+    if (!known.translation.present && !known.rotation.present) break;
+    look(sent);
+    const Quaterniond& R_BD = profile_.X_BD.rotation;
+    seen_.push(R_BD * said_.translation_m, R_BD * said_.rotation_rad);
+    break;
+  }
+  host_->take_report(sent, report);
+}
+
+void HeldCap::see(TimePoint now, const Pose& X_BH) noexcept {
+  seen_.put(X_BH);
+  seen_at_ = std::max(seen_at_, now);
+}
+
+void HeldCap::look(TimePoint now) noexcept {
+  seen_.advance(seconds(now - seen_at_));
+  seen_at_ = std::max(seen_at_, now);
+}
+
+void HeldCap::push() noexcept {
+  look(now_);
+  const Deflection& how = *profile_.deflection;
+  const HandTarget target = hand_target();
+  const Pose& X_BH = seen_.X_BH();
+  Vector3d linear = target.X_BG.translation_m;
+  Vector3d angular = rotation_vector(target.X_BG.rotation);
+  if (how.mode == Deflection::Mode::rate) {
+    linear = target.V_BG.linear_m_per_s + kCorrection_per_s * (linear - X_BH.translation_m);
+    angular = target.V_BG.angular_rad_per_s +
+              kCorrection_per_s * rotation_vector(target.X_BG.rotation * X_BH.rotation.conjugate());
+  }
+  if (now_ < grasped_at_) linear = angular = Vector3d::Zero();
+  const Quaterniond R_DB = profile_.X_BD.rotation.conjugate();
+  std::array<int, 6> counts{};
+  if (how.mode == Deflection::Mode::rate) {
+    linear = linear_.deflection(linear);
+    angular = angular_.deflection(angular);
+  } else {
+    linear /= how.linear_gain;
+    angular /= how.angular_gain;
+  }
+  put(R_DB * linear / coding_.translation_step_m, std::span(counts).first(3));
+  put(R_DB * angular / coding_.rotation_step_rad, std::span(counts).last(3));
+  if (counts == counts_) return;
+  counts_ = counts;
+  mouse_.push(counts);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/bench/method_timing.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+namespace wrenchd::bench {
+namespace {
+
+/// Undisturbed, the passes of one method differ by a few per cent.
+constexpr double kInconclusive = 0.1;
+
+std::vector<double> timed_pass(const Runner& runner, std::size_t poses, const TickScale& scale) {
+  std::vector<double> ns(poses);
+  volatile double answer = 0.0;  // so that no answer can be left out
+  runner.restart();
+  for (std::size_t i = 0; i < poses; ++i) {
+    const std::int64_t before = ticks();
+    answer = runner.solve(i).value;
+    ns[i] = scale.ns(ticks() - before);
+  }
+  static_cast<void>(answer);
+  return ns;
+}
+
+}  // namespace
+
+std::vector<Result> race(const std::vector<Runner>& runners, std::size_t poses, int passes,
+                         const TickScale& scale) {
+  std::vector<Result> results(runners.size());
+  for (std::size_t r = 0; r < runners.size(); ++r) {
+    results[r].name = runners[r].name;
+    runners[r].restart();
+    for (std::size_t i = 0; i < poses; ++i) results[r].answers.push_back(runners[r].solve(i));
+  }
+
+  std::vector least_ns(runners.size(), std::vector(poses, std::numeric_limits<double>::infinity()));
+  std::vector<std::vector<double>> p50_ns(runners.size());
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::size_t r = 0; r < runners.size(); ++r) {
+      const std::vector<double> ns = timed_pass(runners[r], poses, scale);
+      p50_ns[r].push_back(quantile(ns, 0.5));
+      for (std::size_t i = 0; i < poses; ++i) least_ns[r][i] = std::min(least_ns[r][i], ns[i]);
+    }
+  for (std::size_t r = 0; r < runners.size(); ++r) {
+    results[r].ns = quantiles(least_ns[r]);
+    results[r].spread = spread(p50_ns[r]);
+  }
+  return results;
+}
+
+std::string verdict(const Result& result) {
+  return result.spread > kInconclusive ? "inconclusive" : "";
+}
+
+}  // namespace wrenchd::bench

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/triangle_bvh.hpp"
+
+namespace wrenchd {
+namespace {
+
+using Kind = MeshSurface::Kind;
+
+struct Count {
+  std::vector<int> seen;
+  double worst_outside_m = 0.0;
+};
+
+/// Every triangle under a box lies in it, and in all boxes above.
+void descend(const TriangleTree& tree, const MeshSurface& surface, std::uint32_t node,
+             std::vector<std::uint32_t> above, Count& count) {
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    const TriangleTree::Box& box = tree.boxes()[8 * node + i];
+    if (box.count < 0) continue;
+    std::vector<std::uint32_t> path = above;
+    path.push_back(8 * node + i);
+    if (box.count == 0) {
+      descend(tree, surface, box.child, path, count);
+      continue;
+    }
+    for (int lane = 0; lane < box.count; ++lane) {
+      const std::uint32_t t = tree.leaves()[box.child].triangle[lane];
+      ++count.seen[t];
+      for (const std::uint32_t b : path) {
+        const auto& [centre, axis, half, size, child, n, features] = tree.boxes()[b];
+        const Vector3d u(axis[0][0], axis[0][1], axis[0][2]), v(axis[1][0], axis[1][1], axis[1][2]);
+        const std::array<Vector3d, 3> axes = {u, v, u.cross(v)};
+        for (int k = 0; k < 3; ++k) {
+          const Vector3d d = surface.corner_m(t, k) - Vector3d(centre[0], centre[1], centre[2]);
+          for (std::size_t j = 0; j < 3; ++j)
+            count.worst_outside_m = std::max(count.worst_outside_m, std::abs(d.dot(axes[j])) - half[j]);
+        }
+        if (surface.features()[t].vertices !=
+            std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone})
+          CHECK((features & TriangleTree::kVertices) != 0);
+        if (surface.features()[t].edges !=
+            std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone})
+          CHECK((features & TriangleTree::kEdges) != 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("a tree holds every triangle once, inside all boxes above it", "[triangle_tree]") {
+  for (const char* kind : {"cube", "plate", "bumpy", "hole", "bolt", "gear"})
+    for (const std::size_t triangles : {12, 500, 6000}) {
+      INFO(kind << ' ' << triangles);
+      const MeshSurface surface(make_mesh({kind, triangles}), Kind::solid);
+      const TriangleTree tree(surface);
+      Count count{std::vector<int>(surface.triangles().size(), 0)};
+      descend(tree, surface, 0, {}, count);
+      CHECK(std::all_of(count.seen.begin(), count.seen.end(), [](int n) { return n == 1; }));
+      CHECK(count.worst_outside_m <= 0.0);
+      CHECK(static_cast<double>(tree.leaves().size()) <=
+            1.05 * static_cast<double>(surface.triangles().size()) / 8.0 + 1.0);
+    }
+}
+
+TEST_CASE("a tree of no triangles is no tree", "[triangle_tree]") {
+  const TriangleTree tree(MeshSurface(TriangleMesh{}, Kind::surface));
+  CHECK(tree.nodes().empty());
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <set>
+
+#include <catch2/catch.hpp>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/pairs/bvh_traversal.hpp"
+#include "collision/pairs/triangle_intersection.hpp"
+#include "collision/scene.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/random_values.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+using PairSet = std::set<std::pair<std::uint32_t, std::uint32_t>>;
+
+Triangle triangle(const MeshSurface& surface, std::uint32_t t, const Pose& X) {
+  return {X * surface.corner_m(t, 0), X * surface.corner_m(t, 1), X * surface.corner_m(t, 2)};
+}
+
+/// Of the pairs that a walk lists, those that meet at a pose.
+PairSet meeting(TreeWalk& walk, const TreedMesh& a, const TreedMesh& b, const Sweep& sweep,
+                const Pose& X_BA) {
+  WalkBudget budget = {1000000000};
+  REQUIRE(walk.find(a.tree, b.tree, sweep, budget));
+  PairSet out;
+  for (const TrianglePair& pair : walk)
+    if (triangles_meet(triangle(a.surface, pair.a, X_BA), triangle(b.surface, pair.b, Pose{})))
+      out.insert({pair.a, pair.b});
+  return out;
+}
+
+/// A pose at which the two touch or overlap somewhere.
+Pose near_pose(RandomValues& random, const TreedMesh& a, const TreedMesh& b) {
+  const double reach = a.surface.radius_m() + b.surface.radius_m();
+  return {random.rotation(), random.uniform(0.3, 0.95) * reach * random.unit<3>()};
+}
+
+const std::vector<std::pair<MadeMesh, MadeMesh>>& mesh_pairs() {
+  static const std::vector<std::pair<MadeMesh, MadeMesh>> pairs = {
+      {{"bumpy", 2000}, {"boulder", 3000}}, {{"cube", 12}, {"plate", 500}},
+      {{"bolt", 2000}, {"nut", 2000}},      {{"gear", 3000}, {"gear", 1000}},
+      {{"peg", 1000}, {"hole", 2000}},      {{"sphere", 80}, {"boulder", 20000}},
+  };
+  return pairs;
+}
+
+TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of processor", "[tree_walk]") {
+  RandomValues random(21);
+  TreeWalk fastest, portable(walk::walk_portable);
+  std::size_t all = 0;
+  for (const auto& [tool, obstacle] : mesh_pairs()) {
+    const TreedMesh a(make_mesh(tool)), b(make_mesh(obstacle));
+    const ExactMeeting exact(a.surface.mesh(), b.surface.mesh());
+    for (int n = 0; n < 12; ++n) {
+      const Pose X_BA = near_pose(random, a, b);
+      const Sweep sweep = {X_BA, X_BA};
+      const PairSet found = meeting(fastest, a, b, sweep, X_BA);
+      CHECK(found == meeting(portable, a, b, sweep, X_BA));
+      CHECK(found.size() == exact.pairs(X_BA));
+      all += found.size();
+    }
+  }
+  CHECK(all > 1000);
+}
+
+// What a sweep must list is found by trying: the pairs that meet at many poses on the way, and at many within
+// reach of its end.
+TEST_CASE("a swept walk lists whatever meets on the way and within reach of the end", "[tree_walk]") {
+  RandomValues random(22);
+  TreeWalk still, swept, portable(walk::walk_portable);
+  std::size_t all = 0;
+  for (const auto& [tool, obstacle] : mesh_pairs()) {
+    const TreedMesh a(make_mesh(tool)), b(make_mesh(obstacle));
+    const double r = a.surface.radius_m();
+    for (int n = 0; n < 8; ++n) {
+      Sweep sweep;
+      sweep.X_BA_start = near_pose(random, a, b);
+      const double way = r * random.decades(1e-4, 0.3), turn = random.decades(1e-4, 0.05);
+      sweep.X_BA_end = {(sweep.X_BA_start.rotation * random.rotation(turn)).normalized(),
+                        sweep.X_BA_start.translation_m + way * random.unit<3>()};
+      sweep.reach_m = 0.3 * (way + turn * r);
+      WalkBudget budget = {1000000000};
+      std::set<std::pair<std::uint32_t, std::uint32_t>> listed, listed_portable;
+      const bool complete = swept.find(a.tree, b.tree, sweep, budget);
+      if (!complete) continue;  // too long a way for the list
+      for (const TrianglePair& pair : swept) listed.insert({pair.a, pair.b});
+      CHECK(portable.find(a.tree, b.tree, sweep, budget));
+      for (const TrianglePair& pair : portable) listed_portable.insert({pair.a, pair.b});
+      for (int k = 0; k < 12; ++k) {
+        const double s = k / 11.0;
+        Pose X = {sweep.X_BA_start.rotation.slerp(s, sweep.X_BA_end.rotation),
+                  sweep.X_BA_start.translation_m +
+                      s * (sweep.X_BA_end.translation_m - sweep.X_BA_start.translation_m)};
+        if (k % 2 == 0) {
+          const double shift = random.uniform(0.0, 1.0);
+          X = {(sweep.X_BA_end.rotation * random.rotation((1.0 - shift) * sweep.reach_m / r)).normalized(),
+               sweep.X_BA_end.translation_m + shift * sweep.reach_m * random.unit<3>()};
+        }
+        for (const auto& pair : meeting(still, a, b, {X, X}, X)) {
+          ++all;
+          // A pair that meets all along, or passes by, is not kept apart by any plane; it is always listed.
+          REQUIRE(listed.count(pair) == 1);
+          REQUIRE(listed_portable.count(pair) == 1);
+        }
+      }
+    }
+  }
+  CHECK(all > 5000);
+}
+
+TEST_CASE("pairs without features that can meet first are left out when they are not wanted", "[tree_walk]") {
+  const TreedMesh a(make_mesh({"cube", 5000})), b(make_mesh({"table", 5000}));
+  const Pose X_BA = {Quaterniond::Identity(), {0, 0, 0.035}};
+  Sweep sweep = {X_BA, X_BA, 1e-5};
+  TreeWalk walk;
+  WalkBudget budget = {1000000};
+  CHECK(walk.find(a.tree, b.tree, sweep, budget));
+  const std::size_t all = walk.size();
+  sweep.all_pairs = false;
+  CHECK(walk.find(a.tree, b.tree, sweep, budget));
+  CHECK(walk.size() * 4 < all);
+  const auto has = [](const std::array<std::uint32_t, 3>& features) {
+    return features != std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone};
+  };
+  std::set<std::uint32_t> corners;
+  for (const TrianglePair& pair : walk) {
+    const auto& fa = a.surface.features()[pair.a];
+    const auto& fb = b.surface.features()[pair.b];
+    CHECK((has(fa.vertices) || has(fb.vertices) || (has(fa.edges) && has(fb.edges))));
+    for (const std::uint32_t v : fa.vertices)
+      if (v != MeshSurface::kNone) corners.insert(v);
+  }
+  CHECK(corners.size() == 4);  // of the cube's lower face
+}
+
+TEST_CASE("a walk stops where its budget ends, and says so", "[tree_walk]") {
+  const TreedMesh a(make_mesh({"peg", 1000})), b(make_mesh({"hole", 2000}));
+  const Sweep sweep = {Pose{Quaterniond::Identity(), {3e-4, 0, 0}},
+                       Pose{Quaterniond::Identity(), {3e-4, 0, 0}}};
+  TreeWalk walk;
+  WalkBudget plenty = {1000000};
+  REQUIRE(walk.find(a.tree, b.tree, sweep, plenty));
+  const std::uint32_t needed = 1000000 - plenty.visits;
+  CHECK(needed > 100);
+  WalkBudget enough = {needed}, short_of_one = {needed - 1};
+  CHECK(walk.find(a.tree, b.tree, sweep, enough));
+  CHECK(enough.visits == 0);
+  CHECK_FALSE(walk.find(a.tree, b.tree, sweep, short_of_one));
+}
+
+}  // namespace
+}  // namespace wrenchd

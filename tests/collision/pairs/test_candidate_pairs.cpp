@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <set>
+#include <tuple>
+
+#include <catch2/catch.hpp>
+
+#include "collision/pairs/candidate_pairs.hpp"
+#include "collision/pairs/triangle_intersection.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/manipulation_case.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+constexpr std::uint32_t kPlenty = 10000000;
+
+using PairSet = std::set<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>>;
+
+PairSet set_of(const NearPairs& list) {
+  PairSet out;
+  for (const NearPair& pair : list.pairs()) out.insert({pair.a, pair.b, pair.obstacle});
+  return out;
+}
+
+void list_all(NearPairs& list, const NearPairs::Way& way) {
+  WalkBudget budget = {kPlenty};
+  list.set_out(way);
+  REQUIRE(list.go_on(budget));
+  REQUIRE(list.complete());
+}
+
+/// Somewhere near a way, so far from it.
+Pose near_way(RandomValues& random, const NearPairs::Way& way, double away_m, double radius_m) {
+  const double share = random.uniform(0.0, 1.0), of_shift = random.uniform(0.0, 1.0);
+  const Pose on_way = {
+      way.X_WT_start.rotation.slerp(share, way.X_WT_end.rotation),
+      way.X_WT_start.translation_m + share * (way.X_WT_end.translation_m - way.X_WT_start.translation_m)};
+  return {(on_way.rotation * random.rotation((1.0 - of_shift) * away_m / radius_m)).normalized(),
+          on_way.translation_m + of_shift * away_m * random.unit<3>()};
+}
+
+TEST_CASE("a list made in parts is the list made at once", "[near_pairs]") {
+  const Scene scene = scene_of(rough_handling()[7]);
+  const NearPairs::Way way = {
+      {Quaterniond::Identity(), {0.10, 0, 0}}, {rotation_from({0.0, 0.01, 0.0}), {0.099, 0.001, 0}}, 1e-4};
+  NearPairs at_once(scene), in_parts(scene);
+  list_all(at_once, way);
+  in_parts.set_out(way);
+  int parts = 0;
+  for (WalkBudget few = {7}; !in_parts.go_on(few); few = {7}) {
+    CHECK(in_parts.under_way());
+    CHECK_FALSE(in_parts.covers(way.X_WT_start));
+    ++parts;
+  }
+  CHECK(parts > 5);
+  CHECK(in_parts.complete());
+  CHECK(in_parts.visits() == at_once.visits());
+  CHECK(set_of(in_parts) == set_of(at_once));
+  CHECK(at_once.pairs().size() > 10);
+}
+
+// A list that covers a pose holds all that a list made for that pose alone holds; but for what only its
+// margins let in, for which the triangles themselves are asked.
+TEST_CASE("a list holds what meets anywhere near its way", "[near_pairs]") {
+  RandomValues random(31);
+  std::size_t looked_at = 0;
+  for (const std::size_t i : {2, 7, 11, 14}) {
+    const Handling& handling = rough_handling()[i];
+    INFO(handling.name);
+    const Scene scene = scene_of(handling);
+    const double r_m = scene.tool_radius_m();
+    const MeshSurface& tool = scene.tool_mesh()->surface;
+    const MeshSurface& obstacle = scene.meshes()[0].mesh->surface;
+    NearPairs list(scene), here(scene);
+    for (int n = 0; n < repeats(20); ++n) {
+      const Pose X_start = {random.rotation(0.2), random.uniform(0.0, 1.0) * handling.start_m};
+      const NearPairs::Way way = {
+          X_start,
+          {(X_start.rotation * random.rotation(random.uniform(0.0, 0.2))).normalized(),
+           X_start.translation_m + random.uniform(0.0, 0.003) * random.unit<3>()},
+          random.decades(1e-5, 1e-3)};
+      list_all(list, way);
+      const PairSet listed = set_of(list);
+      for (int k = 0; k < 5; ++k) {
+        const Pose X_WT = near_way(random, way, 0.7 * way.reach_m, r_m);
+        REQUIRE(list.covers(X_WT));
+        list_all(here, {X_WT, X_WT, 0.0});
+        for (const NearPair& pair : here.pairs()) {
+          const auto corner = [&](int c) -> Vector3d { return X_WT * tool.corner_m(pair.a, c); };
+          if (!triangles_meet(
+                  {corner(0), corner(1), corner(2)},
+                  {obstacle.corner_m(pair.b, 0), obstacle.corner_m(pair.b, 1), obstacle.corner_m(pair.b, 2)}))
+            continue;
+          ++looked_at;
+          CHECK(listed.count({pair.a, pair.b, pair.obstacle}) == 1);
+        }
+      }
+    }
+  }
+  CHECK(looked_at > 100);
+}
+
+TEST_CASE("what is farther from the way than the reach is not covered", "[near_pairs]") {
+  RandomValues random(32);
+  const Scene scene = scene_of(rough_handling()[8]);
+  const double r_m = scene.tool_radius_m();
+  const NearPairs::Way way = {
+      {Quaterniond::Identity(), {0.08, 0, 0}}, {rotation_from({0.0, 0.02, 0.01}), {0.08, 0.002, 0}}, 1e-4};
+  NearPairs list(scene);
+  CHECK_FALSE(list.covers(way.X_WT_start));  // nothing is listed yet
+  list_all(list, way);
+  CHECK(list.covers(way.X_WT_start));
+  CHECK(list.covers(way.X_WT_end));
+  for (const Vector3d& away : {Vector3d(1, 0, 0), Vector3d(0, -1, 0), Vector3d(0, 0, 1)}) {
+    const auto beside = [&](double share) {
+      return Pose{way.X_WT_start.rotation, way.X_WT_start.translation_m + share * way.reach_m * away};
+    };
+    CHECK(list.covers(beside(0.99)));
+    CHECK_FALSE(list.covers(beside(1.5)));
+    const auto turned = [&](double share) {
+      return Pose{way.X_WT_start.rotation * rotation_from(-share * way.reach_m / r_m * away),
+                  way.X_WT_start.translation_m};
+    };
+    CHECK_FALSE(list.covers(turned(1.5)));
+  }
+}
+
+TEST_CASE("of thousands of obstacles only those near by are listed", "[near_pairs]") {
+  std::vector<MeshObstacle> obstacles;
+  const TreedMesh cube(make_mesh({"cube", 12}));
+  for (int x = 0; x < 10; ++x)
+    for (int y = 0; y < 10; ++y)
+      obstacles.push_back({"cube", cube, Pose{Quaterniond::Identity(), {x * 1.0, y * 1.0, 0.0}}});
+  const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
+  NearPairs list(scene);
+  const Pose X_WT = {Quaterniond::Identity(), {3.0, 4.0, 0.055}};
+  list_all(list, {X_WT, X_WT, 0.01});
+  CHECK(list.near_by().size() == 1);
+  for (const NearPair& pair : list.pairs()) CHECK(pair.obstacle == 34);
+  CHECK_FALSE(list.pairs().empty());
+}
+
+// A tool that stands still and a ball that flies by, 2 mm above it at the nearest.
+TEST_CASE("a list for what moves holds for its time, and for where the obstacle sees the tool",
+          "[near_pairs]") {
+  const ObstacleMotion flies = {{0.5, 0, 0}, {0, 0, 20.0}, 0.0};
+  std::vector<MeshObstacle> obstacles;
+  const auto ball = std::make_shared<const TreedMesh>(make_mesh({"sphere", 320}));
+  obstacles.emplace_back("ball", ball, Pose{Quaterniond::Identity(), {-0.502, 0, 0.062}}, flies);
+  const Scene scene(mesh_tool(make_mesh({"sphere", 320})), {}, {}, std::move(obstacles));
+  const Pose X_WT;
+  NearPairs list(scene);
+  const NearPairs::Way way = {X_WT, X_WT, 0.003, 1.000, 1.002};
+  list_all(list, way);
+  CHECK(list.covers(X_WT, 1.0));
+  CHECK(list.covers(X_WT, 1.001));
+  CHECK(list.covers(X_WT, 1.002));
+  CHECK_FALSE(list.covers(X_WT, 0.999));
+  CHECK_FALSE(list.covers(X_WT, 1.003));
+  CHECK_FALSE(list.covers(Pose{Quaterniond::Identity(), {0, 0, 0.004}}, 1.001));
+  // What the ball sees is a tool that turns: within the reach of the world's way is not enough.
+  const NearPairs::Way short_way = {X_WT, X_WT, 1e-5, 1.000, 1.010};
+  list_all(list, short_way);
+  CHECK(list.covers(X_WT, 1.0));
+  CHECK_FALSE(list.covers(X_WT, 1.005));  // from its arc to its chord it is farther than 10 um
+}
+
+}  // namespace
+}  // namespace wrenchd

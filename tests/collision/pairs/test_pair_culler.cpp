@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/pairs/pair_culler.hpp"
+#include "collision/pairs/triangle_intersection.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/random_values.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+struct Bodies {
+  MeshSurface tool = MeshSurface(make_mesh({"bumpy", 500}), BodyKind::solid);
+  MeshSurface obstacle = MeshSurface(make_mesh({"boulder", 800}), BodyKind::solid);
+
+  double extent_m() const { return tool.radius_m() + obstacle.radius_m(); }
+  std::uint32_t any(RandomValues& random, const MeshSurface& of) const {
+    return static_cast<std::uint32_t>(random.integer(0, static_cast<int>(of.triangles().size()) - 1));
+  }
+};
+
+/// A tool pose at which a triangle of the tool lies somewhere near one of the obstacle.
+Pose near(RandomValues& random, const Bodies& bodies, std::uint32_t a, std::uint32_t b, double away_m) {
+  const Quaterniond turn = random.rotation();
+  return {turn, bodies.obstacle.corner_m(b, 0) - turn * bodies.tool.corner_m(a, 1) +
+                    random.uniform(0.0, away_m) * random.unit<3>()};
+}
+
+/// On the straight way of each of its corners.
+bool meet(const Bodies& bodies, std::uint32_t a, std::uint32_t b, const Frame& from, const Frame& to,
+          double t) {
+  Triangle moved, still;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Vector3d& p = bodies.tool.corner_m(a, k);
+    moved[i] = (1.0 - t) * (from * p) + t * (to * p);
+    still[i] = bodies.obstacle.corner_m(b, k);
+  }
+  return triangles_meet(moved, still);
+}
+
+TEST_CASE("a sieve leaves out no pair that meets on the way, on every kind of processor", "[pair_sieve]") {
+  const Bodies bodies;
+  RandomValues random(51);
+  PairSieve fastest(8, 1, bodies.tool.radius_m()),
+      portable(8, 1, bodies.tool.radius_m(), walk::sift_portable);
+  int met = 0, left_out = 0;
+  const int runs = repeats(20000);
+  for (int n = 0; n < runs; ++n) {
+    const std::uint32_t a = bodies.any(random, bodies.tool), b = bodies.any(random, bodies.obstacle);
+    const Pose X_start = near(random, bodies, a, b, 0.01);
+    // The turn is so small that a chord is as good as an arc.
+    const Pose X_end = {(X_start.rotation * random.rotation(1e-4)).normalized(),
+                        X_start.translation_m + random.decades(1e-6, 1e-2) * random.unit<3>()};
+    const Frame from(X_start), to(X_end);
+    const auto left = [&](PairSieve& sieve) {
+      sieve.clear();
+      sieve.add(bodies.tool, a, bodies.obstacle, b, 0);
+      std::uint32_t pair = 7;
+      const std::size_t count = sieve.sift(0, from, to, bodies.extent_m(), 1e-8, &pair).left;
+      if (count == 1) CHECK(pair == 0);
+      return count;
+    };
+    const std::size_t by_fastest = left(fastest), by_portable = left(portable);
+    bool meets = false;
+    for (int k = 0; k <= 20 && !meets; ++k) meets = meet(bodies, a, b, from, to, k / 20.0);
+    met += meets;
+    left_out += by_fastest == 0;
+    if (meets) {
+      CHECK(by_fastest == 1);
+      CHECK(by_portable == 1);
+    }
+  }
+  CHECK(met > runs / 100);
+  CHECK(left_out > runs / 4);
+}
+
+TEST_CASE("a sieve leaves out what is kept apart by more than rounding and the margin", "[pair_sieve]") {
+  const MeshSurface tool(make_mesh({"cube", 12}), BodyKind::solid);
+  const MeshSurface obstacle(make_mesh({"cube", 12}), BodyKind::solid);
+  const double size_m = 2.0 * obstacle.vertices_m()[0].cwiseAbs().maxCoeff();
+  constexpr double kMargin_m = 1e-4;
+  const auto left = [&](const Vector3d& from_m, const Vector3d& to_m) {
+    PairSieve sieve(144, 1, tool.radius_m());
+    for (std::uint32_t a = 0; a < 12; ++a)
+      for (std::uint32_t b = 0; b < 12; ++b) sieve.add(tool, a, obstacle, b, 0);
+    std::array<std::uint32_t, 144> pairs;
+    return sieve
+        .sift(0, Frame(Pose{Quaterniond::Identity(), from_m}), Frame(Pose{Quaterniond::Identity(), to_m}),
+              2.0 * size_m, kMargin_m, pairs.data())
+        .left;
+  };
+  for (const Vector3d& way : {Vector3d(1, 0, 0), Vector3d(0, -1, 0), Vector3d(0, 0, 1)}) {
+    const Vector3d apart = (size_m + 1.1 * kMargin_m) * way, near = (size_m + 0.9 * kMargin_m) * way;
+    CHECK(left(apart, apart) == 0);
+    CHECK(left(near, near) > 0);
+    CHECK(left(apart, near) > 0);
+    CHECK(left(near, apart) > 0);
+    CHECK(left(apart, -apart) > 0);  // right through
+  }
+}
+
+TEST_CASE("what is left is told by its number, over all parts and in order", "[pair_sieve]") {
+  const Bodies bodies;
+  RandomValues random(52);
+  for (const walk::SieveKernel kernel :
+       {walk::SieveKernel{nullptr}, walk::SieveKernel{walk::sift_portable}}) {
+    PairSieve sieve(2000, 3, bodies.tool.radius_m(), kernel), alone(1, 1, bodies.tool.radius_m(), kernel);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+    const Pose X = {random.rotation(), {0.05, 0.03, 0.0}};
+    const Frame from(X), to(Pose{X.rotation, X.translation_m + Vector3d(0.0, 0.0, 1e-3)});
+    for (const auto& [obstacle, count] : {std::pair{4U, 1003}, {1U, 5}, {9U, 600}})
+      for (int n = 0; n < count; ++n) {
+        pairs.emplace_back(bodies.any(random, bodies.tool), bodies.any(random, bodies.obstacle));
+        sieve.add(bodies.tool, pairs.back().first, bodies.obstacle, pairs.back().second, obstacle);
+      }
+    REQUIRE(sieve.parts().size() == 3);
+    CHECK(sieve.parts()[1].obstacle == 1);
+    std::vector<std::uint32_t> left(2000), expected, all;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t count = sieve.sift(k, from, to, bodies.extent_m(), 2e-3, left.data()).left;
+      all.insert(all.end(), left.begin(), left.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+    for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+      alone.clear();
+      alone.add(bodies.tool, pairs[i].first, bodies.obstacle, pairs[i].second, 0);
+      if (alone.sift(0, from, to, bodies.extent_m(), 2e-3, left.data()).left == 1) expected.push_back(i);
+    }
+    CHECK(all == expected);
+    CHECK_FALSE(expected.empty());
+    CHECK(expected.size() < pairs.size());
+  }
+}
+
+// The tool wanders about a place where the two meet, now by a hair and now by far, and the pairs are those
+// about that place.
+TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool goes", "[pair_sieve]") {
+  const Bodies bodies;
+  for (const walk::SieveKernel kernel :
+       {walk::SieveKernel{nullptr}, walk::SieveKernel{walk::sift_portable}}) {
+    RandomValues random(53);
+    PairSieve sieve(4000, 1, bodies.tool.radius_m(), kernel);
+    std::vector<std::uint32_t> left(4000);
+    std::size_t asked = 0, of = 0, met = 0;
+    for (int place = 0; place < repeats(20); ++place) {
+      const Pose X_near =
+          near(random, bodies, bodies.any(random, bodies.tool), bodies.any(random, bodies.obstacle), 0.0);
+      const Frame there(X_near);
+      std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+      sieve.clear();
+      for (std::uint32_t a = 0; a < bodies.tool.triangles().size(); ++a)
+        for (std::uint32_t b = 0; b < bodies.obstacle.triangles().size() && pairs.size() < 4000; ++b)
+          if ((there * bodies.tool.corner_m(a, 0) - bodies.obstacle.corner_m(b, 0)).norm() < 0.012) {
+            pairs.emplace_back(a, b);
+            sieve.add(bodies.tool, a, bodies.obstacle, b, 0);
+          }
+      Pose X = X_near;
+      for (int n = 0; n < 60; ++n) {
+        const double step = random.decades(1e-7, random.chance(0.1) ? 1e-2 : 1e-4);
+        Pose X_next = {(X.rotation * random.rotation(step)).normalized(),
+                       X.translation_m + 0.04 * step * random.unit<3>()};
+        if ((X_next.translation_m - X_near.translation_m).norm() > 2e-3) X_next = X_near;
+        const Frame from(X), to(X_next);
+        const PairSieve::Sifted sifted = sieve.sift(0, from, to, bodies.extent_m(), 1e-7, left.data());
+        asked += sifted.asked;
+        of += pairs.size();
+        const std::set<std::uint32_t> remain(left.begin(),
+                                             left.begin() + static_cast<std::ptrdiff_t>(sifted.left));
+        for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+          if (!meet(bodies, pairs[i].first, pairs[i].second, from, to, 0.0) &&
+              !meet(bodies, pairs[i].first, pairs[i].second, from, to, 1.0))
+            continue;
+          ++met;
+          CHECK(remain.count(i) == 1);
+        }
+        X = X_next;
+      }
+    }
+    CHECK(met > 1000);
+    CHECK(asked < 3 * of / 4);  // it does remember
+  }
+}
+
+TEST_CASE("a sieve asks again of all pairs where the tool comes from afar", "[pair_sieve]") {
+  const Bodies bodies;
+  RandomValues random(54);
+  PairSieve sieve(800, 1, bodies.tool.radius_m());
+  for (int n = 0; n < 800; ++n)
+    sieve.add(bodies.tool, bodies.any(random, bodies.tool), bodies.obstacle,
+              bodies.any(random, bodies.obstacle), 0);
+  std::vector<std::uint32_t> left(800);
+  const auto asked_at = [&](const Pose& X) {
+    return sieve.sift(0, Frame(X), Frame(X), bodies.extent_m(), 1e-7, left.data()).asked;
+  };
+  const Pose here = {Quaterniond::Identity(), {0.2, 0, 0}};
+  CHECK(asked_at(here) == 800);
+  CHECK(asked_at(here) == 0);
+  CHECK(asked_at({rotation_from({0.0, 0.0, 2.0}), here.translation_m}) == 800);
+  CHECK(asked_at(here) == 800);
+}
+
+// A peg is in its hole where it was made, as a part of the sieve that was not asked yet.
+TEST_CASE("a sieve asks of all pairs that were added anew", "[pair_sieve]") {
+  const MeshSurface tool(make_mesh({"cube", 12}), BodyKind::solid);
+  const MeshSurface obstacle(make_mesh({"cube", 12}), BodyKind::solid);
+  const Frame here(Pose{Quaterniond::Identity(), {1e-3, 0, 0}});
+  std::uint32_t opposite = 0;
+  while (tool.planes()[0].normal.dot(obstacle.planes()[opposite].normal) > -0.9) ++opposite;
+  PairSieve sieve(16, 1, tool.radius_m());
+  std::vector<std::uint32_t> left(16);
+  for (int list = 0; list < 2; ++list) {
+    sieve.clear();
+    for (std::uint32_t n = 0; n < 16; ++n) sieve.add(tool, 0, obstacle, opposite, 0);
+    const auto sift = [&] { return sieve.sift(0, here, here, 0.2, 1e-7, left.data()); };
+    CHECK(sift().asked == 16);
+    REQUIRE(sift().left == 0);
+    CHECK(sift().asked == 0);
+  }
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "collision/pairs/triangle_intersection.hpp"
+#include "tests/support/exact_intersection.hpp"
+#include "tests/support/random_values.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+TriangleMesh mesh_of(const Triangle& t) {
+  return {{t[0], t[1], t[2]}, {{0, 1, 2}}};
+}
+
+TEST_CASE("two triangles meet where exact arithmetic says so", "[triangle_pair]") {
+  RandomValues random(11);
+  int meeting = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const double far = random.decades(1e-2, 1e2), size = random.decades(1e-2, 10.0);
+    const Vector3d origin = random.vector<3>(far);
+    Triangle p, q;
+    for (Vector3d& v : p) v = origin + random.vector<3>();
+    for (Vector3d& v : q) v = origin + random.vector<3>(size) + random.vector<3>(0.3);
+    if (random.chance(0.2))  // nearly in one plane
+      for (Vector3d& v : q)
+        v -= (1.0 - 1e-3) * (p[1] - p[0]).cross(p[2] - p[0]).normalized() *
+             (p[1] - p[0]).cross(p[2] - p[0]).normalized().dot(v - p[0]);
+    const bool exact = ExactMeeting(mesh_of(p), mesh_of(q)).meet(Pose{});
+    meeting += exact ? 1 : 0;
+    REQUIRE(triangles_meet(p, q) == exact);
+    REQUIRE(triangles_meet(q, p) == exact);
+  }
+  CHECK(meeting > 2000);
+  CHECK(meeting < 18000);
+}
+
+TEST_CASE("triangles in one plane meet where they overlap", "[triangle_pair]") {
+  const Triangle p = {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)};
+  const auto shifted = [&](double x, double y) {
+    Triangle q = p;
+    for (Vector3d& v : q) v += Vector3d(x, y, 0);
+    return q;
+  };
+  CHECK(triangles_meet(p, shifted(0.5, 0.25)));
+  CHECK(triangles_meet(p, shifted(0.0, 0.0)));
+  CHECK_FALSE(triangles_meet(p, shifted(0.8, 0.8)));
+  CHECK_FALSE(triangles_meet(p, shifted(-1.1, 0.0)));
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstring>
+
+#include <catch2/catch.hpp>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "config/load_scene.hpp"
+#include "daemon/control/scene_geometry.hpp"
+#include "tests/support/shipped_config.hpp"
+#include "tools/view/view_scene.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+
+namespace {
+
+/// A cube above two gears, one of which moves, and a floor.
+std::shared_ptr<const Scene> three_bodies() {
+  const auto gear =
+      std::make_shared<const TreedMesh>(make_mesh({.kind = "gear", .triangles = 2000, .seed = 1}));
+  ObstacleMotion motion;
+  motion.linear_m_per_s = {0.0, 0.02, 0.0};
+  motion.turn_back_s = 1.5;
+  std::vector<MeshObstacle> meshes;
+  meshes.emplace_back("still", gear, Pose{Quaterniond::Identity(), {0.1, 0.0, 0.0}});
+  meshes.emplace_back("moving", gear, Pose{rotation_from({0.0, 0.3, 0.0}), {-0.1, 0.0, 0.0}}, motion);
+  ToolBody tool = load_tool(shipped_plan().scene.tool);
+  return std::make_shared<const Scene>(std::move(tool),
+                                       std::vector<HalfSpaceSettings>{{"floor", {0, 0, 1}, -0.1}},
+                                       std::vector<ConvexObstacle>{}, std::move(meshes));
+}
+
+Json told(const SceneShapes& shapes, const Scene& scene) {
+  Json description = shapes.description(scene);
+  description["shapes"] = 1;
+  description["rendering"] = 0;
+  description["scene_time_begins_ns"] = 5'000'000'000;
+  description["X_WB"] = pose_json({});
+  description["X_HT"] = pose_json({});
+  description["wrench_about"] = "handle";
+  return description;
+}
+
+}  // namespace
+
+TEST_CASE("the shapes of a scene are in a memory that nobody can change", "[view]") {
+  const auto scene = three_bodies();
+  const SceneShapes shapes(scene);
+  const int fd = shapes.descriptor();
+  CHECK(ftruncate(fd, 1) != 0);
+  CHECK(write(fd, "x", 1) != 1);
+  CHECK(mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0) == MAP_FAILED);
+  void* const seen = mmap(nullptr, shapes.bytes().size(), PROT_READ, MAP_SHARED, fd, 0);
+  REQUIRE(seen != MAP_FAILED);
+  CHECK(std::memcmp(seen, shapes.bytes().data(), shapes.bytes().size()) == 0);
+  munmap(seen, shapes.bytes().size());
+}
+
+TEST_CASE("a mesh is in the shapes once, however many obstacles it is", "[view]") {
+  const auto scene = three_bodies();
+  const SceneShapes shapes(scene);
+  const Json told = shapes.description(*scene);
+  REQUIRE(told["meshes"].size() == 2);
+  REQUIRE(told["obstacles"].size() == 3);
+  CHECK(told["obstacles"][0]["name"] == "floor");
+  CHECK(told["obstacles"][0]["half_space"]["offset_m"] == -0.1);
+  CHECK(told["obstacles"][1]["mesh"] == 1);
+  CHECK(told["obstacles"][2]["mesh"] == 1);
+  CHECK(told["obstacles"][2]["motion"]["turn_back_s"] == 1.5);
+  const Json& gear = told["meshes"][1];
+  const TriangleMesh& mesh = scene->meshes()[0].mesh->surface.mesh();
+  REQUIRE(gear["vertices"] == mesh.vertices_m.size());
+  REQUIRE(gear["triangles"] == mesh.triangles.size());
+  float x = 0.0F;
+  std::uint32_t last = 0;
+  std::memcpy(&x, shapes.bytes().data() + gear["vertices_offset"].get<std::size_t>() + 12 * 7 + 4, 4);
+  CHECK(x == static_cast<float>(mesh.vertices_m[7].y()));
+  std::memcpy(&last, shapes.bytes().data() + shapes.bytes().size() - 4, 4);
+  CHECK(last == mesh.triangles.back()[2]);
+}
+
+TEST_CASE("shapes fit another scene of the same meshes, and no other", "[view]") {
+  const auto scene = three_bodies();
+  const SceneShapes shapes(scene);
+  std::vector<MeshObstacle> fewer = {scene->meshes()[1]};
+  const Scene moved(scene->tool(), {}, {}, fewer);
+  CHECK(shapes.fits(moved));
+  const Json told = shapes.description(moved);
+  REQUIRE(told["obstacles"].size() == 1);
+  CHECK(told["obstacles"][0]["mesh"] == 1);
+  CHECK_FALSE(shapes.fits(*three_bodies()));  // the same gear, loaded again
+  ToolBody other = scene->tool();
+  other.mesh.vertices_m[0].x() += 1e-3;
+  CHECK_FALSE(shapes.fits(Scene(other, {}, {}, fewer)));
+}
+
+TEST_CASE("the view draws what the daemon tells, and moves obstacles by scene time", "[view]") {
+  const auto scene = three_bodies();
+  const SceneShapes shapes(scene);
+  const ViewScene view(told(shapes, *scene), shapes.bytes());
+  CHECK(view.meshes().size() == 2);
+  CHECK(view.obstacle_name(2) == "moving");
+  CHECK(view.obstacle_name(9) == "obstacle 9");
+  const Json moved = view.moved(5'000'000'000 + 2'000'000'000);  // at scene time 2 s
+  REQUIRE(moved.size() == 1);
+  CHECK(moved[0][0] == 2);
+  const Pose X_WO = scene->meshes()[1].X_WO_at(2.0);
+  CHECK(moved[0][1][1].get<double>() == Approx(X_WO.translation_m.y()));
+  CHECK(std::abs(X_WO.translation_m.y()) > 0.005);
+  const ViewScene again(told(shapes, *scene), {}, &view);  // the same shapes are not read again
+  CHECK(again.meshes() == view.meshes());
+  CHECK_THROWS_WITH(ViewScene(told(shapes, *scene), shapes.bytes().first(100)),
+                    Catch::Contains("outside of their memory"));
+  Json broken = told(shapes, *scene);
+  broken.erase("tool");
+  CHECK_THROWS_WITH(ViewScene(broken, shapes.bytes()), Catch::Contains("not told as this program knows it"));
+}

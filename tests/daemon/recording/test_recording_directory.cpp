@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+
+#include <catch2/catch.hpp>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "daemon/recording/recording_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+RecordingSettings into(const std::filesystem::path& directory) {
+  RecordingSettings settings;
+  settings.directory = directory;
+  return settings;
+}
+
+RecordingSettings keeping_free(double MB) {
+  RecordingSettings settings;
+  settings.keep_free_MB = MB;
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("a recording is named by a plain name, or by an administrator's path", "[recording]") {
+  const std::filesystem::path there = "/var/lib/wrenchd/recordings";
+  CHECK(place_of("run", there, false) == there / "run.h5");
+  CHECK(place_of("run-2.h5", there, false) == there / "run-2.h5");
+  CHECK(place_of("a.b", there, true) == there / "a.b.h5");
+  CHECK(place_of("/data/x.h5", there, true) == "/data/x.h5");
+  for (const char* name :
+       {"/data/x.h5", "../x", "a/b", "", ".", "..", ".hidden", "a b", "a\nb", "\xC3\xA4"}) {
+    INFO(name);
+    CHECK_THROWS_WITH(place_of(name, there, false), Contains("no name for a recording") &&
+                                                        Contains("only administrators") &&
+                                                        Contains(there.string()));
+  }
+  CHECK_THROWS_WITH(place_of("../x", there, true), Contains("give an absolute path"));
+  CHECK_THROWS_AS(place_of(std::string(101, 'a'), there, false), RecordingError);
+}
+
+TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]") {
+  const TemporaryDirectory files;
+  CHECK(recordings_in(files.path() / "none").empty());
+  files.write("there/b.h5", "of b");
+  files.write("there/a.h5", "of a");
+  files.write("there/notes.txt", "x");
+  files.write("secret.h5", "secret");
+  const auto there = files.path() / "there";
+  std::filesystem::create_symlink(files.path() / "secret.h5", there / "link.h5");
+  std::filesystem::create_directory(there / "directory.h5");
+  REQUIRE(::mkfifo((there / "pipe.h5").c_str(), 0600) == 0);
+  std::filesystem::last_write_time(there / "b.h5",
+                                   std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
+  const auto found = recordings_in(there);
+  REQUIRE(found.size() == 2);
+  CHECK(found[0].name == "b.h5");  // the older one
+  CHECK(found[1].name == "a.h5");
+  CHECK(found[0].bytes == 4);
+  CHECK(std::time(nullptr) - found[0].changed >= 3590);
+  const OwnedFd open = open_recording(there, "a");
+  std::array<char, 8> text{};
+  CHECK(::read(open.get(), text.data(), text.size()) == 4);
+  CHECK(std::string(text.data()) == "of a");
+  CHECK(::write(open.get(), "x", 1) == -1);
+  for (const char* name : {"link", "directory", "pipe", "c"})
+    CHECK_THROWS_WITH(open_recording(there, name), Contains("there are: b.h5, a.h5"));
+  for (const char* name : {"../secret", "/etc/passwd", ""})
+    CHECK_THROWS_WITH(open_recording(there, name), Contains("no name for a recording"));
+}
+
+TEST_CASE("recordings go where the settings say, else where the system keeps state", "[recording]") {
+  const auto before = [](const char* name) {
+    const char* value = std::getenv(name);
+    return value == nullptr ? std::string() : std::string(value);
+  };
+  const std::string state = before("STATE_DIRECTORY"), xdg = before("XDG_STATE_HOME"), home = before("HOME");
+  setenv("STATE_DIRECTORY", "/var/lib/one:/var/lib/two", 1);
+  CHECK(recordings_directory(into("/data")) == "/data");
+  CHECK(recordings_directory({}) == "/var/lib/one/recordings");
+  unsetenv("STATE_DIRECTORY");
+  setenv("XDG_STATE_HOME", "/xdg", 1);
+  CHECK(recordings_directory({}) == "/xdg/wrenchd/recordings");
+  unsetenv("XDG_STATE_HOME");
+  setenv("HOME", "/home/anna", 1);
+  CHECK(recordings_directory({}) == "/home/anna/.local/state/wrenchd/recordings");
+  unsetenv("HOME");
+  CHECK(recordings_directory({}).empty());
+  CHECK_THROWS_WITH(make_recordings_directory({}), Contains("set directory in [recording]"));
+  for (const auto& [name, value] :
+       {std::pair{"STATE_DIRECTORY", state}, {"XDG_STATE_HOME", xdg}, {"HOME", home}})
+    if (!value.empty()) setenv(name, value.c_str(), 1);
+}
+
+TEST_CASE("a directory for recordings is made, or refused with a cure", "[recording]") {
+  const TemporaryDirectory files;
+  make_recordings_directory(files.path() / "a/b");
+  CHECK(std::filesystem::is_directory(files.path() / "a/b"));
+  using std::filesystem::perms;
+  CHECK(std::filesystem::status(files.path() / "a/b").permissions() ==
+        (perms::owner_all | perms::group_read | perms::group_exec));  // nothing for others
+  const auto file = files.write("file", "");
+  CHECK_THROWS_WITH(make_recordings_directory(file / "below"),
+                    Contains("cannot be made") && Contains("set directory in [recording]"));
+}
+
+TEST_CASE("nothing is recorded where the disk has less room than is to stay free", "[recording]") {
+  const TemporaryDirectory files;
+  const double left_MB = free_MB(files.path());
+  CHECK(left_MB > 0.0);
+  CHECK_NOTHROW(check_room(files.path(), keeping_free(0.0)));
+  CHECK_THROWS_WITH(check_room(files.path(), keeping_free(2.0 * left_MB)),
+                    Contains("MB are left") && Contains("keep_free_MB"));
+  CHECK_THROWS_AS(free_MB(files.path() / "none"), RecordingError);
+}
+
+TEST_CASE("the flight recorder's files are named by time and fault, and the oldest go", "[recording]") {
+  const TemporaryDirectory files;
+  CHECK(stamp(1795356901) == "20261122T141501Z");
+  const auto first = flight_file(files.path(), 1795356901, "overspeed");
+  CHECK(first == files.path() / "flight-20261122T141501Z-overspeed.h5");
+  files.write(first.filename(), "1");
+  CHECK(flight_file(files.path(), 1795356901, "overspeed") ==
+        files.path() / "flight-20261122T141501Z-overspeed-2.h5");
+  files.write("flight-20261122T141500Z-stop_asked.h5", "2");
+  files.write("flight-20261122T141502Z-pinned.h5", "3");
+  files.write("run-1.h5", "4");
+  files.write("flight-plan.txt", "5");
+  keep_newest_flights(files.path(), 2);
+  const auto there = [&](const char* name) { return std::filesystem::exists(files.path() / name); };
+  CHECK_FALSE(there("flight-20261122T141500Z-stop_asked.h5"));
+  CHECK(there("flight-20261122T141501Z-overspeed.h5"));
+  CHECK(there("flight-20261122T141502Z-pinned.h5"));
+  CHECK(there("run-1.h5"));
+  CHECK(there("flight-plan.txt"));
+  keep_newest_flights(files.path() / "none", 2);  // nothing there is nothing to remove
+}

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "daemon/servo/stability_analysis.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/shipped_config.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using namespace std::chrono_literals;
+
+namespace {
+
+/// A second of ticks 1 ms apart with samples of this age, whose commands are acknowledged as late.
+LoopMeasurement measured(Duration age, std::uint64_t ticks_to_acknowledge) {
+  LoopMeasurement loop(0.002);
+  for (std::uint64_t i = 1; i < 1000; ++i) {
+    const TimePoint now = TimePoint{} + std::chrono::milliseconds(i);
+    loop.tick({now, now - age, 1e-3 * static_cast<double>(i), i, true, true,
+               i > ticks_to_acknowledge ? i - ticks_to_acknowledge : 0, i});
+  }
+  return loop;
+}
+
+Stability stability_of(const Plan& plan) {
+  const Scene scene(plan.scene);
+  return Stability(plan.settings, plan.profile, scene.tool().solid.inertia, scene.tool().X_MT());
+}
+
+}  // namespace
+
+TEST_CASE("what the shipped device bears is not touched, and ten times as much is scaled", "[stability]") {
+  Plan plan = shipped_plan();
+  plan.settings.wrench.law = SpringLaw::pid;
+  const LoopMeasurement loop = measured(500us, 1);
+  const StiffnessShare shipped = stability_of(plan).settle(loop);
+  CHECK(shipped.bounded);
+  CHECK(shipped.spring == 1.0);
+  CHECK(shipped.damper == 1.0);
+  plan.settings.wrench.gains.stiffness *= 10.0;
+  const StiffnessShare stiff = stability_of(plan).settle(loop);
+  CHECK(stiff.spring < 0.5);
+  // Passive by the formula, with the delay that was measured.
+  const double b = plan.profile.damping_N_s_per_m;
+  CHECK(stiff.spring * 6000.0 * (0.5 * loop.longest_period_s() + loop.delay_s()) +
+            stiff.damper * plan.settings.wrench.gains.damping(0, 0) <=
+        b * (1.0 + 1e-9));
+  CHECK(stability_of(plan).settle(measured(2500us, 3)).spring < stiff.spring);
+}
+
+TEST_CASE("a profile that states no damping bounds nothing, and its own maximum does", "[stability]") {
+  Plan plan = shipped_plan();
+  plan.settings.wrench.law = SpringLaw::pid;
+  plan.settings.wrench.gains.stiffness *= 10.0;
+  plan.profile.damping_N_s_per_m = DeviceProfile::kNotStated;
+  const StiffnessShare unknown = stability_of(plan).settle(measured(500us, 1));
+  CHECK_FALSE(unknown.bounded);
+  CHECK(unknown.spring == 1.0);
+  plan.profile.max_stiffness_N_per_m = 1500.0;
+  CHECK(stability_of(plan).settle(measured(500us, 1)).spring == Approx(0.25));
+}
+
+TEST_CASE("the encoders that a profile states bound the stiffness too", "[stability]") {
+  Plan plan = shipped_plan();
+  plan.profile.encoder_step_m = 200e-6;
+  const StiffnessShare coarse = stability_of(plan).settle(measured(500us, 1));
+  CHECK(coarse.bounded);
+  CHECK(coarse.spring * 600.0 <= 51.0);
+  plan.profile.encoder_step_m = DeviceProfile::kNotStated;
+  CHECK(stability_of(plan).settle(measured(500us, 1)).spring == 1.0);
+}
+
+TEST_CASE("the energy law is bound by its own stiffness", "[stability]") {
+  Plan plan = shipped_plan();
+  plan.settings.wrench.law = SpringLaw::energy;
+  const LoopMeasurement loop = measured(500us, 1);
+  CHECK(stability_of(plan).settle(loop).spring == 1.0);
+  plan.settings.wrench.energy_stiffness_per_s2 *= 20.0;
+  CHECK(stability_of(plan).settle(loop).spring < 0.3);
+}
+
+TEST_CASE("wrenchd scales what is too stiff for the device, and says so", "[stability]") {
+  const TemporaryDirectory dir;
+  const std::string config =
+      dir.write(
+             "stiff.toml",
+             "[wrench]\nlaw = \"pid\"\nstiffness = { linear_N_per_m = 9000.0, angular_Nm_per_rad = 20.0 }\n")
+          .string();
+  const ProgramResult result =
+      run_program("wrenchd", {"--config", config, "--virtual-time", "--seconds", "4", "--arm", "--live"});
+  INFO(result.err);
+  CHECK(result.exit_code == 0);
+  CHECK(result.err.find("% of the stiffness that is asked for") != std::string::npos);
+  CHECK(result.out.find("in contact at 0 of") == std::string::npos);
+}

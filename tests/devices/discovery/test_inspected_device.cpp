@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <catch2/catch.hpp>
+
+#include "devices/discovery/inspected_device.hpp"
+#include "tests/support/case_count.hpp"
+#include "tests/support/sample_descriptors.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace test;
+
+UsbDevice usb(const Bytes& descriptor, std::uint16_t page, std::uint16_t usage) {
+  UsbDevice device;
+  device.vendor = 0x046d;
+  device.product = 0xc626;
+  device.serial = "A1";
+  device.product_name = "SpaceNavigator";
+  device.report_descriptor = descriptor;
+  device.usage_page = page;
+  device.usage = usage;
+  return device;
+}
+
+using Reports = std::vector<std::pair<int, std::size_t>>;  ///< id and length
+
+Reports in_reports(const Bytes& descriptor) {
+  Reports reports;
+  for (const ReportFact& fact : plugged_facts(usb(descriptor, 1, 8)).device.in_reports)
+    reports.emplace_back(fact.id, fact.length);
+  return reports;
+}
+
+TEST_CASE("a HID device has its ids, strings, usage and in-reports", "[plugged_device]") {
+  const PluggedFacts facts = plugged_facts(usb(space_navigator(), 0x01, 0x08));
+  CHECK(text(facts.device.id) == "046d:c626");
+  CHECK(facts.device.serial == "A1");
+  CHECK(facts.device.product == "SpaceNavigator");
+  CHECK(facts.device.usage_page == 0x01);
+  CHECK(facts.device.usage == 0x08);
+  CHECK(facts.unreadable.empty());
+  REQUIRE(facts.descriptor);
+  CHECK(facts.descriptor->find(ReportKind::output, 4) != nullptr);
+
+  CHECK(in_reports(space_navigator()) == Reports{{1, 7}, {2, 7}, {3, 3}});
+  CHECK(in_reports(space_mouse_wireless()) == Reports{{1, 13}, {3, 3}, {0x17, 3}});
+  CHECK(in_reports(home_made_combined()) == Reports{{1, 13}, {3, 5}});
+  CHECK(in_reports(teensy_rawhid()) == Reports{{0, 64}});  // no ids
+}
+
+TEST_CASE("what is not HID has no usage, and nothing is wrong with it", "[plugged_device]") {
+  const PluggedFacts facts = plugged_facts(usb({}, 0, 0));
+  CHECK_FALSE(facts.device.usage_page);
+  CHECK_FALSE(facts.device.usage);
+  CHECK(facts.device.in_reports.empty());
+  CHECK_FALSE(facts.descriptor);
+  CHECK(facts.unreadable.empty());
+}
+
+TEST_CASE("of a device whose descriptor is refused the rest is known, and why", "[plugged_device]") {
+  Bytes cut = space_navigator();
+  cut.pop_back();
+  const PluggedFacts facts = plugged_facts(usb(cut, 0x01, 0x08));
+  CHECK(facts.device.usage == 0x08);
+  CHECK(facts.device.in_reports.empty());
+  CHECK_FALSE(facts.descriptor);
+  CHECK(facts.unreadable.find("byte 216: ") == 0);
+}
+
+TEST_CASE("whatever a descriptor holds, there are facts or a reason", "[plugged_device]") {
+  RandomValues random(31);
+  for (int i = 0; i < repeats(20'000); ++i) {
+    const Bytes bytes = strange_descriptor(random);
+    const PluggedFacts facts = plugged_facts(usb(bytes, 1, 8));
+    if (facts.descriptor.has_value() == !facts.unreadable.empty()) CHECK(bytes.empty());
+  }
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <chrono>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "config/load_profile.hpp"
+#include "devices/links/host_watchdog.hpp"
+#include "devices/report_codec.hpp"
+#include "tests/support/no_allocation.hpp"
+
+namespace wrenchd {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr TimePoint kStart = TimePoint{} + 5s;
+constexpr Duration kAfter = 6ms;
+
+DeviceProfile shipped(const std::string& name) {
+  return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml");
+}
+
+Packet packet_of(const DeviceProfile& profile, const WrenchReport& report) {
+  Packet packet;
+  packet.length = encode(profile.wrench_report, report, packet.bytes);
+  return packet;
+}
+
+WrenchReport push(std::uint64_t sequence) {
+  WrenchReport report;
+  report.F.force_N = {1.0, 0.0, 0.0};
+  report.hold_time_s = 0.008;
+  report.sequence = sequence;
+  report.enable = true;
+  return report;
+}
+
+/// A writer that has heard that, at kStart.
+struct Said {
+  DeviceProfile profile;
+  LastWord word;
+  Packet packet;
+
+  Said(const DeviceProfile& of, const WrenchReport& report) : profile(of), word(profile, kAfter) {
+    word.heard(kStart, packet_of(profile, report));
+  }
+  bool speaks(TimePoint now) { return word.speak(now, packet); }
+  WrenchReport spoken() const { return decode(profile.wrench_report, packet.report()).report; }
+};
+
+TEST_CASE("a loop that pushes and falls silent is spoken for: zero wrench, motors off", "[last_word]") {
+  Said said(shipped("loopback"), push(65534));
+  CHECK(said.word.due() == kStart + kAfter);
+  CHECK_FALSE(said.speaks(kStart + kAfter - 1ns));
+  TimePoint now = kStart + kAfter;
+  for (unsigned n = 1; n <= LastWord::kTimes; ++n, now += LastWord::kBetween) {
+    REQUIRE(said.word.due() == now);
+    REQUIRE(said.speaks(now));
+    const WrenchReport report = said.spoken();
+    CHECK(report.F.force_N.isZero(0.0));
+    CHECK(report.F.torque_Nm.isZero(0.0));
+    CHECK_FALSE(report.enable);
+    CHECK(report.hold_time_s == Approx(0.008));
+    CHECK(report.sequence == ((65534 + n) & 0xffff));  // a device takes no number twice
+    CHECK(decode(said.profile.wrench_report, said.packet.report()).outcome == Decoding::ok);
+  }
+  CHECK(said.word.due() == TimePoint::max());
+  CHECK_FALSE(said.speaks(now + 1h));
+}
+
+TEST_CASE("whoever goes on speaking is not interrupted", "[last_word]") {
+  Said said(shipped("loopback"), push(1));
+  TimePoint now = kStart;
+  for (std::uint64_t n = 2; n < 100; ++n) {
+    now += 1ms;
+    CHECK_FALSE(said.speaks(now));
+    said.word.heard(now, packet_of(said.profile, push(n)));
+  }
+  CHECK(said.speaks(now + kAfter));
+  // One that comes back is heard again, and spoken for again.
+  said.word.heard(now + 1s, packet_of(said.profile, push(7)));
+  CHECK_FALSE(said.speaks(now + 1s));
+  REQUIRE(said.speaks(now + 1s + kAfter));
+  CHECK(said.spoken().sequence == 8);
+}
+
+TEST_CASE("a silence without a push is nobody's business", "[last_word]") {
+  // The self-test wants to see the watchdog trip: motors on, zero wrench, and then nothing.
+  const DeviceProfile profile = shipped("loopback");
+  WrenchReport rest = push(1);
+  rest.F = {};
+  CHECK(Said(profile, rest).word.due() == TimePoint::max());
+  WrenchReport off = push(1);
+  off.enable = false;
+  CHECK(Said(profile, off).word.due() == TimePoint::max());
+  CHECK(LastWord().due() == TimePoint::max());
+  // A device without motors.
+  DeviceProfile mouse = shipped("spacemouse_split");
+  REQUIRE_FALSE(mouse.has_output);
+  CHECK(LastWord(mouse, kAfter).due() == TimePoint::max());
+}
+
+TEST_CASE("what is no wrench leaves the last one standing", "[last_word]") {
+  Said said(shipped("loopback"), push(1));
+  Packet other;
+  other.length = 3;
+  other.bytes[0] = 0x7f;
+  said.word.heard(kStart + 5ms, other);
+  CHECK(said.word.due() == kStart + kAfter);
+  CHECK(said.speaks(kStart + kAfter));
+}
+
+TEST_CASE("motors that are told their efforts are told none", "[last_word]") {
+  const DeviceProfile polhem = shipped("polhem");
+  REQUIRE(polhem.wrench_report.efforts.present);
+  WrenchReport report;
+  report.efforts = {0.0, 0.3, 0.0};
+  Said said(polhem, report);
+  REQUIRE(said.speaks(kStart + kAfter));
+  for (const double effort : said.spoken().efforts) CHECK(effort == 0.0);
+  report.efforts = {};
+  CHECK(Said(polhem, report).word.due() == TimePoint::max());
+}
+
+TEST_CASE("the last word neither allocates nor locks", "[last_word]") {
+  Said said(shipped("loopback"), push(1));
+  const Packet packet = packet_of(said.profile, push(2));
+  std::uint64_t allocations = 0, locks = 0;
+  {
+    const test::RealtimeGuard guard;
+    said.word.heard(kStart, packet);
+    said.speaks(kStart + kAfter);
+    allocations = guard.allocations(), locks = guard.locks();
+  }
+  CHECK(allocations == 0);
+  CHECK(locks == 0);
+}
+
+}  // namespace
+}  // namespace wrenchd

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <optional>
+
+#include <catch2/catch.hpp>
+
+#include "devices/links/reconnecting_link.hpp"
+#include "devices/simulation/reference_profile.hpp"
+#include "tests/devices/usb/mock_device.hpp"
+#include "tests/support/no_allocation.hpp"
+
+using namespace wrenchd;
+using namespace wrenchd::test;
+using namespace std::chrono_literals;
+using Catch::Contains;
+
+namespace {
+
+TimePoint now() {
+  return std::chrono::steady_clock::now();
+}
+
+DeviceProfile profile_for(Transport transport) {
+  DeviceProfile profile = reference_profile();
+  profile.name = "reference";
+  profile.transport = transport;
+  profile.match.usb = {{0x1209, 0x6d0f}};
+  return profile;
+}
+
+LinkSettings patient() {
+  return {.write_deadline = 1h, .close_within = 10s};
+}
+
+std::string refusal(PluggedLink& link) {
+  try {
+    link.open();
+  } catch (const DeviceNotFound& missing) {
+    std::string text = missing.what();
+    for (const std::string& seen : missing.seen()) text += "\n" + seen;
+    return text;
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
+  MockMachine machine;
+  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  CHECK(refusal(link) == "no device of profile reference is plugged in");
+  std::array<std::uint8_t, 64> buffer{};
+  CHECK(link.read(now(), buffer).status == LinkStatus::gone);
+  CHECK(link.write(now(), buffer) == LinkStatus::gone);
+
+  std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{});
+  link.open();
+  CHECK(link.device()->serial == "A1");
+  mock->send(Bytes(64, 1));
+  link.wait_readable(now() + 1h);
+  CHECK(link.read(now(), buffer).status == LinkStatus::ok);
+  mock->unplug();
+  while (link.read(now(), buffer).status != LinkStatus::gone) std::this_thread::yield();
+  mock.reset();
+  CHECK_THAT(refusal(link), Contains("no device of profile reference"));
+}
+
+TEST_CASE("a device that is plugged in elsewhere is the same device", "[usb]") {
+  MockMachine machine;
+  std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{.place = "1-1", .number = 0});
+  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  link.open();
+  mock->unplug();
+  link.close();
+  mock.reset();
+  mock.emplace(machine, MockIdentity{.place = "2-1.4", .number = 5});
+  link.open();
+  CHECK(link.device()->place == "2-1.4");
+  CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::ok);
+  CHECK(mock->receive(32) == Bytes(32, 7));
+}
+
+TEST_CASE("another device in its place is not opened, and nothing is written to it", "[usb]") {
+  MockMachine machine;
+  std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{.serial = "A1"});
+  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  link.open();
+  mock->unplug();
+  link.close();
+  mock.reset();
+  mock.emplace(machine, MockIdentity{.serial = "B2"});
+  CHECK_THAT(refusal(link), Contains("serial B2") && Contains("not the device that was unplugged"));
+  CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::gone);
+  CHECK_FALSE(mock->anything_received());
+}
+
+TEST_CASE("of two equal devices the serial number decides", "[usb]") {
+  MockMachine machine;
+  MockHidraw first(machine, {.place = "1-1", .number = 0, .serial = "A1"});
+  MockHidraw second(machine, {.place = "1-2", .number = 1, .serial = "B2"});
+  PluggedLink either(profile_for(Transport::hidraw), {}, patient());
+  CHECK_THAT(refusal(either), Contains("serial number A1") && Contains("serial number B2"));
+  PluggedLink link(profile_for(Transport::hidraw), "B2", patient());
+  link.open();
+  CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::ok);
+  CHECK(second.receive(32) == Bytes(32, 7));
+  CHECK_FALSE(first.anything_received());
+}
+
+TEST_CASE("the profile says by which transport", "[usb]") {
+  MockMachine machine;
+  MockUsb mock(machine, {.hid = false});
+  PluggedLink link(profile_for(Transport::libusb), {}, patient());
+  link.open();
+  CHECK(mock.claimed());
+  mock.send(Bytes(64, 3));
+  std::array<std::uint8_t, 64> buffer{};
+  link.wait_readable(now() + 1h);
+  CHECK(link.read(now(), buffer).status == LinkStatus::ok);
+  CHECK(buffer[63] == 3);
+  link.close();
+  CHECK_FALSE(mock.claimed());
+}
+
+TEST_CASE("reading and writing over it allocate nothing", "[usb]") {
+  MockMachine machine;
+  MockHidraw mock(machine, {});
+  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  link.open();
+  mock.send(Bytes(64, 1));
+  std::array<std::uint8_t, 64> buffer{};
+  const std::array<std::uint8_t, 32> command{};
+  const RealtimeGuard guard;
+  link.wait_readable(now() + 1h);
+  link.read(now(), buffer);
+  link.write(now(), command);
+  CHECK(guard.allocations() == 0);
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "tests/support/shipped_config.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace wrenchd::test {
+
+/// The shipped station with a boulder of 60 mm around the origin in the place of its table. The hand goes
+/// from one place to the next as it is told, and stays at the last.
+struct Buried {
+  TemporaryDirectory files;  ///< with the boulder
+  Plan plan = shipped_plan();
+
+  explicit Buried(const std::vector<Waypoint>& path, std::size_t triangles = 2000) {
+    std::ostringstream boulder;
+    write_off(boulder, make_mesh({"boulder", triangles}));
+    plan.scene.half_spaces.clear();
+    MeshObstacleSettings& obstacle = plan.scene.meshes.emplace_back();
+    obstacle.name = "boulder";
+    obstacle.mesh = files.write("boulder.off", boulder.str());
+    plan.settings.simulation.hand_path = path;
+    plan.settings.simulation.hand_repeats = false;
+  }
+};
+
+/// Walls on six sides, so far from the origin.
+inline std::vector<HalfSpaceSettings> closed_box(double half_m) {
+  std::vector<HalfSpaceSettings> walls;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector3d n = Vector3d::Unit(axis);
+    walls.push_back({"wall", n, -half_m});
+    walls.push_back({"wall", -n, -half_m});
+  }
+  return walls;
+}
+
+inline Placing placing(const VirtualStation& s) {
+  return static_cast<Placing>(s.last.placing);
+}
+
+/// Gives a placer on a thread of its own time to answer, while little passes for the hand.
+inline void let_placer_work(const VirtualStation& s) {
+  if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+}  // namespace wrenchd::test

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/support/exact_intersection.hpp"
+
+#include <array>
+#include <iterator>
+#include <vector>
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
+#include <CGAL/Simple_cartesian.h>
+
+namespace wrenchd::test {
+namespace {
+
+using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
+using Rough = CGAL::Simple_cartesian<double>;
+using RoughTriangles = std::vector<Rough::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Rough, RoughTriangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Rough, Primitive>>;
+
+Exact::Point_3 exact(const Vector3d& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+}  // namespace
+
+struct ExactMeeting::Meshes {
+  TriangleMesh a;
+  RoughTriangles rough_b;
+  std::vector<Exact::Triangle_3> exact_b;
+  Tree tree_b;
+};
+
+ExactMeeting::ExactMeeting(const TriangleMesh& a, const TriangleMesh& b)
+    : meshes_(std::make_unique<Meshes>()) {
+  meshes_->a = a;
+  for (const auto& [i, j, k] : b.triangles) {
+    const auto rough = [&](std::uint32_t v) {
+      const Vector3d& p = b.vertices_m[v];
+      return Rough::Point_3(p.x(), p.y(), p.z());
+    };
+    meshes_->rough_b.emplace_back(rough(i), rough(j), rough(k));
+    meshes_->exact_b.emplace_back(exact(b.vertices_m[i]), exact(b.vertices_m[j]), exact(b.vertices_m[k]));
+  }
+  meshes_->tree_b.rebuild(meshes_->rough_b.begin(), meshes_->rough_b.end());
+  meshes_->tree_b.build();
+}
+
+ExactMeeting::~ExactMeeting() = default;
+
+bool ExactMeeting::meet(const Pose& X_BA) const {
+  return pairs(X_BA) > 0;
+}
+
+/// Boxes that hold every triangle with room to spare find the few pairs that are looked at exactly.
+std::size_t ExactMeeting::pairs(const Pose& X_BA) const {
+  constexpr double kRoom_m = 1e-9;
+  const Quaterniond& q = X_BA.rotation;
+  const Exact::FT w = q.w(), x = q.x(), y = q.y(), z = q.z();
+  const Exact::FT n = w * w + x * x + y * y + z * z;
+  const std::array<std::array<Exact::FT, 3>, 3> R = {
+      {{w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+       {2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
+       {2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}}};
+  const auto moved = [&](const Vector3d& p) {
+    const auto row = [&](std::size_t i) -> Exact::FT {
+      return (R[i][0] * p.x() + R[i][1] * p.y() + R[i][2] * p.z()) / n +
+             Exact::FT(X_BA.translation_m[static_cast<int>(i)]);
+    };
+    return Exact::Point_3(row(0), row(1), row(2));
+  };
+  std::size_t count = 0;
+  std::vector<Primitive::Id> near;
+  for (const auto& [i, j, k] : meshes_->a.triangles) {
+    CGAL::Bbox_3 box;
+    for (const std::uint32_t v : {i, j, k}) {
+      const Vector3d p = X_BA * meshes_->a.vertices_m[v];
+      box += CGAL::Bbox_3(p.x() - kRoom_m, p.y() - kRoom_m, p.z() - kRoom_m, p.x() + kRoom_m, p.y() + kRoom_m,
+                          p.z() + kRoom_m);
+    }
+    near.clear();
+    meshes_->tree_b.all_intersected_primitives(box, std::back_inserter(near));
+    if (near.empty()) continue;
+    const Exact::Triangle_3 triangle(moved(meshes_->a.vertices_m[i]), moved(meshes_->a.vertices_m[j]),
+                                     moved(meshes_->a.vertices_m[k]));
+    for (const auto& id : near)
+      if (CGAL::do_intersect(triangle,
+                             meshes_->exact_b[static_cast<std::size_t>(id - meshes_->rough_b.cbegin())]))
+        ++count;
+  }
+  return count;
+}
+
+}  // namespace wrenchd::test

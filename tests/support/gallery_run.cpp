@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tests/support/gallery_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+#include <stdexcept>
+
+#include "tests/support/shipped_config.hpp"
+
+namespace wrenchd::test {
+namespace {
+
+constexpr double kDeg = 180.0 / std::numbers::pi;
+
+Pose pose_of(const std::array<double, 7>& x) {
+  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
+}
+
+double norm3(const std::array<double, 6>& x, std::size_t from) {
+  return std::hypot(x[from], x[from + 1], x[from + 2]);
+}
+
+/// Of its x axis, seen from above.
+double heading_rad(const Pose& X) {
+  const Vector3d x = X.rotation * Vector3d::UnitX();
+  return std::atan2(x.y(), x.x());
+}
+
+const TickRecord& at(const ExhibitRun& run, double time_s) {
+  const auto rate_Hz = run.plan.settings.servo.rate_Hz;
+  const auto i = static_cast<std::size_t>(std::lround(time_s * rate_Hz));
+  if (!(time_s >= 0.0) || i >= run.ticks.size())
+    throw std::invalid_argument("the run has no moment " + std::to_string(time_s) + " s");
+  return run.ticks[i];
+}
+
+double turned_deg(const ExhibitRun& run, bool hand, double time_s) {
+  double turned = 0.0, last = 0.0;
+  const TickRecord* const end = &at(run, time_s);
+  bool begun = false;
+  for (const TickRecord* tick = run.ticks.data(); tick <= end; ++tick) {
+    const auto& x = hand ? tick->X_WP : tick->X_WQ;
+    if (!std::isfinite(x[0])) continue;
+    const double now = heading_rad(pose_of(x));
+    if (begun) turned += std::remainder(now - last, 2.0 * std::numbers::pi);
+    last = now;
+    begun = true;
+  }
+  return turned * kDeg;
+}
+
+}  // namespace
+
+Plan exhibit_plan(const std::string& name) {
+  Plan plan = read_plan({WRENCHD_SOURCE_DIR "/config/gallery/" + name + ".toml", {}, {}, false},
+                        SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+  plan.settings.servo.self_test_s = 0.0;
+  return plan;
+}
+
+double script_s(const Plan& plan) {
+  return plan.settings.simulation.hand_path.back().time_s;
+}
+
+ExhibitRun run_exhibit(const std::string& name, double seconds) {
+  ExhibitRun run{exhibit_plan(name), {}, {}};
+  VirtualStation station(run.plan);
+  const double last_s = seconds > 0.0 ? std::min(seconds, script_s(run.plan)) : script_s(run.plan);
+  const auto count = static_cast<std::size_t>(std::lround(last_s * run.plan.settings.servo.rate_Hz)) + 1;
+  TimePoint first{};
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == 1) station.station.loop().arm();
+    station.tick();
+    if (i == 0) first = station.clock.now();
+    run.ticks.push_back(station.last);
+    run.scene_time_s.push_back(wrenchd::seconds(station.clock.now() - first));
+  }
+  return run;
+}
+
+double figure(const ExhibitRun& run, const std::string& quantity, double time_s) {
+  const auto peak = [&](std::size_t from) {
+    double most = 0.0;
+    for (const TickRecord& tick : run.ticks) most = std::max(most, norm3(tick.F_out, from));
+    return most;
+  };
+  if (quantity == "peak_force_N") return peak(0);
+  if (quantity == "peak_torque_Nm") return peak(3);
+  const TickRecord& tick = at(run, time_s);
+  if (quantity == "force_N") return norm3(tick.F_out, 0);
+  if (quantity == "torque_Nm") return norm3(tick.F_out, 3);
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (quantity == std::string("force_") + kAxes[k] + "_N") return tick.F_out[k];
+    if (quantity == std::string("torque_") + kAxes[k] + "_mNm") return 1e3 * tick.F_out[3 + k];
+  }
+  if (quantity == "contacts") return tick.contacts;
+  const Pose X_WP = pose_of(tick.X_WP), X_WQ = pose_of(tick.X_WQ);
+  if (quantity == "depth_mm") return 1e3 * (X_WP.translation_m - X_WQ.translation_m).norm();
+  const bool hand = quantity.rfind("hand_", 0) == 0;
+  const std::string what = hand ? quantity.substr(5) : quantity;
+  if (what == "turn_deg") return turned_deg(run, hand, time_s);
+  static thread_local std::string scene_of;
+  static thread_local Vector3d p_MT_m;
+  if (scene_of != run.plan.scene.file) {
+    p_MT_m = load_tool(run.plan.scene.tool).solid.p_MT_m;
+    scene_of = run.plan.scene.file;
+  }
+  const Pose& X_WT = hand ? X_WP : X_WQ;
+  const Vector3d p_WM = X_WT * Vector3d(-p_MT_m);
+  if (what == "x_mm") return 1e3 * p_WM.x();
+  if (what == "y_mm") return 1e3 * p_WM.y();
+  if (what == "z_mm") return 1e3 * p_WM.z();
+  if (what == "tilt_deg")
+    return kDeg * std::acos(std::clamp((X_WT.rotation * Vector3d::UnitZ()).z(), -1.0, 1.0));
+  throw std::invalid_argument("no figure is called '" + quantity + "'");
+}
+
+std::vector<ExpectedFigure> expected_figures(const std::string& name) {
+  const std::string file = WRENCHD_SOURCE_DIR "/tests/data/gallery/" + name + ".csv";
+  std::ifstream in(file);
+  std::vector<ExpectedFigure> all;
+  std::string line;
+  std::getline(in, line);  // time_s,quantity,least,most
+  while (std::getline(in, line)) {
+    std::istringstream cells(line);
+    std::string time, quantity, least, most;
+    std::getline(cells, time, ',');
+    std::getline(cells, quantity, ',');
+    std::getline(cells, least, ',');
+    std::getline(cells, most, ',');
+    all.push_back({time.empty() ? -1.0 : std::stod(time), quantity, std::stod(least), std::stod(most)});
+  }
+  return all;
+}
+
+}  // namespace wrenchd::test
