@@ -58,26 +58,28 @@ bool inside(const MeshSurface& surface, const Vector3d& p) noexcept {
 }
 
 /// Nobody waits for one of its ticks.
-Proxy::Effort all_at_once() noexcept {
-  Proxy::Effort effort;
-  effort.evenly = false;
+Proxy::WorkLimit all_at_once() noexcept {
+  Proxy::WorkLimit effort;
+  effort.balanced = false;
   return effort;
 }
 
 }  // namespace
 
-Placement::Placement(const Scene& scene) : scene_(scene), half_spaces_(scene), proxy_(scene, all_at_once()) {}
+FeasiblePoseSearch::FeasiblePoseSearch(const Scene& scene)
+    : scene_(scene), half_spaces_(scene), proxy_(scene, all_at_once()) {}
 
 /// Two surfaces that do not meet are apart, or one body holds the other.
-bool Placement::admissible(const Pose& X_WT, double time_s) noexcept {
+bool FeasiblePoseSearch::admissible(const Pose& X_WT, double time_s) noexcept {
   if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
   for (const MeshObstacle& obstacle : scene_.meshes()) {
     const Pose X_WO = obstacle.X_WO_at(time_s);
     const double centres_m = (X_WO * obstacle.centre_O_m - X_WT.translation_m).norm();
     if (centres_m > obstacle.radius_m + scene_.tool_radius_m()) continue;
     const Pose X_OT = inverse(X_WO) * X_WT;
-    if (!meeting_.find(*scene_.tool_mesh(), *obstacle.mesh, X_OT)) return false;  // far too much to be free
-    if (!meeting_.pairs().empty()) return false;
+    if (!intersecting_pairs_.find(*scene_.tool_mesh(), *obstacle.mesh, X_OT))
+      return false;  // far too much to be free
+    if (!intersecting_pairs_.pairs().empty()) return false;
     const MeshSurface& tool = scene_.tool_mesh()->surface;
     const MeshSurface& solid = obstacle.mesh->surface;
     if (inside(tool, inverse(X_OT) * solid.corner_m(0, 0))) return false;
@@ -87,9 +89,9 @@ bool Placement::admissible(const Pose& X_WT, double time_s) noexcept {
 }
 
 /// From an admissible pose, as near to p as a proxy comes.
-Projection Placement::settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop,
-                              double time_s) noexcept {
-  proxy_.forget(time_s);
+Projection FeasiblePoseSearch::converge_proxy(const Pose& X_WP, const Pose& X_start,
+                                              const std::stop_token& stop, double time_s) noexcept {
+  proxy_.clear_history(time_s);
   Projection q = proxy_.follow(X_WP, X_start, time_s);
   for (int tick = 1; tick < kMostTicks && !stop.stop_requested(); ++tick) {
     const Projection next = proxy_.follow(X_WP, q.X_WQ, time_s);
@@ -100,8 +102,9 @@ Projection Placement::settled(const Pose& X_WP, const Pose& X_start, const std::
   return q;
 }
 
-Projection Placement::nearest(const Pose& X_WP, const std::stop_token& stop, double time_s) noexcept {
-  if (admissible(X_WP, time_s)) return settled(X_WP, X_WP, stop, time_s);
+Projection FeasiblePoseSearch::nearest(const Pose& X_WP, const std::stop_token& stop,
+                                       double time_s) noexcept {
+  if (admissible(X_WP, time_s)) return converge_proxy(X_WP, X_WP, stop, time_s);
   Projection best;
   best.X_WQ = X_WP;
   best.status = ProjectionStatus::infeasible;
@@ -121,7 +124,7 @@ Projection Placement::nearest(const Pose& X_WP, const std::stop_token& stop, dou
       const Pose X_start = {(X_WP.rotation * turn).normalized(), X_WP.translation_m + shift_m};
       if (!admissible(X_start, time_s)) continue;
       ++starts;
-      const Projection q = settled(X_WP, X_start, stop, time_s);
+      const Projection q = converge_proxy(X_WP, X_start, stop, time_s);
       if (q.energy < best.energy) best = q;
     }
   return best;

@@ -18,9 +18,9 @@ namespace wrenchd {
 ///
 /// It takes milliseconds, deep inside a fine mesh seconds, and is no work for the servo thread. The scene is
 /// kept by reference.
-class Placement {
+class FeasiblePoseSearch {
  public:
-  explicit Placement(const Scene& scene);
+  explicit FeasiblePoseSearch(const Scene& scene);
 
   /// Does the tool overlap nothing at this pose, and is it outside of all that is solid? Obstacles stand as
   /// they do at scene time time_s.
@@ -32,12 +32,12 @@ class Placement {
   Projection nearest(const Pose& X_WP, const std::stop_token& stop = {}, double time_s = 0.0) noexcept;
 
  private:
-  Projection settled(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop,
-                     double time_s) noexcept;
+  Projection converge_proxy(const Pose& X_WP, const Pose& X_start, const std::stop_token& stop,
+                            double time_s) noexcept;
 
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;
-  MeetingPairs meeting_;
+  IntersectingPairs intersecting_pairs_;
   Proxy proxy_;
 };
 

@@ -38,18 +38,19 @@ class Deepest {
 }  // namespace
 
 //   gap = n . (R a + x) - o = (R' n) . a - (o - n . x): one dot product a vertex
-HalfSpaceContacts::Seen HalfSpaceContacts::see(std::uint32_t k, const Frame& X_WT) const noexcept {
+HalfSpaceContacts::HalfSpaceInTool HalfSpaceContacts::half_space_in_tool(std::uint32_t k,
+                                                                         const Frame& X_WT) const noexcept {
   const HalfSpaceSettings& half_space = scene_.half_spaces()[k];
   return {X_WT.R.transpose() * half_space.normal_W, half_space.offset_m - half_space.normal_W.dot(X_WT.x_m)};
 }
 
-Contact HalfSpaceContacts::contact(std::uint32_t k, std::uint32_t vertex) const noexcept {
+Contact HalfSpaceContacts::make_contact(std::uint32_t k, std::uint32_t vertex) const noexcept {
   Contact contact;
   contact.n_W = scene_.half_spaces()[k].normal_W;
   contact.offset_m = scene_.half_spaces()[k].offset_m;
-  contact.p_WB_m = contact.offset_m * contact.n_W;
+  contact.p_WCb_m = contact.offset_m * contact.n_W;
   contact.obstacle = k;
-  contact.p_TA_m = scene_.tool().hull.vertices_T_m[vertex];
+  contact.p_TCa_m = scene_.tool().hull.vertices_T_m[vertex];
   contact.tool_feature = vertex;
   return contact;
 }
@@ -57,32 +58,32 @@ Contact HalfSpaceContacts::contact(std::uint32_t k, std::uint32_t vertex) const 
 void HalfSpaceContacts::add_violated(const Frame& X_WT, double tolerance_m,
                                      ContactSet& contacts) const noexcept {
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
-    const Seen seen = see(k, X_WT);
-    Deepest<kPerObstacle> deepest;
+    const HalfSpaceInTool seen = half_space_in_tool(k, X_WT);
+    Deepest<kMaxPerObstacle> deepest;
     scene_.tool().hull.visit_above(
-        -seen.n_T, [&] { return -seen.below_m - std::min(-tolerance_m, deepest.threshold()); },
+        -seen.n_T, [&] { return -seen.offset_m - std::min(-tolerance_m, deepest.threshold()); },
         [&](std::uint32_t v, double depth) {
-          const double gap = -depth - seen.below_m;
+          const double gap = -depth - seen.offset_m;
           if (gap >= -tolerance_m || gap >= deepest.threshold()) return;
-          if (!contacts.contains(contact(k, v))) deepest.insert(gap, v);
+          if (!contacts.contains(make_contact(k, v))) deepest.insert(gap, v);
         });
-    for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(contact(k, deepest.vertex(i)));
+    for (std::size_t i = 0; i < deepest.count(); ++i) contacts.add(make_contact(k, deepest.vertex(i)));
   }
 }
 
 void HalfSpaceContacts::add_touching(const Frame& X_WT, double within_m,
                                      ContactSet& contacts) const noexcept {
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
-    const Seen seen = see(k, X_WT);
+    const HalfSpaceInTool seen = half_space_in_tool(k, X_WT);
     const std::size_t known = contacts.size();
     const auto is_known = [&](std::uint32_t v) {
       return std::any_of(contacts.begin(), contacts.begin() + known,
                          [&](const Contact& c) { return c.obstacle == k && c.tool_feature == v; });
     };
     scene_.tool().hull.visit_above(
-        -seen.n_T, [&] { return -seen.below_m - within_m; },
+        -seen.n_T, [&] { return -seen.offset_m - within_m; },
         [&](std::uint32_t v, double depth) {
-          if (-depth - seen.below_m < within_m && !is_known(v)) contacts.add(contact(k, v));
+          if (-depth - seen.offset_m < within_m && !is_known(v)) contacts.add(make_contact(k, v));
         });
   }
 }
@@ -90,8 +91,8 @@ void HalfSpaceContacts::add_touching(const Frame& X_WT, double within_m,
 bool HalfSpaceContacts::admits(const Frame& X_WT, double tolerance_m) const noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
-    const Seen seen = see(k, X_WT);
-    if (seen.n_T.dot(tool.vertices_T_m[tool.support(-seen.n_T)]) - seen.below_m < -tolerance_m) return false;
+    const HalfSpaceInTool seen = half_space_in_tool(k, X_WT);
+    if (seen.n_T.dot(tool.vertices_T_m[tool.support(-seen.n_T)]) - seen.offset_m < -tolerance_m) return false;
   }
   return true;
 }

@@ -65,141 +65,143 @@ bool over(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3
 
 }  // namespace
 
-MeshContacts::MeshContacts(const Scene& scene) : scene_(scene), pairs_(scene) {
+MeshContacts::MeshContacts(const Scene& scene) : scene_(scene), candidates_(scene) {
   crossings_.reserve(kMostCrossings);
-  left_.resize(TreeWalk::kCapacity);
+  remaining_pairs_.resize(BvhTraversal::kCapacity);
   for (std::uint32_t k = 0; k < scene.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene.meshes()[k];
-    seen_.push_back({&obstacle, scene.first_mesh() + k, Frame(obstacle.X_WO), {}, {}});
+    obstacle_views_.push_back({&obstacle, scene.first_mesh() + k, Frame(obstacle.X_WO), {}, {}});
   }
 }
 
-void MeshContacts::start_at(const Pose& X_WT, double time_s) noexcept {
+void MeshContacts::set_start(const Pose& X_WT, double time_s) noexcept {
   X_start_ = X_WT;
-  start_s_ = time_s;
+  start_time_s_ = time_s;
 }
 
-void MeshContacts::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s,
-                              std::uint32_t to_spare) noexcept {
-  pairs_.look_ahead(X_WT, X_WP, budget, time_s, to_spare);
-  in_doubt_ = false;
-  looking_ = 0;
+void MeshContacts::prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s,
+                            std::uint32_t to_spare) noexcept {
+  candidates_.prefetch(X_WT, X_WP, budget, time_s, to_spare);
+  overlap_found_ = false;
+  sweep_visits_ = 0;
 }
 
-MeshContacts::Findings MeshContacts::look(const Pose& X_WT, double clearance_m, WalkBudget& budget,
-                                          double time_s) noexcept {
-  Findings findings;
+MeshContacts::SweepResult MeshContacts::sweep(const Pose& X_WT, double clearance_m, VisitBudget& budget,
+                                              double time_s) noexcept {
+  SweepResult findings;
   touching_.clear();
   clearance_m_ = clearance_m;
-  if (!pairs_.list(X_start_, X_WT, {start_s_, time_s}, budget)) {
+  if (!candidates_.ensure_covers(X_start_, X_WT, {start_time_s_, time_s}, budget)) {
     findings.complete = false;
-    findings.late = pairs_.waits();
+    findings.list_pending = candidates_.list_pending();
     return findings;
   }
-  see_way(X_WT, time_s);
-  border_m_ = kBeyond * clearance_m + bulge_m_;
-  slope_ = kSlope;
-  look_at_pairs(budget, findings);
+  update_obstacle_views(X_WT, time_s);
+  feature_margin_m_ = kBeyond * clearance_m + arc_deviation_m_;
+  slope_tolerance_ = kSlope;
+  test_pairs(budget, findings);
   if (findings.overlaps && crossings_.empty()) {
-    border_m_ = kWideBorder * way_m_;
-    slope_ = kAnySlope;
-    look_at_pairs(budget, findings);
+    feature_margin_m_ = kWideBorder * displacement_bound_m_;
+    slope_tolerance_ = kAnySlope;
+    test_pairs(budget, findings);
   }
-  choose_first(findings);
-  if (findings.met.empty() && !findings.overlaps && (in_doubt_ || turn_rad_ > kSureTurn_rad))
-    make_sure(budget, findings);
+  select_first_contacts(findings);
+  if (findings.contacts.empty() && !findings.overlaps && (overlap_found_ || rotation_rad_ > kSureTurn_rad))
+    verify_end_pose(budget, findings);
   return findings;
 }
 
 /// Whether any two triangles meet at the end. One that said so is asked about all shorter ways as well, until
 /// the next tick.
-void MeshContacts::make_sure(WalkBudget& budget, Findings& findings) noexcept {
-  const TreedMesh& tool = *scene_.tool_mesh();
-  for (const std::uint32_t k : pairs_.listed().near_by()) {
-    const MeshSurface& surface = seen_[k].obstacle->mesh->surface;
-    const Frame& X_OT = seen_[k].X_OT_end;
+void MeshContacts::verify_end_pose(VisitBudget& budget, SweepResult& findings) noexcept {
+  const MeshBvh& tool = *scene_.tool_mesh();
+  for (const std::uint32_t k : candidates_.current().nearby_obstacles()) {
+    const MeshSurface& surface = obstacle_views_[k].obstacle->mesh->surface;
+    const Frame& X_OT = obstacle_views_[k].X_OT_end;
     const Pose pose = {Quaterniond(X_OT.R), X_OT.x_m};
-    findings.complete = walk_.find(tool.tree, seen_[k].obstacle->mesh->tree, {pose, pose}, budget);
+    findings.complete =
+        traversal_.find(tool.bvh, obstacle_views_[k].obstacle->mesh->bvh, {pose, pose}, budget);
     if (!findings.complete) return;
-    findings.overlaps = std::any_of(walk_.begin(), walk_.end(), [&](const TrianglePair& pair) {
-      return triangles_meet(
+    findings.overlaps = std::any_of(traversal_.begin(), traversal_.end(), [&](const TrianglePair& pair) {
+      return triangles_intersect(
           {X_OT * tool.surface.corner_m(pair.a, 0), X_OT * tool.surface.corner_m(pair.a, 1),
            X_OT * tool.surface.corner_m(pair.a, 2)},
           {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)});
     });
-    in_doubt_ = in_doubt_ || findings.overlaps;
+    overlap_found_ = overlap_found_ || findings.overlaps;
     if (findings.overlaps) return;
   }
 }
 
 /// The way as each obstacle near by sees it.
-void MeshContacts::see_way(const Pose& X_WT, double time_s) noexcept {
+void MeshContacts::update_obstacle_views(const Pose& X_WT, double time_s) noexcept {
   const Frame start(X_start_), end(X_WT);
-  way_m_ = pairs_.listed().way_m(X_start_, X_WT);
-  turn_rad_ = X_start_.rotation.angularDistance(X_WT.rotation);
-  for (const std::uint32_t k : pairs_.listed().near_by()) {
-    Seen& seen = seen_[k];
+  displacement_bound_m_ = candidates_.current().displacement_bound_m(X_start_, X_WT);
+  rotation_rad_ = X_start_.rotation.angularDistance(X_WT.rotation);
+  for (const std::uint32_t k : candidates_.current().nearby_obstacles()) {
+    ObstacleView& seen = obstacle_views_[k];
     if (!seen.obstacle->moves()) {
-      seen.X_OT_start = start.seen_from(seen.X_WO);
-      seen.X_OT_end = end.seen_from(seen.X_WO);
+      seen.X_OT_start = start.relative_to(seen.X_WO);
+      seen.X_OT_end = end.relative_to(seen.X_WO);
       continue;
     }
-    const Pose X_WO_start = seen.obstacle->X_WO_at(start_s_), X_WO_end = seen.obstacle->X_WO_at(time_s);
+    const Pose X_WO_start = seen.obstacle->X_WO_at(start_time_s_), X_WO_end = seen.obstacle->X_WO_at(time_s);
     const Pose X_OT_start = inverse(X_WO_start) * X_start_, X_OT_end = inverse(X_WO_end) * X_WT;
     seen.X_WO = Frame(X_WO_end);
-    seen.X_OT_start = start.seen_from(Frame(X_WO_start));
-    seen.X_OT_end = end.seen_from(seen.X_WO);
-    way_m_ = std::max(way_m_, pairs_.listed().way_m(X_OT_start, X_OT_end));
-    turn_rad_ = std::max(turn_rad_, X_OT_start.rotation.angularDistance(X_OT_end.rotation));
+    seen.X_OT_start = start.relative_to(Frame(X_WO_start));
+    seen.X_OT_end = end.relative_to(seen.X_WO);
+    displacement_bound_m_ =
+        std::max(displacement_bound_m_, candidates_.current().displacement_bound_m(X_OT_start, X_OT_end));
+    rotation_rad_ = std::max(rotation_rad_, X_OT_start.rotation.angularDistance(X_OT_end.rotation));
   }
   // The way of a vertex is straight as long as nothing turns.
-  bulge_m_ = 0.25 * turn_rad_ * turn_rad_ * scene_.tool_radius_m();
+  arc_deviation_m_ = 0.25 * rotation_rad_ * rotation_rad_ * scene_.tool_radius_m();
 }
 
 /// Most pairs are kept apart all the way by the plane of one of the two: those are left out first.
-void MeshContacts::look_at_pairs(WalkBudget& budget, Findings& findings) noexcept {
+void MeshContacts::test_pairs(VisitBudget& budget, SweepResult& findings) noexcept {
   touching_.clear();
   crossings_.clear();
-  moved_.triangle = MeshSurface::kNone;
-  PairSieve& sieve = pairs_.sieve();
-  const double tool_m = scene_.tool_mesh()->tree.extent_m();
-  for (std::size_t k = 0; k < sieve.parts().size(); ++k) {
-    const Seen& seen = seen_[sieve.parts()[k].obstacle];
-    const PairSieve::Sifted sifted =
-        sieve.sift(k, seen.X_OT_start, seen.X_OT_end, tool_m + seen.obstacle->mesh->tree.extent_m(),
-                   border_m_ + bulge_m_ + 2.0 * clearance_m_, left_.data());
-    const auto sieving = static_cast<std::uint32_t>(sifted.asked / PairsAhead::kPairsPerVisit);
-    looked_at_ = 0;
-    for (const std::uint32_t i : std::span(left_).first(sifted.left)) {
-      const NearPair& pair = pairs_.listed().pairs()[i];
-      look_at(pair, moved(pair), findings);
+  moved_triangle_.triangle = MeshSurface::kNone;
+  PairCuller& sieve = candidates_.culler();
+  const double tool_m = scene_.tool_mesh()->bvh.extent_m();
+  for (std::size_t k = 0; k < sieve.groups().size(); ++k) {
+    const ObstacleView& seen = obstacle_views_[sieve.groups()[k].obstacle];
+    const PairCuller::CullResult sifted =
+        sieve.cull(k, seen.X_OT_start, seen.X_OT_end, tool_m + seen.obstacle->mesh->bvh.extent_m(),
+                   feature_margin_m_ + arc_deviation_m_ + 2.0 * clearance_m_, remaining_pairs_.data());
+    const auto sieving = static_cast<std::uint32_t>(sifted.tested / PredictiveCandidateList::kPairsPerVisit);
+    tested_pairs_ = 0;
+    for (const std::uint32_t i : std::span(remaining_pairs_).first(sifted.remaining)) {
+      const CandidatePair& pair = candidates_.current().pairs()[i];
+      test_pair(pair, moved_triangle(pair), findings);
     }
     const auto looking =
-        static_cast<std::uint32_t>(sifted.left / kPairsPerVisit) + kVisitsPerPair * looked_at_;
-    budget.visits -= std::min(budget.visits, sieving + looking);
-    looking_ += sieving + looking;
+        static_cast<std::uint32_t>(sifted.remaining / kPairsPerVisit) + kVisitsPerPair * tested_pairs_;
+    budget.remaining -= std::min(budget.remaining, sieving + looking);
+    sweep_visits_ += sieving + looking;
   }
 }
 
-const MeshContacts::Moved& MeshContacts::moved(const NearPair& pair) noexcept {
-  if (moved_.triangle == pair.a && moved_.obstacle == pair.obstacle) return moved_;
-  const Seen& seen = seen_[pair.obstacle];
-  moved_.triangle = pair.a;
-  moved_.obstacle = pair.obstacle;
+const MeshContacts::MovedTriangle& MeshContacts::moved_triangle(const CandidatePair& pair) noexcept {
+  if (moved_triangle_.triangle == pair.a && moved_triangle_.obstacle == pair.obstacle) return moved_triangle_;
+  const ObstacleView& seen = obstacle_views_[pair.obstacle];
+  moved_triangle_.triangle = pair.a;
+  moved_triangle_.obstacle = pair.obstacle;
   for (int i = 0; i < 3; ++i) {
     const Vector3d& p_T = scene_.tool_mesh()->surface.corner_m(pair.a, i);
     const auto k = static_cast<std::size_t>(i);
-    moved_.start[k] = seen.X_OT_start * p_T;
-    moved_.end[k] = seen.X_OT_end * p_T;
+    moved_triangle_.start[k] = seen.X_OT_start * p_T;
+    moved_triangle_.end[k] = seen.X_OT_end * p_T;
   }
   const MeshSurface::Plane& plane = scene_.tool_mesh()->surface.planes()[pair.a];
   const auto plane_in_O = [&](const Frame& X_OT) -> MeshSurface::Plane {
     const Vector3d normal = X_OT.R * plane.normal;
     return {normal, plane.offset_m + normal.dot(X_OT.x_m)};
   };
-  moved_.plane_start = plane_in_O(seen.X_OT_start);
-  moved_.plane_end = plane_in_O(seen.X_OT_end);
-  return moved_;
+  moved_triangle_.plane_start = plane_in_O(seen.X_OT_start);
+  moved_triangle_.plane_end = plane_in_O(seen.X_OT_end);
+  return moved_triangle_;
 }
 
 /// A pair that has less room than the clearance from the start is closed by what narrows it further.
@@ -209,7 +211,8 @@ bool MeshContacts::closes(double start_m, double end_m) const noexcept {
 
 /// Does a plane keep a triangle on one side at both ends of the way, and so all the way? By at least so much
 /// at the start.
-bool MeshContacts::kept_apart(const Heights& start_m, const Heights& end_m, double least_m) const noexcept {
+bool MeshContacts::plane_separates(const Heights& start_m, const Heights& end_m,
+                                   double least_m) const noexcept {
   if (std::min({end_m[0], end_m[1], end_m[2]}) > (1.0 + kClosed) * clearance_m_ + least_m)
     return std::min({start_m[0], start_m[1], start_m[2]}) >= least_m;
   if (std::max({end_m[0], end_m[1], end_m[2]}) < -clearance_m_ - least_m)
@@ -217,21 +220,24 @@ bool MeshContacts::kept_apart(const Heights& start_m, const Heights& end_m, doub
   return false;
 }
 
-void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findings) noexcept {
-  const Seen& seen = seen_[pair.obstacle];
+void MeshContacts::test_pair(const CandidatePair& pair, const MovedTriangle& a,
+                             SweepResult& findings) noexcept {
+  const ObstacleView& seen = obstacle_views_[pair.obstacle];
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   const Triangle b = {surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2)};
-  if (axes_.apart(a.start, a.end, b, border_m_ + bulge_m_ + 2.0 * clearance_m_)) return;
+  if (separating_axes_.separated(a.start, a.end, b,
+                                 feature_margin_m_ + arc_deviation_m_ + 2.0 * clearance_m_))
+    return;
   const MeshSurface::Plane& plane = surface.planes()[pair.b];
   const auto heights = [](const MeshSurface::Plane& over, const Triangle& triangle) -> Heights {
     return {over.normal.dot(triangle[0]) - over.offset_m, over.normal.dot(triangle[1]) - over.offset_m,
             over.normal.dot(triangle[2]) - over.offset_m};
   };
   const Heights a_end = heights(plane, a.end);
-  if (kept_apart(heights(plane, a.start), a_end, 0.0)) return;
+  if (plane_separates(heights(plane, a.start), a_end, 0.0)) return;
   // Seen from the tool the obstacle's way bulges a little.
-  if (kept_apart(heights(a.plane_start, b), heights(a.plane_end, b), bulge_m_)) return;
-  ++looked_at_;
+  if (plane_separates(heights(a.plane_start, b), heights(a.plane_end, b), arc_deviation_m_)) return;
+  ++tested_pairs_;
   const std::size_t before = crossings_.size();
   vertices_on_face(seen, pair, a);
   face_on_vertices(seen, pair);
@@ -239,12 +245,13 @@ void MeshContacts::look_at(const NearPair& pair, const Moved& a, Findings& findi
   if (crossings_.size() > before || findings.overlaps) return;
   if (std::min({a_end[0], a_end[1], a_end[2]}) > 0.0 || std::max({a_end[0], a_end[1], a_end[2]}) < 0.0)
     return;
-  findings.overlaps = triangles_meet(a.end, b);
+  findings.overlaps = triangles_intersect(a.end, b);
 }
 
 /// Contacts of a vertex of the tool and a face of the obstacle. The way is straight in the obstacle's frame,
 /// so the gap is linear in time, exactly.
-void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, const Moved& a) noexcept {
+void MeshContacts::vertices_on_face(const ObstacleView& seen, const CandidatePair& pair,
+                                    const MovedTriangle& a) noexcept {
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   const auto& vertices = tool.features()[pair.a].vertices;
@@ -263,78 +270,79 @@ void MeshContacts::vertices_on_face(const Seen& seen, const NearPair& pair, cons
     const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
     const Vector3d p = mix(a.start[i], a.end[i], when);
     if (!over(p, surface.corner_m(pair.b, 0), surface.corner_m(pair.b, 1), surface.corner_m(pair.b, 2),
-              surface.planes()[pair.b].normal, closes ? border_m_ : kHolds * clearance_m_))
+              surface.planes()[pair.b].normal, closes ? feature_margin_m_ : kHolds * clearance_m_))
       continue;
     const Vector3d& p_T = tool.vertices_m()[vertices[i]];
     bool first = true;
-    for (const std::uint32_t v : tool.around(vertices[i])) {
+    for (const std::uint32_t v : tool.ring_of(vertices[i])) {
       const Vector3d& q_T = tool.vertices_m()[v];
       const Vector3d q = mix(seen.X_OT_start * q_T, seen.X_OT_end * q_T, when);
-      first = first && plane.normal.dot(q - p) >= -slope_ * (q_T - p_T).norm();
+      first = first && plane.normal.dot(q - p) >= -slope_tolerance_ * (q_T - p_T).norm();
     }
     if (!first) continue;
     Contact contact;
     contact.kind = ContactKind::vertex_face;
-    contact.p_TA_m = p_T;
+    contact.p_TCa_m = p_T;
     contact.n_W = seen.X_WO.R * plane.normal;
-    contact.p_WB_m = seen.X_WO * (plane.offset_m * plane.normal);
+    contact.p_WCb_m = seen.X_WO * (plane.offset_m * plane.normal);
     contact.offset_m = plane.offset_m + contact.n_W.dot(seen.X_WO.x_m);
     contact.tool_feature = vertices[i];
-    contact.obstacle_feature = surface.region(pair.b);
+    contact.obstacle_feature = surface.planar_region(pair.b);
     contact.obstacle = seen.number;
     if (closes)
-      crossed(when, seen.X_WO * p, contact);
+      add_crossing(when, seen.X_WO * p, contact);
     else if (!touching_.contains(contact))
       touching_.add(contact);
   }
 }
 
 /// The same the other way round: seen from the tool, the obstacle's vertex moves.
-void MeshContacts::face_on_vertices(const Seen& seen, const NearPair& pair) noexcept {
+void MeshContacts::face_on_vertices(const ObstacleView& seen, const CandidatePair& pair) noexcept {
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   const MeshSurface::Plane& plane = tool.planes()[pair.a];
   for (const std::uint32_t vertex : surface.features()[pair.b].vertices) {
     if (vertex == MeshSurface::kNone) continue;
     const Vector3d& p_O = surface.vertices_m()[vertex];
-    const Vector3d p_end = seen.X_OT_end.back(p_O);
+    const Vector3d p_end = seen.X_OT_end.inverse_transform(p_O);
     const double end_m = plane.normal.dot(p_end) - plane.offset_m;
     if (end_m > (1.0 + kClosed) * clearance_m_) continue;
-    const Vector3d p_start = seen.X_OT_start.back(p_O);
+    const Vector3d p_start = seen.X_OT_start.inverse_transform(p_O);
     const double start_m = plane.normal.dot(p_start) - plane.offset_m;
     if (start_m < -kWasOpen * clearance_m_) continue;
     const bool closes = this->closes(start_m, end_m);
     const double when = closes ? closing_time(start_m, end_m, clearance_m_) : 1.0;
     const Vector3d p = mix(p_start, p_end, when);
     if (!over(p, tool.corner_m(pair.a, 0), tool.corner_m(pair.a, 1), tool.corner_m(pair.a, 2), plane.normal,
-              closes ? border_m_ : kHolds * clearance_m_))
+              closes ? feature_margin_m_ : kHolds * clearance_m_))
       continue;
     bool first = true;
-    for (const std::uint32_t v : surface.around(vertex)) {
+    for (const std::uint32_t v : surface.ring_of(vertex)) {
       const Vector3d& q_O = surface.vertices_m()[v];
-      const Vector3d q = mix(seen.X_OT_start.back(q_O), seen.X_OT_end.back(q_O), when);
-      first = first && plane.normal.dot(q - p) >= -slope_ * (q_O - p_O).norm();
+      const Vector3d q =
+          mix(seen.X_OT_start.inverse_transform(q_O), seen.X_OT_end.inverse_transform(q_O), when);
+      first = first && plane.normal.dot(q - p) >= -slope_tolerance_ * (q_O - p_O).norm();
     }
     // The lone vertices of a surface may have anything beside them.
     if (!first && surface.kind() == MeshSurface::Kind::solid) continue;
     Contact contact;
     contact.kind = ContactKind::face_vertex;
     contact.d_T = -plane.normal;
-    contact.p_TA_m = plane.offset_m * plane.normal;
-    contact.p_WB_m = seen.X_WO * p_O;
+    contact.p_TCa_m = plane.offset_m * plane.normal;
+    contact.p_WCb_m = seen.X_WO * p_O;
     contact.n_W = seen.X_WO.R * (seen.X_OT_end.R * contact.d_T);
-    contact.tool_feature = tool.region(pair.a);
+    contact.tool_feature = tool.planar_region(pair.a);
     contact.obstacle_feature = vertex;
     contact.obstacle = seen.number;
     if (closes)
-      crossed(when, contact.p_WB_m, contact);
+      add_crossing(when, contact.p_WCb_m, contact);
     else if (!touching_.contains(contact))
       touching_.add(contact);
   }
 }
 
-void MeshContacts::edges_on_edges(const Seen& seen, const NearPair& pair, const Moved& a,
-                                  Findings& findings) noexcept {
+void MeshContacts::edges_on_edges(const ObstacleView& seen, const CandidatePair& pair, const MovedTriangle& a,
+                                  SweepResult& findings) noexcept {
   for (const std::uint32_t edge_a : scene_.tool_mesh()->surface.features()[pair.a].edges) {
     if (edge_a == MeshSurface::kNone) continue;
     for (const std::uint32_t edge_b : seen.obstacle->mesh->surface.features()[pair.b].edges)
@@ -343,17 +351,17 @@ void MeshContacts::edges_on_edges(const Seen& seen, const NearPair& pair, const 
 }
 
 /// On a straight way the gap of two edges, times the length of their cross product N, is quadratic in time.
-void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t edge_a, std::uint32_t edge_b,
-                                Findings& findings) noexcept {
+void MeshContacts::edge_on_edge(const ObstacleView& seen, const MovedTriangle& a, std::uint32_t edge_a,
+                                std::uint32_t edge_b, SweepResult& findings) noexcept {
   constexpr double kParallel = 1e-7;  // sine: they have no common normal to rely on
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = seen.obstacle->mesh->surface;
-  const MeshSurface::Edge& eb = surface.edges()[edge_b];
+  const MeshSurface::Edge& eb = surface.convex_edges()[edge_b];
   // The corners of the triangle are at hand, in its own order.
   std::size_t i = 0;
-  while (tool.triangles()[a.triangle][i] != tool.edges()[edge_a].vertices[0]) ++i;
+  while (tool.triangles()[a.triangle][i] != tool.convex_edges()[edge_a].vertices[0]) ++i;
   const std::size_t j = i == 2 ? 0 : i + 1;
-  EdgesPass pass;
+  EdgePairMotion pass;
   pass.edge_a = edge_a;
   pass.edge_b = edge_b;
   pass.b0 = surface.vertices_m()[eb.vertices[0]];
@@ -384,9 +392,11 @@ void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t 
     const double in = falls_through_zero(f_start, f_middle, f_end);
     const double out = falls_through_zero(-f_start, -f_middle, -f_end);
     const double flips = s_start / (s_start + s_end);
-    findings.overlaps = findings.overlaps || (in > flips && in <= 1.0 && meet(seen, pass, in, border_m_));
+    findings.overlaps =
+        findings.overlaps || (in > flips && in <= 1.0 && edges_touch(seen, pass, in, feature_margin_m_));
     pass.sign = -pass.sign;
-    findings.overlaps = findings.overlaps || (out < flips && out >= 0.0 && meet(seen, pass, out, border_m_));
+    findings.overlaps =
+        findings.overlaps || (out < flips && out >= 0.0 && edges_touch(seen, pass, out, feature_margin_m_));
     return;
   }
   const double start_m = f_start / s_start, end_m = f_end / s_end;
@@ -398,36 +408,38 @@ void MeshContacts::edge_on_edge(const Seen& seen, const Moved& a, std::uint32_t 
   const double crosses = std::clamp(falls_through_zero(g_start, g_middle, g_end), 0.0, 1.0);
   const bool closes = this->closes(start_m, end_m);
   if (closes) {
-    if (!meet(seen, pass, crosses, border_m_)) return;
-  } else if (open || !meet(seen, pass, 1.0, kHolds * clearance_m_)) {
+    if (!edges_touch(seen, pass, crosses, feature_margin_m_)) return;
+  } else if (open || !edges_touch(seen, pass, 1.0, kHolds * clearance_m_)) {
     // They came off each other. Where they were deep before they did, others were not seen to be met: the way
     // is too long.
     const double bend = g_start - 2.0 * g_middle + g_end;
     const double lowest = bend > 0.0 ? (g_start * g_end - g_middle * g_middle) / bend : 0.0;
-    if (lowest < -border_m_ * std::max(s_start, s_end) && meet(seen, pass, crosses, border_m_))
+    if (lowest < -feature_margin_m_ * std::max(s_start, s_end) &&
+        edges_touch(seen, pass, crosses, feature_margin_m_))
       findings.overlaps = true;
     return;
   }
-  const MeshSurface::Edge& ea = tool.edges()[edge_a];
+  const MeshSurface::Edge& ea = tool.convex_edges()[edge_a];
   Contact contact;
   contact.kind = ContactKind::edge_edge;
-  contact.p_TA_m = tool.vertices_m()[ea.vertices[0]];
-  contact.d_T = (tool.vertices_m()[ea.vertices[1]] - contact.p_TA_m).normalized();
-  contact.p_WB_m = seen.X_WO * pass.b0;
+  contact.p_TCa_m = tool.vertices_m()[ea.vertices[0]];
+  contact.d_T = (tool.vertices_m()[ea.vertices[1]] - contact.p_TCa_m).normalized();
+  contact.p_WCb_m = seen.X_WO * pass.b0;
   contact.d_W = seen.X_WO.R * (pass.db * (pass.sign / pass.db.norm()));
   contact.n_W = seen.X_WO.R * (N_end * (pass.sign / s_end));
   contact.tool_feature = edge_a;
   contact.obstacle_feature = edge_b;
   contact.obstacle = seen.number;
   if (closes)
-    crossed(crosses, seen.X_WO * pass.p, contact);
+    add_crossing(crosses, seen.X_WO * pass.p, contact);
   else if (!touching_.contains(contact))
     touching_.add(contact);
 }
 
 /// Do two edges lie opposite each other at this time, with all four faces falling away from the plane between
 /// them? pass.p is where.
-bool MeshContacts::meet(const Seen& seen, EdgesPass& pass, double when, double beyond_m) const noexcept {
+bool MeshContacts::edges_touch(const ObstacleView& seen, EdgePairMotion& pass, double when,
+                               double beyond_m) const noexcept {
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = seen.obstacle->mesh->surface;
   // Where the two lines pass each other: a0 + x da and b0 + y db.
@@ -441,13 +453,13 @@ bool MeshContacts::meet(const Seen& seen, EdgesPass& pass, double when, double b
   pass.p = pass.b0 + y * pass.db;
   const Vector3d n = N * (pass.sign / std::sqrt(NN));
   const auto falls_away = [&](const Vector3d& height_of, double side) {
-    return side * n.dot(height_of) >= -slope_ * height_of.norm();
+    return side * n.dot(height_of) >= -slope_tolerance_ * height_of.norm();
   };
   if (surface.kind() == MeshSurface::Kind::solid)
-    for (const std::uint32_t t : surface.edges()[pass.edge_b].triangles)
+    for (const std::uint32_t t : surface.convex_edges()[pass.edge_b].triangles)
       for (int k = 0; k < 3; ++k)
         if (!falls_away(surface.corner_m(t, k) - pass.b0, -1.0)) return false;
-  for (const std::uint32_t t : tool.edges()[pass.edge_a].triangles)
+  for (const std::uint32_t t : tool.convex_edges()[pass.edge_a].triangles)
     for (int k = 0; k < 3; ++k) {
       const Vector3d& p_T = tool.corner_m(t, k);
       if (!falls_away(mix(seen.X_OT_start * p_T, seen.X_OT_end * p_T, when) - a0, 1.0)) return false;
@@ -456,32 +468,33 @@ bool MeshContacts::meet(const Seen& seen, EdgesPass& pass, double when, double b
 }
 
 /// Where there is no room left, a later one gives way to an earlier.
-void MeshContacts::crossed(double when, const Vector3d& point_W_m, const Contact& contact) noexcept {
+void MeshContacts::add_crossing(double when, const Vector3d& point_W_m, const Contact& contact) noexcept {
   if (crossings_.size() < crossings_.capacity()) {
     crossings_.push_back({when, point_W_m, contact});
     return;
   }
-  const auto last = std::max_element(crossings_.begin(), crossings_.end(),
-                                     [](const Crossing& a, const Crossing& b) { return a.when < b.when; });
-  if (when < last->when) *last = {when, point_W_m, contact};
+  const auto last = std::max_element(
+      crossings_.begin(), crossings_.end(),
+      [](const Crossing& a, const Crossing& b) { return a.path_fraction < b.path_fraction; });
+  if (when < last->path_fraction) *last = {when, point_W_m, contact};
 }
 
-void MeshContacts::choose_first(Findings& findings) noexcept {
+void MeshContacts::select_first_contacts(SweepResult& findings) noexcept {
   if (crossings_.empty()) return;
   std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
-    if (a.when != b.when) return a.when < b.when;
+    if (a.path_fraction != b.path_fraction) return a.path_fraction < b.path_fraction;
     if (a.contact.tool_feature != b.contact.tool_feature)
       return a.contact.tool_feature < b.contact.tool_feature;
     return a.contact.obstacle_feature < b.contact.obstacle_feature;
   });
-  const double close_m = std::min(kClose * way_m_, 0.25 * scene_.tool_radius_m());
-  FixedList<Vector3d, kMostMet> points;
+  const double close_m = std::min(kClose * displacement_bound_m_, 0.25 * scene_.tool_radius_m());
+  StaticVector<Vector3d, kMaxContacts> points;
   for (const Crossing& crossing : crossings_) {
     bool beside = false;
     for (std::size_t i = 0; i < points.size() && !beside; ++i)
       beside = (points[i] - crossing.point_W_m).squaredNorm() < close_m * close_m &&
-               findings.met[i].n_W.dot(crossing.contact.n_W) > kSameWay;
-    if (beside || !findings.met.add(crossing.contact)) continue;
+               findings.contacts[i].n_W.dot(crossing.contact.n_W) > kSameWay;
+    if (beside || !findings.contacts.add(crossing.contact)) continue;
     points.add(crossing.point_W_m);
   }
 }

@@ -28,7 +28,7 @@ struct Penetration {
   /// its own projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For
   /// translational, [d; sum (c_i - x) x d_i]: with the force gain k for both halves this is the force k d at
   /// each contact and its torque about the centre of mass, which is that method's wrench.
-  Vector6d drive = Vector6d::Zero();
+  Vector6d spring_displacement = Vector6d::Zero();
 };
 
 /// Computes the generalized penetration depth of a scene's tool by the method chosen. All memory is taken at
@@ -65,18 +65,18 @@ class PenetrationDepth {
 
   /// Forgets what the last answers were held by: the next pose to follow from is none of them. It is one that
   /// was admissible when the obstacles stood as at scene_time_s [s]. RT safe.
-  void forget(double scene_time_s = 0.0) noexcept;
+  void clear_history(double scene_time_s = 0.0) noexcept;
 
   /// Whether contacts with mesh obstacles number the features of the meshes, or those of their hulls.
-  bool knows_mesh_features() const noexcept { return proxy_.has_value(); }
+  bool uses_mesh_features() const noexcept { return proxy_.has_value(); }
 
  private:
-  Penetration follow_smoothly(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
+  Penetration follow_frictionless(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
   Penetration follow_exactly(const Pose& X_WP, const Pose& X_last) noexcept;
-  Penetration rub(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
-  static Penetration described(const Pose& X_WP, const Projection& projection) noexcept;
+  Penetration follow_with_friction(const Pose& X_WP, const Pose& X_last, double scene_time_s) noexcept;
+  static Penetration to_penetration(const Pose& X_WP, const Projection& projection) noexcept;
   template <class Solve>
-  void settle(Projection& best, const Solve& solve) noexcept;
+  void refine_planes(Projection& best, const Solve& solve) noexcept;
   Projection project_globally(const Pose& X_WP, const std::stop_token& stop) noexcept;
   Projection translate(const Pose& X_WP) noexcept;
   Penetration approximate(const Pose& X_WP, const Pose& X_start) noexcept;
@@ -87,18 +87,19 @@ class PenetrationDepth {
   Options options_;
   const Scene& bodies_;
   Inertia M_;
-  SceneContacts scene_;
+  SceneContacts scene_contacts_;
   ExactProjection exact_;
   Descent descent_;  ///< works with exact_
   PlanarFamily planar_;
-  ContactSet contacts_;                                    ///< what planar works through
-  FixedList<ActiveContact, ContactSet::kCapacity> known_;  ///< what carried at the last answer of follow()
-  std::optional<Pose> X_answered_;                         ///< that answer: the planes held admit it
-  std::vector<HeldPlane> saved_;                           ///< while other planes are tried
-  std::vector<HeldPlane> best_;                            ///< of the best answer so far
-  std::optional<Friction> friction_;                       ///< where there is any
-  std::optional<Proxy> proxy_;                             ///< where there are meshes
-  std::optional<Placement> placement_;                     ///< likewise
+  ContactSet contacts_;  ///< what planar works through
+  StaticVector<ActiveContact, ContactSet::kCapacity>
+      warm_start_;                                 ///< what carried at the last answer of follow()
+  std::optional<Pose> X_last_answer_;              ///< that answer: the planes held admit it
+  std::vector<SeparatingPlane> saved_planes_;      ///< while other planes are tried
+  std::vector<SeparatingPlane> best_planes_;       ///< of the best answer so far
+  std::optional<Friction> friction_;               ///< where there is any
+  std::optional<Proxy> proxy_;                     ///< where there are meshes
+  std::optional<FeasiblePoseSearch> pose_search_;  ///< likewise
 };
 
 }  // namespace wrenchd

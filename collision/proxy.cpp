@@ -44,7 +44,7 @@ constexpr double kLeastClearance = 0.2;
 /// A proxy that obstacles cannot push aside for so many ticks is caught between them.
 constexpr std::uint16_t kMostStuckTicks = 50;
 /// What is pushed goes as far as it must.
-constexpr ExactProjection::Leash kNoLeash = {};
+constexpr ExactProjection::StepLimit kNoLeash = {};
 /// T falls by at least this share from one round to the next, or the rounds end.
 constexpr double kProgress = 1e-9;
 
@@ -57,248 +57,255 @@ bool holds(std::span<const ActiveContact> contacts, const Pose& X_WT) noexcept {
 
 }  // namespace
 
-Proxy::Proxy(const Scene& scene, Effort effort)
+Proxy::Proxy(const Scene& scene, WorkLimit effort)
     : scene_(scene),
-      effort_(effort),
+      work_limit_(effort),
       M_(scene.tool().solid.inertia),
       exact_(M_, ExactProjection::Budget{}, kClearance_m),
       half_spaces_(scene),
       meshes_(scene) {}
 
-void Proxy::stay(const Pose& X_last) noexcept {
-  looks_ = 0;
+void Proxy::hold(const Pose& X_last) noexcept {
+  sweeps_ = 0;
   set_budget(0.0);
-  look_ahead(X_last, X_last);
+  prefetch(X_last, X_last);
 }
 
 Projection Proxy::follow(const Pose& X_WP, const Pose& X_last, double time_s) noexcept {
   X_WQ_ = X_last;
-  looks_ = 0;
+  sweeps_ = 0;
   iterations_ = 0;
-  set_budget(X_asked_ ? way_m(*X_asked_, X_WP) : 0.0);
-  meshes_.start_at(X_WQ_, seen_s_);
-  const Projection q = find(X_WP, time_s);
-  if (!late_) first_share_ = 1.0;
-  look_ahead(q.X_WQ, X_WP);
+  set_budget(X_last_WP_ ? displacement_bound_m(*X_last_WP_, X_WP) : 0.0);
+  meshes_.set_start(X_WQ_, admissible_time_s_);
+  const Projection q = solve(X_WP, time_s);
+  if (!deferred_) first_step_fraction_ = 1.0;
+  prefetch(q.X_WQ, X_WP);
   return q;
 }
 
 /// hand_m: how far the hand has come with this tick. Where obstacles move nothing can wait: what is late
 /// would let them come nearer unseen.
 void Proxy::set_budget(double hand_m) noexcept {
-  late_ = false;
-  least_left_ = 0;
-  budget_ = {effort_.visits};
-  if (!effort_.evenly || scene_.moves()) return;
+  deferred_ = false;
+  min_remaining_visits_ = 0;
+  budget_ = {work_limit_.node_visits};
+  if (!work_limit_.balanced || scene_.has_moving_obstacles()) return;
   const double haste = std::max(1.0, hand_m / (kPatientWay * scene_.tool_radius_m()));
-  const std::uint32_t most = even_.most(haste);
-  least_left_ = effort_.visits - std::min(effort_.visits, most);
-  const auto for_lists = static_cast<std::uint32_t>(std::max<double>(most - even_.usual_of_looks(), 0.0));
-  budget_.kept = effort_.visits - std::min(effort_.visits, for_lists);
+  const std::uint32_t most = balancer_.max_visits(haste);
+  min_remaining_visits_ = work_limit_.node_visits - std::min(work_limit_.node_visits, most);
+  const auto for_lists =
+      static_cast<std::uint32_t>(std::max<double>(most - balancer_.typical_sweep_visits(), 0.0));
+  budget_.reserved = work_limit_.node_visits - std::min(work_limit_.node_visits, for_lists);
 }
 
 /// A tick that had much to do leaves what is made ahead to others, which had little.
-void Proxy::look_ahead(const Pose& X_WT, const Pose& X_WP) noexcept {
+void Proxy::prefetch(const Pose& X_WT, const Pose& X_WP) noexcept {
   std::uint32_t to_spare = 0;
-  if (budget_.kept > 0) {
-    const double even = even_.even();
-    const auto for_all = static_cast<std::uint32_t>(std::min<double>(kAheadUpTo * even, effort_.visits));
-    budget_.kept = std::max(budget_.kept, effort_.visits - for_all);
-    to_spare = static_cast<std::uint32_t>(std::max(even - visits(), 0.0));
+  if (budget_.reserved > 0) {
+    const double even = balancer_.target_visits();
+    const auto for_all =
+        static_cast<std::uint32_t>(std::min<double>(kAheadUpTo * even, work_limit_.node_visits));
+    budget_.reserved = std::max(budget_.reserved, work_limit_.node_visits - for_all);
+    to_spare = static_cast<std::uint32_t>(std::max(even - node_visits(), 0.0));
   }
-  const std::uint32_t looking = meshes_.looking() + looks_ * kVisitsPerLook;
-  meshes_.look_ahead(X_WT, X_WP, budget_, seen_s_, to_spare);
-  even_.learn(looking, meshes_.visits_per_tick(), late_);
+  const std::uint32_t looking = meshes_.sweep_visits() + sweeps_ * kVisitsPerLook;
+  meshes_.prefetch(X_WT, X_WP, budget_, admissible_time_s_, to_spare);
+  balancer_.update(looking, meshes_.list_visits_per_tick(), deferred_);
 }
 
-bool Proxy::worked_enough() const noexcept {
-  return looks_ >= kFewLooks && budget_.visits <= least_left_;
+bool Proxy::target_reached() const noexcept {
+  return sweeps_ >= kFewLooks && budget_.remaining <= min_remaining_visits_;
 }
 
-void Proxy::forget(double time_s) noexcept {
-  known_.clear();
-  X_asked_.reset();
-  meshes_.forget();
-  even_.forget();
-  first_share_ = 1.0;
-  seen_s_ = known_s_ = time_s;
-  stuck_ticks_ = 0;
+void Proxy::clear_history(double time_s) noexcept {
+  known_contacts_.clear();
+  X_last_WP_.reset();
+  meshes_.reset();
+  balancer_.reset();
+  first_step_fraction_ = 1.0;
+  admissible_time_s_ = known_contacts_time_s_ = time_s;
+  trapped_ticks_ = 0;
 }
 
-Projection Proxy::find(const Pose& X_WP, double time_s) noexcept {
-  if (scene_.moves() && time_s != seen_s_ && !give_way(time_s)) return waiting(X_WP);
-  double longest_m =
-      std::max(kLongestStep * (X_asked_ ? way_m(*X_asked_, X_WP) : 0.0), kLeastStep * scene_.tool_radius_m());
-  X_asked_ = X_WP;
-  double share = first_share_;  // of the step that the contacts known allow
+Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
+  if (scene_.has_moving_obstacles() && time_s != admissible_time_s_ && !yield_to_obstacles(time_s))
+    return unfinished_answer(X_WP);
+  double longest_m = std::max(kLongestStep * (X_last_WP_ ? displacement_bound_m(*X_last_WP_, X_WP) : 0.0),
+                              kLeastStep * scene_.tool_radius_m());
+  X_last_WP_ = X_WP;
+  double share = first_step_fraction_;  // of the step that the contacts known allow
   double T_last = energy(M_, X_WP, X_WQ_);
-  while (looks_ < effort_.looks && share >= kShortestShare) {
+  while (sweeps_ < work_limit_.sweeps && share >= kShortestShare) {
     const Projection q = step(X_WP, share * longest_m);
     if (q.status == ProjectionStatus::infeasible) {  // contacts that do not agree: others may
-      if (known_.empty()) break;
-      known_.clear();
+      if (known_contacts_.empty()) break;
+      known_contacts_.clear();
       share = kWary;
-      ++looks_;
+      ++sweeps_;
       continue;
     }
     const bool whole = q.status == ProjectionStatus::converged || q.status == ProjectionStatus::free;
-    const Way way = look_along(q.X_WQ, seen_s_);
-    if (way == Way::met_contacts) {
-      if (late_ && worked_enough()) break;  // they are known in the next tick
+    const PathResult way = sweep_along(q.X_WQ, admissible_time_s_);
+    if (way == PathResult::contacts_found) {
+      if (deferred_ && target_reached()) break;  // they are known in the next tick
       share = 1.0;
       continue;
     }
-    if (way == Way::too_long) {
+    if (way == PathResult::path_too_long) {
       share *= 0.25;
-      first_share_ = std::max(share, kLeastFirstShare);
+      first_step_fraction_ = std::max(share, kLeastFirstShare);
       continue;
     }
-    if (way == Way::late) {  // as far as is known; the rest waits
-      if (std::exchange(late_, true)) break;
+    if (way == PathResult::list_pending) {  // as far as is known; the rest waits
+      if (std::exchange(deferred_, true)) break;
       const double far_m = std::max((q.X_WQ.translation_m - X_WQ_.translation_m).norm(),
                                     scene_.tool_radius_m() * q.X_WQ.rotation.angularDistance(X_WQ_.rotation));
-      share = std::min(share, kSafely * meshes_.share_listed(q.X_WQ) * far_m / longest_m);
+      share = std::min(share, kSafely * meshes_.covered_fraction(q.X_WQ) * far_m / longest_m);
       continue;
     }
-    first_share_ = 1.0;
+    first_step_fraction_ = 1.0;
     X_WQ_ = q.X_WQ;
-    meshes_.start_at(X_WQ_, seen_s_);
-    if (late_) break;
-    if (meshes_.pairs() == 0) longest_m *= kLonger;  // nothing near
-    const bool all_hold = !let_go(q);
+    meshes_.set_start(X_WQ_, admissible_time_s_);
+    if (deferred_) break;
+    if (meshes_.candidate_count() == 0) longest_m *= kLonger;  // nothing near
+    const bool all_hold = !drop_separated_contacts(q);
     share = all_hold ? std::min(1.0, kLonger * share) : kWary;
-    if (!all_hold && worked_enough()) {
-      late_ = true;
+    if (!all_hold && target_reached()) {
+      deferred_ = true;
       break;
     }
     if (!whole) {
       if (all_hold && share == 1.0) longest_m *= kGrowth;  // a long way to go, and nothing on it
       continue;
     }
-    if (all_hold) return described(X_WP, q);
+    if (all_hold) return finish(X_WP, q);
     const double T = energy(M_, X_WP, X_WQ_);
-    if (T > (1.0 - kProgress) * T_last) return described(X_WP, q);
+    if (T > (1.0 - kProgress) * T_last) return finish(X_WP, q);
     T_last = T;
   }
-  return waiting(X_WP);
+  return unfinished_answer(X_WP);
 }
 
 /// As far as it came.
-Projection Proxy::waiting(const Pose& X_WP) const noexcept {
+Projection Proxy::unfinished_answer(const Pose& X_WP) const noexcept {
   Projection q;
-  q.status = stuck_ticks_ < kMostStuckTicks ? ProjectionStatus::budget_spent : ProjectionStatus::infeasible;
+  q.status = trapped_ticks_ < kMostStuckTicks ? ProjectionStatus::budget_spent : ProjectionStatus::infeasible;
   q.X_WQ = X_WQ_;
-  q.active = known_;
-  return described(X_WP, q);
+  q.active = known_contacts_;
+  return finish(X_WP, q);
 }
 
 /// Lets the obstacles move to where they stand at time_s, in parts where it takes that. False where they are
 /// on their way still.
-bool Proxy::give_way(double time_s) noexcept {
-  const double since_s = seen_s_;
+bool Proxy::yield_to_obstacles(double time_s) noexcept {
+  const double since_s = admissible_time_s_;
   double share = 1.0;  // of the time that is left
-  while (seen_s_ != time_s && looks_ < effort_.looks && share >= kShortestShare) {
-    const double next_s = share < 1.0 ? seen_s_ + share * (time_s - seen_s_) : time_s;
-    see(next_s);
+  while (admissible_time_s_ != time_s && sweeps_ < work_limit_.sweeps && share >= kShortestShare) {
+    const double next_s = share < 1.0 ? admissible_time_s_ + share * (time_s - admissible_time_s_) : time_s;
+    move_known_contacts(next_s);
     Projection q;
     q.X_WQ = X_WQ_;
-    q.active = known_;
-    if (!holds({known_.begin(), known_.end()}, X_WQ_)) {
-      q = exact_.step(X_WQ_, X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()), kNoLeash);
+    q.active = known_contacts_;
+    if (!holds({known_contacts_.begin(), known_contacts_.end()}, X_WQ_)) {
+      q = exact_.step(X_WQ_, X_WQ_,
+                      std::span<const ActiveContact>(known_contacts_.begin(), known_contacts_.end()),
+                      kNoLeash);
       iterations_ = static_cast<std::uint16_t>(iterations_ + q.iterations);
     }
     const bool agree = q.status != ProjectionStatus::infeasible;
-    const Way way = agree ? look_along(q.X_WQ, next_s) : Way::too_long;
-    if (way == Way::met_contacts) continue;
-    if (way != Way::free) {
-      if (!agree) known_.clear();
+    const PathResult way = agree ? sweep_along(q.X_WQ, next_s) : PathResult::path_too_long;
+    if (way == PathResult::contacts_found) continue;
+    if (way != PathResult::free) {
+      if (!agree) known_contacts_.clear();
       share *= 0.25;
       continue;
     }
     X_WQ_ = q.X_WQ;
-    seen_s_ = next_s;
-    meshes_.start_at(X_WQ_, seen_s_);
-    let_go(q);
+    admissible_time_s_ = next_s;
+    meshes_.set_start(X_WQ_, admissible_time_s_);
+    drop_separated_contacts(q);
     share = std::min(1.0, kLonger * share);
   }
-  see(seen_s_);
-  if (seen_s_ != since_s)
-    stuck_ticks_ = 0;
-  else if (stuck_ticks_ < kMostStuckTicks)
-    ++stuck_ticks_;
-  return seen_s_ == time_s;
+  move_known_contacts(admissible_time_s_);
+  if (admissible_time_s_ != since_s)
+    trapped_ticks_ = 0;
+  else if (trapped_ticks_ < kMostStuckTicks)
+    ++trapped_ticks_;
+  return admissible_time_s_ == time_s;
 }
 
 /// The known contacts as they stand at this time.
-void Proxy::see(double time_s) noexcept {
-  if (time_s == known_s_) return;
-  Known seen;
-  for (const auto& [contact, multiplier] : known_) seen.add({as_seen(contact, known_s_, time_s), multiplier});
-  known_ = seen;
-  known_s_ = time_s;
+void Proxy::move_known_contacts(double time_s) noexcept {
+  if (time_s == known_contacts_time_s_) return;
+  KnownContacts seen;
+  for (const auto& [contact, multiplier] : known_contacts_)
+    seen.add({contact_at(contact, known_contacts_time_s_, time_s), multiplier});
+  known_contacts_ = seen;
+  known_contacts_time_s_ = time_s;
 }
 
 /// A contact of one time at another.
-Contact Proxy::as_seen(const Contact& contact, double from_s, double to_s) const noexcept {
-  if (!scene_.moves() || from_s == to_s) return contact;
-  return moved(contact, scene_.motion(contact.obstacle, from_s, to_s));
+Contact Proxy::contact_at(const Contact& contact, double from_s, double to_s) const noexcept {
+  if (!scene_.has_moving_obstacles() || from_s == to_s) return contact;
+  return moved(contact, scene_.obstacle_displacement(contact.obstacle, from_s, to_s));
 }
 
 /// As near to p as the contacts known allow, no farther than so much from the pose at hand.
 Projection Proxy::step(const Pose& X_WP, double longest_m) noexcept {
-  const ExactProjection::Leash leash = {longest_m,
-                                        std::min(longest_m / scene_.tool_radius_m(), kLongestTurn_rad)};
-  const Projection q =
-      exact_.step(X_WP, X_WQ_, std::span<const ActiveContact>(known_.begin(), known_.end()), leash);
+  const ExactProjection::StepLimit leash = {longest_m,
+                                            std::min(longest_m / scene_.tool_radius_m(), kLongestTurn_rad)};
+  const Projection q = exact_.step(
+      X_WP, X_WQ_, std::span<const ActiveContact>(known_contacts_.begin(), known_contacts_.end()), leash);
   iterations_ = static_cast<std::uint16_t>(iterations_ + q.iterations);
   return q;
 }
 
 /// How far a point of the tool may be moved from one pose to the other.
-double Proxy::way_m(const Pose& from, const Pose& to) const noexcept {
+double Proxy::displacement_bound_m(const Pose& from, const Pose& to) const noexcept {
   return (to.translation_m - from.translation_m).norm() +
          scene_.tool_radius_m() * from.rotation.angularDistance(to.rotation);
 }
 
 /// Looks along the way from the pose at hand; what it meets there becomes known.
-Proxy::Way Proxy::look_along(const Pose& X_WT, double time_s) noexcept {
-  ++looks_;
-  budget_.visits -= std::min(budget_.visits, kVisitsPerLook);
+Proxy::PathResult Proxy::sweep_along(const Pose& X_WT, double time_s) noexcept {
+  ++sweeps_;
+  budget_.remaining -= std::min(budget_.remaining, kVisitsPerLook);
   bool learned = false;
   ContactSet met;
   const double tolerance_m = exact_.gap_tolerance_m(X_WT) - kClearance_m;
   half_spaces_.add_violated(Frame(X_WT), tolerance_m, met);
-  for (const Contact& contact : met) learned = learn(contact) || learned;
-  if (scene_.meshes().empty()) return learned ? Way::met_contacts : Way::free;
-  const MeshContacts::Findings found = meshes_.look(X_WT, kClearance_m, budget_, time_s);
-  if (!found.complete) return found.late ? Way::late : Way::too_long;
-  for (const Contact& contact : found.met) learned = learn(contact) || learned;
-  if (learned) return Way::met_contacts;
-  return found.overlaps || !found.met.empty() || !met.empty() ? Way::too_long : Way::free;
+  for (const Contact& contact : met) learned = add_known_contact(contact) || learned;
+  if (scene_.meshes().empty()) return learned ? PathResult::contacts_found : PathResult::free;
+  const MeshContacts::SweepResult found = meshes_.sweep(X_WT, kClearance_m, budget_, time_s);
+  if (!found.complete) return found.list_pending ? PathResult::list_pending : PathResult::path_too_long;
+  for (const Contact& contact : found.contacts) learned = add_known_contact(contact) || learned;
+  if (learned) return PathResult::contacts_found;
+  return found.overlaps || !found.contacts.empty() || !met.empty() ? PathResult::path_too_long
+                                                                   : PathResult::free;
 }
 
 /// False where it was known, or there is no room. A contact that has less room already is held where it is:
 /// the pose at hand must remain one of those allowed.
-bool Proxy::learn(Contact contact) noexcept {
-  for (const ActiveContact& known : known_)
+bool Proxy::add_known_contact(Contact contact) noexcept {
+  for (const ActiveContact& known : known_contacts_)
     if (same_features(known.contact, contact)) return false;
-  const double gap = gap_m(as_seen(contact, known_s_, seen_s_), X_WQ_);
+  const double gap = gap_m(contact_at(contact, known_contacts_time_s_, admissible_time_s_), X_WQ_);
   if (gap < kClearance_m) {
     const double lower_m = kClearance_m - std::max(gap, kLeastClearance * kClearance_m);
-    contact.p_WB_m -= lower_m * normal_W(contact, X_WQ_);
+    contact.p_WCb_m -= lower_m * normal_W(contact, X_WQ_);
     contact.offset_m -= lower_m;
   }
-  return known_.add({contact, 0.0});
+  return known_contacts_.add({contact, 0.0});
 }
 
 /// Keeps the contacts that touch at q and whose features lie opposite each other there. True where one that
 /// carried is not among them.
-bool Proxy::let_go(const Projection& q) noexcept {
+bool Proxy::drop_separated_contacts(const Projection& q) noexcept {
   bool carried = false;
-  known_.clear();
+  known_contacts_.clear();
   for (const ActiveContact& active : q.active) {
     if (active.contact.obstacle < scene_.first_mesh() || meshes_.touching().contains(active.contact))
-      known_.add(active);
+      known_contacts_.add(active);
     else
       carried = carried || active.multiplier > 0.0;
   }
@@ -306,7 +313,7 @@ bool Proxy::let_go(const Projection& q) noexcept {
 }
 
 /// q with what it is for p, whatever it was found for.
-Projection Proxy::described(const Pose& X_WP, Projection q) const noexcept {
+Projection Proxy::finish(const Pose& X_WP, Projection q) const noexcept {
   q.iterations = iterations_;
   q.energy = q.status == ProjectionStatus::free ? 0.0 : energy(M_, X_WP, q.X_WQ);
   return q;

@@ -19,22 +19,22 @@ namespace {
 /// What is made once of each mesh file, scale and kind.
 struct Made {
   std::shared_ptr<const LoadedMesh> loaded;
-  std::shared_ptr<const TreedMesh> treed;
+  std::shared_ptr<const MeshBvh> treed;
   std::optional<ConvexBody> hull;  ///< in file units, where it is convex
 };
 
 Made make(const MeshObstacleSettings& obstacle, bool all_convex, MeshLoader& loader) {
   Made made;
-  made.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.made);
-  loader.look_at_size(*made.loaded, obstacle.scale, kObstacleSize);
+  made.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.generated);
+  loader.check_size(*made.loaded, obstacle.scale, kPlausibleObstacleSize);
   require_size_for_contacts(made.loaded->mesh, obstacle.scale, obstacle.mesh);
   TriangleMesh mesh = made.loaded->mesh;
-  if (all_convex && obstacle.kind == BodyKind::solid && may_fill_its_hull(mesh)) {
+  if (all_convex && obstacle.kind == BodyKind::solid && may_be_convex(mesh)) {
     ConvexBody hull = loader.hull(*made.loaded);
-    if (fills_its_hull(mesh, hull)) made.hull = std::move(hull);
+    if (is_convex(mesh, hull)) made.hull = std::move(hull);
   }
   for (Vector3d& p : mesh.vertices_m) p *= obstacle.scale;
-  made.treed = loader.treed(std::move(mesh), obstacle.kind, obstacle.mesh);
+  made.treed = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh);
   return made;
 }
 
@@ -48,14 +48,14 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
   std::vector<MeshObstacle> meshes;
   const bool all_stand = std::none_of(
       settings.meshes.begin(), settings.meshes.end(),
-      [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves() || obstacle.later; });
-  bool all_convex = all_stand && fills_its_hull(tool.mesh, tool.hull);
+      [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves() || obstacle.scheduled; });
+  bool all_convex = all_stand && is_convex(tool.mesh, tool.hull);
   std::map<std::tuple<std::filesystem::path, double, BodyKind>, Made> all_made;
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
     const auto [at, is_new] = all_made.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
     Made& made = at->second;
     if (is_new) made = make(obstacle, all_convex, loader);
-    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM, obstacle.motion, obstacle.later);
+    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM, obstacle.motion, obstacle.scheduled);
     all_convex = all_convex && made.hull;
     if (!all_convex) continue;
     ConvexBody hull = *made.hull;
@@ -63,7 +63,7 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
     convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
   if (!all_convex) convex.clear();
-  auto tool_mesh = loader.treed(tool.mesh, BodyKind::solid, settings.tool.mesh);
+  auto tool_mesh = loader.build_bvh(tool.mesh, BodyKind::solid, settings.tool.mesh);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));
 }
@@ -82,16 +82,16 @@ double farthest_m(const std::vector<Vector3d>& points, const Vector3d& centre) {
 
 ConvexObstacle convex_obstacle(std::string name, ConvexBody body_W) {
   ConvexObstacle obstacle{std::move(name), std::move(body_W)};
-  obstacle.body.find_faces();
+  obstacle.body.compute_derived_data();
   for (const Vector3d& p : obstacle.body.vertices_T_m)
     obstacle.centre_W_m += p / static_cast<double>(obstacle.body.vertices_T_m.size());
   obstacle.radius_m = farthest_m(obstacle.body.vertices_T_m, obstacle.centre_W_m);
   return obstacle;
 }
 
-MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_,
-                           const ObstacleMotion& motion_, const std::optional<LaterMotion>& later_)
-    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_), motion(motion_), later(later_) {
+MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const MeshBvh> mesh_, const Pose& X_WO_,
+                           const ObstacleMotion& motion_, const std::optional<ScheduledMotion>& later_)
+    : name(std::move(name_)), mesh(std::move(mesh_)), X_WO(X_WO_), motion(motion_), scheduled(later_) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : mesh->surface.vertices_m()) box.extend(p);
   centre_O_m = box.center();
@@ -99,12 +99,12 @@ MeshObstacle::MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> m
   radius_m = farthest_m(mesh->surface.vertices_m(), centre_O_m);
 }
 
-double MeshObstacle::fastest_m_per_s() const noexcept {
+double MeshObstacle::speed_bound_m_per_s() const noexcept {
   const double lever_m = centre_O_m.norm();
   const auto fastest = [lever_m](const ObstacleMotion& m) {
     return m.linear_m_per_s.norm() + m.angular_rad_per_s.norm() * lever_m;
   };
-  return later ? std::max(fastest(motion), fastest(later->motion)) : fastest(motion);
+  return scheduled ? std::max(fastest(motion), fastest(scheduled->motion)) : fastest(motion);
 }
 
 Scene::Scene(const SceneSettings& settings, MeshLoader& loader) : Scene(load(settings, loader)) {}
@@ -115,16 +115,16 @@ Scene::Scene(const SceneSettings& settings) {
 }
 
 Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex,
-             std::vector<MeshObstacle> meshes, std::shared_ptr<const TreedMesh> tool_mesh)
+             std::vector<MeshObstacle> meshes, std::shared_ptr<const MeshBvh> tool_mesh)
     : tool_(std::move(tool)),
       tool_radius_m_(farthest_m(tool_.hull.vertices_T_m, Vector3d::Zero())),
       half_spaces_(std::move(half_spaces)),
       convex_(std::move(convex)),
       meshes_(std::move(meshes)),
       tool_mesh_(std::move(tool_mesh)),
-      moves_(any_moves(meshes_)) {
-  if (moves_) convex_.clear();
-  if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const TreedMesh>(tool_.mesh);
+      has_moving_obstacles_(any_moves(meshes_)) {
+  if (has_moving_obstacles_) convex_.clear();
+  if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const MeshBvh>(tool_.mesh);
 }
 
 Scene::Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes) : Scene(other) {
@@ -133,13 +133,13 @@ Scene::Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes
     obstacle.X_WO = meshes[k].X_WM;
     obstacle.centre_W_m = obstacle.X_WO * obstacle.centre_O_m;
     obstacle.motion = meshes[k].motion;
-    obstacle.later = meshes[k].later;
+    obstacle.scheduled = meshes[k].scheduled;
   }
-  moves_ = any_moves(meshes_);
+  has_moving_obstacles_ = any_moves(meshes_);
   convex_.clear();  // which are made where they stood
 }
 
-Pose Scene::motion(std::uint32_t number, double from_s, double to_s) const noexcept {
+Pose Scene::obstacle_displacement(std::uint32_t number, double from_s, double to_s) const noexcept {
   if (from_s == to_s || number < first_mesh() || !meshes_[number - first_mesh()].moves()) return {};
   const MeshObstacle& obstacle = meshes_[number - first_mesh()];
   return obstacle.X_WO_at(to_s) * inverse(obstacle.X_WO_at(from_s));

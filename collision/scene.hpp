@@ -28,26 +28,27 @@ struct ConvexObstacle {
 /// An obstacle of any shape. O: the frame of its mesh, in metres.
 struct MeshObstacle {
   /// The same mesh may be many obstacles.
-  MeshObstacle(std::string name_, std::shared_ptr<const TreedMesh> mesh_, const Pose& X_WO_,
-               const ObstacleMotion& motion_ = {}, const std::optional<LaterMotion>& later_ = {});
-  MeshObstacle(std::string name_, TreedMesh mesh_, const Pose& X_WO_, const ObstacleMotion& motion_ = {})
-      : MeshObstacle(std::move(name_), std::make_shared<const TreedMesh>(std::move(mesh_)), X_WO_, motion_) {}
+  MeshObstacle(std::string name_, std::shared_ptr<const MeshBvh> mesh_, const Pose& X_WO_,
+               const ObstacleMotion& motion_ = {}, const std::optional<ScheduledMotion>& later_ = {});
+  MeshObstacle(std::string name_, MeshBvh mesh_, const Pose& X_WO_, const ObstacleMotion& motion_ = {})
+      : MeshObstacle(std::move(name_), std::make_shared<const MeshBvh>(std::move(mesh_)), X_WO_, motion_) {}
 
   /// Where it stands at scene time t_s [s]: X_WO until it sets out. RT safe.
   Pose X_WO_at(double t_s) const noexcept {
-    return later && t_s >= later->from_s ? later->motion.at(later->X_WO, t_s) : motion.at(X_WO, t_s);
+    return scheduled && t_s >= scheduled->start_s ? scheduled->motion.pose_at(scheduled->X_WO, t_s)
+                                                  : motion.pose_at(X_WO, t_s);
   }
-  bool moves() const noexcept { return motion.moves() || (later && later->motion.moves()); }
+  bool moves() const noexcept { return motion.moves() || (scheduled && scheduled->motion.moves()); }
   /// How fast the centre of the sphere that holds it is at most [m/s].
-  double fastest_m_per_s() const noexcept;
+  double speed_bound_m_per_s() const noexcept;
 
   std::string name;
-  std::shared_ptr<const TreedMesh> mesh;
-  Pose X_WO;                         ///< at scene time 0
-  ObstacleMotion motion;             ///< from there
-  std::optional<LaterMotion> later;  ///< and in the place of that
-  Vector3d centre_O_m;               ///< of a sphere that holds it
-  Vector3d centre_W_m;               ///< the same, at scene time 0
+  std::shared_ptr<const MeshBvh> mesh;
+  Pose X_WO;                                 ///< at scene time 0
+  ObstacleMotion motion;                     ///< from there
+  std::optional<ScheduledMotion> scheduled;  ///< and in the place of that
+  Vector3d centre_O_m;                       ///< of a sphere that holds it
+  Vector3d centre_W_m;                       ///< the same, at scene time 0
   double radius_m;
 };
 
@@ -70,7 +71,7 @@ class Scene {
   explicit Scene(const SceneSettings& settings);  ///< with a loader of its own, that keeps nothing
   /// tool_mesh: the tool's own mesh, where it is at hand already.
   Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vector<ConvexObstacle> convex = {},
-        std::vector<MeshObstacle> meshes = {}, std::shared_ptr<const TreedMesh> tool_mesh = nullptr);
+        std::vector<MeshObstacle> meshes = {}, std::shared_ptr<const MeshBvh> tool_mesh = nullptr);
 
   /// The same bodies, the meshes where these settings have them; there is one for each. Nothing is read.
   Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes);
@@ -81,11 +82,11 @@ class Scene {
   const std::vector<ConvexObstacle>& convex() const noexcept { return convex_; }
   const std::vector<MeshObstacle>& meshes() const noexcept { return meshes_; }
   /// The tool as the meshes meet it, in T; null where there are none.
-  const TreedMesh* tool_mesh() const noexcept { return tool_mesh_.get(); }
-  bool moves() const noexcept { return moves_; }  ///< does any obstacle?
+  const MeshBvh* tool_mesh() const noexcept { return tool_mesh_.get(); }
+  bool has_moving_obstacles() const noexcept { return has_moving_obstacles_; }  ///< does any obstacle?
   /// By how much an obstacle moves in the world from one scene time to another: X_WO then = this * X_WO
   /// before. number: as above. RT safe.
-  Pose motion(std::uint32_t number, double from_s, double to_s) const noexcept;
+  Pose obstacle_displacement(std::uint32_t number, double from_s, double to_s) const noexcept;
   std::size_t obstacle_count() const noexcept {
     return half_spaces_.size() + std::max(convex_.size(), meshes_.size());
   }
@@ -100,8 +101,8 @@ class Scene {
   std::vector<HalfSpaceSettings> half_spaces_;
   std::vector<ConvexObstacle> convex_;
   std::vector<MeshObstacle> meshes_;
-  std::shared_ptr<const TreedMesh> tool_mesh_;
-  bool moves_ = false;
+  std::shared_ptr<const MeshBvh> tool_mesh_;
+  bool has_moving_obstacles_ = false;
 };
 
 }  // namespace wrenchd

@@ -50,7 +50,7 @@ bool between_ends(const ConvexBody& body, const ConvexBody::Edge& edge, const Ve
 }
 
 /// Fixed to the same features?
-bool same_plane(const HeldPlane& a, const HeldPlane& b) noexcept {
+bool same_plane(const SeparatingPlane& a, const SeparatingPlane& b) noexcept {
   if (a.kind != b.kind) return false;
   if (a.kind == ContactKind::vertex_face) return (a.n_W - b.n_W).norm() < kSamePlane;
   return a.d_T == b.d_T && a.d_W == b.d_W;
@@ -62,15 +62,15 @@ SceneContacts::SceneContacts(const Scene& scene)
     : scene_(scene),
       half_spaces_(scene),
       planes_(scene.convex().size()),
-      best_(planes_),
-      last_(planes_.size()) {
-  choices_.reserve(kMaxChoices);
-  openings_.reserve(kMaxOpenings);
+      survey_best_(planes_),
+      last_nearest_(planes_.size()) {
+  candidates_.reserve(kMaxCandidates);
+  survey_candidates_.reserve(kMaxSurveyPlanes);
   std::size_t most = scene.tool().hull.vertices_T_m.size();
   for (const ConvexObstacle& obstacle : scene.convex())
     most = std::max(most, obstacle.body.vertices_T_m.size());
-  touching_.reserve(most);
-  obstacle_touching_.reserve(most);
+  touching_vertices_.reserve(most);
+  obstacle_touching_vertices_.reserve(most);
 }
 
 std::size_t SceneContacts::add_violated(const Pose& pose, double tolerance_m,
@@ -79,7 +79,7 @@ std::size_t SceneContacts::add_violated(const Pose& pose, double tolerance_m,
   const std::size_t before = contacts.size();
   half_spaces_.add_violated(X_WT, tolerance_m, contacts);
   for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
-    add_convex(k, X_WT, tolerance_m, HalfSpaceContacts::kPerObstacle, contacts);
+    add_convex(k, X_WT, tolerance_m, HalfSpaceContacts::kMaxPerObstacle, contacts);
   return contacts.size() - before;
 }
 
@@ -98,21 +98,21 @@ bool SceneContacts::admits(const Pose& pose, double tolerance_m) const noexcept 
   return true;
 }
 
-void SceneContacts::admit(const Pose& pose, double tolerance_m) noexcept {
+void SceneContacts::select_admitting_planes(const Pose& pose, double tolerance_m) noexcept {
   const Frame X_WT(pose);
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (separates(k, X_WT, tolerance_m)) continue;
-    choices_.clear();
+    candidates_.clear();
     if (out_of_reach(k, X_WT))
-      consider_between_centres(k, X_WT);
+      add_centre_line_candidate(k, X_WT);
     else
-      consider_widest(k, X_WT);
-    if (choices_.empty()) {  // they touch: no plane has a width, but one of these has none below zero
-      consider_faces(k, X_WT);
-      consider_edge_pairs(k, X_WT);
-      sort_choices();
+      add_widest_gap_candidate(k, X_WT);
+    if (candidates_.empty()) {  // they touch: no plane has a width, but one of these has none below zero
+      add_face_candidates(k, X_WT);
+      add_edge_pair_candidates(k, X_WT);
+      sort_candidates();
     }
-    if (!choices_.empty()) take(0);
+    if (!candidates_.empty()) hold_alternative(0);
   }
 }
 
@@ -123,7 +123,8 @@ bool SceneContacts::out_of_reach(std::uint32_t k, const Frame& X_WT) const noexc
 }
 
 /// Edges that are parallel have no common normal: then it is that of the pose where the plane was taken.
-SceneContacts::Normal SceneContacts::normal_of(const HeldPlane& plane, const Frame& X_WT) noexcept {
+SceneContacts::PlaneNormal SceneContacts::normal_of(const SeparatingPlane& plane,
+                                                    const Frame& X_WT) noexcept {
   switch (plane.kind) {
     case ContactKind::vertex_face:
       break;
@@ -132,51 +133,53 @@ SceneContacts::Normal SceneContacts::normal_of(const HeldPlane& plane, const Fra
     case ContactKind::edge_edge: {
       const Vector3d N = (X_WT.R * plane.d_T).cross(plane.d_W);
       const double s = N.norm();
-      return s > kParallel ? Normal{N * (1.0 / s), false} : Normal{plane.n_W, true};
+      return s > kParallel ? PlaneNormal{N * (1.0 / s), false} : PlaneNormal{plane.n_W, true};
     }
   }
   return {plane.n_W, false};
 }
 
 /// The spheres around tool and obstacle are apart along n: most obstacles are told so.
-bool SceneContacts::far_above(std::uint32_t k, const Vector3d& n_W, const Frame& X_WT) const noexcept {
+bool SceneContacts::spheres_separated(std::uint32_t k, const Vector3d& n_W,
+                                      const Frame& X_WT) const noexcept {
   const ConvexObstacle& obstacle = scene_.convex()[k];
   return n_W.dot(X_WT.x_m - obstacle.centre_W_m) > scene_.tool_radius_m() + obstacle.radius_m;
 }
 
 /// The vertices of both bodies that lie farthest towards each other along a normal, and how far they are
 /// apart.
-SceneContacts::Standing SceneContacts::stand(std::uint32_t k, const Normal& normal,
-                                             const Frame& X_WT) const noexcept {
+SceneContacts::PlaneSeparation SceneContacts::plane_separation(std::uint32_t k, const PlaneNormal& normal,
+                                                               const Frame& X_WT) const noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const Vector3d& n_W = normal.n_W;
-  Pair& nearest = last_[k];
+  VertexPair& nearest = last_nearest_[k];
   nearest.tool_vertex = tool.support(X_WT.R.transpose() * -n_W, nearest.tool_vertex);
   nearest.obstacle_vertex = obstacle.support(n_W, nearest.obstacle_vertex);
   return {n_W, nearest, separation_m(k, n_W, nearest, X_WT), normal.degenerate};
 }
 
 /// How far a pair is apart along a normal.
-double SceneContacts::separation_m(std::uint32_t k, const Vector3d& n_W, Pair pair,
+double SceneContacts::separation_m(std::uint32_t k, const Vector3d& n_W, VertexPair pair,
                                    const Frame& X_WT) const noexcept {
   const Vector3d a_W = X_WT * scene_.tool().hull.vertices_T_m[pair.tool_vertex];
   return n_W.dot(a_W - scene_.convex()[k].body.vertices_T_m[pair.obstacle_vertex]);
 }
 
 bool SceneContacts::separates(std::uint32_t k, const Frame& X_WT, double tolerance_m) const noexcept {
-  const Normal normal = normal_of(planes_[k], X_WT);
-  return far_above(k, normal.n_W, X_WT) || stand(k, normal, X_WT).separation_m >= -tolerance_m;
+  const PlaneNormal normal = normal_of(planes_[k], X_WT);
+  return spheres_separated(k, normal.n_W, X_WT) ||
+         plane_separation(k, normal, X_WT).separation_m >= -tolerance_m;
 }
 
 /// The deepest pair, and those of its neighbours that lie beyond the plane too: on the side of the tool where
 /// the plane belongs to the obstacle, and the other way round.
 void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
                                ContactSet& contacts) const noexcept {
-  const HeldPlane& plane = planes_[k];
-  const Normal normal = normal_of(plane, X_WT);
-  if (far_above(k, normal.n_W, X_WT)) return;
-  const Standing at = stand(k, normal, X_WT);
+  const SeparatingPlane& plane = planes_[k];
+  const PlaneNormal normal = normal_of(plane, X_WT);
+  if (spheres_separated(k, normal.n_W, X_WT)) return;
+  const PlaneSeparation at = plane_separation(k, normal, X_WT);
   if (at.separation_m >= -tolerance_m) return;
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
@@ -192,9 +195,9 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
       a = first_end(tool, a, plane.d_T);
       b = first_end(obstacle, b, plane.d_W);
     }
-    contact.p_TA_m = tool.vertices_T_m[a];
-    contact.p_WB_m = obstacle.vertices_T_m[b];
-    contact.offset_m = contact.n_W.dot(contact.p_WB_m);
+    contact.p_TCa_m = tool.vertices_T_m[a];
+    contact.p_WCb_m = obstacle.vertices_T_m[b];
+    contact.offset_m = contact.n_W.dot(contact.p_WCb_m);
     contact.tool_feature = a;
     contact.obstacle_feature = b;
     if (!contacts.contains(contact)) contacts.add(contact);
@@ -218,17 +221,17 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
   }
 }
 
-bool SceneContacts::settled(const Projection& q) noexcept {
+bool SceneContacts::planes_optimal(const Projection& q) noexcept {
   for (std::uint32_t k = 0; k < scene_.convex().size(); ++k)
-    if (!press_settled(k, q)) return false;
+    if (!plane_optimal(k, q)) return false;
   return true;
 }
 
 /// The mean of the contacts with one obstacle, each weighted with what it carries. Nothing where none does.
-std::optional<SceneContacts::Pressure> SceneContacts::pressure_of(std::uint32_t k,
-                                                                  const Projection& q) const noexcept {
+std::optional<SceneContacts::PressureCentre> SceneContacts::pressure_of(std::uint32_t k,
+                                                                        const Projection& q) const noexcept {
   const auto number = static_cast<std::uint32_t>(scene_.half_spaces().size()) + k;
-  Pressure out;
+  PressureCentre out;
   double sum = 0.0;
   for (const auto& [contact, multiplier] : q.active) {
     if (contact.obstacle != number || !(multiplier > 0.0)) continue;
@@ -245,10 +248,10 @@ std::optional<SceneContacts::Pressure> SceneContacts::pressure_of(std::uint32_t 
 // The forces of one obstacle's contacts all act along n. They balance on a plane that is free to tilt where
 // their resultant passes through both bodies: where the centre of pressure c = sum m_i c_i / sum m_i lies in
 // the tool and in the obstacle.
-bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept {
+bool SceneContacts::plane_optimal(std::uint32_t k, const Projection& q) noexcept {
   const auto pressure = pressure_of(k, q);
   if (!pressure) return true;
-  const HeldPlane& plane = planes_[k];
+  const SeparatingPlane& plane = planes_[k];
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const Frame X_WT(q.X_WQ);
@@ -265,144 +268,145 @@ bool SceneContacts::press_settled(std::uint32_t k, const Projection& q) noexcept
   }
   // A mean of vertices lies in their body.
   const Vector3d n_W = normal_of(plane, X_WT).n_W;
-  return (plane.kind == ContactKind::face_vertex || holds(obstacle, n_W, b, centre_W)) &&
-         (plane.kind == ContactKind::vertex_face || holds(tool, X_WT.R.transpose() * -n_W, a, centre_T));
+  return (plane.kind == ContactKind::face_vertex || contains(obstacle, n_W, b, centre_W)) &&
+         (plane.kind == ContactKind::vertex_face || contains(tool, X_WT.R.transpose() * -n_W, a, centre_T));
 }
 
 /// Does a body hold a point of the plane that touches it, with this outward normal, at its vertex `farthest`?
 /// Only faces that meet the plane can leave the point out.
-bool SceneContacts::holds(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
-                          const Vector3d& p_m) noexcept {
+bool SceneContacts::contains(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
+                             const Vector3d& p_m) noexcept {
   const double tolerance_m = kPressure * scene_.tool_radius_m();
   const auto below = [&](const ConvexBody::Face& face) {
     return face.n.dot(p_m) <= face.offset_m + tolerance_m;
   };
   if (body.faces.size() <= kFewFaces) return std::all_of(body.faces.begin(), body.faces.end(), below);
-  collect_touching(body, normal, farthest, touching_);
-  for (const std::uint32_t v : touching_)
+  collect_touching(body, normal, farthest, touching_vertices_);
+  for (const std::uint32_t v : touching_vertices_)
     for (const std::uint32_t f : body.faces_of(v))
       if (!below(body.faces[f])) return false;
   return true;
 }
 
 /// Keeps a plane as a choice if it separates well enough.
-void SceneContacts::consider(std::uint32_t k, HeldPlane plane, const Frame& X_WT,
-                             double least_separation_m) noexcept {
-  const Normal normal = normal_of(plane, X_WT);
+void SceneContacts::add_candidate(std::uint32_t k, SeparatingPlane plane, const Frame& X_WT,
+                                  double least_separation_m) noexcept {
+  const PlaneNormal normal = normal_of(plane, X_WT);
   // Any pair tells how far they are apart at most: most planes need no more.
-  if (normal.degenerate || separation_m(k, normal.n_W, last_[k], X_WT) < least_separation_m) return;
-  const Standing at = stand(k, normal, X_WT);
+  if (normal.degenerate || separation_m(k, normal.n_W, last_nearest_[k], X_WT) < least_separation_m) return;
+  const PlaneSeparation at = plane_separation(k, normal, X_WT);
   if (!(at.separation_m >= least_separation_m)) return;
-  for (const Choice& choice : choices_)
+  for (const PlaneCandidate& choice : candidates_)
     if (choice.obstacle == k && same_plane(choice.plane, plane)) return;
   plane.n_W = at.n_W;
-  if (choices_.size() == kMaxChoices) {
-    const auto worst =
-        std::min_element(choices_.begin(), choices_.end(),
-                         [](const Choice& x, const Choice& y) { return x.separation_m < y.separation_m; });
+  if (candidates_.size() == kMaxCandidates) {
+    const auto worst = std::min_element(
+        candidates_.begin(), candidates_.end(),
+        [](const PlaneCandidate& x, const PlaneCandidate& y) { return x.separation_m < y.separation_m; });
     if (worst->separation_m >= at.separation_m) return;
     *worst = {k, plane, at.separation_m};
     return;
   }
-  choices_.push_back({k, plane, at.separation_m});
+  candidates_.push_back({k, plane, at.separation_m});
 }
 
 /// Spheres that are apart are so along the line between their centres.
-void SceneContacts::consider_between_centres(std::uint32_t k, const Frame& X_WT) noexcept {
+void SceneContacts::add_centre_line_candidate(std::uint32_t k, const Frame& X_WT) noexcept {
   const Vector3d apart = X_WT.x_m - scene_.convex()[k].centre_W_m;
-  consider(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, -kInfinity);
+  add_candidate(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, -kInfinity);
 }
 
-void SceneContacts::consider_faces(std::uint32_t k, const Frame& X_WT) noexcept {
+void SceneContacts::add_face_candidates(std::uint32_t k, const Frame& X_WT) noexcept {
   for (const auto& face : scene_.convex()[k].body.faces)
-    consider(k, {ContactKind::vertex_face, face.n}, X_WT, -kInfinity);
+    add_candidate(k, {ContactKind::vertex_face, face.n}, X_WT, -kInfinity);
   for (const auto& face : scene_.tool().hull.faces)
-    consider(k, {ContactKind::face_vertex, Vector3d::UnitZ(), -face.n}, X_WT, -kInfinity);
+    add_candidate(k, {ContactKind::face_vertex, Vector3d::UnitZ(), -face.n}, X_WT, -kInfinity);
 }
 
 /// The common normal of two edges counts where each is the farthest part of its body along it: that is a
 /// facet of the set of all translations that collide. All others are behind one of those.
-void SceneContacts::consider_edge_pair(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
-                                       const ConvexBody::Edge& b, double least_separation_m) noexcept {
+void SceneContacts::add_edge_pair_candidate(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
+                                            const ConvexBody::Edge& b, double least_separation_m) noexcept {
   const Vector3d N = (X_WT.R * a.d).cross(b.d);
   if (!(N.squaredNorm() > kParallel * kParallel)) return;
   for (const double sign : {1.0, -1.0}) {
     const Vector3d n_W = sign * N;
     if (!touches_along(b, n_W) || !touches_along(a, X_WT.R.transpose() * -n_W)) continue;
-    consider(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
+    add_candidate(k, {ContactKind::edge_edge, n_W, a.d, sign * b.d}, X_WT, least_separation_m);
   }
 }
 
-void SceneContacts::consider_edge_pairs(std::uint32_t k, const Frame& X_WT) noexcept {
+void SceneContacts::add_edge_pair_candidates(std::uint32_t k, const Frame& X_WT) noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   if (tool.edges.size() * obstacle.edges.size() > kMaxEdgePairs) return;
   for (const auto& a : tool.edges)
-    for (const auto& b : obstacle.edges) consider_edge_pair(k, X_WT, a, b, -kInfinity);
+    for (const auto& b : obstacle.edges) add_edge_pair_candidate(k, X_WT, a, b, -kInfinity);
 }
 
 // Of two bodies that are apart, the widest gap along any n is a least-distance problem by constraint
 // generation:  min |w|^2  s.t.  w . (p_a - p_b) >= 1 for all pairs,  n = w/|w|, and the gap is 1/|w|.
-void SceneContacts::consider_widest(std::uint32_t k, const Frame& X_WT) noexcept {
+void SceneContacts::add_widest_gap_candidate(std::uint32_t k, const Frame& X_WT) noexcept {
   using Status = LeastDistance<3, 64>::Status;
   constexpr std::size_t kPairs = 64;
   constexpr double kGoodEnough = 0.999;
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const double unit_m = scene_.tool_radius_m();
-  HeldPlane plane = planes_[k];
+  SeparatingPlane plane = planes_[k];
   plane.n_W = normal_of(plane, X_WT).n_W;
   plane.kind = ContactKind::vertex_face;
-  widest_.clear();
+  widest_gap_.clear();
   for (std::size_t pair = 0; pair < kPairs; ++pair) {
-    const Standing at = stand(k, {plane.n_W, false}, X_WT);
-    const double promised_m = widest_.count() == 0 ? kInfinity : unit_m / widest_.z().norm();
+    const PlaneSeparation at = plane_separation(k, {plane.n_W, false}, X_WT);
+    const double promised_m = widest_gap_.count() == 0 ? kInfinity : unit_m / widest_gap_.z().norm();
     if (at.separation_m > 0.0 && at.separation_m >= kGoodEnough * promised_m) break;
     const Vector3d apart =
         X_WT * tool.vertices_T_m[at.nearest.tool_vertex] - obstacle.vertices_T_m[at.nearest.obstacle_vertex];
     if (!(apart.squaredNorm() > 0.0)) return;
-    widest_.add(apart / unit_m, 1.0);
-    if (widest_.solve(Vector3d::Zero(), 1e-12) != Status::optimal) return;  // they overlap
-    plane.n_W = widest_.z().normalized();
+    widest_gap_.add(apart / unit_m, 1.0);
+    if (widest_gap_.solve(Vector3d::Zero(), 1e-12) != Status::optimal) return;  // they overlap
+    plane.n_W = widest_gap_.z().normalized();
   }
-  consider(k, plane, X_WT, 0.0);
+  add_candidate(k, plane, X_WT, 0.0);
 }
 
-void SceneContacts::sort_choices() noexcept {
-  std::sort(choices_.begin(), choices_.end(),
-            [](const Choice& x, const Choice& y) { return x.separation_m > y.separation_m; });
+void SceneContacts::sort_candidates() noexcept {
+  std::sort(candidates_.begin(), candidates_.end(),
+            [](const PlaneCandidate& x, const PlaneCandidate& y) { return x.separation_m > y.separation_m; });
 }
 
-std::size_t SceneContacts::survey(const Pose& pose) noexcept {
+std::size_t SceneContacts::survey_planes(const Pose& pose) noexcept {
   const Frame X_WT(pose);
-  openings_.clear();
+  survey_candidates_.clear();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
-    choices_.clear();
+    candidates_.clear();
     if (out_of_reach(k, X_WT)) {
-      consider_between_centres(k, X_WT);
+      add_centre_line_candidate(k, X_WT);
     } else {
-      consider_faces(k, X_WT);
-      consider_edge_pairs(k, X_WT);
-      consider_widest(k, X_WT);
+      add_face_candidates(k, X_WT);
+      add_edge_pair_candidates(k, X_WT);
+      add_widest_gap_candidate(k, X_WT);
     }
-    if (choices_.empty()) continue;
-    sort_choices();
-    take(0);
-    if (choices_[0].separation_m >= 0.0) continue;  // one plane is enough for what does not overlap
-    const std::size_t room = kMaxOpenings - openings_.size();
-    openings_.insert(openings_.end(), choices_.begin(),
-                     choices_.begin() + static_cast<std::ptrdiff_t>(std::min(room, choices_.size())));
+    if (candidates_.empty()) continue;
+    sort_candidates();
+    hold_alternative(0);
+    if (candidates_[0].separation_m >= 0.0) continue;  // one plane is enough for what does not overlap
+    const std::size_t room = kMaxSurveyPlanes - survey_candidates_.size();
+    survey_candidates_.insert(
+        survey_candidates_.end(), candidates_.begin(),
+        candidates_.begin() + static_cast<std::ptrdiff_t>(std::min(room, candidates_.size())));
   }
-  best_ = planes_;
-  return openings_.size();
+  survey_best_ = planes_;
+  return survey_candidates_.size();
 }
 
-void SceneContacts::open(std::size_t i) noexcept {
-  planes_ = best_;
-  planes_[openings_[i].obstacle] = openings_[i].plane;
+void SceneContacts::hold_survey_plane(std::size_t i) noexcept {
+  planes_ = survey_best_;
+  planes_[survey_candidates_[i].obstacle] = survey_candidates_[i].plane;
 }
 
-void SceneContacts::fix_to_world(const Pose& pose) noexcept {
+void SceneContacts::fix_planes_to_world(const Pose& pose) noexcept {
   const Frame X_WT(pose);
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     planes_[k].n_W = normal_of(planes_[k], X_WT).n_W;
@@ -423,45 +427,46 @@ void SceneContacts::collect_touching(const ConvexBody& body, const Vector3d& nor
 }
 
 /// Planes of the features that touch the plane held, and of the widest gap.
-void SceneContacts::consider_near(std::uint32_t k, const Standing& held, const Frame& X_WT) noexcept {
+void SceneContacts::add_touching_candidates(std::uint32_t k, const PlaneSeparation& held,
+                                            const Frame& X_WT) noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
   const double touching_m = kTouching * scene_.tool_radius_m();
-  collect_touching(tool, X_WT.R.transpose() * -held.n_W, held.nearest.tool_vertex, touching_);
-  collect_touching(obstacle, held.n_W, held.nearest.obstacle_vertex, obstacle_touching_);
-  for (const std::uint32_t v : obstacle_touching_)
+  collect_touching(tool, X_WT.R.transpose() * -held.n_W, held.nearest.tool_vertex, touching_vertices_);
+  collect_touching(obstacle, held.n_W, held.nearest.obstacle_vertex, obstacle_touching_vertices_);
+  for (const std::uint32_t v : obstacle_touching_vertices_)
     for (const std::uint32_t f : obstacle.faces_of(v))
-      consider(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
-  for (const std::uint32_t v : touching_)
+      add_candidate(k, {ContactKind::vertex_face, obstacle.faces[f].n}, X_WT, -touching_m);
+  for (const std::uint32_t v : touching_vertices_)
     for (const std::uint32_t f : tool.faces_of(v))
-      consider(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -touching_m);
-  for (const std::uint32_t v : touching_)
+      add_candidate(k, {ContactKind::face_vertex, held.n_W, -tool.faces[f].n}, X_WT, -touching_m);
+  for (const std::uint32_t v : touching_vertices_)
     for (const std::uint32_t a : tool.edges_of(v))
-      for (const std::uint32_t w : obstacle_touching_)
+      for (const std::uint32_t w : obstacle_touching_vertices_)
         for (const std::uint32_t b : obstacle.edges_of(w))
-          consider_edge_pair(k, X_WT, tool.edges[a], obstacle.edges[b], -touching_m);
-  const bool apart = std::any_of(choices_.begin(), choices_.end(), [&](const Choice& choice) {
+          add_edge_pair_candidate(k, X_WT, tool.edges[a], obstacle.edges[b], -touching_m);
+  const bool apart = std::any_of(candidates_.begin(), candidates_.end(), [&](const PlaneCandidate& choice) {
     return choice.obstacle == k && choice.separation_m > touching_m;
   });
-  if (!apart) consider_widest(k, X_WT);
+  if (!apart) add_widest_gap_candidate(k, X_WT);
 }
 
-std::size_t SceneContacts::find_near_choices(const Pose& pose) noexcept {
+std::size_t SceneContacts::find_alternative_planes(const Pose& pose) noexcept {
   const Frame X_WT(pose);
-  choices_.clear();
+  candidates_.clear();
   const double touching_m = kTouching * scene_.tool_radius_m();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;
-    const Standing held = stand(k, normal_of(planes_[k], X_WT), X_WT);
+    const PlaneSeparation held = plane_separation(k, normal_of(planes_[k], X_WT), X_WT);
     if (held.separation_m > touching_m) continue;
-    consider_near(k, held, X_WT);
-    const auto same = [&](const Choice& choice) {
+    add_touching_candidates(k, held, X_WT);
+    const auto same = [&](const PlaneCandidate& choice) {
       return choice.obstacle == k && same_plane(choice.plane, planes_[k]);
     };
-    choices_.erase(std::remove_if(choices_.begin(), choices_.end(), same), choices_.end());
+    candidates_.erase(std::remove_if(candidates_.begin(), candidates_.end(), same), candidates_.end());
   }
-  sort_choices();
-  return choices_.size();
+  sort_candidates();
+  return candidates_.size();
 }
 
 }  // namespace wrenchd

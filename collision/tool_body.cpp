@@ -37,17 +37,17 @@ ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, double scale, double mass
   for (Vector3d& p : mesh.vertices_m) p *= scale;
   tool.solid = solid_properties(mesh, mass_kg);
   for (Vector3d& p : tool.hull.vertices_T_m) p = p * scale - tool.solid.p_MT_m;
-  tool.hull.find_faces();
+  tool.hull.compute_derived_data();
   for (Vector3d& p : mesh.vertices_m) p -= tool.solid.p_MT_m;
   tool.mesh = std::move(mesh);
   return tool;
 }
 
 ToolBody load_tool(const ToolSettings& settings, MeshLoader& loader) {
-  const auto loaded = loader.load(settings.mesh, BodyKind::solid, settings.made);
+  const auto loaded = loader.load(settings.mesh, BodyKind::solid, settings.generated);
   ToolBody tool = tool_body(loaded->mesh, loader.hull(*loaded), settings.scale, settings.mass_kg);
   require_usable(tool.solid, settings.mesh, settings.scale);
-  loader.look_at_size(*loaded, settings.scale, kToolSize);
+  loader.check_size(*loaded, settings.scale, kPlausibleToolSize);
   return tool;
 }
 

@@ -32,7 +32,7 @@ Feature hull_face(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& 
 }
 
 Feature mesh_edge(const MeshSurface& surface, std::uint32_t edge) noexcept {
-  const auto& [a, b] = surface.edges()[edge].vertices;
+  const auto& [a, b] = surface.convex_edges()[edge].vertices;
   return {FeatureKind::edge, std::min(a, b), std::max(a, b)};
 }
 
@@ -40,8 +40,8 @@ Feature mesh_edge(const MeshSurface& surface, std::uint32_t edge) noexcept {
 /// its edge: then it is there.
 Vector3d point_W(const Contact& contact, FeatureKind tool, FeatureKind obstacle, const Pose& X_WQ) noexcept {
   if (contact.kind != ContactKind::edge_edge) return contact_point_W(contact, X_WQ);
-  if (tool == FeatureKind::hull_vertex) return X_WQ * contact.p_TA_m;
-  if (obstacle == FeatureKind::hull_vertex) return contact.p_WB_m;
+  if (tool == FeatureKind::hull_vertex) return X_WQ * contact.p_TCa_m;
+  if (obstacle == FeatureKind::hull_vertex) return contact.p_WCb_m;
   return contact_point_W(contact, X_WQ);
 }
 
@@ -113,7 +113,7 @@ Touches touches(const Projection& projection, const Scene& scene, bool of_meshes
     order[i] = static_cast<std::uint8_t>(i);
   }
   const auto place = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
-  const std::size_t told = std::min(kMostTouches, active.size());
+  const std::size_t told = std::min(kMaxTouches, active.size());
   std::partial_sort(order.begin(), place(told), place(active.size()), [&](std::uint8_t a, std::uint8_t b) {
     const double difference = active[a].multiplier - active[b].multiplier;
     return difference != 0.0 ? difference > 0.0 : a < b;

@@ -57,8 +57,8 @@ struct Touch {
 };
 
 /// Of many contacts those that carry most are told; an optimum of 6 unknowns has few that carry.
-inline constexpr std::size_t kMostTouches = 16;
-using Touches = FixedList<Touch, kMostTouches>;
+inline constexpr std::size_t kMaxTouches = 16;
+using Touches = StaticVector<Touch, kMaxTouches>;
 
 /// The contacts that hold an answer, those that carry most first. of_meshes: whether contacts with mesh
 /// obstacles number the features of the meshes, as a proxy's do, or those of their hulls. RT safe.

@@ -32,22 +32,22 @@ constexpr double kFarTooMuch = 1e9;
 
 }  // namespace
 
-void EvenWork::learn(std::uint32_t looks, double list, bool late) noexcept {
-  lateness_ = late ? std::min(lateness_ + 1.0, kMostLate) : kForgotten * lateness_;
+void WorkBalancer::update(std::uint32_t looks, double list, bool late) noexcept {
+  recent_deferrals_ = late ? std::min(recent_deferrals_ + 1.0, kMostLate) : kForgotten * recent_deferrals_;
   if (list == 0.0 && late) return;  // it has not begun
-  ++learned_;
-  looks_ += std::max(kNewest, 1.0 / learned_) * (looks - looks_);
-  list_ += std::max(kNewestList, 1.0 / learned_) * (list - list_);
+  ++ticks_;
+  sweep_visits_ += std::max(kNewest, 1.0 / ticks_) * (looks - sweep_visits_);
+  list_visits_ += std::max(kNewestList, 1.0 / ticks_) * (list - list_visits_);
 }
 
-double EvenWork::even() const noexcept {
-  return kEvenLooks * looks_ + kEvenLists * list_;
+double WorkBalancer::target_visits() const noexcept {
+  return kEvenLooks * sweep_visits_ + kEvenLists * list_visits_;
 }
 
-std::uint32_t EvenWork::most(double haste) const noexcept {
-  const double least = learned_ > 0.0 ? kAlways : kAtFirst;
-  const double more = 1.0 + kAfterLate * std::max(lateness_ - kFewLate, 0.0);
-  const double most = std::max(kMost * even(), least) * more * haste;
+std::uint32_t WorkBalancer::max_visits(double haste) const noexcept {
+  const double least = ticks_ > 0.0 ? kAlways : kAtFirst;
+  const double more = 1.0 + kAfterLate * std::max(recent_deferrals_ - kFewLate, 0.0);
+  const double most = std::max(kMost * target_visits(), least) * more * haste;
   return static_cast<std::uint32_t>(std::min(most, kFarTooMuch));
 }
 

@@ -234,7 +234,7 @@ std::string to_text(const Calibration& calibration) {
   return text + checksum_line(text);
 }
 
-Calibration calibration_of(const std::string& text, const fs::path& file) {
+Calibration parse_calibration(const std::string& text, const fs::path& file) {
   require_title(text, file);
   require_checksum(text, file);
   Calibration calibration;
@@ -249,7 +249,7 @@ std::optional<Calibration> CalibrationStore::read(const std::string& profile,
   const fs::path file = file_of(profile, serial);
   const auto text = content_of(file);
   if (!text) return {};
-  Calibration calibration = calibration_of(*text, file);
+  Calibration calibration = parse_calibration(*text, file);
   if (calibration.profile != encoded(profile) || calibration.serial != encoded(serial))
     throw ConfigError(file, {},
                       "is of device '" + printable(calibration.serial) + "' with profile '" +

@@ -56,6 +56,6 @@ class CalibrationStore {
 /// The text of a calibration's file, and back. `file` is for messages. Profile and serial number come back as
 /// the file has them, as in its name (file_of). The second throws ConfigError.
 std::string to_text(const Calibration& calibration);
-Calibration calibration_of(const std::string& text, const std::filesystem::path& file);
+Calibration parse_calibration(const std::string& text, const std::filesystem::path& file);
 
 }  // namespace wrenchd

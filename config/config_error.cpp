@@ -18,17 +18,17 @@ std::string to_lines(const std::vector<Refusal>& refusals) {
 }
 
 bool earlier(const Refusal& a, const Refusal& b) {
-  const bool a_inherited = a.place.file != nullptr, b_inherited = b.place.file != nullptr;
-  return std::tie(a_inherited, a.place.line, a.place.column) <
-         std::tie(b_inherited, b.place.line, b.place.column);
+  const bool a_inherited = a.location.file != nullptr, b_inherited = b.location.file != nullptr;
+  return std::tie(a_inherited, a.location.line, a.location.column) <
+         std::tie(b_inherited, b.location.line, b.location.column);
 }
 
 }  // namespace
 
 std::string to_text(const Refusal& refusal) {
   std::string where = refusal.file.string();
-  if (refusal.place.line > 0) {
-    where += ':' + std::to_string(refusal.place.line) + ':' + std::to_string(refusal.place.column);
+  if (refusal.location.line > 0) {
+    where += ':' + std::to_string(refusal.location.line) + ':' + std::to_string(refusal.location.column);
   }
   return where + ": " + refusal.message;
 }
@@ -43,10 +43,10 @@ std::string printable(std::string text, std::size_t longest) {
 ConfigError::ConfigError(std::vector<Refusal> refusals)
     : std::runtime_error(to_lines(refusals)), refusals_(std::move(refusals)) {}
 
-ConfigError::ConfigError(std::filesystem::path file, Place place, std::string message)
+ConfigError::ConfigError(std::filesystem::path file, SourceLocation place, std::string message)
     : ConfigError(std::vector<Refusal>{{std::move(file), place, std::move(message)}}) {}
 
-void RefusalList::add(Place place, std::string message) {
+void RefusalList::add(SourceLocation place, std::string message) {
   const std::filesystem::path& file = place.file ? *place.file : file_;
   refusals_.push_back({file, std::move(place), std::move(message)});
 }

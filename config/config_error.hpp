@@ -10,7 +10,7 @@
 namespace wrenchd {
 
 /// Line and column in a file, both from 1. Line 0: the file as a whole.
-struct Place {
+struct SourceLocation {
   unsigned line = 0;
   unsigned column = 0;
   std::shared_ptr<const std::filesystem::path> file =
@@ -20,7 +20,7 @@ struct Place {
 /// One thing wrong with a file: where, what was expected, what was found, and the cure.
 struct Refusal {
   std::filesystem::path file;
-  Place place;
+  SourceLocation location;
   std::string message;
 };
 
@@ -34,7 +34,7 @@ std::string printable(std::string text, std::size_t longest = 60);
 class ConfigError : public std::runtime_error {
  public:
   explicit ConfigError(std::vector<Refusal> refusals);
-  ConfigError(std::filesystem::path file, Place place, std::string message);
+  ConfigError(std::filesystem::path file, SourceLocation place, std::string message);
 
   const std::vector<Refusal>& refusals() const noexcept { return refusals_; }
 
@@ -47,7 +47,7 @@ class RefusalList {
  public:
   explicit RefusalList(std::filesystem::path file) : file_(std::move(file)) {}
 
-  void add(Place place, std::string message);
+  void add(SourceLocation place, std::string message);
   void throw_if_any();
 
  private:

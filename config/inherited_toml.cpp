@@ -21,12 +21,12 @@ TomlEntry* find(TomlNode::Table& table, const std::string& key) {
 
 /// Writes the file into every place of a tree.
 void sign(TomlNode& node, const std::shared_ptr<const fs::path>& file) {
-  node.place.file = file;
+  node.location.file = file;
   if (auto* array = std::get_if<TomlNode::Array>(&node.value))
     for (TomlNode& element : *array) sign(element, file);
   if (auto* table = std::get_if<TomlNode::Table>(&node.value)) {
     for (TomlEntry& entry : *table) {
-      entry.place.file = file;
+      entry.location.file = file;
       sign(entry.node, file);
     }
   }
@@ -60,7 +60,7 @@ std::vector<fs::path> candidates(const std::string& name, const fs::path& named_
   return places;
 }
 
-fs::path parent_of(const std::string& name, const Place& place, const std::vector<fs::path>& chain,
+fs::path parent_of(const std::string& name, const SourceLocation& place, const std::vector<fs::path>& chain,
                    const SearchPath& search) {
   bool only_in_chain = false;
   std::string looked_for;
@@ -95,7 +95,7 @@ TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vec
     TomlEntry* entry = find(table, kKey);
     if (!entry) break;
     const auto* name = std::get_if<std::string>(&entry->node.value);
-    Place place = entry->node.place;
+    SourceLocation place = entry->node.location;
     place.file = nullptr;
     if (!name || name->empty() || name->find('\0') != std::string::npos) {
       throw ConfigError(chain.back(), place,

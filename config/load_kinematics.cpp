@@ -22,15 +22,15 @@ void read_slots(const TomlValue& value, Kinematics& k) {
     if (static_cast<double>(slot) != slots[i] || taken[slot])
       return value.refuse("must name each integer of joints once, from 0 to " + std::to_string(k.joints - 1));
     taken[slot] = true;
-    k.slot[i] = slot;
+    k.report_index[i] = slot;
   }
 }
 
 void read_count_button(TomlTable& table, Kinematics& k) {
   Kinematics::CountButton& b = k.count_button;
-  b.present = table.mandatory("slot").integer(b.slot, {0, static_cast<double>(k.joints - 1)});
-  b.present = table.mandatory("above").number(b.above, kCounts) && b.present;
-  b.present = table.mandatory("minus").number(b.minus, kCounts) && b.present;
+  b.present = table.mandatory("slot").integer(b.report_index, {0, static_cast<double>(k.joints - 1)});
+  b.present = table.mandatory("above").number(b.threshold_counts, kCounts) && b.present;
+  b.present = table.mandatory("minus").number(b.offset_counts, kCounts) && b.present;
   table.optional("button").integer(b.button, {0, 31});
 }
 

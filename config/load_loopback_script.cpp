@@ -15,16 +15,16 @@ constexpr Range kTime_s{0, 86400};
 /// The largest `value` of a kind, and the smallest; nothing where it has none.
 Range value_range(Kind kind) {
   switch (kind) {
-    case Kind::lose:
+    case Kind::drop_reports:
       return {1, 1000};
-    case Kind::late:
+    case Kind::delay_reports:
       return {1e-4, 1};
-    case Kind::teleport:
-    case Kind::shake:
+    case Kind::jump:
+    case Kind::vibrate:
       return {1e-6, 10};
-    case Kind::run_away:
+    case Kind::drift:
       return {1e-3, 100};
-    case Kind::press:
+    case Kind::press_button:
       return {0, 31};
     default:
       return {0, 0};
@@ -41,24 +41,24 @@ void read_fault(TomlTable& table, LoopbackScript& script) {
                                               {"freeze", Kind::freeze},
                                               {"repeat", Kind::repeat},
                                               {"swap", Kind::swap},
-                                              {"lose", Kind::lose},
-                                              {"late", Kind::late},
-                                              {"garble", Kind::garble},
+                                              {"lose", Kind::drop_reports},
+                                              {"late", Kind::delay_reports},
+                                              {"garble", Kind::corrupt},
                                               {"short_report", Kind::short_report},
                                               {"long_report", Kind::long_report},
                                               {"wrong_id", Kind::wrong_id},
-                                              {"deaf", Kind::deaf},
-                                              {"swallow", Kind::swallow},
+                                              {"deaf", Kind::refuse_commands},
+                                              {"swallow", Kind::drop_commands},
                                               {"stall", Kind::stall},
                                               {"bad_quaternion", Kind::bad_quaternion},
-                                              {"teleport", Kind::teleport},
-                                              {"run_away", Kind::run_away},
-                                              {"shake", Kind::shake},
-                                              {"stick", Kind::stick},
-                                              {"press", Kind::press},
-                                              {"trip", Kind::trip},
-                                              {"sleepy", Kind::sleepy},
-                                              {"dead_motors", Kind::dead_motors}});
+                                              {"teleport", Kind::jump},
+                                              {"run_away", Kind::drift},
+                                              {"shake", Kind::vibrate},
+                                              {"stick", Kind::freeze_pose},
+                                              {"press", Kind::press_button},
+                                              {"trip", Kind::trip_watchdog},
+                                              {"sleepy", Kind::disable_watchdog},
+                                              {"dead_motors", Kind::motors_off}});
   const TomlValue value = table.optional("value");
   const Range range = value_range(fault.kind);
   if (value && !(range.max > range.min))
@@ -76,9 +76,9 @@ void read_command(TomlTable& table, LoopbackScript& script) {
   table.mandatory("at_s").number(at_s, kTime_s);
   table.mandatory("what").choice(command.commands, {{"arm", CommandSet{kArm}},
                                                     {"arm_with_lease", CommandSet{kArm | kLease}},
-                                                    {"live", CommandSet{kBeat}},
+                                                    {"live", CommandSet{kHeartbeat}},
                                                     {"disarm", CommandSet{kDisarm}},
-                                                    {"start_over", CommandSet{kStartOver}},
+                                                    {"start_over", CommandSet{kReinitialize}},
                                                     {"stop", CommandSet{kStop}},
                                                     {"acknowledge", CommandSet{kAcknowledge}},
                                                     {"quit", CommandSet{kQuit}}});

@@ -66,8 +66,9 @@ void read_motor_heat(TomlTable& table, DeviceProfile& p, const Shape& shape) {
                                       ? "needs continuous_force_N, continuous_torque_Nm and "
                                         "thermal_time_s; state all three, or none"
                                       : "needs continuous_force_N and thermal_time_s; state both, or none");
-  read_rating(force, p.continuous_force_N, {0.01, kHighestForce_N}, p.max_force_N);
-  if (shape.torque) read_rating(torque, p.continuous_torque_Nm, {0.001, kHighestTorque_Nm}, p.max_torque_Nm);
+  read_rating(force, p.continuous_force_N, {0.01, kAbsoluteMaxForce_N}, p.max_force_N);
+  if (shape.torque)
+    read_rating(torque, p.continuous_torque_Nm, {0.001, kAbsoluteMaxTorque_Nm}, p.max_torque_Nm);
   time.number(p.thermal_time_s, {0.1, 10000});
 }
 
@@ -93,11 +94,11 @@ void read_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
   const TomlValue force = shape.output ? table.mandatory("max_force_N") : table.optional("max_force_N");
   const TomlValue torque = shape.torque ? table.mandatory("max_torque_Nm") : table.optional("max_torque_Nm");
   if (shape.output)
-    force.number(p.max_force_N, {0.01, kHighestForce_N});
+    force.number(p.max_force_N, {0.01, kAbsoluteMaxForce_N});
   else if (force)
     force.refuse("the device takes no force: there is no wrench_report; leave it out");
   if (shape.torque)
-    torque.number(p.max_torque_Nm, {0.001, kHighestTorque_Nm});
+    torque.number(p.max_torque_Nm, {0.001, kAbsoluteMaxTorque_Nm});
   else if (torque)
     torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
   if (!shape.output) p.max_force_N = 0.0;
@@ -312,7 +313,7 @@ void read_reach(TomlTable& table, Deflection& d) {
     (is_stated(least) ? least : most)
         .refuse("is one of two corners: state box_min_m and box_max_m, or neither");
   if (!is_stated(least) || !is_stated(most)) return;
-  if (!is_stated(reach)) d.reach_m = Deflection::kEndless;
+  if (!is_stated(reach)) d.reach_m = Deflection::kUnbounded;
   if (!least.vector(d.box_min_m, {-10, 10}) || !most.vector(d.box_max_m, {-10, 10})) return;
   if (d.box_min_m.maxCoeff() > 0.0)
     least.refuse("the pose begins at 0, inside of the box; no number may be above 0");
@@ -338,13 +339,13 @@ void read_steering(TomlTable& table, Deflection& d) {
       value.number(out, range);
     }
   };
-  read(full_m, d.full_m, {1e-5, 1}, true);
-  read(full_rad, d.full_rad, {1e-4, 3.2}, true);
+  read(full_m, d.full_deflection_m, {1e-5, 1}, true);
+  read(full_rad, d.full_deflection_rad, {1e-4, 3.2}, true);
   read(dead_zone, d.dead_zone, {0, 0.9}, true);
-  read(curve, d.curve, {1, 5}, true);
-  read(slow, d.slow, {0.01, 1}, false);
-  read(leash_m, d.leash_m, {1e-4, 0.5}, true);
-  read(leash_rad, d.leash_rad, {1e-3, 3.1}, true);
+  read(curve, d.response_exponent, {1, 5}, true);
+  read(slow, d.slow_factor, {0.01, 1}, false);
+  read(leash_m, d.max_proxy_distance_m, {1e-4, 0.5}, true);
+  read(leash_rad, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
   if (is_stated(leash_m) == is_stated(leash_rad)) return;
   (is_stated(leash_m) ? leash_m : leash_rad).refuse("is one of two: state leash_m and leash_rad, or neither");
 }
@@ -363,9 +364,9 @@ void read_deflection(TomlTable& table, DeviceProfile& p) {
 void read_homing(TomlTable& table, DeviceProfile& p) {
   HomingPlan& plan = p.homing;
   table.optional("reference")
-      .choice(plan.reference, {{"never", ReferenceUse::never},
-                               {"once", ReferenceUse::once},
-                               {"each_start", ReferenceUse::each_start}});
+      .choice(plan.reference, {{"never", ReferenceSchedule::never},
+                               {"once", ReferenceSchedule::once},
+                               {"each_start", ReferenceSchedule::each_start}});
   table.optional("check_axes").boolean(p.check_axes);
   const TomlValue position = table.optional("rest_position_m");
   const TomlValue rotation = table.optional("rest_rotation_vector_rad");
@@ -373,8 +374,8 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   position.vector(plan.X_BR.translation_m, {-2, 2});
   Vector3d turn = Vector3d::Zero();
   if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);
-  table.optional("most_offset_m").number(plan.most_offset_m, {0, 2});
-  table.optional("most_offset_rad").number(plan.most_offset_rad, {0, 4});
+  table.optional("most_offset_m").number(plan.max_offset_m, {0, 2});
+  table.optional("most_offset_rad").number(plan.max_offset_rad, {0, 4});
   table.optional("confirm_buttons").integer(plan.confirm_buttons, {0, 4294967295.0});
   table.optional("travel_m").number(plan.travel_m, {0.001, 0.5});
   table.optional("travel_rad").number(plan.travel_rad, {0.01, 1.5});
@@ -386,13 +387,13 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
     most.refuse("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
                 ", along each axis; along one it is " + to_text(least));
   const TomlValue turns = table.optional("max_turn_rad");
-  turns.number(plan.max_turn_rad, {0.01, 4});
-  if (plan.max_turn_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
+  turns.number(plan.max_rotation_rad, {0.01, 4});
+  if (plan.max_rotation_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
 }
 
 void read_masses(TomlTable& table, MovingMasses& masses) {
   table.optional("handle_kg").number(masses.handle_kg, {0, 20});
-  table.optional("handle_centre_m").vector(masses.p_HC_m, {-0.5, 0.5});
+  table.optional("handle_centre_m").vector(masses.p_HHcm_m, {-0.5, 0.5});
   table.optional("carried_kg").number(masses.carried_kg, {0, 20});
 }
 
@@ -429,8 +430,8 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
                                              {"silent_at_rest", StreamStyle::silent_at_rest}});
   const TomlValue wrench_report = table.mandatory("wrench_report");
   const Shape shape = {!wrench_report.is_text("none"),
-                       !wrench_report.is_text("none") && !wrench_report.holds("efforts") &&
-                           (!wrench_report.is_table() || !wrench_report.says_none("torque"))};
+                       !wrench_report.is_text("none") && !wrench_report.has("efforts") &&
+                           (!wrench_report.is_table() || !wrench_report.is_none("torque"))};
   p.has_output = shape.output;
   const TomlValue watchdog = shape.output ? table.mandatory("watchdog_s") : table.optional("watchdog_s");
   if (!shape.output && watchdog)
@@ -474,8 +475,8 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   if (keep_alive && p.stream == StreamStyle::lock_step)
     keep_alive.refuse("a lock-step device is spoken to all the time; leave it out");
   table.optional("buttons").table(read_buttons, p);
-  check_pose_parts(pose_report, p);
-  check_told_apart(pose_report, more_reports, p);
+  check_pose_complete(pose_report, p);
+  check_distinguishable(pose_report, more_reports, p);
 }
 
 }  // namespace

@@ -166,7 +166,7 @@ class FrameReader {
                                       {"none", Checksum::none}});
     const std::size_t length = length_good ? layout.length : kMaxReportBytes;
     const TomlValue least = table.optional("least_length");
-    if (least.integer(layout.least_length, {shortest, static_cast<double>(length)}) &&
+    if (least.integer(layout.min_length, {shortest, static_cast<double>(length)}) &&
         layout.checksum != Checksum::none)
       least.refuse("a report with a checksum is never short; leave one of the two out");
     end_bit_ = 8 * length;
@@ -314,7 +314,7 @@ void read_parts(TomlTable& table, FrameReader& frame, PoseReportLayout& r, const
 constexpr double kUnitQuaternion = 0.999;  // i16 with a step rounded down from 1/32767 ends just below one
 
 std::size_t least_length(const ReportFrame& frame) {
-  return frame.least_length == 0 ? frame.length : frame.least_length;
+  return frame.min_length == 0 ? frame.length : frame.min_length;
 }
 
 bool told_apart(const ReportFrame& a, const ReportFrame& b) {
@@ -326,7 +326,7 @@ bool told_apart(const ReportFrame& a, const ReportFrame& b) {
 
 void read_pose_report(TomlTable& table, DeviceProfile& profile, const TomlValue& value) {
   PoseReportLayout& r = profile.pose_report;
-  const bool whole = !value.holds("joints") && !value.holds("translation") && !value.holds("rotation");
+  const bool whole = !value.has("joints") && !value.has("translation") && !value.has("rotation");
   const auto key = [&](std::string_view name) {
     return whole ? table.mandatory(name) : table.optional(name);
   };
@@ -353,7 +353,7 @@ void read_more_report(TomlTable& table, PoseReportLayout& r, const DeviceProfile
 
 void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValue& value) {
   WrenchReportLayout& r = profile.wrench_report;
-  const bool whole = !value.holds("efforts");
+  const bool whole = !value.has("efforts");
   const auto key = [&](std::string_view name) {
     return whole ? table.mandatory(name) : table.optional(name);
   };
@@ -380,7 +380,7 @@ void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValu
   }
 }
 
-void check_pose_parts(const TomlValue& pose_report, const DeviceProfile& profile) {
+void check_pose_complete(const TomlValue& pose_report, const DeviceProfile& profile) {
   std::vector<const PoseReportLayout*> layouts = {&profile.pose_report};
   for (const PoseReportLayout& layout : profile.more_reports) layouts.push_back(&layout);
   const auto any = [&](ReportField PoseReportLayout::*field) {
@@ -404,8 +404,8 @@ void check_pose_parts(const TomlValue& pose_report, const DeviceProfile& profile
     pose_report.refuse("[deflection] needs a translation or rotation in a report, or must be left out");
 }
 
-void check_told_apart(const TomlValue& pose_report, const TomlValue& more_reports,
-                      const DeviceProfile& profile) {
+void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_reports,
+                           const DeviceProfile& profile) {
   const auto elements = more_reports.is_array() ? more_reports.elements("") : std::vector<TomlValue>{};
   std::vector<const PoseReportLayout*> layouts = {&profile.pose_report};
   for (const PoseReportLayout& layout : profile.more_reports) layouts.push_back(&layout);

@@ -18,9 +18,9 @@ void read_more_report(TomlTable& table, PoseReportLayout& layout, const DevicePr
 void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValue& value);
 
 /// Whether the reports make a pose together.
-void check_pose_parts(const TomlValue& pose_report, const DeviceProfile& profile);
+void check_pose_complete(const TomlValue& pose_report, const DeviceProfile& profile);
 /// Whether a report shows by its id or length which it is.
-void check_told_apart(const TomlValue& pose_report, const TomlValue& more_reports,
-                      const DeviceProfile& profile);
+void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_reports,
+                           const DeviceProfile& profile);
 
 }  // namespace wrenchd

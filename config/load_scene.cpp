@@ -24,7 +24,7 @@ constexpr Range kTurnBack = {0.0, 86400.0};
 /// Shorter than this a normal is a slip of the keyboard rather than a direction.
 constexpr double kMinNormal = 1e-9;
 
-void read_kind(const TomlValue& value, MadeMesh& made) {
+void read_kind(const TomlValue& value, GeneratedMesh& made) {
   if (!value.text(made.kind)) return;
   std::vector<KnownKey> known;
   for (const MeshKind& kind : mesh_kinds()) known.push_back({kind.name, ""});
@@ -37,11 +37,11 @@ void read_kind(const TomlValue& value, MadeMesh& made) {
                (nearest.name.empty() ? "there are " + all : nearest.advice));
 }
 
-void read_made(TomlTable& table, MadeMesh& made) {
+void read_made(TomlTable& table, GeneratedMesh& made) {
   read_kind(table.mandatory("make"), made);
   table.optional("triangles")
-      .integer(made.triangles,
-               {static_cast<double>(MadeMesh::kFewest), static_cast<double>(MadeMesh::kMost)});
+      .integer(made.triangles, {static_cast<double>(GeneratedMesh::kMinTriangles),
+                                static_cast<double>(GeneratedMesh::kMaxTriangles)});
   const TomlValue seed = table.optional("seed");
   seed.integer(made.seed, {0, 4294967295.0});
   if (seed && made.kind != "bumpy" && made.kind != "boulder")
@@ -54,10 +54,10 @@ void read_made(TomlTable& table, MadeMesh& made) {
 
 /// A file, or what is to be made instead of one.
 void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
-               std::optional<MadeMesh>& made) {
+               std::optional<GeneratedMesh>& made) {
   if (value.is_table()) {
     value.table(read_made, made.emplace());
-    mesh = name_of(*made);
+    mesh = generated_mesh_name(*made);
     return;
   }
   if (!value.path(mesh)) return;
@@ -72,7 +72,7 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
 
 /// The mass may stand in [tool] or at the top of the file.
 void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
-  read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.made);
+  read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.generated);
   table.optional("scale", "m").number(scene.tool.scale, kScale);
   const TomlValue mass = table.optional("mass", "kg");
   mass.number(scene.tool.mass_kg, kMass);
@@ -114,7 +114,7 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
       read_velocity(keys.velocity, ObstacleMotion::kMaxSpeed_m_per_s, motion.linear_m_per_s);
   const bool angular_is_good = read_velocity(
       keys.angular_velocity, ObstacleMotion::kMaxAngularSpeed_rad_per_s, motion.angular_rad_per_s);
-  const bool turns_back = keys.turn_back_after.number(motion.turn_back_s, kTurnBack);
+  const bool turns_back = keys.turn_back_after.number(motion.reverse_after_s, kTurnBack);
   if (turns_back && linear_is_good && angular_is_good && !motion.moves())
     keys.turn_back_after.refuse(
         "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s, or leave this "
@@ -125,7 +125,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
                         const std::string& name) {
   MeshObstacleSettings obstacle;
   obstacle.name = name;
-  read_mesh(mesh, scene, obstacle.mesh, obstacle.made);
+  read_mesh(mesh, scene, obstacle.mesh, obstacle.generated);
   keys.scale.number(obstacle.scale, kScale);
   keys.position.vector(obstacle.X_WM.translation_m, kAny);
   Vector3d rotation_vector_rad = Vector3d::Zero();

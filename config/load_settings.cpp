@@ -33,7 +33,7 @@ void read_file_name(const TomlValue& value, const Lookup& lookup, fs::path& name
   if (value.path(name) || !value) find_file(value, lookup, name);
 }
 
-void read_placement(TomlTable& table, PlacementSettings& placement) {
+void read_placement(TomlTable& table, PoseSettings& placement) {
   table.optional("position_m").vector(placement.position_m, {-10, 10});
   table.optional("rotation_vector_rad").vector(placement.rotation_vector_rad, {-10, 10});
 }
@@ -65,7 +65,7 @@ void read_servo(TomlTable& table, ServoSettings& servo) {
 
 /// One coefficient alone stands for both.
 void read_friction(TomlTable& table, FrictionSettings& friction) {
-  constexpr Range kCoefficient = {0, FrictionSettings::kLargest};
+  constexpr Range kCoefficient = {0, FrictionSettings::kMaxCoefficient};
   const TomlValue dynamic = table.optional("dynamic");
   const bool has_static = table.optional("static").number(friction.static_coefficient, kCoefficient);
   const bool has_dynamic = dynamic.number(friction.dynamic_coefficient, kCoefficient);
@@ -84,7 +84,7 @@ void read_rendering(TomlTable& table, RenderingSettings& rendering) {
   table.optional("planes").integer(rendering.planes, {1, 1000});
   const TomlValue friction = table.optional("friction");
   friction.table(read_friction, rendering.friction);
-  if (rendering.friction.any() && rendering.method != Method::exact)
+  if (rendering.friction.enabled() && rendering.method != Method::exact)
     friction.refuse("only method = \"exact\" knows friction; choose it, or leave friction out");
 }
 

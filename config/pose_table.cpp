@@ -136,15 +136,15 @@ void check_step(Reader& reader, std::size_t line, const TimedPose& from, const T
     reader.refuse(line, 1,
                   "time_s is " + to_text(to.time_s) + ", and " + to_text(from.time_s) +
                       " in the line before; times must rise: sort the lines, and leave out repeated ones");
-  else if (h_s > kLongestGap_s)
+  else if (h_s > kMaxTableGap_s)
     reader.refuse(line, 1,
-                  "a gap of " + to_text(h_s) + " s; give a pose at least every " + to_text(kLongestGap_s) +
+                  "a gap of " + to_text(h_s) + " s; give a pose at least every " + to_text(kMaxTableGap_s) +
                       " s, or write a hand script, which is made for far waypoints");
-  else if (way_m > kFastest_m_per_s * h_s)
+  else if (way_m > kMaxTableSpeed_m_per_s * h_s)
     reader.refuse(line, 1,
                   "a jump of " + to_text(way_m) + " m in " + to_text(h_s) +
                       " s, which no hand makes; give metres and seconds");
-  else if (turn_rad > kFarthestTurn_rad)
+  else if (turn_rad > kMaxTableRotation_rad)
     reader.refuse(line, 1,
                   "a turn of " + to_text(turn_rad) +
                       " rad in one step; give poses between, so that it is "

@@ -23,12 +23,13 @@ class PoseTableError : public std::runtime_error {
 std::vector<Pose> read_poses(std::istream& in, const std::string& name);
 
 /// The same with a time in front: the header `time_s,px,py,pz,qx,qy,qz,qw`. Times rise strictly; they come
-/// back as counted from the first. Refused too: a gap in time of more than kLongestGap_s, a jump that no hand
-/// makes (faster than kFastest_m_per_s), a turn of more than kFarthestTurn_rad, and a table without poses.
+/// back as counted from the first. Refused too: a gap in time of more than kMaxTableGap_s, a jump that no
+/// hand makes (faster than kFastest_m_per_s), a turn of more than kFarthestTurn_rad, and a table without
+/// poses.
 std::vector<TimedPose> read_timed_poses(std::istream& in, const std::string& name);
 
-inline constexpr double kLongestGap_s = 1.0;
-inline constexpr double kFastest_m_per_s = 10.0;
-inline constexpr double kFarthestTurn_rad = 2.0;  ///< farther could be meant either way round
+inline constexpr double kMaxTableGap_s = 1.0;
+inline constexpr double kMaxTableSpeed_m_per_s = 10.0;
+inline constexpr double kMaxTableRotation_rad = 2.0;  ///< farther could be meant either way round
 
 }  // namespace wrenchd

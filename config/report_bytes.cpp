@@ -25,8 +25,8 @@ bool parts(char c) {
 ReportBytes parse_bytes(std::string_view text) {
   ReportBytes parsed;
   const auto refuse = [&](std::size_t at, std::string_view problem) {
-    parsed.wrong_at = at;
-    parsed.problem = problem;
+    parsed.error_index = at;
+    parsed.error = problem;
     return parsed;
   };
   for (std::size_t i = 0; i < text.size();) {
@@ -48,8 +48,8 @@ bool read_bytes(const TomlValue& value, std::vector<std::uint8_t>& out) {
   std::string text;
   if (!value.text(text)) return false;
   const ReportBytes parsed = parse_bytes(text);
-  if (!parsed.problem.empty()) {
-    value.refuse("character " + std::to_string(parsed.wrong_at + 1) + " " + std::string(parsed.problem) +
+  if (!parsed.error.empty()) {
+    value.refuse("character " + std::to_string(parsed.error_index + 1) + " " + std::string(parsed.error) +
                  "; write bytes as in \"04 00\"");
     return false;
   }

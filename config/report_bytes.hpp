@@ -13,8 +13,8 @@ namespace wrenchd {
 /// Bytes as people write them, and what is wrong with them.
 struct ReportBytes {
   std::vector<std::uint8_t> bytes;
-  std::size_t wrong_at = 0;  ///< which byte of the text cannot be read, from 0
-  std::string_view problem;  ///< empty: none
+  std::size_t error_index = 0;  ///< which byte of the text cannot be read, from 0
+  std::string_view error;       ///< empty: none
 };
 
 /// "01 a0 FF", "01a0ff", "0x01,0xa0": pairs of hexadecimal digits, parted by nothing, blanks, commas or

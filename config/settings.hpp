@@ -55,7 +55,7 @@ struct WrenchSettings {
 };
 
 /// Where a frame stands in another, as config files give it.
-struct PlacementSettings {
+struct PoseSettings {
   Vector3d position_m = Vector3d::Zero();
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
 };
@@ -68,8 +68,8 @@ struct DeviceSettings {
   std::string profile = "loopback";    ///< name of a profile file, without .toml; or a file, with it
   std::filesystem::path profile_file;  ///< where the profile was found; empty for kAnyProfile
   std::string serial;                  ///< of the device, where there are several equal ones; empty: any
-  PlacementSettings base_in_world;     ///< X_WB
-  PlacementSettings tool_in_handle;    ///< X_HM: mesh frame of the tool in the handle frame
+  PoseSettings base_in_world;          ///< X_WB
+  PoseSettings tool_in_handle;         ///< X_HM: mesh frame of the tool in the handle frame
 };
 
 /// [recording]

@@ -65,7 +65,7 @@ void refuse_many_dots(const fs::path& file, std::string_view text) {
   }
 }
 
-Place to_place(const toml::source_region& source) {
+SourceLocation to_place(const toml::source_region& source) {
   return {source.begin.line, source.begin.column};
 }
 
@@ -96,7 +96,7 @@ TomlNode::Value convert_value(const fs::path& file, const toml::node& node, int 
 }
 
 TomlNode convert(const fs::path& file, const toml::node& node, int depth) {
-  const Place place = to_place(node.source());
+  const SourceLocation place = to_place(node.source());
   if (depth > kMaxDepth) {
     throw ConfigError(file, place, "is nested more than " + std::to_string(kMaxDepth) + " deep; flatten it");
   }

@@ -20,14 +20,14 @@ struct TomlNode {
   /// std::monostate stands for a date or a time, which no file of ours asks for.
   using Value = std::variant<std::monostate, bool, std::int64_t, double, std::string, Array, Table>;
 
-  Place place;
+  SourceLocation location;
   Value value;
 };
 
 /// One `key = value`; the place is the key's, the value has its own.
 struct TomlEntry {
   std::string key;
-  Place place;
+  SourceLocation location;
   TomlNode node;
 };
 

@@ -44,14 +44,14 @@ bool TomlValue::is_text(std::string_view text) const noexcept {
   return s && *s == text;
 }
 
-bool TomlValue::holds(std::string_view key) const noexcept {
+bool TomlValue::has(std::string_view key) const noexcept {
   const auto* table = node_ ? std::get_if<TomlNode::Table>(&node_->value) : nullptr;
   if (!table) return false;
   const auto has_key = [&](const TomlEntry& entry) { return entry.key == key; };
-  return std::any_of(table->begin(), table->end(), has_key) && !says_none(key);
+  return std::any_of(table->begin(), table->end(), has_key) && !is_none(key);
 }
 
-bool TomlValue::says_none(std::string_view key) const noexcept {
+bool TomlValue::is_none(std::string_view key) const noexcept {
   const auto* table = node_ ? std::get_if<TomlNode::Table>(&node_->value) : nullptr;
   if (!table) return false;
   return std::any_of(table->begin(), table->end(), [&](const TomlEntry& entry) {
@@ -147,13 +147,13 @@ std::vector<TomlValue> TomlValue::elements(std::string_view expected) const {
   if (!array) refuse_found(std::string(expected));
   for (std::size_t i = 0; array && i < array->size(); ++i) {
     const TomlNode& node = (*array)[i];
-    values.emplace_back(*refusals_, &node, node.place, name_ + "[" + std::to_string(i) + "]", unit_);
+    values.emplace_back(*refusals_, &node, node.location, name_ + "[" + std::to_string(i) + "]", unit_);
   }
   return values;
 }
 
 void TomlValue::refuse(const std::string& message) const {
-  refusals_->add(place_, "key '" + name_ + "': " + message);
+  refusals_->add(location_, "key '" + name_ + "': " + message);
 }
 
 bool TomlValue::refuse_found(const std::string& expected) const {
@@ -164,7 +164,7 @@ bool TomlValue::refuse_found(const std::string& expected) const {
 TomlValue TomlTable::optional(std::string_view key, std::string_view unit) {
   known_.push_back({std::string(key), std::string(unit.empty() ? unit_of(key) : unit)});
   const TomlEntry* entry = find(key);
-  const Place place = entry ? entry->node.place : node_.place;
+  const SourceLocation place = entry ? entry->node.location : node_.location;
   return {refusals_, entry ? &entry->node : nullptr, place, dotted(key), known_.back().unit};
 }
 
@@ -181,9 +181,9 @@ TomlValue TomlTable::mandatory_unless(std::string_view other, std::string_view k
 void TomlTable::close() {
   for (const TomlEntry& entry : std::get<TomlNode::Table>(node_.value)) refuse_unknown(entry);
   for (const MissingKey& key : missing_) {
-    const std::string cure =
-        key.other.empty() ? "it has no default, so state it here" : "state it, or '" + key.other + "', here";
-    refusals_.add(node_.place, "key '" + dotted(key.name) + "' is missing; " + cure);
+    const std::string cure = key.alternative.empty() ? "it has no default, so state it here"
+                                                     : "state it, or '" + key.alternative + "', here";
+    refusals_.add(node_.location, "key '" + dotted(key.name) + "' is missing; " + cure);
   }
 }
 
@@ -192,9 +192,9 @@ void TomlTable::refuse_unknown(const TomlEntry& entry) {
   const auto same = [&](const KnownKey& key) { return key.name == entry.key; };
   if (std::any_of(known_.begin(), known_.end(), same)) return;
   const NearestKey nearest = nearest_key(entry.key, known_);
-  refusals_.add(entry.place, "key '" + dotted(printable(entry.key)) + "' is not known; " + nearest.advice);
+  refusals_.add(entry.location, "key '" + dotted(printable(entry.key)) + "' is not known; " + nearest.advice);
   std::erase_if(missing_, [&](const MissingKey& key) {
-    return key.name == nearest.name || (!key.other.empty() && key.other == nearest.name);
+    return key.name == nearest.name || (!key.alternative.empty() && key.alternative == nearest.name);
   });
 }
 

@@ -30,10 +30,11 @@ struct Range {
 /// refused, with its place, what was expected and what was found, and `out` keeps what it had: its default.
 class TomlValue {
  public:
-  TomlValue(RefusalList& refusals, const TomlNode* node, Place place, std::string name, std::string unit)
+  TomlValue(RefusalList& refusals, const TomlNode* node, SourceLocation place, std::string name,
+            std::string unit)
       : refusals_(&refusals),
         node_(node),
-        place_(std::move(place)),
+        location_(std::move(place)),
         name_(std::move(name)),
         unit_(std::move(unit)) {}
 
@@ -43,11 +44,11 @@ class TomlValue {
   /// Is it this very text? "none" stands for something a device does not have.
   bool is_text(std::string_view text) const noexcept;
   /// Does the table hold this key, with anything but the text "none"?
-  bool holds(std::string_view key) const noexcept;
+  bool has(std::string_view key) const noexcept;
   /// Does the table hold this key with the text "none"?
-  bool says_none(std::string_view key) const noexcept;
+  bool is_none(std::string_view key) const noexcept;
   /// Does it come from a profile that the file inherits?
-  bool is_inherited() const noexcept { return place_.file != nullptr; }
+  bool is_inherited() const noexcept { return location_.file != nullptr; }
   const std::string& name() const noexcept { return name_; }  ///< dotted, as in "obstacle[0].half_space"
 
   bool number(double& out, Range range) const;  ///< an integer will do
@@ -86,7 +87,7 @@ class TomlValue {
 
   RefusalList* refusals_;
   const TomlNode* node_;
-  Place place_;
+  SourceLocation location_;
   std::string name_;
   std::string unit_;
 };
@@ -96,7 +97,7 @@ class TomlValue {
 class TomlTable {
   struct MissingKey {
     std::string name;
-    std::string other;  ///< would do as well; may be empty
+    std::string alternative;  ///< would do as well; may be empty
   };
 
  public:
@@ -176,8 +177,8 @@ void TomlValue::table(Read read, Args&&... args) const {
 template <typename Read, typename... Args>
 void TomlValue::table_or_empty(Read read, Args&&... args) const {
   if (node_) return table(read, args...);
-  const TomlNode empty{place_, TomlNode::Table{}};
-  TomlValue(*refusals_, &empty, place_, name_, unit_).table(read, args...);
+  const TomlNode empty{location_, TomlNode::Table{}};
+  TomlValue(*refusals_, &empty, location_, name_, unit_).table(read, args...);
 }
 
 }  // namespace wrenchd

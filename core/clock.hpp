@@ -24,7 +24,7 @@ class Clock {
   virtual TimePoint now() const noexcept = 0;  ///< RT safe.
   virtual void sleep_until(TimePoint t) noexcept = 0;
   /// How long the machine has slept since it was switched on: time that now() leaves out. RT safe.
-  virtual Duration slept() const noexcept { return {}; }
+  virtual Duration time_suspended() const noexcept { return {}; }
 };
 
 /// Time that passes only when somebody sleeps: hours in seconds, and every run the same. RT safe.
@@ -34,13 +34,13 @@ class VirtualClock final : public Clock {
   void sleep_until(TimePoint t) noexcept override {
     if (t > now_) now_ = t;
   }
-  Duration slept() const noexcept override { return slept_; }
+  Duration time_suspended() const noexcept override { return time_suspended_; }
   /// The machine goes to sleep, and wakes up.
-  void sleep_through(Duration d) noexcept { slept_ += d; }
+  void suspend_for(Duration d) noexcept { time_suspended_ += d; }
 
  private:
   TimePoint now_{};
-  Duration slept_{};
+  Duration time_suspended_{};
 };
 
 }  // namespace wrenchd

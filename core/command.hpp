@@ -12,14 +12,14 @@ enum Command : CommandSet {
   kNoCommand = 0,
   kArm = 1,
   kDisarm = 2,
-  kStartOver = 4,     ///< last tick's q means nothing any more
-  kStop = 8,          ///< emergency stop
-  kAcknowledge = 16,  ///< somebody has looked at a fault, or a stop
-  kQuit = 32,         ///< the process is asked to end
-  kLease = 64,        ///< with kArm: whoever arms promises signs of life
-  kBeat = 128,        ///< a sign of life
-  kLetGo = 256,       ///< the hand was released from outside: only in records
-  kHungUp = 512,      ///< whoever promised signs of life is gone: no need to wait for its silence
+  kReinitialize = 4,          ///< last tick's q means nothing any more
+  kStop = 8,                  ///< emergency stop
+  kAcknowledge = 16,          ///< somebody has looked at a fault, or a stop
+  kQuit = 32,                 ///< the process is asked to end
+  kLease = 64,                ///< with kArm: whoever arms promises signs of life
+  kHeartbeat = 128,           ///< a sign of life
+  kReleasedExternally = 256,  ///< the hand was released from outside: only in records
+  kClientLost = 512,          ///< whoever promised signs of life is gone: no need to wait for its silence
 };
 
 }  // namespace wrenchd

@@ -26,12 +26,12 @@ enum class ContactKind : std::uint8_t {
 ///   edge_edge     n = R d_T x d_W / |R d_T x d_W|        d_T, d_W: along the edges, so that n leaves B
 struct Contact {
   ContactKind kind = ContactKind::vertex_face;
-  Vector3d p_TA_m = Vector3d::Zero();  ///< a: a point of the tool's feature, in T [m]
-  Vector3d p_WB_m = Vector3d::Zero();  ///< b: a point of the obstacle's feature, in W [m]
-  Vector3d n_W = Vector3d::UnitZ();    ///< unit normal from B to A, at the pose where the contact was found
-  double offset_m = 0.0;               ///< n_W . b, known better than from b for a face [m]
-  Vector3d d_T = Vector3d::Zero();     ///< see above; zero for vertex_face
-  Vector3d d_W = Vector3d::Zero();     ///< see above; zero but for edge_edge
+  Vector3d p_TCa_m = Vector3d::Zero();  ///< a: a point of the tool's feature, in T [m]
+  Vector3d p_WCb_m = Vector3d::Zero();  ///< b: a point of the obstacle's feature, in W [m]
+  Vector3d n_W = Vector3d::UnitZ();     ///< unit normal from B to A, at the pose where the contact was found
+  double offset_m = 0.0;                ///< n_W . b, known better than from b for a face [m]
+  Vector3d d_T = Vector3d::Zero();      ///< see above; zero for vertex_face
+  Vector3d d_W = Vector3d::Zero();      ///< see above; zero but for edge_edge
   /// Which vertex, edge or face touches. Convex bodies name the vertex that a or b is; 0 for the face of
   /// vertex_face.
   std::uint32_t tool_feature = 0;
@@ -54,25 +54,25 @@ inline Vector3d normal_W(const Contact& c, const Pose& X_WT) noexcept {
 
 /// Signed gap of a contact at a pose of T [m]. RT safe.
 inline double gap_m(const Contact& c, const Pose& X_WT) noexcept {
-  if (c.kind == ContactKind::vertex_face) return c.n_W.dot(X_WT * c.p_TA_m) - c.offset_m;
-  return normal_W(c, X_WT).dot(X_WT * c.p_TA_m - c.p_WB_m);
+  if (c.kind == ContactKind::vertex_face) return c.n_W.dot(X_WT * c.p_TCa_m) - c.offset_m;
+  return normal_W(c, X_WT).dot(X_WT * c.p_TCa_m - c.p_WCb_m);
 }
 
 /// Where the two features touch, or would: the tool's vertex, the obstacle's, or where its edge passes the
 /// tool's [m]. RT safe.
 inline Vector3d contact_point_W(const Contact& c, const Pose& X_WT) noexcept {
-  if (c.kind == ContactKind::face_vertex) return c.p_WB_m;
-  if (c.kind == ContactKind::vertex_face) return X_WT * c.p_TA_m;
-  const Vector3d a_W = X_WT * c.p_TA_m;
+  if (c.kind == ContactKind::face_vertex) return c.p_WCb_m;
+  if (c.kind == ContactKind::vertex_face) return X_WT * c.p_TCa_m;
+  const Vector3d a_W = X_WT * c.p_TCa_m;
   const Vector3d d = X_WT.rotation * c.d_T;
   const Vector3d N = d.cross(c.d_W);
-  return a_W + d * ((c.p_WB_m - a_W).cross(c.d_W).dot(N) / N.squaredNorm());
+  return a_W + d * ((c.p_WCb_m - a_W).cross(c.d_W).dot(N) / N.squaredNorm());
 }
 
 /// A contact whose obstacle has moved by `motion`, in the world: X_WO after it = motion * X_WO before. RT
 /// safe.
 inline Contact moved(Contact c, const Pose& motion) noexcept {
-  c.p_WB_m = motion * c.p_WB_m;
+  c.p_WCb_m = motion * c.p_WCb_m;
   c.offset_m += c.n_W.dot(motion.rotation.conjugate() * motion.translation_m);
   c.n_W = motion.rotation * c.n_W;
   c.d_W = motion.rotation * c.d_W;
@@ -97,7 +97,7 @@ inline bool same_features(const Contact& a, const Contact& b) noexcept {
 
 /// Contacts of one query. The capacity is fixed, so that a tick never allocates; an optimum of 6 unknowns has
 /// few active contacts.
-class ContactSet : public FixedList<Contact, 64> {
+class ContactSet : public StaticVector<Contact, 64> {
  public:
   static constexpr std::size_t kCapacity = 64;
 

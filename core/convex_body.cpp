@@ -32,7 +32,7 @@ void lay_out(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std:
 
 }  // namespace
 
-void ConvexBody::find_faces() {
+void ConvexBody::compute_derived_data() {
   order_.resize(vertices_T_m.size());
   std::iota(order_.begin(), order_.end(), 0u);
   blocks_.clear();
@@ -135,7 +135,7 @@ void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
     std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, before);
     build_blocks(begin, middle);
     build_blocks(middle, end);
-    if (end - begin > kMany) blocks_[here].after = static_cast<std::uint32_t>(blocks_.size());
+    if (end - begin > kMany) blocks_[here].skip_to = static_cast<std::uint32_t>(blocks_.size());
   }
 }
 

@@ -38,18 +38,18 @@ struct ConvexBody {
   std::vector<std::uint32_t> edges_at;
 
   std::span<const std::uint32_t> ring_of(std::size_t vertex) const noexcept {
-    return of(vertex, ring_begin, ring);
+    return adjacency_row(vertex, ring_begin, ring);
   }
   std::span<const std::uint32_t> faces_of(std::size_t vertex) const noexcept {
-    return of(vertex, faces_begin, faces_at);
+    return adjacency_row(vertex, faces_begin, faces_at);
   }
   std::span<const std::uint32_t> edges_of(std::size_t vertex) const noexcept {
-    return of(vertex, edges_begin, edges_at);
+    return adjacency_row(vertex, edges_begin, edges_at);
   }
 
   /// Fills in faces, edges, which of them are at which vertex, and what support() works with from vertices
   /// and rings. Not RT safe.
-  void find_faces();
+  void compute_derived_data();
 
   /// The vertex farthest along a direction, of any length. near: one that is known to be far along it, which
   /// saves time. RT safe.
@@ -65,7 +65,7 @@ struct ConvexBody {
     for (std::size_t k = 0; k < blocks_.size();) {
       const Block& block = blocks_[k];
       if (!one && direction.dot(block.centre_m) + length * block.radius_m < least()) {
-        k = block.after;
+        k = block.skip_to;
         continue;
       }
       ++k;
@@ -80,11 +80,12 @@ struct ConvexBody {
     Vector3d centre_m;
     double radius_m;
     std::uint32_t begin, end;  ///< in order_
-    std::uint32_t after;       ///< the block to look at next where none of these can be the one
+    std::uint32_t skip_to;     ///< the block to look at next where none of these can be the one
   };
 
-  static std::span<const std::uint32_t> of(std::size_t vertex, const std::vector<std::uint32_t>& begin,
-                                           const std::vector<std::uint32_t>& all) noexcept {
+  static std::span<const std::uint32_t> adjacency_row(std::size_t vertex,
+                                                      const std::vector<std::uint32_t>& begin,
+                                                      const std::vector<std::uint32_t>& all) noexcept {
     return std::span(all).subspan(begin[vertex], begin[vertex + 1] - begin[vertex]);
   }
   void build_blocks(std::uint32_t begin, std::uint32_t end);

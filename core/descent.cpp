@@ -25,7 +25,7 @@ Vector3d Descent::gradient(const Pose& X_WP, const Projection& at) const noexcep
   if (E.w() < 0.0) E.coeffs() *= -1.0;
   const Vector3d Hv = M_.H_kg_m2 * E.vec();
   Vector3d g = 4.0 * (E.w() * Hv - E.vec().cross(Hv));
-  for (const auto& [contact, multiplier] : shared_evenly(at)) {
+  for (const auto& [contact, multiplier] : evenly_loaded_contacts(at)) {
     const Vector3d lever_W = contact_point_W(contact, at.X_WQ) - at.X_WQ.translation_m;
     g -= multiplier * (at.X_WQ.rotation.conjugate() * lever_W.cross(normal_W(contact, at.X_WQ)));
   }

@@ -31,7 +31,7 @@ DofMask driven_dofs(const DeviceProfile& profile) noexcept {
   return dofs;
 }
 
-DofMask components(const Wrench& F) noexcept {
+DofMask nonzero_dofs(const Wrench& F) noexcept {
   unsigned dofs = 0;
   for (unsigned i = 0; i < 3; ++i) {
     if (F.force_N[i] != 0.0) dofs |= 1u << i;
@@ -40,7 +40,7 @@ DofMask components(const Wrench& F) noexcept {
   return static_cast<DofMask>(dofs);
 }
 
-Wrench along(Wrench F, DofMask dofs) noexcept {
+Wrench restrict_to_dofs(Wrench F, DofMask dofs) noexcept {
   for (unsigned i = 0; i < 3; ++i) {
     if ((dofs >> i & 1u) == 0) F.force_N[i] = 0.0;
     if ((dofs >> i & 8u) == 0) F.torque_Nm[i] = 0.0;

@@ -72,10 +72,10 @@ enum class Checksum : std::uint8_t {
 
 /// What every report has, whichever way it goes.
 struct ReportFrame {
-  bool has_id = true;            ///< false: byte 0 belongs to the content
-  std::uint8_t id = 0;           ///< byte 0, where the device uses report ids
-  std::size_t length = 0;        ///< bytes, report id included
-  std::size_t least_length = 0;  ///< a shorter report that is still one; what it lacks is 0. 0: none is
+  bool has_id = true;          ///< false: byte 0 belongs to the content
+  std::uint8_t id = 0;         ///< byte 0, where the device uses report ids
+  std::size_t length = 0;      ///< bytes, report id included
+  std::size_t min_length = 0;  ///< a shorter report that is still one; what it lacks is 0. 0: none is
   std::vector<ReportConstant> constants;
   Checksum checksum = Checksum::none;      ///< over the bytes before it
   std::size_t checksum_from = 0;           ///< first byte it covers
@@ -152,7 +152,7 @@ enum class PoseSource : std::uint8_t {
 /// How the deflection of a cap moves a pose (devices/deflection_pose.hpp has the equations).
 struct Deflection {
   static constexpr double kNotStated = std::numeric_limits<double>::quiet_NaN();
-  static constexpr double kEndless = std::numeric_limits<double>::infinity();
+  static constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
   enum class Mode : std::uint8_t {
     rate,      ///< deflection is velocity; the pose stays where it is left
@@ -164,19 +164,21 @@ struct Deflection {
 
   // Where the pose stays: within this distance of where it began, and within this box of B.
   double reach_m = 0.2;
-  Vector3d box_min_m = Vector3d::Constant(-kEndless);
-  Vector3d box_max_m = Vector3d::Constant(kEndless);
+  Vector3d box_min_m = Vector3d::Constant(-kUnbounded);
+  Vector3d box_max_m = Vector3d::Constant(kUnbounded);
 
   // Rate only, and but for `slow` only where the end of the cap's way is stated.
-  double full_m = kNotStated;  ///< deflection at the end of the cap's way, where the speed is gain times it
-  double full_rad = kNotStated;
-  double dead_zone = 0.0;       ///< share of the way in which nothing moves
-  double curve = 1.0;           ///< exponent from deflection to speed; more is finer near the rest
-  double slow = 0.2;            ///< share of the speed while the slow button is held
-  double leash_m = kNotStated;  ///< how far from where the world holds it the pose may be, the cap at its end
-  double leash_rad = kNotStated;
+  double full_deflection_m =
+      kNotStated;  ///< deflection at the end of the cap's way, where the speed is gain times it
+  double full_deflection_rad = kNotStated;
+  double dead_zone = 0.0;          ///< share of the way in which nothing moves
+  double response_exponent = 1.0;  ///< exponent from deflection to speed; more is finer near the rest
+  double slow_factor = 0.2;        ///< share of the speed while the slow button is held
+  double max_proxy_distance_m =
+      kNotStated;  ///< how far from where the world holds it the pose may be, the cap at its end
+  double max_proxy_angle_rad = kNotStated;
 
-  bool has_leash() const noexcept { return leash_m > 0.0; }
+  bool has_proxy_distance_limit() const noexcept { return max_proxy_distance_m > 0.0; }
 };
 
 inline constexpr std::size_t kMaxJoints = 6;
@@ -192,7 +194,8 @@ struct Kinematics {
   };
   Kind kind = Kind::none;
   std::size_t joints = 0;  ///< that are sensed; the first kMaxMotors of them are driven
-  std::array<std::size_t, kMaxJoints> slot = {0, 1, 2, 3, 4, 5};  ///< which integer of the report is joint i
+  std::array<std::size_t, kMaxJoints> report_index = {0, 1, 2,
+                                                      3, 4, 5};  ///< which integer of the report is joint i
   std::array<double, kMaxJoints> rad_per_count{};
   std::array<double, kMaxJoints> zero_rad{};
   std::array<double, kMaxJoints> home_counts{};    ///< by slot: what the encoders say at the home position
@@ -213,9 +216,9 @@ struct Kinematics {
   /// A button that hides in a count: above `above` it is pressed, and `minus` has to be taken off.
   struct CountButton {
     bool present = false;
-    std::size_t slot = 0;
-    double above = 0.0;
-    double minus = 0.0;
+    std::size_t report_index = 0;
+    double threshold_counts = 0.0;
+    double offset_counts = 0.0;
     unsigned button = 0;
   };
   CountButton count_button;
@@ -342,10 +345,10 @@ DofMask sensed_dofs(const DeviceProfile& profile) noexcept;
 DofMask driven_dofs(const DeviceProfile& profile) noexcept;
 
 /// The components of a wrench that are not 0. RT safe.
-DofMask components(const Wrench& F) noexcept;
+DofMask nonzero_dofs(const Wrench& F) noexcept;
 
 /// The wrench without its components along other degrees of freedom. RT safe.
-Wrench along(Wrench F, DofMask dofs) noexcept;
+Wrench restrict_to_dofs(Wrench F, DofMask dofs) noexcept;
 
 /// "loopback", "hidraw", "libusb"
 const char* text(Transport transport) noexcept;

@@ -27,51 +27,51 @@ enum class Fault : std::uint8_t {
   sample_stale,      ///< no new report for longer than the profile allows
 
   // What the reports say
-  pose_not_finite,      ///< NaN or infinity in a reported pose or twist
-  pose_not_a_rotation,  ///< reported quaternion is too far from unit norm
-  pose_teleported,      ///< pose moved farther in one report than any hand can
-  pose_outside,         ///< far out of the workspace
-  pose_stuck,           ///< the pose stays, and the reported twist says it moves
-  overspeed,            ///< handle faster than the profile allows
-  not_homed,            ///< the encoders do not know where they are any more
-  watchdog_tripped,     ///< the device's own watchdog took the motors' current while it was driven
-  motors_off,           ///< the device says that its motors are off, and was told to drive them
+  pose_not_finite,         ///< NaN or infinity in a reported pose or twist
+  pose_not_a_rotation,     ///< reported quaternion is too far from unit norm
+  pose_jumped,             ///< pose moved farther in one report than any hand can
+  pose_outside_workspace,  ///< far out of the workspace
+  pose_stuck,              ///< the pose stays, and the reported twist says it moves
+  overspeed,               ///< handle faster than the profile allows
+  not_homed,               ///< the encoders do not know where they are any more
+  watchdog_tripped,        ///< the device's own watchdog took the motors' current while it was driven
+  motors_off,              ///< the device says that its motors are off, and was told to drive them
 
   // The rendering
   wrench_not_finite,  ///< the rendering produced NaN or infinity
   projection_failed,  ///< no admissible pose was found for several ticks
-  answer_late,        ///< the wrench was ready too long after its pose
+  wrench_late,        ///< the wrench was ready too long after its pose
 
   // The loop and the machine
-  tick_late,      ///< a tick came a few milliseconds late
-  loop_stopped,   ///< no tick for longer than the configuration allows
-  clock_back,     ///< the monotonic clock went back
-  suspended,      ///< the machine slept
-  write_blocked,  ///< the device takes no wrench for a few milliseconds
-  write_failed,   ///< nor for longer
+  tick_late,       ///< a tick came a few milliseconds late
+  loop_stalled,    ///< no tick for longer than the configuration allows
+  clock_reversed,  ///< the monotonic clock went back
+  suspended,       ///< the machine slept
+  write_blocked,   ///< the device takes no wrench for a few milliseconds
+  write_failed,    ///< nor for longer
 
   // The hand and the motors
-  oscillating,       ///< the force alternates with the motion: less stiffness from here on
-  still_oscillates,  ///< again, with what was left of it
-  energy_made,       ///< the rendering gives more energy than it took
-  pinned,            ///< full force against a hand that does not move
-  overheated,        ///< the motors gave more than they can for ever
+  oscillating,           ///< the force alternates with the motion: less stiffness from here on
+  oscillation_persists,  ///< again, with what was left of it
+  energy_generated,      ///< the rendering gives more energy than it took
+  motors_stalled,        ///< full force against a hand that does not move
+  overheated,            ///< the motors gave more than they can for ever
 
   // Who asked for it
-  client_gone,    ///< whoever armed does not say any more that it is alive
-  client_silent,  ///< nor ever did
-  deadman_open,   ///< the button that has to be held is not
-  stop_asked,     ///< emergency stop by a client or a signal
-  stop_button,    ///< by the device's button
+  heartbeat_lost,     ///< whoever armed does not say any more that it is alive
+  heartbeat_missing,  ///< nor ever did
+  deadman_released,   ///< the button that has to be held is not
+  stop_requested,     ///< emergency stop by a client or a signal
+  stop_button,        ///< by the device's button
 
   // What went on for too long, and the test at the start
   degraded_too_long,
   degraded_too_often,
-  test_unclean,   ///< no half second of good reports
-  test_rate,      ///< reports at another rate than the profile's
-  test_watchdog,  ///< the device's watchdog did not trip when it should have
+  self_test_reports,   ///< no half second of good reports
+  self_test_rate,      ///< reports at another rate than the profile's
+  self_test_watchdog,  ///< the device's watchdog did not trip when it should have
 };
-inline constexpr std::size_t kFaultCount = static_cast<std::size_t>(Fault::test_watchdog) + 1;
+inline constexpr std::size_t kFaultCount = static_cast<std::size_t>(Fault::self_test_watchdog) + 1;
 
 /// What wrenchd knows of a fault: one row of the table.
 struct FaultRow {
@@ -79,10 +79,10 @@ struct FaultRow {
   std::string_view name;      ///< as it stands in records and status: "device_lost"
   Trigger trigger;            ///< what it is to the state machine
   Reaction reaction;          ///< of its own, where harder than the transition's
-  Duration after;             ///< how long it has to be there; the reaction comes within one tick after that
+  Duration persistence;       ///< how long it has to be there; the reaction comes within one tick after that
   std::string_view detector;  ///< how it is found
-  std::string_view sentence;  ///< what happened
-  std::string_view why;       ///< why anybody looks for it
+  std::string_view message;   ///< what happened
+  std::string_view reason;    ///< why anybody looks for it
   std::string_view cure;      ///< what to do about it
 };
 

@@ -15,12 +15,12 @@ struct Frame {
 
   Vector3d operator*(const Vector3d& p_m) const noexcept { return R * p_m + x_m; }
   /// The other way: the point of the inner frame.
-  Vector3d back(const Vector3d& p_m) const noexcept { return R.transpose() * (p_m - x_m); }
+  Vector3d inverse_transform(const Vector3d& p_m) const noexcept { return R.transpose() * (p_m - x_m); }
   /// This pose as seen from another: inverse(other) * this.
-  Frame seen_from(const Frame& other) const noexcept {
+  Frame relative_to(const Frame& other) const noexcept {
     Frame out;
     out.R = other.R.transpose() * R;
-    out.x_m = other.back(x_m);
+    out.x_m = other.inverse_transform(x_m);
     return out;
   }
 };

@@ -63,67 +63,67 @@ class Levers {
 Friction::Friction(const Inertia& M, const FrictionSettings& settings, double clearance_m)
     : M_(M),
       H_inverse_(M.H_kg_m2.inverse()),
-      turn_(unit_turns(M)),
+      rotation_scale_(unit_turns(M)),
       settings_(settings),
-      exact_(M, ExactProjection::Budget{}, clearance_m) {}
+      projection_(M, ExactProjection::Budget{}, clearance_m) {}
 
-void Friction::forget() noexcept {
-  X_touched_.reset();
-  holds_ = false;
+void Friction::reset() noexcept {
+  X_WQ_last_.reset();
+  sticks_ = false;
   ticks_stuck_ = 0;
 }
 
-void Friction::keep(const Projection& answer) noexcept {
-  last_.clear();  // where time was up, contacts may be among them that are yet to be reached
+void Friction::store_contacts(const Projection& answer) noexcept {
+  last_contacts_.clear();  // where time was up, contacts may be among them that are yet to be reached
   for (const ActiveContact& active : answer.active)
-    if (gap_m(active.contact, answer.X_WQ) <= kTouching_m) last_.add(active);
-  X_touched_ = answer.X_WQ;
+    if (gap_m(active.contact, answer.X_WQ) <= kTouching_m) last_contacts_.add(active);
+  X_WQ_last_ = answer.X_WQ;
 }
 
-Pose Friction::felt(const Pose& X_WP, const Pose& X_last, bool may_hold) noexcept {
+Pose Friction::frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_hold) noexcept {
   const int ticks_stuck = std::exchange(ticks_stuck_, 0);
-  holds_ = false;
-  if (!X_touched_ || last_.empty() || !same_bits(*X_touched_, X_last)) return X_WP;
-  unhindered_ = exact_.step(X_WP, X_last, std::span(last_.begin(), last_.end()), {});
-  see(X_last);
-  if (std::none_of(touches_.begin(), touches_.end(), [](const Touch& t) { return t.multiplier > 0.0; }))
+  sticks_ = false;
+  if (!X_WQ_last_ || last_contacts_.empty() || !same_bits(*X_WQ_last_, X_last)) return X_WP;
+  frictionless_ = projection_.step(X_WP, X_last, std::span(last_contacts_.begin(), last_contacts_.end()), {});
+  collect_points(X_last);
+  if (std::none_of(points_.begin(), points_.end(), [](const FrictionPoint& t) { return t.multiplier > 0.0; }))
     return X_WP;
-  const Pose X_stuck = stuck(X_last);
+  const Pose X_stuck = stick_pose(X_last);
   const double mu =
       ticks_stuck < kTicksToSettle ? settings_.dynamic_coefficient : settings_.static_coefficient;
-  const double held = share_held(mu, X_WP, X_stuck);
+  const double held = stick_fraction(mu, X_WP, X_stuck);
   if (held <= 0.0) return X_WP;
   if (held < 1.0 - kNoShare) {
-    const Pose& X_WQ = unhindered_.X_WQ;
-    return pressing({X_WQ.rotation.slerp(held, X_stuck.rotation),
-                     X_WQ.translation_m + held * (X_stuck.translation_m - X_WQ.translation_m)},
-                    held);
+    const Pose& X_WQ = frictionless_.X_WQ;
+    return goal_for_pose({X_WQ.rotation.slerp(held, X_stuck.rotation),
+                          X_WQ.translation_m + held * (X_stuck.translation_m - X_WQ.translation_m)},
+                         held);
   }
   ticks_stuck_ = std::min(ticks_stuck + 1, kTicksToSettle);
-  if (!may_hold || !same_bits(X_stuck, X_last)) return pressing(X_stuck, 1.0);
-  holds_ = true;
-  unhindered_.X_WQ = X_last;
-  unhindered_.energy = energy(M_, X_WP, X_last);
-  unhindered_.active.clear();
-  for (std::size_t i = 0; i < touches_.size(); ++i)
-    unhindered_.active.add({touches_[i].contact, presses(i, 1.0)});
+  if (!may_hold || !same_bits(X_stuck, X_last)) return goal_for_pose(X_stuck, 1.0);
+  sticks_ = true;
+  frictionless_.X_WQ = X_last;
+  frictionless_.energy = energy(M_, X_WP, X_last);
+  frictionless_.active.clear();
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    frictionless_.active.add({points_[i].contact, normal_multiplier(i, 1.0)});
   return X_WP;
 }
 
 /// dT by a small turn of the body in its own axes, E = p^-1 q: 4 (w H v - v x H v).
-Vector3d Friction::turning(const Quaterniond& E) const noexcept {
+Vector3d Friction::rotational_gradient(const Quaterniond& E) const noexcept {
   const double sign = E.w() < 0.0 ? -1.0 : 1.0;  // the shorter way round
   const Vector3d Hv = M_.H_kg_m2 * E.vec();
   return 4.0 * (std::abs(E.w()) * sign * Hv - E.vec().cross(Hv));
 }
 
 /// What touches at q*, and how it came there from X_last.
-void Friction::see(const Pose& X_last) noexcept {
-  touches_.clear();
-  const Pose& X_WQ = unhindered_.X_WQ;
-  const Matrix3d turn_W = X_WQ.rotation * turn_;
-  for (const ActiveContact& active : unhindered_.active) {
-    Touch touch;
+void Friction::collect_points(const Pose& X_last) noexcept {
+  points_.clear();
+  const Pose& X_WQ = frictionless_.X_WQ;
+  const Matrix3d turn_W = X_WQ.rotation * rotation_scale_;
+  for (const ActiveContact& active : frictionless_.active) {
+    FrictionPoint touch;
     touch.contact = active.contact;
     touch.multiplier = active.multiplier;
     const Vector3d c_W = contact_point_W(active.contact, X_WQ);
@@ -131,17 +131,17 @@ void Friction::see(const Pose& X_last) noexcept {
     touch.p_TC_m = X_WQ.rotation.conjugate() * lever_W;
     touch.p_WC_m = X_last * touch.p_TC_m;
     touch.n_W = normal_W(active.contact, X_WQ);
-    touch.lever << Matrix3d::Identity(), -hat(lever_W) * turn_W;
+    touch.jacobian << Matrix3d::Identity(), -hat(lever_W) * turn_W;
     touch.gap_m = gap_m(active.contact, X_WQ);
     const Vector3d way_W = c_W - touch.p_WC_m;
-    touch.slid_W_m = way_W - touch.n_W * touch.n_W.dot(way_W);
-    touches_.add(touch);
+    touch.slip_W_m = way_W - touch.n_W * touch.n_W.dot(way_W);
+    points_.add(touch);
   }
 }
 
 /// What a pose has to undo, so that a point that carries is where it was at X_last, but for its way into or
 /// out of the obstacle, and the gap is that of q*. What touches idly does not rub: its gap alone counts.
-Vector3d Friction::strayed_m(const Touch& touch, const Pose& X_WT) const noexcept {
+Vector3d Friction::stick_error_m(const FrictionPoint& touch, const Pose& X_WT) const noexcept {
   const Vector3d& n = touch.n_W;
   Vector3d opened = n * (gap_m(touch.contact, X_WT) - touch.gap_m);
   if (touch.multiplier <= 0.0) return opened;
@@ -152,13 +152,13 @@ Vector3d Friction::strayed_m(const Touch& touch, const Pose& X_WT) const noexcep
 /// q_0: from q* by the least displacement, as the metric measures it, that brings back the points that carry.
 /// With y that displacement in units of which M is m times one, lever_i y = strayed_i is solved for the
 /// shortest y. Newton's method with the levers of q*: what is left falls by the angle turned, each time.
-Pose Friction::stuck(const Pose& X_last) const noexcept {
+Pose Friction::stick_pose(const Pose& X_last) const noexcept {
   Matrix6d N = Matrix6d::Zero();
   double longest_m = 0.0;
-  for (const Touch& touch : touches_) {
-    const Vector6d normal = touch.lever.transpose() * touch.n_W;
+  for (const FrictionPoint& touch : points_) {
+    const Vector6d normal = touch.jacobian.transpose() * touch.n_W;
     if (touch.multiplier > 0.0)
-      N += touch.lever.transpose() * touch.lever;
+      N += touch.jacobian.transpose() * touch.jacobian;
     else
       N += normal * normal.transpose();
     longest_m = std::max(longest_m, touch.p_TC_m.norm());
@@ -166,41 +166,42 @@ Pose Friction::stuck(const Pose& X_last) const noexcept {
   const Levers levers(N);
   if (levers.hold_all()) return X_last;
   constexpr int kSteps = 8;
-  const Pose& X_WQ = unhindered_.X_WQ;
+  const Pose& X_WQ = frictionless_.X_WQ;
   Pose X = X_WQ;
   for (int step = 0; step < kSteps; ++step) {
     Vector6d sum = Vector6d::Zero();
-    for (const Touch& touch : touches_) sum += touch.lever.transpose() * strayed_m(touch, X);
+    for (const FrictionPoint& touch : points_) sum += touch.jacobian.transpose() * stick_error_m(touch, X);
     const Vector6d y = levers.solve(sum);
     X.translation_m -= y.head<3>();
-    X.rotation = (rotation_from(-(X_WQ.rotation * (turn_ * y.tail<3>()))) * X.rotation).normalized();
+    X.rotation =
+        (rotation_from(-(X_WQ.rotation * (rotation_scale_ * y.tail<3>()))) * X.rotation).normalized();
     if (y.norm() < 1e-3 * kNoWay_m) break;
   }
   return way_m(X_last, X, longest_m) < kNoWay_m ? X_last : X;
 }
 
 /// What contact i carries so far from q* to q_0.
-double Friction::presses(std::size_t i, double held) const noexcept {
-  return std::max(0.0, touches_[i].multiplier + held * more_stuck_[i]);
+double Friction::normal_multiplier(std::size_t i, double held) const noexcept {
+  return std::max(0.0, points_[i].multiplier + held * multiplier_increase_[i]);
 }
 
 /// 1 - s. Also finds what each contact carries more at q_0 than at q*: all forces of the contacts together,
 /// friction's among them, keep the tool there against p. Of many sets of them, that next to those at q*.
-double Friction::share_held(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept {
+double Friction::stick_fraction(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept {
   Vector6d lacking;  // of grad T
   lacking << 2.0 * M_.mass_kg * (X_stuck.translation_m - X_WP.translation_m),
-      turn_.transpose() * turning(X_WP.rotation.conjugate() * X_stuck.rotation);
-  const Matrix3d turn_W = X_stuck.rotation * turn_;
+      rotation_scale_.transpose() * rotational_gradient(X_WP.rotation.conjugate() * X_stuck.rotation);
+  const Matrix3d turn_W = X_stuck.rotation * rotation_scale_;
   Matrix6d N = Matrix6d::Zero();
   std::array<Vector6d, ContactSet::kCapacity> normal;   // gradients of the gaps
   std::array<Vector6d, ContactSet::kCapacity> sliding;  // and of the ways towards q*
-  for (std::size_t i = 0; i < touches_.size(); ++i) {
-    const Touch& touch = touches_[i];
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const FrictionPoint& touch = points_[i];
     Eigen::Matrix<double, 3, 6> lever;
     lever << Matrix3d::Identity(),
         -hat(contact_point_W(touch.contact, X_stuck) - X_stuck.translation_m) * turn_W;
     normal[i] = lever.transpose() * normal_W(touch.contact, X_stuck);
-    sliding[i] = lever.transpose() * touch.slid_W_m;
+    sliding[i] = lever.transpose() * touch.slip_W_m;
     lacking -= touch.multiplier * normal[i];
     if (touch.multiplier > 0.0)
       N += lever.transpose() * lever;
@@ -212,12 +213,12 @@ double Friction::share_held(double mu, const Pose& X_WP, const Pose& X_stuck) no
   double D = 0.0;
   double D_stuck = 0.0;
   double drawn = 0.0;
-  for (std::size_t i = 0; i < touches_.size(); ++i) {
-    more_stuck_[i] = normal[i].dot(z);
-    const Touch& touch = touches_[i];
-    const double slid_m = touch.slid_W_m.norm();
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    multiplier_increase_[i] = normal[i].dot(z);
+    const FrictionPoint& touch = points_[i];
+    const double slid_m = touch.slip_W_m.norm();
     D += touch.multiplier * slid_m;
-    D_stuck += (touch.multiplier + more_stuck_[i]) * slid_m;
+    D_stuck += (touch.multiplier + multiplier_increase_[i]) * slid_m;
     if (touch.multiplier > 0.0) drawn -= sliding[i].dot(z);
   }
   return mu * D_stuck < drawn ? std::min(1.0, mu * D / (drawn + mu * (D - D_stuck))) : 1.0;
@@ -230,12 +231,12 @@ double Friction::share_held(double mu, const Pose& X_WP, const Pose& X_stuck) no
 ///   4 (w H v - v x H v)   = sum lambda_i (lever_i x R_q' n_i) = g
 ///
 /// the second solved for v by iterating v = H^-1 (g/4 + v x H v) / w.
-Pose Friction::pressing(const Pose& X_WQ, double held) const noexcept {
+Pose Friction::goal_for_pose(const Pose& X_WQ, double held) const noexcept {
   Vector3d force = Vector3d::Zero();
   Vector3d torque = Vector3d::Zero();
-  for (std::size_t i = 0; i < touches_.size(); ++i) {
-    const Contact& contact = touches_[i].contact;
-    const Vector3d carried = presses(i, held) * normal_W(contact, X_WQ);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Contact& contact = points_[i].contact;
+    const Vector3d carried = normal_multiplier(i, held) * normal_W(contact, X_WQ);
     force += carried;
     torque += (contact_point_W(contact, X_WQ) - X_WQ.translation_m).cross(carried);
   }

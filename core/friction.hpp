@@ -15,12 +15,12 @@ namespace wrenchd {
 
 /// [rendering.friction]: Coulomb's coefficients. 0 <= dynamic <= static; both zero: no friction.
 struct FrictionSettings {
-  static constexpr double kLargest = 5.0;  ///< far beyond rubber on rubber
+  static constexpr double kMaxCoefficient = 5.0;  ///< far beyond rubber on rubber
 
   double static_coefficient = 0.0;   ///< of a tool that has stuck for a while
   double dynamic_coefficient = 0.0;  ///< of a tool that slides
 
-  bool any() const noexcept { return static_coefficient > 0.0 || dynamic_coefficient > 0.0; }
+  bool enabled() const noexcept { return static_coefficient > 0.0 || dynamic_coefficient > 0.0; }
 };
 
 /// Coulomb friction as the proxy's resistance to sliding.
@@ -52,79 +52,80 @@ class Friction {
 
   /// p': where the proxy is to follow to. X_WP itself where nothing rubs. X_WP: p; X_last: last tick's q.
   /// Once a tick. may_hold: whether it may be told to stay by holds(). RT safe.
-  Pose felt(const Pose& X_WP, const Pose& X_last, bool may_hold = true) noexcept;
+  Pose frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_hold = true) noexcept;
 
   /// Before that, where obstacles move: motion_of(k) is by how much obstacle number k has moved in the world
   /// since the last tick, X_WO now = motion * X_WO then. What rubbed goes with it, and the tool with what
   /// presses most. Answers where that takes it, the X_last for felt(). RT safe.
   template <class MotionOf>
-  Pose ride(const Pose& X_last, const MotionOf& motion_of) noexcept;
+  Pose carry_with_obstacle(const Pose& X_last, const MotionOf& motion_of) noexcept;
 
   /// Does the tool stick and cannot turn either? Then it stays at X_last to the bit, and held() says what of
   /// it: energy, contacts and multipliers for p. RT safe.
-  bool holds() const noexcept { return holds_; }
-  const Projection& held() const noexcept { return unhindered_; }
+  bool sticks() const noexcept { return sticks_; }
+  const Projection& stuck_projection() const noexcept { return frictionless_; }
 
   /// The tick's answer: what touches there rubs at the next tick. A tool that comes through the air is not
   /// held back where it came from. RT safe.
-  void keep(const Projection& answer) noexcept;
+  void store_contacts(const Projection& answer) noexcept;
 
-  void forget() noexcept;  ///< RT safe
+  void reset() noexcept;  ///< RT safe
 
  private:
   /// A contact of q*, and the point of the tool that is there.
-  struct Touch {
+  struct FrictionPoint {
     Contact contact;
-    Vector3d p_TC_m;                    ///< the point
-    Vector3d p_WC_m;                    ///< where it was at X_last
-    Vector3d n_W;                       ///< at q*
-    Eigen::Matrix<double, 3, 6> lever;  ///< its displacement, by a displacement y of the body at q*
-    double gap_m;                       ///< at q*
-    double multiplier;                  ///< zero where it touches idly [kg m]
-    Vector3d slid_W_m;                  ///< tangential displacement of the point from X_last to q*
+    Vector3d p_TC_m;                       ///< the point
+    Vector3d p_WC_m;                       ///< where it was at X_last
+    Vector3d n_W;                          ///< at q*
+    Eigen::Matrix<double, 3, 6> jacobian;  ///< its displacement, by a displacement y of the body at q*
+    double gap_m;                          ///< at q*
+    double multiplier;                     ///< zero where it touches idly [kg m]
+    Vector3d slip_W_m;                     ///< tangential displacement of the point from X_last to q*
   };
 
-  void see(const Pose& X_last) noexcept;
-  Pose stuck(const Pose& X_last) const noexcept;
-  Vector3d strayed_m(const Touch& touch, const Pose& X_WT) const noexcept;
-  double share_held(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept;
-  Vector3d turning(const Quaterniond& E) const noexcept;
-  double presses(std::size_t i, double held) const noexcept;
-  Pose pressing(const Pose& X_WQ, double held) const noexcept;
+  void collect_points(const Pose& X_last) noexcept;
+  Pose stick_pose(const Pose& X_last) const noexcept;
+  Vector3d stick_error_m(const FrictionPoint& touch, const Pose& X_WT) const noexcept;
+  double stick_fraction(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept;
+  Vector3d rotational_gradient(const Quaterniond& E) const noexcept;
+  double normal_multiplier(std::size_t i, double held) const noexcept;
+  Pose goal_for_pose(const Pose& X_WQ, double held) const noexcept;
 
   Inertia M_;
   Matrix3d H_inverse_;
-  Matrix3d turn_;  ///< of the last half of y: the turn in T [rad]
+  Matrix3d rotation_scale_;  ///< of the last half of y: the turn in T [rad]
   FrictionSettings settings_;
-  ExactProjection exact_;
-  FixedList<ActiveContact, ContactSet::kCapacity> last_;  ///< what touched at last tick's answer
-  std::optional<Pose> X_touched_;                         ///< that answer
-  Projection unhindered_;                                 ///< q*
-  FixedList<Touch, ContactSet::kCapacity> touches_;
-  std::array<double, ContactSet::kCapacity> more_stuck_;  ///< that each carries at q_0 than at q* [kg m]
-  bool holds_ = false;
+  ExactProjection projection_;
+  StaticVector<ActiveContact, ContactSet::kCapacity> last_contacts_;  ///< what touched at last tick's answer
+  std::optional<Pose> X_WQ_last_;                                     ///< that answer
+  Projection frictionless_;                                           ///< q*
+  StaticVector<FrictionPoint, ContactSet::kCapacity> points_;
+  std::array<double, ContactSet::kCapacity>
+      multiplier_increase_;  ///< that each carries at q_0 than at q* [kg m]
+  bool sticks_ = false;
   int ticks_stuck_ = 0;
 };
 
 template <class MotionOf>
-Pose Friction::ride(const Pose& X_last, const MotionOf& motion_of) noexcept {
-  if (!X_touched_ || last_.empty() || !same_bits(*X_touched_, X_last)) return X_last;
+Pose Friction::carry_with_obstacle(const Pose& X_last, const MotionOf& motion_of) noexcept {
+  if (!X_WQ_last_ || last_contacts_.empty() || !same_bits(*X_WQ_last_, X_last)) return X_last;
   const auto pressing = [&](std::uint32_t obstacle) {
     double sum = 0.0;
-    for (const ActiveContact& touch : last_)
+    for (const ActiveContact& touch : last_contacts_)
       if (touch.contact.obstacle == obstacle) sum += touch.multiplier;
     return sum;
   };
-  std::uint32_t carrier = last_[0].contact.obstacle;
-  FixedList<ActiveContact, ContactSet::kCapacity> now;
-  for (const auto& [contact, multiplier] : last_) {
+  std::uint32_t carrier = last_contacts_[0].contact.obstacle;
+  StaticVector<ActiveContact, ContactSet::kCapacity> now;
+  for (const auto& [contact, multiplier] : last_contacts_) {
     if (pressing(contact.obstacle) > pressing(carrier)) carrier = contact.obstacle;
     now.add({moved(contact, motion_of(contact.obstacle)), multiplier});
   }
-  last_ = now;
-  X_touched_ = motion_of(carrier) * X_last;
-  X_touched_->rotation.normalize();
-  return *X_touched_;
+  last_contacts_ = now;
+  X_WQ_last_ = motion_of(carrier) * X_last;
+  X_WQ_last_->rotation.normalize();
+  return *X_WQ_last_;
 }
 
 }  // namespace wrenchd

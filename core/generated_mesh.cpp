@@ -31,7 +31,7 @@ const std::vector<MeshKind>& mesh_kinds() {
   return kinds;
 }
 
-std::string name_of(const MadeMesh& made) {
+std::string generated_mesh_name(const GeneratedMesh& made) {
   const auto number = [](double x) {
     std::array<char, 32> text{};
     return std::string(text.data(), std::to_chars(text.data(), text.data() + text.size(), x).ptr);
@@ -41,7 +41,7 @@ std::string name_of(const MadeMesh& made) {
     name += ' ' + number(made.size_m.x()) + " x " + number(made.size_m.y()) + " x " +
             number(made.size_m.z()) + " m";
   name += ", " + std::to_string(made.triangles) + " triangles";
-  if (made.seed != MadeMesh().seed) name += ", seed " + std::to_string(made.seed);
+  if (made.seed != GeneratedMesh().seed) name += ", seed " + std::to_string(made.seed);
   return name;
 }
 

@@ -10,8 +10,9 @@
 namespace wrenchd {
 
 /// A solid to try things with, so that no model has to be downloaded.
-struct MadeMesh {
-  static constexpr std::size_t kFewest = 8, kMost = 20'000'000;  ///< triangles that may be asked for
+struct GeneratedMesh {
+  static constexpr std::size_t kMinTriangles = 8,
+                               kMaxTriangles = 20'000'000;  ///< triangles that may be asked for
 
   std::string kind;
   std::size_t triangles = 20000;               ///< about so many
@@ -21,7 +22,7 @@ struct MadeMesh {
 
 struct MeshKind {
   std::string name;
-  std::string what;  ///< one line, with its measures
+  std::string description;  ///< one line, with its measures
 };
 
 /// The kinds of mesh that make_mesh() generates (collision/meshes/make_mesh.hpp).
@@ -29,6 +30,6 @@ const std::vector<MeshKind>& mesh_kinds();
 
 /// "made gear, 5000 triangles": what stands in the place of a file's name. Different meshes have different
 /// ones.
-std::string name_of(const MadeMesh& made);
+std::string generated_mesh_name(const GeneratedMesh& made);
 
 }  // namespace wrenchd

@@ -28,7 +28,7 @@ GravityCompensation::GravityCompensation(const MovingMasses& masses, const Quate
     : masses_(masses) {
   check_mass("handle", masses.handle_kg);
   check_mass("carried parts", masses.carried_kg);
-  if (!is_finite(masses.p_HC_m) || masses.p_HC_m.norm() > kFarthestCentre_m)
+  if (!is_finite(masses.p_HHcm_m) || masses.p_HHcm_m.norm() > kFarthestCentre_m)
     throw std::invalid_argument("gravity compensation: the handle's centre of mass must be within 1 m of H");
   if (!is_finite(R_WB) || std::abs(R_WB.squaredNorm() - 1.0) > kUnitNorm)
     throw std::invalid_argument("gravity compensation: the base's tilt must be a unit quaternion");
@@ -37,7 +37,7 @@ GravityCompensation::GravityCompensation(const MovingMasses& masses, const Quate
 
 //   f = -(m_c + m_h) g_B,   tau = -(R_BH p_HC) x m_h g_B
 Wrench GravityCompensation::wrench(const Pose& X_BH) const noexcept {
-  const Vector3d lever_B = X_BH.rotation * masses_.p_HC_m;
+  const Vector3d lever_B = X_BH.rotation * masses_.p_HHcm_m;
   return {-(masses_.carried_kg + masses_.handle_kg) * g_B_m_per_s2_,
           -lever_B.cross(masses_.handle_kg * g_B_m_per_s2_)};
 }
@@ -45,7 +45,7 @@ Wrench GravityCompensation::wrench(const Pose& X_BH) const noexcept {
 //   U = -g_B . (m_c p_BH + m_h p_BC)
 double GravityCompensation::potential_energy_J(const Pose& X_BH) const noexcept {
   return -g_B_m_per_s2_.dot(masses_.carried_kg * X_BH.translation_m +
-                            masses_.handle_kg * (X_BH * masses_.p_HC_m));
+                            masses_.handle_kg * (X_BH * masses_.p_HHcm_m));
 }
 
 }  // namespace wrenchd

@@ -7,8 +7,8 @@ namespace wrenchd {
 
 /// The masses that a hand on the device carries around. H = handle point, C = centre of mass of the handle.
 struct MovingMasses {
-  double handle_kg = 0.0;              ///< what turns with the handle
-  Vector3d p_HC_m = Vector3d::Zero();  ///< its centre of mass, in H
+  double handle_kg = 0.0;                ///< what turns with the handle
+  Vector3d p_HHcm_m = Vector3d::Zero();  ///< its centre of mass, in H
   /// What travels with the handle point and does not turn: a platform, the base of a gimbal. Of arms that
   /// hold it, the share that rises as far as it does: half of a rod whose other end stays.
   double carried_kg = 0.0;

@@ -9,7 +9,7 @@
 namespace wrenchd {
 
 /// When a device has to be shown where it is.
-enum class ReferenceUse : std::uint8_t {
+enum class ReferenceSchedule : std::uint8_t {
   never,       ///< it knows: absolute encoders, calibrated by its maker
   once,        ///< absolute encoders, which nobody has aligned: the offset is stored
   each_start,  ///< incremental encoders, which count from wherever they were switched on
@@ -23,12 +23,12 @@ struct HomingPlan {
   double travel_rad = 0.25;  ///< likewise about one
   Vector3d workspace_min_m = Vector3d::Constant(-1.0);  ///< p_BH is never outside of this box
   Vector3d workspace_max_m = Vector3d::Constant(1.0);
-  double max_turn_rad = 3.2;  ///< nor is R_BH turned farther than this; above pi: any turn is good
+  double max_rotation_rad = 3.2;  ///< nor is R_BH turned farther than this; above pi: any turn is good
 
-  ReferenceUse reference = ReferenceUse::never;
+  ReferenceSchedule reference = ReferenceSchedule::never;
   Pose X_BR;                          ///< the handle in its rest, the pose that is known
-  double most_offset_m = 0.1;         ///< farther off, the handle is not in its rest
-  double most_offset_rad = 0.5;       ///< likewise; encoders that start anywhere need more
+  double max_offset_m = 0.1;          ///< farther off, the handle is not in its rest
+  double max_offset_rad = 0.5;        ///< likewise; encoders that start anywhere need more
   std::uint32_t confirm_buttons = 0;  ///< any of these says "it is in its rest"; 0: only confirm() does
 };
 

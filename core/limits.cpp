@@ -67,7 +67,7 @@ Vector3d legal(const Vector3d& last, double limit) noexcept {
 }
 
 bool all_finite(const LimitInput& in) noexcept {
-  return is_finite(in.asked) && is_finite(in.authority) && is_finite(in.dt_s) && is_finite(in.V_BH) &&
+  return is_finite(in.requested) && is_finite(in.authority) && is_finite(in.dt_s) && is_finite(in.V_BH) &&
          is_finite(in.p_BH_m);
 }
 
@@ -78,8 +78,8 @@ LimitSettings tighter(const LimitSettings& a, const LimitSettings& b, const Devi
     return within_profile(x, own, highest) <= within_profile(y, own, highest) ? x : y;
   };
   LimitSettings both;
-  both.max_force_N = least(a.max_force_N, b.max_force_N, profile.max_force_N, kHighestForce_N);
-  both.max_torque_Nm = least(a.max_torque_Nm, b.max_torque_Nm, profile.max_torque_Nm, kHighestTorque_Nm);
+  both.max_force_N = least(a.max_force_N, b.max_force_N, profile.max_force_N, kAbsoluteMaxForce_N);
+  both.max_torque_Nm = least(a.max_torque_Nm, b.max_torque_Nm, profile.max_torque_Nm, kAbsoluteMaxTorque_Nm);
   both.force_slew_N_per_s = std::min(a.force_slew_N_per_s, b.force_slew_N_per_s);
   both.torque_slew_Nm_per_s = std::min(a.torque_slew_Nm_per_s, b.torque_slew_Nm_per_s);
   both.soft_start_s = std::max(a.soft_start_s, b.soft_start_s);
@@ -127,8 +127,8 @@ std::string limit_causes_text(std::uint16_t causes) {
 }
 
 WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile)
-    : max_force_N_(within_profile(settings.max_force_N, profile.max_force_N, kHighestForce_N)),
-      max_torque_Nm_(within_profile(settings.max_torque_Nm, profile.max_torque_Nm, kHighestTorque_Nm)),
+    : max_force_N_(within_profile(settings.max_force_N, profile.max_force_N, kAbsoluteMaxForce_N)),
+      max_torque_Nm_(within_profile(settings.max_torque_Nm, profile.max_torque_Nm, kAbsoluteMaxTorque_Nm)),
       force_ceiling_N_(max_force_N_),
       torque_ceiling_Nm_(max_torque_Nm_),
       force_slew_N_per_s_(within(settings.force_slew_N_per_s, std::numeric_limits<double>::max())),
@@ -137,10 +137,10 @@ WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& p
       workspace_centre_m_(profile.workspace_centre_m),
       max_power_W_(profile.max_power_W) {}
 
-void WrenchLimits::change(const LimitSettings& settings, const DeviceProfile& profile) noexcept {
-  const Wrench last = last_;
+void WrenchLimits::set_limits(const LimitSettings& settings, const DeviceProfile& profile) noexcept {
+  const Wrench last = last_sent_;
   *this = WrenchLimits(settings, profile);
-  last_ = last;
+  last_sent_ = last;
 }
 
 void WrenchLimits::set_ceiling(double force_N, double torque_Nm) noexcept {
@@ -148,12 +148,12 @@ void WrenchLimits::set_ceiling(double force_N, double torque_Nm) noexcept {
   torque_ceiling_Nm_ = within(torque_Nm, max_torque_Nm_);
 }
 
-/// 1 within the radius, then along a straight line down to 0 at kEdgeEnd of it.
-double WrenchLimits::edge_share(const Vector3d& p_BH_m) const noexcept {
+/// 1 within the radius, then along a straight line down to 0 at kWorkspaceFadeEnd of it.
+double WrenchLimits::workspace_scale(const Vector3d& p_BH_m) const noexcept {
   if (!is_finite(workspace_radius_m_)) return 1.0;
   const double distance_m = (p_BH_m - workspace_centre_m_).norm();
   if (distance_m <= workspace_radius_m_) return 1.0;
-  const double end_m = kEdgeEnd * workspace_radius_m_;
+  const double end_m = kWorkspaceFadeEnd * workspace_radius_m_;
   if (!(distance_m < end_m)) return 0.0;
   return (end_m - distance_m) / (end_m - workspace_radius_m_);
 }
@@ -163,7 +163,7 @@ double WrenchLimits::edge_share(const Vector3d& p_BH_m) const noexcept {
 ///   P = f . v + tau . w,  and what its rounding may hide
 ///
 /// The twist is taken apart into its largest component and the rest, as P may be infinite otherwise.
-double WrenchLimits::power_share(const Wrench& F, const Twist& V) const noexcept {
+double WrenchLimits::power_scale(const Wrench& F, const Twist& V) const noexcept {
   if (!is_finite(max_power_W_)) return 1.0;
   const double largest =
       std::max(V.linear_m_per_s.cwiseAbs().maxCoeff(), V.angular_rad_per_s.cwiseAbs().maxCoeff());
@@ -182,7 +182,7 @@ Limited WrenchLimits::apply(const LimitInput& in) noexcept {
     reset();
     return {Wrench{}, kNotFinite};
   }
-  Limited out{in.asked, kNotLimited};
+  Limited out{in.requested, kNotLimited};
   Vector3d &force_N = out.F.force_N, &torque_Nm = out.F.torque_Nm;
   const auto mark = [&out](bool cut, LimitCause cause) noexcept {
     if (cut) out.causes = static_cast<std::uint16_t>(out.causes | cause);
@@ -196,17 +196,18 @@ Limited WrenchLimits::apply(const LimitInput& in) noexcept {
   mark(saturate(torque_Nm, max_torque_Nm_), kTorqueMagnitude);
   mark(saturate(force_N, force_ceiling_N_), kForceThermal);
   mark(saturate(torque_Nm, torque_ceiling_Nm_), kTorqueThermal);
-  scale(edge_share(in.p_BH_m), kWorkspaceEdge);
+  scale(workspace_scale(in.p_BH_m), kWorkspaceEdge);
   scale(std::clamp(in.authority, 0.0, 1.0), kAuthority);
 
-  const double dt_s = std::clamp(in.dt_s, 0.0, kLongestStep_s);
-  mark(slew(force_N, legal(last_.force_N, max_force_N_), force_slew_N_per_s_ * dt_s), kForceSlew);
-  mark(slew(torque_Nm, legal(last_.torque_Nm, max_torque_Nm_), torque_slew_Nm_per_s_ * dt_s), kTorqueSlew);
+  const double dt_s = std::clamp(in.dt_s, 0.0, kMaxStep_s);
+  mark(slew(force_N, legal(last_sent_.force_N, max_force_N_), force_slew_N_per_s_ * dt_s), kForceSlew);
+  mark(slew(torque_Nm, legal(last_sent_.torque_Nm, max_torque_Nm_), torque_slew_Nm_per_s_ * dt_s),
+       kTorqueSlew);
   // Between two vectors within the limit lies no longer one, but for rounding.
   saturate(force_N, force_ceiling_N_);
   saturate(torque_Nm, torque_ceiling_Nm_);
-  scale(power_share(out.F, in.V_BH), kPower);
-  last_ = out.F;
+  scale(power_scale(out.F, in.V_BH), kPower);
+  last_sent_ = out.F;
   return out;
 }
 

@@ -23,14 +23,14 @@ struct LimitSettings {
 LimitSettings tighter(const LimitSettings& a, const LimitSettings& b, const DeviceProfile& profile) noexcept;
 
 /// No profile and no setting reaches further, whatever they say.
-inline constexpr double kHighestForce_N = 200.0;
-inline constexpr double kHighestTorque_Nm = 20.0;
+inline constexpr double kAbsoluteMaxForce_N = 200.0;
+inline constexpr double kAbsoluteMaxTorque_Nm = 20.0;
 
 /// Growth is never made up for: a longer step counts as this one. Five periods of the slowest loop.
-inline constexpr double kLongestStep_s = 0.010;
+inline constexpr double kMaxStep_s = 0.010;
 
 /// Outside the workspace the wrench fades; at this many radii it is zero.
-inline constexpr double kEdgeEnd = 1.1;
+inline constexpr double kWorkspaceFadeEnd = 1.1;
 
 /// Why a wrench that goes out is not the one the law asked for. A bit mask.
 enum LimitCause : std::uint16_t {
@@ -56,7 +56,7 @@ std::string limit_causes_text(std::uint16_t causes);
 
 /// What a tick asks for, and where the hand is; all in axes of the base B, about the handle point H.
 struct LimitInput {
-  Wrench asked;
+  Wrench requested;
   double authority = 0.0;              ///< scales what is asked for: 0 to 1
   double dt_s = 0.0;                   ///< since the last call
   Twist V_BH;                          ///< of the handle
@@ -95,20 +95,20 @@ class WrenchLimits {
   void set_ceiling(double force_N, double torque_Nm) noexcept;
 
   /// Nothing goes out any more: the next wrench grows from zero. RT safe.
-  void reset() noexcept { last_ = Wrench{}; }
+  void reset() noexcept { last_sent_ = Wrench{}; }
 
   /// Other settings from here on, though what went out last stays what it was. RT safe.
-  void change(const LimitSettings& settings, const DeviceProfile& profile) noexcept;
+  void set_limits(const LimitSettings& settings, const DeviceProfile& profile) noexcept;
 
   /// What went out last is this, though it did not come from here: the next wrench grows from it. RT safe.
-  void follow(const Wrench& last) noexcept { last_ = last; }
+  void set_last_sent(const Wrench& last) noexcept { last_sent_ = last; }
 
   double max_force_N() const noexcept { return max_force_N_; }
   double max_torque_Nm() const noexcept { return max_torque_Nm_; }
 
  private:
-  double edge_share(const Vector3d& p_BH_m) const noexcept;
-  double power_share(const Wrench& F, const Twist& V_BH) const noexcept;
+  double workspace_scale(const Vector3d& p_BH_m) const noexcept;
+  double power_scale(const Wrench& F, const Twist& V_BH) const noexcept;
 
   double max_force_N_;
   double max_torque_Nm_;
@@ -119,7 +119,7 @@ class WrenchLimits {
   double workspace_radius_m_;  ///< NaN: no edge
   Vector3d workspace_centre_m_;
   double max_power_W_;  ///< NaN: any
-  Wrench last_;
+  Wrench last_sent_;
 };
 
 }  // namespace wrenchd

@@ -33,7 +33,7 @@ double DurationStatistic::quantile_s(double share) const noexcept {
 void LoopMeasurement::tick(const TickTimes& times) noexcept {
   if (ticks_++ > 0) period_.add(seconds(times.now - last_tick_));
   last_tick_ = times.now;
-  if (times.fresh) {
+  if (times.new_report) {
     if (reports_++ == 0) {
       first_arrival_ = times.arrived;
       first_sequence_ = times.sequence;
@@ -42,29 +42,30 @@ void LoopMeasurement::tick(const TickTimes& times) noexcept {
     last_arrival_ = times.arrived;
     last_sequence_ = times.sequence;
     last_device_s_ = times.device_time_s;
-    if (times.acknowledges) look_for_acknowledgement(times);
+    if (times.has_acknowledgement) update_round_trip(times);
   }
   if (reports_ > 0) age_.add(seconds(times.now - last_arrival_));
-  sent_[times.commanded % kAwaited] = {times.commanded, times.now};
-  commanded_ = times.commanded;
+  sent_[times.sent % kMaxPending] = {times.sent, times.now};
+  last_sent_ = times.sent;
 }
 
 /// A command that was lost is acknowledged together with the one after it. What the device did not get acts
 /// no sooner than that one, so the round trip is that of the oldest which is new: the longest.
-void LoopMeasurement::look_for_acknowledgement(const TickTimes& times) noexcept {
-  const std::uint64_t before = taken_;
-  if (times.taken == before && heard_) return;
-  taken_ = times.taken;
-  if (!heard_) {  // how long the first was under way cannot be told: it may be old
-    heard_ = true;
+void LoopMeasurement::update_round_trip(const TickTimes& times) noexcept {
+  const std::uint64_t before = last_acknowledged_;
+  if (times.acknowledged == before && has_acknowledgement_) return;
+  last_acknowledged_ = times.acknowledged;
+  if (!has_acknowledgement_) {  // how long the first was under way cannot be told: it may be old
+    has_acknowledgement_ = true;
     return;
   }
-  if (taken_ < before || taken_ > commanded_) {  // it started anew, or answers nonsense: so do we
-    heard_ = false;
+  if (last_acknowledged_ < before ||
+      last_acknowledged_ > last_sent_) {  // it started anew, or answers nonsense: so do we
+    has_acknowledgement_ = false;
     return;
   }
-  if (taken_ - before > kAwaited) return;
-  const Sent& oldest = sent_[(before + 1) % kAwaited];
+  if (last_acknowledged_ - before > kMaxPending) return;
+  const Sent& oldest = sent_[(before + 1) % kMaxPending];
   if (oldest.number == before + 1 && oldest.at <= times.arrived)
     round_trip_.add(seconds(times.arrived - oldest.at));
 }
@@ -79,7 +80,7 @@ double LoopMeasurement::device_clock_rate() const noexcept {
   return span_s > 0.0 ? (last_device_s_ - first_device_s_) / span_s : 1.0;
 }
 
-double LoopMeasurement::unseen_share() const noexcept {
+double LoopMeasurement::missed_report_fraction() const noexcept {
   const double made = static_cast<double>(last_sequence_ - first_sequence_);
   return made > 0.0 ? 1.0 - static_cast<double>(reports_ - 1) / made : 0.0;
 }
@@ -87,11 +88,13 @@ double LoopMeasurement::unseen_share() const noexcept {
 double LoopMeasurement::typical_delay_s() const noexcept {
   const double rate_Hz = report_rate_Hz();
   const double wait_s = delay_measured() && rate_Hz > 0.0 ? 0.5 / rate_Hz : 0.0;
-  return std::max(0.0, age_.mean_s() + (delay_measured() ? round_trip_.mean_s() : assumed_s_) - wait_s);
+  return std::max(0.0,
+                  age_.mean_s() + (delay_measured() ? round_trip_.mean_s() : assumed_round_trip_s_) - wait_s);
 }
 
 double LoopMeasurement::delay_s() const noexcept {
-  return age_.quantile_s(kCounted) + (delay_measured() ? round_trip_.quantile_s(kCounted) : assumed_s_);
+  return age_.quantile_s(kQuantile) +
+         (delay_measured() ? round_trip_.quantile_s(kQuantile) : assumed_round_trip_s_);
 }
 
 }  // namespace wrenchd

@@ -12,13 +12,13 @@ ObstacleMotion ObstacleMotion::between(const Pose& X_from, const Pose& X_to, dou
   ObstacleMotion motion;
   motion.linear_m_per_s = (X_to.translation_m - X_from.translation_m) / over_s;
   motion.angular_rad_per_s = rotation_vector(X_to.rotation * X_from.rotation.conjugate()) / over_s;
-  motion.begin_s = begin_s;
-  motion.last_s = over_s;
+  motion.start_s = begin_s;
+  motion.duration_s = over_s;
   return motion;
 }
 
-Pose ObstacleMotion::at(const Pose& X_WO_0, double t_s) const noexcept {
-  const double s = on_the_way_s(t_s);
+Pose ObstacleMotion::pose_at(const Pose& X_WO_0, double t_s) const noexcept {
+  const double s = path_time_s(t_s);
   if (!(s > 0.0)) return X_WO_0;
   Pose X_WO = X_WO_0;
   if (!linear_m_per_s.isZero(0.0)) X_WO.translation_m += s * linear_m_per_s;
@@ -32,13 +32,13 @@ Pose ObstacleMotion::at(const Pose& X_WO_0, double t_s) const noexcept {
 }
 
 /// s(t). fmod() is exact, so days later the turning points are still where they were.
-double ObstacleMotion::on_the_way_s(double t_s) const noexcept {
-  const double since_s = t_s - begin_s;
+double ObstacleMotion::path_time_s(double t_s) const noexcept {
+  const double since_s = t_s - start_s;
   if (!(since_s > 0.0)) return 0.0;
-  const double t = std::min(since_s, last_s > 0.0 ? last_s : kLongest_s);
-  if (!(turn_back_s > 0.0)) return t;
-  const double in_round_s = std::fmod(t, 2.0 * turn_back_s);
-  return std::min(in_round_s, 2.0 * turn_back_s - in_round_s);
+  const double t = std::min(since_s, duration_s > 0.0 ? duration_s : kMaxTime_s);
+  if (!(reverse_after_s > 0.0)) return t;
+  const double in_round_s = std::fmod(t, 2.0 * reverse_after_s);
+  return std::min(in_round_s, 2.0 * reverse_after_s - in_round_s);
 }
 
 }  // namespace wrenchd

@@ -13,16 +13,16 @@ namespace wrenchd {
 /// pose depends on t alone, so whoever asks for the same time gets the same bits.
 struct ObstacleMotion {
   /// A pose after longer than this [s] is that of this time: 30 years, and nothing overflows.
-  static constexpr double kLongest_s = 1e9;
+  static constexpr double kMaxTime_s = 1e9;
   /// What a scene may ask for; at() itself takes any finite velocity that keeps kLongest_s times it finite.
   static constexpr double kMaxSpeed_m_per_s = 5.0;
   static constexpr double kMaxAngularSpeed_rad_per_s = 50.0;
 
   Vector3d linear_m_per_s = Vector3d::Zero();     ///< v: of O's origin, in W
   Vector3d angular_rad_per_s = Vector3d::Zero();  ///< w: in W, about O's own origin
-  double turn_back_s = 0.0;                       ///< turns back each time after so long; 0: never
-  double begin_s = 0.0;                           ///< scene time at which it sets out
-  double last_s = 0.0;                            ///< stands again after so long; 0: never
+  double reverse_after_s = 0.0;                   ///< turns back each time after so long; 0: never
+  double start_s = 0.0;                           ///< scene time at which it sets out
+  double duration_s = 0.0;                        ///< stands again after so long; 0: never
 
   bool moves() const noexcept { return !linear_m_per_s.isZero(0.0) || !angular_rad_per_s.isZero(0.0); }
 
@@ -32,15 +32,15 @@ struct ObstacleMotion {
 
   /// X_WO at scene time t_s [s], from X_WO_0, that until it sets out. Exactly X_WO_0 until then, for a NaN,
   /// and where nothing moves; finite for every t. RT safe.
-  Pose at(const Pose& X_WO_0, double t_s) const noexcept;
+  Pose pose_at(const Pose& X_WO_0, double t_s) const noexcept;
 
  private:
-  double on_the_way_s(double t_s) const noexcept;
+  double path_time_s(double t_s) const noexcept;
 };
 
 /// What an obstacle does from some scene time on, in the place of what it did until then.
-struct LaterMotion {
-  double from_s = 0.0;
+struct ScheduledMotion {
+  double start_s = 0.0;
   Pose X_WO;  ///< at that time
   ObstacleMotion motion;
 };

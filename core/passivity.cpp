@@ -28,141 +28,146 @@ double share_of(double cap, double b) noexcept {
 
 }  // namespace
 
-PassivityGuard::PassivityGuard(const DeviceDamping& device, const PassivityCaps& caps)
-    : device_{stated(device.linear_N_s_per_m), stated(device.angular_Nm_s_per_rad)}, caps_(caps) {
+PassivityGuard::PassivityGuard(const DeviceDamping& device, const PassivityLimits& caps)
+    : device_{stated(device.linear_N_s_per_m), stated(device.angular_Nm_s_per_rad)}, limits_(caps) {
   if (!sensible(caps.damping_N_s_per_m) || !sensible(caps.damping_Nm_s_per_rad))
     refuse("the caps on damping must be 0 or more");
-  if (!sensible(caps.unseen_J) || !sensible(caps.most_J) || caps.unseen_J >= caps.most_J)
+  if (!sensible(caps.scaling_start_J) || !sensible(caps.scaling_end_J) ||
+      caps.scaling_start_J >= caps.scaling_end_J)
     refuse("unseen_J must be 0 or more and below most_J");
   if (caps.delay_ticks > kMaxDelay_ticks) refuse("the delay is too long for a hand; shorten it");
   const double linear = share_of(caps.damping_N_s_per_m, device_.linear_N_s_per_m);
   const double angular = share_of(caps.damping_Nm_s_per_rad, device_.angular_Nm_s_per_rad);
-  most_alpha_ = device_.angular_Nm_s_per_rad > 0.0 && device_.linear_N_s_per_m > 0.0
-                    ? std::min(linear, angular)
-                    : std::max(linear, angular);
+  max_alpha_ = device_.angular_Nm_s_per_rad > 0.0 && device_.linear_N_s_per_m > 0.0
+                   ? std::min(linear, angular)
+                   : std::max(linear, angular);
 }
 
 void PassivityGuard::reset() noexcept {
-  *this = PassivityGuard(device_, caps_);  // which were accepted once
+  *this = PassivityGuard(device_, limits_);  // which were accepted once
 }
 
-Wrench PassivityGuard::guard(const Wrench& asked_B, const Pose& X_BH, double dt_s, bool in_contact) noexcept {
-  acted_ = false;
+Wrench PassivityGuard::limit(const Wrench& asked_B, const Pose& X_BH, double dt_s, bool in_contact) noexcept {
+  intervened_ = false;
   if (!is_finite(asked_B) || !is_finite(X_BH) || !is_finite(dt_s)) return asked_B;
-  ++ticks_in_step_;
+  ++ticks_since_sample_;
   if (dt_s > 0.0 && has_pose_)
     observe({X_BH.translation_m - X_BH_.translation_m,
              small_rotation_vector(X_BH.rotation * X_BH_.rotation.conjugate()), dt_s});
   if (dt_s > 0.0 || !has_pose_) {
     X_BH_ = X_BH;
     has_pose_ = true;
-    ticks_in_step_ = 0;
+    ticks_since_sample_ = 0;
   }
-  if (!in_contact && quiet()) net_J_ = std::max(net_J_, 0.0);
-  if (net_J_ > 0.0) net_J_ = std::max(net_J_ - kForgiven_W * std::max(dt_s, 0.0), 0.0);
+  if (!in_contact && no_wrench_pending()) net_J_ = std::max(net_J_, 0.0);
+  if (net_J_ > 0.0) net_J_ = std::max(net_J_ - kEnergyLeak_W * std::max(dt_s, 0.0), 0.0);
 
-  expected_J_ = net_J_ + under_way_J();
+  predicted_net_J_ = net_J_ + pending_work_J();
 
   Wrench out = asked_B;
-  share_ = 1.0;
-  if (in_contact && expected_J_ > 0.0) {
-    share_ = 1.0 - std::clamp((expected_J_ - caps_.unseen_J) / (caps_.most_J - caps_.unseen_J), 0.0, 1.0);
-    out = Wrench{share_ * asked_B.force_N, share_ * asked_B.torque_Nm} + damping(dt_s);
-    acted_ = true;
+  scale_ = 1.0;
+  if (in_contact && predicted_net_J_ > 0.0) {
+    scale_ = 1.0 - std::clamp((predicted_net_J_ - limits_.scaling_start_J) /
+                                  (limits_.scaling_end_J - limits_.scaling_start_J),
+                              0.0, 1.0);
+    out = Wrench{scale_ * asked_B.force_N, scale_ * asked_B.torque_Nm} + damping_wrench(dt_s);
+    intervened_ = true;
   }
   ++tick_;
-  sent_[tick_ % kSent] = out;
+  sent_[tick_ % kSentHistory] = out;
   return out;
 }
 
-void PassivityGuard::told(const Wrench& sent_B) noexcept {
-  sent_[tick_ % kSent] = is_finite(sent_B) ? sent_B : Wrench{};
+void PassivityGuard::record_sent(const Wrench& sent_B) noexcept {
+  sent_[tick_ % kSentHistory] = is_finite(sent_B) ? sent_B : Wrench{};
 }
 
 //   E <- E + F . dx + tau . dtheta - (b |v|^2 + b_rot |w|^2) dt
 void PassivityGuard::observe(const Motion& step) noexcept {
-  Motion& oldest = motion_[++steps_ % kWindow];
-  recent_.way_m += step.way_m - oldest.way_m;
-  recent_.turn_rad += step.turn_rad - oldest.turn_rad;
-  recent_.dt_s += step.dt_s - oldest.dt_s;
+  Motion& oldest = motion_[++steps_ % kVelocityWindow];
+  window_motion_.displacement_m += step.displacement_m - oldest.displacement_m;
+  window_motion_.rotation_rad += step.rotation_rad - oldest.rotation_rad;
+  window_motion_.dt_s += step.dt_s - oldest.dt_s;
   oldest = step;
 
-  const Wrench F = acting();
-  const double work_J = F.force_N.dot(step.way_m) + F.torque_Nm.dot(step.turn_rad);
+  const Wrench F = acting_wrench();
+  const double work_J = F.force_N.dot(step.displacement_m) + F.torque_Nm.dot(step.rotation_rad);
   (work_J > 0.0 ? energy_out_J_ : energy_in_J_) += std::abs(work_J);
-  net_J_ += work_J - taken_by_device_J(step.dt_s);
-  watch(step.dt_s);
+  net_J_ += work_J - device_dissipation_J(step.dt_s);
+  check_energy_runaway(step.dt_s);
 }
 
 /// The mean of the wrenches that acted over the interval: as many ticks of them as it took for a new sample.
-Wrench PassivityGuard::acting() const noexcept {
-  const std::size_t ticks = std::clamp<std::size_t>(ticks_in_step_, 1, kSent - kMaxDelay_ticks);
+Wrench PassivityGuard::acting_wrench() const noexcept {
+  const std::size_t ticks = std::clamp<std::size_t>(ticks_since_sample_, 1, kSentHistory - kMaxDelay_ticks);
   Wrench sum;
   for (std::size_t i = 0; i < ticks; ++i) {
-    const std::uint64_t ago = caps_.delay_ticks + i;
-    if (ago < kSent && ago <= tick_) sum = sum + sent_[(tick_ - ago) % kSent];
+    const std::uint64_t ago = limits_.delay_ticks + i;
+    if (ago < kSentHistory && ago <= tick_) sum = sum + sent_[(tick_ - ago) % kSentHistory];
   }
   const double share = 1.0 / static_cast<double>(ticks);
   return {share * sum.force_N, share * sum.torque_Nm};
 }
 
 /// The work of the wrenches that were sent and have not shown in a sample yet, at the speed of the last two.
-double PassivityGuard::under_way_J() const noexcept {
-  const Motion& step = motion_[steps_ % kWindow];
-  const Motion& before = motion_[(steps_ + kWindow - 1) % kWindow];
+double PassivityGuard::pending_work_J() const noexcept {
+  const Motion& step = motion_[steps_ % kVelocityWindow];
+  const Motion& before = motion_[(steps_ + kVelocityWindow - 1) % kVelocityWindow];
   const double over_s = step.dt_s + before.dt_s;
   if (!(over_s > 0.0)) return 0.0;
-  const std::uint64_t ticks = std::min<std::uint64_t>(caps_.delay_ticks, tick_);
+  const std::uint64_t ticks = std::min<std::uint64_t>(limits_.delay_ticks, tick_);
   Wrench sum;
-  for (std::uint64_t i = 0; i < ticks; ++i) sum = sum + sent_[(tick_ - i) % kSent];
+  for (std::uint64_t i = 0; i < ticks; ++i) sum = sum + sent_[(tick_ - i) % kSentHistory];
   // A sample comes about as often as a tick.
-  return 0.5 *
-         (sum.force_N.dot(step.way_m + before.way_m) + sum.torque_Nm.dot(step.turn_rad + before.turn_rad));
+  return 0.5 * (sum.force_N.dot(step.displacement_m + before.displacement_m) +
+                sum.torque_Nm.dot(step.rotation_rad + before.rotation_rad));
 }
 
 /// |way|^2 / time of the whole window is at most the integral of v^2 over it, by Cauchy and Schwarz.
-double PassivityGuard::taken_by_device_J(double dt_s) const noexcept {
-  if (!(recent_.dt_s > 0.0)) return 0.0;
-  const double rate_W = (device_.linear_N_s_per_m * recent_.way_m.squaredNorm() +
-                         device_.angular_Nm_s_per_rad * recent_.turn_rad.squaredNorm()) /
-                        (recent_.dt_s * recent_.dt_s);
+double PassivityGuard::device_dissipation_J(double dt_s) const noexcept {
+  if (!(window_motion_.dt_s > 0.0)) return 0.0;
+  const double rate_W = (device_.linear_N_s_per_m * window_motion_.displacement_m.squaredNorm() +
+                         device_.angular_Nm_s_per_rad * window_motion_.rotation_rad.squaredNorm()) /
+                        (window_motion_.dt_s * window_motion_.dt_s);
   return rate_W * dt_s;
 }
 
 /// Nothing is under way that could still push.
-bool PassivityGuard::quiet() const noexcept {
-  const std::uint64_t look = std::min<std::uint64_t>(caps_.delay_ticks + 1, tick_);
+bool PassivityGuard::no_wrench_pending() const noexcept {
+  const std::uint64_t look = std::min<std::uint64_t>(limits_.delay_ticks + 1, tick_);
   for (std::uint64_t i = 0; i < look; ++i) {
-    const Wrench& F = sent_[(tick_ - i) % kSent];
+    const Wrench& F = sent_[(tick_ - i) % kSentHistory];
     if (!F.force_N.isZero(0.0) || !F.torque_Nm.isZero(0.0)) return false;
   }
   return true;
 }
 
-/// Holds E against the least it was within the last kOutOfHandWithin_s.
-void PassivityGuard::watch(double dt_s) noexcept {
-  least_J_[slice_] = std::min(least_J_[slice_], injected_J());
-  in_slice_s_ += dt_s;
-  if (in_slice_s_ >= kOutOfHandWithin_s / static_cast<double>(kSlices)) {
-    in_slice_s_ = 0.0;
-    slice_ = (slice_ + 1) % kSlices;
-    least_J_[slice_] = injected_J();
+/// Holds E against the least it was within the last kRunawayWindow_s.
+void PassivityGuard::check_energy_runaway(double dt_s) noexcept {
+  min_injected_J_[slice_] = std::min(min_injected_J_[slice_], injected_J());
+  slice_time_s_ += dt_s;
+  if (slice_time_s_ >= kRunawayWindow_s / static_cast<double>(kRunawaySlices)) {
+    slice_time_s_ = 0.0;
+    slice_ = (slice_ + 1) % kRunawaySlices;
+    min_injected_J_[slice_] = injected_J();
   }
-  out_of_hand_ = injected_J() - *std::min_element(least_J_.begin(), least_J_.end()) > kOutOfHand_J;
+  energy_runaway_ =
+      injected_J() - *std::min_element(min_injected_J_.begin(), min_injected_J_.end()) > kRunawayEnergy_J;
 }
 
 //   F_guard = -alpha (b v, b_rot w),   alpha = E / ((b |v|^2 + b_rot |w|^2) dt)
-Wrench PassivityGuard::damping(double dt_s) const noexcept {
-  const Motion& step = motion_[steps_ % kWindow];
-  const Motion& before = motion_[(steps_ + kWindow - 1) % kWindow];
+Wrench PassivityGuard::damping_wrench(double dt_s) const noexcept {
+  const Motion& step = motion_[steps_ % kVelocityWindow];
+  const Motion& before = motion_[(steps_ + kVelocityWindow - 1) % kVelocityWindow];
   const double over_s = step.dt_s + before.dt_s;  // two samples: half the noise of an encoder's steps
   if (!(over_s > 0.0)) return {};
-  const Vector3d f = device_.linear_N_s_per_m * (step.way_m + before.way_m) / over_s;
-  const Vector3d t = device_.angular_Nm_s_per_rad * (step.turn_rad + before.turn_rad) / over_s;
-  const double takes_J = (f.dot(step.way_m + before.way_m) + t.dot(step.turn_rad + before.turn_rad)) /
-                         over_s * (dt_s > 0.0 ? dt_s : step.dt_s);
+  const Vector3d f = device_.linear_N_s_per_m * (step.displacement_m + before.displacement_m) / over_s;
+  const Vector3d t = device_.angular_Nm_s_per_rad * (step.rotation_rad + before.rotation_rad) / over_s;
+  const double takes_J =
+      (f.dot(step.displacement_m + before.displacement_m) + t.dot(step.rotation_rad + before.rotation_rad)) /
+      over_s * (dt_s > 0.0 ? dt_s : step.dt_s);
   if (!(takes_J > 0.0)) return {};
-  const double alpha = std::min(most_alpha_, expected_J_ / takes_J);
+  const double alpha = std::min(max_alpha_, predicted_net_J_ / takes_J);
   return {-alpha * f, -alpha * t};
 }
 

@@ -129,7 +129,7 @@ PlanarFamily::PlanarFamily(const Inertia& M, const ConvexBody& body, int planes)
 
 PlanarFamily::AtContact::AtContact(const PlanarFamily& family, const Pose& X_WP,
                                    const Contact& contact) noexcept
-    : family_(family), ring_(family.body_.ring_of(contact.tool_feature)), apex_T_(contact.p_TA_m) {
+    : family_(family), ring_(family.body_.ring_of(contact.tool_feature)), apex_T_(contact.p_TCa_m) {
   const Vector3d& n = contact.n_W;
   const Vector3d along = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
   Z_W_ = (along - along.dot(n) * n).normalized();

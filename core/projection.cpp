@@ -63,8 +63,9 @@ double positive_length(const Inertia& M) {
 
 }  // namespace
 
-FixedList<ActiveContact, ContactSet::kCapacity> shared_evenly(const Projection& projection) noexcept {
-  FixedList<ActiveContact, ContactSet::kCapacity> shared;
+StaticVector<ActiveContact, ContactSet::kCapacity> evenly_loaded_contacts(
+    const Projection& projection) noexcept {
+  StaticVector<ActiveContact, ContactSet::kCapacity> shared;
   for (const ActiveContact& a : projection.active) {
     double touching = 0.0;
     double carried = 0.0;
@@ -86,7 +87,7 @@ ExactProjection::ExactProjection(const Inertia& M, Budget budget, double clearan
       iteration_limit_(budget.iterations),
       L_(positive_length(M)),
       clearance_(clearance_m / L_),
-      slack_(std::max(kGapTolerance, kSlack * clearance_)),
+      gap_slack_(std::max(kGapTolerance, kSlack * clearance_)),
       H_hat_(M.H_kg_m2 / (M.mass_kg * L_ * L_)) {
   Matrix6d metric = Matrix6d::Zero();
   metric.diagonal().head<3>().setConstant(2.0);
@@ -96,12 +97,12 @@ ExactProjection::ExactProjection(const Inertia& M, Budget budget, double clearan
 
 Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start,
                                     std::span<const ActiveContact> known) noexcept {
-  begin(X_WP, scene);
-  return known.empty() ? solve(turned_to(X_start.rotation)) : follow(X_start, known);
+  begin_query(X_WP, scene);
+  return known.empty() ? solve(relative_rotation(X_start.rotation)) : solve_from_known(X_start, known);
 }
 
 Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
-                                 const Leash& leash) noexcept {
+                                 const StepLimit& leash) noexcept {
   /// The contacts are all known: nothing is asked.
   class Nothing final : public ContactSource {
    public:
@@ -110,79 +111,80 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
     bool admits(const Pose&, double) const noexcept override { return true; }
   };
   const Nothing nothing;
-  begin(X_WP, nothing);
-  const bool free_at_p = take_over(known);
+  begin_query(X_WP, nothing);
+  const bool free_at_p = load_known_contacts(known);
   iterations_ = 0;
-  met_touching_ = false;
-  start_.E = turned_to(X_start.rotation);
-  start_.R = start_.E.toRotationMatrix();
-  start_.u = X_WP.rotation.conjugate() * (X_start.translation_m - X_WP.translation_m) / L_;
-  start_.T = scaled_energy(start_);
-  leash_ = leash;
-  state_ = State{};
-  if (free_at_p && !strays(state_)) {
-    leash_ = Leash{};
-    return free();
+  touching_added_ = false;
+  step_start_.E = relative_rotation(X_start.rotation);
+  step_start_.R = step_start_.E.toRotationMatrix();
+  step_start_.u = X_WP.rotation.conjugate() * (X_start.translation_m - X_WP.translation_m) / L_;
+  step_start_.T = scaled_energy(step_start_);
+  step_limit_ = leash;
+  state_ = Iterate{};
+  if (free_at_p && !exceeds_step_limit(state_)) {
+    step_limit_ = StepLimit{};
+    return free_projection();
   }
-  state_ = start_;
+  state_ = step_start_;
   if (contacts_.empty()) {  // straight to p
-    const double turn_rad = start_.E.angularDistance(Quaterniond::Identity());
-    const double share = std::min(leash.shift_m / std::max(start_.u.norm() * L_, leash.shift_m),
-                                  leash.turn_rad / std::max(turn_rad, leash.turn_rad));
-    state_.E = start_.E.slerp(share, Quaterniond::Identity());
+    const double turn_rad = step_start_.E.angularDistance(Quaterniond::Identity());
+    const double share =
+        std::min(leash.translation_m / std::max(step_start_.u.norm() * L_, leash.translation_m),
+                 leash.rotation_rad / std::max(turn_rad, leash.rotation_rad));
+    state_.E = step_start_.E.slerp(share, Quaterniond::Identity());
     state_.R = state_.E.toRotationMatrix();
-    state_.u = (1.0 - share) * start_.u;
+    state_.u = (1.0 - share) * step_start_.u;
     state_.T = scaled_energy(state_);
     residual_ = 1.0;
-    leash_ = Leash{};
-    return answer(Local::budget_spent);
+    step_limit_ = StepLimit{};
+    return make_projection(LocalResult::budget_spent);
   }
   // What is pushed from two sides may have to turn. Nothing else has to: where it starts is allowed.
-  const bool pushed = leash.turn_rad == std::numeric_limits<double>::infinity();
-  if (!translate(state_) && !(pushed && seek_feasible(state_))) {
-    leash_ = Leash{};
-    return answer(Local::infeasible);
+  const bool pushed = leash.rotation_rad == std::numeric_limits<double>::infinity();
+  if (!translate(state_) && !(pushed && find_feasible_rotation(state_))) {
+    step_limit_ = StepLimit{};
+    return make_projection(LocalResult::infeasible);
   }
-  Local local = Local::budget_spent;
-  if (strays(state_)) {
+  LocalResult local = LocalResult::budget_spent;
+  if (exceeds_step_limit(state_)) {
     // At one rotation the gaps are affine and T is convex: the way to the nearest translation is open, and
     // falls.
-    const Vector3d way = state_.u - start_.u;
-    state_.u = start_.u + way * (leash.shift_m / (L_ * way.norm()));
+    const Vector3d way = state_.u - step_start_.u;
+    state_.u = step_start_.u + way * (leash.translation_m / (L_ * way.norm()));
     state_.T = scaled_energy(state_);
     linearise(state_);
     residual_ = residual(gradient(state_));
   } else {
     local = minimise(state_, false);
   }
-  leash_ = Leash{};
-  return answer(local);
+  step_limit_ = StepLimit{};
+  return make_projection(local);
 }
 
 /// Is a state beyond the leash?
-bool ExactProjection::strays(const State& state) const noexcept {
-  return (state.u - start_.u).norm() * L_ > leash_.shift_m ||
-         state.E.angularDistance(start_.E) > leash_.turn_rad;
+bool ExactProjection::exceeds_step_limit(const Iterate& state) const noexcept {
+  return (state.u - step_start_.u).norm() * L_ > step_limit_.translation_m ||
+         state.E.angularDistance(step_start_.E) > step_limit_.rotation_rad;
 }
 
 Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& scene,
                                       const Pose& X_rotated) noexcept {
-  begin(X_WP, scene);
-  return solve(turned_to(X_rotated.rotation), Freedom::translation);
+  begin_query(X_WP, scene);
+  return solve(relative_rotation(X_rotated.rotation), Freedom::translation);
 }
 
 Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSource& scene) noexcept {
   iteration_limit_ = static_cast<std::uint16_t>(kPatience * budget_.iterations);
-  begin(X_WP, scene);
-  Projection best = best_of_all_starts();
+  begin_query(X_WP, scene);
+  Projection best = multistart();
   iteration_limit_ = budget_.iterations;
   return best;
 }
 
-Projection ExactProjection::best_of_all_starts() noexcept {
+Projection ExactProjection::multistart() noexcept {
   Projection best = solve(Quaterniond::Identity());
   if (best.status == ProjectionStatus::free) return best;
-  best.proven_global = best.status == ProjectionStatus::converged && proven();
+  best.proven_global = best.status == ProjectionStatus::converged && certify_global();
   if (best.proven_global) return best;
   const Quaterniond dual_optimum =
       best.status == ProjectionStatus::infeasible ? Quaterniond::Identity() : dual_rotation();
@@ -191,7 +193,7 @@ Projection ExactProjection::best_of_all_starts() noexcept {
     Projection other = solve(E);
     if (other.status == ProjectionStatus::infeasible) return;
     if (best.status != ProjectionStatus::infeasible && best.energy <= other.energy) return;
-    other.proven_global = other.status == ProjectionStatus::converged && proven();
+    other.proven_global = other.status == ProjectionStatus::converged && certify_global();
     best = other;
   };
 
@@ -208,7 +210,7 @@ Projection ExactProjection::best_of_all_starts() noexcept {
   // both ways, near and far from p; then the same around the best of these.
   try_from(dual_optimum);
   for (const double angle : {0.25, 0.6, 1.2, 2.2}) try_around(Quaterniond::Identity(), angle);
-  const Quaterniond best_E = turned_to(best.X_WQ.rotation);
+  const Quaterniond best_E = relative_rotation(best.X_WQ.rotation);
   for (const double angle : {0.4, 0.9}) try_around(best_E, angle);
   return best;
 }
@@ -219,59 +221,63 @@ double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
 }
 
 /// What all attempts at one p share.
-void ExactProjection::begin(const Pose& X_WP, const ContactSource& scene) noexcept {
+void ExactProjection::begin_query(const Pose& X_WP, const ContactSource& scene) noexcept {
   X_WP_ = X_WP;
   scene_ = &scene;
-  at_end_of_leash_ = false;
+  at_step_limit_ = false;
   rounding_m_ = gap_tolerance_m(X_WP);
   tolerance_m_ = rounding_m_ - clearance_ * L_;
 }
 
-Quaterniond ExactProjection::turned_to(const Quaterniond& R_WT) const noexcept {
+Quaterniond ExactProjection::relative_rotation(const Quaterniond& R_WT) const noexcept {
   return (X_WP_.rotation.conjugate() * R_WT).normalized();
 }
 
 /// Without history: the contacts to begin with are those that p violates.
 Projection ExactProjection::solve(const Quaterniond& E_start, Freedom freedom) noexcept {
-  if (scene_->admits(X_WP_, tolerance_m_)) return free();
+  if (scene_->admits(X_WP_, tolerance_m_)) return free_projection();
   contacts_.clear();
   scene_->add_violated(X_WP_, tolerance_m_, contacts_);
-  see_from(0);
+  update_local_contacts(0);
   iterations_ = 0;
-  met_touching_ = false;
-  state_ = State{};
+  touching_added_ = false;
+  state_ = Iterate{};
   state_.E = E_start;
   state_.R = E_start.toRotationMatrix();
-  if (freedom == Freedom::translation) return answer(lift(state_) ? Local::converged : Local::infeasible);
-  return answer(lift_turning(state_) ? minimise(state_, true) : Local::infeasible);
+  if (freedom == Freedom::translation)
+    return make_projection(project_translation(state_) ? LocalResult::converged : LocalResult::infeasible);
+  return make_projection(project_translation_or_rotate(state_) ? minimise(state_, true)
+                                                               : LocalResult::infeasible);
 }
 
 /// Begins with these contacts and their multipliers. True where p violates none of them.
-bool ExactProjection::take_over(std::span<const ActiveContact> known) noexcept {
+bool ExactProjection::load_known_contacts(std::span<const ActiveContact> known) noexcept {
   contacts_.clear();
   for (const ActiveContact& active : known) contacts_.add(active.contact);
-  see_from(0);
+  update_local_contacts(0);
   bool apart = true;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
-    apart = apart && !overlaps_at_p(seen_[i]);
+    apart = apart && !overlaps_at_p(local_contacts_[i]);
   }
   return apart;
 }
 
 /// From an admissible pose and the contacts that hold it. Most often one of them tells without asking the
 /// scene that p is not admissible.
-Projection ExactProjection::follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept {
-  if (take_over(known) && scene_->admits(X_WP_, tolerance_m_)) return free();
+Projection ExactProjection::solve_from_known(const Pose& X_start,
+                                             std::span<const ActiveContact> known) noexcept {
+  if (load_known_contacts(known) && scene_->admits(X_WP_, tolerance_m_)) return free_projection();
   iterations_ = 0;
-  met_touching_ = false;
-  state_.E = turned_to(X_start.rotation);
+  touching_added_ = false;
+  state_.E = relative_rotation(X_start.rotation);
   state_.R = state_.E.toRotationMatrix();
-  if (translate(state_)) return answer(minimise(state_, false));
-  return answer(lift_turning(state_) ? minimise(state_, true) : Local::infeasible);
+  if (translate(state_)) return make_projection(minimise(state_, false));
+  return make_projection(project_translation_or_rotate(state_) ? minimise(state_, true)
+                                                               : LocalResult::infeasible);
 }
 
-Projection ExactProjection::free() const noexcept {
+Projection ExactProjection::free_projection() const noexcept {
   Projection out;
   out.X_WQ = X_WP_;
   out.proven_global = true;
@@ -279,42 +285,43 @@ Projection ExactProjection::free() const noexcept {
 }
 
 /// What became of the attempt.
-Projection ExactProjection::answer(Local local) noexcept {
+Projection ExactProjection::make_projection(LocalResult local) noexcept {
   Projection out;
   out.X_WQ = X_WP_;
   out.iterations = iterations_;
   out.status = ProjectionStatus::infeasible;
-  if (local == Local::infeasible) return out;
-  out.status = local == Local::converged ? ProjectionStatus::converged : ProjectionStatus::budget_spent;
-  report(out);
+  if (local == LocalResult::infeasible) return out;
+  out.status = local == LocalResult::converged ? ProjectionStatus::converged : ProjectionStatus::budget_spent;
+  fill_projection(out);
   return out;
 }
 
-Pose ExactProjection::pose_of(const State& state) const noexcept {
+Pose ExactProjection::to_pose(const Iterate& state) const noexcept {
   return {(X_WP_.rotation * state.E).normalized(), X_WP_.translation_m + X_WP_.rotation * (L_ * state.u)};
 }
 
 /// Contacts number `first` and up as p sees them: directions in p's axes, lengths in units of L.
-void ExactProjection::see_from(std::size_t first) noexcept {
+void ExactProjection::update_local_contacts(std::size_t first) noexcept {
   if (first == contacts_.size()) return;
   const Matrix3d R_PW = X_WP_.rotation.toRotationMatrix().transpose();
   for (std::size_t i = first; i < contacts_.size(); ++i) {
     const Contact& contact = contacts_[i];
-    Seen& seen = seen_[i];
+    LocalContact& seen = local_contacts_[i];
     seen.kind = contact.kind;
     seen.n = R_PW * contact.n_W;
-    seen.a = contact.p_TA_m / L_;
+    seen.a = contact.p_TCa_m / L_;
     seen.b.setZero();
     seen.c = (contact.n_W.dot(X_WP_.translation_m) - contact.offset_m) / L_;
     multiplier_[i] = 0.0;
     if (contact.kind == ContactKind::vertex_face) continue;
-    seen.b = R_PW * (contact.p_WB_m - X_WP_.translation_m) / L_;
+    seen.b = R_PW * (contact.p_WCb_m - X_WP_.translation_m) / L_;
     seen.d = contact.d_T;
     seen.dB = R_PW * contact.d_W;
   }
 }
 
-ExactProjection::Affine ExactProjection::affine(const Seen& seen, const Matrix3d& R) const noexcept {
+ExactProjection::AffineGap ExactProjection::affine_gap(const LocalContact& seen,
+                                                       const Matrix3d& R) const noexcept {
   switch (seen.kind) {
     case ContactKind::vertex_face:
       break;
@@ -333,7 +340,7 @@ ExactProjection::Affine ExactProjection::affine(const Seen& seen, const Matrix3d
 
 /// Is a contact certainly nearer at p than it may be? Without clearance the gap of two edges is looked at
 /// without the length of their normal, whose sign is the same.
-bool ExactProjection::overlaps_at_p(const Seen& seen) const noexcept {
+bool ExactProjection::overlaps_at_p(const LocalContact& seen) const noexcept {
   const double least = -tolerance_m_ / L_;
   switch (seen.kind) {
     case ContactKind::vertex_face:
@@ -348,13 +355,13 @@ bool ExactProjection::overlaps_at_p(const Seen& seen) const noexcept {
   return seen.n.dot(seen.a) + seen.c < least;
 }
 
-double ExactProjection::scaled_energy(const State& state) const noexcept {
+double ExactProjection::scaled_energy(const Iterate& state) const noexcept {
   const Vector3d v = state.E.vec();
   return state.u.squaredNorm() + 4.0 * v.dot(H_hat_ * v);
 }
 
 /// E <- E o (1, eta/2), normalised: a retraction that agrees with exp to second order.
-void ExactProjection::turn(State& state, const Vector3d& eta) const noexcept {
+void ExactProjection::rotate(Iterate& state, const Vector3d& eta) const noexcept {
   const Quaterniond step(1.0, 0.5 * eta.x(), 0.5 * eta.y(), 0.5 * eta.z());
   state.E = (state.E * step).normalized();
   state.R = state.E.toRotationMatrix();
@@ -362,23 +369,24 @@ void ExactProjection::turn(State& state, const Vector3d& eta) const noexcept {
 
 /// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -h_i, over the
 /// contacts at hand. False where no translation helps.
-bool ExactProjection::translate(State& state) noexcept {
-  translation_.clear();
-  return translate_further(state);
+bool ExactProjection::translate(Iterate& state) noexcept {
+  translation_problem_.clear();
+  return extend_translation(state);
 }
 
 /// The same with contacts that have come since.
-bool ExactProjection::translate_further(State& state) noexcept {
+bool ExactProjection::extend_translation(Iterate& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
-  for (std::size_t i = translation_.count(); i < contacts_.size(); ++i) {
-    const Affine gap = affine(seen_[i], state.R);
-    translation_.add_unit(gap.n, -gap.h);
+  for (std::size_t i = translation_problem_.count(); i < contacts_.size(); ++i) {
+    const AffineGap gap = affine_gap(local_contacts_[i], state.R);
+    translation_problem_.add_unit(gap.n, -gap.h);
   }
   E_translated_ = state.E;
-  if (translation_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible &&
-      (slack_ == kGapTolerance || translation_.solve(Vector3d::Zero(), slack_) == Status::infeasible))
+  if (translation_problem_.solve(Vector3d::Zero(), kGapTolerance) == Status::infeasible &&
+      (gap_slack_ == kGapTolerance ||
+       translation_problem_.solve(Vector3d::Zero(), gap_slack_) == Status::infeasible))
     return false;
-  state.u = translation_.z();
+  state.u = translation_problem_.z();
   state.T = scaled_energy(state);
   return true;
 }
@@ -387,15 +395,15 @@ bool ExactProjection::translate_further(State& state) noexcept {
 /// scene what the answer violates, add it, repeat. Idle contacts make room for new ones: |u| only grows from
 /// round to round, so none comes back for ever. False where no translation helps, or none was found in the
 /// rounds allowed.
-bool ExactProjection::restore(State& state) noexcept {
-  translation_.clear();
-  for (std::uint16_t round = 0; round < budget_.rounds; ++round) {
-    if (!translate_further(state)) return false;
-    if (contacts_.size() > kCrowded) make_room(state);
+bool ExactProjection::restore_admissibility(Iterate& state) noexcept {
+  translation_problem_.clear();
+  for (std::uint16_t round = 0; round < budget_.constraint_rounds; ++round) {
+    if (!extend_translation(state)) return false;
+    if (contacts_.size() > kCrowded) drop_idle_contacts(state);
     const std::size_t known = contacts_.size();
-    if (scene_->add_violated(pose_of(state), tolerance_m_, contacts_) == 0)
+    if (scene_->add_violated(to_pose(state), tolerance_m_, contacts_) == 0)
       return !contacts_.full();  // a full set cannot tell of what it has no room for
-    see_from(known);
+    update_local_contacts(known);
   }
   return false;
 }
@@ -407,12 +415,14 @@ bool ExactProjection::restore(State& state) noexcept {
 //   vertex_face   nothing
 //   face_vertex   d x r                                      n_Q = d
 //   edge_edge     d x (dB_Q x r_t) / s                       r_t: r without its part along n,  s = |d x dB_Q|
-void ExactProjection::linearise(const State& state) noexcept {
+void ExactProjection::linearise(const Iterate& state) noexcept {
   // Most often this very rotation has just been translated.
-  const bool known = translation_.count() == contacts_.size() && E_translated_.coeffs() == state.E.coeffs();
+  const bool known =
+      translation_problem_.count() == contacts_.size() && E_translated_.coeffs() == state.E.coeffs();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    const Seen& seen = seen_[i];
-    const Affine at = known ? Affine{translation_.normal(i), -translation_.bound(i)} : affine(seen, state.R);
+    const LocalContact& seen = local_contacts_[i];
+    const AffineGap at = known ? AffineGap{translation_problem_.normal(i), -translation_problem_.bound(i)}
+                               : affine_gap(seen, state.R);
     const Vector3d n_Q = state.R.transpose() * at.n;
     gap_[i] = at.n.dot(state.u) + at.h;
     Vector3d turning = seen.a.cross(n_Q);
@@ -431,7 +441,7 @@ void ExactProjection::linearise(const State& state) noexcept {
 }
 
 /// With G = (w I + v^)/2, so that dv = G eta:    g = [ 2 u ; 8 G' H^ v ]
-Vector6d ExactProjection::gradient(const State& state) const noexcept {
+Vector6d ExactProjection::gradient(const Iterate& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Vector3d Hv = H_hat_ * v;
   Vector6d g;
@@ -441,10 +451,10 @@ Vector6d ExactProjection::gradient(const State& state) const noexcept {
 }
 
 /// Hessian of T:  [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ]
-ExactProjection::Curvature ExactProjection::curvature_of_metric(const State& state) const noexcept {
+ExactProjection::HessianBlocks ExactProjection::metric_hessian(const Iterate& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Matrix3d G = 0.5 * (state.E.w() * Matrix3d::Identity() + hat(v));
-  Curvature W;
+  HessianBlocks W;
   W.B = 8.0 * G.transpose() * H_hat_ * G;
   W.B.diagonal().array() -= 2.0 * v.dot(H_hat_ * v);
   return W;
@@ -452,8 +462,8 @@ ExactProjection::Curvature ExactProjection::curvature_of_metric(const State& sta
 
 /// Hessian of the Lagrangian T - sum multiplier_i gap_i: that of T, less sum multiplier_i K_i. K is linear in
 /// what contacts of the same normal differ in, so each normal bends once.
-ExactProjection::Curvature ExactProjection::curvature(const State& state) const noexcept {
-  Curvature W = curvature_of_metric(state);
+ExactProjection::HessianBlocks ExactProjection::lagrangian_hessian(const Iterate& state) const noexcept {
+  HessianBlocks W = metric_hessian(state);
   const auto carries = [&](std::size_t i) { return multiplier_[i] > 0.0; };
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const auto is_of_i = [&](std::size_t j) { return carries(j) && same_normal(contacts_[i], contacts_[j]); };
@@ -461,15 +471,15 @@ ExactProjection::Curvature ExactProjection::curvature(const State& state) const 
     bool done = false;
     for (std::size_t j = 0; j < i; ++j) done = done || is_of_i(j);
     if (done) continue;
-    Load load;
+    WeightedContactSum load;
     for (std::size_t j = i; j < contacts_.size(); ++j) {
       if (!is_of_i(j)) continue;
       load.m += multiplier_[j];
-      load.a += multiplier_[j] * seen_[j].a;
-      load.b += multiplier_[j] * seen_[j].b;
-      load.turning += multiplier_[j] * J_[j].tail<3>();
+      load.a += multiplier_[j] * local_contacts_[j].a;
+      load.b += multiplier_[j] * local_contacts_[j].b;
+      load.angular_gradient += multiplier_[j] * J_[j].tail<3>();
     }
-    bend(state, i, load, W);
+    add_contact_curvature(state, i, load, W);
   }
   return W;
 }
@@ -486,8 +496,9 @@ ExactProjection::Curvature ExactProjection::curvature(const State& state) const 
 //     gap: (K_f - J g_s' - g_s J')/s, but for a term with the gap itself, which is zero where it matters
 //
 // load: a, b and J of all contacts with this normal, and 1, each times its multiplier.
-void ExactProjection::bend(const State& state, std::size_t i, const Load& load, Curvature& W) const noexcept {
-  const Seen& seen = seen_[i];
+void ExactProjection::add_contact_curvature(const Iterate& state, std::size_t i,
+                                            const WeightedContactSum& load, HessianBlocks& W) const noexcept {
+  const LocalContact& seen = local_contacts_[i];
   const Vector3d n = J_[i].head<3>();
   const auto R_T = state.R.transpose();
   const Vector3d n_Q = R_T * n;
@@ -511,7 +522,7 @@ void ExactProjection::bend(const State& state, std::size_t i, const Load& load, 
   const double s = seen.d.cross(dB).norm();
   const Vector3d lever = dB.cross(w + load.a) / s;
   const Vector3d across = seen.d.cross(load.a) * (2.0 / s);
-  const Vector3d tilting = load.a + (2.0 / s * cosine) * load.turning;
+  const Vector3d tilting = load.a + (2.0 / s * cosine) * load.angular_gradient;
   bend_by(lever * seen.d.transpose() - dB * across.transpose() + n_Q * tilting.transpose(),
           lever.dot(seen.d) + n_Q.dot(load.a));
   W.C -= (load.m / s) * (state.R * seen.d * dB.transpose() + cosine * (n * n_Q.transpose() - state.R));
@@ -519,7 +530,7 @@ void ExactProjection::bend(const State& state, std::size_t i, const Load& load, 
 
 /// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. False where it is not
 /// positive definite.
-bool ExactProjection::factorise(const Curvature& W, Root& root) const noexcept {
+bool ExactProjection::factorise(const HessianBlocks& W, CholeskyFactor& root) const noexcept {
   constexpr double kSqrtHalf = 0.70710678118654752440;
   if (!inverse_root(W.B - 0.5 * W.C.transpose() * W.C, root.S_inverse)) return false;
   root.P_inverse = kSqrtHalf * Matrix3d::Identity();
@@ -532,7 +543,8 @@ bool ExactProjection::factorise(const Curvature& W, Root& root) const noexcept {
 /// keeps the convergence quadratic. If that is not enough (far from a minimum), negative eigenvalues are
 /// turned over, taken relative to the metric diag(2 I, 2 H^): a needle's roll is a soft direction, not a flat
 /// one.
-void ExactProjection::factorise_convex_part(const Curvature& curvature, Root& root) const noexcept {
+void ExactProjection::factorise_convexified(const HessianBlocks& curvature,
+                                            CholeskyFactor& root) const noexcept {
   Matrix6d W;
   W << 2.0 * Matrix3d::Identity(), curvature.C, curvature.C.transpose(), curvature.B;
   Matrix6d L;
@@ -563,7 +575,7 @@ void ExactProjection::factorise_convex_part(const Curvature& curvature, Root& ro
   split(metric_root_ * metric_root_.transpose());
 }
 
-Vector6d ExactProjection::Root::solve(const Vector6d& y) const noexcept {
+Vector6d ExactProjection::CholeskyFactor::solve(const Vector6d& y) const noexcept {
   Vector6d z;
   const Vector3d upper = P_inverse * y.head<3>();
   z.head<3>() = upper;
@@ -571,7 +583,7 @@ Vector6d ExactProjection::Root::solve(const Vector6d& y) const noexcept {
   return z;
 }
 
-Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexcept {
+Vector6d ExactProjection::CholeskyFactor::solve_transposed(const Vector6d& z) const noexcept {
   Vector6d y;
   const Vector3d lower = S_inverse.transpose() * z.tail<3>();
   y.head<3>() = P_inverse.transpose() * (z.head<3>() - Q.transpose() * lower);
@@ -583,11 +595,11 @@ Vector6d ExactProjection::Root::solve_transposed(const Vector6d& z) const noexce
 ///
 /// The first multipliers are those of a pure translation, too large where a rotation will do: a Lagrangian
 /// that they bend too far gives way to the metric alone.
-void ExactProjection::model(const State& state) noexcept {
+void ExactProjection::factorise_model(const Iterate& state) noexcept {
   constexpr int kEarly = 2;
-  const Curvature W = curvature(state);
-  if (factorise(W, root_)) return;
-  if (iterations_ > kEarly || !factorise(curvature_of_metric(state), root_)) factorise_convex_part(W, root_);
+  const HessianBlocks W = lagrangian_hessian(state);
+  if (factorise(W, factor_)) return;
+  if (iterations_ > kEarly || !factorise(metric_hessian(state), factor_)) factorise_convexified(W, factor_);
 }
 
 /// The step that minimises the quadratic model within the linearised gaps:
@@ -597,33 +609,35 @@ void ExactProjection::model(const State& state) noexcept {
 /// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g. At an
 /// admissible state dy = 0 is allowed, so there always is an answer. Leaves the multipliers.
 bool ExactProjection::newton_step(const Vector6d& g, Vector6d& dy) noexcept {
-  step_.clear();
-  for (std::size_t i = 0; i < contacts_.size(); ++i) step_.add(root_.solve(J_[i]), -std::max(gap_[i], 0.0));
+  newton_problem_.clear();
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    newton_problem_.add(factor_.solve(J_[i]), -std::max(gap_[i], 0.0));
   using Status = LeastDistance<6, ContactSet::kCapacity>::Status;
-  if (step_.solve(-root_.solve(g), kGapTolerance) != Status::optimal) return false;
-  dy = root_.solve_transposed(step_.z());
-  for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = step_.multiplier(i);
+  if (newton_problem_.solve(-factor_.solve(g), kGapTolerance) != Status::optimal) return false;
+  dy = factor_.solve_transposed(newton_problem_.z());
+  for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = newton_problem_.multiplier(i);
   return true;
 }
 
 /// The nearest translation out, with its multipliers.
-bool ExactProjection::lift(State& state) noexcept {
-  if (!restore(state)) return false;
-  for (std::size_t i = 0; i < contacts_.size(); ++i) multiplier_[i] = 2.0 * translation_.multiplier(i);
+bool ExactProjection::project_translation(Iterate& state) noexcept {
+  if (!restore_admissibility(state)) return false;
+  for (std::size_t i = 0; i < contacts_.size(); ++i)
+    multiplier_[i] = 2.0 * translation_problem_.multiplier(i);
   linearise(state);
   residual_ = residual(gradient(state));
   return true;
 }
 
 /// The same, from another rotation where no translation helps at this one.
-bool ExactProjection::lift_turning(State& state) noexcept {
-  return lift(state) || (seek_feasible(state) && lift(state));
+bool ExactProjection::project_translation_or_rotate(Iterate& state) noexcept {
+  return project_translation(state) || (find_feasible_rotation(state) && project_translation(state));
 }
 
 /// Newton's method, with first guesses of the multipliers. Leaves the gaps of the last state. asked: the
 /// scene has been asked about this state, and is about every next. A proxy begins without: the contacts that
 /// held it are taken for all there are until they have an answer, or one of them lets go.
-ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexcept {
+ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool asked) noexcept {
   double before_short_step = std::numeric_limits<double>::infinity();  // the residual
   for (;;) {
     linearise(state);
@@ -631,34 +645,37 @@ ExactProjection::Local ExactProjection::minimise(State& state, bool asked) noexc
     residual_ = residual(g);
     const bool rounding = residual_ > 0.5 * before_short_step && residual_ <= kRoundedResidual;
     const bool converged = residual_ <= kSmallResidual || rounding;
-    if (converged || iterations_ == iteration_limit_ || at_end_of_leash_) {
-      const Local local = converged ? Local::converged : Local::budget_spent;
-      if (asked || (all_open() && meet_touching(state))) return local;
-      if (!restore(state) && !lift_turning(state)) return Local::infeasible;
+    if (converged || iterations_ == iteration_limit_ || at_step_limit_) {
+      const LocalResult local = converged ? LocalResult::converged : LocalResult::budget_spent;
+      if (asked || (all_gaps_open() && add_touching_contacts(state))) return local;
+      if (!restore_admissibility(state) && !project_translation_or_rotate(state))
+        return LocalResult::infeasible;
       asked = true;
       continue;
     }
     ++iterations_;
-    model(state);
+    factorise_model(state);
     Vector6d dy;
     const bool stepped = newton_step(g, dy);
     const double promised = stepped ? -g.dot(dy) : 0.0;  // first-order fall of T
-    const bool ask = asked || some_contact_idle();       // another has to take its place
-    const Advance moved = stepped ? advance(state, dy, promised, ask) : Advance::stuck;
-    if (moved == Advance::fell) asked = ask;
-    const bool short_step = moved == Advance::fell && dy.norm() < kShortStep;
+    const bool ask = asked || has_idle_contact();        // another has to take its place
+    const LineSearchResult moved =
+        stepped ? line_search(state, dy, promised, ask) : LineSearchResult::no_decrease;
+    if (moved == LineSearchResult::decreased) asked = ask;
+    const bool short_step = moved == LineSearchResult::decreased && dy.norm() < kShortStep;
     before_short_step = short_step ? residual_ : std::numeric_limits<double>::infinity();
-    if (moved != Advance::stuck) continue;  // contacts met: the same state, with a model that knows them
-    if (at_end_of_leash_) continue;
+    if (moved != LineSearchResult::no_decrease)
+      continue;  // contacts met: the same state, with a model that knows them
+    if (at_step_limit_) continue;
     if (!asked) {
-      if (!lift_turning(state)) return Local::infeasible;
+      if (!project_translation_or_rotate(state)) return LocalResult::infeasible;
       asked = true;
       continue;
     }
     linearise(state);  // contacts may have made room for others
     residual_ = residual(gradient(state));
     // Rounding hides the fall of T where the promise is smaller than T's own last digits.
-    return stepped && promised <= 1e-13 * state.T ? Local::converged : Local::budget_spent;
+    return stepped && promised <= 1e-13 * state.T ? LocalResult::converged : LocalResult::budget_spent;
   }
 }
 
@@ -672,43 +689,44 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
 }
 
 /// At the state linearised last. One that was not asked about may overlap what a trial from it has met.
-bool ExactProjection::all_open() const noexcept {
-  const double least = -2.0 * (slack_ + rounding_m_ / L_);
+bool ExactProjection::all_gaps_open() const noexcept {
+  const double least = -2.0 * (gap_slack_ + rounding_m_ / L_);
   return std::all_of(gap_.begin(), gap_.begin() + contacts_.size(), [=](double gap) { return gap >= least; });
 }
 
-bool ExactProjection::some_contact_idle() const noexcept {
+bool ExactProjection::has_idle_contact() const noexcept {
   return std::any_of(multiplier_.begin(), multiplier_.begin() + contacts_.size(),
                      [](double m) { return !(m > 0.0); });
 }
 
 /// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails
 /// and has met contacts the model did not know ends the search: with them the next step will be a better one.
-ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& dy, double promised,
-                                                  bool ask) noexcept {
+ExactProjection::LineSearchResult ExactProjection::line_search(Iterate& state, const Vector6d& dy,
+                                                               double promised, bool ask) noexcept {
   constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
   constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
   const Vector3d eta = dy.tail<3>();
   // What T may seem to rise by: its own rounding, and that of the translation, which meets its gaps to
-  // slack_ only.
-  const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * slack_ * state.u.norm() : 0.0;
-  double fraction = 1.0 / std::max(1.0, eta.norm() / std::min(1.0, leash_.turn_rad));  // one radian at most
+  // gap_slack_ only.
+  const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * gap_slack_ * state.u.norm() : 0.0;
+  double fraction =
+      1.0 / std::max(1.0, eta.norm() / std::min(1.0, step_limit_.rotation_rad));  // one radian at most
   for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
-    State trial = state;
-    turn(trial, fraction * eta);
+    Iterate trial = state;
+    rotate(trial, fraction * eta);
     const std::size_t known = contacts_.size();
-    if ((ask ? restore(trial) : translate(trial)) &&
+    if ((ask ? restore_admissibility(trial) : translate(trial)) &&
         trial.T <= state.T + rounding - kFairShare * fraction * promised) {
-      if (strays(trial)) {
-        at_end_of_leash_ = true;
+      if (exceeds_step_limit(trial)) {
+        at_step_limit_ = true;
         continue;
       }
       state = trial;
-      return Advance::fell;
+      return LineSearchResult::decreased;
     }
-    if (contacts_.size() > known) return Advance::met_contacts;
+    if (contacts_.size() > known) return LineSearchResult::found_contacts;
   }
-  return Advance::stuck;
+  return LineSearchResult::no_decrease;
 }
 
 /// Looks for a rotation from which a translation leads out, by Gauss-Newton on the deepest violation t:
@@ -716,71 +734,72 @@ ExactProjection::Advance ExactProjection::advance(State& state, const Vector6d& 
 ///   min  t^2 + small |dy|^2   s.t.   J_i dy + t >= -gap_i
 ///
 /// a least-distance problem in seven dimensions that always has an answer.
-bool ExactProjection::seek_feasible(State& state) noexcept {
+bool ExactProjection::find_feasible_rotation(Iterate& state) noexcept {
   constexpr double kRegularisation = 1e-3;  // weight of dy against t: small, so that t is what falls
   constexpr int kSteps = 30;
   using Vector7d = Eigen::Matrix<double, 7, 1>;
   for (int step = 0; step < kSteps; ++step) {
     linearise(state);
-    elastic_.clear();
+    feasibility_problem_.clear();
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
       Vector7d row;
       row << J_[i] / kRegularisation, 1.0;
-      elastic_.add(row, -gap_[i]);
+      feasibility_problem_.add(row, -gap_[i]);
     }
     using Status = LeastDistance<7, ContactSet::kCapacity>::Status;
-    if (elastic_.solve(Vector7d::Zero(), kGapTolerance) == Status::infeasible) return false;
-    Vector6d dy = elastic_.z().head<6>() / kRegularisation;
+    if (feasibility_problem_.solve(Vector7d::Zero(), kGapTolerance) == Status::infeasible) return false;
+    Vector6d dy = feasibility_problem_.z().head<6>() / kRegularisation;
     const double largest_turn = dy.tail<3>().norm();
     if (largest_turn > 0.5) dy *= 0.5 / largest_turn;
     if (dy.norm() < kShortStep) return false;
     state.u += dy.head<3>();
-    turn(state, dy.tail<3>());
-    if (restore(state)) return true;
+    rotate(state, dy.tail<3>());
+    if (restore_admissibility(state)) return true;
   }
   return false;
 }
 
 /// Drops contacts that are apart and carry nothing, neither of the last step nor of the translation just
 /// solved.
-void ExactProjection::make_room(const State& state) noexcept {
+void ExactProjection::drop_idle_contacts(const Iterate& state) noexcept {
   for (std::size_t i = contacts_.size(); i-- > 0;) {
-    const Affine gap = affine(seen_[i], state.R);
-    if (multiplier_[i] > 0.0 || translation_.multiplier(i) > 0.0 || gap.n.dot(state.u) + gap.h < kTouching)
+    const AffineGap gap = affine_gap(local_contacts_[i], state.R);
+    if (multiplier_[i] > 0.0 || translation_problem_.multiplier(i) > 0.0 ||
+        gap.n.dot(state.u) + gap.h < kTouching)
       continue;
     contacts_.remove_unordered(i);
     const std::size_t last = contacts_.size();
-    seen_[i] = seen_[last];
+    local_contacts_[i] = local_contacts_[last];
     multiplier_[i] = multiplier_[last];
-    translation_.remove_unordered(i);
+    translation_problem_.remove_unordered(i);
   }
 }
 
 /// Adds what touches idly. False, and nothing is added, where it is not idle: where something that was not
 /// known overlaps.
-bool ExactProjection::meet_touching(const State& state) noexcept {
+bool ExactProjection::add_touching_contacts(const Iterate& state) noexcept {
   const std::size_t known = contacts_.size();
-  const Pose X_WQ = pose_of(state);
+  const Pose X_WQ = to_pose(state);
   scene_->add_touching(X_WQ, (kTouching + clearance_) * L_, contacts_);
-  see_from(known);
-  met_touching_ = true;
-  for (std::size_t i = known; i < contacts_.size() && met_touching_; ++i) {
-    const Affine at = affine(seen_[i], state.R);
+  update_local_contacts(known);
+  touching_added_ = true;
+  for (std::size_t i = known; i < contacts_.size() && touching_added_; ++i) {
+    const AffineGap at = affine_gap(local_contacts_[i], state.R);
     gap_[i] = at.n.dot(state.u) + at.h;
-    met_touching_ = gap_[i] * L_ >= -rounding_m_;
+    touching_added_ = gap_[i] * L_ >= -rounding_m_;
   }
   // A full set cannot tell of what it has no room for.
-  if (contacts_.full() && met_touching_) met_touching_ = scene_->admits(X_WQ, tolerance_m_);
-  if (!met_touching_) contacts_.truncate(known);
-  return met_touching_;
+  if (contacts_.full() && touching_added_) touching_added_ = scene_->admits(X_WQ, tolerance_m_);
+  if (!touching_added_) contacts_.truncate(known);
+  return touching_added_;
 }
 
 /// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the
 /// residual.
-void ExactProjection::report(Projection& out) noexcept {
-  out.X_WQ = pose_of(state_);
+void ExactProjection::fill_projection(Projection& out) noexcept {
+  out.X_WQ = to_pose(state_);
   out.kkt_residual = residual_;
-  if (!met_touching_) meet_touching(state_);
+  if (!touching_added_) add_touching_contacts(state_);
   out.energy = state_.T * M_.mass_kg * L_ * L_;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (gap_[i] <= kTouching) out.active.add({contacts_[i], multiplier_[i] * M_.mass_kg * L_});
@@ -797,11 +816,11 @@ void ExactProjection::report(Projection& out) noexcept {
 // At a KKT point u is its minimiser and q an eigenvector of Z. The bound meets T, and no admissible pose is
 // closer, where the eigenvalue is the least one: where q' Z q curves upwards on the sphere at q, in all three
 // directions. That is the eta block of the Lagrangian's Hessian, so the proof costs one Cholesky factor.
-bool ExactProjection::proven() noexcept {
+bool ExactProjection::certify_global() noexcept {
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (multiplier_[i] > 0.0 && contacts_[i].kind != ContactKind::vertex_face) return false;
-  Root root;
-  return factorise(curvature(state_), root);
+  CholeskyFactor root;
+  return factorise(lagrangian_hessian(state_), root);
 }
 
 /// The rotation at which the dual bound is attained, the eigenvector of the least eigenvalue of Z: where it
@@ -812,8 +831,8 @@ Quaterniond ExactProjection::dual_rotation() const noexcept {
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const double m = multiplier_[i];
     if (!(m > 0.0)) continue;
-    const Vector3d& n = seen_[i].n;
-    const Vector3d& a = seen_[i].a;
+    const Vector3d& n = local_contacts_[i].n;
+    const Vector3d& a = local_contacts_[i].a;
     const Vector3d an = a.cross(n);
     const Matrix3d na = n * a.transpose();
     Z(0, 0) -= m * n.dot(a);

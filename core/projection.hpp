@@ -36,13 +36,14 @@ struct Projection {
   double kkt_residual = 0.0;
   /// No admissible pose is closer: proven by project_globally(), never by project().
   bool proven_global = false;
-  FixedList<ActiveContact, ContactSet::kCapacity> active;  ///< contacts that touch at q
+  StaticVector<ActiveContact, ContactSet::kCapacity> active;  ///< contacts that touch at q
 };
 
 /// The contacts of an answer, with what those of one obstacle carry together shared evenly among them. Where
 /// an edge or a face lies flat no single vertex is the deepest, and a method that does not balance torques
 /// would make one out of rounding by choosing one. RT safe.
-FixedList<ActiveContact, ContactSet::kCapacity> shared_evenly(const Projection& projection) noexcept;
+StaticVector<ActiveContact, ContactSet::kCapacity> evenly_loaded_contacts(
+    const Projection& projection) noexcept;
 
 /// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy
 /// metric, all contacts together.
@@ -66,14 +67,14 @@ FixedList<ActiveContact, ContactSet::kCapacity> shared_evenly(const Projection& 
 class ExactProjection {
  public:
   struct Budget {
-    std::uint16_t iterations = 40;  ///< Newton steps
-    std::uint16_t rounds = 24;      ///< of constraint generation, for each step
+    std::uint16_t iterations = 40;         ///< Newton steps
+    std::uint16_t constraint_rounds = 24;  ///< of constraint generation, for each step
   };
 
   /// How far from X_start a followed proxy may go.
-  struct Leash {
-    double shift_m = std::numeric_limits<double>::infinity();
-    double turn_rad = std::numeric_limits<double>::infinity();
+  struct StepLimit {
+    double translation_m = std::numeric_limits<double>::infinity();
+    double rotation_rad = std::numeric_limits<double>::infinity();
   };
 
   explicit ExactProjection(const Inertia& M);
@@ -92,7 +93,7 @@ class ExactProjection {
   /// a lower T; its status is budget_spent. X_start must be admissible for them, but where the leash is
   /// infinite: then it is pushed out first, turning if it must. RT safe.
   Projection step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
-                  const Leash& leash) noexcept;
+                  const StepLimit& leash) noexcept;
 
   /// The closest admissible configuration to p, whatever came before: tries further starts until the dual
   /// bound proves that none is closer, or the starts are used up. Where the first start is proven, as almost
@@ -109,7 +110,7 @@ class ExactProjection {
 
  private:
   /// A contact seen from p, in units of L.
-  struct Seen {
+  struct LocalContact {
     Vector3d n;   ///< vertex_face: the normal
     Vector3d a;   ///< in T
     Vector3d b;   ///< face_vertex, edge_edge
@@ -119,78 +120,79 @@ class ExactProjection {
     ContactKind kind;
   };
   /// A gap at one rotation, less the clearance: n . u + h.
-  struct Affine {
+  struct AffineGap {
     Vector3d n;
     double h;
   };
-  struct State {
+  struct Iterate {
     Vector3d u = Vector3d::Zero();
     Quaterniond E = Quaterniond::Identity();
     Matrix3d R = Matrix3d::Identity();  ///< of E
     double T = 0.0;                     ///< in units of m L^2
   };
   /// Hessian of the Lagrangian in (u, eta), [2 I, C; C', B].
-  struct Curvature {
+  struct HessianBlocks {
     Matrix3d C = Matrix3d::Zero();
     Matrix3d B = Matrix3d::Zero();
   };
   /// Sums over contacts of one normal, each weighted with its multiplier.
-  struct Load {
+  struct WeightedContactSum {
     double m = 0.0;
     Vector3d a = Vector3d::Zero();
     Vector3d b = Vector3d::Zero();
-    Vector3d turning = Vector3d::Zero();  ///< of J
+    Vector3d angular_gradient = Vector3d::Zero();  ///< of J
   };
   /// Triangular root [P 0; Q S] of a positive definite matrix, with P and S inverted.
-  struct Root {
+  struct CholeskyFactor {
     Matrix3d P_inverse, Q, S_inverse;
 
     Vector6d solve(const Vector6d& y) const noexcept;             ///< root^-1 y
     Vector6d solve_transposed(const Vector6d& z) const noexcept;  ///< root'^-1 z
   };
-  enum class Local : std::uint8_t { converged, budget_spent, infeasible };
-  enum class Advance : std::uint8_t { fell, met_contacts, stuck };
+  enum class LocalResult : std::uint8_t { converged, budget_spent, infeasible };
+  enum class LineSearchResult : std::uint8_t { decreased, found_contacts, no_decrease };
   enum class Freedom : std::uint8_t { all, translation };
 
-  void begin(const Pose& X_WP, const ContactSource& scene) noexcept;
-  Quaterniond turned_to(const Quaterniond& R_WT) const noexcept;
-  Projection best_of_all_starts() noexcept;
+  void begin_query(const Pose& X_WP, const ContactSource& scene) noexcept;
+  Quaterniond relative_rotation(const Quaterniond& R_WT) const noexcept;
+  Projection multistart() noexcept;
   Projection solve(const Quaterniond& E_start, Freedom freedom = Freedom::all) noexcept;
-  bool take_over(std::span<const ActiveContact> known) noexcept;
-  Projection follow(const Pose& X_start, std::span<const ActiveContact> known) noexcept;
-  Projection free() const noexcept;
-  Projection answer(Local local) noexcept;
-  Pose pose_of(const State& state) const noexcept;
-  void see_from(std::size_t first) noexcept;
-  Affine affine(const Seen& seen, const Matrix3d& R) const noexcept;
-  bool overlaps_at_p(const Seen& seen) const noexcept;
-  double scaled_energy(const State& state) const noexcept;
-  void turn(State& state, const Vector3d& eta) const noexcept;
-  bool translate(State& state) noexcept;
-  bool translate_further(State& state) noexcept;
-  bool restore(State& state) noexcept;
-  bool seek_feasible(State& state) noexcept;
-  bool lift(State& state) noexcept;
-  bool lift_turning(State& state) noexcept;
-  Local minimise(State& state, bool asked) noexcept;
-  bool strays(const State& state) const noexcept;
-  bool all_open() const noexcept;
-  bool some_contact_idle() const noexcept;
+  bool load_known_contacts(std::span<const ActiveContact> known) noexcept;
+  Projection solve_from_known(const Pose& X_start, std::span<const ActiveContact> known) noexcept;
+  Projection free_projection() const noexcept;
+  Projection make_projection(LocalResult local) noexcept;
+  Pose to_pose(const Iterate& state) const noexcept;
+  void update_local_contacts(std::size_t first) noexcept;
+  AffineGap affine_gap(const LocalContact& seen, const Matrix3d& R) const noexcept;
+  bool overlaps_at_p(const LocalContact& seen) const noexcept;
+  double scaled_energy(const Iterate& state) const noexcept;
+  void rotate(Iterate& state, const Vector3d& eta) const noexcept;
+  bool translate(Iterate& state) noexcept;
+  bool extend_translation(Iterate& state) noexcept;
+  bool restore_admissibility(Iterate& state) noexcept;
+  bool find_feasible_rotation(Iterate& state) noexcept;
+  bool project_translation(Iterate& state) noexcept;
+  bool project_translation_or_rotate(Iterate& state) noexcept;
+  LocalResult minimise(Iterate& state, bool asked) noexcept;
+  bool exceeds_step_limit(const Iterate& state) const noexcept;
+  bool all_gaps_open() const noexcept;
+  bool has_idle_contact() const noexcept;
   double residual(const Vector6d& g) const noexcept;
-  Vector6d gradient(const State& state) const noexcept;
-  Curvature curvature_of_metric(const State& state) const noexcept;
-  Curvature curvature(const State& state) const noexcept;
-  void bend(const State& state, std::size_t i, const Load& load, Curvature& W) const noexcept;
-  void linearise(const State& state) noexcept;
-  bool factorise(const Curvature& W, Root& root) const noexcept;
-  void factorise_convex_part(const Curvature& W, Root& root) const noexcept;
-  void model(const State& state) noexcept;
+  Vector6d gradient(const Iterate& state) const noexcept;
+  HessianBlocks metric_hessian(const Iterate& state) const noexcept;
+  HessianBlocks lagrangian_hessian(const Iterate& state) const noexcept;
+  void add_contact_curvature(const Iterate& state, std::size_t i, const WeightedContactSum& load,
+                             HessianBlocks& W) const noexcept;
+  void linearise(const Iterate& state) noexcept;
+  bool factorise(const HessianBlocks& W, CholeskyFactor& root) const noexcept;
+  void factorise_convexified(const HessianBlocks& W, CholeskyFactor& root) const noexcept;
+  void factorise_model(const Iterate& state) noexcept;
   bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
-  Advance advance(State& state, const Vector6d& dy, double promised, bool ask) noexcept;
-  void make_room(const State& state) noexcept;
-  bool meet_touching(const State& state) noexcept;
-  void report(Projection& out) noexcept;
-  bool proven() noexcept;
+  LineSearchResult line_search(Iterate& state, const Vector6d& dy, double promised, bool ask) noexcept;
+  void drop_idle_contacts(const Iterate& state) noexcept;
+  bool add_touching_contacts(const Iterate& state) noexcept;
+  void fill_projection(Projection& out) noexcept;
+  bool certify_global() noexcept;
   Quaterniond dual_rotation() const noexcept;
 
   Inertia M_;
@@ -198,7 +200,7 @@ class ExactProjection {
   std::uint16_t iteration_limit_;  ///< of the query at hand
   double L_;                       ///< [m]
   double clearance_;               ///< in units of L
-  double slack_;                   ///< by which a gap may miss it, likewise
+  double gap_slack_;               ///< by which a gap may miss it, likewise
   Matrix3d H_hat_;
   Matrix6d metric_root_;  ///< Cholesky factor of diag(2 I, 2 H^)
 
@@ -208,21 +210,21 @@ class ExactProjection {
   double rounding_m_ = 0.0;   ///< of a gap
   double tolerance_m_ = 0.0;  ///< how far below zero a gap may be: rounding, less the clearance
   ContactSet contacts_;
-  std::array<Seen, ContactSet::kCapacity> seen_;
+  std::array<LocalContact, ContactSet::kCapacity> local_contacts_;
   std::array<double, ContactSet::kCapacity> multiplier_;
   std::array<Vector6d, ContactSet::kCapacity> J_;  ///< gradient of gap i in (u, eta)
   std::array<double, ContactSet::kCapacity> gap_;
-  LeastDistance<3, ContactSet::kCapacity> translation_;
+  LeastDistance<3, ContactSet::kCapacity> translation_problem_;
   Quaterniond E_translated_ = Quaterniond::Identity();  ///< of the problem in translation_
-  LeastDistance<6, ContactSet::kCapacity> step_;
-  LeastDistance<7, ContactSet::kCapacity> elastic_;
-  Root root_;                  ///< of the model at hand
-  bool met_touching_ = false;  ///< what touches at the answer has been added
-  double residual_ = 0.0;      ///< of the state linearised last
-  State state_;                ///< the iterate, and after a query its answer
-  Leash leash_;                ///< infinite but for step()
-  State start_;                ///< where it is tied
-  bool at_end_of_leash_ = false;
+  LeastDistance<6, ContactSet::kCapacity> newton_problem_;
+  LeastDistance<7, ContactSet::kCapacity> feasibility_problem_;
+  CholeskyFactor factor_;        ///< of the model at hand
+  bool touching_added_ = false;  ///< what touches at the answer has been added
+  double residual_ = 0.0;        ///< of the state linearised last
+  Iterate state_;                ///< the iterate, and after a query its answer
+  StepLimit step_limit_;         ///< infinite but for step()
+  Iterate step_start_;           ///< where it is tied
+  bool at_step_limit_ = false;
   std::uint16_t iterations_ = 0;
 };
 

@@ -15,10 +15,11 @@ namespace wrenchd {
 
 /// The virtual body in the hand. M is the frame the mesh file is written in.
 struct ToolSettings {
-  std::filesystem::path mesh;         ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
-  double scale = 1.0;                 ///< metres per mesh unit
-  double mass_kg = 1.0;               ///< of the uniform solid; scales T, moves no minimiser
-  std::optional<MadeMesh> made = {};  ///< then it is made, and `mesh` is name_of() it instead of a file
+  std::filesystem::path mesh;  ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
+  double scale = 1.0;          ///< metres per mesh unit
+  double mass_kg = 1.0;        ///< of the uniform solid; scales T, moves no minimiser
+  std::optional<GeneratedMesh> generated =
+      {};  ///< then it is made, and `mesh` is name_of() it instead of a file
 };
 
 /// Solid where normal_W . x < offset_m.
@@ -38,8 +39,8 @@ struct MeshObstacleSettings {
   /// beyond it, or that it goes through.
   BodyKind kind = BodyKind::solid;
   ObstacleMotion motion = {};  ///< of M; turns are about M's origin
-  std::optional<LaterMotion> later = {};
-  std::optional<MadeMesh> made = {};  ///< as for the tool
+  std::optional<ScheduledMotion> scheduled = {};
+  std::optional<GeneratedMesh> generated = {};  ///< as for the tool
 };
 
 struct SceneSettings {

@@ -96,11 +96,12 @@ double largest_beside(const Matrix6d& L, const Matrix6d& D, const Vector6d& B) {
   return least;
 }
 
-/// The largest s with s S K S <= 4 kStepGain_J I.
+/// The largest s with s S K S <= 4 kMaxEnergyPerEncoderStep_J I.
 double largest_by_steps(const Matrix6d& K, const EncoderStep& step) {
   Vector6d S;
   S << Vector3d::Constant(step.linear_m), Vector3d::Constant(step.angular_rad);
-  return largest_share(S.asDiagonal() * K * S.asDiagonal(), Vector6d::Constant(4.0 * kStepGain_J));
+  return largest_share(S.asDiagonal() * K * S.asDiagonal(),
+                       Vector6d::Constant(4.0 * kMaxEnergyPerEncoderStep_J));
 }
 
 }  // namespace
@@ -113,17 +114,17 @@ Matrix6d energy_stiffness(const Inertia& M, double k_per_s2) noexcept {
 }
 
 // V_T = Ad V_H with Ad of X_TH, so F_H = Ad' F_T and K_H = Ad' K_T Ad.
-Matrix6d at_handle(const Matrix6d& K_T, const Pose& X_HT) noexcept {
+Matrix6d transform_to_handle(const Matrix6d& K_T, const Pose& X_HT) noexcept {
   const Matrix6d Ad = adjoint(inverse(X_HT));
   return Ad.transpose() * (0.5 * (K_T + K_T.transpose())) * Ad;
 }
 
-//   s ( (T/2 + tau) K_H + D_H ) <= diag(b I, b_rot I)         s S K_H S <= 4 kStepGain_J I
+//   s ( (T/2 + tau) K_H + D_H ) <= diag(b I, b_rot I)         s S K_H S <= 4 kMaxEnergyPerEncoderStep_J I
 StabilityBound stability_bound(const DeviceDamping& device, const LoopDelay& loop, const Coupling& coupling,
                                const Pose& X_HT, DofMask driven, const EncoderStep& step) {
   check(device, loop, coupling, driven, step);
   const double lag_s = 0.5 * loop.period_s + loop.delay_s;
-  const auto felt = [&](const Matrix6d& K_T) { return driven_block(at_handle(K_T, X_HT), driven); };
+  const auto felt = [&](const Matrix6d& K_T) { return driven_block(transform_to_handle(K_T, X_HT), driven); };
   const auto one = [&](int first) {
     Matrix6d K = Matrix6d::Zero();
     K.diagonal().segment<3>(first).setOnes();

@@ -21,7 +21,7 @@ struct EncoderStep {
 };
 
 /// What a wall may gain each time that the handle crosses the edge of a step.
-inline constexpr double kStepGain_J = 0.5e-6;
+inline constexpr double kMaxEnergyPerEncoderStep_J = 0.5e-6;
 
 /// How old a pose is when its wrench acts.
 struct LoopDelay {
@@ -66,7 +66,7 @@ struct StabilityBound {
 /// hand that is held on the edge has that each time; nothing but dry friction of step K / 2 takes it away
 /// altogether (Abbott and Okamura 2005), and a hand cannot feel it where it is small:
 ///
-///   s S K_H S <= 4 kStepGain_J I                               S = diag(step I, step_rad I)
+///   s S K_H S <= 4 kMaxEnergyPerEncoderStep_J I                               S = diag(step I, step_rad I)
 ///
 /// So virtual damping counts against passivity, not for it: at frequencies where the delay turns it round it
 /// pushes. For linear stability alone it would count for, within limits; but a hand is not linear, and the
@@ -90,6 +90,6 @@ StabilityBound stability_bound(const DeviceDamping& device, const LoopDelay& loo
 Matrix6d energy_stiffness(const Inertia& M, double k_per_s2) noexcept;
 
 /// The same coupling as felt at the handle point, in its axes: Ad' K Ad, symmetric part. RT safe.
-Matrix6d at_handle(const Matrix6d& K_T, const Pose& X_HT) noexcept;
+Matrix6d transform_to_handle(const Matrix6d& K_T, const Pose& X_HT) noexcept;
 
 }  // namespace wrenchd

@@ -11,16 +11,16 @@ namespace wrenchd {
 /// What "calm" means: slow enough that no push can surprise, and the push itself small.
 inline constexpr double kCalmSpeed_m_per_s = 0.05;
 inline constexpr double kCalmAngularSpeed_rad_per_s = 0.5;
-inline constexpr double kCalmShareOfLimit = 0.10;
-inline constexpr double kCalmFor_s = 0.100;
+inline constexpr double kCalmLimitFraction = 0.10;
+inline constexpr double kCalmDuration_s = 0.100;
 
 /// A degraded loop comes back after so long without a fault, over so long a rise; it may not stay so for
 /// longer, nor become so more often than that.
-inline constexpr double kCleanFor_s = 0.050;
-inline constexpr double kComeBackOver_s = 0.250;
-inline constexpr double kDegradedFor_s = 0.500;
-inline constexpr int kDegradedTimes = 5;
-inline constexpr double kDegradedWithin_s = 10.0;
+inline constexpr double kRecoveryDuration_s = 0.050;
+inline constexpr double kRecoveryRamp_s = 0.250;
+inline constexpr double kMaxDegraded_s = 0.500;
+inline constexpr int kMaxDegradedEntries = 5;
+inline constexpr double kDegradedWindow_s = 10.0;
 
 /// The state of the loop in time, and the authority that follows from it: the share of the wrench asked for
 /// that may go out, 0 to 1. It rises in State::ramping only, and is 0 in every state without force. Follows
@@ -59,14 +59,15 @@ class StateMachine {
   State state_ = State::disconnected;
   Fault cause_ = Fault::none;
   double authority_ = 0.0;
-  double rise_per_s_ = 0.0;  ///< in ramping
-  bool steps_up_ = false;    ///< a ramp of no length
-  double fall_per_s_ = 0.0;  ///< while a reaction goes on
-  double quiet_s_ = 0.0;     ///< for how long it has been calm, or clean
+  double rise_per_s_ = 0.0;     ///< in ramping
+  bool instant_ramp_ = false;   ///< a ramp of no length
+  double fall_per_s_ = 0.0;     ///< while a reaction goes on
+  double undisturbed_s_ = 0.0;  ///< for how long it has been calm, or clean
   double in_state_s_ = 0.0;
-  std::array<double, kDegradedTimes> degraded_ago_s_{};  ///< how long ago the last entries were, a ring
-  std::size_t next_ago_ = 0;
-  bool too_often_ = false;
+  std::array<double, kMaxDegradedEntries>
+      degraded_entry_age_s_{};  ///< how long ago the last entries were, a ring
+  std::size_t next_entry_ = 0;
+  bool degraded_too_often_ = false;
 };
 
 }  // namespace wrenchd

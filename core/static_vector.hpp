@@ -10,16 +10,16 @@ namespace wrenchd {
 /// A list with room for N elements in the object itself, so that growing never allocates and copying moves
 /// only what is there: elements beyond size() do not exist. RT safe.
 template <class T, std::size_t N>
-class FixedList {
+class StaticVector {
   // Elements are overwritten and forgotten without a destructor.
   static_assert(std::is_trivially_destructible_v<T>);
 
  public:
-  FixedList() noexcept {}
-  FixedList(const FixedList& other) noexcept : size_(other.size_) {
+  StaticVector() noexcept {}
+  StaticVector(const StaticVector& other) noexcept : size_(other.size_) {
     std::uninitialized_copy(other.begin(), other.end(), elements_);
   }
-  FixedList& operator=(const FixedList& other) noexcept {
+  StaticVector& operator=(const StaticVector& other) noexcept {
     size_ = other.size_;
     std::uninitialized_copy(other.begin(), other.end(), elements_);
     return *this;

@@ -11,7 +11,7 @@
 namespace wrenchd {
 namespace {
 
-/// What the heat may rise above 1 while the ceiling is on its way down. The rest, up to kMostHeat, is for the
+/// What the heat may rise above 1 while the ceiling is on its way down. The rest, up to kMaxHeat, is for the
 /// tick in which it came to 1.
 constexpr double kRiseWhileFolding = 0.04;
 
@@ -26,7 +26,7 @@ double step_share(double dt_s, double time_s) noexcept {
 
 }  // namespace
 
-GroupHeat::GroupHeat(double maximum, double continuous, double thermal_time_s) noexcept
+MotorGroupHeat::MotorGroupHeat(double maximum, double continuous, double thermal_time_s) noexcept
     : maximum_(is_positive(maximum) ? maximum : 0.0),
       continuous_(continuous),
       time_s_(thermal_time_s),
@@ -37,39 +37,39 @@ GroupHeat::GroupHeat(double maximum, double continuous, double thermal_time_s) n
   //   rise = (t / T) (mean of (F / continuous)^2 - 1) = (t / T) ((r^2 + r + 1) / 3 - 1)
   const double r = maximum_ / continuous_;
   fold_time_s_ = kRiseWhileFolding * time_s_ / ((r * r + r + 1.0) / 3.0 - 1.0);
-  ceiling_ = bearable();
+  ceiling_ = max_next_ceiling();
 }
 
-/// What may be pushed through the next step without passing kMostHeat, however high the maximum is above the
-/// rating; never less than the rating. h' = h + a ((F / continuous)^2 - h) <= kMostHeat
-double GroupHeat::bearable() const noexcept {
-  const double a = step_share(kLongestStep_s, time_s_);
-  const double square = heat_ + (kMostHeat - heat_) / a;
+/// What may be pushed through the next step without passing kMaxHeat, however high the maximum is above the
+/// rating; never less than the rating. h' = h + a ((F / continuous)^2 - h) <= kMaxHeat
+double MotorGroupHeat::max_next_ceiling() const noexcept {
+  const double a = step_share(kMaxStep_s, time_s_);
+  const double square = heat_ + (kMaxHeat - heat_) / a;
   return std::min(maximum_, continuous_ * std::sqrt(std::max(square, 1.0)));
 }
 
 /// A ceiling that was on its way goes on from where it was, unless the new maximum is below it. Heat that
 /// nobody counted, because the maximum was below the rating, is taken for as much as it can have been.
-void GroupHeat::change_maximum(double maximum) noexcept {
+void MotorGroupHeat::set_maximum(double maximum) noexcept {
   if (maximum == maximum_) return;
-  const GroupHeat before = *this;
-  *this = GroupHeat(maximum, continuous_, time_s_);
+  const MotorGroupHeat before = *this;
+  *this = MotorGroupHeat(maximum, continuous_, time_s_);
   if (!rated_) return;
   const double share = before.maximum_ / continuous_;
   heat_ = before.rated_ ? before.heat_ : share * share;
   folded_ = before.folded_;
-  ceiling_ = std::min({before.rated_ ? before.ceiling_ : bearable(), bearable(), maximum_});
+  ceiling_ = std::min({before.rated_ ? before.ceiling_ : max_next_ceiling(), max_next_ceiling(), maximum_});
 }
 
-void GroupHeat::advance(double pushed, double dt_s) noexcept {
+void MotorGroupHeat::advance(double pushed, double dt_s) noexcept {
   if (!rated_ || !is_positive(dt_s)) return;
   const double share = (is_finite(pushed) ? std::min(pushed, maximum_) : maximum_) / continuous_;
   heat_ += step_share(dt_s, time_s_) * (share * share - heat_);
   if (heat_ >= 1.0) folded_ = true;
-  if (heat_ <= kCooled) folded_ = false;
+  if (heat_ <= kRecoveryHeat) folded_ = false;
   const double step = (maximum_ - continuous_) * (dt_s / fold_time_s_);
   const double next = folded_ ? std::max(ceiling_ - step, continuous_) : std::min(ceiling_ + step, maximum_);
-  ceiling_ = std::min(next, bearable());
+  ceiling_ = std::min(next, max_next_ceiling());
 }
 
 ThermalModel::ThermalModel(const DeviceProfile& profile, double max_force_N, double max_torque_Nm) noexcept

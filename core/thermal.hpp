@@ -12,28 +12,28 @@ struct DeviceProfile;
 ///   dh/dt = ((|F| / continuous)^2 - h) / T          the copper's I^2 R, and one time constant
 ///
 /// From cold, full force F takes it to 1 in  t = -T ln(1 - (continuous / F)^2).  There it folds back: the
-/// ceiling goes down to the continuous rating, so fast that the heat stays below kMostHeat, and comes back as
-/// it went when the heat has fallen to kCooled. In between it stays where it is, so nothing chatters.
-class GroupHeat {
+/// ceiling goes down to the continuous rating, so fast that the heat stays below kMaxHeat, and comes back as
+/// it went when the heat has fallen to kRecoveryHeat. In between it stays where it is, so nothing chatters.
+class MotorGroupHeat {
  public:
-  static constexpr double kMostHeat = 1.05;
-  static constexpr double kCooled = 0.8;
+  static constexpr double kMaxHeat = 1.05;
+  static constexpr double kRecoveryHeat = 0.8;
 
   /// Any of the three ratings not stated, or no less than the maximum: the ceiling is the maximum for ever.
-  GroupHeat(double maximum, double continuous, double thermal_time_s) noexcept;
+  MotorGroupHeat(double maximum, double continuous, double thermal_time_s) noexcept;
 
   /// `pushed`: |F| over the last dt_s; more than the maximum, or not finite, counts as the maximum. RT safe.
   void advance(double pushed, double dt_s) noexcept;
 
   /// Another maximum from here on; the motors are as warm as they were. RT safe.
-  void change_maximum(double maximum) noexcept;
+  void set_maximum(double maximum) noexcept;
 
   double ceiling() const noexcept { return ceiling_; }
   double heat() const noexcept { return heat_; }
   bool folded_back() const noexcept { return folded_; }
 
  private:
-  double bearable() const noexcept;
+  double max_next_ceiling() const noexcept;
 
   double maximum_;
   double continuous_;
@@ -56,9 +56,9 @@ class ThermalModel {
   void advance(const Wrench& F, double dt_s) noexcept;
 
   /// As at construction, for maxima that are changed. RT safe.
-  void change_maxima(double max_force_N, double max_torque_Nm) noexcept {
-    force_.change_maximum(max_force_N);
-    torque_.change_maximum(max_torque_Nm);
+  void set_maxima(double max_force_N, double max_torque_Nm) noexcept {
+    force_.set_maximum(max_force_N);
+    torque_.set_maximum(max_torque_Nm);
   }
 
   /// For WrenchLimits::set_ceiling, at the next tick.
@@ -71,8 +71,8 @@ class ThermalModel {
   bool folded_back() const noexcept { return force_.folded_back() || torque_.folded_back(); }
 
  private:
-  GroupHeat force_;
-  GroupHeat torque_;
+  MotorGroupHeat force_;
+  MotorGroupHeat torque_;
 };
 
 }  // namespace wrenchd

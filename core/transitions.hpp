@@ -16,24 +16,24 @@ namespace wrenchd {
 
 /// What can happen. Faults (core/fault.hpp) come as one of these.
 enum class Trigger : std::uint8_t {
-  device_there,  ///< reports come from a device that was identified
-  device_gone,   ///< it left the bus
-  passed,        ///< the self-test
-  failed,        ///< the self-test
-  arm,           ///< somebody asks for force
-  calm,          ///< the hand was slow, and would not have been pushed, for a moment
-  ramped,        ///< authority has reached 1
-  disarm,        ///< somebody, or a fault, wants no more force
-  faded,         ///< authority has reached 0
-  interrupted,   ///< the proxy has lost its place, or the hand let go of the dead man's button
-  soft_fault,    ///< something that may pass by itself
-  clean,         ///< nothing was wrong for a while
-  hard_fault,    ///< something that somebody has to look at
-  stop,          ///< emergency stop
-  acknowledge,   ///< somebody has looked
-  quit,          ///< the process is asked to end
-  end,           ///< the process ends now
-  noted,         ///< something worth knowing that changes nothing
+  device_connected,     ///< reports come from a device that was identified
+  device_disconnected,  ///< it left the bus
+  self_test_passed,     ///< the self-test
+  self_test_failed,     ///< the self-test
+  arm,                  ///< somebody asks for force
+  calm,                 ///< the hand was slow, and would not have been pushed, for a moment
+  ramp_done,            ///< authority has reached 1
+  disarm,               ///< somebody, or a fault, wants no more force
+  fade_done,            ///< authority has reached 0
+  interrupted,          ///< the proxy has lost its place, or the hand let go of the dead man's button
+  soft_fault,           ///< something that may pass by itself
+  recovered,            ///< nothing was wrong for a while
+  hard_fault,           ///< something that somebody has to look at
+  stop,                 ///< emergency stop
+  acknowledge,          ///< somebody has looked
+  quit,                 ///< the process is asked to end
+  process_end,          ///< the process ends now
+  info,                 ///< something worth knowing that changes nothing
 };
 inline constexpr std::size_t kTriggerCount = 18;
 
@@ -46,7 +46,7 @@ enum class Reaction : std::uint8_t {
   fade_100ms,  ///< authority to zero within 100 ms
   fade_10ms,   ///< within 10 ms
   zero,        ///< in this tick
-  let_go,      ///< in this tick, and nothing is sent any more after the zeros of a release
+  release,     ///< in this tick, and nothing is sent any more after the zeros of a release
 };
 
 /// "fade 100 ms"
@@ -63,7 +63,7 @@ constexpr Duration time_to_zero(Reaction reaction) noexcept {
 using StateSet = std::uint16_t;
 
 template <class... States>
-constexpr StateSet set_of(States... states) noexcept {
+constexpr StateSet make_state_set(States... states) noexcept {
   return static_cast<StateSet>((0U | ... | (1U << static_cast<unsigned>(states))));
 }
 constexpr bool contains(StateSet set, State state) noexcept {
@@ -75,10 +75,10 @@ constexpr bool contains(StateSet set, State state) noexcept {
 struct Transition {
   Trigger trigger;
   StateSet from;
-  bool leads;  ///< to `to`; else the state stays as it is
+  bool changes_state;  ///< to `to`; else the state stays as it is
   State to;
   Reaction reaction;
-  const char* why;
+  const char* reason;
 };
 
 /// All rows, by trigger.

@@ -10,8 +10,7 @@ inline constexpr Duration kLateSample = std::chrono::milliseconds(3);  ///< a fe
 inline constexpr Duration kStaleSample =
     std::chrono::milliseconds(20);  ///< unless the profile says otherwise
 inline constexpr Duration kStuckPose = std::chrono::milliseconds(20);
-inline constexpr Duration kDeadMotors =
-    std::chrono::milliseconds(20);  ///< longer than any way there and back
+inline constexpr Duration kMotorsOff = std::chrono::milliseconds(20);  ///< longer than any way there and back
 inline constexpr Duration kLateAnswer = std::chrono::milliseconds(3);
 inline constexpr Duration kLateTick = std::chrono::milliseconds(5);
 inline constexpr Duration kStoppedLoop =
@@ -19,9 +18,9 @@ inline constexpr Duration kStoppedLoop =
 inline constexpr Duration kBlockedWrite = std::chrono::milliseconds(2);
 inline constexpr Duration kFailedWrite = std::chrono::milliseconds(20);
 inline constexpr Duration kOscillation = std::chrono::milliseconds(50);
-inline constexpr Duration kPinned = std::chrono::seconds(1);
-inline constexpr Duration kSilentClient = std::chrono::milliseconds(100);
-inline constexpr Duration kTestFor = std::chrono::seconds(5);
+inline constexpr Duration kMotorsStalled = std::chrono::seconds(1);
+inline constexpr Duration kHeartbeatTimeout = std::chrono::milliseconds(100);
+inline constexpr Duration kSelfTestTimeout = std::chrono::seconds(5);
 inline constexpr Duration kSuspended = std::chrono::milliseconds(100);
 
 }  // namespace wrenchd

@@ -63,9 +63,9 @@ void WrenchLaw::differentiate(const Vector6d& eps, double dt_s) noexcept {
 }
 
 void WrenchLaw::scale(double spring, double damper) noexcept {
-  gains_.stiffness = spring * asked_.stiffness;
-  gains_.integral = spring * asked_.integral;
-  gains_.damping = damper * asked_.damping;
+  gains_.stiffness = spring * base_gains_.stiffness;
+  gains_.integral = spring * base_gains_.integral;
+  gains_.damping = damper * base_gains_.damping;
 }
 
 void WrenchLaw::reset() noexcept {

@@ -65,7 +65,7 @@ class WrenchLaw {
   void differentiate(const Vector6d& eps, double dt_s) noexcept;
 
   WrenchGains gains_;
-  WrenchGains asked_ = gains_;            ///< before any scale()
+  WrenchGains base_gains_ = gains_;       ///< before any scale()
   Vector6d last_eps_ = Vector6d::Zero();  ///< zero outside contact: eps grows from zero, without a step
   Vector6d integral_ = Vector6d::Zero();
   Vector6d rate_ = Vector6d::Zero();

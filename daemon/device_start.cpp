@@ -14,7 +14,8 @@ constexpr Duration kHomingPeriod = std::chrono::milliseconds(1);
 
 }  // namespace
 
-bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& stop, const Waits& waits) {
+bool open_device(Runtime& station, DeviceWait& wait, bool at_start, const StopCondition& stop,
+                 const ReportWaiting& waits) {
   bool first_attempt = at_start;
   std::string said;  // the same trouble is told once
   const auto say = [&](spdlog::level::level_enum level, const std::string& words, const char* more) {
@@ -31,7 +32,7 @@ bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& 
           return true;
         } catch (const DeviceNotFound& missing) {
           say(spdlog::level::info, missing.what(), "; waiting for it");
-          wait.tell(missing.seen());
+          wait.log_rejected(missing.rejected_devices());
         } catch (const std::runtime_error& error) {
           if (first_attempt) throw;
           say(spdlog::level::err, error.what(), "");
@@ -42,13 +43,13 @@ bool open_device(Station& station, DeviceWait& wait, bool at_start, const Stop& 
       stop);
 }
 
-void tell_device(const DeviceProfile& profile, const UsbDevice& device) {
+void log_device(const DeviceProfile& profile, const UsbDevice& device) {
   const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
   spdlog::info("device {} ({}): senses {}, drives {}", describe(device), text(profile.transport),
                dof_text(sensed), dof_text(driven));
 }
 
-void tell_motors(const DeviceProfile& profile) {
+void log_missing_motors(const DeviceProfile& profile) {
   const DofMask driven = driven_dofs(profile);
   if (!profile.has_output)
     spdlog::info(
@@ -63,7 +64,7 @@ void tell_motors(const DeviceProfile& profile) {
                  100.0 * ProfileDevice::kAuthorityWithoutWatchdog);
 }
 
-bool settle_profile(Plan& plan, const Stop& stop, const Waits& waits) {
+bool choose_profile(RunConfig& plan, const StopCondition& stop, const ReportWaiting& waits) {
   DeviceWait wait;
   const KnownProfiles known = known_profiles(SearchPath());
   for (const std::string& refused : known.refused) spdlog::warn("profile refused: {}", refused);
@@ -73,9 +74,9 @@ bool settle_profile(Plan& plan, const Stop& stop, const Waits& waits) {
         const std::vector<UsbDevice> plugged = list_usb_devices();
         const DeviceChoice choice =
             choose_device(plugged, known.profiles, {{}, plan.settings.device.serial, {}});
-        if (choice.pick) {
-          plan.profile = known.profiles[choice.pick->profile];
-          plan.settings.device.profile_file = known.files[choice.pick->profile];
+        if (choice.selection) {
+          plan.profile = known.profiles[choice.selection->profile];
+          plan.settings.device.profile_file = known.files[choice.selection->profile];
           return true;
         }
         if (!said) {
@@ -83,15 +84,15 @@ bool settle_profile(Plan& plan, const Stop& stop, const Waits& waits) {
           waits("no device that has a profile is plugged in");
         }
         said = true;
-        wait.tell(seen_instead(plugged, choice));
+        wait.log_rejected(describe_rejected(plugged, choice));
         return false;
       },
       stop);
 }
 
-std::string calibrate(Station& station, const UsbDevice& device, const CalibrationStore& store) {
-  const DeviceProfile& profile = station.plan().profile;
-  const bool offsets_are_stored = profile.homing.reference == ReferenceUse::once;
+std::string calibrate(Runtime& station, const UsbDevice& device, const CalibrationStore& store) {
+  const DeviceProfile& profile = station.config().profile;
+  const bool offsets_are_stored = profile.homing.reference == ReferenceSchedule::once;
   if (!offsets_are_stored && !profile.check_axes) return {};
   const std::string cure = "; run wrenchctl calibrate " + profile.name;
   if (device.serial.empty())
@@ -100,22 +101,23 @@ std::string calibrate(Station& station, const UsbDevice& device, const Calibrati
   try {
     const auto stored = store.read(profile.name, device.serial);
     if (!stored) return "it was never calibrated" + cure;
-    if (offsets_are_stored) station.device().recalibrate(calibrated(profile, stored->offsets));
+    if (offsets_are_stored) station.device().recalibrate(apply_calibration(profile, stored->offsets));
     return {};
   } catch (const std::exception& refused) {  // a damaged file, or one of another profile
     return refused.what() + cure;
   }
 }
 
-bool find_rest(Station& station, Clock& clock, const Stop& stop, const Waits& waits) {
-  const DeviceProfile& profile = station.plan().profile;
-  if (profile.homing.reference != ReferenceUse::each_start) return true;
-  DeviceHoming homing(station.device(), profile, DeviceHoming::Extent::rest);
+bool wait_for_rest_pose(Runtime& station, Clock& clock, const StopCondition& stop,
+                        const ReportWaiting& waits) {
+  const DeviceProfile& profile = station.config().profile;
+  if (profile.homing.reference != ReferenceSchedule::each_start) return true;
+  DeviceHoming homing(station.device(), profile, DeviceHoming::Extent::reference_only);
   std::string said;
-  while (!stop() && !homing.lost()) {
+  while (!stop() && !homing.device_lost()) {
     clock.sleep_until(clock.now() + kHomingPeriod);
     const HomingState& state = homing.step(clock.now());
-    if (const std::string words = told(state); words != said) {
+    if (const std::string words = operator_instruction(state); words != said) {
       spdlog::info("homing: {}", words);
       waits("homing: " + words);
       said = words;

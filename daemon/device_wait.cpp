@@ -17,9 +17,9 @@ constexpr int kLooksBetween = 10;
 
 DeviceWait::DeviceWait() {
   try {
-    monitor_ = std::make_unique<PlugMonitor>([this](const PlugEvent&) {
+    monitor_ = std::make_unique<HotplugMonitor>([this](const HotplugEvent&) {
       const std::lock_guard lock(mutex_);
-      news_ = true;
+      plug_event_pending_ = true;
       changed_.notify_all();
     });
   } catch (const std::runtime_error& error) {
@@ -31,19 +31,20 @@ bool DeviceWait::until(const std::function<bool()>& attempt, const std::function
   while (!stop()) {
     if (attempt()) return true;
     std::unique_lock lock(mutex_);
-    for (int looks = 0; looks < kLooksBetween && !news_ && !stop(); ++looks) changed_.wait_for(lock, kLook);
-    news_ = false;
+    for (int looks = 0; looks < kLooksBetween && !plug_event_pending_ && !stop(); ++looks)
+      changed_.wait_for(lock, kLook);
+    plug_event_pending_ = false;
   }
   return false;
 }
 
-void DeviceWait::tell(const std::vector<std::string>& seen) {
+void DeviceWait::log_rejected(const std::vector<std::string>& seen) {
   std::set<std::string> now;
   for (const std::string& line : seen) {
-    if (told_.count(line) == 0) spdlog::info("{}", plain(line));
+    if (logged_.count(line) == 0) spdlog::info("{}", to_printable(line));
     now.insert(line);
   }
-  told_ = std::move(now);
+  logged_ = std::move(now);
 }
 
 }  // namespace wrenchd

@@ -25,14 +25,14 @@ class DeviceWait {
   bool until(const std::function<bool()>& attempt, const std::function<bool()>& stop);
 
   /// Logs what is plugged in instead, and why it will not do: each line once, until it was not there.
-  void tell(const std::vector<std::string>& seen);
+  void log_rejected(const std::vector<std::string>& seen);
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool news_ = false;
-  std::set<std::string> told_;
-  std::unique_ptr<PlugMonitor> monitor_;  ///< last: its thread uses all of the above
+  bool plug_event_pending_ = false;
+  std::set<std::string> logged_;
+  std::unique_ptr<HotplugMonitor> monitor_;  ///< last: its thread uses all of the above
 };
 
 }  // namespace wrenchd

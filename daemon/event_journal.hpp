@@ -16,8 +16,8 @@ namespace wrenchd {
 JournalFieldList journal_fields(const Event& event);
 
 /// The ids, for `journalctl MESSAGE_ID=...`.
-inline constexpr const char* kStateMessage = "4e4882be19de4db6b9953f47b8c2b7ef";
-inline constexpr const char* kFaultMessage = "97836e6f60a2477cb2efbfb243d6577f";
-inline constexpr const char* kRenderingMessage = "e746b232b843498ebd9f18da5ddae19d";
+inline constexpr const char* kStateMessageId = "4e4882be19de4db6b9953f47b8c2b7ef";
+inline constexpr const char* kFaultMessageId = "97836e6f60a2477cb2efbfb243d6577f";
+inline constexpr const char* kRenderingMessageId = "e746b232b843498ebd9f18da5ddae19d";
 
 }  // namespace wrenchd

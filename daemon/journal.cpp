@@ -42,7 +42,7 @@ class JournalSink final : public spdlog::sinks::base_sink<spdlog::details::null_
     std::vector<std::string> assignments = {"MESSAGE=" + text,
                                             "PRIORITY=" + std::to_string(priority_of(message.level)),
                                             "SYSLOG_IDENTIFIER=wrenchd"};
-    for (const auto& [name, value] : JournalFields::here()) assignments.push_back(name + "=" + value);
+    for (const auto& [name, value] : JournalFields::current()) assignments.push_back(name + "=" + value);
     std::vector<iovec> parts;
     parts.reserve(assignments.size());
     for (std::string& assignment : assignments) parts.push_back({assignment.data(), assignment.size()});
@@ -64,15 +64,15 @@ void log_to_journal() {
   spdlog::set_default_logger(std::make_shared<spdlog::logger>("journal", std::make_shared<JournalSink>()));
 }
 
-JournalFields::JournalFields(JournalFieldList fields) : before_(std::exchange(fields_here, {})) {
+JournalFields::JournalFields(JournalFieldList fields) : previous_(std::exchange(fields_here, {})) {
   fields_here = std::move(fields);
 }
 
 JournalFields::~JournalFields() {
-  fields_here = std::move(before_);
+  fields_here = std::move(previous_);
 }
 
-const JournalFieldList& JournalFields::here() noexcept {
+const JournalFieldList& JournalFields::current() noexcept {
   return fields_here;
 }
 

@@ -27,10 +27,10 @@ class JournalFields {
   JournalFields& operator=(const JournalFields&) = delete;
 
   /// Those of the calling thread.
-  static const JournalFieldList& here() noexcept;
+  static const JournalFieldList& current() noexcept;
 
  private:
-  JournalFieldList before_;
+  JournalFieldList previous_;
 };
 
 }  // namespace wrenchd

@@ -36,9 +36,10 @@ double angle(const std::array<double, 7>& X) {
 
 std::string state(const TickRecord& r) {
   const auto state = static_cast<State>(r.state);
-  if (r.cause != 0 && (is_latched(state) || state == State::degraded))
-    return fmt::format("{}:{}", name(state), fault_row(static_cast<Fault>(r.cause)).name);
-  if (const auto placing = static_cast<Placing>(r.placing); placing != Placing::following)
+  if (r.state_cause != 0 && (is_latched(state) || state == State::degraded))
+    return fmt::format("{}:{}", name(state), fault_row(static_cast<Fault>(r.state_cause)).name);
+  if (const auto placing = static_cast<ProxyInitialization>(r.proxy_initialization);
+      placing != ProxyInitialization::complete)
     return name(placing);
   return name(state);
 }
@@ -54,7 +55,7 @@ std::array<double, 6> wrench(const TickRecord& r, ShownWrench shown) {
 
 std::string remark(const TickRecord& r, ShownWrench shown) {
   if (shown == ShownWrench::on_tool) return " on the tool (no motors)";
-  return r.dropped == 0 ? "" : " (no motor: " + dof_text(r.dropped) + ")";
+  return r.undriven_dofs == 0 ? "" : " (no motor: " + dof_text(r.undriven_dofs) + ")";
 }
 
 }  // namespace
@@ -69,13 +70,13 @@ std::string live_line(const TickRecord& r, const LoopTiming& timing, ShownWrench
       1e3 * F[5], remark(r, shown), times(timing.tick));
 }
 
-void look(RunTotals& totals, const TickRecord& r) {
-  ++totals.looks;
-  if (r.contacts > 0) ++totals.ticks_in_contact;
+void add_sample(RunTotals& totals, const TickRecord& r) {
+  ++totals.samples;
+  if (r.contacts > 0) ++totals.samples_in_contact;
   totals.ticks = r.tick + 1;
   const std::array<double, 6> F = wrench(r, totals.shown);
-  totals.most_force_N = std::max(totals.most_force_N, length(F.data()));
-  totals.most_torque_Nm = std::max(totals.most_torque_Nm, length(&F[3]));
+  totals.max_force_N = std::max(totals.max_force_N, length(F.data()));
+  totals.max_torque_Nm = std::max(totals.max_torque_Nm, length(&F[3]));
 }
 
 std::string summary(const RunTotals& totals, const LoopTiming& timing) {
@@ -83,14 +84,15 @@ std::string summary(const RunTotals& totals, const LoopTiming& timing) {
       "{} ticks in {:.2f} s ({:.1f} Hz); in contact at {} of {} looks; largest force {:.2f} N, torque {:.1f} "
       "mN.m{}\n",
       totals.ticks, totals.seconds, static_cast<double>(totals.ticks) / std::max(totals.seconds, 1e-9),
-      totals.ticks_in_contact, totals.looks, totals.most_force_N, 1e3 * totals.most_torque_Nm,
+      totals.samples_in_contact, totals.samples, totals.max_force_N, 1e3 * totals.max_torque_Nm,
       totals.shown == ShownWrench::on_tool ? " on the tool, not sent: no motors" : "");
   text += fmt::format("{:<14} {:>24}\n", "", "p50 / p99.9 / max [us]");
   text += fmt::format("{:<14} {:>24}\n", "wake-up late", times(timing.wake_latency));
   text += fmt::format("{:<14} {:>24}\n", "tick", times(timing.tick));
   for (std::size_t i = 0; i < kStageCount; ++i)
     text += fmt::format("  {:<12} {:>24}\n", name(static_cast<Stage>(i)), times(timing.stage[i]));
-  text += fmt::format("overruns {}, ticks left out {}\n", timing.overruns.load(), timing.skipped.load());
+  text +=
+      fmt::format("overruns {}, ticks left out {}\n", timing.overruns.load(), timing.skipped_ticks.load());
   return text;
 }
 

@@ -22,14 +22,14 @@ struct RunTotals {
   ShownWrench shown = ShownWrench::sent;
   double seconds = 0.0;
   std::uint64_t ticks = 0;
-  std::uint64_t ticks_in_contact = 0;  ///< of those that were looked at for the live line
-  std::uint64_t looks = 0;
-  double most_force_N = 0.0;  ///< seen at the looks
-  double most_torque_Nm = 0.0;
+  std::uint64_t samples_in_contact = 0;  ///< of those that were looked at for the live line
+  std::uint64_t samples = 0;
+  double max_force_N = 0.0;  ///< seen at the looks
+  double max_torque_Nm = 0.0;
 };
 
 /// Adds a look at the loop to the totals.
-void look(RunTotals& totals, const TickRecord& record);
+void add_sample(RunTotals& totals, const TickRecord& record);
 
 /// Several lines at the end of a run: rate, contact, times of each stage, overruns.
 std::string summary(const RunTotals& totals, const LoopTiming& timing);

@@ -64,7 +64,7 @@ void tell_waiting(const std::string& what) {
 }
 
 struct Options {
-  PlanFiles files;
+  RunConfigFiles files;
   std::string simulate;
   std::string realtime;
   std::string record;
@@ -131,7 +131,7 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--record", options.record, "write every tick to this HDF5 file (it must not exist yet)")
       ->check(not_empty());
   app.add_option("--seconds", options.seconds, "stop after this many seconds; without it, run until Ctrl-C")
-      ->check(number_from(0.001, 1e9));
+      ->check(number_in_range(0.001, 1e9));
   app.add_flag(
       "--arm", options.arm,
       "arm as soon as the self-test has passed; without it the loop measures, and the motors stay off");
@@ -144,11 +144,11 @@ void describe(CLI::App& app, Options& options) {
 }
 
 /// The command line on top of the configuration.
-Plan plan_of(const Options& options) {
-  PlanFiles files = options.files;
+RunConfig plan_of(const Options& options) {
+  RunConfigFiles files = options.files;
   if (!options.simulate.empty()) files.profile = options.simulate;
   files.simulate = !options.simulate.empty();
-  Plan plan = read_plan(files, SearchPath());
+  RunConfig plan = load_run_config(files, SearchPath());
   const std::string& name = plan.profile.name;
   if (options.link_fd >= 0 && name.empty())
     throw std::runtime_error(
@@ -185,9 +185,9 @@ Plan plan_of(const Options& options) {
 void log_grants(const std::vector<RealtimeGrant>& grants) {
   for (const RealtimeGrant& grant : grants) {
     if (grant.granted)
-      spdlog::info("granted: {}", grant.what);
+      spdlog::info("granted: {}", grant.request);
     else
-      spdlog::warn("refused: {}: {}", grant.what, grant.cure);
+      spdlog::warn("refused: {}: {}", grant.request, grant.cure);
   }
 }
 
@@ -200,9 +200,9 @@ class LiveView {
 
   void look_at(ServoLoop& loop) {
     TickRecord record;
-    if (!loop.latest().read(record)) return;
-    look(totals_, record);
-    if (!shown_ || (!terminal_ && totals_.looks % 5 != 0)) return;
+    if (!loop.latest_record().read(record)) return;
+    add_sample(totals_, record);
+    if (!shown_ || (!terminal_ && totals_.samples % 5 != 0)) return;
     std::fputs(terminal_ ? "\r\x1b[K" : "", stdout);
     std::fputs(live_line(record, loop.timing(), totals_.shown).c_str(), stdout);
     std::fputs(terminal_ ? "" : "\n", stdout);
@@ -232,7 +232,7 @@ class Wishes {
 
   void pass_on(ServoLoop& loop, TimePoint now) {
     for (; next_ < commands_.size() && start_ + commands_[next_].at <= now; ++next_)
-      loop.ask(commands_[next_].commands);
+      loop.request(commands_[next_].commands);
     if (!arm_ || loop.state() != State::disarmed) return;
     loop.arm();
     arm_ = false;
@@ -255,17 +255,17 @@ Fault fault_of(const ServoLoop& loop, Fault ended) {
 }
 
 /// Where real time is required a hand shall not feel a loop that has lost it.
-void tell_realtime(const RealtimeWatch::News& news, Station& station) {
-  const bool disarms = news.lost && station.plan().settings.servo.realtime == Realtime::required;
+void tell_realtime(const RealtimeWatch::Change& news, Runtime& station) {
+  const bool disarms = news.lost && station.config().settings.servo.realtime == Realtime::required;
   if (disarms) station.loop().disarm();
-  spdlog::log(news.lost ? spdlog::level::err : spdlog::level::info, "{}{}", news.text,
+  spdlog::log(news.lost ? spdlog::level::err : spdlog::level::info, "{}{}", news.message,
               disarms ? "; disarmed, as realtime = \"required\"" : "");
 }
 
 /// Wall time: the servo thread ticks, this one looks on.
-Fault run_in_wall_time(Station& station, const std::string& device, TimePoint end, WallClock& clock,
+Fault run_in_wall_time(Runtime& station, const std::string& device, TimePoint end, WallClock& clock,
                        LiveView& view, Wishes wishes) {
-  const ServoSettings& servo = station.plan().settings.servo;
+  const ServoSettings& servo = station.config().settings.servo;
   std::promise<std::vector<RealtimeGrant>> prepared;
   auto grants = prepared.get_future();
   std::atomic<bool> stop_loop{false};
@@ -291,7 +291,7 @@ Fault run_in_wall_time(Station& station, const std::string& device, TimePoint en
     log_grants(grants.get());
     the_service->running(
         [&loop = station.loop()] {
-          return LoopView{loop.state(), loop.cause(), loop.timing().tick.count()};
+          return LoopStatus{loop.state(), loop.cause(), loop.timing().tick.count()};
         },
         device);
     RealtimeWatch realtime(servo_number.load());
@@ -299,7 +299,7 @@ Fault run_in_wall_time(Station& station, const std::string& device, TimePoint en
       std::this_thread::sleep_until(wishes.next(clock.now() + kLook));
       wishes.pass_on(station.loop(), clock.now());
       view.look_at(station.loop());
-      if (const auto news = realtime.look()) tell_realtime(*news, station);
+      if (const auto news = realtime.check()) tell_realtime(*news, station);
     }
     latched = fault_of(station.loop(), Fault::none);
     if (!over.load()) the_service->stopping("stopping");
@@ -312,9 +312,9 @@ Fault run_in_wall_time(Station& station, const std::string& device, TimePoint en
 }
 
 /// Virtual time: the same ticks one after the other, on this thread.
-Fault run_in_virtual_time(Station& station, Recordings& recordings, TimePoint end, VirtualClock& clock,
+Fault run_in_virtual_time(Runtime& station, Recordings& recordings, TimePoint end, VirtualClock& clock,
                           LiveView& view, Wishes wishes) {
-  const Duration period = from_seconds(1.0 / station.plan().settings.servo.rate_Hz);
+  const Duration period = from_seconds(1.0 / station.config().settings.servo.rate_Hz);
   TimePoint next_look = clock.now() + kLook;
   Fault fault = Fault::none;
   while (fault != Fault::device_lost && clock.now() < end && !stop_requested.load()) {
@@ -334,26 +334,26 @@ Fault run_in_virtual_time(Station& station, Recordings& recordings, TimePoint en
 
 /// A real device, and the loop for as long as it is there. One that was unplugged is waited for, and comes
 /// back disarmed.
-Fault run_with_device(Station& station, const PluggedLink& link, const Options& options, TimePoint end,
+Fault run_with_device(Runtime& station, const ReconnectingLink& link, const Options& options, TimePoint end,
                       WallClock& clock, LiveView& view) {
   DeviceWait wait;
-  const Stop stop = [&] { return stop_requested.load() || clock.now() >= end; };
+  const StopCondition stop = [&] { return stop_requested.load() || clock.now() >= end; };
   for (bool at_start = true;; at_start = false) {
     if (!open_device(station, wait, at_start, stop, tell_waiting)) return Fault::none;
     const UsbDevice& device = link.device().value();
-    if (at_start) tell_device(station.plan().profile, device);
-    if (at_start) tell_motors(station.plan().profile);
+    if (at_start) log_device(station.config().profile, device);
+    if (at_start) log_missing_motors(station.config().profile);
     if (!at_start) spdlog::info("the device is back, disarmed: {}", describe(device));
     const std::string not_armed = calibrate(station, device, CalibrationStore());
     if (!not_armed.empty()) spdlog::warn("the device may not be armed: {}", not_armed);
-    if (!find_rest(station, clock, stop, tell_waiting)) {
+    if (!wait_for_rest_pose(station, clock, stop, tell_waiting)) {
       station.close();
       if (stop()) return Fault::none;
       continue;
     }
     const Wishes wishes(options.arm && at_start && not_armed.empty(), {}, clock.now());
-    const Fault fault = run_in_wall_time(station, station.plan().profile.name + ", " + describe(device), end,
-                                         clock, view, wishes);
+    const Fault fault = run_in_wall_time(station, station.config().profile.name + ", " + describe(device),
+                                         end, clock, view, wishes);
     if (fault == Fault::device_lost) tell_waiting("the device was unplugged");
     station.close();
     if (fault != Fault::device_lost) return fault;
@@ -361,7 +361,7 @@ Fault run_with_device(Station& station, const PluggedLink& link, const Options& 
 }
 
 /// Reads the configuration again, and tells everybody who wants to know. Throws as Workbench::reload().
-ReloadResult read_again(Station& station, EventFeed& feed, const Options& options) {
+ReloadResult read_again(Runtime& station, EventFeed& feed, const Options& options) {
   struct Reloading {
     Reloading() {
       if (the_service != nullptr) the_service->reloading();
@@ -371,27 +371,27 @@ ReloadResult read_again(Station& station, EventFeed& feed, const Options& option
     }
   };
   const Reloading reloading;
-  return reload(station.workbench(), feed, [&options] { return plan_of(options); });
+  return reload_config(station.reconfigurator(), feed, [&options] { return plan_of(options); });
 }
 
 /// The control socket, where one is wanted. The usual place may be another daemon's; one that somebody named
 /// may not.
-std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, Recordings& recordings,
-                                      const Options& options) {
-  const SocketPlace place = socket_place(options.control, station.plan().settings.control);
+std::unique_ptr<ControlInterface> open_control(Runtime& station, EventFeed& feed, Recordings& recordings,
+                                               const Options& options) {
+  const SocketPath place = choose_socket_path(options.control, station.config().settings.control);
   if (place.path.empty() || options.virtual_time) return nullptr;
-  auto control = std::make_unique<Control>(station, feed);
+  auto control = std::make_unique<ControlInterface>(station, feed);
   try {
     add_state_methods(control->methods(), station);
-    add_scene_methods(control->methods(), station.workbench(),
+    add_scene_methods(control->methods(), station.reconfigurator(),
                       [&] { return read_again(station, feed, options); });
     add_record_methods(control->methods(), recordings);
-    control->status()["recording"] = [&recordings] { return recording_json(recordings); };
+    control->status_sections()["recording"] = [&recordings] { return recording_json(recordings); };
     control->open(place.path);
     spdlog::info("control socket: {}", place.path.string());
     return control;
   } catch (const std::runtime_error& error) {
-    if (place.asked_for) throw;
+    if (place.explicitly_named) throw;
     spdlog::warn("no control socket: {}", error.what());
     return nullptr;
   }
@@ -400,7 +400,7 @@ std::unique_ptr<Control> open_control(Station& station, EventFeed& feed, Recordi
 /// Reads the configuration again where a signal asks for it, on a thread of its own: meshes take time.
 class Reloader {
  public:
-  Reloader(Station& station, EventFeed& feed, const Options& options)
+  Reloader(Runtime& station, EventFeed& feed, const Options& options)
       : thread_([&](const std::stop_token& stop) {
           while (!stop.stop_requested()) {
             try {
@@ -416,23 +416,24 @@ class Reloader {
 };
 
 /// Builds the station around its link, and runs it.
-Fault run(Plan plan, const Options& options, ReportLink& link, Clock& clock,
-          const std::function<Fault(Station&, Recordings&, LiveView&)>& run_it) {
-  Station station(std::move(plan), link, clock, options.virtual_time ? PlaceIn::step : PlaceIn::thread,
+Fault run(RunConfig plan, const Options& options, ReportLink& link, Clock& clock,
+          const std::function<Fault(Runtime&, Recordings&, LiveView&)>& run_it) {
+  Runtime station(std::move(plan), link, clock,
+                  options.virtual_time ? ProxySearchMode::in_tick : ProxySearchMode::background,
                   MeshLoader(cache_directory(), [](const std::string& what) { spdlog::info("{}", what); }));
-  const Settings& settings = station.plan().settings;
+  const Settings& settings = station.config().settings;
   the_loop = &station.loop();
   for (const std::string& remark : station.mesh_remarks()) spdlog::warn("{}", remark);
   spdlog::info("wrenchd {}: device {}, tool of {} hull vertices, {} obstacles, {} Hz", kVersion,
-               station.plan().profile.name, station.scene().tool().hull.vertices_T_m.size(),
+               station.config().profile.name, station.scene().tool().hull.vertices_T_m.size(),
                station.scene().obstacle_count(), settings.servo.rate_Hz);
-  LiveView view(options.live, station.plan().profile);
+  LiveView view(options.live, station.config().profile);
   Fault fault = Fault::none;
   double ran_s = 0.0;
   {
     EventFeed feed(station.loop());
     Recordings recordings(station, feed, clock,
-                          options.virtual_time ? Recordings::Pace::by_hand : Recordings::Pace::threads);
+                          options.virtual_time ? Recordings::Pace::manual : Recordings::Pace::threads);
     if (!settings.recording.file.empty()) recordings.start_file(settings.recording.file);
     const auto control = open_control(station, feed, recordings, options);
     const Reloader reloader(station, feed, options);
@@ -450,7 +451,8 @@ TimePoint end_of(const Options& options, const Clock& clock) {
 }
 
 /// The simulated device, with what shall go wrong with it.
-std::unique_ptr<SimulatedLink> scripted_link(const Plan& plan, const LoopbackScript& script, Clock& clock) {
+std::unique_ptr<SimulatedLink> scripted_link(const RunConfig& plan, const LoopbackScript& script,
+                                             Clock& clock) {
   auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
   for (const SimulatedFault& fault : script.faults) try {
       link->device().inject(fault);
@@ -461,20 +463,20 @@ std::unique_ptr<SimulatedLink> scripted_link(const Plan& plan, const LoopbackScr
 }
 
 /// The end of a link that is not plugged in: in this process, or in another.
-std::unique_ptr<ReportLink> link_in_wall_time(const Plan& plan, const LoopbackScript& script,
+std::unique_ptr<ReportLink> link_in_wall_time(const RunConfig& plan, const LoopbackScript& script,
                                               const Options& options, Clock& clock) {
   if (options.link_fd >= 0) return std::make_unique<SocketLink>(options.link_fd, link_settings(plan));
   return scripted_link(plan, script, clock);
 }
 
-Fault run_simulated(Plan plan, const Options& options) {
+Fault run_simulated(RunConfig plan, const Options& options) {
   LoopbackScript script;
   if (!options.script.empty()) script = load_loopback_script(options.script);
   const auto run_it = [&](auto& clock, auto run_in_time) {
     return
-        [&clock, &options, &script, run_in_time](Station& station, Recordings& recordings, LiveView& view) {
+        [&clock, &options, &script, run_in_time](Runtime& station, Recordings& recordings, LiveView& view) {
           station.open();
-          tell_motors(station.plan().profile);
+          log_missing_motors(station.config().profile);
           return run_in_time(station, recordings, end_of(options, clock), clock, view,
                              Wishes(options.arm, script.commands, clock.now()));
         };
@@ -487,29 +489,29 @@ Fault run_simulated(Plan plan, const Options& options) {
   WallClock clock;
   const auto link = link_in_wall_time(plan, script, options, clock);
   log_grants(lock_memory(plan.settings.servo.realtime));
-  const auto in_wall_time = [&](Station& station, Recordings&, auto&&... more) {
-    return run_in_wall_time(station, station.plan().profile.name + ", simulated", more...);
+  const auto in_wall_time = [&](Runtime& station, Recordings&, auto&&... more) {
+    return run_in_wall_time(station, station.config().profile.name + ", simulated", more...);
   };
   return run(std::move(plan), options, *link, clock, run_it(clock, in_wall_time));
 }
 
-Fault run_real(Plan plan, const Options& options) {
+Fault run_real(RunConfig plan, const Options& options) {
   WallClock clock;
   const TimePoint end = end_of(options, clock);
   if (plan.profile.name.empty() &&
-      !settle_profile(
+      !choose_profile(
           plan, [&] { return stop_requested.load() || clock.now() >= end; }, tell_waiting))
     return Fault::none;
   const auto link = make_plugged_link(plan);
   log_grants(lock_memory(plan.settings.servo.realtime));
-  return run(std::move(plan), options, *link, clock, [&](Station& station, Recordings&, LiveView& view) {
+  return run(std::move(plan), options, *link, clock, [&](Runtime& station, Recordings&, LiveView& view) {
     return run_with_device(station, *link, options, end, clock, view);
   });
 }
 
 /// From a signal handler.
 void ask(CommandSet commands) {
-  if (ServoLoop* loop = the_loop) loop->ask(commands);
+  if (ServoLoop* loop = the_loop) loop->request(commands);
 }
 
 void catch_signals() {
@@ -550,7 +552,7 @@ int main(int argc, char** argv) {
   ServiceNotify service;
   the_service = &service;
   try {
-    Plan plan = plan_of(options);
+    RunConfig plan = plan_of(options);
     const bool simulated = plan.simulated || options.link_fd >= 0;
     const Fault fault =
         simulated ? run_simulated(std::move(plan), options) : run_real(std::move(plan), options);

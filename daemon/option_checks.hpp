@@ -9,7 +9,7 @@
 namespace wrenchd {
 
 /// A number from min to max. CLI11's own range check lets NaN pass.
-inline CLI::Validator number_from(double min, double max) {
+inline CLI::Validator number_in_range(double min, double max) {
   const std::string range = CLI::detail::to_string(min) + " to " + CLI::detail::to_string(max);
   return {[=](std::string& text) -> std::string {
             char* end = nullptr;

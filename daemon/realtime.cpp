@@ -26,7 +26,7 @@ std::vector<RealtimeGrant> required_or_told(Realtime mode, std::vector<RealtimeG
   if (mode != Realtime::required) return grants;
   std::string refused;
   for (const RealtimeGrant& grant : grants)
-    if (!grant.granted) refused += "\n  " + grant.what + ": " + grant.cure;
+    if (!grant.granted) refused += "\n  " + grant.request + ": " + grant.cure;
   if (!refused.empty())
     throw RealtimeError("the kernel refused what realtime = \"required\" asks for:" + refused +
                         "\n  or set realtime = \"best_effort\" under [servo] to run without");

@@ -11,7 +11,7 @@ namespace wrenchd {
 
 /// One thing asked of the kernel, and what came of it.
 struct RealtimeGrant {
-  std::string what;  ///< "SCHED_FIFO priority 45"
+  std::string request;  ///< "SCHED_FIFO priority 45"
   bool granted = false;
   std::string cure;  ///< where refused: why, and what to do
 };

@@ -8,7 +8,7 @@
 namespace wrenchd {
 
 /// What the files say, read and checked, before anything is built from it.
-struct Plan {
+struct RunConfig {
   Settings settings;
   DeviceProfile profile;  ///< without a name where the settings leave it to the device that is plugged in
   SceneSettings scene;

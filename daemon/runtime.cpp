@@ -22,7 +22,7 @@ std::filesystem::path named_on_command_line(const std::filesystem::path& name, c
 }
 
 /// How often the loop ticks at most: by the clock, or with each report of the device.
-double tick_rate_Hz(const Plan& plan) {
+double tick_rate_Hz(const RunConfig& plan) {
   const double reports_Hz = plan.profile.report_rate_Hz;
   const double rate_Hz = plan.settings.servo.rate_Hz;
   if (plan.settings.servo.pacing == Pacing::clock || !(reports_Hz > rate_Hz)) return rate_Hz;
@@ -31,14 +31,14 @@ double tick_rate_Hz(const Plan& plan) {
 
 /// From when on a loop that says nothing is a stuck one: no late tick takes so long.
 Duration silent_after(const ServoSettings& servo) noexcept {
-  const int periods = servo.pacing == Pacing::device ? kDevicePatience_periods : 1;
+  const int periods = servo.pacing == Pacing::device ? kDeviceTimeout_periods : 1;
   return periods * from_seconds(1.0 / servo.rate_Hz) + kLateTick;
 }
 
 }  // namespace
 
-Plan read_plan(const PlanFiles& files, const SearchPath& search) {
-  Plan plan;
+RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search) {
+  RunConfig plan;
   plan.settings = load_settings(named_on_command_line(files.config, search), search);
   if (!files.scene.empty()) plan.settings.scene = named_on_command_line(files.scene, search);
   if (!files.profile.empty()) {
@@ -57,7 +57,7 @@ Plan read_plan(const PlanFiles& files, const SearchPath& search) {
   return plan;
 }
 
-LinkSettings link_settings(const Plan& plan) {
+LinkSettings link_settings(const RunConfig& plan) {
   const ServoSettings& servo = plan.settings.servo;
   LinkSettings settings = link_settings(plan.profile, silent_after(servo));
   settings.write_deadline =
@@ -66,46 +66,47 @@ LinkSettings link_settings(const Plan& plan) {
   return settings;
 }
 
-std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan) {
-  return std::make_unique<PluggedLink>(plan.profile, plan.settings.device.serial, link_settings(plan));
+std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& plan) {
+  return std::make_unique<ReconnectingLink>(plan.profile, plan.settings.device.serial, link_settings(plan));
 }
 
-Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& meshes)
-    : Station(std::move(plan), link, clock, place_in, meshes, meshes) {}
+Runtime::Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode place_in,
+                 const MeshLoader& meshes)
+    : Runtime(std::move(plan), link, clock, place_in, meshes, meshes) {}
 
 /// The loader that has read the scene is told from a fresh one, by which it is read again.
-Station::Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& fresh,
-                 MeshLoader used)
-    : plan_(std::move(plan)),
+Runtime::Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode place_in,
+                 const MeshLoader& fresh, MeshLoader used)
+    : config_(std::move(plan)),
       clock_(clock),
-      scene_(std::make_shared<const Scene>(plan_.scene, used)),
+      scene_(std::make_shared<const Scene>(config_.scene, used)),
       mesh_remarks_(used.changes()),
-      texts_(recorded_texts(plan_)),
-      device_(plan_.profile, link),
-      loop_(plan_.settings, plan_.profile, device_,
-            std::make_unique<Rendering>(0, plan_.settings, plan_.profile, scene_,
-                                        make_placer(scene_, place_in)),
+      recorded_texts_(read_recorded_texts(config_)),
+      device_(config_.profile, link),
+      loop_(config_.settings, config_.profile, device_,
+            std::make_unique<Rendering>(0, config_.settings, config_.profile, scene_,
+                                        make_proxy_initializer(scene_, place_in)),
             clock),
-      workbench_(plan_, scene_, loop_, place_in, fresh) {
-  mesh_remarks_.insert(mesh_remarks_.end(), used.remarks().begin(), used.remarks().end());
+      reconfigurator_(config_, scene_, loop_, place_in, fresh) {
+  mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());
 }
 
-Station::~Station() {
+Runtime::~Runtime() {
   device_.close();
 }
 
-SharedState& Station::show_state() {
+SharedState& Runtime::enable_shared_state() {
   if (shared_state_) return *shared_state_;
-  shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(plan_));
-  loop_.show_in(*shared_state_);
+  shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(config_));
+  loop_.publish_to(*shared_state_);
   return *shared_state_;
 }
 
-RecordingHeader Station::recording_header() const {
-  RecordingHeader header = texts_;
-  header.rate_Hz = tick_rate_Hz(plan_);
-  add_meshes(workbench_.scene(), header);
-  begin_now(clock_, header);
+RecordingHeader Runtime::recording_header() const {
+  RecordingHeader header = recorded_texts_;
+  header.rate_Hz = tick_rate_Hz(config_);
+  add_meshes(reconfigurator_.scene(), header);
+  set_start_time(clock_, header);
   return header;
 }
 

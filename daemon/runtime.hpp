@@ -25,7 +25,7 @@ namespace wrenchd {
 
 /// What a command line names: the configuration, and what stands in place of what the configuration names. A
 /// file is taken as it is given, from the working directory, and then looked for along the search path.
-struct PlanFiles {
+struct RunConfigFiles {
   std::filesystem::path config = "wrenchd.toml";
   std::filesystem::path scene;  ///< empty: the configuration's
   std::string profile;          ///< name or file; empty: the configuration's
@@ -33,27 +33,27 @@ struct PlanFiles {
 };
 
 /// Reads the configuration, its scene and its profile. Throws ConfigError.
-Plan read_plan(const PlanFiles& files, const SearchPath& search);
+RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search);
 
 /// Of any link that has a thread of its own: how long its writes may take, and when a loop that is silent is
 /// spoken for.
-LinkSettings link_settings(const Plan& plan);
+LinkSettings link_settings(const RunConfig& plan);
 
 /// The link to the plugged-in device that the plan wants, not opened.
-std::unique_ptr<PluggedLink> make_plugged_link(const Plan& plan);
+std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& plan);
 
 /// The parts of one running wrenchd, built from a plan in the order in which they need each other.
-class Station {
+class Runtime {
  public:
   /// Link and clock must outlive this. meshes: reads those of the scene; its changes and remarks are kept.
   /// Throws MeshError, std::runtime_error.
-  Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in = PlaceIn::thread,
-          const MeshLoader& meshes = {});
-  ~Station();
-  Station(const Station&) = delete;
-  Station& operator=(const Station&) = delete;
+  Runtime(RunConfig plan, ReportLink& link, Clock& clock,
+          ProxySearchMode place_in = ProxySearchMode::background, const MeshLoader& meshes = {});
+  ~Runtime();
+  Runtime(const Runtime&) = delete;
+  Runtime& operator=(const Runtime&) = delete;
 
-  const Plan& plan() const noexcept { return plan_; }
+  const RunConfig& config() const noexcept { return config_; }
   const Scene& scene() const noexcept { return *scene_; }  ///< of the start
   /// What a person should know of the meshes of the scene, a sentence each.
   const std::vector<std::string>& mesh_remarks() const noexcept { return mesh_remarks_; }
@@ -65,26 +65,26 @@ class Station {
   ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
   /// Where what is rendered is changed while the loop runs.
-  Workbench& workbench() noexcept { return workbench_; }
+  Reconfigurator& reconfigurator() noexcept { return reconfigurator_; }
   /// Shows every tick to recorders and to other processes from now on. First before the loop runs; when
   /// called again, the same. Throws std::system_error.
-  SharedState& show_state();
+  SharedState& enable_shared_state();
 
   /// What a recording of this station must know, that begins now. Reads its mesh files.
   RecordingHeader recording_header() const;
 
  private:
-  Plan plan_;
+  RunConfig config_;
   const Clock& clock_;
   std::shared_ptr<const Scene> scene_;
   std::vector<std::string> mesh_remarks_;
-  RecordingHeader texts_;  ///< as they were read: files may change while the loop runs
+  RecordingHeader recorded_texts_;  ///< as they were read: files may change while the loop runs
   ProfileDevice device_;
   std::unique_ptr<SharedState> shared_state_;
   ServoLoop loop_;
-  Workbench workbench_;
+  Reconfigurator reconfigurator_;
 
-  Station(Plan plan, ReportLink& link, Clock& clock, PlaceIn place_in, const MeshLoader& fresh,
+  Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode place_in, const MeshLoader& fresh,
           MeshLoader used);
 };
 

@@ -31,78 +31,78 @@ std::chrono::microseconds look_period() {
 
 }  // namespace
 
-std::string status_text(const LoopView& loop, const std::string& device) {
+std::string status_text(const LoopStatus& loop, const std::string& device) {
   std::string text = name(loop.state);
   if (loop.cause != Fault::none) {
     const FaultRow& row = fault_row(loop.cause);
-    text += ": " + std::string(row.name) + ": " + std::string(row.sentence) + "; " + std::string(row.cure);
+    text += ": " + std::string(row.name) + ": " + std::string(row.message) + "; " + std::string(row.cure);
   }
   return in_one_line(text + "; device " + device);
 }
 
 void ServiceReport::waiting(std::string why) {
   phase_ = Phase::waiting;
-  words_ = std::move(why);
-  ticks_.reset();
+  detail_ = std::move(why);
+  last_ticks_.reset();
 }
 
 void ServiceReport::running(std::string device) {
   phase_ = Phase::running;
-  words_ = std::move(device);
-  ticks_.reset();
+  detail_ = std::move(device);
+  last_ticks_.reset();
 }
 
 void ServiceReport::stopping(std::string words) {
-  if (phase_ != Phase::stopping) next_ += "STOPPING=1\n";
+  if (phase_ != Phase::stopping) pending_ += "STOPPING=1\n";
   phase_ = Phase::stopping;
-  words_ = std::move(words);
+  detail_ = std::move(words);
 }
 
 void ServiceReport::reloading(std::uint64_t monotonic_us) {
-  next_ += "RELOADING=1\nMONOTONIC_USEC=" + std::to_string(monotonic_us) + "\n";
+  pending_ += "RELOADING=1\nMONOTONIC_USEC=" + std::to_string(monotonic_us) + "\n";
 }
 
 void ServiceReport::reloaded() {
-  next_ += "READY=1\n";
+  pending_ += "READY=1\n";
 }
 
-std::string ServiceReport::look(const std::optional<LoopView>& loop) {
+std::string ServiceReport::next_message(const std::optional<LoopStatus>& loop) {
   std::string words;
-  bool ready = ready_, alive = true;
+  bool ready = ready_sent_, alive = true;
   switch (phase_) {
     case Phase::starting:
       words = "starting";
       alive = false;  // the manager does not watch before it is ready
       break;
     case Phase::waiting:
-      words = in_one_line("waiting: " + words_);
+      words = in_one_line("waiting: " + detail_);
       ready = true;
       break;
     case Phase::running:
       if (!loop) break;  // it has just ended
-      words = status_text(*loop, words_);
+      words = status_text(*loop, detail_);
       ready = ready || (loop->state != State::disconnected && loop->state != State::self_test);
-      alive = ticks_ != loop->ticks;
-      ticks_ = loop->ticks;
+      alive = last_ticks_ != loop->ticks;
+      last_ticks_ = loop->ticks;
       break;
     case Phase::stopping:
-      words = in_one_line(words_);
+      words = in_one_line(detail_);
       break;
   }
-  std::string text = std::exchange(next_, {});
-  if (ready && !std::exchange(ready_, ready)) text += "READY=1\n";
-  if (alive && ready_) text += "WATCHDOG=1\n";
-  if (!words.empty() && words != said_) text += "STATUS=" + words + "\n";
-  if (!words.empty()) said_ = words;
+  std::string text = std::exchange(pending_, {});
+  if (ready && !std::exchange(ready_sent_, ready)) text += "READY=1\n";
+  if (alive && ready_sent_) text += "WATCHDOG=1\n";
+  if (!words.empty() && words != last_status_) text += "STATUS=" + words + "\n";
+  if (!words.empty()) last_status_ = words;
   return text;
 }
 
-ServiceNotify::ServiceNotify() : wanted_(std::getenv("NOTIFY_SOCKET") != nullptr) {
-  if (!wanted_) return;
+ServiceNotify::ServiceNotify() : enabled_(std::getenv("NOTIFY_SOCKET") != nullptr) {
+  if (!enabled_) return;
   thread_ = std::jthread([this, period = look_period()](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     do {
-      look();
+      send_report();
     } while (!changed_.wait_for(lock, stop, period, [&stop] { return stop.stop_requested(); }));
   });
 }
@@ -112,53 +112,54 @@ ServiceNotify::~ServiceNotify() {
 }
 
 void ServiceNotify::waiting(const std::string& why) {
-  tell([&] {
-    loop_ = nullptr;
+  update([&] {
+    read_loop_status_ = nullptr;
     report_.waiting(why);
   });
 }
 
-void ServiceNotify::running(Look loop, const std::string& device) {
-  tell([&] {
-    loop_ = std::move(loop);
+void ServiceNotify::running(ReadLoopStatus loop, const std::string& device) {
+  update([&] {
+    read_loop_status_ = std::move(loop);
     report_.running(device);
   });
 }
 
 void ServiceNotify::loop_ended() noexcept {
   const std::lock_guard lock(mutex_);
-  loop_ = nullptr;
+  read_loop_status_ = nullptr;
 }
 
 void ServiceNotify::stopping(const std::string& words) {
-  tell([&] {
-    loop_ = nullptr;
+  update([&] {
+    read_loop_status_ = nullptr;
     report_.stopping(words);
   });
 }
 
 void ServiceNotify::reloading() {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();  // CLOCK_MONOTONIC
-  tell([&] {
+  update([&] {
     report_.reloading(
         static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(now).count()));
   });
 }
 
 void ServiceNotify::reloaded() {
-  tell([&] { report_.reloaded(); });
+  update([&] { report_.reloaded(); });
 }
 
-void ServiceNotify::tell(const std::function<void()>& change) {
-  if (!wanted_) return;
+void ServiceNotify::update(const std::function<void()>& change) {
+  if (!enabled_) return;
   const std::lock_guard lock(mutex_);
   change();
-  look();
+  send_report();
 }
 
 /// Under mutex_.
-void ServiceNotify::look() {
-  const std::string text = report_.look(loop_ ? std::optional(loop_()) : std::nullopt);
+void ServiceNotify::send_report() {
+  const std::string text =
+      report_.next_message(read_loop_status_ ? std::optional(read_loop_status_()) : std::nullopt);
   if (!text.empty()) sd_notify(0, text.c_str());
 }
 

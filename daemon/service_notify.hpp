@@ -16,7 +16,7 @@
 namespace wrenchd {
 
 /// What the service manager wants to know of a servo loop, at one moment.
-struct LoopView {
+struct LoopStatus {
   State state = State::disconnected;
   Fault cause = Fault::none;  ///< that led to it
   std::uint64_t ticks = 0;    ///< since it was made
@@ -24,7 +24,7 @@ struct LoopView {
 
 /// One line for a person who asks the service manager: the state, the device, and where a fault led to the
 /// state its sentence and its cure.
-std::string status_text(const LoopView& loop, const std::string& device);
+std::string status_text(const LoopStatus& loop, const std::string& device);
 
 /// What the service manager is to be told, look after look: assignments as sd_notify(3) has them. No I/O, no
 /// clock.
@@ -46,16 +46,16 @@ class ServiceReport {
   void reloaded();
 
   /// What to say now; empty: nothing. `loop`: where one runs.
-  std::string look(const std::optional<LoopView>& loop);
+  std::string next_message(const std::optional<LoopStatus>& loop);
 
  private:
   enum class Phase : std::uint8_t { starting, waiting, running, stopping };
   Phase phase_ = Phase::starting;
-  std::string words_;  ///< why it waits, the device, or how it ends
-  std::string said_;   ///< the last status
-  std::string next_;   ///< to be said with the next look
-  bool ready_ = false;
-  std::optional<std::uint64_t> ticks_;  ///< at the look before
+  std::string detail_;       ///< why it waits, the device, or how it ends
+  std::string last_status_;  ///< the last status
+  std::string pending_;      ///< to be said with the next look
+  bool ready_sent_ = false;
+  std::optional<std::uint64_t> last_ticks_;  ///< at the look before
 };
 
 /// Tells the service manager (systemd, by the socket in $NOTIFY_SOCKET) how the daemon is, from a thread of
@@ -63,7 +63,7 @@ class ServiceReport {
 /// but the servo thread; they wait for one look at most.
 class ServiceNotify {
  public:
-  using Look = std::function<LoopView()>;
+  using ReadLoopStatus = std::function<LoopStatus()>;
 
   ServiceNotify();
   /// The last words are out when it returns.
@@ -73,21 +73,21 @@ class ServiceNotify {
 
   void waiting(const std::string& why);
   /// `loop` is called from the thread until waiting(), loop_ended() or stopping() is.
-  void running(Look loop, const std::string& device);
+  void running(ReadLoopStatus loop, const std::string& device);
   void loop_ended() noexcept;
   void stopping(const std::string& words);
   void reloading();
   void reloaded();
 
  private:
-  void tell(const std::function<void()>& change);
-  void look();
+  void update(const std::function<void()>& change);
+  void send_report();
 
-  const bool wanted_;
+  const bool enabled_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   ServiceReport report_;
-  Look loop_;
+  ReadLoopStatus read_loop_status_;
   std::jthread thread_;  ///< last: it uses all of the above
 };
 

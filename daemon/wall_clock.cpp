@@ -19,7 +19,7 @@ void WallClock::sleep_until(TimePoint t) noexcept {
 }
 
 /// CLOCK_BOOTTIME goes on in sleep, CLOCK_MONOTONIC does not. Both are read without a system call.
-Duration WallClock::slept() const noexcept {
+Duration WallClock::time_suspended() const noexcept {
   timespec boot{}, monotonic{};
   clock_gettime(CLOCK_BOOTTIME, &boot);
   clock_gettime(CLOCK_MONOTONIC, &monotonic);

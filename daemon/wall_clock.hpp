@@ -10,7 +10,7 @@ class WallClock final : public Clock {
  public:
   TimePoint now() const noexcept override;
   void sleep_until(TimePoint t) noexcept override;
-  Duration slept() const noexcept override;
+  Duration time_suspended() const noexcept override;
 };
 
 }  // namespace wrenchd

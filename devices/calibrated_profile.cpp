@@ -44,7 +44,7 @@ JointAngles angles_in_rest(const DeviceProfile& profile) {
 }  // namespace
 
 //   p_BH = p_reported - position,   R_BH = R_reported exp(-rotation),   with X_BH = X_BD X_DE X_EH
-DeviceProfile calibrated(DeviceProfile profile, const std::vector<AxisOffset>& offsets) {
+DeviceProfile apply_calibration(DeviceProfile profile, const std::vector<AxisOffset>& offsets) {
   if (has_joints(profile)) {
     for (const AxisOffset& offset : offsets) shift_joint(profile, offset);
     return profile;
@@ -59,8 +59,8 @@ DeviceProfile calibrated(DeviceProfile profile, const std::vector<AxisOffset>& o
   return profile;
 }
 
-std::vector<AxisOffset> offsets_in_rest(const DeviceProfile& profile, const Pose& X_BH,
-                                        const JointAngles& angles) {
+std::vector<AxisOffset> offsets_at_reference(const DeviceProfile& profile, const Pose& X_BH,
+                                             const JointAngles& angles) {
   if (!has_joints(profile)) return axis_offsets(offset_between(X_BH, profile.homing.X_BR));
   const Kinematics& k = profile.kinematics;
   const JointAngles true_angles = angles_in_rest(profile);
@@ -74,7 +74,7 @@ HomingPlan homing_plan(const DeviceProfile& profile) {
   const DofMask sensed = sensed_dofs(profile);
   for (unsigned i = 0; i < 6; ++i) plan.sensed[i] = (sensed >> i & 1u) != 0;
   if (!has_joints(profile) || profile.has_rest_pose) return plan;
-  if (const auto X_DE = home(profile.kinematics)) plan.X_BR = profile.X_BD * *X_DE * profile.X_EH;
+  if (const auto X_DE = home_pose(profile.kinematics)) plan.X_BR = profile.X_BD * *X_DE * profile.X_EH;
   return plan;
 }
 

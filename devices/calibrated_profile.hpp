@@ -18,13 +18,13 @@ namespace wrenchd {
 
 /// The profile of the device that this was measured of. Throws std::invalid_argument for an axis that the
 /// profile does not have.
-DeviceProfile calibrated(DeviceProfile profile, const std::vector<AxisOffset>& offsets);
+DeviceProfile apply_calibration(DeviceProfile profile, const std::vector<AxisOffset>& offsets);
 
 /// The offsets of a device that reports this in its rest: the pose X_BH, and the joint angles where it has
 /// joints. Throws std::invalid_argument where the joints cannot hold the rest that the profile states. Not RT
 /// safe.
-std::vector<AxisOffset> offsets_in_rest(const DeviceProfile& profile, const Pose& X_BH,
-                                        const JointAngles& angles);
+std::vector<AxisOffset> offsets_at_reference(const DeviceProfile& profile, const Pose& X_BH,
+                                             const JointAngles& angles);
 
 /// What homing asks of a device of this profile: of the axes it senses, and with the home position of its
 /// joints as the rest where no other is stated.

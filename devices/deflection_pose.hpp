@@ -19,10 +19,10 @@ class SteeringCurve {
  public:
   /// full: NaN where it is not stated.
   SteeringCurve(const Deflection& settings, double gain, double full) noexcept
-      : gain_(gain), full_(full), dead_zone_(settings.dead_zone), curve_(settings.curve) {}
+      : gain_(gain), full_scale_(full), dead_zone_(settings.dead_zone), curve_(settings.response_exponent) {}
 
   /// 0 where the end of the way is not stated. RT safe.
-  double firmness(const Vector3d& t) const noexcept;
+  double response(const Vector3d& t) const noexcept;
   /// [m/s] or [rad/s]. RT safe.
   Vector3d velocity(const Vector3d& t) const noexcept;
   /// The other way round: the deflection for a velocity, no farther than the end of the way. Less than a ten
@@ -30,9 +30,9 @@ class SteeringCurve {
   Vector3d deflection(const Vector3d& v) const noexcept;
 
  private:
-  bool has_end() const noexcept { return full_ > 0.0; }
+  bool has_full_scale() const noexcept { return full_scale_ > 0.0; }
 
-  double gain_, full_, dead_zone_, curve_;
+  double gain_, full_scale_, dead_zone_, curve_;
 };
 
 /// A pose made of how far a cap is pushed: what a six-axis mouse gives instead of a pose. B = device base,
@@ -57,24 +57,24 @@ class DeflectionPose {
   DeflectionPose(const Deflection& settings, double max_linear_speed_m_per_s,
                  double max_angular_speed_rad_per_s)
       : settings_(settings),
-        linear_(settings, settings.linear_gain, settings.full_m),
-        angular_(settings, settings.angular_gain, settings.full_rad),
+        linear_(settings, settings.linear_gain, settings.full_deflection_m),
+        angular_(settings, settings.angular_gain, settings.full_deflection_rad),
         max_linear_m_per_s_(max_linear_speed_m_per_s),
         max_angular_rad_per_s_(max_angular_speed_rad_per_s) {}
 
   /// From now on the cap is pushed this far.
-  void push(const Vector3d& translation_B_m, const Vector3d& rotation_B_rad) noexcept {
+  void set_deflection(const Vector3d& translation_B_m, const Vector3d& rotation_B_rad) noexcept {
     translation_m_ = translation_B_m;
     rotation_rad_ = rotation_B_rad;
   }
   /// From now on the pose goes at the profile's share of its speed, or at all of it.
-  void go_slowly(bool slowly) noexcept { speed_share_ = slowly ? settings_.slow : 1.0; }
+  void set_slow(bool slowly) noexcept { speed_share_ = slowly ? settings_.slow_factor : 1.0; }
   /// From now on the world holds the handle there; nothing: nobody knows where, and there is no leash.
-  void hold(const std::optional<Pose>& X_BG) noexcept { held_ = X_BG; }
+  void set_proxy_pose(const std::optional<Pose>& X_BG) noexcept { X_BQ_ = X_BG; }
   /// Leaps back to where it began.
   void recentre() noexcept { X_BH_ = {}; }
   /// Leaps there.
-  void put(const Pose& X_BH) noexcept { X_BH_ = X_BH; }
+  void set_pose(const Pose& X_BH) noexcept { X_BH_ = X_BH; }
   /// Moves the pose on to a later time.
   void advance(double dt_s) noexcept;
 
@@ -83,9 +83,9 @@ class DeflectionPose {
   const Twist& V_BH() const noexcept { return V_BH_; }  ///< in the last step
 
  private:
-  Twist wanted(double dt_s) const noexcept;
-  void take_in(const Pose& before, double dt_s) noexcept;
-  void stay_inside(const Pose& before, double dt_s) noexcept;
+  Twist commanded_twist(double dt_s) const noexcept;
+  void limit_lead(const Pose& before, double dt_s) noexcept;
+  void clamp_to_workspace(const Pose& before, double dt_s) noexcept;
 
   Deflection settings_;
   SteeringCurve linear_;
@@ -95,7 +95,7 @@ class DeflectionPose {
   double speed_share_ = 1.0;
   Vector3d translation_m_ = Vector3d::Zero();
   Vector3d rotation_rad_ = Vector3d::Zero();
-  std::optional<Pose> held_;
+  std::optional<Pose> X_BQ_;
   Pose X_BH_;
   Twist V_BH_;
 };

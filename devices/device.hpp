@@ -19,7 +19,7 @@ struct DeviceSample {
   std::uint64_t sequence = 0;      ///< of the report, unwrapped
   std::uint64_t acknowledged = 0;  ///< sequence of the last command the device took, unwrapped
   TimePoint arrived{};             ///< when the newest report reached the host
-  std::uint32_t skipped = 0;       ///< older reports drained together with this one
+  std::uint32_t superseded = 0;    ///< older reports drained together with this one
   std::uint32_t missing = 0;       ///< reports lost since the last sample, by sequence number
   std::uint32_t rejected =
       0;  ///< reports dropped in this read: wrong id, length or checksum, backward or duplicate sequence
@@ -28,11 +28,11 @@ struct DeviceSample {
   bool fresh = false;          ///< a new report arrived since the last read
   bool motors_on = false;
   bool watchdog_tripped = false;
-  bool homed = true;          ///< the encoders know where they are; until then no sample is fresh
-  DofMask sensed = kAllDofs;  ///< whose motion the device reports; it stays put along the others
-  DofMask driven = kAllDofs;  ///< along which its motors push
-  DofMask dropped = kNoDof;   ///< components of the last wrench that were not 0 and have no motor
-  Fault fault = Fault::none;  ///< what is wrong with it; the pose is the last good one then
+  bool homed = true;               ///< the encoders know where they are; until then no sample is fresh
+  DofMask sensed_dofs = kAllDofs;  ///< whose motion the device reports; it stays put along the others
+  DofMask driven_dofs = kAllDofs;  ///< along which its motors push
+  DofMask dropped_dofs = kNoDof;   ///< components of the last wrench that were not 0 and have no motor
+  Fault fault = Fault::none;       ///< what is wrong with it; the pose is the last good one then
 };
 
 /// The device contract. A device is opened and closed by an ordinary thread; between the two only the servo
@@ -48,7 +48,7 @@ class Device {
   /// Where the world holds the handle, in the base: the handle with the tool where the world allows it.
   /// Nothing: that is not known. A device whose pose is steered keeps near it; one with a handle of its own
   /// does not care. RT safe.
-  virtual void hold(const std::optional<Pose>& /*X_BG*/) noexcept {}
+  virtual void set_proxy_pose(const std::optional<Pose>& /*X_BG*/) noexcept {}
   /// Sends one wrench, on the hand, about the point and in the axes the profile names. RT safe.
   virtual Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept = 0;
   /// The number of the last command that was sent, as DeviceSample::acknowledged counts them. RT safe.

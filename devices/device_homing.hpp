@@ -15,8 +15,8 @@ namespace wrenchd {
 class DeviceHoming {
  public:
   enum class Extent : std::uint8_t {
-    rest,  ///< what a device needs at each start
-    all,   ///< a calibration: the rest and the axes
+    reference_only,  ///< what a device needs at each start
+    full,            ///< a calibration: the rest and the axes
   };
 
   /// The device has to be open; offsets that it took over before are forgotten. Throws std::invalid_argument
@@ -31,20 +31,20 @@ class DeviceHoming {
   const HomingState& state() const noexcept { return state_; }
   /// What the rest has shown; empty before that, and where the profile asks for no rest.
   const std::vector<AxisOffset>& offsets() const noexcept { return offsets_; }
-  bool lost() const noexcept { return lost_; }  ///< the device was unplugged on the way
+  bool device_lost() const noexcept { return device_lost_; }  ///< the device was unplugged on the way
 
  private:
-  static HomingPlan with_rest(const DeviceProfile& profile);
-  void take_rest(const DeviceSample& sample);
+  static HomingPlan plan_with_reference(const DeviceProfile& profile);
+  void apply_reference_offsets(const DeviceSample& sample);
 
   ProfileDevice& device_;
   DeviceProfile profile_;
   Extent extent_;
-  bool resting_;  ///< the rest has not been shown yet
+  bool reference_pending_;  ///< the rest has not been shown yet
   Homing homing_;
   HomingState state_;
   std::vector<AxisOffset> offsets_;
-  bool lost_ = false;
+  bool device_lost_ = false;
 };
 
 }  // namespace wrenchd

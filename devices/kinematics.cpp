@@ -207,30 +207,31 @@ std::optional<Pose> delta_forward(const Kinematics& k, const JointAngles& wanted
 JointAngles joint_angles(const Kinematics& k, const JointCounts& counts) noexcept {
   JointAngles angles{};
   for (std::size_t i = 0; i < k.joints; ++i)
-    angles[i] = k.rad_per_count[i] * counts[k.slot[i]] + k.zero_rad[i];
+    angles[i] = k.rad_per_count[i] * counts[k.report_index[i]] + k.zero_rad[i];
   return angles;
 }
 
 JointCounts joint_counts(const Kinematics& k, const JointAngles& angles) noexcept {
   JointCounts counts{};
   for (std::size_t i = 0; i < k.joints; ++i)
-    counts[k.slot[i]] = (angles[i] - k.zero_rad[i]) / k.rad_per_count[i];
+    counts[k.report_index[i]] = (angles[i] - k.zero_rad[i]) / k.rad_per_count[i];
   return counts;
 }
 
-JointCounts without_button(const Kinematics& k, JointCounts counts, std::uint32_t& buttons) noexcept {
+JointCounts strip_count_button(const Kinematics& k, JointCounts counts, std::uint32_t& buttons) noexcept {
   const Kinematics::CountButton& hidden = k.count_button;
   if (!hidden.present) return counts;
   const std::uint32_t bit = std::uint32_t{1} << hidden.button;
   buttons &= ~bit;
-  if (counts[hidden.slot] > hidden.above) {
-    counts[hidden.slot] -= hidden.minus;
+  if (counts[hidden.report_index] > hidden.threshold_counts) {
+    counts[hidden.report_index] -= hidden.offset_counts;
     buttons |= bit;
   }
   return counts;
 }
 
-std::optional<Pose> forward(const Kinematics& k, const JointAngles& angles, const Pose& near) noexcept {
+std::optional<Pose> forward_kinematics(const Kinematics& k, const JointAngles& angles,
+                                       const Pose& near) noexcept {
   switch (k.kind) {
     case Kinematics::Kind::none:
       return {};
@@ -280,8 +281,8 @@ Vector3d joint_torques(const Kinematics& k, const MotorEfforts& efforts) noexcep
   return {efforts[0] / k.effort_per_Nm[0], efforts[1] / k.effort_per_Nm[1], efforts[2] / k.effort_per_Nm[2]};
 }
 
-std::optional<Pose> home(const Kinematics& k) noexcept {
-  return forward(k, joint_angles(k, k.home_counts), {});
+std::optional<Pose> home_pose(const Kinematics& k) noexcept {
+  return forward_kinematics(k, joint_angles(k, k.home_counts), {});
 }
 
 }  // namespace wrenchd

@@ -41,12 +41,13 @@ JointAngles joint_angles(const Kinematics& kinematics, const JointCounts& counts
 JointCounts joint_counts(const Kinematics& kinematics, const JointAngles& angles) noexcept;
 
 /// The counts without the button that hides in one of them; adds it to `buttons`.
-JointCounts without_button(const Kinematics& kinematics, JointCounts counts, std::uint32_t& buttons) noexcept;
+JointCounts strip_count_button(const Kinematics& kinematics, JointCounts counts,
+                               std::uint32_t& buttons) noexcept;
 
 /// X_DE of joint angles. `near`: where E was last; the delta is solved from there by Newton's method. Empty
 /// where no position belongs to these angles: an encoder that lies.
-std::optional<Pose> forward(const Kinematics& kinematics, const JointAngles& angles,
-                            const Pose& near) noexcept;
+std::optional<Pose> forward_kinematics(const Kinematics& kinematics, const JointAngles& angles,
+                                       const Pose& near) noexcept;
 
 /// Angles that hold E at X_DE: of the two the one with the elbow as the device is built. What the joints
 /// cannot do (the orientation, without a wrist) is left out. Empty out of reach.
@@ -63,6 +64,6 @@ MotorEfforts motor_efforts(const Kinematics& kinematics, const Matrix3d& J, cons
 Vector3d joint_torques(const Kinematics& kinematics, const MotorEfforts& efforts) noexcept;
 
 /// E at the home position: what the encoders say there is in the profile.
-std::optional<Pose> home(const Kinematics& kinematics) noexcept;
+std::optional<Pose> home_pose(const Kinematics& kinematics) noexcept;
 
 }  // namespace wrenchd

@@ -86,7 +86,7 @@ bool agrees(const std::vector<Cell>& cells, std::size_t begin, std::size_t end, 
 
 /// Is a report of the device shorter than expected, and good nevertheless?
 bool good_but_short(const DescribedReport& device, const ExpectedReport& wanted) {
-  return wanted.least_length != 0 && device.length >= wanted.least_length && device.length < wanted.length;
+  return wanted.min_length != 0 && device.length >= wanted.min_length && device.length < wanted.length;
 }
 
 /// What is wrong with one field, once, however many of its numbers are affected.
@@ -118,8 +118,8 @@ std::string ids_of(const ReportDescriptor& device, ReportKind kind) {
 
 }  // namespace
 
-std::vector<std::string> differences(const ReportDescriptor& device,
-                                     const std::vector<ExpectedReport>& expected) {
+std::vector<std::string> find_differences(const ReportDescriptor& device,
+                                          const std::vector<ExpectedReport>& expected) {
   std::vector<std::string> lines;
   for (const ExpectedReport& wanted : expected) {
     const std::string which = report_text(wanted.kind, wanted.id);

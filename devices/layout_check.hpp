@@ -23,8 +23,8 @@ struct ExpectedReport {
   std::optional<std::uint8_t> id;  ///< none: the device has no report ids
   std::size_t length = 0;          ///< bytes, the id included if there is one
   std::vector<ExpectedField> fields;
-  std::size_t least_length = 0;  ///< a shorter one that will do: fields end where it ends; 0: none will
-  bool may_be_absent = false;    ///< the device need not have it
+  std::size_t min_length = 0;  ///< a shorter one that will do: fields end where it ends; 0: none will
+  bool may_be_absent = false;  ///< the device need not have it
 };
 
 /// What an expectation and the device's own descriptor disagree about, a line each; empty where they agree.
@@ -36,7 +36,7 @@ struct ExpectedReport {
 /// Makers of private layouts describe bytes, no more: fields of 8 bits on a page of their own. Such bytes
 /// agree with everything that lies within them. Elsewhere a field must be one of the device's, with its sign,
 /// or a mask of its single bits, as of buttons. Padding is no data. Not RT safe.
-std::vector<std::string> differences(const ReportDescriptor& device,
-                                     const std::vector<ExpectedReport>& expected);
+std::vector<std::string> find_differences(const ReportDescriptor& device,
+                                          const std::vector<ExpectedReport>& expected);
 
 }  // namespace wrenchd

@@ -50,7 +50,7 @@ Hermite hermite(double u, const Vector3d& m0, const Vector3d& way, const Vector3
 
 }  // namespace
 
-PoseTrack::PoseTrack(const std::vector<TimedPose>& poses) {
+PoseSpline::PoseSpline(const std::vector<TimedPose>& poses) {
   if (poses.empty()) throw std::invalid_argument("the path to play back has no pose");
   if (poses.front().time_s != 0.0) refuse(0, "it is not at time 0");
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -60,8 +60,9 @@ PoseTrack::PoseTrack(const std::vector<TimedPose>& poses) {
     knots_.push_back({time_s, X, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()});
   }
   for (std::size_t i = 0; i + 1 < knots_.size(); ++i) {
-    knots_[i].turn_rad = rotation_vector(knots_[i].X_BG.rotation.conjugate() * knots_[i + 1].X_BG.rotation);
-    if (knots_[i].turn_rad.norm() > kFarthestTurn_rad)
+    knots_[i].rotation_rad =
+        rotation_vector(knots_[i].X_BG.rotation.conjugate() * knots_[i + 1].X_BG.rotation);
+    if (knots_[i].rotation_rad.norm() > kMaxRotation_rad)
       refuse(i + 1, "it is turned too far from the one before to know which way round is meant");
   }
   // The mean over both intervals. The axis of a turn is the same before and after it, so both are in axes of
@@ -69,11 +70,11 @@ PoseTrack::PoseTrack(const std::vector<TimedPose>& poses) {
   for (std::size_t i = 1; i + 1 < knots_.size(); ++i) {
     const double span_s = knots_[i + 1].time_s - knots_[i - 1].time_s;
     knots_[i].v_m_per_s = (knots_[i + 1].X_BG.translation_m - knots_[i - 1].X_BG.translation_m) / span_s;
-    knots_[i].w_rad_per_s = (knots_[i - 1].turn_rad + knots_[i].turn_rad) / span_s;
+    knots_[i].w_rad_per_s = (knots_[i - 1].rotation_rad + knots_[i].rotation_rad) / span_s;
   }
 }
 
-HandTarget PoseTrack::at(Duration since_start) const noexcept {
+HandTarget PoseSpline::at(Duration since_start) const noexcept {
   const double t_s = std::max(seconds(since_start), 0.0);
   const auto next = std::upper_bound(knots_.begin(), knots_.end(), t_s,
                                      [](double time_s, const Knot& k) { return time_s < k.time_s; });
@@ -83,8 +84,8 @@ HandTarget PoseTrack::at(Duration since_start) const noexcept {
   const double u = (t_s - from.time_s) / h_s;
   const Hermite p = hermite(u, h_s * from.v_m_per_s, next->X_BG.translation_m - from.X_BG.translation_m,
                             h_s * next->v_m_per_s);
-  const Hermite phi = hermite(u, h_s * from.w_rad_per_s, from.turn_rad,
-                              h_s * (inverse_right_jacobian(from.turn_rad) * next->w_rad_per_s));
+  const Hermite phi = hermite(u, h_s * from.w_rad_per_s, from.rotation_rad,
+                              h_s * (inverse_right_jacobian(from.rotation_rad) * next->w_rad_per_s));
   const Quaterniond R = (from.X_BG.rotation * rotation_from(phi.value)).normalized();
   return {{R, from.X_BG.translation_m + p.value},
           {p.slope / h_s, R * (right_jacobian(phi.value) * phi.slope / h_s)}};

@@ -24,14 +24,14 @@ struct HandTarget {
 ///
 /// v and w (in axes of G) at each pose are the mean rates over the two intervals beside it, at the ends zero:
 /// it starts and ends at rest. Jr is the right Jacobian of exp.
-class PoseTrack {
+class PoseSpline {
  public:
   /// Turns farther than this from one pose to the next could be meant either way round.
-  static constexpr double kFarthestTurn_rad = 2.0;
+  static constexpr double kMaxRotation_rad = 2.0;
 
   /// Throws std::invalid_argument where there is no pose, a number is not finite, times do not rise strictly
   /// from 0, or a turn is too far.
-  explicit PoseTrack(const std::vector<TimedPose>& poses);
+  explicit PoseSpline(const std::vector<TimedPose>& poses);
 
   /// After the last pose the handle stays there. RT safe.
   HandTarget at(Duration since_start) const noexcept;
@@ -41,9 +41,9 @@ class PoseTrack {
   struct Knot {
     double time_s;
     Pose X_BG;
-    Vector3d v_m_per_s;    ///< in B
-    Vector3d w_rad_per_s;  ///< in G
-    Vector3d turn_rad;     ///< to the next, in G
+    Vector3d v_m_per_s;     ///< in B
+    Vector3d w_rad_per_s;   ///< in G
+    Vector3d rotation_rad;  ///< to the next, in G
   };
   std::vector<Knot> knots_;
 };

@@ -89,12 +89,12 @@ void ProfileDevice::open() {
   check_profile(profile_);
   link_.open();
   recalibrate(profile_);
-  clock_ = acknowledging_ = nullptr;
+  device_time_field_ = acknowledged_field_ = nullptr;
   pose_layouts_ = 0;
   for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
     const PoseReportLayout& report = *layout(i);
-    if (report.device_time.present) clock_ = &report.device_time;
-    if (report.acknowledged.present) acknowledging_ = &report.acknowledged;
+    if (report.device_time.present) device_time_field_ = &report.device_time;
+    if (report.acknowledged.present) acknowledged_field_ = &report.acknowledged;
     if (carries_pose(report)) pose_layouts_ |= std::uint64_t{1} << i;
   }
   sample_ = {};
@@ -104,12 +104,12 @@ void ProfileDevice::open() {
     deflection_.emplace(*profile_.deflection, profile_.max_linear_speed_m_per_s,
                         profile_.max_angular_speed_rad_per_s);
   silent_since_.reset();
-  reported_.reset();
+  previous_pose_.reset();
   acknowledged_.reset();
   sent_before_open_ = commands_sent_;
-  heard_ = gone_ = placed_ = false;
-  heard_layouts_ = 0;
-  fast_samples_ = 0;
+  report_received_ = disconnected_ = kinematics_valid_ = false;
+  layouts_since_open_ = 0;
+  overspeed_samples_ = 0;
   open_ = true;
 }
 
@@ -118,8 +118,8 @@ void ProfileDevice::recalibrate(const DeviceProfile& calibrated) noexcept {
   profile_.X_EH = calibrated.X_EH;
   profile_.kinematics.zero_rad = calibrated.kinematics.zero_rad;
   same_frames_ = same_bits(profile_.X_BD, {}) && same_bits(profile_.X_EH, {});
-  reported_.reset();
-  placed_ = false;
+  previous_pose_.reset();
+  kinematics_valid_ = false;
 }
 
 void ProfileDevice::close() noexcept {
@@ -136,46 +136,47 @@ const PoseReportLayout* ProfileDevice::layout(std::size_t index) const noexcept 
 DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
   sample_.fresh = false;
   sample_.fault = Fault::none;
-  sample_.skipped = sample_.missing = sample_.rejected = sample_.repeated = 0;
+  sample_.superseded = sample_.missing = sample_.rejected = sample_.repeated = 0;
   if (!silent_since_) {
-    start(now);
-  } else if (const std::optional<Arrival> newest = drain(now); newest && !gone_) {
-    take(*newest);
+    discard_waiting_reports(now);
+  } else if (const std::optional<Arrival> newest = drain(now); newest && !disconnected_) {
+    update_sample(*newest);
   }
-  if (deflection_ && open_ && !gone_) follow_deflection(now);
-  if (gone_ || !open_) {
+  if (deflection_ && open_ && !disconnected_) integrate_deflection(now);
+  if (disconnected_ || !open_) {
     sample_.fault = Fault::device_lost;
   } else if (sample_.fault == Fault::none && silent_too_long(now)) {
     sample_.fault = Fault::sample_stale;
   }
-  kick(now);
+  prompt_device(now);
   return sample_;
 }
 
 /// The first read throws away what waited since open(), however old, and the time of silence begins.
-void ProfileDevice::start(TimePoint now) noexcept {
+void ProfileDevice::discard_waiting_reports(TimePoint now) noexcept {
   drain(now);
   sample_ = {};
-  sample_.sensed = sensed_dofs(profile_);
-  sample_.driven = driven_dofs(profile_);
-  heard_ = false;
-  heard_layouts_ = 0;
+  sample_.sensed_dofs = sensed_dofs(profile_);
+  sample_.driven_dofs = driven_dofs(profile_);
+  report_received_ = false;
+  layouts_since_open_ = 0;
   state_ = {};
-  if (deflection_) deflection_->push(Vector3d::Zero(), Vector3d::Zero());
-  silent_since_ = deflected_at_ = now;
-  kicked_at_ = now - kKickAfter;  // a lock-step device is spoken to at once
+  if (deflection_) deflection_->set_deflection(Vector3d::Zero(), Vector3d::Zero());
+  silent_since_ = deflection_time_ = now;
+  prompted_at_ = now - kLockStepTimeout;  // a lock-step device is spoken to at once
 }
 
 /// Speaks to a device that needs it: a lock-step one that has lost count of the conversation, or never heard
 /// its beginning, and one that wants to be kept alive.
-void ProfileDevice::kick(TimePoint now) noexcept {
+void ProfileDevice::prompt_device(TimePoint now) noexcept {
   const bool lock_step = profile_.stream == StreamStyle::lock_step;
-  if (!open_ || gone_ || (!lock_step && profile_.keep_alive.bytes.empty())) return;
-  if (now - kicked_at_ < (lock_step ? kKickAfter : from_seconds(profile_.keep_alive_period_s))) return;
-  kicked_at_ = now;
+  if (!open_ || disconnected_ || (!lock_step && profile_.keep_alive.bytes.empty())) return;
+  if (now - prompted_at_ < (lock_step ? kLockStepTimeout : from_seconds(profile_.keep_alive_period_s)))
+    return;
+  prompted_at_ = now;
   if (!lock_step)
-    hand_over(now, profile_.keep_alive.bytes);
-  else if (!heard_ || now - *silent_since_ >= kKickAfter)
+    transmit(now, profile_.keep_alive.bytes);
+  else if (!report_received_ || now - *silent_since_ >= kLockStepTimeout)
     send(now, {}, false);
 }
 
@@ -189,14 +190,14 @@ bool ProfileDevice::silent_too_long(TimePoint now) const noexcept {
 std::optional<ProfileDevice::Arrival> ProfileDevice::drain(TimePoint now) noexcept {
   std::optional<Arrival> newest;
   std::array<std::uint8_t, kMaxReportBytes> buffer;
-  read_layouts_ = 0;
-  for (int i = 0; i < kMostReportsPerRead && !gone_ && open_; ++i) {
+  layouts_this_read_ = 0;
+  for (int i = 0; i < kMaxReportsPerRead && !disconnected_ && open_; ++i) {
     const LinkRead read = link_.read(now, buffer);
-    gone_ = read.status == LinkStatus::gone;
+    disconnected_ = read.status == LinkStatus::disconnected;
     if (read.status != LinkStatus::ok) break;
     const auto bytes = std::span<const std::uint8_t>(buffer).first(std::min(read.length, buffer.size()));
     const PoseReportLayout* known = nullptr;
-    if (read.length <= buffer.size()) known = understand(bytes, read.arrived);
+    if (read.length <= buffer.size()) known = decode_report(bytes, read.arrived);
     if (known == nullptr) {
       ++sample_.rejected;
       continue;
@@ -208,25 +209,25 @@ std::optional<ProfileDevice::Arrival> ProfileDevice::drain(TimePoint now) noexce
 
 /// The layout that this report has, and its content in state_. A report of a kind that came before in this
 /// read makes the earlier one one that was skipped.
-const PoseReportLayout* ProfileDevice::understand(std::span<const std::uint8_t> bytes,
-                                                  TimePoint arrived) noexcept {
+const PoseReportLayout* ProfileDevice::decode_report(std::span<const std::uint8_t> bytes,
+                                                     TimePoint arrived) noexcept {
   for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
     const PoseReportLayout& known = *layout(i);
     PoseReport report = state_;
     if (decode_into(known, bytes, report) != Decoding::ok) continue;
-    if (!count_in(known, report, arrived)) {
+    if (!accept_counters(known, report, arrived)) {
       ++sample_.repeated;
       return nullptr;
     }
     if (deflection_) {
-      follow_deflection(arrived);
-      steer(report);
+      integrate_deflection(arrived);
+      apply_deflection(report);
     }
     state_ = report;
     const std::uint64_t bit = std::uint64_t{1} << i;
-    if ((read_layouts_ & bit) != 0) ++sample_.skipped;
-    read_layouts_ |= bit;
-    heard_layouts_ |= bit;
+    if ((layouts_this_read_ & bit) != 0) ++sample_.superseded;
+    layouts_this_read_ |= bit;
+    layouts_since_open_ |= bit;
     return &known;
   }
   return nullptr;
@@ -234,10 +235,10 @@ const PoseReportLayout* ProfileDevice::understand(std::span<const std::uint8_t> 
 
 /// Follows the counters. False for a repetition, or a step back: more than half way round. After a silence
 /// that is a fault by itself the counters may be anywhere, so then a step back is a new start.
-bool ProfileDevice::count_in(const PoseReportLayout& layout, const PoseReport& report,
-                             TimePoint arrived) noexcept {
+bool ProfileDevice::accept_counters(const PoseReportLayout& layout, const PoseReport& report,
+                                    TimePoint arrived) noexcept {
   const bool after_silence = silent_too_long(arrived);
-  if (heard_) {
+  if (report_received_) {
     const std::uint64_t reports =
         layout.sequence.present ? ahead(layout.sequence, sequence_, report.sequence) : 1;
     const std::uint64_t ticks = ahead(layout.device_time, device_time_, report.device_time);
@@ -249,11 +250,11 @@ bool ProfileDevice::count_in(const PoseReportLayout& layout, const PoseReport& r
   } else {
     sample_.sequence = report.sequence;
     device_ticks_ = report.device_time;
-    heard_ = true;
+    report_received_ = true;
   }
   if (after_silence) {
     sample_.fault = Fault::sample_stale;
-    reported_.reset();  // nothing to compare motion with
+    previous_pose_.reset();  // nothing to compare motion with
   }
   sequence_ = report.sequence;
   device_time_ = report.device_time;
@@ -261,41 +262,41 @@ bool ProfileDevice::count_in(const PoseReportLayout& layout, const PoseReport& r
   return true;
 }
 
-void ProfileDevice::take(const Arrival& newest) noexcept {
-  pass_time(newest);
-  note_acknowledged();
-  without_button(profile_.kinematics, state_.joints, state_.buttons);
+void ProfileDevice::update_sample(const Arrival& newest) noexcept {
+  update_device_time(newest);
+  update_acknowledged();
+  strip_count_button(profile_.kinematics, state_.joints, state_.buttons);
   sample_.buttons = state_.buttons;
   if (newest.layout->motors_on.present) sample_.motors_on = state_.motors_on;
   sample_.watchdog_tripped = state_.watchdog_tripped;
-  if (!state_.homed) reported_.reset();  // where the encoders begin to count is about to change
+  if (!state_.homed) previous_pose_.reset();  // where the encoders begin to count is about to change
   sample_.homed = state_.homed;
-  if (deflection_ || !state_.homed || (heard_layouts_ & pose_layouts_) != pose_layouts_ ||
-      (read_layouts_ & pose_layouts_) == 0) {
-    placed_ = placed_ && state_.homed;
+  if (deflection_ || !state_.homed || (layouts_since_open_ & pose_layouts_) != pose_layouts_ ||
+      (layouts_this_read_ & pose_layouts_) == 0) {
+    kinematics_valid_ = kinematics_valid_ && state_.homed;
     return;
   }
   sample_.fresh = true;
   PoseReport report = state_;
-  Fault fault = make_pose(report);
-  if (fault == Fault::none) fault = judge(report);
+  Fault fault = compute_pose(report);
+  if (fault == Fault::none) fault = validate_pose(report);
   if (fault != Fault::none) {
     sample_.fault = fault;
     return;
   }
-  sample_.X_BH = *reported_;
+  sample_.X_BH = *previous_pose_;
   sample_.V_BH = report.V_BH;
 }
 
-Fault ProfileDevice::make_pose(PoseReport& report) noexcept {
+Fault ProfileDevice::compute_pose(PoseReport& report) noexcept {
   const Kinematics& k = profile_.kinematics;
   if (k.kind != Kinematics::Kind::none) {
-    angles_ = wrenchd::joint_angles(k, without_button(k, report.joints, report.buttons));
-    const std::optional<Pose> X_DE = forward(k, angles_, X_DE_);
-    placed_ = X_DE.has_value();
+    joint_angles_ = wrenchd::joint_angles(k, strip_count_button(k, report.joints, report.buttons));
+    const std::optional<Pose> X_DE = forward_kinematics(k, joint_angles_, X_DE_);
+    kinematics_valid_ = X_DE.has_value();
     if (!X_DE) return Fault::pose_not_finite;
     report.X_BH = X_DE_ = *X_DE;
-    J_ = jacobian(k, angles_, X_DE_);
+    J_ = jacobian(k, joint_angles_, X_DE_);
   }
   if (same_frames_) return Fault::none;
   const Quaterniond& R_BD = profile_.X_BD.rotation;
@@ -310,36 +311,36 @@ Fault ProfileDevice::make_pose(PoseReport& report) noexcept {
 }
 
 /// What the cap and its buttons ask for from now on.
-void ProfileDevice::steer(const PoseReport& report) noexcept {
+void ProfileDevice::apply_deflection(const PoseReport& report) noexcept {
   const Quaterniond& R_BD = profile_.X_BD.rotation;
-  deflection_->push(R_BD * report.translation_m, R_BD * report.rotation_rad);
+  deflection_->set_deflection(R_BD * report.translation_m, R_BD * report.rotation_rad);
   const std::uint32_t recentre = button_bit(profile_.recentre_button);
   if ((report.buttons & ~state_.buttons & recentre) != 0) deflection_->recentre();
-  deflection_->go_slowly((report.buttons & button_bit(profile_.slow_button)) != 0);
+  deflection_->set_slow((report.buttons & button_bit(profile_.slow_button)) != 0);
 }
 
 /// The cap's pose goes on between reports, and is as of now.
-void ProfileDevice::follow_deflection(TimePoint now) noexcept {
-  if (now <= deflected_at_) return;
+void ProfileDevice::integrate_deflection(TimePoint now) noexcept {
+  if (now <= deflection_time_) return;
   const bool lost = silent_too_long(now);
-  if (lost) deflection_->push(Vector3d::Zero(), Vector3d::Zero());
-  const double dt_s = seconds(now - deflected_at_);
+  if (lost) deflection_->set_deflection(Vector3d::Zero(), Vector3d::Zero());
+  const double dt_s = seconds(now - deflection_time_);
   deflection_->advance(dt_s);
-  deflected_at_ = now;
+  deflection_time_ = now;
   sample_.device_time_s += dt_s;
   sample_.arrived = now;
   sample_.fresh = true;
   sample_.X_BH = deflection_->X_BH();
   sample_.V_BH = deflection_->V_BH();
-  link_.show(now, sample_.X_BH);
+  link_.show_pose(now, sample_.X_BH);
   if (lost) sample_.fault = Fault::sample_stale;
 }
 
 /// Moves arrival and device time on to a new sample. A device without a clock lives by the host's.
-void ProfileDevice::pass_time(const Arrival& newest) noexcept {
+void ProfileDevice::update_device_time(const Arrival& newest) noexcept {
   if (deflection_) return;
-  if (clock_ != nullptr) {
-    sample_.device_time_s = clock_->step * static_cast<double>(device_ticks_);
+  if (device_time_field_ != nullptr) {
+    sample_.device_time_s = device_time_field_->step * static_cast<double>(device_ticks_);
   } else if (sample_.arrived != TimePoint{}) {
     sample_.device_time_s += seconds(newest.arrived - sample_.arrived);
   }
@@ -349,62 +350,62 @@ void ProfileDevice::pass_time(const Arrival& newest) noexcept {
 /// The most time that can have passed since the last pose that was one [s]: a coarse clock must not make
 /// motion look fast. Never more than the time after which silence is a fault anyway.
 double ProfileDevice::elapsed_s() const noexcept {
-  const double one_tick_s = clock_ != nullptr ? clock_->step : 0.0;
-  return std::min(sample_.device_time_s - reported_at_s_ + one_tick_s, profile_.stale_fault_s);
+  const double one_tick_s = device_time_field_ != nullptr ? device_time_field_->step : 0.0;
+  return std::min(sample_.device_time_s - previous_pose_time_s_ + one_tick_s, profile_.stale_fault_s);
 }
 
 /// The newest command whose low bits the device names, if it was sent since open(). What the device names
 /// until it takes one of these is somebody else's.
-void ProfileDevice::note_acknowledged() noexcept {
+void ProfileDevice::update_acknowledged() noexcept {
   const std::uint64_t raw = state_.acknowledged;
-  if (acknowledging_ == nullptr || raw == acknowledged_) return;
+  if (acknowledged_field_ == nullptr || raw == acknowledged_) return;
   acknowledged_ = raw;
-  const std::uint64_t behind = (commands_sent_ - raw) & largest(*acknowledging_);
+  const std::uint64_t behind = (commands_sent_ - raw) & largest(*acknowledged_field_);
   if (behind < commands_sent_ - sent_before_open_) sample_.acknowledged = commands_sent_ - behind;
 }
 
-Fault ProfileDevice::judge(PoseReport report) noexcept {
+Fault ProfileDevice::validate_pose(PoseReport report) noexcept {
   if (!is_finite(report.X_BH) || !is_finite(report.V_BH)) return Fault::pose_not_finite;
   const double norm2 = report.X_BH.rotation.squaredNorm();
   if (norm2 < kLeastQuaternionNorm2 || norm2 > kMostQuaternionNorm2) return Fault::pose_not_a_rotation;
   report.X_BH.rotation.normalize();
-  const Fault fault = judge_motion(report);
-  reported_ = report.X_BH;
-  reported_at_s_ = sample_.device_time_s;
+  const Fault fault = validate_motion(report);
+  previous_pose_ = report.X_BH;
+  previous_pose_time_s_ = sample_.device_time_s;
   return fault;
 }
 
-Fault ProfileDevice::judge_motion(const PoseReport& report) noexcept {
+Fault ProfileDevice::validate_motion(const PoseReport& report) noexcept {
   const double max_v = profile_.max_linear_speed_m_per_s;
   const double max_w = profile_.max_angular_speed_rad_per_s;
   double v = report.V_BH.linear_m_per_s.norm();
   double w = report.V_BH.angular_rad_per_s.norm();
-  if (reported_) {
-    const double way_m = (report.X_BH.translation_m - reported_->translation_m).norm() - kEncoderStep_m;
-    const double turn_rad = report.X_BH.rotation.angularDistance(reported_->rotation) - kEncoderStep_rad;
+  if (previous_pose_) {
+    const double way_m = (report.X_BH.translation_m - previous_pose_->translation_m).norm() - kEncoderStep_m;
+    const double turn_rad = report.X_BH.rotation.angularDistance(previous_pose_->rotation) - kEncoderStep_rad;
     const double t = elapsed_s();
     if (way_m > kTeleportFactor * max_v * t || turn_rad > kTeleportFactor * max_w * t)
-      return Fault::pose_teleported;
+      return Fault::pose_jumped;
     if (t > 0.0) {
       v = std::max(v, way_m / t);
       w = std::max(w, turn_rad / t);
     }
   }
-  fast_samples_ = v > max_v || w > max_w ? fast_samples_ + 1 : 0;
-  return fast_samples_ >= kFastSamples ? Fault::overspeed : Fault::none;
+  overspeed_samples_ = v > max_v || w > max_w ? overspeed_samples_ + 1 : 0;
+  return overspeed_samples_ >= kFastSamples ? Fault::overspeed : Fault::none;
 }
 
 // --- writing ----------------------------------------------------------------------------------------------
 
 Fault ProfileDevice::write(TimePoint now, const Wrench& F, bool motors_on) noexcept {
   if (!is_finite(F)) {
-    sample_.dropped = kNoDof;
+    sample_.dropped_dofs = kNoDof;
     send(now, {}, false);
     return Fault::wrench_not_finite;
   }
-  sample_.dropped = motors_on ? static_cast<DofMask>(components(F) & ~driven_dofs(profile_)) : kNoDof;
-  if (!profile_.has_output) return open_ && !gone_ ? Fault::none : Fault::device_lost;
-  const bool lost = profile_.kinematics.kind != Kinematics::Kind::none && !placed_;
+  sample_.dropped_dofs = motors_on ? static_cast<DofMask>(nonzero_dofs(F) & ~driven_dofs(profile_)) : kNoDof;
+  if (!profile_.has_output) return open_ && !disconnected_ ? Fault::none : Fault::device_lost;
+  const bool lost = profile_.kinematics.kind != Kinematics::Kind::none && !kinematics_valid_;
   if (!motors_on || lost || !sample_.homed) return send(now, {}, false);
   const double authority = profile_.watchdog_s > 0.0 ? 1.0 : kAuthorityWithoutWatchdog;
   const WrenchReportLayout& report = profile_.wrench_report;
@@ -416,7 +417,7 @@ Fault ProfileDevice::write(TimePoint now, const Wrench& F, bool motors_on) noexc
   return send(now, sent, true);
 }
 
-void ProfileDevice::put_wrench(const Wrench& F_B, WrenchReport& report) const noexcept {
+void ProfileDevice::fill_wrench(const Wrench& F_B, WrenchReport& report) const noexcept {
   report.F = F_B;
   if (!same_frames_)
     report.F = shifted(expressed(profile_.X_BD.rotation.conjugate(), F_B),
@@ -429,7 +430,7 @@ Fault ProfileDevice::send(TimePoint now, const Wrench& F, bool motors_on) noexce
   if (!open_) return Fault::device_lost;
   if (!profile_.has_output) return Fault::none;
   WrenchReport report;
-  put_wrench(F, report);
+  fill_wrench(F, report);
   report.hold_time_s =
       std::max(profile_.watchdog_s, profile_.wrench_report.hold_time.step);  // 0 is "default"
   report.sequence = ++commands_sent_;
@@ -437,16 +438,16 @@ Fault ProfileDevice::send(TimePoint now, const Wrench& F, bool motors_on) noexce
   if (!profile_.pose_report.motors_on.present) sample_.motors_on = motors_on;
   std::array<std::uint8_t, kMaxReportBytes> buffer;
   const std::size_t length = encode(profile_.wrench_report, report, buffer);
-  return hand_over(now, std::span(buffer).first(length));
+  return transmit(now, std::span(buffer).first(length));
 }
 
-Fault ProfileDevice::hand_over(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {
+Fault ProfileDevice::transmit(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {
   switch (link_.write(now, bytes)) {
     case LinkStatus::ok:
       return Fault::none;
-    case LinkStatus::empty:
+    case LinkStatus::not_ready:
       return Fault::write_failed;
-    case LinkStatus::gone:
+    case LinkStatus::disconnected:
       break;
   }
   return Fault::device_lost;
@@ -454,7 +455,7 @@ Fault ProfileDevice::hand_over(TimePoint now, std::span<const std::uint8_t> byte
 
 void ProfileDevice::release(TimePoint now) noexcept {
   for (int i = 0; i < kReleaseReports; ++i) send(now, {}, false);
-  if (open_ && !profile_.shutdown.bytes.empty()) hand_over(now, profile_.shutdown.bytes);
+  if (open_ && !profile_.shutdown.bytes.empty()) transmit(now, profile_.shutdown.bytes);
 }
 
 }  // namespace wrenchd

@@ -13,7 +13,7 @@ class Gathering {
     report_.kind = kind;
     if (frame.has_id) report_.id = frame.id;
     report_.length = frame.length;
-    report_.least_length = frame.least_length;
+    report_.min_length = frame.min_length;
     const unsigned checksum_bits = frame.checksum == Checksum::crc16_ccitt_false ? 16 : 8;
     if (frame.checksum != Checksum::none)
       add("checksum", 8 * frame.checksum_at.value_or(frame.length - checksum_bits / 8), checksum_bits, 1,

@@ -49,7 +49,7 @@ std::uint64_t mask_of(unsigned bits) noexcept {
 // the integer the piece belongs.
 
 template <class Visit>
-void walk(const ReportField& field, std::size_t index, Visit visit) noexcept {
+void simd(const ReportField& field, std::size_t index, Visit visit) noexcept {
   const std::size_t first = 8 * field.byte + field.bit + index * stride_of(field);
   if (field.coding == Coding::nibble_ascii || field.big_endian) {
     const unsigned width = field.coding == Coding::nibble_ascii ? kBitsPerNibble : 8;
@@ -108,7 +108,7 @@ void put_raw(const ReportField& field, std::uint64_t value, MutableBytes bytes,
              std::size_t index = 0) noexcept {
   if (!field.present) return;
   if (is_plain(field)) return put_plain(field.bits, value, &bytes[field.byte + index * field.bits / 8]);
-  walk(field, index, [&](std::size_t byte, unsigned bit, unsigned width, unsigned up) {
+  simd(field, index, [&](std::size_t byte, unsigned bit, unsigned width, unsigned up) {
     const unsigned mask = static_cast<unsigned>(mask_of(width)) << bit;
     const unsigned piece = static_cast<unsigned>(value >> up) << bit;
     const unsigned old = static_cast<std::uint8_t>(bytes[byte] - field.base);
@@ -198,7 +198,7 @@ std::uint16_t checksum_of(const ReportFrame& frame, Bytes bytes) noexcept {
 }
 
 bool has_length_of(const ReportFrame& frame, std::size_t length) noexcept {
-  const std::size_t least = frame.least_length == 0 ? frame.length : frame.least_length;
+  const std::size_t least = frame.min_length == 0 ? frame.length : frame.min_length;
   return length >= least && length <= frame.length;
 }
 
@@ -246,10 +246,10 @@ class BitMap {
     if (frame.length < least || frame.length > kMaxReportBytes)
       refuse("length = " + std::to_string(frame.length) + " must be " + std::to_string(least) + " to " +
              std::to_string(kMaxReportBytes) + " bytes");
-    if (frame.least_length > frame.length || (frame.least_length != 0 && frame.checksum != Checksum::none))
-      refuse("least_length = " + std::to_string(frame.least_length) +
+    if (frame.min_length > frame.length || (frame.min_length != 0 && frame.checksum != Checksum::none))
+      refuse("least_length = " + std::to_string(frame.min_length) +
              " must not be above length, and not be stated where there is a checksum");
-    if (frame.least_length == 0 && frame.length < least) refuse("is empty");
+    if (frame.min_length == 0 && frame.length < least) refuse("is empty");
     room_ = 8 * (frame.length - tail);
     if (frame.has_id) claim("the report id", 0, 8);
     if (frame.checksum_at) {
@@ -354,13 +354,13 @@ BitMap claimed(const PoseReportLayout& layout) {
   return map;
 }
 
-void check_told_apart(const PoseReportLayout& a, const PoseReportLayout& b) {
+void check_distinguishable(const PoseReportLayout& a, const PoseReportLayout& b) {
   const bool ids = a.has_id && b.has_id;
   if (a.has_id != b.has_id)
     throw std::invalid_argument(
         "reports with an id and without one cannot be told apart; a device has either");
   if (ids && a.id != b.id) return;
-  const auto least = [](const ReportFrame& r) { return r.least_length == 0 ? r.length : r.least_length; };
+  const auto least = [](const ReportFrame& r) { return r.min_length == 0 ? r.length : r.min_length; };
   if (least(a) > b.length || least(b) > a.length) return;
   throw std::invalid_argument("two reports have the same " + std::string(ids ? "id" : "length") +
                               " and cannot be told apart");
@@ -403,7 +403,7 @@ std::uint64_t raw_integer(const ReportField& field, std::span<const std::uint8_t
   if (is_plain(field) && first + field.bits / 8 <= bytes.size()) {
     value = plain_integer(field.bits, &bytes[first]);
   } else {
-    walk(field, index, [&](std::size_t byte, unsigned bit, unsigned width, unsigned up) {
+    simd(field, index, [&](std::size_t byte, unsigned bit, unsigned width, unsigned up) {
       if (byte >= bytes.size()) return;
       const unsigned piece = static_cast<std::uint8_t>(bytes[byte] - field.base);
       value |= ((std::uint64_t{piece} >> bit) & mask_of(width)) << up;
@@ -551,7 +551,7 @@ void check_reports(const DeviceProfile& profile) {
   for (const PoseReportLayout& layout : profile.more_reports) layouts.push_back(&layout);
   for (std::size_t i = 0; i < layouts.size(); ++i) {
     claimed(*layouts[i]);
-    for (std::size_t j = 0; j < i; ++j) check_told_apart(*layouts[j], *layouts[i]);
+    for (std::size_t j = 0; j < i; ++j) check_distinguishable(*layouts[j], *layouts[i]);
   }
   check_pose(profile, layouts);
   if (!profile.has_output) return;

@@ -41,7 +41,7 @@ class Search {
  public:
   explicit Search(const ReportDescriptor& descriptor) : descriptor_(descriptor) {}
 
-  SixAxesFound find() {
+  SixAxisResult find() {
     for (const DescribedReport& report : descriptor_.reports)
       for (const DescribedField& field : report.fields) {
         if (descriptor_.application(field) != kMultiAxis) continue;
@@ -124,7 +124,7 @@ class Search {
   }
 
   const ReportDescriptor& descriptor_;
-  SixAxes found_;
+  SixAxisController found_;
   std::array<bool, 6> seen_{};
   bool met_ = false;  ///< some field of a multi-axis collection
   std::string why_not_;
@@ -132,7 +132,7 @@ class Search {
 
 }  // namespace
 
-SixAxesFound find_six_axes(const ReportDescriptor& descriptor) {
+SixAxisResult find_six_axes(const ReportDescriptor& descriptor) {
   return Search(descriptor).find();
 }
 

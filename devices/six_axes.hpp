@@ -37,7 +37,7 @@ struct DescribedBits {
 };
 
 /// A multi-axis controller, generic desktop usage 01:08, as its report descriptor shows it.
-struct SixAxes {
+struct SixAxisController {
   AxesLayout layout = AxesLayout::combined;
   std::array<DescribedNumber, 6> axes;   ///< X Y Z Rx Ry Rz
   std::optional<DescribedBits> buttons;  ///< of the first report that has some
@@ -45,13 +45,13 @@ struct SixAxes {
 };
 
 /// The six axes, or the sentence that says why the device has none that can be told.
-struct SixAxesFound {
-  std::optional<SixAxes> device;
-  std::string why_not;
+struct SixAxisResult {
+  std::optional<SixAxisController> controller;
+  std::string rejection;
 };
 
 /// Looks for a multi-axis controller. Ids of the device play no part: firmware made at home borrows those of
 /// devices whose reports look different. Not RT safe.
-SixAxesFound find_six_axes(const ReportDescriptor& descriptor);
+SixAxisResult find_six_axes(const ReportDescriptor& descriptor);
 
 }  // namespace wrenchd

@@ -42,22 +42,22 @@ struct Target {
 Target find_target(const CalibrateOptions& options) {
   const std::vector<DeviceProfile> profiles = profiles_named(options.profile);
   const std::vector<UsbDevice> plugged = list_usb_devices();
-  WantedDevice wanted;
+  DeviceCriteria wanted;
   wanted.serial = options.serial;
   if (options.profile != kAnyProfile) wanted.profile = profiles.front().name;
   const DeviceChoice choice = choose_device(plugged, profiles, wanted);
-  if (!choice.pick) {
+  if (!choice.selection) {
     std::string text = "no such device is plugged in; wrenchctl devices lists what is";
-    for (const std::string& seen : seen_instead(plugged, choice)) text += "\n  " + seen;
+    for (const std::string& seen : describe_rejected(plugged, choice)) text += "\n  " + seen;
     throw std::runtime_error(text);
   }
-  const UsbDevice& device = plugged[choice.pick->device];
+  const UsbDevice& device = plugged[choice.selection->device];
   if (device.serial.empty())
     throw std::runtime_error(
         describe(device) +
         ": it has no serial number, so nothing can be kept for it and no other; have its "
         "firmware send one");
-  return {profiles[choice.pick->profile], device.serial};
+  return {profiles[choice.selection->profile], device.serial};
 }
 
 /// Whether a line was typed since it was asked last.
@@ -73,17 +73,18 @@ bool line_typed() {
 }  // namespace
 
 Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const std::string& serial,
-                      Clock& clock, const Bystander& person) {
-  DeviceHoming homing(device, profile, DeviceHoming::Extent::all);
+                      Clock& clock, const OperatorInterface& person) {
+  DeviceHoming homing(device, profile, DeviceHoming::Extent::full);
   std::string said;
-  while (!person.stops()) {
+  while (!person.cancelled()) {
     clock.sleep_until(clock.now() + kPeriod);
-    if (homing.state().step == HomingStep::reference && person.confirms()) homing.confirm();
+    if (homing.state().step == HomingStep::reference && person.confirmed()) homing.confirm();
     const HomingState& state = homing.step(clock.now());
-    if (homing.lost()) throw std::runtime_error("the device was unplugged; plug it in, and begin again");
-    const std::string words = told(state);
+    if (homing.device_lost())
+      throw std::runtime_error("the device was unplugged; plug it in, and begin again");
+    const std::string words = operator_instruction(state);
     if (state.step == HomingStep::failed) throw std::runtime_error(words);
-    if (words != said) person.told(words);
+    if (words != said) person.instruct(words);
     said = words;
     if (state.step == HomingStep::done) return {profile.name, serial, homing.offsets()};
   }
@@ -93,18 +94,18 @@ Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const
 int run_calibrate(const CalibrateOptions& options) {
   const Target target = find_target(options);
   const CalibrationStore store;
-  PluggedLink link(target.profile, target.serial, link_settings(target.profile));
+  ReconnectingLink link(target.profile, target.serial, link_settings(target.profile));
   ProfileDevice device(target.profile, link);
   WallClock clock;
   device.open();
   std::signal(SIGINT, [](int) { interrupted.store(true); });
   std::printf("%s, serial number %s. Its motors stay off. Ctrl-C ends.\n", target.profile.name.c_str(),
               target.serial.c_str());
-  const Bystander person = {[](const std::string& words) {
-                              std::printf("%s\n", words.c_str());
-                              std::fflush(stdout);
-                            },
-                            line_typed, [] { return interrupted.load(); }};
+  const OperatorInterface person = {[](const std::string& words) {
+                                      std::printf("%s\n", words.c_str());
+                                      std::fflush(stdout);
+                                    },
+                                    line_typed, [] { return interrupted.load(); }};
   const auto released = [&] {
     device.release(clock.now());
     device.close();

@@ -11,16 +11,16 @@
 namespace wrenchd {
 
 /// The person beside the device.
-struct Bystander {
-  std::function<void(const std::string&)> told;  ///< a sentence on what to do
-  std::function<bool()> confirms;                ///< whether the handle is in its rest, by now
-  std::function<bool()> stops;                   ///< whether they have had enough
+struct OperatorInterface {
+  std::function<void(const std::string&)> instruct;  ///< a sentence on what to do
+  std::function<bool()> confirmed;                   ///< whether the handle is in its rest, by now
+  std::function<bool()> cancelled;                   ///< whether they have had enough
 };
 
 /// Calibrates an opened device: its rest, where the profile asks for one, and its axes, motors off all the
 /// while. Throws std::runtime_error where it failed, was lost or was stopped; nothing is stored here.
 Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const std::string& serial,
-                      Clock& clock, const Bystander& person);
+                      Clock& clock, const OperatorInterface& person);
 
 struct CalibrateOptions {
   std::string profile = "auto";

@@ -40,9 +40,9 @@ std::string about(const SceneSettings& settings, MeshLoader& meshes) {
   text << "  tool " << settings.tool.mesh.filename().string() << ": volume " << tool.solid.volume_m3
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
-       << " mesh obstacle(s)" << (scene.moves() ? ", moving" : "") << '\n';
+       << " mesh obstacle(s)" << (scene.has_moving_obstacles() ? ", moving" : "") << '\n';
   for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';
-  for (const std::string& remark : meshes.remarks()) text << "  remark: " << remark << '\n';
+  for (const std::string& remark : meshes.warnings()) text << "  remark: " << remark << '\n';
   return text.str();
 }
 
@@ -73,18 +73,18 @@ std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
     case Kind::settings:
       break;
   }
-  const Plan plan = read_plan({file, {}, {}, false}, SearchPath());
+  const RunConfig plan = load_run_config({file, {}, {}, false}, SearchPath());
   return file.string() + ": a good configuration\n" +
          (plan.profile.name.empty() ? "profile: that of the device that is plugged in\n"
                                     : about(plan.profile)) +
          about(plan.scene, meshes);
 }
 
-std::string check_against(const std::filesystem::path& profile, const DescriptorSource& device) {
+std::string check_against_descriptor(const std::filesystem::path& profile, const DescriptorSource& device) {
   const auto expected = expected_reports(load_profile(profile));
-  const auto lines = differences(parse_descriptor(device), expected);
-  if (lines.empty()) return profile.string() + ": agrees with the report descriptor of " + device.from + '\n';
-  std::string text = profile.string() + ": disagrees with what " + device.from +
+  const auto lines = find_differences(parse_descriptor(device), expected);
+  if (lines.empty()) return profile.string() + ": agrees with the report descriptor of " + device.file + '\n';
+  std::string text = profile.string() + ": disagrees with what " + device.file +
                      " says of its reports; change the profile, or name the device it is for:";
   for (const std::string& line : lines) text += "\n  " + line;
   throw std::runtime_error(text);

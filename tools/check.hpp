@@ -19,6 +19,6 @@ std::string check_file(const std::filesystem::path& file, MeshLoader& meshes);
 /// Reads a device profile and holds it against what a device says of its reports. Returns a line that they
 /// agree; throws std::runtime_error with a line for each thing they disagree about, and what the loader and
 /// the parser throw.
-std::string check_against(const std::filesystem::path& profile, const DescriptorSource& device);
+std::string check_against_descriptor(const std::filesystem::path& profile, const DescriptorSource& device);
 
 }  // namespace wrenchd

@@ -83,7 +83,7 @@ void see_it_fade(Client& client, const ControlOptions& options, std::string stat
   const auto end = std::chrono::steady_clock::now() + kFadesWithin;
   while ((is_armed(state) || state == "releasing") && std::chrono::steady_clock::now() < end) {
     const auto event = next_event(client, kBeatEvery);
-    client.beat();
+    client.heartbeat();
     if (!event) continue;
     show(*event, options);
     if ((*event)["name"] == "state") state = (*event)["state"];
@@ -155,11 +155,11 @@ int run_arm(const ControlOptions& options) {
   catch_signals();
   Client client(options.socket, kAnswerWithin);
   call(client, "subscribe", {{"events", {"state", "fault", "refused", "lease", "lost"}}});
-  call(client, "lease.take", options.from_other ? Json{{"from_other", true}} : Json::object());
+  call(client, "lease.take", options.preempt ? Json{{"from_other", true}} : Json::object());
   call(client, "arm");
   std::string state = "waiting";
   while (!interrupted) {
-    client.beat();
+    client.heartbeat();
     const auto event = next_event(client, kBeatEvery);
     if (!event) continue;
     show(*event, options);

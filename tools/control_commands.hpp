@@ -16,7 +16,7 @@ struct ControlOptions {
   std::string method;
   std::string file;
   std::string output;
-  bool from_other = false;
+  bool preempt = false;
 };
 
 // What `wrenchctl` does with a daemon that runs. Each prints to standard output, and throws what Client

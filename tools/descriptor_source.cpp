@@ -126,7 +126,7 @@ void add_bytes_of_line(std::string_view text, std::size_t line, std::vector<std:
 
 }  // namespace
 
-std::vector<std::uint8_t> bytes_of_hex_text(std::string_view text) {
+std::vector<std::uint8_t> parse_hex_text(std::string_view text) {
   std::vector<std::uint8_t> bytes;
   for (std::size_t line = 1; !text.empty(); ++line) {
     const std::size_t length = std::min(text.find('\n'), text.size());
@@ -150,7 +150,7 @@ DescriptorSource read_descriptor_source(const fs::path& file) {
   const std::string content = content_of(file);
   if (!is_text(content)) return {{content.begin(), content.end()}, file.string(), {}, {}};
   try {
-    return {bytes_of_hex_text(content), file.string(), {}, {}};
+    return {parse_hex_text(content), file.string(), {}, {}};
   } catch (const std::runtime_error& wrong) {
     throw std::runtime_error(file.string() + ":" + wrong.what());
   }
@@ -160,7 +160,7 @@ ReportDescriptor parse_descriptor(const DescriptorSource& source) {
   try {
     return parse_report_descriptor(source.bytes);
   } catch (const DescriptorError& error) {
-    throw std::runtime_error(source.from + ": report descriptor, " + error.what());
+    throw std::runtime_error(source.file + ": report descriptor, " + error.what());
   }
 }
 

@@ -16,7 +16,7 @@ namespace wrenchd {
 /// A report descriptor as bytes, and what is known of the device it came from.
 struct DescriptorSource {
   std::vector<std::uint8_t> bytes;
-  std::string from;           ///< the file
+  std::string file;           ///< the file
   std::string device;         ///< 'usb 046d:c626, "SpaceNavigator"', where the kernel knows; otherwise empty
   std::optional<UsbId> id{};  ///< vendor and product, likewise
 };
@@ -31,6 +31,6 @@ ReportDescriptor parse_descriptor(const DescriptorSource& source);
 
 /// "05 01 09 08", "0x05, 0x01," or "05010908", with comments from # or // to the end of a line. Throws
 /// std::runtime_error that begins with LINE:COLUMN.
-std::vector<std::uint8_t> bytes_of_hex_text(std::string_view text);
+std::vector<std::uint8_t> parse_hex_text(std::string_view text);
 
 }  // namespace wrenchd

@@ -79,16 +79,16 @@ std::optional<fs::path> unit_file(const fs::path& root) {
 
 // --- kernel and processors --------------------------------------------------------------------------------
 
-Finding kernel(const Patient& p) {
+Finding kernel(const MachineState& p) {
   const std::string release = content(p.root / "proc/sys/kernel/osrelease");
   if (content(p.root / "sys/kernel/realtime") == "1") return ok("kernel: " + release + ", PREEMPT_RT");
-  return {Health::better,
+  return {Health::warning,
           "kernel: " + release + " is not PREEMPT_RT: under load it may wake the servo thread late",
           "apt install linux-image-rt-amd64, and boot it"};
 }
 
 /// What else stands on the kernel's command line is for those who want the last microseconds.
-Finding boot_options(const Patient& p) {
+Finding boot_options(const MachineState& p) {
   std::istringstream line(content(p.root / "proc/cmdline"));
   bool isolated = false, threaded = content(p.root / "sys/kernel/realtime") == "1";
   for (std::string word; line >> word;) {
@@ -106,10 +106,10 @@ Finding boot_options(const Patient& p) {
     what += std::string(isolated ? "" : ";") + " interrupts come before the servo thread";
     cure += std::string(cure.empty() ? "" : "; ") + "threadirqs there, or a PREEMPT_RT kernel";
   }
-  return {Health::better, what, cure};
+  return {Health::warning, what, cure};
 }
 
-Finding governor(const Patient& p) {
+Finding governor(const MachineState& p) {
   std::set<std::string> others;
   int processors = 0, slow = 0;
   std::error_code error;
@@ -127,19 +127,19 @@ Finding governor(const Patient& p) {
   if (slow == 0) return ok("governor: performance on all " + std::to_string(processors) + " processors");
   std::string names;
   for (const std::string& name : others) names += (names.empty() ? "" : ", ") + name;
-  return {Health::better,
+  return {Health::warning,
           "governor: " + names + " on " + std::to_string(slow) + " of " + std::to_string(processors) +
               " processors: they are slow when the servo thread wakes",
           "cpupower frequency-set -g performance (package linux-cpupower)"};
 }
 
-Finding rt_share(const Patient& p) {
+Finding rt_share(const MachineState& p) {
   const std::string text = content(p.root / "proc/sys/kernel/sched_rt_runtime_us");
   const long us = text.empty() ? -1 : std::atol(text.c_str());
   if (us < 0 || us >= 500000)
     return ok("real-time share: " +
               (us < 0 ? std::string("all of a processor") : std::to_string(us / 10000) + " %"));
-  return {Health::wrong, "real-time share: only " + std::to_string(us / 10000) + " % of a processor's time",
+  return {Health::failure, "real-time share: only " + std::to_string(us / 10000) + " % of a processor's time",
           "sysctl -w kernel.sched_rt_runtime_us=950000"};
 }
 
@@ -149,7 +149,7 @@ std::string size_text(std::uint64_t bytes) {
   return bytes == kNoLimit ? "unlimited" : std::to_string(bytes >> 20U) + " MiB";
 }
 
-std::vector<Finding> user_limits(const Patient& p) {
+std::vector<Finding> user_limits(const MachineState& p) {
   if (p.is_root) return {ok("limits of " + p.user + ": root needs none")};
   const std::string cure =
       "nothing, where it runs as a service; else a line in /etc/security/limits.d, and log in anew: " +
@@ -158,7 +158,7 @@ std::vector<Finding> user_limits(const Patient& p) {
   if (p.rtprio_limit >= kServoPriority)
     found.push_back(ok("real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit)));
   else
-    found.push_back({Health::better,
+    found.push_back({Health::warning,
                      "real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit) +
                          ", and the servo thread wants " + std::to_string(kServoPriority),
                      cure + " - rtprio 49"});
@@ -166,12 +166,12 @@ std::vector<Finding> user_limits(const Patient& p) {
   if (p.memlock_limit_bytes >= kLeastMemory_bytes)
     found.push_back(ok(memory));
   else
-    found.push_back({Health::better, memory, cure + " - memlock unlimited"});
+    found.push_back({Health::warning, memory, cure + " - memlock unlimited"});
   return found;
 }
 
 /// The value of a setting in a unit file and its drop-ins; the last counts.
-std::string setting(const Patient& p, const fs::path& unit, const std::string& key) {
+std::string setting(const MachineState& p, const fs::path& unit, const std::string& key) {
   std::vector<fs::path> files = {unit};
   std::vector<fs::path> more;
   std::error_code error;
@@ -187,10 +187,10 @@ std::string setting(const Patient& p, const fs::path& unit, const std::string& k
   return value;
 }
 
-std::vector<Finding> service(const Patient& p) {
+std::vector<Finding> service(const MachineState& p) {
   const auto unit = unit_file(p.root);
   if (!unit)
-    return {{Health::better,
+    return {{Health::warning,
              "service: wrenchd.service is not installed: wrenchd runs only where somebody starts it",
              "install the package: tools/package, then apt install ./build/package/wrenchd_*.deb"}};
   std::vector<Finding> found;
@@ -198,13 +198,13 @@ std::vector<Finding> service(const Patient& p) {
   const std::string cure = "systemctl edit wrenchd: under [Service], ";
   const bool may = priority == "infinity" || std::strtoul(priority.c_str(), nullptr, 10) >= kServoPriority;
   found.push_back(may ? ok("service: LimitRTPRIO=" + priority)
-                      : Finding{Health::wrong,
+                      : Finding{Health::failure,
                                 "service: LimitRTPRIO=" + priority + ", and the servo thread wants " +
                                     std::to_string(kServoPriority),
                                 cure + "LimitRTPRIO=49"});
   found.push_back(memory == "infinity"
                       ? ok("service: LimitMEMLOCK=infinity")
-                      : Finding{Health::better,
+                      : Finding{Health::warning,
                                 "service: LimitMEMLOCK=" + memory + ": a large mesh may not fit",
                                 cure + "LimitMEMLOCK=infinity"});
   return found;
@@ -212,26 +212,26 @@ std::vector<Finding> service(const Patient& p) {
 
 // --- groups, rules and devices ----------------------------------------------------------------------------
 
-bool has_group(const Patient& p, const std::string& name) {
+bool has_group(const MachineState& p, const std::string& name) {
   for (const std::string& line : lines_of(content(p.root / "etc/group")))
     if (line.starts_with(name + ":")) return true;
   return false;
 }
 
-Finding groups(const Patient& p) {
+Finding groups(const MachineState& p) {
   if (!has_group(p, kGroup))
-    return {unit_file(p.root) ? Health::wrong : Health::better,
+    return {unit_file(p.root) ? Health::failure : Health::warning,
             std::string("groups: there is no group ") + kGroup + ", which the nodes of devices belong to",
             std::string("systemd-sysusers, which the package runs; or groupadd --system ") + kGroup};
   const auto in = [&p](const char* group) {
     return std::find(p.groups.begin(), p.groups.end(), group) != p.groups.end();
   };
   if (!p.is_root && in(kGroup))
-    return {Health::wrong,
+    return {Health::failure,
             "groups: " + p.user + " is in " + kGroup + ", and may push the hand past all limits",
             "gpasswd -d " + p.user + " " + kGroup + ": it is the service's alone"};
   if (p.is_root || in(kOperators)) return ok("groups: " + p.user + " may arm");
-  return {Health::better,
+  return {Health::warning,
           "groups: " + p.user + " is not in " + kOperators + ", and may only look on and stop",
           "usermod -aG " + std::string(kOperators) + " " + p.user + ", and log in anew"};
 }
@@ -244,13 +244,13 @@ std::set<std::string> acting(const std::string& rules) {
   return lines;
 }
 
-Finding rules(const Patient& p) {
+Finding rules(const MachineState& p) {
   const auto file =
       first_of(p.root, {"etc/udev/rules.d", "run/udev/rules.d", "lib/udev/rules.d", "usr/lib/udev/rules.d"},
                "70-wrenchd.rules");
   const std::string cure = "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules, then udevadm trigger";
   if (!file)
-    return {p.nodes.empty() && !unit_file(p.root) ? Health::better : Health::wrong,
+    return {p.nodes.empty() && !unit_file(p.root) ? Health::warning : Health::failure,
             "udev rules: there are none, so that only root can open a device", cure};
   const std::string name = "/" + file->lexically_relative(p.root).string(), installed = content(*file);
   const std::set<std::string> there = acting(installed);
@@ -258,14 +258,14 @@ Finding rules(const Patient& p) {
   const std::set<std::string> wanted = acting(udev_rules(p.profiles));
   for (const std::string& line : wanted) missing += there.count(line) == 0 ? 1 : 0;
   if (missing > 0)
-    return {Health::wrong,
+    return {Health::failure,
             "udev rules: " + name + " lacks " + std::to_string(missing) + " of the " +
                 std::to_string(wanted.size()) + " lines for the profiles of wrenchd " + kVersion,
             cure};
   return ok("udev rules: " + name + " has all profiles");
 }
 
-std::vector<Finding> devices(const Patient& p) {
+std::vector<Finding> devices(const MachineState& p) {
   if (p.nodes.empty()) return {ok("devices: none that has a profile is plugged in")};
   std::vector<Finding> found;
   for (const DeviceNode& node : p.nodes) {
@@ -274,21 +274,21 @@ std::vector<Finding> devices(const Patient& p) {
     const std::string who =
         "device " + node.profile + ": " + node.node + " is of group " + node.group + ", mode " + mode.data();
     if (node.group != kGroup || (node.mode & 0060U) != 0060U)
-      found.push_back({Health::wrong, who + ": the service cannot open it",
+      found.push_back({Health::failure, who + ": the service cannot open it",
                        "udevadm trigger, or unplug it and plug it in again, where the udev rules are right"});
     else if ((node.mode & 0006U) != 0)
-      found.push_back({Health::wrong, who + ": anybody may push the hand past all limits",
+      found.push_back({Health::failure, who + ": anybody may push the hand past all limits",
                        "look for the rule that opens it: grep -l 0666 /etc/udev/rules.d/*"});
     else
       found.push_back(ok(who));
-    if (node.place.empty()) continue;
-    const std::string control = content(p.root / "sys/bus/usb/devices" / node.place / "power/control");
+    if (node.port_path.empty()) continue;
+    const std::string control = content(p.root / "sys/bus/usb/devices" / node.port_path / "power/control");
     if (control == "auto")
       found.push_back(
-          {Health::wrong, "device " + node.profile + " in " + node.place + ": it may fall asleep",
-           "udevadm trigger, or: echo on > /sys/bus/usb/devices/" + node.place + "/power/control"});
+          {Health::failure, "device " + node.profile + " in " + node.port_path + ": it may fall asleep",
+           "udevadm trigger, or: echo on > /sys/bus/usb/devices/" + node.port_path + "/power/control"});
     else if (!control.empty())
-      found.push_back(ok("device " + node.profile + " in " + node.place + ": it stays awake"));
+      found.push_back(ok("device " + node.profile + " in " + node.port_path + ": it stays awake"));
   }
   return found;
 }
@@ -301,20 +301,20 @@ std::string us_text(Duration d) {
   return text.data();
 }
 
-Finding wake_ups(const WakeUps& seen) {
+Finding wake_ups(const WakeLatency& seen) {
   const std::string what = "wake-ups: p50 " + us_text(seen.p50) + ", p99.9 " + us_text(seen.p999) +
                            ", at most " + us_text(seen.max) + " late, " + (seen.fifo ? "with" : "without") +
                            " SCHED_FIFO";
   if (seen.p999 <= kGoodWakeUp) return ok(what);
   if (!seen.fifo)
-    return {Health::better, what, "run it as root, or raise the limits above, to see what the service gets"};
-  return {seen.p999 <= kBadWakeUp ? Health::better : Health::wrong, what,
+    return {Health::warning, what, "run it as root, or raise the limits above, to see what the service gets"};
+  return {seen.p999 <= kBadWakeUp ? Health::warning : Health::failure, what,
           "the cures above; nothing else that is heavy on this machine; no virtual machine"};
 }
 
 }  // namespace
 
-std::vector<Finding> examine(const Patient& patient) {
+std::vector<Finding> check_machine(const MachineState& patient) {
   std::vector<Finding> all = {kernel(patient), boot_options(patient), governor(patient), rt_share(patient)};
   const auto add = [&all](std::vector<Finding> more) {
     all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
@@ -323,27 +323,27 @@ std::vector<Finding> examine(const Patient& patient) {
   add(service(patient));
   add({groups(patient), rules(patient)});
   add(devices(patient));
-  if (patient.wake_ups) add({wake_ups(*patient.wake_ups)});
+  if (patient.wake_latency) add({wake_ups(*patient.wake_latency)});
   return all;
 }
 
 std::string text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& f : findings) {
-    text += f.health == Health::ok ? "ok      " : f.health == Health::better ? "better  " : "WRONG   ";
-    text += f.what + "\n";
+    text += f.health == Health::ok ? "ok      " : f.health == Health::warning ? "better  " : "WRONG   ";
+    text += f.summary + "\n";
     if (!f.cure.empty()) text += "        -> " + f.cure + "\n";
   }
   return text;
 }
 
-bool unfit(std::span<const Finding> findings) noexcept {
+bool has_failure(std::span<const Finding> findings) noexcept {
   return std::any_of(findings.begin(), findings.end(),
-                     [](const Finding& f) { return f.health == Health::wrong; });
+                     [](const Finding& f) { return f.health == Health::failure; });
 }
 
-Patient this_machine(std::vector<DeviceProfile> profiles) {
-  Patient p;
+MachineState read_machine_state(std::vector<DeviceProfile> profiles) {
+  MachineState p;
   const uid_t uid = ::geteuid();
   p.is_root = uid == 0;
   const passwd* const user = ::getpwuid(uid);
@@ -359,22 +359,22 @@ Patient this_machine(std::vector<DeviceProfile> profiles) {
     p.memlock_limit_bytes = limit.rlim_cur == RLIM_INFINITY ? kNoLimit : limit.rlim_cur;
   p.profiles = std::move(profiles);
   for (const UsbDevice& device : list_usb_devices()) {
-    const MatchResult match = match_profile(plugged_facts(device).device, p.profiles);
+    const MatchResult match = match_profile(inspect_device(device).identity, p.profiles);
     if (!match.profile) continue;
     const DeviceProfile& profile = p.profiles[*match.profile];
     const std::string& node = profile.transport == Transport::libusb ? device.usb_node : device.hidraw_node;
     struct stat status {};
     if (node.empty() || ::stat(node.c_str(), &status) != 0) continue;
     const group* const g = ::getgrgid(status.st_gid);
-    p.nodes.push_back({profile.name, node, device.place,
+    p.nodes.push_back({profile.name, node, device.port_path,
                        g != nullptr ? g->gr_name : std::to_string(status.st_gid), status.st_mode & 0777U});
   }
   return p;
 }
 
-WakeUps measure_wake_ups(Duration for_so_long) {
+WakeLatency measure_wake_latency(Duration for_so_long) {
   constexpr Duration kPeriod = std::chrono::milliseconds(1);
-  WakeUps seen;
+  WakeLatency seen;
   DurationHistogram late;
   std::thread([&] {
     sched_param priority{};

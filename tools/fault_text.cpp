@@ -17,8 +17,8 @@ double milliseconds(Duration d) {
 
 /// When the reaction to a fault begins, counted from the moment at which the fault can be seen.
 std::string begins(const FaultRow& row) {
-  if (row.after == Duration{0}) return "in the same tick";
-  return fmt::format("after {:.0f} ms, within one tick", milliseconds(row.after));
+  if (row.persistence == Duration{0}) return "in the same tick";
+  return fmt::format("after {:.0f} ms, within one tick", milliseconds(row.persistence));
 }
 
 /// Until when the hand is free of force, counted from there.
@@ -37,7 +37,7 @@ std::string ends(Reaction reaction) {
 /// Where a trigger leads from a loop at full force.
 std::string follows(const FaultRow& row) {
   const Transition& from_active = transition(row.trigger, State::active);
-  if (!from_active.leads) return "it is told, and the force stays";
+  if (!from_active.changes_state) return "it is told, and the force stays";
   return fmt::format("state {}; {}, {}", name(from_active.to), begins(row),
                      ends(std::max(from_active.reaction, row.reaction)));
 }
@@ -46,7 +46,7 @@ std::string paragraph(const FaultRow& row) {
   return fmt::format(
       "{}\n  what happened  {}\n  found by       {}\n  what follows   {}\n  why it exists  {}\n"
       "  what to do     {}\n",
-      row.name, row.sentence, row.detector, follows(row), row.why, row.cure);
+      row.name, row.message, row.detector, follows(row), row.reason, row.cure);
 }
 
 std::string names_of(StateSet set) {
@@ -75,17 +75,17 @@ std::string fault_text(const std::string& name) {
   throw std::runtime_error("there is no fault '" + name + "'; the names are " + names);
 }
 
-std::string state_text() {
+std::string state_machine_text() {
   std::string text = fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", "what happens", "in the states",
                                  "leads to", "the force", "free in", "because");
   for (const Transition& row : transitions()) {
-    const std::string to = row.leads ? name(row.to) : "-";
+    const std::string to = row.changes_state ? name(row.to) : "-";
     const std::string within = row.reaction == Reaction::none ? "-"
                                : time_to_zero(row.reaction) == Duration{0}
                                    ? "1 tick"
                                    : fmt::format("{:.0f} ms", milliseconds(time_to_zero(row.reaction)));
     text += fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", name(row.trigger), names_of(row.from), to,
-                        name(row.reaction), within, row.why);
+                        name(row.reaction), within, row.reason);
   }
   return text;
 }

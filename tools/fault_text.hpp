@@ -14,6 +14,6 @@ std::string fault_text();
 std::string fault_text(const std::string& name);
 
 /// The state machine, row by row.
-std::string state_text();
+std::string state_machine_text();
 
 }  // namespace wrenchd

@@ -40,17 +40,17 @@ std::string paragraph(const std::string& text) {
 
 }  // namespace
 
-std::vector<Exhibit> gallery(const SearchPath& search) {
-  std::vector<Exhibit> all;
+std::vector<GalleryScene> gallery(const SearchPath& search) {
+  std::vector<GalleryScene> all;
   for (const std::filesystem::path& file : toml_files("gallery", search))
     all.push_back({file.stem().string(), file, on_one_line(load_settings(file, search).description)});
   return all;
 }
 
 std::string gallery_text(const SearchPath& search) {
-  const std::vector<Exhibit> all = gallery(search);
+  const std::vector<GalleryScene> all = gallery(search);
   std::size_t wide = 0;
-  for (const Exhibit& exhibit : all) wide = std::max(wide, exhibit.name.size());
+  for (const GalleryScene& exhibit : all) wide = std::max(wide, exhibit.name.size());
   std::string text;
   for (const auto& [name, file, description] : all)
     text += name + std::string(wide - name.size() + 2, ' ') + first_sentence(description) + '\n';
@@ -58,10 +58,10 @@ std::string gallery_text(const SearchPath& search) {
 }
 
 std::string gallery_text(const SearchPath& search, const std::string& name) {
-  const std::vector<Exhibit> all = gallery(search);
+  const std::vector<GalleryScene> all = gallery(search);
   std::vector<KnownKey> known;
   std::string names;
-  for (const Exhibit& exhibit : all) {
+  for (const GalleryScene& exhibit : all) {
     if (exhibit.name == name)
       return paragraph(exhibit.description) + "\n    wrenchd --arm --live --config gallery/" + name +
              ".toml\n\n" + "or, from a source tree, tools/run " + name + ". It is " + exhibit.file.string() +

@@ -10,14 +10,14 @@
 namespace wrenchd {
 
 /// A scene of the gallery: a whole configuration that says what there is to feel and to see.
-struct Exhibit {
+struct GalleryScene {
   std::string name;
   std::filesystem::path file;
   std::string description;
 };
 
 /// Those in gallery/ along the search path, by name. Throws ConfigError where one of them cannot be read.
-std::vector<Exhibit> gallery(const SearchPath& search);
+std::vector<GalleryScene> gallery(const SearchPath& search);
 
 /// A line for each: its name, and the first sentence of what it says.
 std::string gallery_text(const SearchPath& search);

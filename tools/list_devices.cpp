@@ -19,7 +19,7 @@ constexpr Usage kMultiAxis = {0x01, 0x08};
 /// One interface, and what came of holding the profiles against it.
 struct Entry {
   UsbDevice shown;  ///< its strings made plain
-  PluggedFacts facts;
+  InspectedDevice facts;
   MatchResult match;
   bool ours = false;  ///< it has to do with us, whether or not it can be used
 };
@@ -31,13 +31,13 @@ using Interfaces = std::span<const Entry>;
 
 constexpr std::size_t kLongestName = 60, kLongestReason = 400;
 
-std::string plain(const std::string& text, std::size_t longest) {
-  return printable(wrenchd::plain(text), longest);
+std::string to_printable(const std::string& text, std::size_t longest) {
+  return printable(wrenchd::to_printable(text), longest);
 }
 
-UsbDevice plain(UsbDevice device) {
+UsbDevice to_printable(UsbDevice device) {
   for (std::string* text : {&device.serial, &device.manufacturer, &device.product_name})
-    *text = plain(*text, kLongestName);
+    *text = to_printable(*text, kLongestName);
   return device;
 }
 
@@ -49,18 +49,18 @@ bool claims(const DeviceProfile& profile, UsbId id) {
 }
 
 Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profiles) {
-  Entry entry{plain(device), plugged_facts(device), {}, false};
-  entry.match = match_profile(entry.facts.device, profiles);
+  Entry entry{to_printable(device), inspect_device(device), {}, false};
+  entry.match = match_profile(entry.facts.identity, profiles);
   const bool multi_axis = Usage{device.usage_page, device.usage} == kMultiAxis;
-  entry.ours = entry.match.profile || !entry.match.refused.empty() || multi_axis ||
+  entry.ours = entry.match.profile || !entry.match.refusal.empty() || multi_axis ||
                std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
-                 return claims(profile, entry.facts.device.id);
+                 return claims(profile, entry.facts.identity.id);
                });
   return entry;
 }
 
 bool same_socket(const UsbDevice& a, const UsbDevice& b) {
-  return !a.place.empty() && a.place == b.place && a.vendor == b.vendor && a.product == b.product;
+  return !a.port_path.empty() && a.port_path == b.port_path && a.vendor == b.vendor && a.product == b.product;
 }
 
 /// The interfaces of one device follow each other in the list.
@@ -101,7 +101,7 @@ std::string indented(const std::string& text) {
 }
 
 std::string where(const UsbDevice& device) {
-  if (!device.place.empty()) return device.place;
+  if (!device.port_path.empty()) return device.port_path;
   return device.hidraw_node.empty() ? "not on USB" : device.hidraw_node + " (not on USB)";
 }
 
@@ -163,13 +163,13 @@ std::string degrees_of_freedom(const DeviceProfile& profile) {
 }
 
 /// The profile held against what the device says of its reports.
-std::string agreement(const PluggedFacts& facts, const DeviceProfile& profile) {
-  if (!facts.unreadable.empty())
+std::string agreement(const InspectedDevice& facts, const DeviceProfile& profile) {
+  if (!facts.descriptor_error.empty())
     return indented("its report descriptor is refused, so the profile could not be held against it: " +
-                    facts.unreadable);
+                    facts.descriptor_error);
   if (!facts.descriptor)
     return indented("it is not HID: there is no report descriptor to hold the profile against");
-  const auto lines = differences(*facts.descriptor, expected_reports(profile));
+  const auto lines = find_differences(*facts.descriptor, expected_reports(profile));
   if (lines.empty()) return indented("its report descriptor agrees with the profile");
   std::string text =
       "its report descriptor disagrees with the profile; change the profile, or it is for another device:";
@@ -182,7 +182,7 @@ std::string why_not(const Entry& entry, const std::vector<DeviceProfile>& profil
   std::vector<std::pair<std::string, std::string>> names_by_reason;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     if (entry.match.profile == i) continue;
-    std::string reason = plain(entry.match.why_not[i], kLongestReason);
+    std::string reason = to_printable(entry.match.rejections[i], kLongestReason);
     if (reason.empty())
       reason = entry.match.profile ? "it fits as well, and the other is nearer" : "it fits, and is not alone";
     const auto same = std::find_if(names_by_reason.begin(), names_by_reason.end(),
@@ -214,15 +214,15 @@ std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& prof
     return begin + access(device, profile.transport, why_not_open) + paragraph_of_matched(entry, profile) +
            (others.empty() ? "" : "  the other profiles:\n" + others);
   }
-  if (known_unusable(entry.facts.device.id) != nullptr)
-    return begin + indented(entry.match.refused) +
+  if (find_unusable_device(entry.facts.identity.id) != nullptr)
+    return begin + indented(entry.match.refusal) +
            indented("wrenchd does not open it, whatever a profile says");
   std::string text = begin + access(device, why_not_open);
-  if (!entry.facts.unreadable.empty())
-    text += indented("its report descriptor is refused: " + entry.facts.unreadable);
-  text += indented(entry.match.refused.empty() ? "no profile is for it:" : entry.match.refused);
+  if (!entry.facts.descriptor_error.empty())
+    text += indented("its report descriptor is refused: " + entry.facts.descriptor_error);
+  text += indented(entry.match.refusal.empty() ? "no profile is for it:" : entry.match.refusal);
   text += why_not(entry, profiles);
-  if (entry.match.refused.empty() && entry.facts.descriptor && !device.hidraw_node.empty())
+  if (entry.match.refusal.empty() && entry.facts.descriptor && !device.hidraw_node.empty())
     text += indented("wrenchctl profile --from " + device.hidraw_node + " proposes one");
   return text;
 }

@@ -79,7 +79,7 @@ std::vector<PaperStep> simulate_example_4_2(Method method) {
     const Penetration p = i == 0 ? depth.query(X_WP) : depth.follow(X_WP, X_WQ);
     X_WQ = p.projection.X_WQ;
     const bool in_contact = p.contacts > 0;
-    const Wrench F_T = law.update(p.drive, in_contact, kStep_s);
+    const Wrench F_T = law.update(p.spring_displacement, in_contact, kStep_s);
     steps.push_back({i * kStep_s, X_WP, in_contact, expressed(X_WP.rotation, F_T)});
     move(M, F_T, V, X_WP);
   }
@@ -90,8 +90,8 @@ PaperSummary summary_of(const std::vector<PaperStep>& steps) {
   PaperSummary summary;
   for (const PaperStep& step : steps) {
     summary.steps_in_contact += step.in_contact ? 1 : 0;
-    summary.most_force_y = std::max(summary.most_force_y, step.F_W.force_N.y());
-    summary.most_torque_z = std::max(summary.most_torque_z, std::abs(step.F_W.torque_Nm.z()));
+    summary.max_force_y = std::max(summary.max_force_y, step.F_W.force_N.y());
+    summary.max_torque_z = std::max(summary.max_torque_z, std::abs(step.F_W.torque_Nm.z()));
   }
   return summary;
 }

@@ -33,8 +33,8 @@ std::vector<PaperStep> simulate_example_4_2(Method method);
 /// What the figures of example 4.2 show, in numbers.
 struct PaperSummary {
   int steps_in_contact = 0;
-  double most_force_y = 0.0;   ///< of Fig. 14
-  double most_torque_z = 0.0;  ///< |tau_z| of Fig. 15
+  double max_force_y = 0.0;   ///< of Fig. 14
+  double max_torque_z = 0.0;  ///< |tau_z| of Fig. 15
 };
 PaperSummary summary_of(const std::vector<PaperStep>& steps);
 

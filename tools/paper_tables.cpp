@@ -124,15 +124,15 @@ std::string example_4_2() {
     return fmt::format("{:<22} {:>10}{}\n", name, shown, cells);
   };
   text += line("steps in contact", "-", 0, [](const PaperSummary& s) { return double(s.steps_in_contact); });
-  text += line("largest f_y", "Fig. 14", 4, [](const PaperSummary& s) { return s.most_force_y; });
-  text += line("largest |tau_z|", "Fig. 15", 4, [](const PaperSummary& s) { return s.most_torque_z; });
+  text += line("largest f_y", "Fig. 14", 4, [](const PaperSummary& s) { return s.max_force_y; });
+  text += line("largest |tau_z|", "Fig. 15", 4, [](const PaperSummary& s) { return s.max_torque_z; });
   return text + fmt::format(
                     "\nThe paper shows this example in figures only: similar forces, and a far larger torque "
                     "of the\n"
                     "traditional method. Here its force is {:.2f} times and its torque {:.0f} times that of "
                     "exact.\n",
-                    found[2].most_force_y / found[0].most_force_y,
-                    found[2].most_torque_z / found[0].most_torque_z);
+                    found[2].max_force_y / found[0].max_force_y,
+                    found[2].max_torque_z / found[0].max_torque_z);
 }
 
 }  // namespace

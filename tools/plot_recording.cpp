@@ -123,7 +123,7 @@ std::string variables(const Recording& recording, const std::string& terminal, c
   return text;
 }
 
-std::string plain(const std::string& text) {
+std::string to_printable(const std::string& text) {
   std::string good;
   for (const char c : text)
     if (c != '\'' && c != '\\' && static_cast<unsigned char>(c) >= ' ') good += c;
@@ -164,7 +164,7 @@ class Workshop {
 std::vector<fs::path> plot_recording(const Recording& recording, const fs::path& output) {
   if (recording.ticks.empty())
     throw std::runtime_error("the recording has no ticks, so there is nothing to draw");
-  const std::string title = plain(recording.header.scene_file.stem().string());
+  const std::string title = to_printable(recording.header.scene_file.stem().string());
   const std::string kind = output.extension().string();
   if (kind == ".svg" || kind == ".pdf" || kind == ".png") {
     const Workshop workshop;

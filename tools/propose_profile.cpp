@@ -37,7 +37,7 @@ std::string place_text(std::size_t bit) {
 }
 
 /// A name that somebody else chose, fit for a comment: TOML wants one line of good UTF-8.
-std::string plain(std::string text) {
+std::string to_printable(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
   return printable(text, 200);
@@ -72,8 +72,8 @@ std::string head(const DescriptorSource& source, const ReportDescriptor& descrip
       "# want to be looked at; lines marked FILL IN are things that nobody but you can know, and until they\n"
       "# are filled in the profile does not load. profiles/example.toml explains every key.\n"
       "#\n";
-  text += "# Made from " + plain(source.from) + "\n";
-  if (!source.device.empty()) text += "# Device: " + plain(source.device) + "\n";
+  text += "# Made from " + to_printable(source.file) + "\n";
+  if (!source.device.empty()) text += "# Device: " + to_printable(source.device) + "\n";
   text += "# What the device says of its reports";
   if (!descriptor.has_ids()) text += ", which have no id";
   text += ":\n";
@@ -209,7 +209,7 @@ double rest_count(const DescribedNumber& axis) {
 }
 
 /// Counts from rest to the farther end, of the widest of the three.
-double counts_to_end(const SixAxes& device, const Half& half) {
+double counts_to_end(const SixAxisController& device, const Half& half) {
   double most = 0.0;
   for (std::size_t i = half.first; i < half.first + 3; ++i) {
     const DescribedNumber& axis = device.axes[i];
@@ -221,7 +221,7 @@ double counts_to_end(const SixAxes& device, const Half& half) {
 }
 
 /// Three equal numbers that follow each other: what a field is. The step is one for all three.
-bool is_row(const SixAxes& device, const Half& half) {
+bool is_row(const SixAxisController& device, const Half& half) {
   const DescribedNumber& a = device.axes[half.first];
   for (std::size_t i = 1; i < 3; ++i) {
     const DescribedNumber& b = device.axes[half.first + i];
@@ -239,7 +239,7 @@ struct Step {
   bool guessed = false;
 };
 
-Step step_of(const SixAxes& device, const Half& half) {
+Step step_of(const SixAxisController& device, const Half& half) {
   const double own = device.axes[half.first].step;
   const double offset = std::abs(rest_count(device.axes[half.first]) * own);
   if (own >= kLeastStep && own <= kLargestStep && offset <= kLargestOffset) return {own, false};
@@ -252,7 +252,7 @@ std::string number_text(double x, int digits) {
   return text.data();
 }
 
-std::string axes_places(const SixAxes& device, std::size_t first) {
+std::string axes_places(const SixAxisController& device, std::size_t first) {
   static constexpr std::array<const char*, 6> kNames = {"X", "Y", "Z", "Rx", "Ry", "Rz"};
   std::string text;
   for (std::size_t i = first; i < first + 3; ++i) {
@@ -275,7 +275,7 @@ std::string place_keys(std::size_t bit, unsigned bits, bool is_signed, bool sign
   return is_signed == signed_by_itself ? text : text + ", signed = " + (is_signed ? "true" : "false");
 }
 
-std::string axes_field(const SixAxes& device, const Half& half) {
+std::string axes_field(const SixAxisController& device, const Half& half) {
   const DescribedNumber& axis = device.axes[half.first];
   if (!is_row(device, half))
     return std::string("# FILL IN: ") + half.key + ". " + axes_places(device, half.first) +
@@ -298,7 +298,7 @@ std::string axes_field(const SixAxes& device, const Half& half) {
 }
 
 /// As much a metre, or a radian, as makes the end of the cap's way the speed that is wanted there.
-std::string gain(const SixAxes& device, const Half& half) {
+std::string gain(const SixAxisController& device, const Half& half) {
   const double value =
       is_row(device, half) ? half.speed / (step_of(device, half).si * counts_to_end(device, half)) : 0.0;
   if (!(value >= kLeastGain && value <= kLargestGain))
@@ -309,12 +309,12 @@ std::string gain(const SixAxes& device, const Half& half) {
 }
 
 /// [m] or [rad] at the end of the cap's way; 0 where that cannot be told.
-double end_of_way(const SixAxes& device, const Half& half) {
+double end_of_way(const SixAxisController& device, const Half& half) {
   return is_row(device, half) ? step_of(device, half).si * counts_to_end(device, half) : 0.0;
 }
 
 /// How it steers: as the SpaceMouse's shipped profiles have it.
-std::string steering(const SixAxes& device) {
+std::string steering(const SixAxisController& device) {
   const double full_m = end_of_way(device, kTranslation), full_rad = end_of_way(device, kRotation);
   if (!(full_m >= 1e-5 && full_m <= 1.0 && full_rad >= 1e-4 && full_rad <= 3.2)) return {};
   return "full_m = " + number_text(full_m, 4) + "\nfull_rad = " + number_text(full_rad, 4) +
@@ -322,7 +322,7 @@ std::string steering(const SixAxes& device) {
          "dead_zone = 0.08\ncurve = 2.0\nleash_m = 0.010\nleash_rad = 0.2\n";
 }
 
-std::string deflection_table(const SixAxes& device) {
+std::string deflection_table(const SixAxisController& device) {
   return "\n# GUESSED: that the axes say how far a cap is pushed and twisted, which springs back. If they "
          "say "
          "where a\n"
@@ -339,7 +339,7 @@ bool is_mask(const DescribedReport& report, const DescribedBits& bits) {
   });
 }
 
-std::string buttons_field(const SixAxes& device, const DescribedReport& report) {
+std::string buttons_field(const SixAxisController& device, const DescribedReport& report) {
   const DescribedBits& bits = *device.buttons;
   const std::string which =
       "# Buttons: " + std::to_string(bits.count) + " bits from " + place_text(bits.bit) + ".";
@@ -351,7 +351,7 @@ std::string buttons_field(const SixAxes& device, const DescribedReport& report) 
 }
 
 /// What a report of the device carries of axes and buttons.
-std::string report_fields(const SixAxes& device, const DescribedReport& report) {
+std::string report_fields(const SixAxisController& device, const DescribedReport& report) {
   std::string text;
   for (const Half& half : {kTranslation, kRotation})
     if (device.axes[half.first].report_id == report.id) text += axes_field(device, half);
@@ -359,12 +359,12 @@ std::string report_fields(const SixAxes& device, const DescribedReport& report) 
   return text;
 }
 
-std::string more_report(const SixAxes& device, const DescribedReport& report, const char* name) {
+std::string more_report(const SixAxisController& device, const DescribedReport& report, const char* name) {
   return std::string("\n[[more_reports]]\nname = \"") + name + "\"\n" + frame_keys(report) +
          report_fields(device, report);
 }
 
-std::string multi_axis(const DescriptorSource& source, const SixAxes& device,
+std::string multi_axis(const DescriptorSource& source, const SixAxisController& device,
                        const ReportDescriptor& descriptor) {
   const auto input = [&](std::optional<std::uint8_t> id) -> const DescribedReport& {
     return *descriptor.find(ReportKind::input, id);
@@ -426,10 +426,10 @@ std::string makers_own(const DescriptorSource& source, const ReportDescriptor& d
 
 std::string propose_profile(const DescriptorSource& source) {
   const ReportDescriptor descriptor = parse_descriptor(source);
-  const SixAxesFound axes = find_six_axes(descriptor);
-  if (axes.device) return head(source, descriptor) + multi_axis(source, *axes.device, descriptor);
+  const SixAxisResult axes = find_six_axes(descriptor);
+  if (axes.controller) return head(source, descriptor) + multi_axis(source, *axes.controller, descriptor);
   if (std::none_of(descriptor.reports.begin(), descriptor.reports.end(), of_maker))
-    throw std::runtime_error(source.from + ": nothing to propose: " + axes.why_not +
+    throw std::runtime_error(source.file + ": nothing to propose: " + axes.rejection +
                              ", and has no report of its maker's own; name another device");
   return head(source, descriptor) + makers_own(source, descriptor);
 }

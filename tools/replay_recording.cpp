@@ -10,19 +10,19 @@
 #include "daemon/version.hpp"
 
 namespace wrenchd {
-bool replay_recording(const std::filesystem::path& file, const std::optional<PlanFiles>& files) {
+bool replay_recording(const std::filesystem::path& file, const std::optional<RunConfigFiles>& files) {
   const Recording recording = read_recording(file);
   std::optional<RecordedRun> recorded;
-  Plan plan;
+  RunConfig plan;
   if (files) {
-    plan = read_plan(*files, SearchPath());
+    plan = load_run_config(*files, SearchPath());
     if (plan.profile.name.empty())
       throw std::runtime_error(
           "the configuration leaves the profile to the device that is plugged in; name the one of the "
           "recording with --profile");
   } else {
     recorded.emplace(recording.header);
-    plan = recorded->plan();
+    plan = recorded->config();
   }
   if (recording.header.version != kVersion)
     std::printf("recorded by wrenchd %s, replayed by %s: the bits may differ for that\n",

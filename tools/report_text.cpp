@@ -24,7 +24,7 @@ std::string number(double x) {
 }
 
 /// Lines of a name, values and a unit.
-class Lines {
+class LineReader {
  public:
   void add(const std::string& name, const std::string& text) {
     std::array<char, 64> column{};
@@ -76,7 +76,7 @@ std::string why(const ReportFrame& frame, Decoding outcome, Bytes bytes) {
     case Decoding::ok:
       return "fits";
     case Decoding::wrong_length:
-      return "has " + (frame.least_length == 0 ? "" : std::to_string(frame.least_length) + " to ") +
+      return "has " + (frame.min_length == 0 ? "" : std::to_string(frame.min_length) + " to ") +
              std::to_string(frame.length) + " bytes, these are " + std::to_string(bytes.size());
     case Decoding::wrong_id:
       return "begins with another id: these begin with " + hex_text(bytes.first(1));
@@ -99,7 +99,7 @@ std::string buttons_text(std::uint32_t buttons) {
   return list.empty() ? "none" : list;
 }
 
-void add_pose(Lines& lines, const std::string& where, const Pose& X) {
+void add_pose(LineReader& lines, const std::string& where, const Pose& X) {
   const Vector3d p = X.translation_m;
   const std::array<double, 4> q = {X.rotation.x(), X.rotation.y(), X.rotation.z(), X.rotation.w()};
   lines.add("position " + where, p, "m");
@@ -107,14 +107,14 @@ void add_pose(Lines& lines, const std::string& where, const Pose& X) {
 }
 
 /// What wrenchd makes of a report, in the axes of the base.
-void add_meaning(Lines& lines, const DeviceProfile& profile, const PoseReportLayout& layout,
+void add_meaning(LineReader& lines, const DeviceProfile& profile, const PoseReportLayout& layout,
                  PoseReport report) {
   const Quaterniond& R_BD = profile.X_BD.rotation;
   if (layout.joints.present && profile.kinematics.kind != Kinematics::Kind::none) {
     const Kinematics& k = profile.kinematics;
-    const JointAngles angles = joint_angles(k, without_button(k, report.joints, report.buttons));
+    const JointAngles angles = joint_angles(k, strip_count_button(k, report.joints, report.buttons));
     lines.add("joint angles", std::span<const double>(angles.data(), k.joints), "rad");
-    const auto X_DE = forward(k, angles, {});
+    const auto X_DE = forward_kinematics(k, angles, {});
     if (!X_DE) return lines.add("position in base", "none: no place of the handle belongs to these angles");
     lines.add("position in device", X_DE->translation_m, "m");
     add_pose(lines, "in base", profile.X_BD * *X_DE * profile.X_EH);
@@ -139,7 +139,7 @@ void add_meaning(Lines& lines, const DeviceProfile& profile, const PoseReportLay
 std::string pose_text(const DeviceProfile& profile, const PoseReportLayout& r, Bytes bytes) {
   PoseReport report;
   decode_into(r, bytes, report);
-  Lines lines;
+  LineReader lines;
   lines.add(profile.name, label(r, r.name) + ", " + std::to_string(bytes.size()) + " bytes, from the device");
   lines.field("sequence", r.sequence, bytes, "");
   lines.field("device_time", r.device_time, bytes, "s");
@@ -166,7 +166,7 @@ std::string pose_text(const DeviceProfile& profile, const PoseReportLayout& r, B
 
 std::string wrench_text(const DeviceProfile& profile, Bytes bytes) {
   const WrenchReportLayout& r = profile.wrench_report;
-  Lines lines;
+  LineReader lines;
   lines.add(profile.name, label(r, {}) + ", " + std::to_string(bytes.size()) + " bytes, to the device");
   lines.bit("enable", r.enable, bytes);
   lines.field("sequence", r.sequence, bytes, "");
@@ -186,7 +186,7 @@ Bytes without_wrapping(const DeviceProfile& profile, Bytes bytes) {
   const std::size_t prefix = profile.endpoints.prefix_bytes;
   if (prefix > 0 && bytes.size() == r.length + prefix) return bytes.subspan(prefix);
   const bool one_more =
-      bytes.size() == r.length + 1 || (r.least_length != 0 && bytes.size() == r.least_length + 1);
+      bytes.size() == r.length + 1 || (r.min_length != 0 && bytes.size() == r.min_length + 1);
   if (!r.has_id && one_more && bytes[0] == 0) return bytes.subspan(1);
   return bytes;
 }
@@ -196,7 +196,7 @@ class BytesLink final : public ReportLink {
  public:
   void open() override {}
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
-    if (!waiting || waiting->size() > buffer.size()) return {LinkStatus::empty, 0, now};
+    if (!waiting || waiting->size() > buffer.size()) return {LinkStatus::not_ready, 0, now};
     std::copy(waiting->begin(), waiting->end(), buffer.begin());
     const std::size_t length = waiting->size();
     waiting.reset();
@@ -294,7 +294,7 @@ EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes
     if (!sample.homed)
       encoded.remarks.push_back("the encoders are not homed in --at: the motors get nothing");
     else if (sample.fault != Fault::none)
-      throw std::runtime_error("--at: " + std::string(fault_row(sample.fault).sentence));
+      throw std::runtime_error("--at: " + std::string(fault_row(sample.fault).message));
     if (at.empty())
       encoded.remarks.push_back("at the home position, which the device reports as " +
                                 hex_text(home_report(profile)));
@@ -307,7 +307,7 @@ EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes
     remark_cut(encoded.remarks, "the torque", F.torque_Nm.norm(), authority * profile.max_torque_Nm, "N.m");
   do device.write(now, F, true);
   while (device.commands_sent() < sequence);
-  const DofMask dropped = device.read_newest(now).dropped;
+  const DofMask dropped = device.read_newest(now).dropped_dofs;
   if (dropped != kNoDof) encoded.remarks.push_back("dropped, for there are no motors: " + dof_text(dropped));
   encoded.bytes.assign(link.written.begin(), link.written.begin() + static_cast<long>(link.written_length));
   return encoded;

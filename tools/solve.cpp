@@ -18,7 +18,7 @@ constexpr const char* kHeader =
     "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
     "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
 
-const char* name_of(ProjectionStatus status) {
+const char* generated_mesh_name(ProjectionStatus status) {
   switch (status) {
     case ProjectionStatus::free:
       return "free";
@@ -62,7 +62,7 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
     const bool moved = row.penetration.projection.status != ProjectionStatus::free;
     row.X_WM = moved ? row.penetration.projection.X_WQ * X_TM : X_WM_p;
     row.F_T = settings.law == SpringLaw::pid
-                  ? law.update(row.penetration.drive, row.penetration.contacts > 0, 0.0)
+                  ? law.update(row.penetration.spring_displacement, row.penetration.contacts > 0, 0.0)
                   : energy_wrench(tool.solid.inertia, settings.energy_stiffness_per_s2, X_WP,
                                   row.penetration.projection.X_WQ);
     row.F_S = spatial_wrench(X_WP, row.F_T);
@@ -82,7 +82,8 @@ void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool prox
         << q.z() << q.w();
     row << Vector3d(r.penetration.eps.head<3>()) << Vector3d(r.penetration.eps.tail<3>());
     row << r.F_T.force_N << r.F_T.torque_Nm << r.F_S.force_N << r.F_S.torque_Nm << r.solve_ns;
-    if (proxy) row << name_of(r.penetration.projection.status) << r.penetration.projection.iterations;
+    if (proxy)
+      row << generated_mesh_name(r.penetration.projection.status) << r.penetration.projection.iterations;
   }
 }
 

@@ -30,7 +30,7 @@ struct Wanted {
 using WantedById = std::map<std::pair<std::uint16_t, std::uint16_t>, Wanted>;
 
 void want(WantedById& wanted, const DeviceProfile& profile, UsbId id) {
-  if (known_unusable(id) != nullptr) return;  // never opened, whatever a profile says
+  if (find_unusable_device(id) != nullptr) return;  // never opened, whatever a profile says
   Wanted& w = wanted[{id.vendor, id.product}];
   if (std::find(w.profiles.begin(), w.profiles.end(), profile.name) != w.profiles.end()) return;
   w.profiles.push_back(profile.name);

@@ -80,7 +80,7 @@ std::optional<FrictionSettings> friction_of(const std::string& text) {
   const char* const end = text.data() + text.size();
   const auto read = [end](const char* from, double& x) {
     const auto [stop, error] = std::from_chars(from, end, x);
-    return error == std::errc() && x >= 0.0 && x <= FrictionSettings::kLargest ? stop : nullptr;
+    return error == std::errc() && x >= 0.0 && x <= FrictionSettings::kMaxCoefficient ? stop : nullptr;
   };
   const char* stop = read(text.data(), friction.static_coefficient);
   friction.dynamic_coefficient = friction.static_coefficient;
@@ -103,7 +103,7 @@ CLI::Validator friction_pair() {
 struct MeshOptions {
   std::filesystem::path file;
   double scale = 1.0;
-  MadeMesh wanted;
+  GeneratedMesh wanted;
   std::string output = "-";
 };
 
@@ -130,7 +130,7 @@ int run_solve(const SolveOptions& options) {
   for (const std::string& change : meshes.changes()) say(change);
   const std::vector<Pose> poses = read_poses_from(options.poses);
   SolveSettings settings = options.settings;
-  if (scene.moves() && !settings.proxy)
+  if (scene.has_moving_obstacles() && !settings.proxy)
     say("obstacles move, and every pose is solved with them where they stand at time 0; --proxy moves them");
   settings.depth.method = kMethods.at(options.method);
   settings.depth.friction = friction_of(options.friction).value();
@@ -159,21 +159,22 @@ int run_mesh(const std::filesystem::path& file, double scale) {
   const std::string name = file.filename().string();
   MeshSource source = read_mesh_source(file);
   const std::size_t size = source.bytes.size();
-  if (size >= MeshLoader::kManyBytes) say(name + ": reading " + grouped(size / 1'000'000) + " MB");
+  if (size >= MeshLoader::kLargeMeshBytes)
+    say(name + ": reading " + with_thousands_separators(size / 1'000'000) + " MB");
   PolygonSoup soup = parse_mesh(std::move(source));
-  if (soup.faces.size() >= MeshLoader::kManyTriangles)
-    say(name + ": " + grouped(soup.faces.size()) + " faces, checking");
+  if (soup.faces.size() >= MeshLoader::kLargeMeshTriangles)
+    say(name + ": " + with_thousands_separators(soup.faces.size()) + " faces, checking");
   std::printf("%-18s %zu\n%-18s %zu\n", "vertices", soup.vertices.size(), "faces", soup.faces.size());
   TriangleMesh mesh;
   const MeshReport report = repair_and_check_solid(soup, &mesh);
-  for (const std::string& change : report.changes) std::printf("%-18s %s\n", "repaired", change.c_str());
+  for (const std::string& change : report.repairs) std::printf("%-18s %s\n", "repaired", change.c_str());
   std::printf("%-18s %s\n%-18s %s\n", "closed", report.closed ? "yes" : "no", "consistent",
               report.consistent ? "yes" : "no");
   if (!report.solid()) {
-    std::fprintf(stderr, "wrenchctl: %s\n", refusal(file, soup, BodyKind::solid, report).c_str());
+    std::fprintf(stderr, "wrenchctl: %s\n", rejection_text(file, soup, BodyKind::solid, report).c_str());
     return kExitDefects;
   }
-  const auto unlikely = unlikely_size(mesh, scale, kToolSize);
+  const auto unlikely = implausible_size(mesh, scale, kPlausibleToolSize);
   for (Vector3d& p : mesh.vertices_m) p *= scale;
   const SolidProperties solid = solid_properties(mesh, 1.0);
   require_usable(solid, file, scale);
@@ -209,10 +210,10 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
       ->check(CLI::IsMember({"pid", "energy"}))
       ->capture_default_str();
   solve->add_option("--energy-stiffness", options.settings.energy_stiffness_per_s2, "k of law energy [1/s2]")
-      ->check(number_from(0.0, 1e9))
+      ->check(number_in_range(0.0, 1e9))
       ->capture_default_str();
   solve->add_option("--k-p", options.settings.k_P, "k_P of Eq. (16); no integral, no derivative")
-      ->check(number_from(0.0, 1e9))
+      ->check(number_in_range(0.0, 1e9))
       ->capture_default_str();
   auto* proxy =
       solve->add_flag("--proxy", options.settings.proxy,
@@ -221,7 +222,7 @@ void add_solve(CLI::App& app, SolveOptions& options, int& exit_code) {
   solve
       ->add_option("--rate", options.settings.rate_Hz,
                    "poses a second of that trajectory [Hz], by which obstacles move")
-      ->check(number_from(0.001, 1e6))
+      ->check(number_in_range(0.001, 1e6))
       ->needs(proxy)
       ->capture_default_str();
   solve
@@ -251,7 +252,7 @@ void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
                          "to try things with");
   auto* file = mesh->add_option("file", options.file, "OFF, OBJ, STL or PLY")->check(not_empty());
   mesh->add_option("--scale", options.scale, "metres per mesh unit")
-      ->check(number_from(1e-9, 1e6))
+      ->check(number_in_range(1e-9, 1e6))
       ->capture_default_str();
   std::vector<std::string> kinds;
   std::string list = "Kinds that can be made:\n";
@@ -263,7 +264,7 @@ void add_mesh(CLI::App& app, MeshOptions& options, int& exit_code) {
                    ->check(CLI::IsMember(kinds))
                    ->excludes(file);
   mesh->add_option("--triangles", options.wanted.triangles, "about so many")
-      ->check(CLI::Range(MadeMesh::kFewest, MadeMesh::kMost))
+      ->check(CLI::Range(GeneratedMesh::kMinTriangles, GeneratedMesh::kMaxTriangles))
       ->needs(make)
       ->capture_default_str();
   mesh->add_option("--seed", options.wanted.seed, "which of the bumpy ones")
@@ -298,11 +299,11 @@ struct ReportOptions {
 
 std::vector<std::uint8_t> bytes_of(const char* option, const std::string& text) {
   const ReportBytes parsed = parse_bytes(text);
-  if (parsed.problem.empty()) return parsed.bytes;
+  if (parsed.error.empty()) return parsed.bytes;
   const std::string found =
-      parsed.wrong_at < text.size() ? "'" + text.substr(parsed.wrong_at, 1) + "'" : "the end";
-  throw std::runtime_error(std::string(option) + ": character " + std::to_string(parsed.wrong_at + 1) + ", " +
-                           found + ", " + std::string(parsed.problem) +
+      parsed.error_index < text.size() ? "'" + text.substr(parsed.error_index, 1) + "'" : "the end";
+  throw std::runtime_error(std::string(option) + ": character " + std::to_string(parsed.error_index + 1) +
+                           ", " + found + ", " + std::string(parsed.error) +
                            "; write bytes in hexadecimal, as in \"01 00 ff\"");
 }
 
@@ -388,7 +389,7 @@ void add_devices(CLI::App& app, bool& all) {
       "config/profiles of the source tree; of two files with the same name the first counts.");
   devices->callback([&all] {
     const auto may_open = [](const UsbDevice& device, const std::string& node) {
-      return why_not_open(device, node);
+      return open_error(device, node);
     };
     std::cout << device_list(list_usb_devices(), known_profiles(SearchPath()), all, may_open);
   });
@@ -424,11 +425,11 @@ void add_udev_rules(CLI::App& app, RuleOptions& options) {
 }
 
 int run_doctor() {
-  Patient patient = this_machine(known_profiles(SearchPath()).profiles);
-  patient.wake_ups = measure_wake_ups(std::chrono::seconds(1));
-  const std::vector<Finding> findings = examine(patient);
+  MachineState patient = read_machine_state(known_profiles(SearchPath()).profiles);
+  patient.wake_latency = measure_wake_latency(std::chrono::seconds(1));
+  const std::vector<Finding> findings = check_machine(patient);
   std::cout << text(findings);
-  return unfit(findings) ? kExitUnfit : 0;
+  return has_failure(findings) ? kExitUnfit : 0;
 }
 
 void add_doctor(CLI::App& app, int& exit_code) {
@@ -457,7 +458,7 @@ void add_faults(CLI::App& app, FaultOptions& options) {
   faults->add_flag("--states", options.states, "the states instead, and what leads from one to the next");
   faults->callback([&options] {
     if (options.states)
-      std::cout << state_text();
+      std::cout << state_machine_text();
     else
       std::cout << (options.name.empty() ? fault_text() : fault_text(options.name));
   });
@@ -540,7 +541,7 @@ void add_view(CLI::App& app, ViewOptions& options) {
       ->capture_default_str();
   view->add_option("--socket", options.socket, "the daemon's control socket; without it as for status")
       ->check(not_empty());
-  view->add_flag("--open", options.open, "open the page in a browser, by xdg-open");
+  view->add_flag("--open", options.open_browser, "open the page in a browser, by xdg-open");
   view->footer(
       "Prints the address, which only works as a whole: it holds a token. The page arms with the rights of\n"
       "whoever runs this, for as long as it is open and seen; anybody's stop works always.");
@@ -549,7 +550,7 @@ void add_view(CLI::App& app, ViewOptions& options) {
 
 struct RecordingOptions {
   std::filesystem::path file;
-  PlanFiles files;
+  RunConfigFiles files;
   std::string output;
   ExportSettings wanted;
 };
@@ -569,8 +570,8 @@ void add_replay(CLI::App& app, RecordingOptions& options, int& exit_code) {
   for (CLI::Option* option : named) option->check(not_empty());
   again->callback([&options, &exit_code, named] {
     const bool from_files = std::any_of(named.begin(), named.end(), [](auto* o) { return o->count() > 0; });
-    const bool same = replay_recording(
-        options.file, from_files ? std::optional<PlanFiles>(options.files) : std::optional<PlanFiles>());
+    const bool same = replay_recording(options.file, from_files ? std::optional<RunConfigFiles>(options.files)
+                                                                : std::optional<RunConfigFiles>());
     exit_code = same ? 0 : kExitDiffers;
   });
 }
@@ -588,9 +589,9 @@ void add_export(CLI::App& app, RecordingOptions& options) {
       ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000'000}))
       ->capture_default_str();
   exported->add_option("--from", options.wanted.from_s, "leave out what was before [s since the first tick]")
-      ->check(number_from(0.0, 1e9));
+      ->check(number_in_range(0.0, 1e9));
   exported->add_option("--to", options.wanted.to_s, "leave out what came after [s, likewise]")
-      ->check(number_from(0.0, 1e9));
+      ->check(number_in_range(0.0, 1e9));
   exported->callback([&options] {
     const Recording recording = read_recording(options.file);
     if (options.output.empty()) return write_csv(std::cout, recording, options.wanted);
@@ -645,7 +646,7 @@ void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   })->add_option("events", options.events, "names of events to show; without them all (wrenchctl describe)");
   add("arm", "Takes the lease and arms; Ctrl-C, or the end of this program, disarms", [&] {
     exit_code = run_arm(options);
-  })->add_flag("--from-other", options.from_other, "administrators: take the lease from whoever has it");
+  })->add_flag("--from-other", options.preempt, "administrators: take the lease from whoever has it");
   add("describe", "What can be asked of it, by whom; and its events", [&] {
     run_describe(options);
   })->add_option("method", options.method, "one method");
@@ -703,7 +704,7 @@ int main(int argc, char** argv) {
   check->callback([&] {
     MeshLoader meshes = mesh_loader();
     std::cout << check_file(checked, meshes);
-    if (!device.empty()) std::cout << check_against(checked, read_descriptor_source(device));
+    if (!device.empty()) std::cout << check_against_descriptor(checked, read_descriptor_source(device));
   });
 
   ReportOptions report_options;

@@ -39,7 +39,7 @@ ConvexBody convex_hull(std::span<const Vector3d> points_T_m) {
                 body.ring.end());
   }
   body.ring_begin.push_back(static_cast<std::uint32_t>(body.ring.size()));
-  body.find_faces();
+  body.compute_derived_data();
   return body;
 }
 

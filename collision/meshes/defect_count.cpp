@@ -6,19 +6,19 @@
 
 namespace wrenchd {
 
-std::string place(const Vector3d& p) {
+std::string format_point(const Vector3d& p) {
   std::ostringstream text;
   text.imbue(std::locale::classic());
   text << '(' << p.x() << ", " << p.y() << ", " << p.z() << ')';
   return text.str();
 }
 
-std::string in_all(std::size_t count) {
+std::string total_suffix(std::size_t count) {
   return count > 1 ? " (" + std::to_string(count) + " in all)" : "";
 }
 
-void Tally::report(std::vector<std::string>& changes, const std::string& before, const std::string& one,
-                   const std::string& after) const {
+void DefectCount::report(std::vector<std::string>& changes, const std::string& before, const std::string& one,
+                         const std::string& after) const {
   if (count_ == 0) return;
   changes.push_back(before + ' ' + std::to_string(count_) + ' ' + one + (count_ > 1 ? "s" : "") + after +
                     (count_ > 1 ? ", first " : ": ") + first_);

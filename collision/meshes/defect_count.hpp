@@ -10,22 +10,22 @@
 namespace wrenchd {
 
 /// "(1, 2, 3)", as messages name a place.
-std::string place(const Vector3d& p);
+std::string format_point(const Vector3d& p);
 
 /// " (12 in all)"; nothing for one.
-std::string in_all(std::size_t count);
+std::string total_suffix(std::size_t count);
 
 /// First place and number of one kind of defect.
-class Tally {
+class DefectCount {
  public:
   /// sentence: makes the text, which only the first of a million needs.
   template <class Sentence>
-  void found(const Sentence& sentence) {
+  void add(const Sentence& sentence) {
     if (count_++ == 0) first_ = sentence();
   }
   /// Adds "FIRST (N in all); CURE".
   void report(std::vector<std::string>& defects, const std::string& cure) const {
-    if (count_ > 0) defects.push_back(first_ + in_all(count_) + "; " + cure);
+    if (count_ > 0) defects.push_back(first_ + total_suffix(count_) + "; " + cure);
   }
   /// Adds "BEFORE N AFTER, the first FIRST". One: the word for what is counted, which takes an s for more.
   void report(std::vector<std::string>& changes, const std::string& before, const std::string& one,

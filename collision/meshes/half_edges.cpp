@@ -8,28 +8,28 @@
 namespace wrenchd {
 
 // Put down vertex by vertex first: what is left to sort is short.
-std::vector<Side> sides_of(const PolygonSoup& soup) {
+std::vector<HalfEdge> half_edges_of(const PolygonSoup& soup) {
   const auto each = [&](const auto& use) {
     for (std::size_t f = 0; f < soup.faces.size(); ++f) {
       const auto& face = soup.faces[f];
       for (std::size_t i = 0; i < face.size(); ++i) {
         const auto [low, high] = std::minmax(face[i], face[i + 1 < face.size() ? i + 1 : 0]);
-        use(Side{{low, high}, f, low == face[i]});
+        use(HalfEdge{{low, high}, f, low == face[i]});
       }
     }
   };
   std::vector<std::size_t> begin(soup.vertices.size() + 1, 0);
-  each([&](const Side& side) { ++begin[side.edge.first + 1]; });
+  each([&](const HalfEdge& side) { ++begin[side.edge.first + 1]; });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<Side> sides(begin.back());
+  std::vector<HalfEdge> sides(begin.back());
   std::vector<std::size_t> at(begin.begin(), begin.end() - 1);
-  each([&](const Side& side) { sides[at[side.edge.first]++] = side; });
+  each([&](const HalfEdge& side) { sides[at[side.edge.first]++] = side; });
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
-    std::sort(sides.begin() + static_cast<std::ptrdiff_t>(begin[v]),
-              sides.begin() + static_cast<std::ptrdiff_t>(begin[v + 1]), [](const Side& a, const Side& b) {
-                return std::tuple(a.edge.second, a.face, a.forward) <
-                       std::tuple(b.edge.second, b.face, b.forward);
-              });
+    std::sort(
+        sides.begin() + static_cast<std::ptrdiff_t>(begin[v]),
+        sides.begin() + static_cast<std::ptrdiff_t>(begin[v + 1]), [](const HalfEdge& a, const HalfEdge& b) {
+          return std::tuple(a.edge.second, a.face, a.forward) < std::tuple(b.edge.second, b.face, b.forward);
+        });
   return sides;
 }
 

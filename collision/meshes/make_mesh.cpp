@@ -80,7 +80,7 @@ TriangleMesh geodesic(std::uint32_t f) {
 }
 
 /// A sphere with smooth bumps all over it: sums of sines with seeded directions and phases.
-TriangleMesh bumpy(const MadeMesh& wanted, double radius_m, double height) {
+TriangleMesh bumpy(const GeneratedMesh& wanted, double radius_m, double height) {
   struct Wave {
     Vector3d k;
     double amplitude, phase;
@@ -105,7 +105,7 @@ TriangleMesh bumpy(const MadeMesh& wanted, double radius_m, double height) {
 }
 
 /// A box cut into nearly square cells of two triangles each.
-TriangleMesh box(const MadeMesh& wanted, const Vector3d& size_m) {
+TriangleMesh box(const GeneratedMesh& wanted, const Vector3d& size_m) {
   const double area = 2.0 * (size_m.x() * size_m.y() + size_m.y() * size_m.z() + size_m.z() * size_m.x());
   const double cell_m = std::sqrt(2.0 * area / static_cast<double>(wanted.triangles));
   std::array<std::uint32_t, 3> cells{};
@@ -212,13 +212,13 @@ TriangleMesh turned(const Turned& body) {
 }
 
 /// Cells around and along so that they are about square, and their triangles as many as wanted.
-Turned cut(const MadeMesh& wanted, double length_m, double radius_m, int sheets) {
+Turned cut(const GeneratedMesh& wanted, double length_m, double radius_m, int sheets) {
   const double cells = static_cast<double>(wanted.triangles) / (2.0 * sheets);
   const double around = std::sqrt(cells * kTurn * radius_m / length_m);
   return {length_m, {}, {}, at_least(around, 8), at_least(cells / around, 1)};
 }
 
-TriangleMesh peg(const MadeMesh& wanted) {
+TriangleMesh peg(const GeneratedMesh& wanted) {
   Turned body = cut(wanted, 0.060, 0.0098, 1);
   body.radius_m = [](double angle, double z) {
     return 0.0098 + 0.00002 * std::sin(5.0 * angle) * std::sin(25.0 * z / 0.060);
@@ -226,7 +226,7 @@ TriangleMesh peg(const MadeMesh& wanted) {
   return turned(body);
 }
 
-TriangleMesh hole(const MadeMesh& wanted) {
+TriangleMesh hole(const GeneratedMesh& wanted) {
   Turned body = cut(wanted, 0.080, 0.0130, 2);
   body.radius_m = [](double, double) { return 0.020; };
   body.bore_m = [](double angle, double z) {
@@ -248,13 +248,13 @@ double thread(double angle, double z) {
   return kThread_m * triangle_wave(z / kPitch_m - angle / kTurn);
 }
 
-TriangleMesh bolt(const MadeMesh& wanted) {
+TriangleMesh bolt(const GeneratedMesh& wanted) {
   Turned body = cut(wanted, 0.030, 0.005, 1);
   body.radius_m = [](double angle, double z) { return 0.0041 + thread(angle, z); };
   return turned(body);
 }
 
-TriangleMesh nut(const MadeMesh& wanted) {
+TriangleMesh nut(const GeneratedMesh& wanted) {
   Turned body = cut(wanted, 0.008, 0.0067, 2);
   body.around = (body.around + 5) / 6 * 6;  // six corners
   body.radius_m = [](double angle, double) {
@@ -266,7 +266,7 @@ TriangleMesh nut(const MadeMesh& wanted) {
   return turned(body);
 }
 
-TriangleMesh gear(const MadeMesh& wanted) {
+TriangleMesh gear(const GeneratedMesh& wanted) {
   constexpr double kTeeth = 20.0;
   Turned body = cut(wanted, 0.010, 0.021, 2);
   body.radius_m = [](double angle, double) {
@@ -282,17 +282,17 @@ Ring circle(double z_m, double radius_m) {
 }
 
 /// So many around that rings like these come to about the triangles wanted.
-std::uint32_t around_for(const MadeMesh& wanted, std::size_t rings) {
+std::uint32_t around_for(const GeneratedMesh& wanted, std::size_t rings) {
   return at_least(static_cast<double>(wanted.triangles) / (2.0 * static_cast<double>(rings)), 8);
 }
 
-TriangleMesh dowel(const MadeMesh& wanted) {
+TriangleMesh dowel(const GeneratedMesh& wanted) {
   const std::vector<Ring> rings = {circle(-0.030, 0.0079), circle(-0.028, 0.0099), circle(0.028, 0.0099),
                                    circle(0.030, 0.0079)};
   return lathe(even_angles(around_for(wanted, rings.size())), rings, {});
 }
 
-TriangleMesh socket(const MadeMesh& wanted) {
+TriangleMesh socket(const GeneratedMesh& wanted) {
   const std::vector<Ring> outside = {circle(-0.025, 0.020), circle(0.025, 0.020)};
   const std::vector<Ring> bore = {circle(-0.025, 0.010), circle(0.022, 0.010), circle(0.025, 0.013)};
   return lathe(even_angles(around_for(wanted, outside.size() + bore.size())), outside, bore);
@@ -330,7 +330,7 @@ std::vector<double> angles_of(const Keyhole& shape, std::uint32_t around) {
 }
 
 /// Shaft, bit near its lower end, and a flat bow to hold it by. Its middle is that of the shaft's length.
-TriangleMesh key(const MadeMesh& wanted) {
+TriangleMesh key(const GeneratedMesh& wanted) {
   const Keyhole bit = {0.0030, 0.0012, 0.0080};
   const auto bow = [](double angle) {
     return 1.0 / std::hypot(std::cos(angle) / 0.010, std::sin(angle) / 0.0025);
@@ -342,7 +342,7 @@ TriangleMesh key(const MadeMesh& wanted) {
 }
 
 /// A round plate with a keyhole, z from 0 to 6 mm, above a chamber that is open below.
-TriangleMesh lock(const MadeMesh& wanted) {
+TriangleMesh lock(const GeneratedMesh& wanted) {
   const Keyhole hole = {0.0033, 0.0015, 0.0084}, mouth = {0.0043, 0.0025, 0.0094};
   const std::vector<Ring> outside = {circle(-0.012, 0.020), circle(0.006, 0.020)};
   const std::vector<Ring> bore = {
@@ -456,11 +456,11 @@ double hexagon(double angle, double half_width_m) {
 }
 
 /// Vertices around a thread so that all of it comes to about the triangles wanted; six corners.
-std::uint32_t around_thread(const MadeMesh& wanted, double lines) {
+std::uint32_t around_thread(const GeneratedMesh& wanted, double lines) {
   return (at_least(static_cast<double>(wanted.triangles) / (2.0 * lines), 12) + 5) / 6 * 6;
 }
 
-TriangleMesh screw(const MadeMesh& wanted) {
+TriangleMesh screw(const GeneratedMesh& wanted) {
   constexpr std::uint32_t kTurns = 10;
   const std::uint32_t around = around_thread(wanted, Thread::kLines * kTurns + 5);
   const std::vector<double> angles = even_angles(around);
@@ -476,7 +476,7 @@ TriangleMesh screw(const MadeMesh& wanted) {
   return mesh;
 }
 
-TriangleMesh screw_nut(const MadeMesh& wanted) {
+TriangleMesh screw_nut(const GeneratedMesh& wanted) {
   constexpr std::uint32_t kTurns = 4;
   constexpr double kWider_m = 0.0001;
   const std::uint32_t around = around_thread(wanted, Thread::kLines * kTurns + 5);
@@ -538,7 +538,7 @@ double hare_reach_m(const Vector3d& u) {
 
 /// Every ray from the origin meets its skin once, so that it cannot cut through itself. Directions are first
 /// drawn to where the edges are long, on the flanks of the ears, as by springs along them.
-TriangleMesh hare(const MadeMesh& wanted) {
+TriangleMesh hare(const GeneratedMesh& wanted) {
   constexpr int kRounds = 60;
   TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(wanted.triangles) / 20.0), 1));
   std::vector<Vector3d>& directions = mesh.vertices_m;
@@ -570,32 +570,32 @@ TriangleMesh hare(const MadeMesh& wanted) {
 
 struct Maker {
   std::string kind;
-  TriangleMesh (*make)(const MadeMesh&);
+  TriangleMesh (*make)(const GeneratedMesh&);
 };
 
 const std::vector<Maker>& makers() {
   static const std::vector<Maker> all = {
       {"cube",
-       [](const MadeMesh& m) {
+       [](const GeneratedMesh& m) {
          return box(m, {0.05, 0.05, 0.05});
        }},
       {"plate",
-       [](const MadeMesh& m) {
+       [](const GeneratedMesh& m) {
          return box(m, {0.1, 0.1, 0.001});
        }},
       {"table",
-       [](const MadeMesh& m) {
+       [](const GeneratedMesh& m) {
          return box(m, {0.3, 0.3, 0.02});
        }},
-      {"sphere", [](const MadeMesh& m) { return bumpy(m, 0.03, 0.0); }},
-      {"bumpy", [](const MadeMesh& m) { return bumpy(m, 0.04, 0.008); }},
-      {"boulder", [](const MadeMesh& m) { return bumpy(m, 0.06, 0.008); }},
+      {"sphere", [](const GeneratedMesh& m) { return bumpy(m, 0.03, 0.0); }},
+      {"bumpy", [](const GeneratedMesh& m) { return bumpy(m, 0.04, 0.008); }},
+      {"boulder", [](const GeneratedMesh& m) { return bumpy(m, 0.06, 0.008); }},
       {"peg", peg},
       {"hole", hole},
       {"bolt", bolt},
       {"nut", nut},
       {"gear", gear},
-      {"box", [](const MadeMesh& m) { return box(m, m.size_m); }},
+      {"box", [](const GeneratedMesh& m) { return box(m, m.size_m); }},
       {"dowel", dowel},
       {"socket", socket},
       {"key", key},
@@ -609,7 +609,7 @@ const std::vector<Maker>& makers() {
 
 }  // namespace
 
-TriangleMesh make_mesh(const MadeMesh& wanted) {
+TriangleMesh make_mesh(const GeneratedMesh& wanted) {
   for (const Maker& maker : makers())
     if (maker.kind == wanted.kind) return maker.make(wanted);
   throw std::invalid_argument("no mesh of kind '" + wanted.kind + "' can be made");

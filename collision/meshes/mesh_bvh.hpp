@@ -10,13 +10,13 @@
 namespace wrenchd {
 
 /// The surface of a body of any shape, and the tree over its triangles.
-struct TreedMesh {
-  TreedMesh() = default;  ///< of nothing, to be filled in
-  explicit TreedMesh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid)
-      : surface(std::move(mesh), kind), tree(surface) {}
+struct MeshBvh {
+  MeshBvh() = default;  ///< of nothing, to be filled in
+  explicit MeshBvh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid)
+      : surface(std::move(mesh), kind), bvh(surface) {}
 
   MeshSurface surface;
-  TriangleTree tree;
+  TriangleBvh bvh;
 };
 
 }  // namespace wrenchd

@@ -98,13 +98,13 @@ std::string MeshCache::key(const std::vector<std::string_view>& made_from) {
   return sha256(parts);
 }
 
-fs::path MeshCache::file_of(const std::string& key) const {
+fs::path MeshCache::path_of(const std::string& key) const {
   return directory_ / (hexadecimal(key) + std::string(kSuffix));
 }
 
 std::optional<std::string> MeshCache::read(const std::string& key) const {
-  if (off()) return {};
-  const fs::path name = file_of(key);
+  if (disabled()) return {};
+  const fs::path name = path_of(key);
   const File file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return {};
@@ -121,31 +121,31 @@ std::optional<std::string> MeshCache::read(const std::string& key) const {
   return bytes;
 }
 
-bool MeshCache::refuse(const std::string& why) {
-  why_ = directory_.string() + ": " + why + "; what is made of large meshes is not kept";
+bool MeshCache::fail(const std::string& why) {
+  error_ = directory_.string() + ": " + why + "; what is made of large meshes is not kept";
   return false;
 }
 
 // Written beside its place and renamed: whoever reads finds all of it or nothing.
 bool MeshCache::write(const std::string& key, std::string_view bytes) {
-  if (off()) return false;
+  if (disabled()) return false;
   std::error_code error;
   fs::create_directories(directory_, error);
-  if (error) return refuse("cannot be made (" + error.message() + ")");
+  if (error) return fail("cannot be made (" + error.message() + ")");
   std::string name = (directory_ / ("new-XXXXXX" + std::string(kSuffix))).string();
   const File file(::mkostemps(name.data(), static_cast<int>(kSuffix.size()), O_CLOEXEC));
-  if (file.get() < 0) return refuse(std::string("cannot be written to (") + std::strerror(errno) + ")");
+  if (file.get() < 0) return fail(std::string("cannot be written to (") + std::strerror(errno) + ")");
   if (!file.write(header(key, bytes)) || !file.write(bytes) ||
-      ::rename(name.c_str(), file_of(key).c_str()) != 0) {
+      ::rename(name.c_str(), path_of(key).c_str()) != 0) {
     const std::string reason = std::strerror(errno);
     ::unlink(name.c_str());
-    return refuse("cannot be written to (" + reason + ")");
+    return fail("cannot be written to (" + reason + ")");
   }
-  drop_oldest();
+  evict_oldest();
   return true;
 }
 
-void MeshCache::drop_oldest() const {
+void MeshCache::evict_oldest() const {
   struct Kept {
     fs::file_time_type time;
     std::uintmax_t size;

@@ -20,7 +20,7 @@ class MeshCache {
   /// A directory; it is made when it is first written to. Empty: nothing is kept.
   explicit MeshCache(std::filesystem::path directory) : directory_(std::move(directory)) {}
 
-  bool off() const noexcept { return directory_.empty(); }
+  bool disabled() const noexcept { return directory_.empty(); }
 
   /// From what something is made, in this order, to its key.
   static std::string key(const std::vector<std::string_view>& made_from);
@@ -30,15 +30,15 @@ class MeshCache {
 
   /// False where it cannot be written; why() says it then.
   bool write(const std::string& key, std::string_view bytes);
-  const std::string& why() const noexcept { return why_; }
+  const std::string& error() const noexcept { return error_; }
 
  private:
-  std::filesystem::path file_of(const std::string& key) const;
-  bool refuse(const std::string& why);
-  void drop_oldest() const;
+  std::filesystem::path path_of(const std::string& key) const;
+  bool fail(const std::string& why);
+  void evict_oldest() const;
 
   std::filesystem::path directory_;
-  std::string why_;
+  std::string error_;
 };
 
 /// Where caches belong: $CACHE_DIRECTORY, which systemd gives a service (/var/cache/wrenchd), else

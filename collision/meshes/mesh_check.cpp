@@ -34,7 +34,7 @@ using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Edge = std::pair<std::size_t, std::size_t>;  ///< from, to
 
 std::string edge_place(const PolygonSoup& soup, const Edge& e) {
-  return place(soup.vertices[e.first]) + " to " + place(soup.vertices[e.second]);
+  return format_point(soup.vertices[e.first]) + " to " + format_point(soup.vertices[e.second]);
 }
 
 /// A negative index of the file has wrapped around; it is told as it was written.
@@ -56,17 +56,17 @@ bool uses_a_vertex_twice(const std::vector<std::size_t>& face) {
 
 /// Without numbers and indices right, nothing else can be asked.
 void check_numbers(const PolygonSoup& soup, std::vector<std::string>& defects) {
-  Tally not_finite, out_of_range;
+  DefectCount not_finite, out_of_range;
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
     if (!soup.vertices[v].allFinite())
-      not_finite.found([&] {
+      not_finite.add([&] {
         return "vertex " + std::to_string(soup.vertex_in_file(v)) +
-               " is not a number: " + place(soup.vertices[v]);
+               " is not a number: " + format_point(soup.vertices[v]);
       });
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     for (const std::size_t v : soup.faces[f])
       if (v >= soup.vertices.size())
-        out_of_range.found([&] {
+        out_of_range.add([&] {
           return face_name(soup, f) + " uses vertex " + index_text(v) + ", but there are only " +
                  std::to_string(soup.vertices.size());
         });
@@ -78,13 +78,12 @@ void check_numbers(const PolygonSoup& soup, std::vector<std::string>& defects) {
 /// Faces that are no polygons.
 void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
   check_numbers(soup, defects);
-  Tally too_few, repeated;
+  DefectCount too_few, repeated;
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     const auto& face = soup.faces[f];
     if (face.size() < 3)
-      too_few.found([&] { return face_name(soup, f) + " has " + std::to_string(face.size()) + " vertices"; });
-    if (uses_a_vertex_twice(face))
-      repeated.found([&] { return face_name(soup, f) + " uses a vertex twice"; });
+      too_few.add([&] { return face_name(soup, f) + " has " + std::to_string(face.size()) + " vertices"; });
+    if (uses_a_vertex_twice(face)) repeated.add([&] { return face_name(soup, f) + " uses a vertex twice"; });
   }
   too_few.report(defects, "remove it");
   repeated.report(defects, "remove degenerate faces in the modeller");
@@ -99,19 +98,19 @@ double area_of(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
 }
 
 void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
-  Tally flat;
+  DefectCount flat;
   for (std::size_t f = 0; f < soup.faces.size(); ++f)
     if (!(area_of(soup, soup.faces[f]) > 0.0))
-      flat.found([&] {
-        return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) + " has no area";
+      flat.add([&] {
+        return face_name(soup, f) + " near " + format_point(soup.vertices[soup.faces[f][0]]) + " has no area";
       });
   flat.report(defects, "remove degenerate faces in the modeller");
 }
 
 /// Closed and consistently oriented: every edge runs once in each direction.
 void check_edges(const PolygonSoup& soup, MeshReport& report) {
-  Tally open, crowded, same_way;
-  for_each_edge(sides_of(soup), [&](std::span<const Side> sides) {
+  DefectCount open, crowded, same_way;
+  for_each_edge(half_edges_of(soup), [&](std::span<const HalfEdge> sides) {
     const auto where = [&] {
       const Edge& e = sides[0].edge;
       const bool as_stored = sides[0].forward || sides.size() > 2;
@@ -119,11 +118,11 @@ void check_edges(const PolygonSoup& soup, MeshReport& report) {
     };
     const auto face = [&](std::size_t k) { return std::to_string(soup.face_in_file(sides[k].face)); };
     if (sides.size() == 1)
-      open.found([&] { return where() + " belongs to face " + face(0) + " only: the surface is open"; });
+      open.add([&] { return where() + " belongs to face " + face(0) + " only: the surface is open"; });
     else if (sides.size() > 2)
-      crowded.found([&] { return where() + " belongs to " + std::to_string(sides.size()) + " faces"; });
+      crowded.add([&] { return where() + " belongs to " + std::to_string(sides.size()) + " faces"; });
     else if (sides[0].forward == sides[1].forward)
-      same_way.found([&] {
+      same_way.add([&] {
         return "faces " + face(0) + " and " + face(1) + " are oriented against each other along " + where();
       });
   });
@@ -150,7 +149,7 @@ void check_vertices(const PolygonSoup& soup, MeshReport& report) {
     return a.vertex != b.vertex ? a.vertex < b.vertex : a.from < b.from;
   };
   std::sort(turns.begin(), turns.end(), before);
-  Tally pinched;
+  DefectCount pinched;
   for (auto begin = turns.begin(); begin != turns.end();) {
     const auto end =
         std::find_if(begin, turns.end(), [&](const Turn& t) { return t.vertex != begin->vertex; });
@@ -160,10 +159,10 @@ void check_vertices(const PolygonSoup& soup, MeshReport& report) {
       at = std::lower_bound(begin, end, Turn{begin->vertex, at->to, 0}, before);
     } while (++ring < end - begin && at != begin);
     if (ring < end - begin)
-      pinched.found([&] {
+      pinched.add([&] {
         return "parts of the surface meet only in vertex " +
                std::to_string(soup.vertex_in_file(begin->vertex)) + " at " +
-               place(soup.vertices[begin->vertex]);
+               format_point(soup.vertices[begin->vertex]);
       });
     begin = end;
   }
@@ -200,14 +199,14 @@ bool is_simple(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
 /// the file.
 std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh, MeshReport& report) {
   std::vector<std::size_t> face_of(soup.faces.size());
-  Tally uncut;
+  DefectCount uncut;
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     face_of[f] = soup.face_in_file(f);  // its first triangle keeps the index
     const std::size_t corners = soup.faces[f].size();
     if ((corners > 4 && !is_simple(soup, soup.faces[f])) ||
         (corners > 3 && !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh)))
-      uncut.found([&] {
-        return face_name(soup, f) + " near " + place(soup.vertices[soup.faces[f][0]]) +
+      uncut.add([&] {
+        return face_name(soup, f) + " near " + format_point(soup.vertices[soup.faces[f][0]]) +
                " cannot be cut into triangles";
       });
     face_of.resize(mesh.number_of_faces(), soup.face_in_file(f));
@@ -228,8 +227,8 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
   report.defects.push_back(
       (a == b ? "two halves of face " + std::to_string(a)
               : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
-      " near " + place({corner.x(), corner.y(), corner.z()}) + " cut through each other" +
-      (pairs.size() < kMostIntersections ? in_all(pairs.size()) : " (1000 or more in all)") +
+      " near " + format_point({corner.x(), corner.y(), corner.z()}) + " cut through each other" +
+      (pairs.size() < kMostIntersections ? total_suffix(pairs.size()) : " (1000 or more in all)") +
       "; unite the parts in the modeller");
 }
 
@@ -282,7 +281,7 @@ MeshReport report_on(const PolygonSoup& soup) {
 
 }  // namespace
 
-std::vector<std::string> wrong_numbers(const PolygonSoup& soup) {
+std::vector<std::string> find_invalid_values(const PolygonSoup& soup) {
   std::vector<std::string> defects;
   check_numbers(soup, defects);
   return defects;
@@ -311,14 +310,14 @@ MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles) {
 MeshReport repair_and_check_solid(PolygonSoup& soup, TriangleMesh* triangles) {
   std::vector<std::string> changes = repair(soup);
   MeshReport report = check_solid(soup, triangles);
-  report.changes = std::move(changes);
+  report.repairs = std::move(changes);
   return report;
 }
 
 MeshReport repair_and_check_surface(PolygonSoup& soup, TriangleMesh* triangles) {
   std::vector<std::string> changes = repair(soup);
   MeshReport report = check_surface(soup, triangles);
-  report.changes = std::move(changes);
+  report.repairs = std::move(changes);
   return report;
 }
 

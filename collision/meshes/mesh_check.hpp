@@ -19,7 +19,7 @@ struct MeshReport {
   bool outward = false;     ///< the faces bound a volume, with their outer side outside
   bool self_intersecting = false;
   double volume = 0.0;  ///< in file units cubed; NaN while the mesh is not closed and consistent
-  std::vector<std::string> changes = {};  ///< what was repaired before, a sentence each (mesh_repair.hpp)
+  std::vector<std::string> repairs = {};  ///< what was repaired before, a sentence each (mesh_repair.hpp)
   std::vector<std::string> defects;       ///< one sentence each: what, where, how many, and the cure
 
   bool solid() const noexcept { return defects.empty(); }
@@ -27,7 +27,7 @@ struct MeshReport {
 
 /// What makes a soup nothing at all: coordinates that are no numbers, indices of vertices that are not there.
 /// One sentence each; none where all is right. Not RT safe.
-std::vector<std::string> wrong_numbers(const PolygonSoup& soup);
+std::vector<std::string> find_invalid_values(const PolygonSoup& soup);
 
 /// Looks at everything that makes a mesh a closed, consistently oriented solid. Names faces and vertices by
 /// their number in the file, from 0. `triangles` receives the triangulated surface when there is no defect.

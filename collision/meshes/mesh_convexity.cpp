@@ -14,17 +14,17 @@ constexpr std::size_t kSome = 20'000;
 
 }  // namespace
 
-bool fills_its_hull(const TriangleMesh& solid, const ConvexBody& hull) {
+bool is_convex(const TriangleMesh& solid, const ConvexBody& hull) {
   return solid_properties(solid, 1.0).volume_m3 >= kFull * volume(hull);
 }
 
 // The hull of some vertices lies in that of all.
-bool may_fill_its_hull(const TriangleMesh& solid) {
+bool may_be_convex(const TriangleMesh& solid) {
   const std::size_t count = solid.vertices_m.size();
   if (count <= 2 * kSome) return true;
   std::vector<Vector3d> some;
   for (std::size_t i = 0; i < kSome; ++i) some.push_back(solid.vertices_m[i * count / kSome]);
-  return fills_its_hull(solid, convex_hull(some));
+  return is_convex(solid, convex_hull(some));
 }
 
 }  // namespace wrenchd

@@ -7,10 +7,10 @@
 namespace wrenchd {
 
 /// Is a solid convex, but for what rounding of its corners takes away? Not RT safe.
-bool fills_its_hull(const TriangleMesh& solid, const ConvexBody& hull);
+bool is_convex(const TriangleMesh& solid, const ConvexBody& hull);
 
 /// False where some of the vertices alone tell that it is not; true where the hull has to. Quick. Not RT
 /// safe.
-bool may_fill_its_hull(const TriangleMesh& solid);
+bool may_be_convex(const TriangleMesh& solid);
 
 }  // namespace wrenchd

@@ -58,7 +58,7 @@ MeshSource read_bytes(const std::filesystem::path& file) {
   MeshSource source{file, {}};
   source.bytes.resize(std::filesystem::file_size(file));
   in.read(source.bytes.data(), static_cast<std::streamsize>(source.bytes.size()));
-  if (!in || source.bytes.empty()) source.refuse(0, "cannot be read; check the file and its permissions");
+  if (!in || source.bytes.empty()) source.reject(0, "cannot be read; check the file and its permissions");
   if (source.bytes.starts_with(kByteOrderMark)) source.bytes.erase(0, kByteOrderMark.size());
   return source;
 }
@@ -75,10 +75,10 @@ bool read_soup(MeshSource source, const std::string& extension, std::vector<Poin
                std::vector<std::vector<std::size_t>>& faces) {
   const auto silent = CGAL::parameters::verbose(false);
   if (extension == ".off") part_off_counts(source.bytes);
-  if (extension == ".off") guard_off(source);
-  if (extension == ".ply") source.bytes = guarded_ply(std::move(source));
-  if (extension == ".stl") source.bytes = guarded_stl(std::move(source));
-  if (extension == ".obj") source.bytes = guarded_obj(source);
+  if (extension == ".off") validate_off(source);
+  if (extension == ".ply") source.bytes = normalise_ply(std::move(source));
+  if (extension == ".stl") source.bytes = normalise_stl(std::move(source));
+  if (extension == ".obj") source.bytes = normalise_obj(source);
   std::istringstream in(std::move(source.bytes));
   if (extension == ".off") return CGAL::IO::read_OFF(in, points, faces, silent);
   if (extension == ".ply") return CGAL::IO::read_PLY(in, points, faces, silent);

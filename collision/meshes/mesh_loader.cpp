@@ -26,32 +26,32 @@ void add_once(std::vector<std::string>& list, const std::string& text) {
   if (std::find(list.begin(), list.end(), text) == list.end()) list.push_back(text);
 }
 
-std::string_view name_of(BodyKind kind) {
+std::string_view generated_mesh_name(BodyKind kind) {
   return kind == BodyKind::solid ? "solid" : "surface";
 }
 
 template <class Use>
 void each_part(LoadedMesh& loaded, const Use& use) {
-  use(loaded.mesh.vertices_m), use(loaded.mesh.triangles), use(loaded.changes);
+  use(loaded.mesh.vertices_m), use(loaded.mesh.triangles), use(loaded.repairs);
 }
 template <class Use>
 void each_part(ConvexBody& hull, const Use& use) {
   use(hull.vertices_T_m), use(hull.ring_begin), use(hull.ring);
 }
 template <class Use>
-void each_part(TreedMesh& treed, const Use& use) {
-  treed.surface.each_member(use), treed.tree.each_member(use);
+void each_part(MeshBvh& treed, const Use& use) {
+  treed.surface.visit_members(use), treed.bvh.visit_members(use);
 }
 
 }  // namespace
 
-std::string refusal(const std::filesystem::path& file, const PolygonSoup& soup, BodyKind kind,
-                    const MeshReport& report) {
+std::string rejection_text(const std::filesystem::path& file, const PolygonSoup& soup, BodyKind kind,
+                           const MeshReport& report) {
   std::string text =
       file.string() + (kind == BodyKind::solid ? ": is not a closed, consistently oriented solid:"
                                                : ": cannot be used, not even as a surface:");
   for (const std::string& defect : report.defects) text += "\n  " + defect;
-  for (const std::string& change : report.changes) text += "\n  (after a repair: " + change + ")";
+  for (const std::string& change : report.repairs) text += "\n  (after a repair: " + change + ")";
   if (kind == BodyKind::solid && check_surface(soup).defects.empty())
     text +=
         "\n  an obstacle may be used as it is with kind = \"surface\": it then has two sides and no inside; "
@@ -60,22 +60,22 @@ std::string refusal(const std::filesystem::path& file, const PolygonSoup& soup, 
   return text;
 }
 
-std::string grouped(std::size_t number) {
+std::string with_thousands_separators(std::size_t number) {
   std::string text = std::to_string(number);
   for (std::size_t at = text.size(); at > 3; at -= 3) text.insert(at - 3, ",");
   return text;
 }
 
-void MeshLoader::tell(const std::filesystem::path& file, std::size_t triangles,
-                      const std::string& what) const {
-  if (progress_ && triangles >= kManyTriangles)
-    progress_(file.filename().string() + ": " + grouped(triangles) + " triangles, " + what);
+void MeshLoader::report_progress(const std::filesystem::path& file, std::size_t triangles,
+                                 const std::string& what) const {
+  if (progress_ && triangles >= kLargeMeshTriangles)
+    progress_(file.filename().string() + ": " + with_thousands_separators(triangles) + " triangles, " + what);
 }
 
 /// From the cache, or made and put there. key: all that it is made from.
 template <class T, class Make>
-T MeshLoader::kept(const std::vector<std::string_view>& made_from, bool large, const Make& make) {
-  if (cache_.off() || !large) return make();
+T MeshLoader::cached(const std::vector<std::string_view>& made_from, bool large, const Make& make) {
+  if (cache_.disabled() || !large) return make();
   const std::string key = MeshCache::key(made_from);
   if (const auto bytes = cache_.read(key)) {
     T value;
@@ -87,20 +87,20 @@ T MeshLoader::kept(const std::vector<std::string_view>& made_from, bool large, c
   std::string bytes;
   each_part(value, Packer(bytes));
   if (!cache_.write(key, bytes)) {
-    add_once(remarks_, cache_.why());
+    add_once(warnings_, cache_.error());
     cache_ = MeshCache({});
   }
   return value;
 }
 
 std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& file, BodyKind kind,
-                                                   const std::optional<MadeMesh>& made) {
+                                                   const std::optional<GeneratedMesh>& made) {
   std::error_code error;
   const std::filesystem::path same = std::filesystem::weakly_canonical(file, error);
   auto& loaded = loaded_[{error || made ? file : same, kind}];
   if (!loaded) loaded = std::make_shared<const LoadedMesh>(made ? make(*made, file, kind) : read(file, kind));
   const std::string begin = loaded->file.string() + ": ";
-  for (const std::string& change : loaded->changes) add_once(changes_, begin + change);
+  for (const std::string& change : loaded->repairs) add_once(changes_, begin + change);
   if (kind == BodyKind::surface)
     add_once(changes_, begin +
                            "taken as a surface: it has two sides and no inside, so that nothing pushes out a "
@@ -109,39 +109,40 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& 
   return loaded;
 }
 
-LoadedMesh MeshLoader::checked(PolygonSoup soup, const std::filesystem::path& file, BodyKind kind) const {
+LoadedMesh MeshLoader::repair_and_check(PolygonSoup soup, const std::filesystem::path& file,
+                                        BodyKind kind) const {
   LoadedMesh made;
-  tell(file, soup.faces.size(), "checking");
+  report_progress(file, soup.faces.size(), "checking");
   const MeshReport report = kind == BodyKind::solid ? repair_and_check_solid(soup, &made.mesh)
                                                     : repair_and_check_surface(soup, &made.mesh);
-  if (!report.defects.empty()) throw MeshError(refusal(file, soup, kind, report));
-  made.changes = report.changes;
+  if (!report.defects.empty()) throw MeshError(rejection_text(file, soup, kind, report));
+  made.repairs = report.repairs;
   return made;
 }
 
 LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
   MeshSource source = read_mesh_source(file);
   const std::size_t size = source.bytes.size();
-  const bool large = size >= kManyBytes;
+  const bool large = size >= kLargeMeshBytes;
   if (progress_ && large)
-    progress_(file.filename().string() + ": reading " + grouped(size / 1'000'000) + " MB");
+    progress_(file.filename().string() + ": reading " + with_thousands_separators(size / 1'000'000) + " MB");
   const std::string extension = file.extension().string();
-  LoadedMesh loaded = kept<LoadedMesh>({"mesh", extension, name_of(kind), source.bytes}, large,
-                                       [&] { return checked(parse_mesh(source), file, kind); });
+  LoadedMesh loaded = cached<LoadedMesh>({"mesh", extension, generated_mesh_name(kind), source.bytes}, large,
+                                         [&] { return repair_and_check(parse_mesh(source), file, kind); });
   loaded.file = file;
   return loaded;
 }
 
 /// What was made is looked at like a file: a body of somebody's measures may come out thinner than it can be.
-LoadedMesh MeshLoader::make(const MadeMesh& made, const std::filesystem::path& name, BodyKind kind) {
+LoadedMesh MeshLoader::make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind) {
   const TriangleMesh mesh = make_mesh(made);
-  const bool large = mesh.triangles.size() >= kManyTriangles;
-  const std::vector<std::string_view> made_from = {"made", name_of(kind), bytes_of(mesh.vertices_m),
-                                                   bytes_of(mesh.triangles)};
-  LoadedMesh loaded = kept<LoadedMesh>(made_from, large, [&] {
+  const bool large = mesh.triangles.size() >= kLargeMeshTriangles;
+  const std::vector<std::string_view> made_from = {"made", generated_mesh_name(kind),
+                                                   bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
+  LoadedMesh loaded = cached<LoadedMesh>(made_from, large, [&] {
     PolygonSoup soup{mesh.vertices_m, {}};
     for (const auto& [a, b, c] : mesh.triangles) soup.faces.push_back({a, b, c});
-    return checked(std::move(soup), name, kind);
+    return repair_and_check(std::move(soup), name, kind);
   });
   loaded.file = name;
   return loaded;
@@ -149,26 +150,27 @@ LoadedMesh MeshLoader::make(const MadeMesh& made, const std::filesystem::path& n
 
 ConvexBody MeshLoader::hull(const LoadedMesh& loaded) {
   const std::size_t triangles = loaded.mesh.triangles.size();
-  return kept<ConvexBody>({"hull", bytes_of(loaded.mesh.vertices_m)}, triangles >= kManyTriangles, [&] {
-    tell(loaded.file, triangles, "finding its convex hull");
-    return convex_hull(loaded.mesh.vertices_m);
-  });
+  return cached<ConvexBody>({"hull", bytes_of(loaded.mesh.vertices_m)}, triangles >= kLargeMeshTriangles,
+                            [&] {
+                              report_progress(loaded.file, triangles, "finding its convex hull");
+                              return convex_hull(loaded.mesh.vertices_m);
+                            });
 }
 
-std::shared_ptr<const TreedMesh> MeshLoader::treed(TriangleMesh mesh, BodyKind kind,
-                                                   const std::filesystem::path& file) {
+std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind kind,
+                                                     const std::filesystem::path& file) {
   const std::size_t triangles = mesh.triangles.size();
-  const std::vector<std::string_view> made_from = {"treed", name_of(kind), bytes_of(mesh.vertices_m),
-                                                   bytes_of(mesh.triangles)};
-  return std::make_shared<const TreedMesh>(kept<TreedMesh>(made_from, triangles >= kManyTriangles, [&] {
-    tell(file, triangles, "finding its edges and building its tree");
-    return TreedMesh(mesh, kind);
+  const std::vector<std::string_view> made_from = {"treed", generated_mesh_name(kind),
+                                                   bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
+  return std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
+    report_progress(file, triangles, "finding its edges and building its tree");
+    return MeshBvh(mesh, kind);
   }));
 }
 
-void MeshLoader::look_at_size(const LoadedMesh& loaded, double scale, LikelySize likely) {
-  if (const auto unlikely = unlikely_size(loaded.mesh, scale, likely))
-    add_once(remarks_, loaded.file.string() + ": " + *unlikely);
+void MeshLoader::check_size(const LoadedMesh& loaded, double scale, PlausibleSize likely) {
+  if (const auto unlikely = implausible_size(loaded.mesh, scale, likely))
+    add_once(warnings_, loaded.file.string() + ": " + *unlikely);
 }
 
 }  // namespace wrenchd

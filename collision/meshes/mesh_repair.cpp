@@ -112,12 +112,12 @@ class Repair {
   std::string face_name(std::size_t f) const { return "face " + std::to_string(soup_.face_in_file(f)); }
   std::string face_place(std::size_t f) const {
     const Face& face = soup_.faces[f];
-    return face_name(f) + (face.empty() ? "" : " near " + place(soup_.vertices[face[0]]));
+    return face_name(f) + (face.empty() ? "" : " near " + format_point(soup_.vertices[face[0]]));
   }
 
   std::vector<std::string> changes() const;
-  const std::vector<Side>& sides() {
-    if (sides_.empty()) sides_ = sides_of(soup_);
+  const std::vector<HalfEdge>& sides() {
+    if (sides_.empty()) sides_ = half_edges_of(soup_);
     return sides_;
   }
   void keep_faces(const std::vector<bool>& kept) {
@@ -141,7 +141,7 @@ class Repair {
   void drop_duplicate_faces();
   void close_cracks();
   void turn_faces();
-  std::vector<Shell> shells(std::span<const Side> sides, std::vector<bool>& turned, bool& closed) const;
+  std::vector<Shell> shells(std::span<const HalfEdge> sides, std::vector<bool>& turned, bool& closed) const;
   bool holds(const Shell& shell, const std::vector<bool>& turned, const Vector3d& p) const;
   void turn_shells_out(std::vector<Shell>& shells, std::vector<bool>& turned) const;
 
@@ -149,8 +149,8 @@ class Repair {
 
   PolygonSoup& soup_;
   Eigen::AlignedBox3d box_;
-  std::vector<Side> sides_;  ///< empty: to be found again
-  Tally unused_, merged_, repeated_, too_few_, duplicate_, thin_, joined_, turned_;
+  std::vector<HalfEdge> sides_;  ///< empty: to be found again
+  DefectCount unused_, merged_, repeated_, too_few_, duplicate_, thin_, joined_, turned_;
 };
 
 std::vector<std::string> Repair::changes() const {
@@ -177,8 +177,8 @@ void Repair::leave_out_unused_points() {
   const std::vector<bool> used = used_points();
   for (std::size_t v = 0; v < used.size(); ++v)
     if (!used[v])
-      unused_.found([&] {
-        return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " + place(soup_.vertices[v]);
+      unused_.add([&] {
+        return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " + format_point(soup_.vertices[v]);
       });
   drop_unused_points();
 }
@@ -212,8 +212,8 @@ void Repair::merge_equal_points() {
     duplicate[order[i]] = p[order[i]] == p[order[i - 1]] && merged.merge(order[i - 1], order[i]);
   for (std::size_t v = 0; v < duplicate.size(); ++v)
     if (duplicate[v])
-      merged_.found(
-          [&] { return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " + place(p[v]); });
+      merged_.add(
+          [&] { return "vertex " + std::to_string(soup_.vertex_in_file(v)) + " at " + format_point(p[v]); });
   if (!merged_.any()) return;
   use(merged);
   drop_unused_points();
@@ -244,7 +244,7 @@ void Repair::drop_repeated_corners() {
     if (face.size() > 1 && face.front() == face.back()) face.pop_back();
     kept[f] = face.size() >= 3;
     drops = drops || !kept[f];
-    (kept[f] ? repeated_ : too_few_).found([&] { return where; });
+    (kept[f] ? repeated_ : too_few_).add([&] { return where; });
     sides_.clear();
   }
   if (drops) keep_faces(kept);
@@ -284,11 +284,11 @@ bool Repair::fold_thin_faces() {
     }
   if (list.empty()) return false;
 
-  const std::vector<Side>& all_sides = sides();
+  const std::vector<HalfEdge>& all_sides = sides();
   const auto faces_along = [&](std::size_t a, std::size_t b) {
     const auto [low, high] = std::minmax(a, b);
-    return std::equal_range(all_sides.begin(), all_sides.end(), Side{{low, high}, 0, false},
-                            [](const Side& x, const Side& y) { return x.edge < y.edge; });
+    return std::equal_range(all_sides.begin(), all_sides.end(), HalfEdge{{low, high}, 0, false},
+                            [](const HalfEdge& x, const HalfEdge& y) { return x.edge < y.edge; });
   };
   Merged merged(soup_.vertices.size());
   bool changed = false;
@@ -298,7 +298,7 @@ bool Repair::fold_thin_faces() {
     const auto& p = soup_.vertices;
     const std::size_t nearer = (p[a] - p[apex]).norm() < (p[b] - p[apex]).norm() ? a : b;
     const std::size_t thin_face = f;  // clang 14 captures no structured binding
-    const auto told = [&] { thin_.found([&] { return face_place(thin_face); }); };
+    const auto told = [&] { thin_.add([&] { return face_place(thin_face); }); };
     if ((p[nearer] - p[apex]).norm() <= tolerance) {
       told();
       changed = true;
@@ -345,9 +345,9 @@ Face canonical(const Face& face) {
 void Repair::drop_duplicate_faces() {
   // They have edges of more than two faces, or of two that run the same way.
   std::vector<bool> suspect(soup_.faces.size(), false);
-  for_each_edge(sides(), [&](std::span<const Side> sides) {
+  for_each_edge(sides(), [&](std::span<const HalfEdge> sides) {
     if (sides.size() < 2 || (sides.size() == 2 && sides[0].forward != sides[1].forward)) return;
-    for (const Side& side : sides) suspect[side.face] = true;
+    for (const HalfEdge& side : sides) suspect[side.face] = true;
   });
   bool drops = false;
   std::map<Face, std::size_t> seen;
@@ -357,7 +357,7 @@ void Repair::drop_duplicate_faces() {
     kept[f] = seen.emplace(canonical(soup_.faces[f]), f).second;
     if (kept[f]) continue;
     drops = true;
-    duplicate_.found([&] { return face_place(f); });
+    duplicate_.add([&] { return face_place(f); });
   }
   if (drops) keep_faces(kept);
 }
@@ -365,7 +365,7 @@ void Repair::drop_duplicate_faces() {
 /// Only the ends of open edges are looked at: elsewhere nothing is wanting.
 void Repair::close_cracks() {
   std::vector<std::size_t> border;
-  for_each_edge(sides(), [&](std::span<const Side> sides) {
+  for_each_edge(sides(), [&](std::span<const HalfEdge> sides) {
     if (sides.size() == 1) border.insert(border.end(), {sides[0].edge.first, sides[0].edge.second});
   });
   if (border.empty()) return;
@@ -400,7 +400,7 @@ void Repair::close_cracks() {
       found = near_by != last;
       if (!found) continue;
       merged.merge(v, near_by->second);
-      joined_.found([&] { return place(p); });
+      joined_.add([&] { return format_point(p); });
     }
     if (!found) grid.emplace(c, v);
   }
@@ -411,7 +411,7 @@ void Repair::close_cracks() {
 
 /// Spreads from face to face over edges that have two; `turned` receives the faces to turn so that neighbours
 /// agree, the fewest of each shell. What has only one side is left as it is.
-std::vector<Shell> Repair::shells(std::span<const Side> all_sides, std::vector<bool>& turned,
+std::vector<Shell> Repair::shells(std::span<const HalfEdge> all_sides, std::vector<bool>& turned,
                                   bool& closed) const {
   struct Neighbour {
     std::size_t face;
@@ -419,7 +419,7 @@ std::vector<Shell> Repair::shells(std::span<const Side> all_sides, std::vector<b
   };
   std::vector<std::size_t> begin(soup_.faces.size() + 1, 0);
   const auto each_pair = [&](const auto& look) {
-    for_each_edge(all_sides, [&](std::span<const Side> sides) {
+    for_each_edge(all_sides, [&](std::span<const HalfEdge> sides) {
       if (sides.size() == 2)
         look(sides[0], sides[1]);
       else
@@ -427,14 +427,14 @@ std::vector<Shell> Repair::shells(std::span<const Side> all_sides, std::vector<b
     });
   };
   closed = true;
-  each_pair([&](const Side& a, const Side& b) {
+  each_pair([&](const HalfEdge& a, const HalfEdge& b) {
     ++begin[a.face + 1];
     ++begin[b.face + 1];
   });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
   std::vector<Neighbour> neighbours(begin.back());
   std::vector<std::size_t> at(begin.begin(), begin.end() - 1);
-  each_pair([&](const Side& a, const Side& b) {
+  each_pair([&](const HalfEdge& a, const HalfEdge& b) {
     const bool agrees = a.forward != b.forward;
     neighbours[at[a.face]++] = {b.face, agrees};
     neighbours[at[b.face]++] = {a.face, agrees};
@@ -525,7 +525,7 @@ void Repair::turn_faces() {
   if (closed) turn_shells_out(found, turned);
   for (std::size_t f = 0; f < turned.size(); ++f) {
     if (!turned[f]) continue;
-    turned_.found([&] { return face_place(f); });
+    turned_.add([&] { return face_place(f); });
     std::reverse(soup_.faces[f].begin(), soup_.faces[f].end());
   }
 }
@@ -533,7 +533,7 @@ void Repair::turn_faces() {
 }  // namespace
 
 std::vector<std::string> repair(PolygonSoup& soup) {
-  if (!wrong_numbers(soup).empty()) return {};
+  if (!find_invalid_values(soup).empty()) return {};
   return Repair(soup).all();
 }
 

@@ -33,12 +33,12 @@ std::string size_text(double side_m, double scale) {
 }
 
 /// The scale that would make the size a likely one: a unit beside the one that was taken.
-std::string cure(double side_m, double scale, LikelySize likely) {
+std::string cure(double side_m, double scale, PlausibleSize likely) {
   std::ostringstream text;
   text.imbue(std::locale::classic());
-  const double factor = side_m > likely.largest_m ? 1e-3 : 1e3;
+  const double factor = side_m > likely.max_m ? 1e-3 : 1e3;
   const double other_m = side_m * factor;
-  if (other_m < likely.least_m || other_m > likely.largest_m) return "give 'scale' in metres per mesh unit";
+  if (other_m < likely.min_m || other_m > likely.max_m) return "give 'scale' in metres per mesh unit";
   text << (factor < 1.0 ? "were millimetres taken for metres? 'scale' would be "
                         : "were metres taken for millimetres? 'scale' would be ")
        << scale * factor;
@@ -47,9 +47,9 @@ std::string cure(double side_m, double scale, LikelySize likely) {
 
 }  // namespace
 
-std::optional<std::string> unlikely_size(const TriangleMesh& mesh, double scale, LikelySize likely) {
+std::optional<std::string> implausible_size(const TriangleMesh& mesh, double scale, PlausibleSize likely) {
   const double side_m = scale * largest_side(mesh);
-  if (side_m >= likely.least_m && side_m <= likely.largest_m) return {};
+  if (side_m >= likely.min_m && side_m <= likely.max_m) return {};
   return size_text(side_m, scale) + ": " + cure(side_m, scale, likely);
 }
 

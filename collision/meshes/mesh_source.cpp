@@ -29,11 +29,11 @@ std::optional<T> parsed(std::string_view word) noexcept {
 
 }  // namespace
 
-void MeshSource::refuse(std::size_t line, const std::string& message) const {
+void MeshSource::reject(std::size_t line, const std::string& message) const {
   throw MeshError(file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": " + message);
 }
 
-bool Lines::next(std::string_view& line) noexcept {
+bool LineReader::next(std::string_view& line) noexcept {
   if (rest_.empty()) return false;
   const std::size_t end = rest_.find('\n');
   line = rest_.substr(0, end);
@@ -43,7 +43,7 @@ bool Lines::next(std::string_view& line) noexcept {
   return true;
 }
 
-std::vector<std::string_view> words_of(std::string_view line) {
+std::vector<std::string_view> split_words(std::string_view line) {
   line = line.substr(0, line.find('#'));
   std::vector<std::string_view> words;
   for (;;) {
@@ -56,16 +56,16 @@ std::vector<std::string_view> words_of(std::string_view line) {
   }
 }
 
-std::optional<double> number_of(std::string_view word) noexcept {
+std::optional<double> parse_number(std::string_view word) noexcept {
   const auto x = parsed<double>(word);
   return x && is_finite(*x) ? x : std::nullopt;
 }
 
-std::optional<long long> whole_number_of(std::string_view word) noexcept {
+std::optional<long long> parse_integer(std::string_view word) noexcept {
   return parsed<long long>(word);
 }
 
-std::string in_quotes(std::string_view word) {
+std::string quote_word(std::string_view word) {
   constexpr std::size_t kLongest = 40;
   std::string text(word.substr(0, kLongest));
   if (word.size() > kLongest) text += "...";

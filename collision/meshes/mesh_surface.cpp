@@ -53,8 +53,8 @@ MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)),
   features_.assign(mesh_.triangles.size(), {{kNone, kNone, kNone}, {kNone, kNone, kNone}});
   find_neighbours();
   find_planes();
-  find_edges();
-  find_pointed_vertices();
+  find_convex_edges();
+  find_convex_vertices();
 }
 
 /// Pairs the sides of the triangles: a side that runs from a to b meets one that runs from b to a. Where
@@ -107,10 +107,10 @@ void MeshSurface::find_planes() {
 
   const double flat_m = std::min(kFlat * radius_m_, kFlat_m);
   planes_.resize(count);
-  region_.assign(count, kNone);
+  planar_region_.assign(count, kNone);
   std::vector<std::uint32_t> front;
   for (const std::uint32_t seed : largest_first) {
-    if (region_[seed] != kNone) continue;
+    if (planar_region_[seed] != kNone) continue;
     const Vector3d normal = area_normals[seed].normalized();
     const Plane plane = {normal, normal.dot(corner_m(seed, 0))};
     const auto lies_in_plane = [&](std::uint32_t t) {
@@ -118,15 +118,15 @@ void MeshSurface::find_planes() {
         if (!(std::abs(normal.dot(corner_m(t, i)) - plane.offset_m) <= flat_m)) return false;
       return normal.dot(area_normals[t]) >= 0.0;
     };
-    region_[seed] = seed;
+    planar_region_[seed] = seed;
     front.assign(1, seed);
     while (!front.empty()) {
       const std::uint32_t t = front.back();
       front.pop_back();
       planes_[t] = plane;
       for (const std::uint32_t u : neighbours_[t]) {
-        if (u == kNone || region_[u] != kNone || !lies_in_plane(u)) continue;
-        region_[u] = seed;
+        if (u == kNone || planar_region_[u] != kNone || !lies_in_plane(u)) continue;
+        planar_region_[u] = seed;
         front.push_back(u);
       }
     }
@@ -134,10 +134,10 @@ void MeshSurface::find_planes() {
 }
 
 /// Does the face across this side fall away? Its far corner then lies below the plane.
-bool MeshSurface::sharp(std::uint32_t triangle, int side) const noexcept {
+bool MeshSurface::is_convex_edge(std::uint32_t triangle, int side) const noexcept {
   const std::uint32_t other = neighbours_[triangle][static_cast<std::size_t>(side)];
   if (other == kNone) return true;
-  if (region_[other] == region_[triangle]) return false;
+  if (planar_region_[other] == planar_region_[triangle]) return false;
   if (kind_ == Kind::surface) return true;
   const Plane& plane = planes_[triangle];
   double height_m = 0.0;
@@ -148,23 +148,23 @@ bool MeshSurface::sharp(std::uint32_t triangle, int side) const noexcept {
   return height_m < 0.0;
 }
 
-void MeshSurface::find_edges() {
+void MeshSurface::find_convex_edges() {
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
       const auto side = static_cast<std::size_t>(i);
       const std::uint32_t other = neighbours_[t][side];
-      if (other < t || !sharp(t, i)) continue;  // the lower number speaks for the edge
-      features_[t].edges[side] = static_cast<std::uint32_t>(edges_.size());
+      if (other < t || !is_convex_edge(t, i)) continue;  // the lower number speaks for the edge
+      features_[t].edges[side] = static_cast<std::uint32_t>(convex_edges_.size());
       const Corners& corners = mesh_.triangles[t];
-      edges_.push_back({{corners[side], corners[static_cast<std::size_t>(next(i))]}, {t, other}});
+      convex_edges_.push_back({{corners[side], corners[static_cast<std::size_t>(next(i))]}, {t, other}});
     }
 }
 
 /// At a pointed vertex at least three sharp edges meet: the corners of the cone that its neighbours span.
-void MeshSurface::find_pointed_vertices() {
+void MeshSurface::find_convex_vertices() {
   const std::size_t count = mesh_.vertices_m.size();
   std::vector<std::uint32_t> sharp_edges(count, 0);
-  for (const Edge& edge : edges_)
+  for (const Edge& edge : convex_edges_)
     for (const std::uint32_t v : edge.vertices) ++sharp_edges[v];
 
   // The triangles around each vertex, one list after the other.
@@ -201,7 +201,7 @@ void MeshSurface::find_pointed_vertices() {
       if (mesh_.triangles[speaker][i] == v) features_[speaker].vertices[i] = v;
     ring_.insert(ring_.end(), neighbours.begin(), neighbours.end());
     ring_begin_[v + 1] = static_cast<std::uint32_t>(ring_.size());
-    ++pointed_count_;
+    ++convex_vertex_count_;
   }
 }
 

@@ -55,28 +55,30 @@ class MeshSurface {
   const TriangleMesh& mesh() const noexcept { return mesh_; }
   const std::vector<Plane>& planes() const noexcept { return planes_; }
   const std::vector<Features>& features() const noexcept { return features_; }
-  const std::vector<Edge>& edges() const noexcept { return edges_; }
+  const std::vector<Edge>& convex_edges() const noexcept { return convex_edges_; }
 
   /// The corner of a triangle [m]. RT safe.
   const Vector3d& corner_m(std::uint32_t triangle, int i) const noexcept {
     return mesh_.vertices_m[mesh_.triangles[triangle][static_cast<std::size_t>(i)]];
   }
   /// The vertices that share an edge with a pointed vertex; empty for any other. RT safe.
-  std::span<const std::uint32_t> around(std::uint32_t vertex) const noexcept {
+  std::span<const std::uint32_t> ring_of(std::uint32_t vertex) const noexcept {
     return std::span(ring_).subspan(ring_begin_[vertex], ring_begin_[vertex + 1] - ring_begin_[vertex]);
   }
   /// Triangles that lie in one plane, side by side, have the same. RT safe.
-  std::uint32_t region(std::uint32_t triangle) const noexcept { return region_[triangle]; }
+  std::uint32_t planar_region(std::uint32_t triangle) const noexcept { return planar_region_[triangle]; }
 
   /// Farthest vertex from the origin of the mesh's frame [m].
   double radius_m() const noexcept { return radius_m_; }
-  std::size_t pointed_count() const noexcept { return pointed_count_; }
+  std::size_t convex_vertex_count() const noexcept { return convex_vertex_count_; }
 
   /// Calls use(member) for all that it holds: how it is kept on disk (collision/meshes/mesh_cache.hpp).
   template <class Use>
-  void each_member(const Use& use) {
-    use(mesh_.vertices_m), use(mesh_.triangles), use(kind_), use(neighbours_), use(planes_), use(region_);
-    use(features_), use(edges_), use(ring_begin_), use(ring_), use(radius_m_), use(pointed_count_);
+  void visit_members(const Use& use) {
+    use(mesh_.vertices_m), use(mesh_.triangles), use(kind_), use(neighbours_), use(planes_),
+        use(planar_region_);
+    use(features_), use(convex_edges_), use(ring_begin_), use(ring_), use(radius_m_),
+        use(convex_vertex_count_);
   }
 
  private:
@@ -84,21 +86,21 @@ class MeshSurface {
 
   void find_neighbours();
   void find_planes();
-  void find_edges();
-  void find_pointed_vertices();
-  bool sharp(std::uint32_t triangle, int side) const noexcept;
+  void find_convex_edges();
+  void find_convex_vertices();
+  bool is_convex_edge(std::uint32_t triangle, int side) const noexcept;
 
   TriangleMesh mesh_;
   Kind kind_ = Kind::solid;
   std::vector<Corners> neighbours_;  ///< across the side from corner i to corner i + 1; kNone: none
   std::vector<Plane> planes_;
-  std::vector<std::uint32_t> region_;  ///< the triangle whose plane it is
+  std::vector<std::uint32_t> planar_region_;  ///< the triangle whose plane it is
   std::vector<Features> features_;
-  std::vector<Edge> edges_;
+  std::vector<Edge> convex_edges_;
   std::vector<std::uint32_t> ring_begin_;
   std::vector<std::uint32_t> ring_;
   double radius_m_ = 0.0;
-  std::size_t pointed_count_ = 0;
+  std::size_t convex_vertex_count_ = 0;
 };
 
 }  // namespace wrenchd

@@ -14,9 +14,9 @@ namespace {
 using Words = std::vector<std::string_view>;
 
 /// The next line with words on it.
-bool next_words(Lines& lines, Words& words) {
+bool next_words(LineReader& lines, Words& words) {
   for (std::string_view line; lines.next(line);)
-    if (!(words = words_of(line)).empty()) return true;
+    if (!(words = split_words(line)).empty()) return true;
   words.clear();
   return false;
 }
@@ -24,8 +24,8 @@ bool next_words(Lines& lines, Words& words) {
 void require_numbers(const MeshSource& source, std::size_t line, const Words& words, std::size_t first,
                      std::size_t last, const std::string& what) {
   for (std::size_t i = first; i < last; ++i)
-    if (!number_of(words[i]))
-      source.refuse(line, what + ": expected a finite number, found " + in_quotes(words[i]) +
+    if (!parse_number(words[i]))
+      source.reject(line, what + ": expected a finite number, found " + quote_word(words[i]) +
                               "; export the mesh again");
 }
 
@@ -44,7 +44,7 @@ OffKind off_kind(const MeshSource& source, std::size_t line, std::string_view wo
   if (word == "COFF") return {3, true};
   if (word == "NOFF") return {6, false};
   if (word == "CNOFF") return {6, true};
-  source.refuse(line, "expected OFF (or COFF, NOFF, CNOFF), found " + in_quotes(word) +
+  source.reject(line, "expected OFF (or COFF, NOFF, CNOFF), found " + quote_word(word) +
                           "; save the mesh as a plain OFF");
 }
 
@@ -55,72 +55,73 @@ struct OffCounts {
 
 /// "vertices faces edges", behind the keyword or on the next line. Every vertex and face has a line, hence
 /// two bytes.
-OffCounts off_counts(const MeshSource& source, Lines& lines, Words words) {
+OffCounts off_counts(const MeshSource& source, LineReader& lines, Words words) {
   words.erase(words.begin());
   if (words.empty()) next_words(lines, words);
   std::size_t counts[2] = {0, 0};
   if (words.size() != 3)
-    source.refuse(lines.number(),
+    source.reject(lines.number(),
                   "expected the three counts of vertices, faces and edges; save the mesh as ascii OFF");
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto count = whole_number_of(words[i]);
+    const auto count = parse_integer(words[i]);
     if (!count || *count < 0 || (i == 2 && *count > INT32_MAX))
-      source.refuse(lines.number(),
-                    "expected a count, found " + in_quotes(words[i]) + "; save the mesh as ascii OFF");
+      source.reject(lines.number(),
+                    "expected a count, found " + quote_word(words[i]) + "; save the mesh as ascii OFF");
     if (i < 2) counts[i] = static_cast<std::size_t>(*count);
   }
   if (counts[0] + counts[1] > source.bytes.size() / 2)
-    source.refuse(lines.number(), "announces " + std::to_string(counts[0]) + " vertices and " +
+    source.reject(lines.number(), "announces " + std::to_string(counts[0]) + " vertices and " +
                                       std::to_string(counts[1]) +
                                       " faces, more than the file can hold; correct the counts");
   return {counts[0], counts[1]};
 }
 
 [[noreturn]] void refuse_short(const MeshSource& source, const std::string& what, std::size_t count) {
-  source.refuse(0, "ends before " + what + " of " + std::to_string(count) +
+  source.reject(0, "ends before " + what + " of " + std::to_string(count) +
                        "; the file is cut short or its counts are wrong: export the mesh again");
 }
 
-void guard_off_vertices(const MeshSource& source, Lines& lines, const OffKind& kind, std::size_t count) {
+void guard_off_vertices(const MeshSource& source, LineReader& lines, const OffKind& kind, std::size_t count) {
   Words words;
   std::size_t width = 0;
   for (std::size_t v = 0; v < count; ++v) {
     const std::string what = "vertex " + std::to_string(v);
     if (!next_words(lines, words)) refuse_short(source, what, count);
     if (words.size() < kind.coordinates)
-      source.refuse(lines.number(), what + ": expected " + std::to_string(kind.coordinates) +
+      source.reject(lines.number(), what + ": expected " + std::to_string(kind.coordinates) +
                                         " numbers, found " + std::to_string(words.size()) +
                                         "; export the mesh again");
     if (v == 0) width = words.size();
     if (!kind.allows(words.size() - kind.coordinates) || (kind.colours && words.size() != width))
-      source.refuse(lines.number(),
+      source.reject(lines.number(),
                     what + ": a colour has 3 or 4 numbers, at every vertex or at none; save without colours");
     require_numbers(source, lines.number(), words, 0, kind.colours ? words.size() : kind.coordinates, what);
   }
 }
 
-void guard_off_faces(const MeshSource& source, Lines& lines, const OffKind& kind, const OffCounts& counts) {
+void guard_off_faces(const MeshSource& source, LineReader& lines, const OffKind& kind,
+                     const OffCounts& counts) {
   Words words;
   std::size_t colour = 0;
   for (std::size_t f = 0; f < counts.faces; ++f) {
     const std::string what = "face " + std::to_string(f);
     if (!next_words(lines, words)) refuse_short(source, what, counts.faces);
-    const auto corners = whole_number_of(words[0]);
+    const auto corners = parse_integer(words[0]);
     if (!corners || *corners < 0 || static_cast<std::size_t>(*corners) >= words.size())
-      source.refuse(lines.number(), what + ": " + in_quotes(words[0]) + " corners announced, " +
+      source.reject(lines.number(), what + ": " + quote_word(words[0]) + " corners announced, " +
                                         std::to_string(words.size() - 1) +
                                         " numbers follow; export the mesh again");
     const std::size_t width = static_cast<std::size_t>(*corners) + 1;
     for (std::size_t i = 1; i < width; ++i) {
-      const auto v = whole_number_of(words[i]);
+      const auto v = parse_integer(words[i]);
       if (!v || *v < 0 || static_cast<std::size_t>(*v) >= counts.vertices)
-        source.refuse(lines.number(), what + ": there is no vertex " + in_quotes(words[i]) + "; there are " +
+        source.reject(lines.number(), what + ": there is no vertex " + quote_word(words[i]) + "; there are " +
                                           std::to_string(counts.vertices) +
                                           ", numbered from 0: export the mesh again");
     }
     if (f == 0) colour = words.size() - width;
     if (!kind.allows(words.size() - width) || (kind.colours && words.size() - width != colour))
-      source.refuse(lines.number(),
+      source.reject(lines.number(),
                     what + ": a colour has 3 or 4 numbers, at every face or at none; save without colours");
     if (kind.colours) require_numbers(source, lines.number(), words, width, words.size(), what);
   }
@@ -129,14 +130,14 @@ void guard_off_faces(const MeshSource& source, Lines& lines, const OffKind& kind
 /// A corner of an OBJ face: "7", "7/1", "7//3", "7/1/3", and -1 for the last vertex so far. From 0; nothing
 /// where it is none of these.
 std::optional<long long> obj_corner(std::string_view word, std::size_t vertices_so_far) {
-  auto v = whole_number_of(word.substr(0, word.find('/')));
+  auto v = parse_integer(word.substr(0, word.find('/')));
   if (!v || *v == 0) return {};
   return *v > 0 ? *v - 1 : *v + static_cast<long long>(vertices_so_far);
 }
 
 std::size_t count_obj_vertices(const MeshSource& source) {
   std::size_t count = 0;
-  Lines lines(source.bytes);
+  LineReader lines(source.bytes);
   for (Words words; next_words(lines, words);) count += words[0] == "v" ? 1 : 0;
   return count;
 }
@@ -179,7 +180,7 @@ void guard_binary_stl(const MeshSource& source, std::size_t triangles) {
   for (std::size_t f = 0; f < triangles; ++f)
     for (std::size_t i = 3; i < 12; ++i)
       if (!is_finite(at<float>(source.bytes, kStlHeader + kStlTriangle * f + 4 * i)))
-        source.refuse(0, "face " + std::to_string(f) + ": corner " + std::to_string(i / 3 - 1) +
+        source.reject(0, "face " + std::to_string(f) + ": corner " + std::to_string(i / 3 - 1) +
                              " is not a finite number; export the mesh again");
 }
 
@@ -195,14 +196,14 @@ std::string guarded_ascii_stl(const MeshSource& source) {
   int numbers = 0;  // still to come
   int corners = 0;
   bool normal = false;  // from "facet" to "outer": all numbers, and of no use
-  Lines lines(source.bytes);
+  LineReader lines(source.bytes);
   for (Words words; next_words(lines, words);) {
     for (std::size_t i = 0; i < words.size(); ++i) {
       const std::string_view word = words[i];
       const auto is = [&](std::string_view lower_case) { return is_word(word, lower_case); };
       if (numbers > 0) {
-        if (!number_of(word))
-          source.refuse(lines.number(), "vertex: expected three finite numbers, found " + in_quotes(word) +
+        if (!parse_number(word))
+          source.reject(lines.number(), "vertex: expected three finite numbers, found " + quote_word(word) +
                                             "; export the mesh again");
         (text += ' ') += word;
         if (--numbers == 0) text += '\n';
@@ -219,7 +220,7 @@ std::string guarded_ascii_stl(const MeshSource& source) {
         normal = false;
       } else if (is("endfacet")) {
         if (corners != 3)
-          source.refuse(lines.number(), "facet " + std::to_string(facet) + " has " + std::to_string(corners) +
+          source.reject(lines.number(), "facet " + std::to_string(facet) + " has " + std::to_string(corners) +
                                             " vertices, not three; export the mesh again");
         text += "endfacet\n";
         ++facet;
@@ -229,7 +230,7 @@ std::string guarded_ascii_stl(const MeshSource& source) {
         text += is("solid") ? "solid\n" : "endsolid\n";
         break;  // a name may follow
       } else if (!normal && !is("loop") && !(i + 1 == words.size() && lines.rest().empty())) {
-        source.refuse(lines.number(), in_quotes(word) + " is no word of an STL file; export the mesh again");
+        source.reject(lines.number(), quote_word(word) + " is no word of an STL file; export the mesh again");
       }
     }
   }
@@ -238,35 +239,35 @@ std::string guarded_ascii_stl(const MeshSource& source) {
 
 }  // namespace
 
-void guard_off(const MeshSource& source) {
-  Lines lines(source.bytes);
+void validate_off(const MeshSource& source) {
+  LineReader lines(source.bytes);
   Words words;
-  if (!next_words(lines, words)) source.refuse(0, "holds no mesh; export it again");
+  if (!next_words(lines, words)) source.reject(0, "holds no mesh; export it again");
   const OffKind kind = off_kind(source, lines.number(), words[0]);
   const OffCounts counts = off_counts(source, lines, words);
   guard_off_vertices(source, lines, kind, counts.vertices);
   guard_off_faces(source, lines, kind, counts);
   if (next_words(lines, words))
-    source.refuse(lines.number(), "more lines than the counts announce, " + std::to_string(counts.vertices) +
+    source.reject(lines.number(), "more lines than the counts announce, " + std::to_string(counts.vertices) +
                                       " vertices and " + std::to_string(counts.faces) +
                                       " faces; correct the counts");
 }
 
-std::string guarded_obj(const MeshSource& as_it_is) {
+std::string normalise_obj(const MeshSource& as_it_is) {
   const MeshSource source = with_joined_lines(as_it_is);
   const std::size_t count = count_obj_vertices(source);
   std::string text;
   std::size_t vertices = 0;
   std::size_t faces = 0;
-  Lines lines(source.bytes);
+  LineReader lines(source.bytes);
   for (Words words; next_words(lines, words);) {
     if (!obj_statement(words[0]))
-      source.refuse(lines.number(),
-                    in_quotes(words[0]) + " is no statement of an OBJ file; export the mesh again");
+      source.reject(lines.number(),
+                    quote_word(words[0]) + " is no statement of an OBJ file; export the mesh again");
     if (words[0] == "v") {
       const std::string what = "vertex " + std::to_string(vertices++);
       if (words.size() < 4)
-        source.refuse(lines.number(), what + ": expected 3 numbers, found " +
+        source.reject(lines.number(), what + ": expected 3 numbers, found " +
                                           std::to_string(words.size() - 1) + "; export the mesh again");
       require_numbers(source, lines.number(), words, 1, 4, what);
       append_line(text, {words.begin(), words.begin() + 4});
@@ -275,8 +276,8 @@ std::string guarded_obj(const MeshSource& as_it_is) {
       for (std::size_t i = 1; i < words.size(); ++i) {
         const auto v = obj_corner(words[i], vertices);
         if (!v || *v < 0 || static_cast<std::size_t>(*v) >= count)
-          source.refuse(lines.number(), "face " + std::to_string(faces) + ": there is no vertex " +
-                                            in_quotes(words[i]) + "; there are " + std::to_string(count) +
+          source.reject(lines.number(), "face " + std::to_string(faces) + ": there is no vertex " +
+                                            quote_word(words[i]) + "; there are " + std::to_string(count) +
                                             ", numbered from 1: export the mesh again");
         text += ' ' + std::to_string(*v + 1);
       }
@@ -284,12 +285,12 @@ std::string guarded_obj(const MeshSource& as_it_is) {
       ++faces;
     }
   }
-  if (faces == 0) source.refuse(0, "has no faces; a tool needs a closed surface");
+  if (faces == 0) source.reject(0, "has no faces; a tool needs a closed surface");
   return text;
 }
 
 // A binary file may begin with "solid" too, so its size decides: 84 bytes and 50 a triangle.
-std::string guarded_stl(MeshSource source) {
+std::string normalise_stl(MeshSource source) {
   const std::size_t size = source.bytes.size();
   const std::size_t triangles = size < kStlHeader ? 0 : at<std::uint32_t>(source.bytes, 80);
   const std::size_t binary_size = kStlHeader + kStlTriangle * triangles;
@@ -300,8 +301,8 @@ std::string guarded_stl(MeshSource source) {
   const auto start = source.bytes.find_first_not_of(" \t\r\n");
   if (start != std::string::npos && is_word(std::string_view(source.bytes).substr(start, 5), "solid"))
     return guarded_ascii_stl(source);
-  if (size < kStlHeader) source.refuse(0, "is too short for an STL; export the mesh again");
-  source.refuse(0, "does not begin with 'solid', and a binary STL of " + std::to_string(triangles) +
+  if (size < kStlHeader) source.reject(0, "is too short for an STL; export the mesh again");
+  source.reject(0, "does not begin with 'solid', and a binary STL of " + std::to_string(triangles) +
                        " triangles has " + std::to_string(binary_size) + " bytes, not " +
                        std::to_string(size) + ": it is cut short, or no STL; export the mesh again");
 }

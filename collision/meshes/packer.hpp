@@ -16,11 +16,11 @@ namespace wrenchd {
 /// Types whose bytes say all that they hold. Eigen's vectors have a copy constructor of their own, and are so
 /// nevertheless.
 template <class T>
-constexpr bool kPlain = std::is_trivially_copyable_v<T>;
+constexpr bool kBytewiseCopyable = std::is_trivially_copyable_v<T>;
 template <>
-inline constexpr bool kPlain<Vector3d> = true;
+inline constexpr bool kBytewiseCopyable<Vector3d> = true;
 template <>
-inline constexpr bool kPlain<MeshSurface::Plane> = true;
+inline constexpr bool kBytewiseCopyable<MeshSurface::Plane> = true;
 
 /// Appends values to bytes. For this machine alone: sizes and order of bytes are its own.
 class Packer {
@@ -29,13 +29,13 @@ class Packer {
 
   template <class T>
   void operator()(const T& value) const {
-    static_assert(kPlain<T>);
+    static_assert(kBytewiseCopyable<T>);
     bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
   template <class T>
   void operator()(const std::vector<T>& list) const {
     (*this)(static_cast<std::uint64_t>(list.size()));
-    if constexpr (kPlain<T>)
+    if constexpr (kBytewiseCopyable<T>)
       bytes_.append(reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T));
     else
       for (const T& value : list) (*this)(value);
@@ -54,7 +54,7 @@ class Unpacker {
 
   template <class T>
   void operator()(T& value) const {
-    static_assert(kPlain<T>);
+    static_assert(kBytewiseCopyable<T>);
     if (!has(sizeof value)) return;
     std::memcpy(static_cast<void*>(&value), rest_.data(), sizeof value);
     rest_.remove_prefix(sizeof value);
@@ -63,10 +63,10 @@ class Unpacker {
   void operator()(std::vector<T>& list) const {
     std::uint64_t size = 0;
     (*this)(size);
-    constexpr std::size_t least = kPlain<T> ? sizeof(T) : 1;
+    constexpr std::size_t least = kBytewiseCopyable<T> ? sizeof(T) : 1;
     if (!has(0) || size > rest_.size() / least) return void(good_ = false);
     list.resize(size);
-    if constexpr (kPlain<T>) {
+    if constexpr (kBytewiseCopyable<T>) {
       if (size > 0) std::memcpy(static_cast<void*>(list.data()), rest_.data(), size * sizeof(T));
       rest_.remove_prefix(size * sizeof(T));
     } else {

@@ -91,7 +91,7 @@ auto with_type(PlyType type, Use use) {
 PlyType type_of(const MeshSource& source, std::size_t line, std::string_view word) {
   for (const auto& [name, type] : kTypes)
     if (name == word) return type;
-  source.refuse(line, in_quotes(word) + " is no type of PLY; export the mesh again");
+  source.reject(line, quote_word(word) + " is no type of PLY; export the mesh again");
 }
 
 void read_format(const MeshSource& source, std::size_t line, const std::vector<std::string_view>& words,
@@ -99,7 +99,7 @@ void read_format(const MeshSource& source, std::size_t line, const std::vector<s
   const std::string_view format = words.size() == 3 && words[0] == "format" ? words[1] : std::string_view();
   const bool little = format == "binary_little_endian";
   if (format != "ascii" && !little && format != "binary_big_endian")
-    source.refuse(
+    source.reject(
         line,
         "expected 'format ascii 1.0', 'binary_little_endian' or 'binary_big_endian'; export the mesh again");
   header.text = format == "ascii";
@@ -108,8 +108,8 @@ void read_format(const MeshSource& source, std::size_t line, const std::vector<s
 
 void read_element(const MeshSource& source, std::size_t line, const std::vector<std::string_view>& words,
                   PlyHeader& header) {
-  const auto count = words.size() == 3 ? whole_number_of(words[2]) : std::nullopt;
-  if (!count || *count < 0) source.refuse(line, "expected 'element NAME COUNT'; export the mesh again");
+  const auto count = words.size() == 3 ? parse_integer(words[2]) : std::nullopt;
+  if (!count || *count < 0) source.reject(line, "expected 'element NAME COUNT'; export the mesh again");
   header.elements.push_back({std::string(words[1]), static_cast<std::size_t>(*count), {}});
 }
 
@@ -117,28 +117,28 @@ void read_property(const MeshSource& source, std::size_t line, const std::vector
                    PlyHeader& header) {
   const bool list = words.size() == 5 && words[1] == "list";
   if ((!list && words.size() != 3) || header.elements.empty())
-    source.refuse(
+    source.reject(
         line,
         "expected 'property TYPE NAME' or 'property list TYPE TYPE NAME' below an element; export the "
         "mesh again");
   PlyProperty property{std::string(words.back()), type_of(source, line, words[words.size() - 2]), {}};
   if (list) property.size = type_of(source, line, words[2]);
   if (list && !whole(*property.size))
-    source.refuse(line,
+    source.reject(line,
                   "the length of a list cannot be a " + std::string(words[2]) + "; export the mesh again");
   header.elements.back().properties.push_back(property);
 }
 
-PlyHeader read_header(const MeshSource& source, Lines& lines) {
+PlyHeader read_header(const MeshSource& source, LineReader& lines) {
   PlyHeader header;
   std::string_view line;
-  if (!lines.next(line) || words_of(line) != std::vector<std::string_view>{"ply"})
-    source.refuse(
-        1, "expected 'ply', found " + in_quotes(line) + "; save the mesh as PLY, or correct the extension");
+  if (!lines.next(line) || split_words(line) != std::vector<std::string_view>{"ply"})
+    source.reject(
+        1, "expected 'ply', found " + quote_word(line) + "; save the mesh as PLY, or correct the extension");
   lines.next(line);
-  read_format(source, lines.number(), words_of(line), header);
+  read_format(source, lines.number(), split_words(line), header);
   while (lines.next(line)) {
-    const auto words = words_of(line);
+    const auto words = split_words(line);
     const std::string_view keyword = words.empty() ? std::string_view() : words[0];
     if (keyword == "end_header") return header;
     if (keyword == "element")
@@ -146,9 +146,9 @@ PlyHeader read_header(const MeshSource& source, Lines& lines) {
     else if (keyword == "property")
       read_property(source, lines.number(), words, header);
     else if (keyword != "comment" && keyword != "obj_info")
-      source.refuse(lines.number(), in_quotes(line) + " is no line of a PLY header; export the mesh again");
+      source.reject(lines.number(), quote_word(line) + " is no line of a PLY header; export the mesh again");
   }
-  source.refuse(lines.number(), "the header has no 'end_header'; export the mesh again");
+  source.reject(lines.number(), "the header has no 'end_header'; export the mesh again");
 }
 
 const PlyProperty* find(const PlyElement& element, std::string_view name) {
@@ -166,7 +166,7 @@ void require_colours_alike(const MeshSource& source, const PlyElement& element) 
     if (colour == nullptr) continue;
     if (first == nullptr) first = colour;
     if (colour->type != first->type || colour->size || first->size)
-      source.refuse(
+      source.reject(
           0, "the colours of element '" + element.name + "' differ in type; save the mesh without colours");
   }
 }
@@ -175,7 +175,7 @@ void require_vertices(const MeshSource& source, const PlyElement& element) {
   for (const char* name : {"x", "y", "z"}) {
     const PlyProperty* property = find(element, name);
     if (property == nullptr || property->size || whole(property->type))
-      source.refuse(0, std::string("element 'vertex' needs a property '") + name +
+      source.reject(0, std::string("element 'vertex' needs a property '") + name +
                            "' of type float or double; save the mesh with such coordinates");
   }
 }
@@ -187,19 +187,19 @@ void require_faces(const MeshSource& source, const PlyElement& element) {
         (property->type == PlyType::int32 || property->type == PlyType::uint32))
       return;
   }
-  source.refuse(
+  source.reject(
       0, "element 'face' needs a property list 'vertex_indices' of type int or uint; save the mesh so");
 }
 
 void check_elements(const MeshSource& source, const PlyHeader& header) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty())
-      source.refuse(0, "element " + in_quotes(element.name) + " has no properties; export the mesh again");
+      source.reject(0, "element " + quote_word(element.name) + " has no properties; export the mesh again");
     require_colours_alike(source, element);
     if (element.name == "vertex" || element.name == "vertices") require_vertices(source, element);
     if (element.name == "face" || element.name == "faces") require_faces(source, element);
     if (element.name == "halfedge")
-      source.refuse(0, "holds half-edges; save the mesh with vertices and faces only");
+      source.reject(0, "holds half-edges; save the mesh with vertices and faces only");
   }
 }
 
@@ -229,8 +229,8 @@ class Values {
     rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
     const std::string_view word = rest_.substr(0, rest_.find_first_of(" \t\r\n"));
     rest_.remove_prefix(word.size());
-    std::optional<double> x = number_of(word);
-    if (whole(type) && !whole_number_of(word)) x.reset();
+    std::optional<double> x = parse_number(word);
+    if (whole(type) && !parse_integer(word)) x.reset();
     if (x && !with_type(type, [&](auto t) { return fits<decltype(t)>(*x); })) x.reset();
     return x;
   }
@@ -254,8 +254,8 @@ class Values {
 
 }  // namespace
 
-std::string guarded_ply(MeshSource source) {
-  Lines lines(source.bytes);
+std::string normalise_ply(MeshSource source) {
+  LineReader lines(source.bytes);
   const PlyHeader header = read_header(source, lines);
   check_elements(source, header);
   Values values(lines.rest(), header);
@@ -263,14 +263,14 @@ std::string guarded_ply(MeshSource source) {
     for (std::size_t i = 0; i < element.count; ++i) {
       for (const PlyProperty& property : element.properties) {
         if (values.pass(property)) continue;
-        source.refuse(0, element.name + " " + std::to_string(i) + " of " + std::to_string(element.count) +
+        source.reject(0, element.name + " " + std::to_string(i) + " of " + std::to_string(element.count) +
                              " is cut short, or its '" + property.name +
                              "' is no number of the type declared; export the mesh again");
       }
     }
   }
   if (!values.at_end())
-    source.refuse(0, "goes on behind the elements that its header counts; correct the counts");
+    source.reject(0, "goes on behind the elements that its header counts; correct the counts");
   const auto header_end = source.bytes.end() - static_cast<std::ptrdiff_t>(lines.rest().size());
   source.bytes.erase(std::remove(source.bytes.begin(), header_end, '\r'), header_end);
   return std::move(source.bytes);

@@ -12,7 +12,7 @@
 namespace wrenchd {
 namespace {
 
-constexpr std::size_t kWidth = TriangleTree::kWidth;
+constexpr std::size_t kWidth = TriangleBvh::kWidth;
 /// Boxes grow by this share of the mesh's extent: what rounding to single precision may take from them.
 constexpr double kRounding = 4e-7;
 
@@ -39,8 +39,8 @@ std::uint16_t features_of(const MeshSurface::Features& features) {
   const auto some = [](const std::array<std::uint32_t, 3>& list) {
     return std::any_of(list.begin(), list.end(), [](std::uint32_t f) { return f != MeshSurface::kNone; });
   };
-  return static_cast<std::uint16_t>((some(features.vertices) ? TriangleTree::kVertices : 0) |
-                                    (some(features.edges) ? TriangleTree::kEdges : 0));
+  return static_cast<std::uint16_t>((some(features.vertices) ? TriangleBvh::kVertices : 0) |
+                                    (some(features.edges) ? TriangleBvh::kEdges : 0));
 }
 
 class Builder {
@@ -59,7 +59,7 @@ class Builder {
   double extent_m() const noexcept { return extent_m_; }
   const std::vector<Branch>& branches() const noexcept { return branches_; }
 
-  TriangleTree::Leaf leaf(const Branch& branch) const;
+  TriangleBvh::Leaf leaf(const Branch& branch) const;
   /// Of all triangles under a branch.
   std::uint16_t features(const Branch& branch) const;
 
@@ -148,18 +148,18 @@ void Builder::split() {
   }
 }
 
-TriangleTree::Leaf Builder::leaf(const Branch& branch) const {
-  TriangleTree::Leaf leaf;
+TriangleBvh::Leaf Builder::leaf(const Branch& branch) const {
+  TriangleBvh::Leaf leaf;
   leaf.has_vertices = leaf.has_edges = 0;
-  std::fill_n(leaf.low_of_all, 3, 3e38F);
-  std::fill_n(leaf.high_of_all, 3, -3e38F);
+  std::fill_n(leaf.bounds_low, 3, 3e38F);
+  std::fill_n(leaf.bounds_high, 3, -3e38F);
   for (std::size_t lane = 0; lane < kWidth; ++lane) {
     const bool used = lane < branch.end - branch.begin;
     const std::uint32_t t = order_[used ? branch.begin + lane : branch.begin];
     leaf.triangle[lane] = t;
     const std::uint16_t features = used ? features_of(surface_.features()[t]) : std::uint16_t{0};
-    if ((features & TriangleTree::kVertices) != 0) leaf.has_vertices |= 1U << lane;
-    if ((features & TriangleTree::kEdges) != 0) leaf.has_edges |= 1U << lane;
+    if ((features & TriangleBvh::kVertices) != 0) leaf.has_vertices |= 1U << lane;
+    if ((features & TriangleBvh::kEdges) != 0) leaf.has_edges |= 1U << lane;
     const Vector3d& a = corner(t, 0);
     const Vector3d n = (corner(t, 1) - a).cross(corner(t, 2) - a).normalized();
     for (int d = 0; d < 3; ++d) {
@@ -173,8 +173,8 @@ TriangleTree::Leaf Builder::leaf(const Branch& branch) const {
       leaf.low[d][lane] = used ? low : 3e38F;
       leaf.high[d][lane] = used ? high : -3e38F;
       leaf.normal[d][lane] = static_cast<float>(n[d]);
-      leaf.low_of_all[d] = std::min(leaf.low_of_all[d], low);
-      leaf.high_of_all[d] = std::max(leaf.high_of_all[d], high);
+      leaf.bounds_low[d] = std::min(leaf.bounds_low[d], low);
+      leaf.bounds_high[d] = std::max(leaf.bounds_high[d], high);
     }
     leaf.offset[lane] = static_cast<float>(n.dot(a));
   }
@@ -188,34 +188,34 @@ std::uint16_t Builder::features(const Branch& branch) const {
   return out;
 }
 
-TriangleTree::Box single(const Fitted& fitted, double rounding_m) {
-  TriangleTree::Box box{};
+TriangleBvh::Box single(const Fitted& fitted, double rounding_m) {
+  TriangleBvh::Box box{};
   for (int d = 0; d < 3; ++d) {
     box.centre[d] = static_cast<float>(fitted.centre_m[d]);
     box.axis[0][d] = static_cast<float>(fitted.axes(0, d));
     box.axis[1][d] = static_cast<float>(fitted.axes(1, d));
     box.half[d] = static_cast<float>(fitted.half_m[d] + rounding_m);
   }
-  box.size = static_cast<float>(fitted.half_area());
+  box.half_area = static_cast<float>(fitted.half_area());
   return box;
 }
 
 /// A box far away that has no size: nothing meets it.
-TriangleTree::Box nothing() {
-  TriangleTree::Box box{};
+TriangleBvh::Box nothing() {
+  TriangleBvh::Box box{};
   box.centre[0] = box.centre[1] = box.centre[2] = 1e18F;
   box.axis[0][0] = box.axis[1][1] = 1.0F;
   box.count = -1;
   return box;
 }
 
-TriangleTree::Node side_by_side(const TriangleTree::Box* boxes) {
-  TriangleTree::Node node;
+TriangleBvh::Node side_by_side(const TriangleBvh::Box* boxes) {
+  TriangleBvh::Node node;
   node.has_vertices = node.has_edges = 0;
   for (std::size_t lane = 0; lane < kWidth; ++lane) {
     const auto& [centre, axis, half, size, child, count, features] = boxes[lane];
-    if ((features & TriangleTree::kVertices) != 0) node.has_vertices |= 1U << lane;
-    if ((features & TriangleTree::kEdges) != 0) node.has_edges |= 1U << lane;
+    if ((features & TriangleBvh::kVertices) != 0) node.has_vertices |= 1U << lane;
+    if ((features & TriangleBvh::kEdges) != 0) node.has_edges |= 1U << lane;
     for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t e = (d + 1) % 3, f = (d + 2) % 3;
       node.centre[d][lane] = centre[d];
@@ -262,7 +262,7 @@ std::vector<std::uint32_t> opened(const std::vector<Branch>& branches, std::uint
 
 }  // namespace
 
-TriangleTree::TriangleTree(const MeshSurface& surface) {
+TriangleBvh::TriangleBvh(const MeshSurface& surface) {
   if (surface.triangles().empty()) return;
   const Builder builder(surface);
   const std::vector<Branch>& branches = builder.branches();
@@ -291,7 +291,7 @@ TriangleTree::TriangleTree(const MeshSurface& surface) {
   }
 }
 
-std::size_t TriangleTree::bytes() const noexcept {
+std::size_t TriangleBvh::bytes() const noexcept {
   return boxes_.size() * sizeof(Box) + nodes_.size() * sizeof(Node) + leaves_.size() * sizeof(Leaf);
 }
 

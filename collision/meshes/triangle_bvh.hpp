@@ -18,7 +18,7 @@ namespace wrenchd {
 ///
 /// Single precision, for what it leaves out is left out by a margin; what it lets through is looked at again
 /// in double precision by whoever asked. Built once, then only read.
-class TriangleTree {
+class TriangleBvh {
  public:
   static constexpr int kWidth = 8;
 
@@ -27,7 +27,7 @@ class TriangleTree {
     float centre[3];
     float axis[2][3];  ///< unit; the third is their cross product
     float half[3];     ///< half its size along each axis
-    float size;        ///< half its area: the larger of two boxes is opened first
+    float half_area;   ///< half its area: the larger of two boxes is opened first
     std::uint32_t child;
     std::int16_t count;      ///< of triangles in the leaf `child`; 0: `child` is a node; -1: there is no box
     std::uint16_t features;  ///< kVertices, kEdges: what triangles in it speak for
@@ -45,15 +45,15 @@ class TriangleTree {
     float corner[3][3][kWidth];  ///< [which][component]
     float low[3][kWidth];        ///< bounds of each triangle
     float high[3][kWidth];
-    float low_of_all[3], high_of_all[3];
+    float bounds_low[3], bounds_high[3];
     float normal[3][kWidth];  ///< of its plane, outward unit
     float offset[kWidth];     ///< normal . corner
     std::uint32_t triangle[kWidth];
     std::uint32_t has_vertices, has_edges;  ///< a bit for each triangle
   };
 
-  TriangleTree() = default;  ///< of nothing, to be filled in by each_member()
-  explicit TriangleTree(const MeshSurface& surface);
+  TriangleBvh() = default;  ///< of nothing, to be filled in by each_member()
+  explicit TriangleBvh(const MeshSurface& surface);
 
   /// Number i of node n is boxes()[8 n + i]. Node 0 is the root; there is none in a tree without triangles.
   const std::vector<Box>& boxes() const noexcept { return boxes_; }
@@ -65,7 +65,7 @@ class TriangleTree {
 
   /// Calls use(member) for all that it holds: how it is kept on disk (collision/meshes/mesh_cache.hpp).
   template <class Use>
-  void each_member(const Use& use) {
+  void visit_members(const Use& use) {
     use(boxes_), use(nodes_), use(leaves_), use(extent_m_);
   }
 

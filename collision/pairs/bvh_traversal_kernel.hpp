@@ -5,10 +5,10 @@
 #include "collision/pairs/bvh_traversal.hpp"
 #include "collision/pairs/float8.hpp"
 
-namespace wrenchd::walk {
+namespace wrenchd::simd {
 namespace {
 
-static_assert(kWidth == TriangleTree::kWidth);
+static_assert(kWidth == TriangleBvh::kWidth);
 
 WRENCHD_INLINE float magnitude(float x) noexcept {
   return x < 0.0F ? -x : x;
@@ -27,8 +27,8 @@ struct SweptBox {
 
 /// Half way it stands at `middle`. Its own points leave the straight way of its centre by half the turn times
 /// their distance from it.
-WRENCHD_INLINE SweptBox swept(const TriangleTree::Box& box, const Transform& middle, const Transform& travel,
-                              const Motion& motion) noexcept {
+WRENCHD_INLINE SweptBox swept(const TriangleBvh::Box& box, const Transform& middle, const Transform& travel,
+                              const RelativeMotion& motion) noexcept {
   SweptBox out;
   turned(middle, box.centre, out.centre);
   float way[3];
@@ -43,14 +43,14 @@ WRENCHD_INLINE SweptBox swept(const TriangleTree::Box& box, const Transform& mid
     const int e = (d + 1) % 3, f = (d + 2) % 3;
     out.axis[2][d] = out.axis[0][e] * out.axis[1][f] - out.axis[0][f] * out.axis[1][e];
   }
-  const float more = motion.half_turn * (box.half[0] + box.half[1] + box.half[2]) + motion.margin;
+  const float more = motion.half_angle * (box.half[0] + box.half[1] + box.half[2]) + motion.margin;
   for (int i = 0; i < 3; ++i) out.half[i] = box.half[i] + 0.5F * magnitude(dot(way, out.axis[i])) + more;
   return out;
 }
 
 /// Which of the eight boxes of a node meet a box, by all fifteen axes that may separate two boxes: the faces'
 /// normals of both, and their edges' cross products.
-WRENCHD_INLINE unsigned meeting(const SweptBox& s, const TriangleTree::Node& node) noexcept {
+WRENCHD_INLINE unsigned meeting(const SweptBox& s, const TriangleBvh::Node& node) noexcept {
   constexpr float kParallel = 1e-6F;  // where two axes are parallel their cross product says nothing
   Float8 between[3], half[3];
   for (int d = 0; d < 3; ++d) {
@@ -98,9 +98,9 @@ struct alignas(64) MovedLeaf {
 constexpr std::uint32_t kMovedLeaves = kMovedLeavesBytes / sizeof(MovedLeaf);
 static_assert(kMovedLeaves >= 64);
 
-void move(const TriangleTree::Leaf& leaf, const TriangleTree::Box& box, const Motion& motion,
+void move(const TriangleBvh::Leaf& leaf, const TriangleBvh::Box& box, const RelativeMotion& motion,
           MovedLeaf& out) noexcept {
-  out.box = swept(box, motion.X_BA_middle, motion.travel_BA, motion);
+  out.box = swept(box, motion.X_BA_middle, motion.displacement_BA, motion);
   const Transform* ends[2] = {&motion.X_BA_start, &motion.X_BA_end};
   Float8 low[3], high[3];
   for (int e = 0; e < 2; ++e) {
@@ -157,7 +157,7 @@ WRENCHD_INLINE Mask8 miss(const MovedLeaf& a, const SweptBox& box, float margin,
 }
 
 /// A box that stands still.
-WRENCHD_INLINE SweptBox standing(const TriangleTree::Box& box) noexcept {
+WRENCHD_INLINE SweptBox standing(const TriangleBvh::Box& box) noexcept {
   SweptBox out;
   for (int d = 0; d < 3; ++d) {
     const int e = (d + 1) % 3, f = (d + 2) % 3;
@@ -184,8 +184,8 @@ WRENCHD_INLINE Mask8 beside(const float (*low)[kWidth], const float (*high)[kWid
 
 /// Triangle i of a leaf of A against the eight of a leaf of B: which are kept apart neither by their bounds
 /// nor by a plane of one of the two.
-WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleTree::Leaf& b, Mask8 apart,
-                             float margin, float margin_of_plane, bool moving) noexcept {
+WRENCHD_INLINE unsigned near(const MovedLeaf& a, int i, const TriangleBvh::Leaf& b, Mask8 apart, float margin,
+                             float margin_of_plane, bool moving) noexcept {
   apart |= load(b.low[0]) > a.high[0][i];
   apart |= load(b.high[0]) < a.low[0][i];
   for (int d = 1; d < 3; ++d) {
@@ -265,7 +265,7 @@ struct Settled {
 /// `margin` at most: two triangles meet where each cuts the other's plane, and the cuts overlap on the line
 /// where the planes meet. The line has the length of the sine of the planes' angle: where that is so small
 /// that rounding could turn it, what overlaps along it is within `margin` too.
-WRENCHD_INLINE Settled settle(const MovedLeaf& a, int i, const TriangleTree::Leaf& b, Mask8 apart,
+WRENCHD_INLINE Settled settle(const MovedLeaf& a, int i, const TriangleBvh::Leaf& b, Mask8 apart,
                               float margin) noexcept {
   for (int d = 0; d < 3; ++d) {
     apart |= load(b.low[d]) > a.high[d][i];
@@ -309,7 +309,7 @@ WRENCHD_INLINE Settled settle(const MovedLeaf& a, int i, const TriangleTree::Lea
 }
 
 /// How far the boxed part of B may be from this place.
-WRENCHD_INLINE float distance_bound(const TriangleTree::Box& box, const float* centre) noexcept {
+WRENCHD_INLINE float distance_bound(const TriangleBvh::Box& box, const float* centre) noexcept {
   float sum = box.half[0] + box.half[1] + box.half[2];
   for (int d = 0; d < 3; ++d) sum += magnitude(box.centre[d] - centre[d]);
   return sum;
@@ -317,19 +317,19 @@ WRENCHD_INLINE float distance_bound(const TriangleTree::Box& box, const float* c
 
 class Walk {
  public:
-  explicit Walk(Job& job) noexcept : job_(job), moved_(static_cast<MovedLeaf*>(job.moved_leaves)) {}
+  explicit Walk(TraversalJob& job) noexcept : job_(job), moved_(static_cast<MovedLeaf*>(job.moved_leaves)) {}
 
   void run() noexcept {
-    if (!job_.begun) {
+    if (!job_.started) {
       for (std::uint32_t k = 0; k < kMovedLeaves; ++k) moved_[k].leaf = ~0U;
       for (std::uint32_t a = 0; a < kWidth; ++a)
         if (job_.a.boxes[a].count >= 0) open_b(a, 0);
-      job_.begun = true;
+      job_.started = true;
     }
-    while (job_.stack_top > 0 && !job_.overflow && job_.visits < job_.visits_allowed) {
+    while (job_.stack_top > 0 && !job_.overflow && job_.node_visits < job_.max_node_visits) {
       const std::uint32_t b = job_.stack[--job_.stack_top];
       const std::uint32_t a = job_.stack[--job_.stack_top];
-      ++job_.visits;
+      ++job_.node_visits;
       visit(a, b);
     }
   }
@@ -337,11 +337,11 @@ class Walk {
  private:
   /// Opens the larger of two boxes, or looks at the triangles of two leaves.
   void visit(std::uint32_t a, std::uint32_t b) noexcept {
-    const TriangleTree::Box& box_a = job_.a.boxes[a];
-    const TriangleTree::Box& box_b = job_.b.boxes[b];
+    const TriangleBvh::Box& box_a = job_.a.boxes[a];
+    const TriangleBvh::Box& box_b = job_.b.boxes[b];
     if (box_a.count > 0 && box_b.count > 0) {
       meet_leaves(box_a, box_b);
-    } else if (box_b.count > 0 || (box_a.count == 0 && box_a.size > box_b.size)) {
+    } else if (box_b.count > 0 || (box_a.count == 0 && box_a.half_area > box_b.half_area)) {
       open_a(box_a.child, b);
     } else {
       open_b(a, box_b.child);
@@ -349,24 +349,24 @@ class Walk {
   }
 
   void open_a(std::uint32_t node, std::uint32_t b) noexcept {
-    const Motion& m = job_.motion;
+    const RelativeMotion& m = job_.motion;
     if (swept_b_ != b) {
-      box_b_ = swept(job_.b.boxes[b], m.X_AB_middle, m.travel_AB, m);
+      box_b_ = swept(job_.b.boxes[b], m.X_AB_middle, m.displacement_AB, m);
       swept_b_ = b;
     }
-    const TriangleTree::Node& eight = job_.a.nodes[node];
+    const TriangleBvh::Node& eight = job_.a.nodes[node];
     const unsigned worth = worth_it(job_.b.boxes[b].features, eight.has_vertices, eight.has_edges);
     for (unsigned hits = meeting(box_b_, eight) & worth; hits != 0; hits &= hits - 1)
       push(kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)), b);
   }
 
   void open_b(std::uint32_t a, std::uint32_t node) noexcept {
-    const Motion& m = job_.motion;
+    const RelativeMotion& m = job_.motion;
     if (swept_a_ != a) {
-      box_a_ = swept(job_.a.boxes[a], m.X_BA_middle, m.travel_BA, m);
+      box_a_ = swept(job_.a.boxes[a], m.X_BA_middle, m.displacement_BA, m);
       swept_a_ = a;
     }
-    const TriangleTree::Node& eight = job_.b.nodes[node];
+    const TriangleBvh::Node& eight = job_.b.nodes[node];
     const unsigned worth = worth_it(job_.a.boxes[a].features, eight.has_vertices, eight.has_edges);
     for (unsigned hits = meeting(box_a_, eight) & worth; hits != 0; hits &= hits - 1)
       push(a, kWidth * node + static_cast<unsigned>(__builtin_ctz(hits)));
@@ -374,8 +374,8 @@ class Walk {
 
   /// Which of eight have features that can meet those of another first.
   unsigned worth_it(unsigned features, unsigned has_vertices, unsigned has_edges) const noexcept {
-    if (job_.motion.all_pairs || (features & TriangleTree::kVertices) != 0) return 255;
-    return (features & TriangleTree::kEdges) != 0 ? has_vertices | has_edges : has_vertices;
+    if (job_.motion.all_pairs || (features & TriangleBvh::kVertices) != 0) return 255;
+    return (features & TriangleBvh::kEdges) != 0 ? has_vertices | has_edges : has_vertices;
   }
 
   void push(std::uint32_t a, std::uint32_t b) noexcept {
@@ -387,7 +387,7 @@ class Walk {
     job_.stack[job_.stack_top++] = b;
   }
 
-  const MovedLeaf& moved(const TriangleTree::Box& box) noexcept {
+  const MovedLeaf& moved(const TriangleBvh::Box& box) noexcept {
     MovedLeaf& slot = moved_[box.child % kMovedLeaves];
     if (slot.leaf != box.child) {
       move(job_.a.leaves[box.child], box, job_.motion, slot);
@@ -396,26 +396,26 @@ class Walk {
     return slot;
   }
 
-  void meet_leaves(const TriangleTree::Box& box_a, const TriangleTree::Box& box_b) noexcept {
-    const Motion& m = job_.motion;
+  void meet_leaves(const TriangleBvh::Box& box_a, const TriangleBvh::Box& box_b) noexcept {
+    const RelativeMotion& m = job_.motion;
     const MovedLeaf& a = moved(box_a);
-    const TriangleTree::Leaf& b = job_.b.leaves[box_b.child];
+    const TriangleBvh::Leaf& b = job_.b.leaves[box_b.child];
     Mask8 apart = beside(b.low, b.high, a.low_of_all, a.high_of_all);
     if (bits(apart) == 255) return;
     apart |= miss(b.normal, b.offset, a.box, 0.0F);  // the box has its margin
     if (bits(apart) == 255) return;
     unsigned rows = (1U << box_a.count) - 1;
-    rows &= ~bits(beside(a.low, a.high, b.low_of_all, b.high_of_all));
+    rows &= ~bits(beside(a.low, a.high, b.bounds_low, b.bounds_high));
     if (rows == 0) return;
-    if (m.settle) {
+    if (m.classify) {
       settle_leaves(box_a, a, b, rows & ~bits(miss(a, standing(box_b), m.rounding, false)), apart);
       return;
     }
-    const float far = (distance_bound(box_b, m.centre_B) + m.centre_way) / m.radius;
+    const float far = (distance_bound(box_b, m.centre_B) + m.centre_travel) / m.radius;
     const float margin_of_plane = m.rounding + m.reach * (far > 1.0F ? far : 1.0F);
     for (rows &= ~bits(miss(a, standing(box_b), margin_of_plane, m.moving)); rows != 0; rows &= rows - 1) {
       const int i = __builtin_ctz(rows);
-      const TriangleTree::Leaf& leaf_a = job_.a.leaves[box_a.child];
+      const TriangleBvh::Leaf& leaf_a = job_.a.leaves[box_a.child];
       const std::uint32_t ta = leaf_a.triangle[i];
       const unsigned features = ((leaf_a.has_vertices >> i) & 1U) | (((leaf_a.has_edges >> i) & 1U) << 1);
       const unsigned worth = worth_it(features, b.has_vertices, b.has_edges);
@@ -431,24 +431,25 @@ class Walk {
     }
   }
 
-  void settle_leaves(const TriangleTree::Box& box_a, const MovedLeaf& a, const TriangleTree::Leaf& b,
+  void settle_leaves(const TriangleBvh::Box& box_a, const MovedLeaf& a, const TriangleBvh::Leaf& b,
                      unsigned rows, Mask8 apart) noexcept {
     const std::uint32_t* triangle_a = job_.a.leaves[box_a.child].triangle;
     for (; rows != 0; rows &= rows - 1) {
       const int i = __builtin_ctz(rows);
       const auto [meet, doubtful] = settle(a, i, b, apart, job_.motion.margin);
-      if (job_.pair_count + job_.meeting_count + kWidth > job_.capacity) {
+      if (job_.pair_count + job_.intersecting_count + kWidth > job_.capacity) {
         job_.overflow = true;
         return;
       }
       for (unsigned hits = meet; hits != 0; hits &= hits - 1)
-        job_.pairs[job_.capacity - ++job_.meeting_count] = {triangle_a[i], b.triangle[__builtin_ctz(hits)]};
+        job_.pairs[job_.capacity - ++job_.intersecting_count] = {triangle_a[i],
+                                                                 b.triangle[__builtin_ctz(hits)]};
       for (unsigned hits = doubtful; hits != 0; hits &= hits - 1)
         job_.pairs[job_.pair_count++] = {triangle_a[i], b.triangle[__builtin_ctz(hits)]};
     }
   }
 
-  Job& job_;
+  TraversalJob& job_;
   MovedLeaf* moved_;
   std::uint32_t swept_a_ = ~0U, swept_b_ = ~0U;  ///< often the same one again
   SweptBox box_a_, box_b_;
@@ -456,8 +457,8 @@ class Walk {
 
 }  // namespace
 
-void WRENCHD_WALK(Job& job) noexcept {
+void WRENCHD_WALK(TraversalJob& job) noexcept {
   Walk(job).run();
 }
 
-}  // namespace wrenchd::walk
+}  // namespace wrenchd::simd

@@ -3,7 +3,7 @@
 #define WRENCHD_WALK walk_portable
 #include "collision/pairs/bvh_traversal_kernel.hpp"
 
-namespace wrenchd::walk {
+namespace wrenchd::simd {
 
 bool has_avx2() noexcept {
 #if defined(__x86_64__)
@@ -13,4 +13,4 @@ bool has_avx2() noexcept {
 #endif
 }
 
-}  // namespace wrenchd::walk
+}  // namespace wrenchd::simd

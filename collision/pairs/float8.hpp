@@ -11,7 +11,7 @@
 // compiler makes of this what the processor has. Only what it would not find by itself is written with
 // intrinsics.
 
-namespace wrenchd::walk {
+namespace wrenchd::simd {
 namespace {
 
 constexpr int kWidth = 8;
@@ -59,4 +59,4 @@ WRENCHD_INLINE Float8 magnitude(Float8 x) noexcept {
 }
 
 }  // namespace
-}  // namespace wrenchd::walk
+}  // namespace wrenchd::simd

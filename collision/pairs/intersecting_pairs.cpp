@@ -15,22 +15,22 @@ Triangle triangle(const MeshSurface& surface, std::uint32_t t) noexcept {
 
 }  // namespace
 
-MeetingPairs::MeetingPairs(walk::Kernel kernel) : walk_(kernel) {
-  pairs_.reserve(TreeWalk::kCapacity);
+IntersectingPairs::IntersectingPairs(simd::TraversalKernel kernel) : traversal_(kernel) {
+  pairs_.reserve(BvhTraversal::kCapacity);
 }
 
-bool MeetingPairs::find(const TreedMesh& a, const TreedMesh& b, const Pose& X_BA) noexcept {
-  WalkBudget unlimited = {std::numeric_limits<std::uint32_t>::max()};
+bool IntersectingPairs::find(const MeshBvh& a, const MeshBvh& b, const Pose& X_BA) noexcept {
+  VisitBudget unlimited = {std::numeric_limits<std::uint32_t>::max()};
   Sweep here = {X_BA, X_BA};
-  here.settle = true;
-  const bool all = walk_.find(a.tree, b.tree, here, unlimited);
-  const std::span<const TrianglePair> sure = walk_.meeting();
+  here.classify = true;
+  const bool all = traversal_.find(a.bvh, b.bvh, here, unlimited);
+  const std::span<const TrianglePair> sure = traversal_.intersecting();
   pairs_.assign(sure.begin(), sure.end());
   const Frame X(X_BA);
-  for (const TrianglePair& pair : walk_) {
+  for (const TrianglePair& pair : traversal_) {
     Triangle moved = triangle(a.surface, pair.a);
     for (Vector3d& corner : moved) corner = X * corner;
-    if (triangles_meet(moved, triangle(b.surface, pair.b))) pairs_.push_back(pair);
+    if (triangles_intersect(moved, triangle(b.surface, pair.b))) pairs_.push_back(pair);
   }
   return all;
 }

@@ -14,48 +14,52 @@ constexpr double kNewestDrift = 0.1;
 
 }  // namespace
 
-void ExpectedMotion::learn_late(const Pose& X_WP) noexcept {
-  if (!known()) return;
+void MotionPredictor::observe_deferred(const Pose& X_WP) noexcept {
+  if (!has_observation()) return;
   const Vector3d hand_turn = small_rotation_vector(X_WP_.rotation.conjugate() * X_WP.rotation);
-  const Pose X_WT = {(rotation_from(drift_turn_) * X_WT_.rotation * rotation_from(hand_turn)).normalized(),
-                     X_WT_.translation_m + X_WP.translation_m - X_WP_.translation_m + drift_m_};
-  learn(X_WT, X_WP);
+  const Pose X_WT = {
+      (rotation_from(drift_rad_per_tick_) * X_WT_.rotation * rotation_from(hand_turn)).normalized(),
+      X_WT_.translation_m + X_WP.translation_m - X_WP_.translation_m + drift_m_per_tick_};
+  observe(X_WT, X_WP);
 }
 
-void ExpectedMotion::learn(const Pose& X_WT, const Pose& X_WP) noexcept {
-  if (known()) {
+void MotionPredictor::observe(const Pose& X_WT, const Pose& X_WP) noexcept {
+  if (has_observation()) {
     const Vector3d hand_m = X_WP.translation_m - X_WP_.translation_m;
     const Vector3d hand_turn = small_rotation_vector(X_WP_.rotation.conjugate() * X_WP.rotation);
     const Vector3d tool_m = X_WT.translation_m - X_WT_.translation_m;
     const Vector3d tool_turn_W = small_rotation_vector(X_WT.rotation * X_WT_.rotation.conjugate());
-    const double newest = std::max(kNewest, 1.0 / learned_);
-    const Vector3d faster_m = newest * (hand_m - shift_m_), faster = newest * (hand_turn - turn_);
-    shift_m_ += faster_m;
-    turn_ += faster;
-    if (learned_ > 1.0) {
-      shift_more_m_ += kNewestMore * (faster_m - shift_more_m_);
-      turn_more_ += kNewestMore * (faster - turn_more_);
+    const double newest = std::max(kNewest, 1.0 / observations_);
+    const Vector3d faster_m = newest * (hand_m - hand_velocity_m_per_tick_),
+                   faster = newest * (hand_turn - hand_velocity_rad_per_tick_);
+    hand_velocity_m_per_tick_ += faster_m;
+    hand_velocity_rad_per_tick_ += faster;
+    if (observations_ > 1.0) {
+      hand_acceleration_m_per_tick2_ += kNewestMore * (faster_m - hand_acceleration_m_per_tick2_);
+      hand_acceleration_rad_per_tick2_ += kNewestMore * (faster - hand_acceleration_rad_per_tick2_);
     }
-    drift_m_ += kNewestDrift * (tool_m - hand_m - drift_m_);
-    drift_turn_ += kNewestDrift * (tool_turn_W - X_WP.rotation * hand_turn - drift_turn_);
+    drift_m_per_tick_ += kNewestDrift * (tool_m - hand_m - drift_m_per_tick_);
+    drift_rad_per_tick_ += kNewestDrift * (tool_turn_W - X_WP.rotation * hand_turn - drift_rad_per_tick_);
   }
-  ++learned_;
+  ++observations_;
   X_WT_ = X_WT;
   X_WP_ = X_WP;
 }
 
-Pose ExpectedMotion::after(double ticks) const noexcept {
+Pose MotionPredictor::predict(double ticks) const noexcept {
   const double late = (1.0 - kNewest) / kNewest;  // ticks by which what is smoothed lags
   const double more = ticks * (0.5 * ticks + late);
-  return {
-      (rotation_from(ticks * drift_turn_) * X_WT_.rotation * rotation_from(ticks * turn_ + more * turn_more_))
-          .normalized(),
-      X_WT_.translation_m + ticks * (shift_m_ + drift_m_) + more * shift_more_m_};
+  return {(rotation_from(ticks * drift_rad_per_tick_) * X_WT_.rotation *
+           rotation_from(ticks * hand_velocity_rad_per_tick_ + more * hand_acceleration_rad_per_tick2_))
+              .normalized(),
+          X_WT_.translation_m + ticks * (hand_velocity_m_per_tick_ + drift_m_per_tick_) +
+              more * hand_acceleration_m_per_tick2_};
 }
 
 /// A parabola leaves its chord by an eighth of a t^2.
-double ExpectedMotion::bend_m(double ticks, double radius_m) const noexcept {
-  return ticks * ticks / 8.0 * (shift_more_m_.norm() + radius_m * turn_more_.norm());
+double MotionPredictor::chord_deviation_m(double ticks, double radius_m) const noexcept {
+  return ticks * ticks / 8.0 *
+         (hand_acceleration_m_per_tick2_.norm() + radius_m * hand_acceleration_rad_per_tick2_.norm());
 }
 
 }  // namespace wrenchd

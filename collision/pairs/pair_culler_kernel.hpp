@@ -5,12 +5,12 @@
 #include "collision/pairs/float8.hpp"
 #include "collision/pairs/pair_culler.hpp"
 
-namespace wrenchd::walk {
+namespace wrenchd::simd {
 namespace {
 
 /// How far eight planes keep their triangles on one side at both ends, at least; less than zero: they do not.
 /// X takes the plane's frame P to that of the corners Q: n_Q = R n_P, and n_Q . x = n_P . x_P + n_Q . t.
-WRENCHD_INLINE Float8 apart_by_plane(const SieveBlock& block, const Transform (&X_QP)[2]) noexcept {
+WRENCHD_INLINE Float8 apart_by_plane(const PairBlock& block, const Transform (&X_QP)[2]) noexcept {
   Float8 lowest = all(3e38F), highest = all(-3e38F);
   const Float8 nx = load(block.normal[0]), ny = load(block.normal[1]), nz = load(block.normal[2]);
   for (const Transform& X : X_QP) {
@@ -29,7 +29,7 @@ WRENCHD_INLINE Float8 apart_by_plane(const SieveBlock& block, const Transform (&
 }
 
 /// How far the bounds of eight pairs lie beside each other all the way, as the obstacle sees them.
-WRENCHD_INLINE Float8 apart_by_bounds(const SieveBlock& tool, const SieveBlock& obstacle,
+WRENCHD_INLINE Float8 apart_by_bounds(const PairBlock& tool, const PairBlock& obstacle,
                                       const Transform (&X_OT)[2]) noexcept {
   Float8 apart = all(-3e38F);
   for (int d = 0; d < 3; ++d) {
@@ -58,8 +58,8 @@ WRENCHD_INLINE float least_of(Float8 x) noexcept {
 
 }  // namespace
 
-void WRENCHD_SIFT(const SieveBlock* of_obstacle, const SieveBlock* of_tool, const std::uint32_t* which,
-                  std::size_t blocks, const SieveWay& way, float* apart_m, std::uint8_t* left) noexcept {
+void WRENCHD_SIFT(const PairBlock* of_obstacle, const PairBlock* of_tool, const std::uint32_t* which,
+                  std::size_t blocks, const CullPath& way, float* apart_m, std::uint8_t* left) noexcept {
   for (std::size_t i = 0; i < blocks; ++i) {
     const std::uint32_t block = which[i];
     Float8 apart = apart_by_plane(of_obstacle[block], way.X_TO);
@@ -71,4 +71,4 @@ void WRENCHD_SIFT(const SieveBlock* of_obstacle, const SieveBlock* of_tool, cons
   }
 }
 
-}  // namespace wrenchd::walk
+}  // namespace wrenchd::simd

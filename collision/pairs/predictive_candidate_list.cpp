@@ -63,115 +63,120 @@ constexpr double kLeastPortion = 32.0;
 constexpr double kLongestWalk = 0.7;
 
 /// What can wait takes what there is for it.
-std::uint32_t most_visits(const WalkBudget& budget) noexcept {
-  if (budget.kept > 0) return budget.visits - std::min(budget.visits, budget.kept);
-  return static_cast<std::uint32_t>(kLongestWalk * budget.visits);
+std::uint32_t most_visits(const VisitBudget& budget) noexcept {
+  if (budget.reserved > 0) return budget.remaining - std::min(budget.remaining, budget.reserved);
+  return static_cast<std::uint32_t>(kLongestWalk * budget.remaining);
 }
 
 /// Goes on with a list for no more than so many visits of the budget.
-bool go_on(NearPairs& list, std::uint32_t visits, WalkBudget& budget) noexcept {
-  WalkBudget part = {std::min(visits, budget.visits)};
-  budget.visits -= part.visits;
-  const bool ended = list.go_on(part);
-  budget.visits += part.visits;
+bool go_on(CandidatePairs& list, std::uint32_t visits, VisitBudget& budget) noexcept {
+  VisitBudget part = {std::min(visits, budget.remaining)};
+  budget.remaining -= part.remaining;
+  const bool ended = list.resume(part);
+  budget.remaining += part.remaining;
   return ended;
 }
 
 }  // namespace
 
-PairsAhead::PairsAhead(const Scene& scene)
+PredictiveCandidateList::PredictiveCandidateList(const Scene& scene)
     : scene_(scene),
-      lists_{NearPairs(scene), NearPairs(scene), NearPairs(scene)},
-      ticks_ahead_(kMostTicksAhead) {}
+      lists_{CandidatePairs(scene), CandidatePairs(scene), CandidatePairs(scene)},
+      horizon_ticks_(kMostTicksAhead) {}
 
-bool PairsAhead::list(const Pose& X_start, const Pose& X_end, const Times& times,
-                      WalkBudget& budget) noexcept {
-  const auto holds = [&](const NearPairs& list) {
+bool PredictiveCandidateList::ensure_covers(const Pose& X_start, const Pose& X_end, const PathTimes& times,
+                                            VisitBudget& budget) noexcept {
+  const auto holds = [&](const CandidatePairs& list) {
     return list.covers(X_end, times.end_s) && list.covers(X_start, times.start_s);
   };
-  const auto will_hold = [&](const NearPairs& list) {
+  const auto will_hold = [&](const CandidatePairs& list) {
     return list.will_cover(X_end, times.end_s) && list.will_cover(X_start, times.start_s);
   };
-  late_ = false;
-  if (holds(*listed_)) return true;
-  if (ahead_->under_way() && will_hold(*ahead_) && is_sooner_made(most_visits(budget))) {
-    if (go_on(*ahead_, most_visits(budget), budget)) weigh();
-    if (ahead_->under_way() && budget.kept > 0) return late();
+  list_pending_ = false;
+  if (holds(*current_)) return true;
+  if (next_->in_progress() && will_hold(*next_) && next_list_is_cheaper(most_visits(budget))) {
+    if (go_on(*next_, most_visits(budget), budget)) adapt_horizon();
+    if (next_->in_progress() && budget.reserved > 0) return defer();
   }
-  if (holds(*ahead_)) {
-    serve(ahead_);
-    ahead_->clear();  // it has served
+  if (holds(*next_)) {
+    make_current(next_);
+    next_->clear();  // it has served
     return true;
   }
-  if (!list_at_once(X_start, X_end, times, budget)) return false;
-  ++made_at_once_;
-  visits_at_once_ = spare_->visits();
-  serve(spare_);
-  const bool ahead_is_there = ahead_->under_way() || ahead_->complete();
-  astray_ = astray_ || (ahead_is_there && !ahead_->will_cover(X_end, times.end_s));
-  return holds(*listed_);  // one that was late was made for where the tool was to go then
+  if (!build_immediately(X_start, X_end, times, budget)) return false;
+  ++immediate_lists_;
+  immediate_cost_visits_ = spare_->node_visits();
+  make_current(spare_);
+  const bool ahead_is_there = next_->in_progress() || next_->complete();
+  mispredicted_ = mispredicted_ || (ahead_is_there && !next_->will_cover(X_end, times.end_s));
+  return holds(*current_);  // one that was late was made for where the tool was to go then
 }
 
 /// Is what is left of the list ahead sooner made than another at once? Not where it would take more than so
 /// many visits, and the other would not.
-bool PairsAhead::is_sooner_made(std::uint32_t most) const noexcept {
-  const double at_once = visits_at_once_ > 0 ? visits_at_once_ : kAtOnce * listed().visits();
-  return to_do() <= most || at_once > most;
+bool PredictiveCandidateList::next_list_is_cheaper(std::uint32_t most) const noexcept {
+  const double at_once =
+      immediate_cost_visits_ > 0 ? immediate_cost_visits_ : kAtOnce * current().node_visits();
+  return remaining_visits() <= most || at_once > most;
 }
 
 /// What the list ahead takes yet, in visits.
-double PairsAhead::to_do() const noexcept {
-  const double expected = std::max(visits_of_list_, listed().visits());
-  return std::max(expected - ahead_->visits(), kUnforeseen * expected);
+double PredictiveCandidateList::remaining_visits() const noexcept {
+  const double expected = std::max(prefetch_cost_visits_, current().node_visits());
+  return std::max(expected - next_->node_visits(), kUnforeseen * expected);
 }
 
-bool PairsAhead::late() noexcept {
-  late_ = late_tick_ = true;
+bool PredictiveCandidateList::defer() noexcept {
+  list_pending_ = deferred_tick_ = true;
   return false;
 }
 
 /// One that was late already is gone on with, if it leads on.
-bool PairsAhead::list_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
-                              WalkBudget& budget) noexcept {
+bool PredictiveCandidateList::build_immediately(const Pose& X_start, const Pose& X_end,
+                                                const PathTimes& times, VisitBudget& budget) noexcept {
   const std::uint32_t most = most_visits(budget);
-  const bool waits = budget.kept > 0;
-  if (waits && most < kLeastPortion) return late();
-  const bool begun = waits && spare_->under_way() &&
-                     share_of(*spare_, X_start, X_end) > share_of(*listed_, X_start, X_end) + kLeadsOn;
+  const bool waits = budget.reserved > 0;
+  if (waits && most < kLeastPortion) return defer();
+  const bool begun = waits && spare_->in_progress() &&
+                     covered_fraction_of(*spare_, X_start, X_end) >
+                         covered_fraction_of(*current_, X_start, X_end) + kLeadsOn;
   if (!begun) {
     const double ticks =
-        waits && listed().visits() > most ? static_cast<double>(listed().visits()) / most : 0.0;
-    spare_->set_out(way_at_once(X_start, X_end, times, std::log2(1.0 + ticks)));
+        waits && current().node_visits() > most ? static_cast<double>(current().node_visits()) / most : 0.0;
+    spare_->start(immediate_path(X_start, X_end, times, std::log2(1.0 + ticks)));
   }
   go_on(*spare_, most, budget);
-  if (waits && spare_->under_way()) return late();
+  if (waits && spare_->in_progress()) return defer();
   return spare_->complete();
 }
 
 /// For as long as it takes to make the next list, if the way leads where the tool is expected; else for this
 /// way alone. One that will be late is made for as much longer as the hand will have gone on by then. Whether
 /// the way expected holds this one for obstacles that move too is not looked at.
-NearPairs::Way PairsAhead::way_at_once(const Pose& X_start, const Pose& X_end, const Times& times,
-                                       double wait_ticks) const noexcept {
-  const double least_m = (motion_.known() ? kLeastReach : kFirstReach) * scene_.tool_radius_m();
-  NearPairs::Way way = {X_start, X_end, std::max(kReach * listed().way_m(X_start, X_end), least_m),
-                        times.start_s, times.end_s};
-  if (scene_.moves() || !motion_.known()) return way;
+CandidatePairs::Path PredictiveCandidateList::immediate_path(const Pose& X_start, const Pose& X_end,
+                                                             const PathTimes& times,
+                                                             double wait_ticks) const noexcept {
+  const double least_m = (predictor_.has_observation() ? kLeastReach : kFirstReach) * scene_.tool_radius_m();
+  CandidatePairs::Path way = {X_start, X_end,
+                              std::max(kReach * current().displacement_bound_m(X_start, X_end), least_m),
+                              times.start_s, times.end_s};
+  if (scene_.has_moving_obstacles() || !predictor_.has_observation()) return way;
   if (wait_ticks > 0.0) {
-    const Pose X_now = motion_.after(0.0), X_then = motion_.after(wait_ticks + kTicksAtOnce);
+    const Pose X_now = predictor_.predict(0.0), X_then = predictor_.predict(wait_ticks + kTicksAtOnce);
     way.X_WT_end = {(X_then.rotation * X_now.rotation.conjugate() * X_end.rotation).normalized(),
                     X_end.translation_m + X_then.translation_m - X_now.translation_m};
-    way.reach_m = std::max(
-        {kReach * listed().way_m(X_start, way.X_WT_end), least_m, kBesideWay * listed().away_m(way, X_end)});
+    way.reach_m = std::max({kReach * current().displacement_bound_m(X_start, way.X_WT_end), least_m,
+                            kBesideWay * current().distance_m(way, X_end)});
     return way;
   }
-  const NearPairs::Way expected = way_ahead(0.0, kTicksAtOnce);
-  const auto holds = [&](const Pose& X) { return listed().away_m(expected, X) <= expected.reach_m; };
-  return goes_slowly(expected) && holds(X_start) && holds(X_end) ? expected : way;
+  const CandidatePairs::Path expected = predicted_path(0.0, kTicksAtOnce);
+  const auto holds = [&](const Pose& X) { return current().distance_m(expected, X) <= expected.reach_m; };
+  return within_prefetch_limits(expected) && holds(X_start) && holds(X_end) ? expected : way;
 }
 
 /// The start must be among what the list holds for. A list holds for the whole of a way if for its ends.
-double PairsAhead::share_of(const NearPairs& list, const Pose& X_start, const Pose& X_end) const noexcept {
+double PredictiveCandidateList::covered_fraction_of(const CandidatePairs& list, const Pose& X_start,
+                                                    const Pose& X_end) const noexcept {
   constexpr int kHalvings = 7;
   if (!list.will_cover(X_start)) return 0.0;
   if (list.will_cover(X_end)) return 1.0;
@@ -185,110 +190,120 @@ double PairsAhead::share_of(const NearPairs& list, const Pose& X_start, const Po
   return share;
 }
 
-void PairsAhead::look_ahead(const Pose& X_WT, const Pose& X_WP, WalkBudget& budget, double time_s,
-                            std::uint32_t to_spare) noexcept {
-  if (std::exchange(late_tick_, false))
-    motion_.learn_late(X_WP);
+void PredictiveCandidateList::prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s,
+                                       std::uint32_t to_spare) noexcept {
+  if (std::exchange(deferred_tick_, false))
+    predictor_.observe_deferred(X_WP);
   else
-    motion_.learn(X_WT, X_WP);
-  tick_s_ = time_s - last_s_;
-  last_s_ = time_s;
-  const double soon = ticks_to_serve();
-  const Pose X_soon = motion_.after(soon);
-  const double soon_s = time_s + soon * tick_s_;
-  unsure_ = astray_ ? std::min(kLessSurely * unsure_, kLeastSurely) : std::max(kMoreSurely * unsure_, 1.0);
-  const bool astray = std::exchange(astray_, false) && !ahead_->will_cover(X_soon, soon_s);
-  if (!ahead_->under_way() || astray) {
-    if (provided(X_WT, soon, time_s, to_spare > 0)) return;
-    const NearPairs::Way way = way_ahead(holds_for_ticks(kFrom * soon, time_s), kTo * soon);
-    if (!goes_slowly(way)) return;
-    if (ahead_->covers(X_WT, time_s)) serve(ahead_);  // it holds for longer than the one that serves
-    ahead_->set_out(way);
+    predictor_.observe(X_WT, X_WP);
+  tick_duration_s_ = time_s - last_scene_time_s_;
+  last_scene_time_s_ = time_s;
+  const double soon = service_ticks();
+  const Pose X_soon = predictor_.predict(soon);
+  const double soon_s = time_s + soon * tick_duration_s_;
+  reach_scale_ = mispredicted_ ? std::min(kLessSurely * reach_scale_, kLeastSurely)
+                               : std::max(kMoreSurely * reach_scale_, 1.0);
+  const bool astray = std::exchange(mispredicted_, false) && !next_->will_cover(X_soon, soon_s);
+  if (!next_->in_progress() || astray) {
+    if (next_list_unneeded(X_WT, soon, time_s, to_spare > 0)) return;
+    const CandidatePairs::Path way = predicted_path(valid_for_ticks(kFrom * soon, time_s), kTo * soon);
+    if (!within_prefetch_limits(way)) return;
+    if (next_->covers(X_WT, time_s)) make_current(next_);  // it holds for longer than the one that serves
+    next_->start(way);
   }
-  const std::uint32_t visits = std::max(portion(X_soon, soon), to_spare);
-  if (go_on(*ahead_, budget.kept > 0 ? std::min(visits, most_visits(budget)) : visits, budget)) weigh();
-  if (ticks_ahead_ > kLeastTicksAhead && static_cast<double>(ahead_->pairs().size()) >
-                                             kFarMore * static_cast<double>(listed().pairs().size()) + kFew) {
-    ticks_ahead_ = std::max(kFarFewer * ticks_ahead_, kLeastTicksAhead);
-    ahead_->clear();
+  const std::uint32_t visits = std::max(visits_this_tick(X_soon, soon), to_spare);
+  if (go_on(*next_, budget.reserved > 0 ? std::min(visits, most_visits(budget)) : visits, budget))
+    adapt_horizon();
+  if (horizon_ticks_ > kLeastTicksAhead &&
+      static_cast<double>(next_->pairs().size()) >
+          kFarMore * static_cast<double>(current().pairs().size()) + kFew) {
+    horizon_ticks_ = std::max(kFarFewer * horizon_ticks_, kLeastTicksAhead);
+    next_->clear();
   }
 }
 
 /// For how many ticks yet the list that serves holds, if the tool goes where it is expected; so many at most.
-double PairsAhead::holds_for_ticks(double most, double time_s) const noexcept {
+double PredictiveCandidateList::valid_for_ticks(double most, double time_s) const noexcept {
   double ticks = 0.0;
-  while (ticks < most && listed_->covers(motion_.after(ticks + 1.0), time_s + (ticks + 1.0) * tick_s_))
+  while (ticks < most &&
+         current_->covers(predictor_.predict(ticks + 1.0), time_s + (ticks + 1.0) * tick_duration_s_))
     ++ticks;
   return std::min(ticks, most);
 }
 
 /// Is there no list to be begun now? With work to spare the next is begun as soon as the last is made, if it
 /// leads on: the younger a list, the better the motion was known.
-bool PairsAhead::provided(const Pose& X_WT, double soon, double time_s, bool to_spare) const noexcept {
-  const auto covers = [&](const NearPairs& list, double ticks) {
-    return list.covers(motion_.after(ticks), time_s + ticks * tick_s_);
+bool PredictiveCandidateList::next_list_unneeded(const Pose& X_WT, double soon, double time_s,
+                                                 bool to_spare) const noexcept {
+  const auto covers = [&](const CandidatePairs& list, double ticks) {
+    return list.covers(predictor_.predict(ticks), time_s + ticks * tick_duration_s_);
   };
-  if (!to_spare) return covers(*listed_, soon) || covers(*ahead_, soon);
-  return covers(*listed_, kTo * soon) || (covers(*ahead_, soon) && !ahead_->covers(X_WT, time_s));
+  if (!to_spare) return covers(*current_, soon) || covers(*next_, soon);
+  return covers(*current_, kTo * soon) || (covers(*next_, soon) && !next_->covers(X_WT, time_s));
 }
 
 /// What is to be done of the list ahead with this tick, in visits, so that it is done when the one that
 /// serves no longer holds.
-std::uint32_t PairsAhead::portion(const Pose& X_soon, double soon) const noexcept {
+std::uint32_t PredictiveCandidateList::visits_this_tick(const Pose& X_soon, double soon) const noexcept {
   double left = soon;  // ticks
-  if (!scene_.moves()) {
-    const double tick_m = listed().way_m(motion_.after(0.0), X_soon) / soon;
-    const double beyond_m = std::max(-listed().room_m(X_soon), 0.0);
+  if (!scene_.has_moving_obstacles()) {
+    const double tick_m = current().displacement_bound_m(predictor_.predict(0.0), X_soon) / soon;
+    const double beyond_m = std::max(-current().margin_m(X_soon), 0.0);
     left = std::max(1.0, tick_m > 0.0 ? soon - beyond_m / tick_m : soon);
   }
-  return static_cast<std::uint32_t>(std::max(kHaste * to_do() / left, kLeastPortion));
+  return static_cast<std::uint32_t>(std::max(kHaste * remaining_visits() / left, kLeastPortion));
 }
 
-void PairsAhead::forget() noexcept {
-  motion_.forget();
-  for (NearPairs& list : lists_) list.clear();
-  astray_ = late_ = late_tick_ = false;
-  visits_of_list_ = visits_at_once_ = 0;
-  ticks_ahead_ = kMostTicksAhead;
-  unsure_ = 1.0;
+void PredictiveCandidateList::reset() noexcept {
+  predictor_.reset();
+  for (CandidatePairs& list : lists_) list.clear();
+  mispredicted_ = list_pending_ = deferred_tick_ = false;
+  prefetch_cost_visits_ = immediate_cost_visits_ = 0;
+  horizon_ticks_ = kMostTicksAhead;
+  reach_scale_ = 1.0;
 }
 
 /// How long the next list is to serve, by what this one took to make and takes to sieve.
-void PairsAhead::weigh() noexcept {
-  visits_of_list_ = ahead_->visits();
-  const double sieving = kSieved * static_cast<double>(ahead_->pairs().size()) / kPairsPerVisit;
-  const double making = visits_of_list_ / ticks_ahead_;
-  if (!ahead_->complete() || sieving > kTooDear * making)
-    ticks_ahead_ = std::max(kFewer * ticks_ahead_, kLeastTicksAhead);
+void PredictiveCandidateList::adapt_horizon() noexcept {
+  prefetch_cost_visits_ = next_->node_visits();
+  const double sieving = kSieved * static_cast<double>(next_->pairs().size()) / kPairsPerVisit;
+  const double making = prefetch_cost_visits_ / horizon_ticks_;
+  if (!next_->complete() || sieving > kTooDear * making)
+    horizon_ticks_ = std::max(kFewer * horizon_ticks_, kLeastTicksAhead);
   else if (making > kTooDear * sieving)
-    ticks_ahead_ = std::min(ticks_ahead_ / kFewer, kMostTicksAhead);
+    horizon_ticks_ = std::min(horizon_ticks_ / kFewer, kMostTicksAhead);
 }
 
-void PairsAhead::serve(NearPairs*& list) noexcept {
-  std::swap(listed_, list);
+void PredictiveCandidateList::make_current(CandidatePairs*& list) noexcept {
+  std::swap(current_, list);
 }
 
-double PairsAhead::ticks_to_serve() const noexcept {
-  const double far_m = listed().way_m(motion_.after(0.0), motion_.after(ticks_ahead_));
+double PredictiveCandidateList::service_ticks() const noexcept {
+  const double far_m =
+      current().displacement_bound_m(predictor_.predict(0.0), predictor_.predict(horizon_ticks_));
   const double farthest_m = kFarthestAhead * scene_.tool_radius_m() / (kTo - kFrom);
-  return std::max(1.0, far_m > farthest_m ? ticks_ahead_ * farthest_m / far_m : ticks_ahead_);
+  return std::max(1.0, far_m > farthest_m ? horizon_ticks_ * farthest_m / far_m : horizon_ticks_);
 }
 
-NearPairs::Way PairsAhead::way_ahead(double from_ticks, double to_ticks) const noexcept {
+CandidatePairs::Path PredictiveCandidateList::predicted_path(double from_ticks,
+                                                             double to_ticks) const noexcept {
   const double r_m = scene_.tool_radius_m(), ticks = to_ticks - from_ticks;
-  const Pose X_near = motion_.after(from_ticks), X_far = motion_.after(to_ticks);
-  const double way_m = listed().way_m(motion_.after(0.0), X_far);  // what is expected may be wrong all along
-  const bool dear = visits_of_list_ > kDear;
-  const double less = dear ? std::sqrt(kDear / visits_of_list_) : 1.0;
-  double reach_m = std::max(less * kReachAhead, kLeastReachAhead) * way_m + motion_.bend_m(ticks, r_m);
-  if (!dear) reach_m = std::max(reach_m, std::min(unsure_ * reach_m, kWidestAhead * r_m));
-  reach_m = std::max(reach_m, unsure_ * kLeastReach * r_m);
-  return {X_near, X_far, reach_m, last_s_ + from_ticks * tick_s_, last_s_ + to_ticks * tick_s_};
+  const Pose X_near = predictor_.predict(from_ticks), X_far = predictor_.predict(to_ticks);
+  const double way_m = current().displacement_bound_m(predictor_.predict(0.0),
+                                                      X_far);  // what is expected may be wrong all along
+  const bool dear = prefetch_cost_visits_ > kDear;
+  const double less = dear ? std::sqrt(kDear / prefetch_cost_visits_) : 1.0;
+  double reach_m =
+      std::max(less * kReachAhead, kLeastReachAhead) * way_m + predictor_.chord_deviation_m(ticks, r_m);
+  if (!dear) reach_m = std::max(reach_m, std::min(reach_scale_ * reach_m, kWidestAhead * r_m));
+  reach_m = std::max(reach_m, reach_scale_ * kLeastReach * r_m);
+  return {X_near, X_far, reach_m, last_scene_time_s_ + from_ticks * tick_duration_s_,
+          last_scene_time_s_ + to_ticks * tick_duration_s_};
 }
 
-bool PairsAhead::goes_slowly(const NearPairs::Way& way) const noexcept {
+bool PredictiveCandidateList::within_prefetch_limits(const CandidatePairs::Path& way) const noexcept {
   const double r_m = scene_.tool_radius_m();
-  return listed().way_m(way.X_WT_start, way.X_WT_end) <= kFarthestAhead * r_m &&
+  return current().displacement_bound_m(way.X_WT_start, way.X_WT_end) <= kFarthestAhead * r_m &&
          way.reach_m <= kWidestAhead * r_m;
 }
 

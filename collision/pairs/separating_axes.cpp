@@ -8,13 +8,13 @@
 
 namespace wrenchd {
 
-SeparatingAxes::SeparatingAxes(walk::AxesKernel kernel)
+SeparatingAxes::SeparatingAxes(simd::AxesKernel kernel)
     : kernel_(kernel != nullptr  ? kernel
-              : walk::has_avx2() ? walk::apart_avx2
-                                 : walk::apart_portable) {}
+              : simd::has_avx2() ? simd::apart_avx2
+                                 : simd::apart_portable) {}
 
-bool SeparatingAxes::apart(const Triangle& a_start, const Triangle& a_end, const Triangle& b,
-                           double margin_m) const noexcept {
+bool SeparatingAxes::separated(const Triangle& a_start, const Triangle& a_end, const Triangle& b,
+                               double margin_m) const noexcept {
   const Vector3d& origin = b[0];
   const Vector3d b1 = b[1] - origin, b2 = b[2] - origin;
   Triangle start, end;
@@ -26,7 +26,7 @@ bool SeparatingAxes::apart(const Triangle& a_start, const Triangle& a_end, const
   }
   if (!(extent_m > 0.0)) return false;
   const double scale = 1.0 / extent_m;
-  walk::AxesPair pair;
+  simd::AxesTriangles pair;
   for (int d = 0; d < 3; ++d) {
     for (std::size_t k = 0; k < 3; ++k) {
       pair.a[0][k][d] = static_cast<float>(scale * start[k][d]);
@@ -36,7 +36,7 @@ bool SeparatingAxes::apart(const Triangle& a_start, const Triangle& a_end, const
     pair.b[1][d] = static_cast<float>(scale * b1[d]);
     pair.b[2][d] = static_cast<float>(scale * b2[d]);
   }
-  pair.margin = static_cast<float>(scale * margin_m + walk::kRounding);
+  pair.margin = static_cast<float>(scale * margin_m + simd::kRounding);
   return kernel_(pair);
 }
 

@@ -5,7 +5,7 @@
 #include "collision/pairs/float8.hpp"
 #include "collision/pairs/separating_axes.hpp"
 
-namespace wrenchd::walk {
+namespace wrenchd::simd {
 namespace {
 
 struct Vector {
@@ -21,7 +21,8 @@ WRENCHD_INLINE Vector cross(const Vector& u, const Vector& v) noexcept {
 }
 
 /// Eight axes, u x v each. Any axis will do as long as both triangles are seen along the same.
-WRENCHD_INLINE bool apart_along(const Float8 (&u)[3], const Float8 (&v)[3], const AxesPair& pair) noexcept {
+WRENCHD_INLINE bool apart_along(const Float8 (&u)[3], const Float8 (&v)[3],
+                                const AxesTriangles& pair) noexcept {
   const Float8 axis[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
   const auto height = [&](const float(&p)[3]) { return axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2]; };
   Float8 low_a = height(pair.a[0][0]), high_a = low_a, low_b = height(pair.b[0]), high_b = low_b;
@@ -41,7 +42,7 @@ WRENCHD_INLINE bool apart_along(const Float8 (&u)[3], const Float8 (&v)[3], cons
 
 }  // namespace
 
-bool WRENCHD_APART(const AxesPair& pair) noexcept {
+bool WRENCHD_APART(const AxesTriangles& pair) noexcept {
   float middle[3][3];
   for (int k = 0; k < 3; ++k)
     for (int d = 0; d < 3; ++d) middle[k][d] = 0.5F * (pair.a[0][k][d] + pair.a[1][k][d]);
@@ -63,4 +64,4 @@ bool WRENCHD_APART(const AxesPair& pair) noexcept {
   return apart_along(u, v, pair);
 }
 
-}  // namespace wrenchd::walk
+}  // namespace wrenchd::simd

@@ -3,7 +3,7 @@
 
 #include "core/pose.hpp"
 
-namespace wrenchd::walk {
+namespace wrenchd::simd {
 
 /// What single precision may be wrong by, as a share of the coordinates: rounding of the input, of two
 /// products of three terms each, and of a plane's offset.
@@ -16,7 +16,7 @@ struct Transform {
   float t[3];
 };
 
-inline Transform single(const Matrix3d& R, const Vector3d& t) noexcept {
+inline Transform to_single(const Matrix3d& R, const Vector3d& t) noexcept {
   Transform out;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) out.R[i][j] = static_cast<float>(R(i, j));
@@ -25,4 +25,4 @@ inline Transform single(const Matrix3d& R, const Vector3d& t) noexcept {
   return out;
 }
 
-}  // namespace wrenchd::walk
+}  // namespace wrenchd::simd

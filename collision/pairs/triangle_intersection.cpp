@@ -62,7 +62,7 @@ Interval cut(const double (&x)[3], const double (&h)[3]) noexcept {
 // Each triangle must cut the other's plane; both cuts lie on the line where the planes meet, and the
 // triangles meet where the cuts overlap. Where a corner lies in the other's plane, as far as rounding can
 // tell, or the ends of the cuts coincide, all axes are looked at instead.
-bool triangles_meet(const Triangle& p, const Triangle& q) noexcept {
+bool triangles_intersect(const Triangle& p, const Triangle& q) noexcept {
   constexpr double kRounding = 1e-9;  // of the largest height, far above what rounding can make of it
   const Vector3d m = (q[1] - q[0]).cross(q[2] - q[0]);
   const Heights p_above = heights(p, q[0], m);

@@ -6,19 +6,19 @@
 
 namespace wrenchd {
 
-Control::Control(Station& station, EventFeed& feed)
-    : station_(station),
+ControlInterface::ControlInterface(Runtime& station, EventFeed& feed)
+    : runtime_(station),
       feed_(feed),
       lease_(station.loop(), feed),
-      methods_(station.plan().settings.control) {
-  add_daemon_methods(methods_, {station_, feed_, lease_, status_});
+      methods_(station.config().settings.control) {
+  add_daemon_methods(methods_, {runtime_, feed_, lease_, status_sections_});
 }
 
-void Control::open(const std::filesystem::path& path, const Identify& identify) {
-  const Settings& settings = station_.plan().settings;
-  const RoleRules rules = role_rules(settings.control, settings.file.string());
-  listening_.emplace(path, rules);
-  socket_.emplace(*listening_, rules, methods_, feed_, lease_, identify);
+void ControlInterface::open(const std::filesystem::path& path, const IdentifyPeer& identify) {
+  const Settings& settings = runtime_.config().settings;
+  const RoleRules rules = load_role_rules(settings.control, settings.file.string());
+  listening_socket_.emplace(path, rules);
+  control_socket_.emplace(*listening_socket_, rules, methods_, feed_, lease_, identify);
 }
 
 }  // namespace wrenchd

@@ -13,32 +13,32 @@
 
 namespace wrenchd {
 
-class Station;
+class Runtime;
 
 /// The control socket of a running station, and what is behind it: the methods, the lease, the events. Parts
 /// of the daemon add their methods, then it opens.
-class Control {
+class ControlInterface {
  public:
   /// Station and feed must outlive this.
-  Control(Station& station, EventFeed& feed);
+  ControlInterface(Runtime& station, EventFeed& feed);
 
   /// To add rows to, before open().
   MethodTable& methods() noexcept { return methods_; }
   /// Likewise, of what `status` answers.
-  StatusRows& status() noexcept { return status_; }
+  StatusSections& status_sections() noexcept { return status_sections_; }
 
   /// Serves from now on. Throws std::runtime_error, which names the path, or the setting of a group that does
   /// not exist, and the cure.
-  void open(const std::filesystem::path& path, const Identify& identify = peer_of);
+  void open(const std::filesystem::path& path, const IdentifyPeer& identify = peer_of);
 
  private:
-  Station& station_;
+  Runtime& runtime_;
   EventFeed& feed_;
   Lease lease_;
-  StatusRows status_;
+  StatusSections status_sections_;
   MethodTable methods_;
-  std::optional<ListeningSocket> listening_;
-  std::optional<ControlSocket> socket_;  ///< last: its thread uses all of the above
+  std::optional<ListeningSocket> listening_socket_;
+  std::optional<ControlSocket> control_socket_;  ///< last: its thread uses all of the above
 };
 
 }  // namespace wrenchd

@@ -59,7 +59,7 @@ std::string found(const Json& value) {
 }
 
 RpcError wrong_params(const MethodRow& row, const std::string& what) {
-  return {RpcCode::wrong_params, sentence("Method '" + row.name + "': " + what)};
+  return {RpcCode::invalid_params, sentence("Method '" + row.name + "': " + what)};
 }
 
 void check_params(const MethodRow& row, const Json& params) {
@@ -73,18 +73,18 @@ void check_params(const MethodRow& row, const Json& params) {
                                             : "there is no parameter '" + printable(name) + "'; " +
                                                   nearest_key(name, known).advice);
     if (!is(value, param->type))
-      throw wrong_params(row, "parameter '" + name + "' has to be " + words(param->type) + ", and is " +
+      throw wrong_params(row, "parameter '" + name + "' has to be " + type_text(param->type) + ", and is " +
                                   found(value) + "; it is: " + param->doc);
   }
   for (const ParamRow& param : row.params)
     if (param.required && !params.contains(param.name))
-      throw wrong_params(
-          row, "parameter '" + param.name + "', " + words(param.type) + ", is missing; it is: " + param.doc);
+      throw wrong_params(row, "parameter '" + param.name + "', " + type_text(param.type) +
+                                  ", is missing; it is: " + param.doc);
 }
 
 }  // namespace
 
-const char* words(ParamType type) noexcept {
+const char* type_text(ParamType type) noexcept {
   switch (type) {
     case ParamType::boolean:
       return "true or false";
@@ -121,30 +121,30 @@ const MethodRow& MethodTable::look_up(const RpcRequest& request, Role role) cons
   if (found == methods_.end()) {
     std::vector<KnownKey> known;
     for (const auto& [name, row] : methods_) known.push_back({name, ""});
-    throw RpcError(RpcCode::no_such_method, sentence("There is no method '" + printable(request.method) +
-                                                     "'; " + nearest_key(request.method, known).advice));
+    throw RpcError(RpcCode::method_not_found, sentence("There is no method '" + printable(request.method) +
+                                                       "'; " + nearest_key(request.method, known).advice));
   }
   const MethodRow& row = found->second;
   // Who may not ask learns nothing of whether it asked well.
-  if (role < row.least)
-    throw RpcError(RpcCode::not_allowed,
-                   "Method '" + row.name + "' is for " + name(row.least) + "s, and you are " +
+  if (role < row.min_role)
+    throw RpcError(RpcCode::permission_denied,
+                   "Method '" + row.name + "' is for " + name(row.min_role) + "s, and you are " +
                        (role == Role::observer ? "an " : "a ") + name(role) + ". It is for " +
-                       who_has(row.least, settings_) + ".",
-                   {{"role", name(role)}, {"needs", name(row.least)}});
+                       role_group_text(row.min_role, settings_) + ".",
+                   {{"role", name(role)}, {"needs", name(row.min_role)}});
   check_params(row, request.params);
   return row;
 }
 
-Answer MethodTable::run(const MethodRow& row, const Json& params, const Caller& caller) {
+MethodResult MethodTable::run(const MethodRow& row, const Json& params, const Caller& caller) {
   try {
     return row.run(params, caller);
   } catch (const RpcError&) {
     throw;
   } catch (const ConfigError& error) {
-    throw RpcError(RpcCode::refused, error.what());
+    throw RpcError(RpcCode::rejected, error.what());
   } catch (const std::exception& error) {
-    throw RpcError(RpcCode::internal, "Method '" + row.name + "' failed: " + error.what() + ".");
+    throw RpcError(RpcCode::internal_error, "Method '" + row.name + "' failed: " + error.what() + ".");
   }
 }
 
@@ -153,35 +153,36 @@ Json MethodTable::describe() const {
   for (const auto& [name, row] : methods_) {
     Json params = Json::object();
     for (const ParamRow& param : row.params)
-      params[param.name] = {{"type", words(param.type)}, {"required", param.required}, {"doc", param.doc}};
+      params[param.name] = {
+          {"type", type_text(param.type)}, {"required", param.required}, {"doc", param.doc}};
     methods.push_back(
-        {{"name", name}, {"role", wrenchd::name(row.least)}, {"params", params}, {"doc", row.doc}});
+        {{"name", name}, {"role", wrenchd::name(row.min_role)}, {"params", params}, {"doc", row.doc}});
   }
   Json events = Json::array();
   for (const EventRow& row : events_) events.push_back({{"name", row.name}, {"doc", row.doc}});
   Json roles = Json::object();
   for (const Role role : {Role::observer, Role::operator_, Role::administrator})
-    roles[name(role)] = who_has(role, settings_);
+    roles[name(role)] = role_group_text(role, settings_);
   const auto error = [](RpcCode code, const char* doc) {
     return Json{{"code", static_cast<int>(code)}, {"doc", doc}};
   };
-  return {
-      {"version", kVersion},
-      {"protocol", kProtocol},
-      {"roles", roles},
-      {"methods", methods},
-      {"events", events},
-      {"errors",
-       {error(RpcCode::no_json, "The line was not understood."),
-        error(RpcCode::no_request, "It is JSON, and no request."),
-        error(RpcCode::no_such_method, "There is no such method."),
-        error(RpcCode::wrong_params, "A parameter is unknown, missing, or of another type."),
-        error(RpcCode::internal, "It failed, and that is the daemon's fault."),
-        error(RpcCode::not_allowed, "The role is too low. data: role, needs."),
-        error(RpcCode::not_now, "The state does not allow it. data: state."),
-        error(RpcCode::taken, "Somebody else holds the lease. data: holder."),
-        error(RpcCode::refused, "What the request names is not as it has to be.")}},
-      {"limits", {{"line_bytes", kMaxLineBytes}, {"depth", kMaxDepth}, {"events_kept", EventFeed::kKept}}}};
+  return {{"version", kVersion},
+          {"protocol", kProtocol},
+          {"roles", roles},
+          {"methods", methods},
+          {"events", events},
+          {"errors",
+           {error(RpcCode::parse_error, "The line was not understood."),
+            error(RpcCode::invalid_request, "It is JSON, and no request."),
+            error(RpcCode::method_not_found, "There is no such method."),
+            error(RpcCode::invalid_params, "A parameter is unknown, missing, or of another type."),
+            error(RpcCode::internal_error, "It failed, and that is the daemon's fault."),
+            error(RpcCode::permission_denied, "The role is too low. data: role, needs."),
+            error(RpcCode::invalid_state, "The state does not allow it. data: state."),
+            error(RpcCode::lease_held, "Somebody else holds the lease. data: holder."),
+            error(RpcCode::rejected, "What the request names is not as it has to be.")}},
+          {"limits",
+           {{"line_bytes", kMaxLineBytes}, {"depth", kMaxDepth}, {"events_kept", EventFeed::kHistorySize}}}};
 }
 
 }  // namespace wrenchd

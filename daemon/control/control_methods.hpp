@@ -24,7 +24,7 @@ namespace wrenchd {
 enum class ParamType : std::uint8_t { boolean, integer, number, text, texts, vector, object };
 
 /// "three numbers"
-const char* words(ParamType type) noexcept;
+const char* type_text(ParamType type) noexcept;
 
 struct ParamRow {
   std::string name;  ///< ends in its unit
@@ -35,45 +35,45 @@ struct ParamRow {
 
 /// What a client hears of events. Belongs to its connection.
 struct Subscription {
-  bool on = false;
-  std::set<std::string> names;  ///< none: all
-  std::uint64_t next = 0;       ///< sequence number of the first that it has not got
-  bool behind = false;          ///< there are events already that it has not got
+  bool active = false;
+  std::set<std::string> event_names;  ///< none: all
+  std::uint64_t next_sequence = 0;    ///< sequence number of the first that it has not got
+  bool has_backlog = false;           ///< there are events already that it has not got
 };
 
 /// Who asks.
 struct Caller {
   std::uint64_t client = 0;  ///< number of the connection, never used again
   Role role = Role::observer;
-  std::string who;                       ///< for people: "process 4242 of uid 1000"
+  std::string identity;                  ///< for people: "process 4242 of uid 1000"
   Subscription* subscription = nullptr;  ///< null in slow methods
 };
 
 /// What a method answers.
-struct Answer {
+struct MethodResult {
   Json result;
   int fd = -1;  ///< goes with the reply (SCM_RIGHTS); -1: none
-  std::shared_ptr<const OwnedFd> held;
+  std::shared_ptr<const OwnedFd> owned_fd;
 
-  Answer(Json json) : result(std::move(json)) {}  // NOLINT: a result is an answer
+  MethodResult(Json json) : result(std::move(json)) {}  // NOLINT: a result is an answer
   /// A descriptor that stays open here.
-  Answer(Json json, int descriptor) : result(std::move(json)), fd(descriptor) {}
+  MethodResult(Json json, int descriptor) : result(std::move(json)), fd(descriptor) {}
   /// One that is for whoever asked alone.
-  Answer(Json json, OwnedFd descriptor)
+  MethodResult(Json json, OwnedFd descriptor)
       : result(std::move(json)),
         fd(descriptor.get()),
-        held(std::make_shared<const OwnedFd>(std::move(descriptor))) {}
+        owned_fd(std::make_shared<const OwnedFd>(std::move(descriptor))) {}
 };
 
 struct MethodRow {
   std::string name;  ///< "scene.move", or a plain verb
-  Role least;        ///< the lowest role that may ask
+  Role min_role;     ///< the lowest role that may ask
   std::vector<ParamRow> params;
   std::string doc;  ///< what it does and answers, in a sentence or two
   /// params: all that are required are there, of their types, and no other than those of the row. Throws
   /// RpcError; a ConfigError becomes RpcCode::refused. Runs on the control thread, where it must not wait, or
   /// where `slow` is set on a thread for such.
-  std::function<Answer(const Json& params, const Caller& caller)> run;
+  std::function<MethodResult(const Json& params, const Caller& caller)> run;
   bool slow = false;
 };
 
@@ -94,7 +94,7 @@ class MethodTable {
   const MethodRow& look_up(const RpcRequest& request, Role role) const;
 
   /// Runs it. Throws RpcError, and nothing else.
-  static Answer run(const MethodRow& row, const Json& params, const Caller& caller);
+  static MethodResult run(const MethodRow& row, const Json& params, const Caller& caller);
 
   /// {version, protocol, roles, methods, events, errors, limits}
   Json describe() const;

@@ -76,69 +76,70 @@ ssize_t send_some(int socket, std::string_view bytes, int fd) {
 
 /// To somebody who is not let in: one line, if there is room for it.
 void turn_away(int socket, const std::string& sentence) {
-  send_some(socket, error_line(nullptr, RpcError(RpcCode::not_allowed, sentence)), -1);
+  send_some(socket, error_line(nullptr, RpcError(RpcCode::permission_denied, sentence)), -1);
 }
 
 }  // namespace
 
 ControlSocket::ControlSocket(const ListeningSocket& listening, RoleRules rules, const MethodTable& methods,
-                             EventFeed& feed, Lease& lease, Identify identify)
+                             EventFeed& feed, Lease& lease, IdentifyPeer identify)
     : listening_(listening),
       rules_(std::move(rules)),
       methods_(methods),
       feed_(feed),
       lease_(lease),
-      identify_(std::move(identify)),
+      identify_peer_(std::move(identify)),
       epoll_(checked(epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
-      wake_(checked(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {
+      wake_fd_(checked(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd")) {
   add(epoll_.get(), listening_.fd(), kListening);
-  add(epoll_.get(), wake_.get(), kWake);
-  slow_work_.emplace();
-  feed_.wake(wake_.get());
+  add(epoll_.get(), wake_fd_.get(), kWake);
+  worker_.emplace();
+  feed_.set_wake_fd(wake_fd_.get());
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   pthread_setname_np(thread_.native_handle(), "control");
 }
 
 ControlSocket::~ControlSocket() {
   thread_.request_stop();
-  notify(wake_.get());
+  notify(wake_fd_.get());
   thread_.join();
-  slow_work_.reset();  // uses what follows
-  feed_.wake(-1);
+  worker_.reset();  // uses what follows
+  feed_.set_wake_fd(-1);
 }
 
 void ControlSocket::run(const std::stop_token& stop) {
   std::vector<Client*> turns;
   while (!stop.stop_requested()) {
-    std::array<epoll_event, kMostClients + 2> events{};
+    std::array<epoll_event, kMaxClients + 2> events{};
     const int count =
         epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), wait_ms(wall_now()));
     for (int i = 0; i < count; ++i)
-      hear(events[static_cast<std::size_t>(i)].data.u64, events[static_cast<std::size_t>(i)].events);
+      handle_epoll_event(events[static_cast<std::size_t>(i)].data.u64,
+                         events[static_cast<std::size_t>(i)].events);
     const TimePoint now = wall_now();
-    admit(now);
-    collect_finished();
+    accept_clients(now);
+    send_finished_results();
     turns.clear();
     for (auto& [number, client] : clients_) turns.push_back(&client);
     std::stable_sort(turns.begin(), turns.end(),
                      [](const Client* a, const Client* b) { return a->tokens > b->tokens; });
     for (Client* client : turns) serve(*client, now);
-    lease_.look(wall_now());
-    bury();
+    lease_.check(wall_now());
+    remove_clients();
   }
-  last_words();
+  flush_before_exit();
 }
 
 /// Until something has to be done that no descriptor tells of.
 int ControlSocket::wait_ms(TimePoint now) const {
-  TimePoint until = lease_.look_again_at();
-  if (admit_again_at_ > now) until = std::min(until, admit_again_at_);
+  TimePoint until = lease_.next_check_at();
+  if (accept_again_at_ > now) until = std::min(until, accept_again_at_);
   for (const auto& [number, client] : clients_) {
-    if (client.closing || client.out_bytes >= kMostUnread_bytes) continue;
-    if (client.no_more_input && !client.line_waits) continue;
+    if (client.close_after_flush || client.output_bytes >= kMaxUnsent_bytes) continue;
+    if (client.end_of_input && !client.has_complete_line) continue;
     if (client.tokens <= 0.0)
       until = std::min(until, now + from_seconds(-client.tokens / kLinesPerSecond));
-    else if (client.line_waits || client.hung_up)
+    else if (client.has_complete_line || client.disconnected)
       return 0;
   }
   if (until == TimePoint::max()) return -1;
@@ -146,10 +147,10 @@ int ControlSocket::wait_ms(TimePoint now) const {
       std::chrono::ceil<std::chrono::milliseconds>(std::max(until - now, Duration{0})).count());
 }
 
-void ControlSocket::hear(std::uint64_t who, std::uint32_t what) {
+void ControlSocket::handle_epoll_event(std::uint64_t who, std::uint32_t what) {
   if (who == kWake) {
     std::uint64_t ignored = 0;
-    [[maybe_unused]] const ssize_t got = ::read(wake_.get(), &ignored, sizeof ignored);
+    [[maybe_unused]] const ssize_t got = ::read(wake_fd_.get(), &ignored, sizeof ignored);
   }
   const auto found = clients_.find(who);
   if (found == clients_.end()) return;
@@ -157,26 +158,26 @@ void ControlSocket::hear(std::uint64_t who, std::uint32_t what) {
   if ((what & EPOLLIN) != 0) client.readable = true;
   // Whoever can say nothing more can give no sign of life: the hand is not kept until that is read.
   if ((what & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) {
-    client.half_closed = true;
-    lease_.hung_up(who);
+    client.write_side_closed = true;
+    lease_.client_lost(who);
   }
   if ((what & (EPOLLHUP | EPOLLERR)) == 0) return;
   // What it said before is still done, as far as its share goes; epoll would not stop telling meanwhile.
-  client.hung_up = true;
-  client.subscription.on = false;
+  client.disconnected = true;
+  client.subscription.active = false;
   epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, client.socket.get(), nullptr);
 }
 
-void ControlSocket::admit(TimePoint now) {
-  if (now < admit_again_at_) return;
+void ControlSocket::accept_clients(TimePoint now) {
+  if (now < accept_again_at_) return;
   for (int i = 0; i < kAdmitPerRound; ++i) {
     OwnedFd socket(::accept4(listening_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;
-      admit_again_at_ = now + kNoDescriptors;
+      accept_again_at_ = now + kNoDescriptors;
       return;
     }
-    const std::optional<Peer> peer = identify_(socket.get());
+    const std::optional<Peer> peer = identify_peer_(socket.get());
     const std::optional<Role> role = peer ? role_of(*peer, rules_) : std::nullopt;
     if (!role) {
       turn_away(
@@ -185,30 +186,31 @@ void ControlSocket::admit(TimePoint now) {
           "its administrator to add you to the one of its observers.");
       continue;
     }
-    if (clients_.size() >= kMostClients) make_room();
+    if (clients_.size() >= kMaxClients) evict_client();
     Client client;
-    client.number = ++last_number_;
+    client.number = ++last_client_number_;
     client.socket = std::move(socket);
     client.peer = *peer;
     client.role = *role;
-    client.refilled = client.last_heard = now;
-    client.told_epoll = EPOLLIN | EPOLLRDHUP;
+    client.tokens_refilled_at = client.last_received_at = now;
+    client.epoll_events = EPOLLIN | EPOLLRDHUP;
     epoll_event event{};
-    event.events = client.told_epoll;
+    event.events = client.epoll_events;
     event.data.u64 = client.number;
     if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, client.socket.get(), &event) != 0) continue;
     clients_.emplace(client.number, std::move(client));
   }
 }
 
-void ControlSocket::make_room() {
+void ControlSocket::evict_client() {
   std::map<uid_t, int> connections;
   for (const auto& [number, client] : clients_) ++connections[client.peer.uid];
   auto leaves = clients_.end();
   const auto before = [&](const Client& a, const Client& b) {
     const int of_a = connections[a.peer.uid], of_b = connections[b.peer.uid];
     if (of_a != of_b) return of_a > of_b;
-    return a.spoke != b.spoke ? !a.spoke : a.last_heard < b.last_heard;
+    return a.made_valid_request != b.made_valid_request ? !a.made_valid_request
+                                                        : a.last_received_at < b.last_received_at;
   };
   for (auto client = clients_.begin(); client != clients_.end(); ++client)
     if (!lease_.held_by(client->first) &&
@@ -220,93 +222,96 @@ void ControlSocket::make_room() {
 }
 
 /// Not before its share allows, nor before it has read what it asked for.
-bool ControlSocket::may_take(const Client& client) const noexcept {
-  return client.tokens > 0.0 && client.out_bytes < kMostUnread_bytes && !client.closing && !client.dead;
+bool ControlSocket::can_process_line(const Client& client) const noexcept {
+  return client.tokens > 0.0 && client.output_bytes < kMaxUnsent_bytes && !client.close_after_flush &&
+         !client.to_remove;
 }
 
 void ControlSocket::serve(Client& client, TimePoint now) {
-  client.tokens = std::min(kBurst_lines, client.tokens + kLinesPerSecond * seconds(now - client.refilled));
-  client.refilled = now;
-  if ((client.readable || client.hung_up) && !client.line_waits && may_take(client)) read(client, now);
-  take_lines(client);
-  tell_events(client);
+  client.tokens =
+      std::min(kBurst_lines, client.tokens + kLinesPerSecond * seconds(now - client.tokens_refilled_at));
+  client.tokens_refilled_at = now;
+  if ((client.readable || client.disconnected) && !client.has_complete_line && can_process_line(client))
+    read_input(client, now);
+  process_lines(client);
+  send_events(client);
   flush(client);
-  const bool done =
-      client.no_more_input && !client.line_waits && client.pending == 0 && !client.subscription.on;
-  if (client.out.empty() && (client.closing || done)) client.dead = true;
-  if (client.hung_up && (done || client.tokens <= 0.0)) client.dead = true;
-  if (!client.dead) want(client);
+  const bool done = client.end_of_input && !client.has_complete_line && client.pending_methods == 0 &&
+                    !client.subscription.active;
+  if (client.output.empty() && (client.close_after_flush || done)) client.to_remove = true;
+  if (client.disconnected && (done || client.tokens <= 0.0)) client.to_remove = true;
+  if (!client.to_remove) update_epoll_events(client);
 }
 
-void ControlSocket::read(Client& client, TimePoint now) {
+void ControlSocket::read_input(Client& client, TimePoint now) {
   client.readable = false;
   client.tokens -= kRead_lines;
   std::array<char, kReadPerRound_bytes> bytes;
   const ssize_t got = ::recv(client.socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
   if (got > 0) {
-    client.in.append(bytes.data(), static_cast<std::size_t>(got));
-    client.last_heard = now;
+    client.input.append(bytes.data(), static_cast<std::size_t>(got));
+    client.last_received_at = now;
   } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
-    client.no_more_input = true;
-    lease_.hung_up(client.number);
-    if (got < 0) client.dead = true;
+    client.end_of_input = true;
+    lease_.client_lost(client.number);
+    if (got < 0) client.to_remove = true;
   }
 }
 
 /// A few whole lines, if there are any.
-void ControlSocket::take_lines(Client& client) {
+void ControlSocket::process_lines(Client& client) {
   std::size_t begin = 0;
-  for (int lines = 0; lines < kLinesPerRound && may_take(client); ++lines) {
-    const std::size_t end = client.in.find('\n', begin);
+  for (int lines = 0; lines < kLinesPerRound && can_process_line(client); ++lines) {
+    const std::size_t end = client.input.find('\n', begin);
     if (end == std::string::npos) break;
     client.tokens -= cost_lines(end - begin);
-    take_line(client, std::string_view(client.in).substr(begin, end - begin));
+    process_line(client, std::string_view(client.input).substr(begin, end - begin));
     begin = end + 1;
   }
-  client.in.erase(0, begin);
-  const bool whole = client.in.find('\n') != std::string::npos;
-  client.line_waits = whole;
-  if (whole || client.in.size() <= kMaxLineBytes || client.closing) return;
+  client.input.erase(0, begin);
+  const bool whole = client.input.find('\n') != std::string::npos;
+  client.has_complete_line = whole;
+  if (whole || client.input.size() <= kMaxLineBytes || client.close_after_flush) return;
   // Nobody knows where its next line would begin.
-  send(client, error_line(nullptr, RpcError(RpcCode::no_json, "The line is longer than " +
-                                                                  std::to_string(kMaxLineBytes) +
-                                                                  " bytes, and the connection ends here; "
-                                                                  "send less at once.")));
-  client.closing = true;
-  client.in.clear();
+  queue_line(client, error_line(nullptr, RpcError(RpcCode::parse_error,
+                                                  "The line is longer than " + std::to_string(kMaxLineBytes) +
+                                                      " bytes, and the connection ends here; "
+                                                      "send less at once.")));
+  client.close_after_flush = true;
+  client.input.clear();
 }
 
-void ControlSocket::take_line(Client& client, std::string_view line) {
-  const auto read = read_request(line);
-  if (const auto* refused = std::get_if<RefusedLine>(&read))
-    return send(client, error_line(refused->id, refused->error));
+void ControlSocket::process_line(Client& client, std::string_view line) {
+  const auto read = parse_request(line);
+  if (const auto* refused = std::get_if<InvalidRequest>(&read))
+    return queue_line(client, error_line(refused->id, refused->error));
   const auto& request = std::get<RpcRequest>(read);
-  Caller caller{client.number, client.role, client.peer.text(), &client.subscription};
+  Caller caller{client.number, client.role, client.peer.description(), &client.subscription};
   try {
     const MethodRow& row = methods_.look_up(request, client.role);
-    client.spoke = true;
-    if (row.slow) return do_slowly(client, row, request, caller);
-    const Answer answer = MethodTable::run(row, request.params, caller);
+    client.made_valid_request = true;
+    if (row.slow) return run_slow_method(client, row, request, caller);
+    const MethodResult answer = MethodTable::run(row, request.params, caller);
     if (!request.wants_reply) return;
     OwnedFd fd;
     if (answer.fd >= 0) fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
-    send(client, reply_line(request.id, answer.result), std::move(fd));
+    queue_line(client, reply_line(request.id, answer.result), std::move(fd));
   } catch (const RpcError& error) {
-    if (request.wants_reply) send(client, error_line(request.id, error));
+    if (request.wants_reply) queue_line(client, error_line(request.id, error));
   }
 }
 
-void ControlSocket::do_slowly(Client& client, const MethodRow& row, const RpcRequest& request,
-                              const Caller& caller) {
-  if (client.pending > 0)
-    throw RpcError(RpcCode::not_now,
+void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const RpcRequest& request,
+                                    const Caller& caller) {
+  if (client.pending_methods > 0)
+    throw RpcError(RpcCode::invalid_state,
                    "Your last request of this kind is still under way; wait for its answer.");
   Caller away = caller;
   away.subscription = nullptr;
-  const bool posted = slow_work_->post([this, &row, request, away] {
+  const bool posted = worker_->post([this, &row, request, away] {
     Finished finished{away.client, {}, {}};
     try {
-      const Answer answer = MethodTable::run(row, request.params, away);
+      const MethodResult answer = MethodTable::run(row, request.params, away);
       if (answer.fd >= 0) finished.fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
       if (request.wants_reply) finished.line = reply_line(request.id, answer.result);
     } catch (const RpcError& error) {
@@ -316,14 +321,15 @@ void ControlSocket::do_slowly(Client& client, const MethodRow& row, const RpcReq
       const std::scoped_lock lock(finished_mutex_);
       finished_.push_back(std::move(finished));
     }
-    notify(wake_.get());
+    notify(wake_fd_.get());
   });
   if (!posted)
-    throw RpcError(RpcCode::not_now, "Others have asked for so much that takes long; try again in a moment.");
-  ++client.pending;
+    throw RpcError(RpcCode::invalid_state,
+                   "Others have asked for so much that takes long; try again in a moment.");
+  ++client.pending_methods;
 }
 
-void ControlSocket::collect_finished() {
+void ControlSocket::send_finished_results() {
   std::vector<Finished> finished;
   {
     const std::scoped_lock lock(finished_mutex_);
@@ -332,93 +338,94 @@ void ControlSocket::collect_finished() {
   for (Finished& one : finished) {
     const auto found = clients_.find(one.client);
     if (found == clients_.end()) continue;
-    --found->second.pending;
-    if (!one.line.empty()) send(found->second, std::move(one.line), std::move(one.fd));
+    --found->second.pending_methods;
+    if (!one.line.empty()) queue_line(found->second, std::move(one.line), std::move(one.fd));
   }
 }
 
 /// What it does not read stays in the feed, for as long as that keeps it.
-void ControlSocket::tell_events(Client& client) {
+void ControlSocket::send_events(Client& client) {
   Subscription& subscription = client.subscription;
-  if (!subscription.on || client.dead || client.out_bytes >= kMostUnread_bytes / 2) return;
-  EventFeed::Batch batch = feed_.since(subscription.next, subscription.names, kEventsPerRound_bytes);
+  if (!subscription.active || client.to_remove || client.output_bytes >= kMaxUnsent_bytes / 2) return;
+  EventFeed::Batch batch =
+      feed_.events_since(subscription.next_sequence, subscription.event_names, kEventsPerRound_bytes);
   if (batch.lost > 0)
-    send(client,
-         notification_line("event", {{"sequence", subscription.next + batch.lost - 1},
-                                     {"time_ns", wall_now().time_since_epoch().count()},
-                                     {"name", "lost"},
-                                     {"level", "warning"},
-                                     {"text", std::to_string(batch.lost) +
-                                                  " events were lost: they were not read in time; ask "
-                                                  "for the status"},
-                                     {"count", batch.lost}}));
-  subscription.next = batch.next;
-  subscription.behind = batch.more;
-  for (std::string& line : batch.lines) send(client, std::move(line));
+    queue_line(client,
+               notification_line("event", {{"sequence", subscription.next_sequence + batch.lost - 1},
+                                           {"time_ns", wall_now().time_since_epoch().count()},
+                                           {"name", "lost"},
+                                           {"level", "warning"},
+                                           {"text", std::to_string(batch.lost) +
+                                                        " events were lost: they were not read in time; ask "
+                                                        "for the status"},
+                                           {"count", batch.lost}}));
+  subscription.next_sequence = batch.next;
+  subscription.has_backlog = batch.more;
+  for (std::string& line : batch.lines) queue_line(client, std::move(line));
 }
 
-void ControlSocket::send(Client& client, std::string line, OwnedFd fd) {
-  client.out_bytes += line.size();
-  client.out.push_back({std::move(line), 0, std::move(fd)});
+void ControlSocket::queue_line(Client& client, std::string line, OwnedFd fd) {
+  client.output_bytes += line.size();
+  client.output.push_back({std::move(line), 0, std::move(fd)});
 }
 
 void ControlSocket::flush(Client& client) {
-  while (!client.out.empty() && !client.dead) {
-    Chunk& chunk = client.out.front();
+  while (!client.output.empty() && !client.to_remove) {
+    Chunk& chunk = client.output.front();
     const std::string_view rest = std::string_view(chunk.bytes).substr(chunk.sent);
     const ssize_t sent = send_some(client.socket.get(), rest, chunk.fd.get());
     if (sent < 0 && (errno == EAGAIN || errno == EINTR || errno == ENOBUFS || errno == ETOOMANYREFS)) return;
     if (sent < 0) {  // nobody is there to read it; what it said is still done
-      client.out.clear();
-      client.out_bytes = 0;
-      client.subscription.on = false;
-      if (!client.hung_up) client.dead = true;
+      client.output.clear();
+      client.output_bytes = 0;
+      client.subscription.active = false;
+      if (!client.disconnected) client.to_remove = true;
       return;
     }
     chunk.fd.reset();
     chunk.sent += static_cast<std::size_t>(sent);
     if (chunk.sent < chunk.bytes.size()) continue;
-    client.out_bytes -= chunk.bytes.size();
-    client.out.pop_front();
+    client.output_bytes -= chunk.bytes.size();
+    client.output.pop_front();
   }
 }
 
 /// Tells epoll what there is to wait for: nothing from who may not go on.
-void ControlSocket::want(Client& client) {
-  if (client.hung_up) return;
+void ControlSocket::update_epoll_events(Client& client) {
+  if (client.disconnected) return;
   std::uint32_t wanted = 0;
-  if (!client.no_more_input && !client.closing) {
-    if (!client.half_closed) wanted |= EPOLLRDHUP;
-    if (!client.line_waits && may_take(client)) wanted |= EPOLLIN;
+  if (!client.end_of_input && !client.close_after_flush) {
+    if (!client.write_side_closed) wanted |= EPOLLRDHUP;
+    if (!client.has_complete_line && can_process_line(client)) wanted |= EPOLLIN;
   }
   // No news comes of events that did not fit into this round: the next is asked for.
-  const bool behind = client.subscription.on && client.subscription.behind;
-  if (!client.out.empty() || behind) wanted |= EPOLLOUT;
-  if (wanted == client.told_epoll) return;
+  const bool behind = client.subscription.active && client.subscription.has_backlog;
+  if (!client.output.empty() || behind) wanted |= EPOLLOUT;
+  if (wanted == client.epoll_events) return;
   epoll_event event{};
   event.events = wanted;
   event.data.u64 = client.number;
   epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, client.socket.get(), &event);
-  client.told_epoll = wanted;
+  client.epoll_events = wanted;
 }
 
-void ControlSocket::bury() {
+void ControlSocket::remove_clients() {
   for (auto client = clients_.begin(); client != clients_.end();) {
-    if (!client->second.dead) {
+    if (!client->second.to_remove) {
       ++client;
       continue;
     }
-    lease_.hung_up(client->first);
+    lease_.client_lost(client->first);
     client = clients_.erase(client);
   }
 }
 
 /// The loop has ended, or is about to: those who listen are told so as far as they read it.
-void ControlSocket::last_words() {
-  lease_.give("loses it: the daemon ends");
+void ControlSocket::flush_before_exit() {
+  lease_.release("loses it: the daemon ends");
   feed_.drain();
   for (auto& [number, client] : clients_) {
-    tell_events(client);
+    send_events(client);
     flush(client);
   }
   clients_.clear();

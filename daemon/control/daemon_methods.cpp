@@ -29,7 +29,7 @@ Json times_json(const DurationHistogram& times) {
           {"max_us", us(times.max())}};
 }
 
-Json limits_json(const Plan& plan) {
+Json limits_json(const RunConfig& plan) {
   const WrenchLimits limits(plan.settings.limits, plan.profile);
   const bool watched = !plan.profile.has_output || plan.profile.watchdog_s > 0.0;
   return {{"max_force_N", limits.max_force_N()},
@@ -40,30 +40,31 @@ Json limits_json(const Plan& plan) {
           {"authority", watched ? 1.0 : ProfileDevice::kAuthorityWithoutWatchdog}};
 }
 
-Json state_json(const DaemonParts& parts, const FeedSnapshot& now) {
+Json state_json(const DaemonContext& parts, const FeedSnapshot& now) {
   const Lease& lease = parts.lease;
   Json armed_by = nullptr;
-  if (is_armed(now.state)) armed_by = lease.armed() && lease.holder() ? lease.holder()->who : "command line";
+  if (is_armed(now.state))
+    armed_by = lease.armed() && lease.holder() ? lease.holder()->identity : "command line";
   return {{"sequence", now.sequence},
           {"state", name(now.state)},
           {"cause", fault_json(now.cause)},
           {"armed_by", armed_by},
-          {"lease", lease.holder() ? Json(lease.holder()->who) : Json(nullptr)},
-          {"placing", now.placing}};
+          {"lease", lease.holder() ? Json(lease.holder()->identity) : Json(nullptr)},
+          {"placing", now.proxy_initialization}};
 }
 
 /// What a client hears first: the status, and all that happens after it.
-Answer subscribe(const MethodTable& table, const DaemonParts& parts, const Json& params,
-                 const Caller& caller) {
+MethodResult subscribe(const MethodTable& table, const DaemonContext& parts, const Json& params,
+                       const Caller& caller) {
   std::set<std::string> names;
   if (const auto events = params.find("events"); events != params.end())
     for (const Json& event : *events) {
       const auto name = event.get<std::string>();
       const auto& known = table.events();
       if (std::none_of(known.begin(), known.end(), [&](const EventRow& row) { return row.name == name; }))
-        throw RpcError(RpcCode::wrong_params, "There is no event '" + printable(name) +
-                                                  "'; method 'describe' lists them. Leave 'events' out to "
-                                                  "hear all.");
+        throw RpcError(RpcCode::invalid_params, "There is no event '" + printable(name) +
+                                                    "'; method 'describe' lists them. Leave 'events' out to "
+                                                    "hear all.");
       names.insert(name);
     }
   const Json status = status_json(parts);
@@ -72,92 +73,94 @@ Answer subscribe(const MethodTable& table, const DaemonParts& parts, const Json&
 }
 
 Lease::Holder as_holder(const Caller& caller) {
-  return {caller.client, caller.who};
+  return {caller.client, caller.identity};
 }
 
 /// That the caller holds the lease, or why it cannot do what it asks for.
 void check_holder(const Lease& lease, const Caller& caller) {
   if (lease.held_by(caller.client)) return;
   if (lease.holder())
-    throw RpcError(RpcCode::taken, "The lease is held by " + lease.holder()->who + ".",
-                   {{"holder", lease.holder()->who}});
-  throw RpcError(RpcCode::not_now,
+    throw RpcError(RpcCode::lease_held, "The lease is held by " + lease.holder()->identity + ".",
+                   {{"holder", lease.holder()->identity}});
+  throw RpcError(RpcCode::invalid_state,
                  "You do not hold the lease: take it with 'lease.take', and say 'beat' more often than every "
                  "0.1 s from then on.");
 }
 
-Answer take_lease(const DaemonParts& parts, const Json& params, const Caller& caller) {
+MethodResult take_lease(const DaemonContext& parts, const Json& params, const Caller& caller) {
   Lease& lease = parts.lease;
   const auto now = std::chrono::steady_clock::now();
   const bool from_other = params.value("from_other", false);
   if (from_other && caller.role < Role::administrator)
-    throw RpcError(RpcCode::not_allowed,
+    throw RpcError(RpcCode::permission_denied,
                    "Only administrators take the lease from another, and you are an " +
                        std::string(name(caller.role)) + "; ask for it without 'from_other'.",
                    {{"role", name(caller.role)}, {"needs", name(Role::administrator)}});
   if (lease.holder() && !lease.held_by(caller.client) && !from_other)
-    throw RpcError(RpcCode::taken,
-                   "The lease is held by " + lease.holder()->who +
+    throw RpcError(RpcCode::lease_held,
+                   "The lease is held by " + lease.holder()->identity +
                        "; wait until it gives it back, or have an administrator take it with 'from_other'.",
-                   {{"holder", lease.holder()->who}});
-  lease.take_over(as_holder(caller), now);
-  return Json{{"beat_within_s", seconds(kSilentClient)}};
+                   {{"holder", lease.holder()->identity}});
+  lease.preempt(as_holder(caller), now);
+  return Json{{"beat_within_s", seconds(kHeartbeatTimeout)}};
 }
 
 /// Whether a state allows a request, by the table of the state machine.
 void check_state(const ServoLoop& loop, Trigger trigger, const char* what) {
   const State state = loop.state();
   const Transition& row = transition(trigger, state);
-  if (row.leads) return;
-  throw RpcError(RpcCode::not_now,
-                 "It cannot be " + std::string(what) + " in state '" + name(state) + "': " + row.why + ".",
+  if (row.changes_state) return;
+  throw RpcError(RpcCode::invalid_state,
+                 "It cannot be " + std::string(what) + " in state '" + name(state) + "': " + row.reason + ".",
                  {{"state", name(state)}, {"cause", fault_json(loop.cause())}});
 }
 
-Answer arm(const DaemonParts& parts, const Caller& caller) {
+MethodResult arm(const DaemonContext& parts, const Caller& caller) {
   check_holder(parts.lease, caller);
-  check_state(parts.station.loop(), Trigger::arm, "armed");
+  check_state(parts.runtime.loop(), Trigger::arm, "armed");
   parts.lease.arm(std::chrono::steady_clock::now());
   return Json{{"asked", "arm"}};
 }
 
-Answer stop(const DaemonParts& parts, const Caller& caller) {
-  ServoLoop& loop = parts.station.loop();
+MethodResult stop(const DaemonContext& parts, const Caller& caller) {
+  ServoLoop& loop = parts.runtime.loop();
   const bool first = loop.state() != State::stopped;
   loop.stop();
   if (first)
-    parts.feed.tell("log", EventLevel::warning, "stop: asked for by " + caller.who, {{"by", caller.who}});
+    parts.feed.emit("log", EventLevel::warning, "stop: asked for by " + caller.identity,
+                    {{"by", caller.identity}});
   return Json{{"asked", "stop"}};
 }
 
-Answer acknowledge(const DaemonParts& parts, const Caller& caller) {
-  ServoLoop& loop = parts.station.loop();
+MethodResult acknowledge(const DaemonContext& parts, const Caller& caller) {
+  ServoLoop& loop = parts.runtime.loop();
   check_state(loop, Trigger::acknowledge, "acknowledged");
   loop.acknowledge();
-  parts.feed.tell("log", EventLevel::info, "acknowledged by " + caller.who, {{"by", caller.who}});
+  parts.feed.emit("log", EventLevel::info, "acknowledged by " + caller.identity, {{"by", caller.identity}});
   return Json{{"asked", "acknowledge"}};
 }
 
-Answer devices() {
+MethodResult devices() {
   const KnownProfiles known = known_profiles(SearchPath());
   const std::vector<UsbDevice> plugged = list_usb_devices();
   const DeviceChoice choice = choose_device(plugged, known.profiles, {});
   Json list = Json::array();
   for (std::size_t i = 0; i < plugged.size(); ++i) {
-    const bool picked = choice.pick && choice.pick->device == i;
-    list.push_back({{"device", describe(plugged[i])},
-                    {"product", plain(plugged[i].product_name)},
-                    {"profile", picked ? Json(known.profiles[choice.pick->profile].name) : Json(nullptr)},
-                    {"why_not", choice.why_not[i]}});
+    const bool picked = choice.selection && choice.selection->device == i;
+    list.push_back(
+        {{"device", describe(plugged[i])},
+         {"product", to_printable(plugged[i].product_name)},
+         {"profile", picked ? Json(known.profiles[choice.selection->profile].name) : Json(nullptr)},
+         {"why_not", choice.rejections[i]}});
   }
   return Json{{"devices", list}, {"refused_profiles", known.refused}};
 }
 
 }  // namespace
 
-Json status_json(const DaemonParts& parts) {
-  const Plan& plan = parts.station.plan();
-  const ServoLoop& loop = parts.station.loop();
+Json status_json(const DaemonContext& parts) {
+  const RunConfig& plan = parts.runtime.config();
+  const ServoLoop& loop = parts.runtime.loop();
   const LoopTiming& timing = loop.timing();
   parts.feed.drain();  // so that it is as of now
   const FeedSnapshot now = parts.feed.snapshot();
@@ -169,21 +172,21 @@ Json status_json(const DaemonParts& parts) {
         {{"profile", plan.profile.name},
          {"present", now.state != State::disconnected && now.state != State::shutdown},
          {"simulated", plan.simulated}}},
-       {"scene", {{"file", plan.scene.file.string()}, {"obstacles", parts.station.scene().obstacle_count()}}},
+       {"scene", {{"file", plan.scene.file.string()}, {"obstacles", parts.runtime.scene().obstacle_count()}}},
        {"rates", {{"rate_Hz", plan.settings.servo.rate_Hz}}},
        {"limits", limits_json(plan)},
-       {"stiffness_share", now.stiffness_share},
+       {"stiffness_share", now.stiffness_scale},
        {"timing",
         {{"tick", times_json(timing.tick)},
          {"wake_latency", times_json(timing.wake_latency)},
          {"overruns", timing.overruns.load()},
-         {"skipped", timing.skipped.load()}}},
+         {"skipped", timing.skipped_ticks.load()}}},
        {"dropped_events", loop.dropped_events()}});
-  for (const auto& [name, row] : parts.more) status[name] = row();
+  for (const auto& [name, row] : parts.status_sections) status[name] = row();
   return status;
 }
 
-void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
+void add_daemon_methods(MethodTable& table, const DaemonContext& parts) {
   for (const EventRow& row : feed_events()) table.add(row);
   table.add(EventRow{"lease", "Somebody has the lease now, or nobody. holder: who, or null."});
   table.add(EventRow{"lost",
@@ -195,14 +198,14 @@ void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
                       {},
                       "Version and protocol, every method with its role and parameters, every event, every "
                       "error.",
-                      [&table](const Json&, const Caller&) { return Answer(table.describe()); }});
+                      [&table](const Json&, const Caller&) { return MethodResult(table.describe()); }});
   table.add(
       MethodRow{"status",
                 Role::observer,
                 {},
                 "State and cause, device, limits, lease, and the times that ticks take. It is as of the "
                 "event with the number 'sequence'.",
-                [parts](const Json&, const Caller&) { return Answer(status_json(parts)); }});
+                [parts](const Json&, const Caller&) { return MethodResult(status_json(parts)); }});
   table.add(
       MethodRow{"subscribe",
                 Role::observer,
@@ -215,7 +218,7 @@ void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
   table.add(
       MethodRow{"unsubscribe", Role::observer, {}, "No more events.", [](const Json&, const Caller& caller) {
                   *caller.subscription = {};
-                  return Answer(Json::object());
+                  return MethodResult(Json::object());
                 }});
   table.add(
       MethodRow{"devices",
@@ -244,8 +247,8 @@ void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
                       "Gives the lease back; what it armed is disarmed.",
                       [parts](const Json&, const Caller& caller) {
                         check_holder(parts.lease, caller);
-                        parts.lease.give("gave it back");
-                        return Answer(Json::object());
+                        parts.lease.release("gave it back");
+                        return MethodResult(Json::object());
                       }});
   table.add(MethodRow{"beat",
                       Role::operator_,
@@ -253,8 +256,8 @@ void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
                       "Its holder's sign of life. Send it without an id, so that nothing is answered.",
                       [parts](const Json&, const Caller& caller) {
                         check_holder(parts.lease, caller);
-                        parts.lease.beat(std::chrono::steady_clock::now());
-                        return Answer(Json::object());
+                        parts.lease.heartbeat(std::chrono::steady_clock::now());
+                        return MethodResult(Json::object());
                       }});
   table.add(
       MethodRow{"arm",
@@ -268,8 +271,8 @@ void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
                       {},
                       "The force fades within 100 ms, whoever armed. The lease stays where it is.",
                       [parts](const Json&, const Caller&) {
-                        parts.station.loop().disarm();
-                        return Answer(Json{{"asked", "disarm"}});
+                        parts.runtime.loop().disarm();
+                        return MethodResult(Json{{"asked", "disarm"}});
                       }});
   table.add(MethodRow{"acknowledge",
                       Role::operator_,
@@ -283,8 +286,8 @@ void add_daemon_methods(MethodTable& table, const DaemonParts& parts) {
                       "The place of the tool is looked for anew; there is no force until it is found, and a "
                       "soft start.",
                       [parts](const Json&, const Caller&) {
-                        parts.station.loop().start_over();
-                        return Answer(Json{{"asked", "start_over"}});
+                        parts.runtime.loop().reinitialize_proxy();
+                        return MethodResult(Json{{"asked", "start_over"}});
                       }});
 }
 

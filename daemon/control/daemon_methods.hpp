@@ -12,25 +12,25 @@
 
 namespace wrenchd {
 
-class Station;
+class Runtime;
 
 /// What other parts of the daemon add to `status`, by its name there. Each is asked on the control thread,
 /// and must not wait.
-using StatusRows = std::map<std::string, std::function<Json()>>;
+using StatusSections = std::map<std::string, std::function<Json()>>;
 
 /// What the methods of the daemon itself work on.
-struct DaemonParts {
-  Station& station;
+struct DaemonContext {
+  Runtime& runtime;
   EventFeed& feed;
   Lease& lease;
-  const StatusRows& more;
+  const StatusSections& status_sections;
 };
 
 /// The rows of what every daemon answers: describe, status, devices, events, lease, arming and stopping; and
 /// the rows of its events. All must outlive the table.
-void add_daemon_methods(MethodTable& table, const DaemonParts& parts);
+void add_daemon_methods(MethodTable& table, const DaemonContext& parts);
 
 /// What `status` answers. From a method that is not slow: the lease belongs to that thread.
-Json status_json(const DaemonParts& parts);
+Json status_json(const DaemonContext& parts);
 
 }  // namespace wrenchd

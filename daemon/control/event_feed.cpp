@@ -18,20 +18,20 @@ constexpr auto kPause = std::chrono::milliseconds(10);
 /// Whether a fault latches, or lets go of the hand.
 bool is_grave(Fault fault) {
   const Trigger trigger = fault_row(fault).trigger;
-  return trigger == Trigger::hard_fault || trigger == Trigger::failed || trigger == Trigger::stop ||
-         trigger == Trigger::device_gone;
+  return trigger == Trigger::hard_fault || trigger == Trigger::self_test_failed || trigger == Trigger::stop ||
+         trigger == Trigger::device_disconnected;
 }
 
 EventLevel level_of(const Event& event) {
   switch (event.kind) {
-    case Event::Kind::fault:
+    case Event::Kind::fault_raised:
       return is_grave(static_cast<Fault>(event.detail)) ? EventLevel::error : EventLevel::warning;
-    case Event::Kind::state:
-    case Event::Kind::placing:
-    case Event::Kind::placed:
+    case Event::Kind::state_changed:
+    case Event::Kind::proxy_search_started:
+    case Event::Kind::proxy_found:
     case Event::Kind::released:
-    case Event::Kind::changing:
-    case Event::Kind::changed:
+    case Event::Kind::crossfade_started:
+    case Event::Kind::rendering_changed:
       return EventLevel::info;
     default:
       return EventLevel::warning;
@@ -54,10 +54,10 @@ spdlog::level::level_enum log_level(EventLevel level) {
 std::string measured(Fault fault, double value) {
   switch (fault) {
     case Fault::tick_late:
-    case Fault::loop_stopped:
-    case Fault::answer_late:
+    case Fault::loop_stalled:
+    case Fault::wrench_late:
       return fmt::format(" ({:.1f} ms)", 1e3 * value);
-    case Fault::test_rate:
+    case Fault::self_test_rate:
       return fmt::format(" ({:.0f} a second)", value);
     default:
       return {};
@@ -70,26 +70,26 @@ Fault cause_of(const Event& event) {
 }
 
 /// The name that programs know it by.
-std::string name_of(Event::Kind kind) {
+std::string generated_mesh_name(Event::Kind kind) {
   switch (kind) {
-    case Event::Kind::state:
+    case Event::Kind::state_changed:
       return "state";
-    case Event::Kind::fault:
+    case Event::Kind::fault_raised:
       return "fault";
-    case Event::Kind::stiffness:
-    case Event::Kind::unbounded:
+    case Event::Kind::stiffness_scaled:
+    case Event::Kind::stability_bound_unknown:
       return "stiffness";
-    case Event::Kind::refused:
+    case Event::Kind::arming_refused:
       return "refused";
-    case Event::Kind::no_admissible_pose:
-    case Event::Kind::placing:
-    case Event::Kind::placed:
-    case Event::Kind::nowhere:
+    case Event::Kind::projection_infeasible:
+    case Event::Kind::proxy_search_started:
+    case Event::Kind::proxy_found:
+    case Event::Kind::proxy_search_failed:
       return "placing";
     case Event::Kind::released:
       return "released";
-    case Event::Kind::changing:
-    case Event::Kind::changed:
+    case Event::Kind::crossfade_started:
+    case Event::Kind::rendering_changed:
       return "scene";
   }
   return "log";
@@ -97,27 +97,27 @@ std::string name_of(Event::Kind kind) {
 
 Json fields_of(const Event& event) {
   switch (event.kind) {
-    case Event::Kind::state:
+    case Event::Kind::state_changed:
       return {{"state", name(static_cast<State>(event.detail))}, {"cause", fault_json(cause_of(event))}};
-    case Event::Kind::fault:
+    case Event::Kind::fault_raised:
       return {{"fault", fault_json(static_cast<Fault>(event.detail))}, {"value", event.value}};
-    case Event::Kind::stiffness:
+    case Event::Kind::stiffness_scaled:
       return {{"share", event.value}};
-    case Event::Kind::unbounded:
+    case Event::Kind::stability_bound_unknown:
       return {{"share", nullptr}};
-    case Event::Kind::refused:
+    case Event::Kind::arming_refused:
       return {{"state", name(static_cast<State>(event.detail))}};
-    case Event::Kind::no_admissible_pose:
+    case Event::Kind::projection_infeasible:
       return {{"outcome", "no_admissible_pose"}};
-    case Event::Kind::placing:
+    case Event::Kind::proxy_search_started:
       return {{"outcome", "seeking"}};
-    case Event::Kind::placed:
+    case Event::Kind::proxy_found:
       return {{"outcome", "placed"}, {"distance_m", event.value}};
-    case Event::Kind::nowhere:
+    case Event::Kind::proxy_search_failed:
       return {{"outcome", "nowhere"}};
-    case Event::Kind::changing:
-    case Event::Kind::changed:
-      return {{"rendering", event.detail}, {"felt", event.kind == Event::Kind::changed}};
+    case Event::Kind::crossfade_started:
+    case Event::Kind::rendering_changed:
+      return {{"rendering", event.detail}, {"felt", event.kind == Event::Kind::rendering_changed}};
     case Event::Kind::released:
       break;
   }
@@ -126,14 +126,14 @@ Json fields_of(const Event& event) {
 
 /// What the event changes in what is known.
 void apply(FeedSnapshot& now, const Event& event) {
-  if (event.kind == Event::Kind::state) {
+  if (event.kind == Event::Kind::state_changed) {
     now.state = static_cast<State>(event.detail);
     now.cause = cause_of(event);
-    if (now.state == State::self_test) now.stiffness_share = 1.0;  // it is measured anew
+    if (now.state == State::self_test) now.stiffness_scale = 1.0;  // it is measured anew
   }
-  if (event.kind == Event::Kind::stiffness) now.stiffness_share = event.value;
-  if (name_of(event.kind) == "placing" && event.kind != Event::Kind::no_admissible_pose)
-    now.placing = fields_of(event)["outcome"].get<std::string>();
+  if (event.kind == Event::Kind::stiffness_scaled) now.stiffness_scale = event.value;
+  if (generated_mesh_name(event.kind) == "placing" && event.kind != Event::Kind::projection_infeasible)
+    now.proxy_initialization = fields_of(event)["outcome"].get<std::string>();
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ const char* name(EventLevel level) noexcept {
 Json fault_json(Fault fault) {
   if (fault == Fault::none) return nullptr;
   const FaultRow& row = fault_row(fault);
-  return {{"name", row.name}, {"sentence", row.sentence}, {"cure", row.cure}};
+  return {{"name", row.name}, {"sentence", row.message}, {"cure", row.cure}};
 }
 
 std::span<const EventRow> feed_events() {
@@ -182,39 +182,39 @@ std::span<const EventRow> feed_events() {
 
 std::string to_text(const Event& event) {
   switch (event.kind) {
-    case Event::Kind::state:
+    case Event::Kind::state_changed:
       return fmt::format("state: {}", name(static_cast<State>(event.detail)));
-    case Event::Kind::fault: {
+    case Event::Kind::fault_raised: {
       const auto fault = static_cast<Fault>(event.detail);
       const FaultRow& row = fault_row(fault);
-      return fmt::format("{}: {}{}; {}", row.name, row.sentence, measured(fault, event.value), row.cure);
+      return fmt::format("{}: {}{}; {}", row.name, row.message, measured(fault, event.value), row.cure);
     }
-    case Event::Kind::stiffness:
+    case Event::Kind::stiffness_scaled:
       return fmt::format(
           "the device bears {:.0f} % of the stiffness that is asked for, at the rate and delay measured: it "
           "is "
           "scaled; lower it in [wrench], or state more damping in the profile if it has more",
           100.0 * event.value);
-    case Event::Kind::unbounded:
+    case Event::Kind::stability_bound_unknown:
       return "the profile states no damping: nobody knows how stiff a wall the device bears; measure it, and "
              "state "
              "damping_N_s_per_m and damping_Nm_s_per_rad";
-    case Event::Kind::refused:
-      return fmt::format("not armed: {}", transition(Trigger::arm, static_cast<State>(event.detail)).why);
-    case Event::Kind::no_admissible_pose:
+    case Event::Kind::arming_refused:
+      return fmt::format("not armed: {}", transition(Trigger::arm, static_cast<State>(event.detail)).reason);
+    case Event::Kind::projection_infeasible:
       return "no admissible pose near the hand: the obstacles leave no room; the proxy stays where it was";
-    case Event::Kind::placing:
+    case Event::Kind::proxy_search_started:
       return "placing: the admissible pose nearest to the hand is looked for; zero wrench until it is found";
-    case Event::Kind::placed:
+    case Event::Kind::proxy_found:
       return fmt::format("placed {:.1f} mm from the hand", 1e3 * event.value);
-    case Event::Kind::nowhere:
+    case Event::Kind::proxy_search_failed:
       return "no admissible pose was found: the tool does not fit in where the hand is; zero wrench, and it "
              "is looked for again";
     case Event::Kind::released:
       return "the hand is released: zero wrench, motors off";
-    case Event::Kind::changing:
+    case Event::Kind::crossfade_started:
       return fmt::format("rendering {} begins to take the place of the one before", event.detail);
-    case Event::Kind::changed:
+    case Event::Kind::rendering_changed:
       return fmt::format("rendering {} is felt from now on", event.detail);
   }
   return "unknown event";
@@ -234,107 +234,108 @@ EventFeed::~EventFeed() {
   thread_.join();
 }
 
-void EventFeed::tell(const std::string& name, EventLevel level, const std::string& text, const Json& fields) {
+void EventFeed::emit(const std::string& name, EventLevel level, const std::string& text, const Json& fields) {
   const std::scoped_lock lock(mutex_);
-  keep(std::chrono::steady_clock::now(), name, level, text, fields);
+  append(std::chrono::steady_clock::now(), name, level, text, fields);
 }
 
 /// With the mutex held, so that what an event changes is known with its number and not before.
-void EventFeed::keep(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
-                     const Json& fields) {
-  Json params = {{"sequence", ++now_.sequence},
+void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
+                       const Json& fields) {
+  Json params = {{"sequence", ++snapshot_.sequence},
                  {"time_ns", at.time_since_epoch().count()},
                  {"name", name},
                  {"level", wrenchd::name(level)},
                  {"text", text}};
   for (const auto& [key, value] : fields.items()) params[key] = value;
-  kept_.push_back({name, notification_line("event", params)});
-  if (kept_.size() > kKept) kept_.pop_front();
+  history_.push_back({name, notification_line("event", params)});
+  if (history_.size() > kHistorySize) history_.pop_front();
   spdlog::log(log_level(level), "{}", text);
-  if (wake_ < 0) return;
+  if (wake_fd_ < 0) return;
   const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(wake_, &one, sizeof one);  // full is awake
+  [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof one);  // full is awake
 }
 
-void EventFeed::keep_faults_by(KeptIn kept_in) {
-  const std::scoped_lock draining(draining_);
-  kept_in_ = std::move(kept_in);
+void EventFeed::set_fault_recorder(RecordFault kept_in) {
+  const std::scoped_lock draining(drain_mutex_);
+  record_fault_ = std::move(kept_in);
 }
 
-void EventFeed::take(const Event& event) {
+void EventFeed::publish(const Event& event) {
   const auto fault = static_cast<Fault>(event.detail);
   std::string kept_in;
-  if (event.kind == Event::Kind::fault && is_grave(fault) && kept_in_) kept_in = kept_in_(fault, event.at);
+  if (event.kind == Event::Kind::fault_raised && is_grave(fault) && record_fault_)
+    kept_in = record_fault_(fault, event.at);
   const std::scoped_lock lock(mutex_);
   const JournalFields fields(journal_fields(event));
-  const State from = now_.state;
-  apply(now_, event);
+  const State from = snapshot_.state;
+  apply(snapshot_, event);
   Json fields_told = fields_of(event);
   std::string text = to_text(event);
   if (!kept_in.empty()) {
     fields_told["recording"] = kept_in;
     text += "; what led to it: " + kept_in;
   }
-  keep(event.at, name_of(event.kind), level_of(event), text, fields_told);
-  if (event.kind == Event::Kind::state) keep_device(event, from);
+  append(event.at, generated_mesh_name(event.kind), level_of(event), text, fields_told);
+  if (event.kind == Event::Kind::state_changed) append_device_event(event, from);
 }
 
 /// That a device came or went is told by the states it leads to, whatever link it is on.
-void EventFeed::keep_device(const Event& event, State from) {
+void EventFeed::append_device_event(const Event& event, State from) {
   const auto to = static_cast<State>(event.detail);
   if (from == State::disconnected && to != State::shutdown) {
-    keep(event.at, "device", EventLevel::info,
-         device_was_there_ ? "the device is back" : "the device is there",
-         {{"present", true}, {"again", device_was_there_}});
-    device_was_there_ = true;
+    append(event.at, "device", EventLevel::info,
+           device_was_present_ ? "the device is back" : "the device is there",
+           {{"present", true}, {"again", device_was_present_}});
+    device_was_present_ = true;
   } else if (to == State::disconnected) {
-    keep(event.at, "device", EventLevel::warning, "the device is gone",
-         {{"present", false}, {"again", device_was_there_}});
+    append(event.at, "device", EventLevel::warning, "the device is gone",
+           {{"present", false}, {"again", device_was_present_}});
   }
 }
 
 void EventFeed::drain() {
-  const std::scoped_lock draining(draining_);
+  const std::scoped_lock draining(drain_mutex_);
   Event event;
-  while (loop_.events().pop(event)) take(event);
+  while (loop_.events().pop(event)) publish(event);
   const std::uint64_t dropped = loop_.dropped_events();
-  if (dropped == dropped_said_) return;
+  if (dropped == dropped_reported_) return;
   const std::scoped_lock lock(mutex_);
-  now_.state = loop_.state();
-  now_.cause = loop_.cause();
-  keep(std::chrono::steady_clock::now(), "state", EventLevel::warning,
-       fmt::format("{} events were dropped: the log fell behind; state: {}", dropped - dropped_said_,
-                   wrenchd::name(now_.state)),
-       {{"state", wrenchd::name(now_.state)}, {"cause", fault_json(now_.cause)}});
-  dropped_said_ = dropped;
+  snapshot_.state = loop_.state();
+  snapshot_.cause = loop_.cause();
+  append(std::chrono::steady_clock::now(), "state", EventLevel::warning,
+         fmt::format("{} events were dropped: the log fell behind; state: {}", dropped - dropped_reported_,
+                     wrenchd::name(snapshot_.state)),
+         {{"state", wrenchd::name(snapshot_.state)}, {"cause", fault_json(snapshot_.cause)}});
+  dropped_reported_ = dropped;
 }
 
 FeedSnapshot EventFeed::snapshot() const {
   const std::scoped_lock lock(mutex_);
-  return now_;
+  return snapshot_;
 }
 
-EventFeed::Batch EventFeed::since(std::uint64_t next, const std::set<std::string>& names,
-                                  std::size_t max_bytes) const {
+EventFeed::Batch EventFeed::events_since(std::uint64_t next, const std::set<std::string>& names,
+                                         std::size_t max_bytes) const {
   const std::scoped_lock lock(mutex_);
-  const std::uint64_t first = now_.sequence + 1 - kept_.size();
+  const std::uint64_t first = snapshot_.sequence + 1 - history_.size();
   Batch batch;
   if (next < first) batch.lost = first - next;
   batch.next = next + batch.lost;
-  for (std::size_t bytes = 0; batch.next <= now_.sequence; ++batch.next) {
-    const Kept& event = kept_[batch.next - first];
+  for (std::size_t bytes = 0; batch.next <= snapshot_.sequence; ++batch.next) {
+    const StoredEvent& event = history_[batch.next - first];
     if (!names.empty() && !names.contains(event.name)) continue;
     if (bytes > 0 && bytes + event.line.size() > max_bytes) break;
     bytes += event.line.size();
     batch.lines.push_back(event.line);
   }
-  batch.more = batch.next <= now_.sequence;
+  batch.more = batch.next <= snapshot_.sequence;
   return batch;
 }
 
-void EventFeed::wake(int eventfd) {
+void EventFeed::set_wake_fd(int eventfd) {
   const std::scoped_lock lock(mutex_);
-  wake_ = eventfd;
+  wake_fd_ = eventfd;
 }
 
 }  // namespace wrenchd

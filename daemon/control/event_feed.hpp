@@ -39,8 +39,8 @@ struct FeedSnapshot {
   std::uint64_t sequence = 0;  ///< of the last event that is in it; 0: none yet
   State state = State::disconnected;
   Fault cause = Fault::none;
-  std::string placing = "unknown";  ///< "seeking", "placed", "nowhere"
-  double stiffness_share = 1.0;     ///< of the spring asked for that the device bears
+  std::string proxy_initialization = "unknown";  ///< "seeking", "placed", "nowhere"
+  double stiffness_scale = 1.0;                  ///< of the spring asked for that the device bears
 };
 
 /// News of the daemon: each gets a sequence number, is logged, and is kept for a while for whoever listens.
@@ -55,14 +55,14 @@ class EventFeed {
   EventFeed& operator=(const EventFeed&) = delete;
 
   /// fields: an object; its members are added to those that every event has.
-  void tell(const std::string& name, EventLevel level, const std::string& text,
+  void emit(const std::string& name, EventLevel level, const std::string& text,
             const Json& fields = Json::object());
 
   /// Asked about each fault that latches or lets go of the hand, before it is told: the file that will show
   /// what led to it, which the event then names; empty: none. From the feed's thread; must not come back
   /// here.
-  using KeptIn = std::function<std::string(Fault fault, TimePoint at)>;
-  void keep_faults_by(KeptIn kept_in);
+  using RecordFault = std::function<std::string(Fault fault, TimePoint at)>;
+  void set_fault_recorder(RecordFault kept_in);
 
   /// Takes what is in the servo thread's ring now. Any thread but the servo's.
   void drain();
@@ -76,35 +76,35 @@ class EventFeed {
     bool more = false;               ///< there was no room for all
   };
   /// Events from that sequence number on, of these names (none given: all), until they are max_bytes long.
-  Batch since(std::uint64_t next, const std::set<std::string>& names, std::size_t max_bytes) const;
+  Batch events_since(std::uint64_t next, const std::set<std::string>& names, std::size_t max_bytes) const;
 
   /// An eventfd that is written to with each event; -1: nobody listens. Must stay open until it is unset.
-  void wake(int eventfd);
+  void set_wake_fd(int eventfd);
 
   /// How many are kept.
-  static constexpr std::size_t kKept = 1024;
+  static constexpr std::size_t kHistorySize = 1024;
 
  private:
-  struct Kept {
+  struct StoredEvent {
     std::string name;
     std::string line;
   };
 
-  void take(const Event& event);
-  void keep(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
-            const Json& fields);
-  void keep_device(const Event& event, State from);
+  void publish(const Event& event);
+  void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
+              const Json& fields);
+  void append_device_event(const Event& event, State from);
 
   ServoLoop& loop_;
-  std::mutex draining_;  ///< the ring has one reader at a time
-  std::uint64_t dropped_said_ = 0;
-  bool device_was_there_ = false;
-  KeptIn kept_in_;
+  std::mutex drain_mutex_;  ///< the ring has one reader at a time
+  std::uint64_t dropped_reported_ = 0;
+  bool device_was_present_ = false;
+  RecordFault record_fault_;
 
-  mutable std::mutex mutex_;  ///< of all that follows
-  std::deque<Kept> kept_;     ///< the last is the one of now_.sequence
-  FeedSnapshot now_;
-  int wake_ = -1;
+  mutable std::mutex mutex_;         ///< of all that follows
+  std::deque<StoredEvent> history_;  ///< the last is the one of now_.sequence
+  FeedSnapshot snapshot_;
+  int wake_fd_ = -1;
 
   std::jthread thread_;  ///< last: it uses all of the above
 };

@@ -105,29 +105,31 @@ std::string line_of(const Json& object) {
 
 }  // namespace
 
-std::variant<RpcRequest, RefusedLine> read_request(std::string_view line) {
+std::variant<RpcRequest, InvalidRequest> parse_request(std::string_view line) {
   if (const std::string wrong = wrong_with(line); !wrong.empty())
-    return RefusedLine{nullptr, RpcError(RpcCode::no_json, "The line was not understood: " + wrong + ".")};
+    return InvalidRequest{nullptr,
+                          RpcError(RpcCode::parse_error, "The line was not understood: " + wrong + ".")};
   Json object = Json::parse(line, nullptr, false);
   if (object.is_array())
-    return RefusedLine{
-        nullptr, RpcError(RpcCode::no_request, "Batches are not taken; send each request on its own line.")};
+    return InvalidRequest{nullptr, RpcError(RpcCode::invalid_request,
+                                            "Batches are not taken; send each request on its own line.")};
   if (!object.is_object())
-    return RefusedLine{nullptr, RpcError(RpcCode::no_request,
-                                         "A request is an object, as in "
-                                         "{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"describe\"}.")};
+    return InvalidRequest{nullptr, RpcError(RpcCode::invalid_request,
+                                            "A request is an object, as in "
+                                            "{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"describe\"}.")};
   RpcRequest request;
   const auto id = object.find("id");
   request.wants_reply = id != object.end();
   if (request.wants_reply && is_id(*id)) request.id = *id;
   if (const std::string wrong = wrong_with(object); !wrong.empty())
-    return RefusedLine{request.id, RpcError(RpcCode::no_request, wrong.ends_with('?') ? wrong : wrong + ".")};
+    return InvalidRequest{request.id,
+                          RpcError(RpcCode::invalid_request, wrong.ends_with('?') ? wrong : wrong + ".")};
   request.method = object["method"].get<std::string>();
   const auto params = object.find("params");
   if (params == object.end()) return request;
   if (!params->is_object())
-    return RefusedLine{request.id, RpcError(RpcCode::wrong_params,
-                                            "Parameters have names: params is an object, or left out.")};
+    return InvalidRequest{request.id, RpcError(RpcCode::invalid_params,
+                                               "Parameters have names: params is an object, or left out.")};
   request.params = std::move(*params);
   return request;
 }

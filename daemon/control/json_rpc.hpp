@@ -23,15 +23,15 @@ inline constexpr std::size_t kMaxIdBytes = 128;                       ///< of an
 
 /// The numbers of JSON-RPC 2.0, and ours.
 enum class RpcCode : int {
-  no_json = -32700,
-  no_request = -32600,
-  no_such_method = -32601,
-  wrong_params = -32602,
-  internal = -32603,
-  not_allowed = -32001,  ///< the role is too low
-  not_now = -32002,      ///< the state does not allow it
-  taken = -32003,        ///< somebody else holds the lease
-  refused = -32004,      ///< what it names, a file or a place in a scene, is not as it has to be
+  parse_error = -32700,
+  invalid_request = -32600,
+  method_not_found = -32601,
+  invalid_params = -32602,
+  internal_error = -32603,
+  permission_denied = -32001,  ///< the role is too low
+  invalid_state = -32002,      ///< the state does not allow it
+  lease_held = -32003,         ///< somebody else holds the lease
+  rejected = -32004,           ///< what it names, a file or a place in a scene, is not as it has to be
 };
 
 /// Why a request is not done: what() is a whole sentence that says what to do.
@@ -56,14 +56,14 @@ struct RpcRequest {
 };
 
 /// A line that is no request.
-struct RefusedLine {
+struct InvalidRequest {
   Json id;  ///< the line's, where that much can be told; else null
   RpcError error;
 };
 
 /// What a line without its '\n' says. Never throws for what stands in it: no JSON, bytes that are no UTF-8,
 /// zero bytes, the same name twice, too deep, too long, another version, a batch, unknown members.
-std::variant<RpcRequest, RefusedLine> read_request(std::string_view line);
+std::variant<RpcRequest, InvalidRequest> parse_request(std::string_view line);
 
 /// Lines to send, with their '\n'. Bytes of a text that are no UTF-8 are replaced.
 std::string reply_line(const Json& id, const Json& result);

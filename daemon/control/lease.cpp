@@ -8,65 +8,65 @@ namespace wrenchd {
 namespace {
 
 Json holder_json(const std::optional<Lease::Holder>& holder) {
-  return {{"holder", holder ? Json(holder->who) : Json(nullptr)}};
+  return {{"holder", holder ? Json(holder->identity) : Json(nullptr)}};
 }
 
 }  // namespace
 
-void Lease::take(const Holder& client, TimePoint now) {
+void Lease::acquire(const Holder& client, TimePoint now) {
   const bool again = held_by(client.client);
   holder_ = client;
-  beat(now);
+  heartbeat(now);
   if (again) return;
   armed_ = false;
-  feed_.tell("lease", EventLevel::info, "lease: " + client.who + " has it", holder_json(holder_));
+  feed_.emit("lease", EventLevel::info, "lease: " + client.identity + " has it", holder_json(holder_));
 }
 
-void Lease::take_over(const Holder& client, TimePoint now) {
+void Lease::preempt(const Holder& client, TimePoint now) {
   if (holder_ && !held_by(client.client)) {
     if (armed_) loop_.disarm();
-    end(EventLevel::warning, "lease: " + client.who + " takes it from " + holder_->who);
+    end(EventLevel::warning, "lease: " + client.identity + " takes it from " + holder_->identity);
   }
-  take(client, now);
+  acquire(client, now);
 }
 
-void Lease::give(const std::string& why) {
+void Lease::release(const std::string& why) {
   if (!holder_) return;
   if (armed_) loop_.disarm();
-  end(EventLevel::info, "lease: " + holder_->who + " " + why);
+  end(EventLevel::info, "lease: " + holder_->identity + " " + why);
 }
 
-void Lease::beat(TimePoint now) {
-  last_ = now;
-  loop_.live();
+void Lease::heartbeat(TimePoint now) {
+  last_heartbeat_ = now;
+  loop_.heartbeat();
 }
 
 void Lease::arm(TimePoint now) {
-  last_ = now;
+  last_heartbeat_ = now;
   armed_ = true;
   loop_.arm_with_lease();
 }
 
-void Lease::hung_up(std::uint64_t client) {
+void Lease::client_lost(std::uint64_t client) {
   if (!held_by(client)) return;
-  if (armed_) loop_.hang_up();
-  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->who + " hung up");
+  if (armed_) loop_.client_lost();
+  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " hung up");
 }
 
-void Lease::look(TimePoint now) {
-  if (!holder_ || now - last_ <= kSilentClient) return;
-  if (armed_) loop_.hang_up();
-  end(EventLevel::warning, "lease: " + holder_->who + " gives no sign of life any more");
+void Lease::check(TimePoint now) {
+  if (!holder_ || now - last_heartbeat_ <= kHeartbeatTimeout) return;
+  if (armed_) loop_.client_lost();
+  end(EventLevel::warning, "lease: " + holder_->identity + " gives no sign of life any more");
 }
 
-TimePoint Lease::look_again_at() const noexcept {
-  return holder_ ? last_ + kSilentClient + std::chrono::milliseconds(1) : TimePoint::max();
+TimePoint Lease::next_check_at() const noexcept {
+  return holder_ ? last_heartbeat_ + kHeartbeatTimeout + std::chrono::milliseconds(1) : TimePoint::max();
 }
 
 void Lease::end(EventLevel level, const std::string& what) {
   holder_.reset();
   armed_ = false;
-  feed_.tell("lease", level, what, holder_json(holder_));
+  feed_.emit("lease", level, what, holder_json(holder_));
 }
 
 }  // namespace wrenchd

@@ -21,27 +21,27 @@ class Lease {
 
   struct Holder {
     std::uint64_t client = 0;
-    std::string who;
+    std::string identity;
   };
   const std::optional<Holder>& holder() const noexcept { return holder_; }
   bool held_by(std::uint64_t client) const noexcept { return holder_ && holder_->client == client; }
 
   /// Nobody may have it, or the same client. Counts as a sign of life.
-  void take(const Holder& client, TimePoint now);
+  void acquire(const Holder& client, TimePoint now);
   /// Takes it from whoever has it; who armed with it is disarmed.
-  void take_over(const Holder& client, TimePoint now);
+  void preempt(const Holder& client, TimePoint now);
   /// Disarms what was armed with it.
-  void give(const std::string& why);
+  void release(const std::string& why);
   /// Its holder lives.
-  void beat(TimePoint now);
+  void heartbeat(TimePoint now);
   /// Its holder arms. Counts as a sign of life.
   void arm(TimePoint now);
   /// That client's connection has ended: if it held the lease the hand is released.
-  void hung_up(std::uint64_t client);
+  void client_lost(std::uint64_t client);
   /// Ends the lease of a holder that does not say any more that it lives, in the same way.
-  void look(TimePoint now);
+  void check(TimePoint now);
   /// When to look again; the end of time where nobody holds it.
-  TimePoint look_again_at() const noexcept;
+  TimePoint next_check_at() const noexcept;
 
   /// What is armed now, if anything is, was armed with this lease.
   bool armed() const noexcept { return armed_; }
@@ -52,7 +52,7 @@ class Lease {
   ServoLoop& loop_;
   EventFeed& feed_;
   std::optional<Holder> holder_;
-  TimePoint last_{};
+  TimePoint last_heartbeat_{};
   bool armed_ = false;
 };
 

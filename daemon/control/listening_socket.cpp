@@ -28,7 +28,7 @@ std::string reason() {
   return std::strerror(errno);
 }
 
-std::runtime_error refusal(const fs::path& path, const std::string& what) {
+std::runtime_error rejection_text(const fs::path& path, const std::string& what) {
   return std::runtime_error(path.string() + ": " + what);
 }
 
@@ -42,8 +42,8 @@ sockaddr_un address_of(const fs::path& path) {
   address.sun_family = AF_UNIX;
   const std::string& text = path.native();
   if (text.size() >= sizeof address.sun_path)
-    throw refusal(path, "is longer than the " + std::to_string(sizeof address.sun_path - 1) +
-                            " bytes that a socket's path may have");
+    throw rejection_text(path, "is longer than the " + std::to_string(sizeof address.sun_path - 1) +
+                                   " bytes that a socket's path may have");
   std::memcpy(address.sun_path, text.data(), text.size());
   return address;
 }
@@ -57,24 +57,27 @@ OwnedFd stream_socket() {
 /// Whoever can write there can put another socket in the place of ours.
 void check_directory(const fs::path& directory) {
   if (::mkdir(directory.c_str(), geteuid() == 0 ? 0755 : 0700) != 0 && errno != EEXIST)
-    throw refusal(directory, "cannot be made: " + reason() +
-                                 "; make it and give it to the user that wrenchd runs as, or name another "
-                                 "path with --control");
+    throw rejection_text(directory,
+                         "cannot be made: " + reason() +
+                             "; make it and give it to the user that wrenchd runs as, or name another "
+                             "path with --control");
   struct stat status {};
-  if (::stat(directory.c_str(), &status) != 0) throw refusal(directory, reason());
-  if (!S_ISDIR(status.st_mode)) throw refusal(directory, "is no directory; name another path with --control");
+  if (::stat(directory.c_str(), &status) != 0) throw rejection_text(directory, reason());
+  if (!S_ISDIR(status.st_mode))
+    throw rejection_text(directory, "is no directory; name another path with --control");
   if (status.st_uid != geteuid() && status.st_uid != 0)
-    throw refusal(directory,
-                  "belongs to uid " + std::to_string(status.st_uid) +
-                      ", who could put another socket there; name a path in a directory of your own");
+    throw rejection_text(directory,
+                         "belongs to uid " + std::to_string(status.st_uid) +
+                             ", who could put another socket there; name a path in a directory of your own");
   if ((status.st_mode & 022U) != 0 && (status.st_mode & S_ISVTX) == 0)
-    throw refusal(directory, "others may write there, and put another socket in its place; run: chmod go-w " +
-                                 directory.string());
+    throw rejection_text(
+        directory,
+        "others may write there, and put another socket in its place; run: chmod go-w " + directory.string());
 }
 
 }  // namespace
 
-SocketPlace socket_place(const std::string& command_line, const ControlSettings& settings) {
+SocketPath choose_socket_path(const std::string& command_line, const ControlSettings& settings) {
   const std::pair<const char*, std::string> named[] = {{"--control", command_line},
                                                        {"WRENCHD_SOCKET", environment("WRENCHD_SOCKET")},
                                                        {"control.socket", settings.socket}};
@@ -95,14 +98,14 @@ SocketPlace socket_place(const std::string& command_line, const ControlSettings&
 }
 
 ListeningSocket::ListeningSocket(const fs::path& path, const RoleRules& rules) : path_(path) {
-  if (take_from_systemd()) return;
+  if (adopt_from_systemd()) return;
   check_directory(path_.parent_path());
-  lock();
-  remove_dead();
+  lock_path();
+  remove_stale_socket();
   bind_private();
   try {
-    open_to(rules);
-    if (::listen(socket_.get(), kBacklog) != 0) throw refusal(path_, "cannot listen: " + reason());
+    grant_access(rules);
+    if (::listen(socket_.get(), kBacklog) != 0) throw rejection_text(path_, "cannot listen: " + reason());
   } catch (...) {
     ::unlink(path_.c_str());
     throw;
@@ -116,7 +119,7 @@ ListeningSocket::~ListeningSocket() {
   if (ours) ::unlink(path_.c_str());
 }
 
-bool ListeningSocket::take_from_systemd() {
+bool ListeningSocket::adopt_from_systemd() {
   const int passed = sd_listen_fds(1);
   if (passed <= 0) return false;
   const int fd = SD_LISTEN_FDS_START;
@@ -133,27 +136,29 @@ bool ListeningSocket::take_from_systemd() {
 
 /// For as long as this lives; the kernel lets go of it when the process dies, however it does. It is not
 /// removed: another daemon may be waiting to lock this very file.
-void ListeningSocket::lock() {
+void ListeningSocket::lock_path() {
   const fs::path file = path_.string() + ".lock";
   lock_ = OwnedFd(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (!lock_) throw refusal(file, "cannot be made: " + reason());
+  if (!lock_) throw rejection_text(file, "cannot be made: " + reason());
   if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0)
-    throw refusal(path_, "another wrenchd listens there; stop it, or name another path with --control");
+    throw rejection_text(path_,
+                         "another wrenchd listens there; stop it, or name another path with --control");
 }
 
 /// Nobody who locks is there any more. What is left may still be another program's.
-void ListeningSocket::remove_dead() {
+void ListeningSocket::remove_stale_socket() {
   struct stat status {};
   if (::lstat(path_.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw refusal(path_, "is there, and is no socket; move it away, or name another path with --control");
+    throw rejection_text(path_,
+                         "is there, and is no socket; move it away, or name another path with --control");
   const sockaddr_un address = address_of(path_);
   const OwnedFd probe = stream_socket();
   const bool lives =
       ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       errno == EAGAIN;  // too many wait for it already
-  if (lives) throw refusal(path_, "another program listens there; name another path with --control");
-  if (::unlink(path_.c_str()) != 0) throw refusal(path_, "cannot be removed: " + reason());
+  if (lives) throw rejection_text(path_, "another program listens there; name another path with --control");
+  if (::unlink(path_.c_str()) != 0) throw rejection_text(path_, "cannot be removed: " + reason());
 }
 
 /// The file gets the permissions of the socket, less the umask: nobody else can connect before they are
@@ -161,27 +166,27 @@ void ListeningSocket::remove_dead() {
 void ListeningSocket::bind_private() {
   const sockaddr_un address = address_of(path_);
   socket_ = stream_socket();
-  if (::fchmod(socket_.get(), 0600) != 0) throw refusal(path_, reason());
+  if (::fchmod(socket_.get(), 0600) != 0) throw rejection_text(path_, reason());
   if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    throw refusal(path_, "cannot be made: " + reason());
+    throw rejection_text(path_, "cannot be made: " + reason());
   struct stat status {};
-  if (::lstat(path_.c_str(), &status) != 0) throw refusal(path_, reason());
+  if (::lstat(path_.c_str(), &status) != 0) throw rejection_text(path_, reason());
   device_ = status.st_dev;
   inode_ = status.st_ino;
 }
 
 /// The directory is ours, so that the path is still what was made.
-void ListeningSocket::open_to(const RoleRules& rules) {
+void ListeningSocket::grant_access(const RoleRules& rules) {
   // Where everybody may connect no group has to own it.
-  const auto group = rules.everybody_observes ? std::nullopt
+  const auto group = rules.anyone_may_observe ? std::nullopt
                      : rules.observers        ? rules.observers
                      : rules.operators        ? rules.operators
                                               : rules.administrators;
   if (group && ::chown(path_.c_str(), static_cast<uid_t>(-1), *group) != 0)
-    throw refusal(path_, "cannot be given to group " + std::to_string(*group) + ": " + reason() +
-                             "; make the user that wrenchd runs as a member of it");
-  const mode_t mode = rules.everybody_observes ? 0666 : group ? 0660 : 0600;
-  if (::chmod(path_.c_str(), mode) != 0) throw refusal(path_, reason());
+    throw rejection_text(path_, "cannot be given to group " + std::to_string(*group) + ": " + reason() +
+                                    "; make the user that wrenchd runs as a member of it");
+  const mode_t mode = rules.anyone_may_observe ? 0666 : group ? 0660 : 0600;
+  if (::chmod(path_.c_str(), mode) != 0) throw rejection_text(path_, reason());
 }
 
 }  // namespace wrenchd

@@ -14,14 +14,14 @@
 namespace wrenchd {
 
 /// Where the control socket is to be.
-struct SocketPlace {
-  std::filesystem::path path;  ///< empty: nowhere, nobody wants one
-  bool asked_for = false;      ///< somebody named it; else it is the usual place, and may be another's
+struct SocketPath {
+  std::filesystem::path path;     ///< empty: nowhere, nobody wants one
+  bool explicitly_named = false;  ///< somebody named it; else it is the usual place, and may be another's
 };
 
 /// The first of: the command line's, $WRENCHD_SOCKET, the configuration's, and the usual place. Throws
 /// std::runtime_error where the path is not absolute.
-SocketPlace socket_place(const std::string& command_line, const ControlSettings& settings);
+SocketPath choose_socket_path(const std::string& command_line, const ControlSettings& settings);
 
 /// A Unix stream socket that listens where it was told to, and nowhere else.
 ///
@@ -43,11 +43,11 @@ class ListeningSocket {
   bool from_systemd() const noexcept { return from_systemd_; }
 
  private:
-  bool take_from_systemd();
-  void lock();
-  void remove_dead();
+  bool adopt_from_systemd();
+  void lock_path();
+  void remove_stale_socket();
   void bind_private();
-  void open_to(const RoleRules& rules);
+  void grant_access(const RoleRules& rules);
 
   std::filesystem::path path_;
   OwnedFd lock_;

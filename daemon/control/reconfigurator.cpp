@@ -45,24 +45,24 @@ std::string names(const SceneSettings& scene) {
 
 /// What moves by itself sets out now.
 void set_out_at(double now_s, SceneSettings& scene) {
-  for (MeshObstacleSettings& obstacle : scene.meshes) obstacle.motion.begin_s = now_s;
+  for (MeshObstacleSettings& obstacle : scene.meshes) obstacle.motion.start_s = now_s;
 }
 
 /// What has come to where it went stands there, and is none that moves any more.
 void settle(MeshObstacleSettings& obstacle, double now_s) {
-  if (obstacle.later && now_s >= obstacle.later->from_s) {
-    obstacle.X_WM = obstacle.later->X_WO;
-    obstacle.motion = obstacle.later->motion;
-    obstacle.later.reset();
+  if (obstacle.scheduled && now_s >= obstacle.scheduled->start_s) {
+    obstacle.X_WM = obstacle.scheduled->X_WO;
+    obstacle.motion = obstacle.scheduled->motion;
+    obstacle.scheduled.reset();
   }
   const ObstacleMotion& motion = obstacle.motion;
-  if (!(motion.last_s > 0.0) || now_s < motion.begin_s + motion.last_s) return;
-  obstacle.X_WM = motion.at(obstacle.X_WM, now_s);
+  if (!(motion.duration_s > 0.0) || now_s < motion.start_s + motion.duration_s) return;
+  obstacle.X_WM = motion.pose_at(obstacle.X_WM, now_s);
   obstacle.motion = {};
 }
 
 double least_time_s(const ObstacleMotion& motion) {
-  return motion.last_s *
+  return motion.duration_s *
          std::max(motion.linear_m_per_s.norm() / ObstacleMotion::kMaxSpeed_m_per_s,
                   motion.angular_rad_per_s.norm() / ObstacleMotion::kMaxAngularSpeed_rad_per_s);
 }
@@ -85,20 +85,20 @@ double value_of(const Settings& settings, const char* name) {
 
 }  // namespace
 
-Workbench::Workbench(Plan plan, std::shared_ptr<const Scene> scene, ServoLoop& loop, PlaceIn place_in,
-                     MeshLoader loader)
-    : plan_(std::move(plan)),
-      configured_(plan_.settings),
-      profile_text_(contents(plan_.settings.device.profile_file)),
-      scene_files_(files_text(plan_.scene)),
+Reconfigurator::Reconfigurator(RunConfig plan, std::shared_ptr<const Scene> scene, ServoLoop& loop,
+                               ProxySearchMode place_in, MeshLoader loader)
+    : config_(std::move(plan)),
+      file_settings_(config_.settings),
+      profile_text_(contents(config_.settings.device.profile_file)),
+      scene_fingerprint_(files_fingerprint(config_.scene)),
       scene_(std::move(scene)),
       loop_(loop),
-      place_in_(place_in),
+      proxy_search_mode_(place_in),
       loader_(std::move(loader)),
       names_{0, names_of(*scene_)} {}
 
 /// By which it is seen that one of its files was written since.
-std::string Workbench::files_text(const SceneSettings& scene) const {
+std::string Reconfigurator::files_fingerprint(const SceneSettings& scene) const {
   std::string text = scene.file.string() + '\n' + contents(scene.file);
   const auto add = [&text](const std::filesystem::path& mesh) {
     std::error_code error;
@@ -110,85 +110,89 @@ std::string Workbench::files_text(const SceneSettings& scene) const {
   return text;
 }
 
-std::shared_ptr<const Scene> Workbench::built(const SceneSettings& scene) {
+std::shared_ptr<const Scene> Reconfigurator::build_scene(const SceneSettings& scene) {
   MeshLoader loader = loader_;
   auto made = std::make_shared<const Scene>(scene, loader);
   remarks_ = loader.changes();
-  remarks_.insert(remarks_.end(), loader.remarks().begin(), loader.remarks().end());
+  remarks_.insert(remarks_.end(), loader.warnings().begin(), loader.warnings().end());
   return made;
 }
 
 /// In steps of time nothing is warmed up: how far that comes depends on the machine.
-std::unique_ptr<Rendering> Workbench::made(const Settings& settings, std::shared_ptr<const Scene> scene) {
-  auto placer = make_placer(scene, place_in_);
-  auto rendering =
-      std::make_unique<Rendering>(number_ + 1, settings, plan_.profile, std::move(scene), std::move(placer));
-  const ServoLoop::Whereabouts hand = loop_.whereabouts();
-  if (place_in_ == PlaceIn::thread) rendering->warm_up(hand.X_WH, hand.scene_time_s);
+std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& settings,
+                                                           std::shared_ptr<const Scene> scene) {
+  auto placer = make_proxy_initializer(scene, proxy_search_mode_);
+  auto rendering = std::make_unique<Rendering>(rendering_id_ + 1, settings, config_.profile, std::move(scene),
+                                               std::move(placer));
+  const ServoLoop::HandlePose hand = loop_.handle_pose();
+  if (proxy_search_mode_ == ProxySearchMode::background) rendering->warm_up(hand.X_WH, hand.scene_time_s);
   return rendering;
 }
 
-void Workbench::hand_over(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
-                          std::shared_ptr<const Scene> built) {
-  plan_.settings = settings;
-  plan_.scene = std::move(scene);
+void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings& settings,
+                           SceneSettings scene, std::shared_ptr<const Scene> built) {
+  config_.settings = settings;
+  config_.scene = std::move(scene);
   scene_ = std::move(built);
-  number_ = rendering->number();
-  sum_ = rendering->sum();
+  rendering_id_ = rendering->id();
+  checksum_ = rendering->checksum();
   {
-    const std::lock_guard told(told_);
-    names_ = {number_, names_of(*scene_)};
+    const std::lock_guard told(names_mutex_);
+    names_ = {rendering_id_, names_of(*scene_)};
   }
   loop_.exchange().offer(std::move(rendering));
 }
 
-void Workbench::load(const std::filesystem::path& file) {
+void Reconfigurator::replace_scene(const std::filesystem::path& file) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = load_scene(file);
-  auto scene_built = built(scene);
-  set_out_at(now_s(), scene);
-  if (scene_built->moves()) scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
-  Settings settings = plan_.settings;
+  auto scene_built = build_scene(scene);
+  set_out_at(scene_time_s(), scene);
+  if (scene_built->has_moving_obstacles())
+    scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
+  Settings settings = config_.settings;
   settings.scene = file;
-  auto rendering = made(settings, scene_built);
-  hand_over(std::move(rendering), settings, std::move(scene), std::move(scene_built));
+  auto rendering = build_rendering(settings, scene_built);
+  offer(std::move(rendering), settings, std::move(scene), std::move(scene_built));
 }
 
-std::string Workbench::add(const TomlNode& obstacle, const std::filesystem::path& source) {
+std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source) {
   const std::lock_guard lock(mutex_);
-  SceneSettings scene = plan_.scene;
+  SceneSettings scene = config_.scene;
   const std::size_t half_spaces = scene.half_spaces.size();
   add_obstacle(obstacle, source, scene);
   const bool is_half_space = scene.half_spaces.size() > half_spaces;
-  const double now = now_s();
-  if (!is_half_space) scene.meshes.back().motion.begin_s = now;
+  const double now = scene_time_s();
+  if (!is_half_space) scene.meshes.back().motion.start_s = now;
   for (MeshObstacleSettings& mesh : scene.meshes) settle(mesh, now);
-  auto scene_built = built(scene);
+  auto scene_built = build_scene(scene);
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
-  auto rendering = made(plan_.settings, scene_built);
-  hand_over(std::move(rendering), plan_.settings, std::move(scene), std::move(scene_built));
+  auto rendering = build_rendering(config_.settings, scene_built);
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
   return name;
 }
 
-void Workbench::remove(const std::string& name) {
+void Reconfigurator::remove_obstacle(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  SceneSettings scene = plan_.scene;
+  SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
     refuse_unknown(name, scene);
-  for (MeshObstacleSettings& mesh : scene.meshes) settle(mesh, now_s());
-  auto scene_built = built(scene);
-  auto rendering = made(plan_.settings, scene_built);
-  hand_over(std::move(rendering), plan_.settings, std::move(scene), std::move(scene_built));
+  for (MeshObstacleSettings& mesh : scene.meshes) settle(mesh, scene_time_s());
+  auto scene_built = build_scene(scene);
+  auto rendering = build_rendering(config_.settings, scene_built);
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
 }
 
 /// Until nothing is on its way into the loop any more, so that an obstacle cannot have set out before it is
 /// followed. A loop that does not tick has no hand in it, and need not be waited for.
-void Workbench::wait_until_quiet() {
-  const auto quiet = [this] { return loop_.exchange().taken() && !loop_.changing(); };
+void Reconfigurator::wait_until_idle() {
+  const auto quiet = [this] { return loop_.exchange().taken() && !loop_.crossfading(); };
   if (quiet()) return;
-  const auto busy = [] { throw NotNow("another change is on its way to the hand; ask again in a moment"); };
-  if (place_in_ == PlaceIn::step) busy();
+  const auto busy = [] {
+    throw BusyError("another change is on its way to the hand; ask again in a moment");
+  };
+  if (proxy_search_mode_ == ProxySearchMode::in_tick) busy();
   const auto end = std::chrono::steady_clock::now() + kPatience;
   const std::uint64_t ticks = loop_.timing().tick.count();
   while (!quiet()) {
@@ -200,9 +204,9 @@ void Workbench::wait_until_quiet() {
   }
 }
 
-void Workbench::move(const std::string& name, const Pose& X_WO, double over_s) {
+void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, double over_s) {
   const std::lock_guard lock(mutex_);
-  SceneSettings scene = plan_.scene;
+  SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   const auto mesh = std::find_if(scene.meshes.begin(), scene.meshes.end(), is_it);
   if (mesh == scene.meshes.end()) {
@@ -214,130 +218,130 @@ void Workbench::move(const std::string& name, const Pose& X_WO, double over_s) {
   if (!is_finite(X_WO)) throw std::invalid_argument("the pose of '" + name + "' is not finite");
   if (!(over_s > 0.0) || !(over_s <= 86400.0))
     throw std::invalid_argument("over_s: expected more than 0 and at most 86400 s, found " + to_text(over_s));
-  wait_until_quiet();
-  const double now = now_s(), begin = now + kSetsOutAfter_s;
+  wait_until_idle();
+  const double now = scene_time_s(), begin = now + kMoveDelay_s;
   for (MeshObstacleSettings& obstacle : scene.meshes) settle(obstacle, now);
-  if (mesh->later)
-    throw NotNow("'" + name + "' was told to move a moment ago, and has not set out; ask again in " +
-                 to_text(kSetsOutAfter_s) + " s");
-  const Pose X_begin = mesh->motion.at(mesh->X_WM, begin);
+  if (mesh->scheduled)
+    throw BusyError("'" + name + "' was told to move a moment ago, and has not set out; ask again in " +
+                    to_text(kMoveDelay_s) + " s");
+  const Pose X_begin = mesh->motion.pose_at(mesh->X_WM, begin);
   const ObstacleMotion motion = ObstacleMotion::between(X_begin, X_WO, begin, over_s);
   if (const double least_s = least_time_s(motion); least_s > over_s)
     throw std::invalid_argument("'" + name + "' would have to be faster than obstacles may be (" +
                                 to_text(ObstacleMotion::kMaxSpeed_m_per_s) + " m/s, " +
                                 to_text(ObstacleMotion::kMaxAngularSpeed_rad_per_s) +
                                 " rad/s); give it at least over_s = " + to_text(least_s));
-  mesh->later = {begin, X_begin, motion};
+  mesh->scheduled = {begin, X_begin, motion};
   auto scene_built = std::make_shared<const Scene>(*scene_, scene.meshes);
-  auto rendering = made(plan_.settings, scene_built);
-  hand_over(std::move(rendering), plan_.settings, std::move(scene), std::move(scene_built));
+  auto rendering = build_rendering(config_.settings, scene_built);
+  offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
 }
 
-void Workbench::set_rendering(const TomlNode& changes, const std::filesystem::path& source) {
+void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesystem::path& source) {
   const std::lock_guard lock(mutex_);
-  Settings settings = plan_.settings;
+  Settings settings = config_.settings;
   change_rendering(changes, source, settings);
-  auto rendering = made(settings, scene_);
-  hand_over(std::move(rendering), settings, plan_.scene, scene_);
+  auto rendering = build_rendering(settings, scene_);
+  offer(std::move(rendering), settings, config_.scene, scene_);
 }
 
-void Workbench::set_workspace(const WorkspaceWish& wish) {
+void Reconfigurator::set_workspace(const WorkspaceRequest& wish) {
   workspace_ = wish;
   loop_.set_workspace(wish);
 }
 
-void Workbench::set_scale(double scale) {
+void Reconfigurator::set_scale(double scale) {
   const std::lock_guard lock(mutex_);
-  if (!(scale >= WorkspaceWish::kLeastScale && scale <= WorkspaceWish::kLargestScale))
-    throw std::invalid_argument("scale: expected " + to_text(WorkspaceWish::kLeastScale) + " to " +
-                                to_text(WorkspaceWish::kLargestScale) + ", found " + to_text(scale));
-  WorkspaceWish wish = workspace_;
+  if (!(scale >= WorkspaceRequest::kMinScale && scale <= WorkspaceRequest::kMaxScale))
+    throw std::invalid_argument("scale: expected " + to_text(WorkspaceRequest::kMinScale) + " to " +
+                                to_text(WorkspaceRequest::kMaxScale) + ", found " + to_text(scale));
+  WorkspaceRequest wish = workspace_;
   wish.scale = scale;
   set_workspace(wish);
 }
 
-void Workbench::set_clutch(bool in) {
+void Reconfigurator::set_clutched(bool in) {
   const std::lock_guard lock(mutex_);
-  WorkspaceWish wish = workspace_;
+  WorkspaceRequest wish = workspace_;
   wish.clutched = in;
   set_workspace(wish);
 }
 
-void Workbench::recentre() {
+void Reconfigurator::recentre() {
   const std::lock_guard lock(mutex_);
-  WorkspaceWish wish = workspace_;
-  ++wish.recentred;
+  WorkspaceRequest wish = workspace_;
+  ++wish.recentre_count;
   set_workspace(wish);
 }
 
 /// Those that have not expired.
-LocalModelSet Workbench::other_models(std::uint32_t id) {
-  const TimePoint now = loop_.whereabouts().at;
+LocalModelSet Reconfigurator::other_models(std::uint32_t id) {
+  const TimePoint now = loop_.handle_pose().at;
   LocalModelSet others;
   for (const LocalModel& model : models_)
     if (model.id != id && model.expires > now) others.add(model);
   return others;
 }
 
-void Workbench::set_model(LocalModel model, double for_s) {
+void Reconfigurator::set_model(LocalModel model, double for_s) {
   const std::lock_guard lock(mutex_);
   const auto expect = [](double x, double most, const char* name) {
     if (!(x >= 0.0 && x <= most))
       throw std::invalid_argument(std::string(name) + ": expected 0 to " + to_text(most) + ", found " +
                                   to_text(x));
   };
-  if (plan_.profile.wrench_point == WrenchPoint::world_origin)
+  if (config_.profile.wrench_point == WrenchPoint::world_origin)
     throw std::invalid_argument(
         "this device's wrench is not about its handle, so that it knows no local models");
-  if (!(for_s > 0.0 && for_s <= LocalModel::kLongest_s))
+  if (!(for_s > 0.0 && for_s <= LocalModel::kMaxLifetime_s))
     throw std::invalid_argument("expires_s: expected more than 0 and at most " +
-                                to_text(LocalModel::kLongest_s) + ", found " + to_text(for_s) +
+                                to_text(LocalModel::kMaxLifetime_s) + ", found " + to_text(for_s) +
                                 "; a model that is to stay is sent again");
   expect(model.stiffness_N_per_m, kMostModelStiffness, "stiffness_N_per_m");
   expect(model.stiffness_Nm_per_rad, kMostModelStiffness, "stiffness_Nm_per_rad");
   expect(model.damping_N_s_per_m, kMostModelStiffness, "damping_N_s_per_m");
   expect(model.damping_Nm_s_per_rad, kMostModelStiffness, "damping_Nm_s_per_rad");
-  if (!is_finite(model.normal_W) || !is_finite(model.offset_m) || !is_finite(model.X_WF))
+  if (!is_finite(model.normal_W) || !is_finite(model.offset_m) || !is_finite(model.X_WA))
     throw std::invalid_argument("the model's place is not finite");
   const double length = model.normal_W.norm();
   if (!(length > 1e-9)) throw std::invalid_argument("normal: must not be zero; it points out of the solid");
   model.normal_W /= length;
   model.offset_m /= length;
-  model.X_WF.rotation.normalize();
-  model.expires = loop_.whereabouts().at + from_seconds(for_s);
+  model.X_WA.rotation.normalize();
+  model.expires = loop_.handle_pose().at + from_seconds(for_s);
   LocalModelSet models = other_models(model.id);
   if (!models.add(model))
-    throw std::invalid_argument("there are " + std::to_string(kMostLocalModels) +
+    throw std::invalid_argument("there are " + std::to_string(kMaxLocalModels) +
                                 " local models already; remove one, or let it expire");
   models_ = models;
   loop_.set_local_models(models_);
 }
 
-void Workbench::remove_model(std::uint32_t id) {
+void Reconfigurator::remove_model(std::uint32_t id) {
   const std::lock_guard lock(mutex_);
   models_ = other_models(id);
   loop_.set_local_models(models_);
 }
 
-ReloadResult Workbench::reload(const std::function<Plan()>& read) {
+ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   const std::lock_guard lock(mutex_);
   ReloadResult result;
-  const Plan plan = read();
-  Settings settings = plan_.settings;  // that will hold
-  Settings configured = configured_;   // and as far as it comes from files
+  const RunConfig plan = read();
+  Settings settings = config_.settings;  // that will hold
+  Settings configured = file_settings_;  // and as far as it comes from files
   bool needs_rendering = false, limits_changed = false;
   const bool armed = loop_.state() == State::waiting || is_driving(loop_.state());
   for (const SettingKey& key : setting_keys()) {
-    if (key.same(plan.settings, configured_)) continue;
-    if (key.takes == SettingKey::Takes::restart) {
+    if (key.same(plan.settings, file_settings_)) continue;
+    if (key.effect == SettingKey::Effect::restart) {
       result.not_applied.push_back(std::string(key.name) + ": takes a restart");
       continue;
     }
     Settings wanted = settings;
     key.copy(plan.settings, wanted);
-    if (key.takes == SettingKey::Takes::limits) {
+    if (key.effect == SettingKey::Effect::limits) {
       Settings allowed = wanted;
-      if (armed) allowed.limits = tighter(settings.limits, wanted.limits, plan_.profile);
+      if (armed) allowed.limits = tighter(settings.limits, wanted.limits, config_.profile);
       if (!key.same(allowed, wanted)) {
         result.not_applied.push_back(std::string(key.name) + ": is looser than " +
                                      to_text(value_of(settings, key.name)) +
@@ -345,82 +349,83 @@ ReloadResult Workbench::reload(const std::function<Plan()>& read) {
         continue;
       }
       limits_changed = true;
-    } else if (key.takes == SettingKey::Takes::rendering) {
+    } else if (key.effect == SettingKey::Effect::new_rendering) {
       needs_rendering = true;
     }
     settings = wanted;
     key.copy(plan.settings, configured);
     result.applied.emplace_back(key.name);
   }
-  if (plan.settings.device.profile == configured_.device.profile &&
+  if (plan.settings.device.profile == file_settings_.device.profile &&
       contents(plan.settings.device.profile_file) != profile_text_)
     result.not_applied.emplace_back("the device profile was changed: takes a restart");
-  const std::string scene_files = files_text(plan.scene);
-  const bool new_scene = scene_files != scene_files_;
-  SceneSettings scene = plan_.scene;
+  const std::string scene_files = files_fingerprint(plan.scene);
+  const bool new_scene = scene_files != scene_fingerprint_;
+  SceneSettings scene = config_.scene;
   auto scene_built = scene_;
   if (new_scene) {
     scene = plan.scene;
-    scene_built = built(scene);
-    set_out_at(now_s(), scene);
-    if (scene_built->moves()) scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
+    scene_built = build_scene(scene);
+    set_out_at(scene_time_s(), scene);
+    if (scene_built->has_moving_obstacles())
+      scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
     settings.scene = configured.scene = plan.settings.scene;
     result.applied.emplace_back("scene");
     result.remarks = remarks_;
   }
   std::unique_ptr<Rendering> rendering;
-  if (needs_rendering || new_scene) rendering = made(settings, scene_built);
+  if (needs_rendering || new_scene) rendering = build_rendering(settings, scene_built);
 
   // All of it is good.
   if (limits_changed) loop_.set_limits(settings.limits);
-  plan_.settings = settings;
-  configured_ = configured;
-  scene_files_ = scene_files;
-  if (rendering) hand_over(std::move(rendering), settings, std::move(scene), std::move(scene_built));
+  config_.settings = settings;
+  file_settings_ = configured;
+  scene_fingerprint_ = scene_files;
+  if (rendering) offer(std::move(rendering), settings, std::move(scene), std::move(scene_built));
   return result;
 }
 
-Settings Workbench::settings() const {
+Settings Reconfigurator::settings() const {
   const std::lock_guard lock(mutex_);
-  return plan_.settings;
+  return config_.settings;
 }
 
-SceneSettings Workbench::scene() const {
+SceneSettings Reconfigurator::scene() const {
   const std::lock_guard lock(mutex_);
-  return plan_.scene;
+  return config_.scene;
 }
 
-WorkspaceWish Workbench::workspace() const {
+WorkspaceRequest Reconfigurator::workspace() const {
   const std::lock_guard lock(mutex_);
   return workspace_;
 }
 
-Workbench::HandedOver Workbench::handed_over() const {
+Reconfigurator::CurrentRendering Reconfigurator::current_rendering() const {
   const std::lock_guard lock(mutex_);
-  return {number_, sum_};
+  return {rendering_id_, checksum_};
 }
 
-Workbench::ObstacleNames Workbench::obstacle_names() const {
-  const std::lock_guard told(told_);
+Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
+  const std::lock_guard told(names_mutex_);
   return names_;
 }
 
-Workbench::Shown Workbench::shown() {
+Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
-  const ServoLoop::Whereabouts seen = loop_.whereabouts();
-  const auto pose_of = [](const PlacementSettings& placed) {
+  const ServoLoop::HandlePose seen = loop_.handle_pose();
+  const auto pose_of = [](const PoseSettings& placed) {
     return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
   };
-  const DeviceSettings& device = plan_.settings.device;
+  const DeviceSettings& device = config_.settings.device;
   // The view is of the scene that the configuration names: of one that a client has loaded nobody has said.
-  const bool configured = plan_.settings.scene == configured_.scene;
+  const bool configured = config_.settings.scene == file_settings_.scene;
   return {scene_,
-          number_,
+          rendering_id_,
           seen.at - from_seconds(seen.scene_time_s),
           pose_of(device.base_in_world),
           pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
-          plan_.profile.wrench_point,
-          configured ? plan_.settings.view : ViewSettings{}};
+          config_.profile.wrench_point,
+          configured ? config_.settings.view : ViewSettings{}};
 }
 
 }  // namespace wrenchd

@@ -17,7 +17,7 @@
 namespace wrenchd {
 
 /// It cannot be done now, though it may be in a moment: the message says why, and when.
-class NotNow : public std::runtime_error {
+class BusyError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -33,24 +33,24 @@ struct ReloadResult {
 /// what is ready. Where anything is wrong nothing at all is changed, and the loop never knows of it.
 ///
 /// Any thread but the servo thread, one at a time; meshes may take seconds. What is refused is thrown as
-/// ConfigError (place and cure), MeshError, std::invalid_argument or NotNow.
-class Workbench {
+/// ConfigError (place and cure), MeshError, std::invalid_argument or BusyError.
+class Reconfigurator {
  public:
   /// plan: what the loop runs with, by whatever was read. scene: what it renders now. loader: kept as it is,
   /// and copied for each reading, so that what is read anew is read. The loop must outlive this.
-  Workbench(Plan plan, std::shared_ptr<const Scene> scene, ServoLoop& loop, PlaceIn place_in,
-            MeshLoader loader);
+  Reconfigurator(RunConfig plan, std::shared_ptr<const Scene> scene, ServoLoop& loop,
+                 ProxySearchMode place_in, MeshLoader loader);
 
   // --- the scene ---
 
   /// Another scene, tool included, from its file. Obstacles that move set out now.
-  void load(const std::filesystem::path& file);
+  void replace_scene(const std::filesystem::path& file);
   /// Another obstacle: the table of an [[obstacle]]. source: for messages. Returns its name.
-  std::string add(const TomlNode& obstacle, const std::filesystem::path& source);
-  void remove(const std::string& name);
+  std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source);
+  void remove_obstacle(const std::string& name);
   /// Lets an obstacle, which has to be a mesh, go to this pose of its mesh frame within so long, on the
-  /// straight way, at constant speed. It sets out kSetsOutAfter_s from now.
-  void move(const std::string& name, const Pose& X_WO, double over_s);
+  /// straight way, at constant speed. It sets out kMoveDelay_s from now.
+  void move_obstacle(const std::string& name, const Pose& X_WO, double over_s);
 
   /// What [rendering] and [wrench] say, or parts of them. source: for messages.
   void set_rendering(const TomlNode& changes, const std::filesystem::path& source);
@@ -58,7 +58,7 @@ class Workbench {
   // --- the workspace ---
 
   void set_scale(double scale);  ///< metres that the tool goes for a metre of the handle
-  void set_clutch(bool in);
+  void set_clutched(bool in);
   void recentre();
 
   // --- local models ---
@@ -73,68 +73,68 @@ class Workbench {
   /// Reads the configuration again: all of it is applied that can be, or, where anything in it is refused,
   /// nothing. Limits that are tighter hold at once; those that are looser wait until the loop is disarmed.
   /// What clients changed stays where the files say what they said before. read: the plan, as at the start.
-  ReloadResult reload(const std::function<Plan()>& read);
+  ReloadResult reload(const std::function<RunConfig()>& read);
 
   // --- what holds now ---
 
   Settings settings() const;
   SceneSettings scene() const;
-  WorkspaceWish workspace() const;
+  WorkspaceRequest workspace() const;
   /// Of what was handed over last: its number, and what Rendering::sum() has to be in every tick.
-  struct HandedOver {
-    std::uint32_t number;
-    std::uint64_t sum;
+  struct CurrentRendering {
+    std::uint32_t id;
+    std::uint64_t checksum;
   };
-  HandedOver handed_over() const;
+  CurrentRendering current_rendering() const;
   /// What there is to be drawn: the scene that was handed over last, and where and when it is.
-  struct Shown {
+  struct SceneView {
     std::shared_ptr<const Scene> scene;
-    std::uint32_t number;         ///< of its rendering
+    std::uint32_t rendering_id;   ///< of its rendering
     TimePoint scene_time_begins;  ///< the time of the tick that is scene time 0
     Pose X_WB;                    ///< device base in the world
     Pose X_HT;                    ///< tool body in the handle
     WrenchPoint wrench_point;     ///< what the wrenches in records are about
-    ViewSettings view;            ///< from where it is seen best
+    ViewSettings viewpoint;       ///< from where it is seen best
   };
-  Shown shown();
+  SceneView scene_view();
 
   /// Names of the obstacles, by their numbers.
   struct ObstacleNames {
-    std::uint32_t rendering;  ///< number of the one they are of
+    std::uint32_t rendering_id;  ///< number of the one they are of
     std::vector<std::string> names;
   };
   /// Waits for no change that is under way.
   ObstacleNames obstacle_names() const;
 
-  static constexpr double kSetsOutAfter_s = 0.200;
+  static constexpr double kMoveDelay_s = 0.200;
 
  private:
-  std::string files_text(const SceneSettings& scene) const;
-  double now_s() { return loop_.whereabouts().scene_time_s; }
-  void wait_until_quiet();
-  std::shared_ptr<const Scene> built(const SceneSettings& scene);
-  std::unique_ptr<Rendering> made(const Settings& settings, std::shared_ptr<const Scene> scene);
-  void hand_over(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
-                 std::shared_ptr<const Scene> built);
-  void set_workspace(const WorkspaceWish& wish);
+  std::string files_fingerprint(const SceneSettings& scene) const;
+  double scene_time_s() { return loop_.handle_pose().scene_time_s; }
+  void wait_until_idle();
+  std::shared_ptr<const Scene> build_scene(const SceneSettings& scene);
+  std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);
+  void offer(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
+             std::shared_ptr<const Scene> built);
+  void set_workspace(const WorkspaceRequest& wish);
   LocalModelSet other_models(std::uint32_t id);
 
   mutable std::mutex mutex_;  ///< of all of the below
-  Plan plan_;                 ///< what holds
-  Settings configured_;       ///< as far as it came from files
+  RunConfig config_;          ///< what holds
+  Settings file_settings_;    ///< as far as it came from files
   std::string profile_text_;
-  std::string scene_files_;  ///< what the scene's files were when the configuration was read
+  std::string scene_fingerprint_;  ///< what the scene's files were when the configuration was read
   std::shared_ptr<const Scene> scene_;
   ServoLoop& loop_;
-  PlaceIn place_in_;
+  ProxySearchMode proxy_search_mode_;
   MeshLoader loader_;
   std::vector<std::string> remarks_;
-  std::uint32_t number_ = 0;
-  std::uint64_t sum_ = 0;
-  WorkspaceWish workspace_;
+  std::uint32_t rendering_id_ = 0;
+  std::uint64_t checksum_ = 0;
+  WorkspaceRequest workspace_;
   LocalModelSet models_;
 
-  mutable std::mutex told_;  ///< of what is told while a change is under way
+  mutable std::mutex names_mutex_;  ///< of what is told while a change is under way
   ObstacleNames names_;
 };
 

@@ -4,13 +4,13 @@
 namespace wrenchd {
 namespace {
 
-Json written_json(const Recordings::Written& written) {
+Json written_json(const Recordings::Summary& written) {
   return {{"file", written.file.string()}, {"ticks", written.ticks}, {"lost", written.lost}};
 }
 
-Answer start(Recordings& recordings, const Json& params, const Caller& caller) {
+MethodResult start(Recordings& recordings, const Json& params, const Caller& caller) {
   if (const auto running = recordings.status().running)
-    throw RpcError(RpcCode::not_now,
+    throw RpcError(RpcCode::invalid_state,
                    "It is recorded already, into " + running->file.string() + "; 'record.stop' ends that.",
                    {{"file", running->file.string()}});
   try {
@@ -18,30 +18,30 @@ Answer start(Recordings& recordings, const Json& params, const Caller& caller) {
         recordings.start(params.value("file", std::string()), caller.role >= Role::administrator);
     return Json{{"file", file.string()}};
   } catch (const RecordingError& error) {
-    throw RpcError(RpcCode::refused, error.what());
+    throw RpcError(RpcCode::rejected, error.what());
   }
 }
 
-Answer stop(Recordings& recordings) {
+MethodResult stop(Recordings& recordings) {
   if (const auto written = recordings.stop()) return written_json(*written);
   const std::string failed = recordings.status().failed;
-  throw RpcError(RpcCode::not_now, failed.empty() ? "Nothing is recorded; 'record.start' begins."
-                                                  : "Nothing is recorded any more: " + failed + ".");
+  throw RpcError(RpcCode::invalid_state, failed.empty() ? "Nothing is recorded; 'record.start' begins."
+                                                        : "Nothing is recorded any more: " + failed + ".");
 }
 
 Json list(const Recordings& recordings) {
   Json all = Json::array();
-  for (const RecordingFound& one : recordings.list())
-    all.push_back({{"name", one.name}, {"bytes", one.bytes}, {"written", stamp(one.changed)}});
+  for (const StoredRecording& one : recordings.list())
+    all.push_back({{"name", one.name}, {"bytes", one.bytes}, {"written", utc_stamp(one.modified_at)}});
   return {{"directory", recordings.status().directory.string()}, {"recordings", all}};
 }
 
-Answer open(const Recordings& recordings, const Json& params) {
+MethodResult open(const Recordings& recordings, const Json& params) {
   try {
     const auto name = params["name"].get<std::string>();
     return {Json{{"name", name}}, recordings.open(name)};
   } catch (const RecordingError& error) {
-    throw RpcError(RpcCode::refused, error.what());
+    throw RpcError(RpcCode::rejected, error.what());
   }
 }
 
@@ -79,21 +79,21 @@ void add_record_methods(MethodTable& table, Recordings& recordings) {
                       "Ends what record.start began: answers file, ticks, and lost, how many are missing.",
                       [&recordings](const Json&, const Caller&) { return stop(recordings); },
                       true});
-  table.add(
-      MethodRow{"record.status",
-                Role::observer,
-                {},
-                "running: file, ticks and lost so far, or null; failed: why the last one ended by "
-                "itself; directory; flight_s: what the flight recorder holds; last_flight: its newest "
-                "file since the start; flights: how many.",
-                [&recordings](const Json&, const Caller&) { return Answer(recording_json(recordings)); }});
+  table.add(MethodRow{
+      "record.status",
+      Role::observer,
+      {},
+      "running: file, ticks and lost so far, or null; failed: why the last one ended by "
+      "itself; directory; flight_s: what the flight recorder holds; last_flight: its newest "
+      "file since the start; flights: how many.",
+      [&recordings](const Json&, const Caller&) { return MethodResult(recording_json(recordings)); }});
   table.add(
       MethodRow{"record.list",
                 Role::observer,
                 {},
                 "The recordings of the directory that record.status names, the oldest first: name, bytes, "
                 "and when they were written (UTC). What is being written is not among them.",
-                [&recordings](const Json&, const Caller&) { return Answer(list(recordings)); },
+                [&recordings](const Json&, const Caller&) { return MethodResult(list(recordings)); },
                 true});
   table.add(MethodRow{"record.open",
                       Role::observer,

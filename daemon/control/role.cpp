@@ -42,7 +42,7 @@ const char* name(Role role) noexcept {
   return "unknown";
 }
 
-std::string Peer::text() const {
+std::string Peer::description() const {
   return "process " + std::to_string(pid) + " of uid " + std::to_string(uid);
 }
 
@@ -65,25 +65,25 @@ std::optional<Peer> peer_of(int socket) {
   return {};
 }
 
-RoleRules role_rules(const ControlSettings& settings, const std::string& file) {
+RoleRules load_role_rules(const ControlSettings& settings, const std::string& file) {
   RoleRules rules;
-  rules.own = geteuid();
-  rules.everybody_observes = settings.observers == kEverybody;
-  if (!rules.everybody_observes) rules.observers = group_of("observers", settings.observers, file);
+  rules.own_uid = geteuid();
+  rules.anyone_may_observe = settings.observers == kEverybody;
+  if (!rules.anyone_may_observe) rules.observers = group_of("observers", settings.observers, file);
   rules.operators = group_of("operators", settings.operators, file);
   rules.administrators = group_of("administrators", settings.administrators, file);
   return rules;
 }
 
 std::optional<Role> role_of(const Peer& peer, const RoleRules& rules) noexcept {
-  if (peer.uid == 0 || peer.uid == rules.own || is_member(peer, rules.administrators))
+  if (peer.uid == 0 || peer.uid == rules.own_uid || is_member(peer, rules.administrators))
     return Role::administrator;
   if (is_member(peer, rules.operators)) return Role::operator_;
-  if (rules.everybody_observes || is_member(peer, rules.observers)) return Role::observer;
+  if (rules.anyone_may_observe || is_member(peer, rules.observers)) return Role::observer;
   return {};
 }
 
-std::string who_has(Role role, const ControlSettings& settings) {
+std::string role_group_text(Role role, const ControlSettings& settings) {
   const std::string& group = role == Role::administrator ? settings.administrators
                              : role == Role::operator_   ? settings.operators
                                                          : settings.observers;

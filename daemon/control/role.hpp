@@ -31,7 +31,7 @@ struct Peer {
   pid_t pid = 0;
 
   /// "process 4242 of uid 1000"
-  std::string text() const;
+  std::string description() const;
 };
 
 /// Of a connected Unix socket. Nothing where the kernel does not say.
@@ -39,20 +39,20 @@ std::optional<Peer> peer_of(int socket);
 
 /// Which groups may do what. root and the daemon's own user may do everything.
 struct RoleRules {
-  uid_t own = 0;
-  bool everybody_observes = false;
+  uid_t own_uid = 0;
+  bool anyone_may_observe = false;
   std::optional<gid_t> observers, operators, administrators;
 };
 
 /// Looks the groups up. Throws std::runtime_error, which names the setting and the cure, where there is no
 /// such group. May ask the network, as name services do: not from a thread that others wait for.
-RoleRules role_rules(const ControlSettings& settings, const std::string& file);
+RoleRules load_role_rules(const ControlSettings& settings, const std::string& file);
 
 /// The highest role of that peer; nothing: it may not even look.
 std::optional<Role> role_of(const Peer& peer, const RoleRules& rules) noexcept;
 
 /// The group whose members have a role, as settings name it, for messages: "group 'wrenchd-operators'", or
 /// what to set where none does.
-std::string who_has(Role role, const ControlSettings& settings);
+std::string role_group_text(Role role, const ControlSettings& settings);
 
 }  // namespace wrenchd

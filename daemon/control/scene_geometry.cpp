@@ -41,9 +41,9 @@ Json json_of(const Vector3d& v) {
 Json json_of(const ObstacleMotion& motion) {
   return {{"linear_m_per_s", json_of(motion.linear_m_per_s)},
           {"angular_rad_per_s", json_of(motion.angular_rad_per_s)},
-          {"turn_back_s", motion.turn_back_s},
-          {"begin_s", motion.begin_s},
-          {"last_s", motion.last_s}};
+          {"turn_back_s", motion.reverse_after_s},
+          {"begin_s", motion.start_s},
+          {"last_s", motion.duration_s}};
 }
 
 bool same(const TriangleMesh& a, const TriangleMesh& b) {
@@ -64,7 +64,7 @@ Json pose_json(const Pose& X) {
   return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
 }
 
-SceneShapes::SceneShapes(std::shared_ptr<const Scene> scene) : scene_(std::move(scene)) {
+SceneGeometry::SceneGeometry(std::shared_ptr<const Scene> scene) : scene_(std::move(scene)) {
   std::vector<const TriangleMesh*> all = {&scene_->tool().mesh};
   for (const MeshObstacle& obstacle : scene_->meshes()) {
     if (std::find(meshes_.begin(), meshes_.end(), obstacle.mesh.get()) != meshes_.end()) continue;
@@ -73,7 +73,7 @@ SceneShapes::SceneShapes(std::shared_ptr<const Scene> scene) : scene_(std::move(
   }
   for (const TriangleMesh* mesh : all) {
     const std::size_t vertices = mesh->vertices_m.size(), triangles = mesh->triangles.size();
-    places_.push_back({vertices, bytes_, triangles, bytes_ + 12 * vertices});
+    layouts_.push_back({vertices, bytes_, triangles, bytes_ + 12 * vertices});
     bytes_ += 12 * (vertices + triangles);
   }
   descriptor_ = memfd_create("wrenchd-shapes", MFD_CLOEXEC | MFD_ALLOW_SEALING);
@@ -89,7 +89,7 @@ SceneShapes::SceneShapes(std::shared_ptr<const Scene> scene) : scene_(std::move(
   if (memory == MAP_FAILED) give_up("mmap");
   memory_ = static_cast<std::byte*>(memory);
   for (std::size_t i = 0; i < all.size(); ++i)
-    write(*all[i], memory_ + places_[i].vertices_offset, memory_ + places_[i].triangles_offset);
+    write(*all[i], memory_ + layouts_[i].vertices_offset, memory_ + layouts_[i].triangles_offset);
   // Nothing is written any more: a mapping that could would keep the seal off.
   munmap(memory_, bytes_);
   if (fcntl(descriptor_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0)
@@ -99,27 +99,27 @@ SceneShapes::SceneShapes(std::shared_ptr<const Scene> scene) : scene_(std::move(
   memory_ = static_cast<std::byte*>(readable);
 }
 
-SceneShapes::~SceneShapes() {
+SceneGeometry::~SceneGeometry() {
   munmap(memory_, bytes_);
   close(descriptor_);
 }
 
-bool SceneShapes::fits(const Scene& scene) const {
+bool SceneGeometry::matches(const Scene& scene) const {
   if (&scene == scene_.get()) return true;
   return std::all_of(scene.meshes().begin(), scene.meshes().end(),
-                     [this](const MeshObstacle& one) { return number_of(one.mesh.get()) != 0; }) &&
+                     [this](const MeshObstacle& one) { return mesh_number(one.mesh.get()) != 0; }) &&
          same(scene.tool().mesh, scene_->tool().mesh);
 }
 
 /// 0: it is none of these. The tool's comes first.
-std::size_t SceneShapes::number_of(const TreedMesh* mesh) const {
+std::size_t SceneGeometry::mesh_number(const MeshBvh* mesh) const {
   const auto found = std::find(meshes_.begin(), meshes_.end(), mesh);
   return found == meshes_.end() ? 0 : static_cast<std::size_t>(found - meshes_.begin()) + 1;
 }
 
-Json SceneShapes::description(const Scene& scene) const {
+Json SceneGeometry::description(const Scene& scene) const {
   Json meshes = Json::array();
-  for (const Place& place : places_)
+  for (const MeshLayout& place : layouts_)
     meshes.push_back({{"vertices", place.vertices},
                       {"vertices_offset", place.vertices_offset},
                       {"triangles", place.triangles},
@@ -132,13 +132,13 @@ Json SceneShapes::description(const Scene& scene) const {
   number = scene.first_mesh();
   for (const MeshObstacle& one : scene.meshes()) {
     Json obstacle = {{"name", obstacle_name(scene, number++)},
-                     {"mesh", number_of(one.mesh.get())},
+                     {"mesh", mesh_number(one.mesh.get())},
                      {"X_WO", pose_json(one.X_WO)}};
     if (one.motion.moves()) obstacle["motion"] = json_of(one.motion);
-    if (one.later)
-      obstacle["later"] = {{"from_s", one.later->from_s},
-                           {"X_WO", pose_json(one.later->X_WO)},
-                           {"motion", json_of(one.later->motion)}};
+    if (one.scheduled)
+      obstacle["later"] = {{"from_s", one.scheduled->start_s},
+                           {"X_WO", pose_json(one.scheduled->X_WO)},
+                           {"motion", json_of(one.scheduled->motion)}};
     obstacles.push_back(std::move(obstacle));
   }
   return {{"bytes", bytes_}, {"meshes", meshes}, {"tool", {{"mesh", 0}}}, {"obstacles", obstacles}};

@@ -19,16 +19,16 @@ namespace wrenchd {
 ///   triangles   three vertex numbers of 32 bits each, counter-clockwise seen from outside
 ///
 /// Not RT safe; a million triangles take some tens of milliseconds.
-class SceneShapes {
+class SceneGeometry {
  public:
   /// Throws std::system_error where the kernel gives no such memory.
-  explicit SceneShapes(std::shared_ptr<const Scene> scene);
-  ~SceneShapes();
-  SceneShapes(const SceneShapes&) = delete;
-  SceneShapes& operator=(const SceneShapes&) = delete;
+  explicit SceneGeometry(std::shared_ptr<const Scene> scene);
+  ~SceneGeometry();
+  SceneGeometry(const SceneGeometry&) = delete;
+  SceneGeometry& operator=(const SceneGeometry&) = delete;
 
   /// Whether another scene has the same meshes, wherever its obstacles stand: then these shapes are its too.
-  bool fits(const Scene& scene) const;
+  bool matches(const Scene& scene) const;
   /// Which mesh is whose, where it stands and how it moves: {bytes, meshes, tool, obstacles}. The scene has
   /// to be one that fits(). Obstacles are in the order of their numbers.
   Json description(const Scene& scene) const;
@@ -37,14 +37,14 @@ class SceneShapes {
   std::span<const std::byte> bytes() const noexcept { return {memory_, bytes_}; }
 
  private:
-  struct Place {
+  struct MeshLayout {
     std::size_t vertices, vertices_offset, triangles, triangles_offset;
   };
-  std::size_t number_of(const TreedMesh* mesh) const;
+  std::size_t mesh_number(const MeshBvh* mesh) const;
 
   std::shared_ptr<const Scene> scene_;  ///< keeps the meshes, by which others are told to be the same
-  std::vector<const TreedMesh*> meshes_;
-  std::vector<Place> places_;  ///< of the tool, then of each of meshes_
+  std::vector<const MeshBvh*> meshes_;
+  std::vector<MeshLayout> layouts_;  ///< of the tool, then of each of meshes_
   std::size_t bytes_ = 0;
   int descriptor_ = -1;
   std::byte* memory_ = nullptr;

@@ -20,7 +20,7 @@ Vector3d vector_of(const Json& params, const char* name, const Vector3d& otherwi
   return {(*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>()};
 }
 
-double number_of(const Json& params, const char* name, double otherwise) {
+double parse_number(const Json& params, const char* name, double otherwise) {
   const auto found = params.find(name);
   return found == params.end() ? otherwise : found->get<double>();
 }
@@ -31,50 +31,50 @@ Json json_of(const Vector3d& v) {
 
 /// What the workbench refuses, in the words of the protocol.
 template <class Act>
-Answer answered(const Act& act) {
+MethodResult answered(const Act& act) {
   try {
     return act();
-  } catch (const NotNow& error) {
-    throw RpcError(RpcCode::not_now, error.what());
+  } catch (const BusyError& error) {
+    throw RpcError(RpcCode::invalid_state, error.what());
   } catch (const ConfigError& error) {
-    throw RpcError(RpcCode::refused, error.what());
+    throw RpcError(RpcCode::rejected, error.what());
   } catch (const MeshError& error) {
-    throw RpcError(RpcCode::refused, error.what());
+    throw RpcError(RpcCode::rejected, error.what());
   } catch (const std::invalid_argument& error) {
-    throw RpcError(RpcCode::refused, error.what());
+    throw RpcError(RpcCode::rejected, error.what());
   }
 }
 
-Json handed_over(const Workbench& workbench) {
-  return {{"rendering", workbench.handed_over().number}};
+Json handed_over(const Reconfigurator& workbench) {
+  return {{"rendering", workbench.current_rendering().id}};
 }
 
 /// What the bodies look like, in memory of its own; the same memory for as long as the meshes are the same.
 class ShapesKept {
  public:
-  Answer answer(Workbench& bench) {
-    const Workbench::Shown shown = bench.shown();
-    if (!shapes_ || !shapes_->fits(*shown.scene)) {
-      shapes_ = std::make_unique<SceneShapes>(shown.scene);
+  MethodResult answer(Reconfigurator& bench) {
+    const Reconfigurator::SceneView shown = bench.scene_view();
+    if (!shapes_ || !shapes_->matches(*shown.scene)) {
+      shapes_ = std::make_unique<SceneGeometry>(shown.scene);
       ++number_;
     }
     Json result = shapes_->description(*shown.scene);
     result["shapes"] = number_;
-    result["rendering"] = shown.number;
+    result["rendering"] = shown.rendering_id;
     result["scene_time_begins_ns"] = shown.scene_time_begins.time_since_epoch().count();
     result["X_WB"] = pose_json(shown.X_WB);
     result["X_HT"] = pose_json(shown.X_HT);
     result["wrench_about"] = shown.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
-    result["view"] = view_json(shown.view);
+    result["view"] = view_json(shown.viewpoint);
     return {std::move(result), shapes_->descriptor()};
   }
 
  private:
-  std::unique_ptr<SceneShapes> shapes_;
+  std::unique_ptr<SceneGeometry> shapes_;
   std::uint64_t number_ = 0;
 };
 
-Json scene_json(const Workbench& workbench) {
+Json scene_json(const Reconfigurator& workbench) {
   const SceneSettings scene = workbench.scene();
   Json obstacles = Json::array();
   for (const HalfSpaceSettings& obstacle : scene.half_spaces)
@@ -87,18 +87,18 @@ Json scene_json(const Workbench& workbench) {
                          {"scale", obstacle.scale},
                          {"position_m", json_of(obstacle.X_WM.translation_m)},
                          {"rotation_vector_rad", json_of(rotation_vector(obstacle.X_WM.rotation))},
-                         {"moves", obstacle.motion.moves() || obstacle.later.has_value()}});
+                         {"moves", obstacle.motion.moves() || obstacle.scheduled.has_value()}});
   return {{"file", scene.file.string()},
           {"tool",
            {{"mesh", scene.tool.mesh.string()}, {"scale", scene.tool.scale}, {"mass", scene.tool.mass_kg}}},
           {"obstacles", obstacles},
-          {"rendering", workbench.handed_over().number}};
+          {"rendering", workbench.current_rendering().id}};
 }
 
 std::uint32_t id_of(const Json& params) {
   const auto id = params["id"].get<std::int64_t>();
   if (id < 0 || id > std::numeric_limits<std::uint32_t>::max())
-    throw RpcError(RpcCode::wrong_params, "'id' is 0 to 4294967295.");
+    throw RpcError(RpcCode::invalid_params, "'id' is 0 to 4294967295.");
   return static_cast<std::uint32_t>(id);
 }
 
@@ -109,30 +109,30 @@ LocalModel model_of(const Json& params) {
   if (kind == "plane") {
     model.kind = LocalModel::Kind::plane;
     if (!params.contains("normal") || !params.contains("offset_m"))
-      throw RpcError(RpcCode::wrong_params,
+      throw RpcError(RpcCode::invalid_params,
                      "A plane needs 'normal' and 'offset_m': it is solid where normal . x < offset_m.");
   } else if (kind == "spring") {
     model.kind = LocalModel::Kind::spring;
     if (!params.contains("position_m"))
-      throw RpcError(RpcCode::wrong_params,
+      throw RpcError(RpcCode::invalid_params,
                      "A spring needs 'position_m', the place in the world that it draws the handle to.");
   } else if (kind != "damping") {
-    throw RpcError(RpcCode::wrong_params,
+    throw RpcError(RpcCode::invalid_params,
                    "There is no local model '" + kind + "'; there are plane, spring, damping.");
   }
   model.normal_W = vector_of(params, "normal", Vector3d::UnitZ());
-  model.offset_m = number_of(params, "offset_m", 0.0);
-  model.X_WF = {rotation_from(vector_of(params, "rotation_vector_rad", Vector3d::Zero())),
+  model.offset_m = parse_number(params, "offset_m", 0.0);
+  model.X_WA = {rotation_from(vector_of(params, "rotation_vector_rad", Vector3d::Zero())),
                 vector_of(params, "position_m", Vector3d::Zero())};
-  model.stiffness_N_per_m = number_of(params, "stiffness_N_per_m", 0.0);
-  model.stiffness_Nm_per_rad = number_of(params, "stiffness_Nm_per_rad", 0.0);
-  model.damping_N_s_per_m = number_of(params, "damping_N_s_per_m", 0.0);
-  model.damping_Nm_s_per_rad = number_of(params, "damping_Nm_s_per_rad", 0.0);
+  model.stiffness_N_per_m = parse_number(params, "stiffness_N_per_m", 0.0);
+  model.stiffness_Nm_per_rad = parse_number(params, "stiffness_Nm_per_rad", 0.0);
+  model.damping_N_s_per_m = parse_number(params, "damping_N_s_per_m", 0.0);
+  model.damping_Nm_s_per_rad = parse_number(params, "damping_Nm_s_per_rad", 0.0);
   return model;
 }
 
-Json workspace_json(const Workbench& workbench) {
-  const WorkspaceWish wish = workbench.workspace();
+Json workspace_json(const Reconfigurator& workbench) {
+  const WorkspaceRequest wish = workbench.workspace();
   return {{"scale", wish.scale}, {"clutched", wish.clutched}};
 }
 
@@ -142,10 +142,10 @@ std::string listed(const std::vector<std::string>& what) {
   return text.empty() ? "nothing" : text;
 }
 
-Answer reloaded(const std::function<ReloadResult()>& reload_all) {
+MethodResult reloaded(const std::function<ReloadResult()>& reload_all) {
   return answered([&] {
     const ReloadResult result = reload_all();
-    return Answer(
+    return MethodResult(
         Json{{"applied", result.applied}, {"not_applied", result.not_applied}, {"remarks", result.remarks}});
   });
 }
@@ -176,31 +176,34 @@ TomlNode toml_of(const Json& json) {
     }
     node.value = std::move(table);
   } else {
-    throw RpcError(RpcCode::wrong_params, "There is no null in a configuration; leave the key out instead.");
+    throw RpcError(RpcCode::invalid_params,
+                   "There is no null in a configuration; leave the key out instead.");
   }
   return node;
 }
 
-ReloadResult reload(Workbench& workbench, EventFeed& feed, const std::function<Plan()>& read) try {
+ReloadResult reload_config(Reconfigurator& workbench, EventFeed& feed,
+                           const std::function<RunConfig()>& read) try {
   ReloadResult result = workbench.reload(read);
-  feed.tell("reload", result.not_applied.empty() ? EventLevel::info : EventLevel::warning,
+  feed.emit("reload", result.not_applied.empty() ? EventLevel::info : EventLevel::warning,
             "reload: applied: " + listed(result.applied) + "; not applied: " + listed(result.not_applied),
             {{"applied", result.applied}, {"not_applied", result.not_applied}, {"refused", nullptr}});
   return result;
 } catch (const std::exception& error) {
-  feed.tell("reload", EventLevel::error,
+  feed.emit("reload", EventLevel::error,
             std::string("reload: refused, and everything stays as it was: ") + error.what(),
             {{"applied", Json::array()}, {"not_applied", Json::array()}, {"refused", error.what()}});
   throw;
 }
 
-void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<ReloadResult()> reload_all) {
-  Workbench& bench = workbench;
+void add_scene_methods(MethodTable& table, Reconfigurator& workbench,
+                       std::function<ReloadResult()> reload_all) {
+  Reconfigurator& bench = workbench;
   table.add(MethodRow{"scene.get",
                       Role::observer,
                       {},
                       "The tool and the obstacles, each with its name.",
-                      [&bench](const Json&, const Caller&) { return Answer(scene_json(bench)); },
+                      [&bench](const Json&, const Caller&) { return MethodResult(scene_json(bench)); },
                       true});
   table.add(
       MethodRow{"scene.shapes",
@@ -222,8 +225,8 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
       "Another scene, tool included. It is felt when its place is found, without a jump.",
       [&bench](const Json& params, const Caller&) {
         return answered([&] {
-          bench.load(SearchPath().require(params["file"].get<std::string>()));
-          return Answer(handed_over(bench));
+          bench.replace_scene(SearchPath().require(params["file"].get<std::string>()));
+          return MethodResult(handed_over(bench));
         });
       },
       true});
@@ -233,10 +236,11 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
                       "Another obstacle. Answers its name, by which it is moved and removed.",
                       [&bench](const Json& params, const Caller&) {
                         return answered([&] {
-                          const std::string name = bench.add(toml_of(params["obstacle"]), "scene.add");
+                          const std::string name =
+                              bench.insert_obstacle(toml_of(params["obstacle"]), "scene.add");
                           Json result = handed_over(bench);
                           result["name"] = name;
-                          return Answer(result);
+                          return MethodResult(result);
                         });
                       },
                       true});
@@ -246,8 +250,8 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
                       "Takes an obstacle away; what it pushed fades.",
                       [&bench](const Json& params, const Caller&) {
                         return answered([&] {
-                          bench.remove(params["name"].get<std::string>());
-                          return Answer(handed_over(bench));
+                          bench.remove_obstacle(params["name"].get<std::string>());
+                          return MethodResult(handed_over(bench));
                         });
                       },
                       true});
@@ -263,8 +267,8 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
         return answered([&] {
           const Pose X_WO = {rotation_from(vector_of(params, "rotation_vector_rad", Vector3d::Zero())),
                              vector_of(params, "position_m", Vector3d::Zero())};
-          bench.move(params["name"].get<std::string>(), X_WO, params["over_s"].get<double>());
-          return Answer(handed_over(bench));
+          bench.move_obstacle(params["name"].get<std::string>(), X_WO, params["over_s"].get<double>());
+          return MethodResult(handed_over(bench));
         });
       },
       true});
@@ -277,7 +281,7 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
       [&bench](const Json& params, const Caller&) {
         return answered([&] {
           bench.set_rendering(toml_of(params), "rendering.set");
-          return Answer(handed_over(bench));
+          return MethodResult(handed_over(bench));
         });
       },
       true});
@@ -292,9 +296,9 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
       [&bench](const Json& params, const Caller&) {
         return answered([&] {
           if (params.contains("scale")) bench.set_scale(params["scale"].get<double>());
-          if (params.contains("clutched")) bench.set_clutch(params["clutched"].get<bool>());
+          if (params.contains("clutched")) bench.set_clutched(params["clutched"].get<bool>());
           if (params.value("recentre", false)) bench.recentre();
-          return Answer(workspace_json(bench));
+          return MethodResult(workspace_json(bench));
         });
       },
       true});
@@ -317,7 +321,7 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
                 [&bench](const Json& params, const Caller&) {
                   return answered([&] {
                     bench.set_model(model_of(params), params["expires_s"].get<double>());
-                    return Answer(Json::object());
+                    return MethodResult(Json::object());
                   });
                 },
                 true});
@@ -327,7 +331,7 @@ void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<R
                       "Lets a local model fade out now.",
                       [&bench](const Json& params, const Caller&) {
                         bench.remove_model(id_of(params));
-                        return Answer(Json::object());
+                        return MethodResult(Json::object());
                       },
                       true});
   table.add(MethodRow{

@@ -11,11 +11,13 @@ namespace wrenchd {
 
 /// The rows of what is rendered: scene, rendering, workspace, local models, reload. Both must outlive the
 /// table. reload_all: what `reload` does; it throws as Workbench::reload().
-void add_scene_methods(MethodTable& table, Workbench& workbench, std::function<ReloadResult()> reload_all);
+void add_scene_methods(MethodTable& table, Reconfigurator& workbench,
+                       std::function<ReloadResult()> reload_all);
 
 /// Reads the configuration again, and tells what became of it. Throws as Workbench::reload(), when that is
 /// told.
-ReloadResult reload(Workbench& workbench, EventFeed& feed, const std::function<Plan()>& read);
+ReloadResult reload_config(Reconfigurator& workbench, EventFeed& feed,
+                           const std::function<RunConfig()>& read);
 
 /// What a client gave in JSON as a table of a configuration file, to be read and refused in the same words.
 /// Throws RpcError where it holds a null, which no such file knows.

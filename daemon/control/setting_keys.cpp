@@ -11,7 +11,7 @@ template <class T>
 bool equal(const T& a, const T& b) {
   return a == b;
 }
-bool equal(const PlacementSettings& a, const PlacementSettings& b) {
+bool equal(const PoseSettings& a, const PoseSettings& b) {
   return a.position_m == b.position_m && a.rotation_vector_rad == b.rotation_vector_rad;
 }
 bool equal(const std::vector<Waypoint>& a, const std::vector<Waypoint>& b) {
@@ -28,7 +28,7 @@ bool equal(const std::vector<TimedPose>& a, const std::vector<TimedPose>& b) {
 
 #define WRENCHD_KEY(name, takes, member)                                                \
   SettingKey {                                                                          \
-    name, SettingKey::Takes::takes,                                                     \
+    name, SettingKey::Effect::takes,                                                    \
         [](const Settings& a, const Settings& b) { return equal(a.member, b.member); }, \
         [](const Settings& from, Settings& to) { to.member = from.member; }             \
   }
@@ -36,7 +36,7 @@ constexpr std::array kKeys = {
     WRENCHD_KEY("device.profile", restart, device.profile),
     WRENCHD_KEY("device.serial", restart, device.serial),
     WRENCHD_KEY("device.base_in_world", restart, device.base_in_world),
-    WRENCHD_KEY("device.tool_in_handle", rendering, device.tool_in_handle),
+    WRENCHD_KEY("device.tool_in_handle", new_rendering, device.tool_in_handle),
     WRENCHD_KEY("servo.rate_Hz", restart, servo.rate_Hz),
     WRENCHD_KEY("servo.pacing", restart, servo.pacing),
     WRENCHD_KEY("servo.realtime", restart, servo.realtime),
@@ -44,18 +44,18 @@ constexpr std::array kKeys = {
     WRENCHD_KEY("servo.cpu", restart, servo.cpu),
     WRENCHD_KEY("servo.late_limit_s", restart, servo.late_limit_s),
     WRENCHD_KEY("servo.self_test_s", restart, servo.self_test_s),
-    WRENCHD_KEY("rendering.method", rendering, rendering.method),
-    WRENCHD_KEY("rendering.planes", rendering, rendering.planes),
-    WRENCHD_KEY("rendering.friction.static", rendering, rendering.friction.static_coefficient),
-    WRENCHD_KEY("rendering.friction.dynamic", rendering, rendering.friction.dynamic_coefficient),
-    WRENCHD_KEY("wrench.law", rendering, wrench.law),
-    WRENCHD_KEY("wrench.energy_stiffness_per_s2", rendering, wrench.energy_stiffness_per_s2),
-    WRENCHD_KEY("wrench.stiffness", rendering, wrench.gains.stiffness),
-    WRENCHD_KEY("wrench.integral", rendering, wrench.gains.integral),
-    WRENCHD_KEY("wrench.damping", rendering, wrench.gains.damping),
-    WRENCHD_KEY("wrench.integral_limit_N", rendering, wrench.gains.integral_limit_N),
-    WRENCHD_KEY("wrench.integral_limit_Nm", rendering, wrench.gains.integral_limit_Nm),
-    WRENCHD_KEY("wrench.derivative_cutoff_Hz", rendering, wrench.gains.derivative_cutoff_Hz),
+    WRENCHD_KEY("rendering.method", new_rendering, rendering.method),
+    WRENCHD_KEY("rendering.planes", new_rendering, rendering.planes),
+    WRENCHD_KEY("rendering.friction.static", new_rendering, rendering.friction.static_coefficient),
+    WRENCHD_KEY("rendering.friction.dynamic", new_rendering, rendering.friction.dynamic_coefficient),
+    WRENCHD_KEY("wrench.law", new_rendering, wrench.law),
+    WRENCHD_KEY("wrench.energy_stiffness_per_s2", new_rendering, wrench.energy_stiffness_per_s2),
+    WRENCHD_KEY("wrench.stiffness", new_rendering, wrench.gains.stiffness),
+    WRENCHD_KEY("wrench.integral", new_rendering, wrench.gains.integral),
+    WRENCHD_KEY("wrench.damping", new_rendering, wrench.gains.damping),
+    WRENCHD_KEY("wrench.integral_limit_N", new_rendering, wrench.gains.integral_limit_N),
+    WRENCHD_KEY("wrench.integral_limit_Nm", new_rendering, wrench.gains.integral_limit_Nm),
+    WRENCHD_KEY("wrench.derivative_cutoff_Hz", new_rendering, wrench.gains.derivative_cutoff_Hz),
     WRENCHD_KEY("control.socket", restart, control.socket),
     WRENCHD_KEY("control.observers", restart, control.observers),
     WRENCHD_KEY("control.operators", restart, control.operators),
@@ -65,8 +65,8 @@ constexpr std::array kKeys = {
     WRENCHD_KEY("limits.force_slew_N_per_s", limits, limits.force_slew_N_per_s),
     WRENCHD_KEY("limits.torque_slew_Nm_per_s", limits, limits.torque_slew_Nm_per_s),
     WRENCHD_KEY("limits.soft_start_s", limits, limits.soft_start_s),
-    WRENCHD_KEY("view.eye_m", at_once, view.eye_m),
-    WRENCHD_KEY("view.target_m", at_once, view.target_m),
+    WRENCHD_KEY("view.eye_m", immediate, view.eye_m),
+    WRENCHD_KEY("view.target_m", immediate, view.target_m),
     WRENCHD_KEY("simulation.hand_script", restart, simulation.hand_script),
     WRENCHD_KEY("simulation.hand_script (what it says)", restart, simulation.hand_path),
     WRENCHD_KEY("simulation.hand_stiffness_N_per_m", restart, simulation.hand_stiffness_N_per_m),

@@ -10,15 +10,15 @@ namespace wrenchd {
 
 /// One key of wrenchd.toml, and what can become of it while the loop runs.
 struct SettingKey {
-  enum class Takes : std::uint8_t {
-    rendering,  ///< another rendering, which takes the place of the last without a jump
-    at_once,    ///< nothing: it is for whoever asks
-    limits,     ///< where it is tighter, nothing; where it is looser, a loop that is disarmed
-    restart,    ///< what it is for is built once
+  enum class Effect : std::uint8_t {
+    new_rendering,  ///< another rendering, which takes the place of the last without a jump
+    immediate,      ///< nothing: it is for whoever asks
+    limits,         ///< where it is tighter, nothing; where it is looser, a loop that is disarmed
+    restart,        ///< what it is for is built once
   };
 
   const char* name;  ///< "wrench.stiffness"
-  Takes takes;
+  Effect effect;
   bool (*same)(const Settings& a, const Settings& b);
   void (*copy)(const Settings& from, Settings& to);
 };

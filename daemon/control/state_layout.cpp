@@ -31,11 +31,11 @@ json described(std::span<const RecordField> fields, std::size_t base) {
 
 }  // namespace
 
-json state_layout(const SharedState& state, const Workbench::ObstacleNames& obstacles) {
+json state_layout(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles) {
   json fields = described(tick_fields(), offsetof(StateRecord, tick));
   fields.push_back(
       {{"name", "touch_count"},
-       {"offset", offsetof(StateRecord, touch_count)},
+       {"offset", offsetof(StateRecord, contact_count)},
        {"type", "u64"},
        {"count", 1},
        {"unit", "1"},
@@ -54,15 +54,15 @@ json state_layout(const SharedState& state, const Workbench::ObstacleNames& obst
           {"byte_order", std::endian::native == std::endian::little ? "little" : "big"},
           {"fields", fields},
           {"touches",
-           {{"offset", offsetof(StateRecord, touches)},
+           {{"offset", offsetof(StateRecord, contacts)},
             {"bytes", sizeof(Touch)},
-            {"most", kMostTouches},
-            {"fields", described(touch_fields(), 0)}}},
+            {"most", kMaxTouches},
+            {"fields", described(contact_fields(), 0)}}},
           {"obstacles", obstacles.names},
-          {"rendering", obstacles.rendering}};
+          {"rendering", obstacles.rendering_id}};
 }
 
-void open_state(const SharedState& state, const Workbench::ObstacleNames& obstacles,
+void open_state(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles,
                 const SendWithDescriptor& send) {
   send({{"layout", state_layout(state, obstacles)}}, state.descriptor());
 }

@@ -8,8 +8,8 @@
 
 namespace wrenchd {
 
-void add_state_methods(MethodTable& table, Station& station) {
-  const SharedState& state = station.show_state();
+void add_state_methods(MethodTable& table, Runtime& station) {
+  const SharedState& state = station.enable_shared_state();
   table.add(
       {"state.open",
        Role::observer,
@@ -20,11 +20,12 @@ void add_state_methods(MethodTable& table, Station& station) {
        [&](const Json&, const Caller&) {
          Json result;
          int fd = -1;
-         open_state(state, station.workbench().obstacle_names(), [&](const Json& layout, int descriptor) {
-           result = layout;
-           fd = descriptor;
-         });
-         return Answer(std::move(result), fd);
+         open_state(state, station.reconfigurator().obstacle_names(),
+                    [&](const Json& layout, int descriptor) {
+                      result = layout;
+                      fd = descriptor;
+                    });
+         return MethodResult(std::move(result), fd);
        }});
   table.add(
       {"state.names",
@@ -33,8 +34,8 @@ void add_state_methods(MethodTable& table, Station& station) {
        "obstacles: the names by number, as they are in the rendering of that number: contacts of ticks of "
        "another rendering are with other obstacles",
        [&](const Json&, const Caller&) {
-         const Workbench::ObstacleNames obstacles = station.workbench().obstacle_names();
-         return Answer(Json{{"obstacles", obstacles.names}, {"rendering", obstacles.rendering}});
+         const Reconfigurator::ObstacleNames obstacles = station.reconfigurator().obstacle_names();
+         return MethodResult(Json{{"obstacles", obstacles.names}, {"rendering", obstacles.rendering_id}});
        }});
 }
 

@@ -5,10 +5,10 @@
 
 namespace wrenchd {
 
-class Station;
+class Runtime;
 
 /// The row of `state.open`. The station shows its state from here on, so its loop may not run yet; it must
 /// outlive the table. Throws std::system_error where there is no memory to show it in.
-void add_state_methods(MethodTable& table, Station& station);
+void add_state_methods(MethodTable& table, Runtime& station);
 
 }  // namespace wrenchd

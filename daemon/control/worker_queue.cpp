@@ -5,32 +5,32 @@
 
 namespace wrenchd {
 
-SlowWork::SlowWork() : thread_([this](const std::stop_token& stop) { run(stop); }) {
+WorkerQueue::WorkerQueue() : thread_([this](const std::stop_token& stop) { run(stop); }) {
   pthread_setname_np(thread_.native_handle(), "slow work");
 }
 
-SlowWork::~SlowWork() {
+WorkerQueue::~WorkerQueue() {
   thread_.request_stop();
   thread_.join();
 }
 
-bool SlowWork::post(std::function<void()> piece) {
+bool WorkerQueue::post(std::function<void()> piece) {
   {
     const std::scoped_lock lock(mutex_);
-    if (waiting_.size() >= kMostWaiting) return false;
-    waiting_.push_back(std::move(piece));
+    if (queue_.size() >= kMaxQueued) return false;
+    queue_.push_back(std::move(piece));
   }
   changed_.notify_one();
   return true;
 }
 
-void SlowWork::run(const std::stop_token& stop) {
+void WorkerQueue::run(const std::stop_token& stop) {
   while (true) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, stop, [this] { return !waiting_.empty(); });
+    changed_.wait(lock, stop, [this] { return !queue_.empty(); });
     if (stop.stop_requested()) return;
-    const std::function<void()> piece = std::move(waiting_.front());
-    waiting_.pop_front();
+    const std::function<void()> piece = std::move(queue_.front());
+    queue_.pop_front();
     lock.unlock();
     piece();
   }

@@ -39,7 +39,7 @@ std::vector<TimedPose> of_recording(const std::filesystem::path& file) {
     const double time_s =
         device_time_rises ? tick.device_time_s : 1e-9 * static_cast<double>(tick.arrived_ns);
     if (!poses.empty() && !(time_s > poses.back().time_s)) continue;
-    if (!poses.empty() && time_s - poses.back().time_s > kLongestGap_s)
+    if (!poses.empty() && time_s - poses.back().time_s > kMaxTableGap_s)
       throw RecordingError(file.string() + ": before tick " + std::to_string(tick.tick) +
                            " there is a gap of " + to_text(time_s - poses.back().time_s) +
                            " s without a pose, which nobody can play; export what is wanted of it, with "

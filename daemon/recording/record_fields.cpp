@@ -71,8 +71,9 @@ constexpr std::array kTick = {
                  "when the sample reached the host; its age is answered_ns - arrived_ns"),
     WRENCHD_TICK(device_time_s, "s", "", none, "the device's own clock"),
     WRENCHD_TICK(sequence, "1", "", none, "number of the sample, by the device"),
-    WRENCHD_TICK(acknowledged, "1", "", none, "number of the last command that the device says it took"),
-    WRENCHD_TICK(skipped, "1", "", none, "older samples that came at once with this one"),
+    WRENCHD_TICK(acknowledged_command, "1", "", none,
+                 "number of the last command that the device says it took"),
+    WRENCHD_TICK(superseded, "1", "", none, "older samples that came at once with this one"),
     WRENCHD_TICK(missing, "1", "", none, "samples that never came, by their sequence numbers"),
     WRENCHD_TICK(rejected, "1", "", none, "reports that could not be used"),
     WRENCHD_TICK(repeated, "1", "", none, "reports that were there already"),
@@ -84,8 +85,8 @@ constexpr std::array kTick = {
     WRENCHD_TICK(sample_fault, "enum", "", fault, "what the device found in its reports"),
     WRENCHD_TICK(write_fault, "enum", "", fault, "what the write came to"),
     WRENCHD_TICK(commands, "bits", "", command_bits, "what was asked for since the last tick"),
-    WRENCHD_TICK(commanded, "1", "", none, "number of the last command sent before this tick"),
-    WRENCHD_TICK(slept_ns, "ns", "", none, "how long the machine has slept since it was switched on"),
+    WRENCHD_TICK(last_command_sent, "1", "", none, "number of the last command sent before this tick"),
+    WRENCHD_TICK(suspended_ns, "ns", "", none, "how long the machine has slept since it was switched on"),
     WRENCHD_TICK(X_BH, kPose, "handle H in device base B", none, "pose of the handle"),
     WRENCHD_TICK(V_BH, "m/s x3, rad/s x3", "handle H in axes of B", none, "twist: linear, angular"),
     WRENCHD_TICK(X_WP, kPose, "tool body T in world W", none, "p: what the hand asks for"),
@@ -99,29 +100,33 @@ constexpr std::array kTick = {
     WRENCHD_TICK(contacts, "1", "", none, "contacts that hold q; 0 in free space"),
     WRENCHD_TICK(iterations, "1", "", none, "Newton steps of the projection"),
     WRENCHD_TICK(projection_status, "enum", "", projection_status, "how the projection ended"),
-    WRENCHD_TICK(placing, "enum", "", placing, "where the proxy stands"),
-    WRENCHD_TICK(rendering, "1", "", none,
+    WRENCHD_TICK(proxy_initialization, "enum", "", placing, "where the proxy stands"),
+    WRENCHD_TICK(rendering_id, "1", "", none,
                  "number of the rendering that this is of; 0: that of the start, others were made since"),
-    WRENCHD_TICK(changes, "1", "", none, "how often anything was changed while the loop ran"),
-    WRENCHD_TICK(rendering_sum, "1", "", none, "sum over what the rendering was made with"),
-    WRENCHD_TICK(next_share, "1", "", none, "of F_out that another rendering has, which takes its place"),
-    WRENCHD_TICK(through, "1", "", none, "share of the contact's wrench that the workspace lets through"),
+    WRENCHD_TICK(change_count, "1", "", none, "how often anything was changed while the loop ran"),
+    WRENCHD_TICK(rendering_checksum, "1", "", none, "sum over what the rendering was made with"),
+    WRENCHD_TICK(next_rendering_weight, "1", "", none,
+                 "of F_out that another rendering has, which takes its place"),
+    WRENCHD_TICK(contact_gain, "1", "", none,
+                 "share of the contact's wrench that the workspace lets through"),
     WRENCHD_TICK(state, "enum", "", state, "state of the loop"),
-    WRENCHD_TICK(cause, "enum", "", fault, "the fault that led to it"),
+    WRENCHD_TICK(state_cause, "enum", "", fault, "the fault that led to it"),
     WRENCHD_TICK(faults, "bits", "", fault_bits, "all that was found in this tick"),
     WRENCHD_TICK(limit_causes, "bits", "", limit_bits, "why F_out is not what the law asked for"),
-    WRENCHD_TICK(dropped, "bits", "", dof_bits, "components of the wrench that the device has no motors for"),
-    WRENCHD_TICK(motors_told, "bool", "", flag, "1: the command says motors on"),
+    WRENCHD_TICK(undriven_dofs, "bits", "", dof_bits,
+                 "components of the wrench that the device has no motors for"),
+    WRENCHD_TICK(motors_commanded, "bool", "", flag, "1: the command says motors on"),
     WRENCHD_TICK(released, "bool", "", flag, "1: the hand was released; F_out is zero"),
     WRENCHD_TICK(authority, "1", "", none, "share of the wrench that goes out, 0 to 1"),
-    WRENCHD_TICK(stiffness_share, "1", "", none, "of the spring that the configuration asks for"),
-    WRENCHD_TICK(guard_share, "1", "", none, "of the wrench that the passivity guard leaves"),
+    WRENCHD_TICK(stiffness_scale, "1", "", none, "of the spring that the configuration asks for"),
+    WRENCHD_TICK(passivity_scale, "1", "", none, "of the wrench that the passivity guard leaves"),
     WRENCHD_TICK(energy_in_J, "J", "", none, "work of the hand on the loop since the force began"),
     WRENCHD_TICK(energy_out_J, "J", "", none, "work of the loop on the hand, likewise"),
     WRENCHD_TICK(injected_J, "J", "", none, "what of it came from nowhere, net of the device's friction"),
     WRENCHD_TICK(F_out, kWrench, "about the point and in the axes the profile names", none,
                  "wrench told to the device"),
-    WRENCHD_TICK(answered_ns, "ns", "", none, "CLOCK_MONOTONIC at which the wrench was ready, before limits"),
+    WRENCHD_TICK(wrench_ready_ns, "ns", "", none,
+                 "CLOCK_MONOTONIC at which the wrench was ready, before limits"),
     WRENCHD_TICK(wake_latency_ns, "ns", "", none, "from the time the tick was due to its start"),
     WRENCHD_TICK(stage_ns, "ns x5: read projection wrench limits write", "", none, "what the tick took"),
 };
@@ -184,7 +189,7 @@ std::vector<std::string> value_names(ValueNames names) {
     case ValueNames::projection_status:
       return {"free", "converged", "budget spent", "infeasible"};
     case ValueNames::placing:
-      return names_of(4, [](std::size_t i) { return name(static_cast<Placing>(i)); });
+      return names_of(4, [](std::size_t i) { return name(static_cast<ProxyInitialization>(i)); });
     case ValueNames::contact_kind:
       return {"vertex on face", "face on vertex", "edge on edge"};
     case ValueNames::feature_kind:
@@ -204,7 +209,7 @@ std::span<const RecordField> tick_fields() noexcept {
   return kTick;
 }
 
-std::span<const RecordField> touch_fields() noexcept {
+std::span<const RecordField> contact_fields() noexcept {
   return kTouch;
 }
 

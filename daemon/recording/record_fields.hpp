@@ -55,6 +55,6 @@ struct RecordField {
 /// Those of TickRecord, all of them, in order.
 std::span<const RecordField> tick_fields() noexcept;
 /// Those of Touch, likewise.
-std::span<const RecordField> touch_fields() noexcept;
+std::span<const RecordField> contact_fields() noexcept;
 
 }  // namespace wrenchd

@@ -12,8 +12,8 @@ namespace wrenchd {
 /// Where memory is locked a limit may refuse what a machine would have.
 RecordHistory::RecordHistory(std::size_t ticks) try
     : ticks_(std::max<std::size_t>(ticks, 1)),
-      ranges_(ticks_.size()),
-      touches_(std::max(kTouchesPerTick * ticks_.size(), kMostTouches)) {
+      contact_ranges_(ticks_.size()),
+      contacts_(std::max(kContactsPerTick * ticks_.size(), kMaxTouches)) {
 } catch (const std::bad_alloc&) {
   throw std::runtime_error("the last " + std::to_string(ticks) + " ticks take " +
                            std::to_string(ticks * kBytesPerTick / 1'000'000) +
@@ -25,14 +25,14 @@ void RecordHistory::append(const StateRecord& record) {
   const std::scoped_lock lock(mutex_);
   const std::size_t place = end_ % ticks_.size();
   ticks_[place] = record.tick;
-  ranges_[place] = {touch_end_, static_cast<std::uint32_t>(record.touch_count)};
-  for (std::uint64_t i = 0; i < record.touch_count; ++i)
-    touches_[(touch_end_ + i) % touches_.size()] = record.touches[i];
-  touch_end_ += record.touch_count;
+  contact_ranges_[place] = {contact_end_, static_cast<std::uint32_t>(record.contact_count)};
+  for (std::uint64_t i = 0; i < record.contact_count; ++i)
+    contacts_[(contact_end_ + i) % contacts_.size()] = record.contacts[i];
+  contact_end_ += record.contact_count;
   ++end_;
 }
 
-RecordHistory::Held RecordHistory::held() const {
+RecordHistory::RecordRange RecordHistory::stored_range() const {
   const std::scoped_lock lock(mutex_);
   return {begin(), end_};
 }
@@ -42,7 +42,7 @@ std::int64_t RecordHistory::newest_ns() const {
   return end_ == 0 ? 0 : tick(end_ - 1).now_ns;
 }
 
-std::uint64_t RecordHistory::first_since(std::int64_t now_ns) const {
+std::uint64_t RecordHistory::first_at_or_after(std::int64_t now_ns) const {
   const std::scoped_lock lock(mutex_);
   std::uint64_t low = begin(), high = end_;  // the times of ticks rise
   while (low < high) {
@@ -61,13 +61,13 @@ std::uint64_t RecordHistory::copy(std::uint64_t from, std::uint64_t end, std::si
   const std::scoped_lock lock(mutex_);
   const std::uint64_t first = std::max(from, begin());
   const std::uint64_t last = std::min({first + most, end, end_});
-  const std::uint64_t touches_begin = touch_end_ - std::min<std::uint64_t>(touch_end_, touches_.size());
+  const std::uint64_t touches_begin = contact_end_ - std::min<std::uint64_t>(contact_end_, contacts_.size());
   for (std::uint64_t number = first; number < last; ++number) {
-    const TouchRange& range = ranges_[number % ranges_.size()];
+    const ContactRange& range = contact_ranges_[number % contact_ranges_.size()];
     const bool there = range.first >= touches_begin;
-    std::array<Touch, kMostTouches> its;
+    std::array<Touch, kMaxTouches> its;
     for (std::uint32_t i = 0; there && i < range.count; ++i)
-      its[i] = touches_[(range.first + i) % touches_.size()];
+      its[i] = contacts_[(range.first + i) % contacts_.size()];
     out.add(tick(number), std::span(its).first(there ? range.count : 0));
   }
   return first;

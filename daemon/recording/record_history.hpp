@@ -20,10 +20,10 @@ class RecordHistory {
  public:
   /// Contacts that there is room for, as a mean over all ticks. Where there are more, those of the oldest
   /// ticks are gone first; the ticks stay.
-  static constexpr std::size_t kTouchesPerTick = 8;
+  static constexpr std::size_t kContactsPerTick = 8;
   /// Of memory, for a tick.
   static constexpr std::size_t kBytesPerTick =
-      sizeof(TickRecord) + sizeof(TouchRange) + kTouchesPerTick * sizeof(Touch);
+      sizeof(TickRecord) + sizeof(ContactRange) + kContactsPerTick * sizeof(Touch);
 
   /// Room for so many ticks, at least one.
   explicit RecordHistory(std::size_t ticks);
@@ -31,13 +31,13 @@ class RecordHistory {
   void append(const StateRecord& record);
 
   /// Numbers of the oldest record held, and of the one that comes next.
-  struct Held {
+  struct RecordRange {
     std::uint64_t begin = 0;
     std::uint64_t end = 0;
   };
-  Held held() const;
+  RecordRange stored_range() const;
   /// Number of the first record held that began at that time [ns] or later; held().end: there is none.
-  std::uint64_t first_since(std::int64_t now_ns) const;
+  std::uint64_t first_at_or_after(std::int64_t now_ns) const;
   /// When the newest began [ns]; 0: there is none.
   std::int64_t newest_ns() const;
 
@@ -52,10 +52,10 @@ class RecordHistory {
 
   mutable std::mutex mutex_;  ///< of all of the below
   std::vector<TickRecord> ticks_;
-  std::vector<TouchRange> ranges_;  ///< by numbers of touches, which are counted as ticks are
-  std::vector<Touch> touches_;
+  std::vector<ContactRange> contact_ranges_;  ///< by numbers of touches, which are counted as ticks are
+  std::vector<Touch> contacts_;
   std::uint64_t end_ = 0;
-  std::uint64_t touch_end_ = 0;
+  std::uint64_t contact_end_ = 0;
 };
 
 }  // namespace wrenchd

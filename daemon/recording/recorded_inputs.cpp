@@ -93,17 +93,17 @@ fs::path mesh_at(const RecordingHeader& header, const std::string& role, const f
     throw RecordingError("the recording has no mesh '" + role +
                          "', which its scene names: it cannot be replayed from itself; name the scene with "
                          "--scene and the configuration with --config");
-  if (mesh->inside) {
-    const fs::path file = directory / "meshes" / (role + mesh->at.extension().string());
+  if (mesh->embedded) {
+    const fs::path file = directory / "meshes" / (role + mesh->path.extension().string());
     write(file, mesh->bytes);
     return file;
   }
-  const auto bytes = contents(mesh->at);
+  const auto bytes = contents(mesh->path);
   if (!bytes || sha256(*bytes) != mesh->sha256)
-    throw RecordingError(mesh->at.string() + ": " + (bytes ? "is another file" : "is not there") +
+    throw RecordingError(mesh->path.string() + ": " + (bytes ? "is another file" : "is not there") +
                          " than when this was recorded (SHA-256 " + mesh->sha256 +
                          "), and was too large to be in the recording; put it back");
-  return mesh->at;
+  return mesh->path;
 }
 
 TomlEntry* find(TomlNode& table, const std::string& key) {
@@ -172,14 +172,14 @@ DeviceProfile profile_of(const RecordingHeader& header, const fs::path& director
   for (int i = 1;; ++i) {
     const RecordedFile* const parent = find(header, "profile_" + std::to_string(i));
     if (parent == nullptr) break;
-    put(parent->at, parent->bytes);
+    put(parent->path, parent->bytes);
   }
   return load_profile(nearest, SearchPath(places));
 }
 
 }  // namespace
 
-RecordingHeader recorded_texts(const Plan& plan) {
+RecordingHeader read_recorded_texts(const RunConfig& plan) {
   RecordingHeader header;
   header.version = kVersion;
   header.settings_file = plan.settings.file;
@@ -205,19 +205,19 @@ void add_meshes(const SceneSettings& scene, RecordingHeader& header) {
   const auto add = [&](const std::string& role, const fs::path& at) {
     std::string bytes = contents(at).value_or("");
     RecordedFile mesh{role, fs::absolute(at).lexically_normal(), sha256(bytes), true, {}};
-    mesh.inside = inside + bytes.size() <= kMostMeshBytes;
-    if (mesh.inside) {
+    mesh.embedded = inside + bytes.size() <= kMaxEmbeddedMesh_bytes;
+    if (mesh.embedded) {
       inside += bytes.size();
       mesh.bytes = std::move(bytes);
     }
     header.files.push_back(std::move(mesh));
   };
-  if (!scene.tool.made) add("tool", scene.tool.mesh);
+  if (!scene.tool.generated) add("tool", scene.tool.mesh);
   for (std::size_t i = 0; i < scene.meshes.size(); ++i)
-    if (!scene.meshes[i].made) add("obstacle_" + std::to_string(i), scene.meshes[i].mesh);
+    if (!scene.meshes[i].generated) add("obstacle_" + std::to_string(i), scene.meshes[i].mesh);
 }
 
-void begin_now(const Clock& clock, RecordingHeader& header) {
+void set_start_time(const Clock& clock, RecordingHeader& header) {
   header.started_ns = clock.now().time_since_epoch().count();
   header.started_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
                                std::chrono::system_clock::now().time_since_epoch())
@@ -225,7 +225,7 @@ void begin_now(const Clock& clock, RecordingHeader& header) {
   header.virtual_time = dynamic_cast<const WallClock*>(&clock) == nullptr;
 }
 
-Plan recorded_plan(const RecordingHeader& header, const fs::path& directory) {
+RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& directory) {
   if (header.settings.empty() || header.scene.empty() || header.profile.empty())
     throw RecordingError(
         "the recording lacks the texts of its configuration, scene or profile; name them with --config, "
@@ -233,7 +233,7 @@ Plan recorded_plan(const RecordingHeader& header, const fs::path& directory) {
   const RecordedFile* const script = find(header, "hand_script");
   const fs::path hand = directory / "hand.toml";
   write(hand, script == nullptr ? "" : script->bytes);
-  Plan plan;
+  RunConfig plan;
   plan.profile = profile_of(header, directory);
   plan.scene = scene_of(header, directory);
   TomlNode tree = read_toml_text(header.settings, header.settings_file);

@@ -15,21 +15,21 @@ namespace wrenchd {
 
 /// Meshes up to so many bytes together are inside, the tool's first; larger ones are named with their
 /// SHA-256, so that a recording of seconds does not weigh as much as a scene of a million triangles.
-inline constexpr std::size_t kMostMeshBytes = std::size_t{32} << 20;
+inline constexpr std::size_t kMaxEmbeddedMesh_bytes = std::size_t{32} << 20;
 
 /// Versions, and the texts of settings, scene, profile with its parents, and hand script. What cannot be read
 /// any more is empty. Not RT safe.
-RecordingHeader recorded_texts(const Plan& plan);
+RecordingHeader read_recorded_texts(const RunConfig& plan);
 
 /// The mesh files of the scene, as they are now. Meshes that are made stand in the scene's text.
 void add_meshes(const SceneSettings& scene, RecordingHeader& header);
 
 /// That the recording begins now: by that clock, and by UTC.
-void begin_now(const Clock& clock, RecordingHeader& header);
+void set_start_time(const Clock& clock, RecordingHeader& header);
 
 /// What a recording ran with, made of what is in it. Writes its files into the directory, which has to be
 /// there for as long as the plan is used. Throws RecordingError where it lacks something: a mesh that is too
 /// large to be inside is taken from where it was, if it is still the same.
-Plan recorded_plan(const RecordingHeader& header, const std::filesystem::path& directory);
+RunConfig unpack_run_config(const RecordingHeader& header, const std::filesystem::path& directory);
 
 }  // namespace wrenchd

@@ -26,7 +26,7 @@ void discard(const std::filesystem::path& directory) noexcept {
 
 RecordedRun::RecordedRun(const RecordingHeader& header) : directory_(new_directory()) {
   try {
-    plan_ = recorded_plan(header, directory_);
+    config_ = unpack_run_config(header, directory_);
   } catch (...) {
     discard(directory_);
     throw;

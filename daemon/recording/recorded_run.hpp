@@ -12,17 +12,17 @@ namespace wrenchd {
 /// which goes with this.
 class RecordedRun {
  public:
-  /// Throws RecordingError as recorded_plan(), and std::system_error where nothing can be unpacked.
+  /// Throws RecordingError as unpack_run_config(), and std::system_error where nothing can be unpacked.
   explicit RecordedRun(const RecordingHeader& header);
   ~RecordedRun();
   RecordedRun(const RecordedRun&) = delete;
   RecordedRun& operator=(const RecordedRun&) = delete;
 
-  const Plan& plan() const noexcept { return plan_; }
+  const RunConfig& config() const noexcept { return config_; }
 
  private:
   std::filesystem::path directory_;
-  Plan plan_;
+  RunConfig config_;
 };
 
 }  // namespace wrenchd

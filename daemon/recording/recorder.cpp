@@ -15,8 +15,8 @@ Recorder::Recorder(const RecordHistory& history, const std::filesystem::path& fi
                    const RecordingHeader& header, std::uint64_t first)
     : history_(history), file_(file), writer_(file, header), next_(first) {}
 
-bool Recorder::step(std::uint64_t end, bool rest) {
-  const std::uint64_t begin = std::max(next_, history_.held().begin);
+bool Recorder::write_next(std::uint64_t end, bool rest) {
+  const std::uint64_t begin = std::max(next_, history_.stored_range().begin);
   const std::uint64_t there = end - std::min(begin, end);
   std::size_t most = std::min<std::uint64_t>(there, kMostChunks * RecordingWriter::kChunkTicks);
   // A chunk that is begun is written again when it goes on: only the last one is.

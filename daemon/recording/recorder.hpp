@@ -18,7 +18,7 @@ class Recorder {
 
   /// Writes the next piece of what is held before that number: whole chunks, which cost least, or, where
   /// `rest` is set, what is left too. False: there is nothing to write now. Throws RecordingError.
-  bool step(std::uint64_t end, bool rest);
+  bool write_next(std::uint64_t end, bool rest);
 
   const std::filesystem::path& file() const noexcept { return file_; }
   std::uint64_t next() const noexcept { return next_; }        ///< number of the next record to write

@@ -59,14 +59,14 @@ void make_recordings_directory(const fs::path& directory) {
   fs::permissions(directory, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec, error);
 }
 
-std::string stamp(std::time_t utc) {
+std::string utc_stamp(std::time_t utc) {
   std::tm parts{};
   gmtime_r(&utc, &parts);
   std::array<char, 32> text{};
   return {text.data(), std::strftime(text.data(), text.size(), "%Y%m%dT%H%M%SZ", &parts)};
 }
 
-fs::path place_of(const std::string& asked, const fs::path& directory, bool anywhere) {
+fs::path recording_path(const std::string& asked, const fs::path& directory, bool anywhere) {
   fs::path name = asked;
   if (anywhere && name.is_absolute()) return name.lexically_normal();
   if (!is_plain(asked))
@@ -87,7 +87,7 @@ double free_MB(const fs::path& directory) {
   return 1e-6 * static_cast<double>(space.available);
 }
 
-void check_room(const fs::path& directory, const RecordingSettings& settings) {
+void check_free_space(const fs::path& directory, const RecordingSettings& settings) {
   const double left_MB = free_MB(directory);
   if (left_MB > settings.keep_free_MB) return;
   throw RecordingError(directory.string() + ": " + std::to_string(static_cast<long>(left_MB)) +
@@ -95,8 +95,8 @@ void check_room(const fs::path& directory, const RecordingSettings& settings) {
                        " MB are to stay free; remove old recordings, or lower keep_free_MB in [recording]");
 }
 
-std::vector<RecordingFound> recordings_in(const fs::path& directory) {
-  std::vector<RecordingFound> found;
+std::vector<StoredRecording> stored_recordings(const fs::path& directory) {
+  std::vector<StoredRecording> found;
   std::error_code error;
   for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
     struct stat status {};
@@ -105,33 +105,34 @@ std::vector<RecordingFound> recordings_in(const fs::path& directory) {
     if (::lstat(at->path().c_str(), &status) != 0 || !S_ISREG(status.st_mode)) continue;
     found.push_back({name, static_cast<std::uint64_t>(status.st_size), status.st_mtime});
   }
-  std::sort(found.begin(), found.end(), [](const RecordingFound& a, const RecordingFound& b) {
-    return std::tie(a.changed, a.name) < std::tie(b.changed, b.name);
+  std::sort(found.begin(), found.end(), [](const StoredRecording& a, const StoredRecording& b) {
+    return std::tie(a.modified_at, a.name) < std::tie(b.modified_at, b.name);
   });
   return found;
 }
 
 OwnedFd open_recording(const fs::path& directory, const std::string& name) {
-  const fs::path file = place_of(name, directory, false);
+  const fs::path file = recording_path(name, directory, false);
   // What somebody may have put there in a file's place is not followed, nor waited for.
   OwnedFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat status {};
   if (fd && ::fstat(fd.get(), &status) == 0 && S_ISREG(status.st_mode)) return fd;
   std::string there;
-  for (const RecordingFound& one : recordings_in(directory)) there += (there.empty() ? "" : ", ") + one.name;
+  for (const StoredRecording& one : stored_recordings(directory))
+    there += (there.empty() ? "" : ", ") + one.name;
   throw RecordingError(file.string() +
                        ": is no recording that can be read; there are: " + (there.empty() ? "none" : there));
 }
 
-fs::path flight_file(const fs::path& directory, std::time_t utc, std::string_view fault) {
-  const std::string name = kFlight + stamp(utc) + "-" + std::string(fault);
+fs::path flight_path(const fs::path& directory, std::time_t utc, std::string_view fault) {
+  const std::string name = kFlight + utc_stamp(utc) + "-" + std::string(fault);
   std::error_code ignored;
   fs::path file = directory / (name + ".h5");
   for (int i = 2; fs::exists(file, ignored); ++i) file = directory / (name + "-" + std::to_string(i) + ".h5");
   return file;
 }
 
-void keep_newest_flights(const fs::path& directory, std::size_t most) {
+void prune_flights(const fs::path& directory, std::size_t most) {
   std::vector<fs::path> flights;
   std::error_code error;
   for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {

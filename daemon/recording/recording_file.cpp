@@ -15,8 +15,8 @@ namespace wrenchd {
 namespace {
 
 /// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
-/// is not the placer's; 2: `placing` and `start_over`; 3: `dropped`; 4: states and faults; 5: what was
-/// changed while the loop ran; 6: contacts, texts and meshes in places of their own.
+/// is not the placer's; 2: `placing` and `reinitialize_proxy`; 3: `dropped`; 4: states and faults; 5: what
+/// was changed while the loop ran; 6: contacts, texts and meshes in places of their own.
 constexpr const char* kFormat = "6";
 constexpr hsize_t kChunkTouches = 1024;
 constexpr unsigned kDeflateLevel = 1;
@@ -64,7 +64,7 @@ const TableKind& tick_table() {
 
 const TableKind& touch_table() {
   static const TableKind kind = [] {
-    const auto fields = touch_fields();
+    const auto fields = contact_fields();
     TableKind made{"/touches", "touches", sizeof(Touch), {}, kChunkTouches};
     for (const RecordField& field : fields)
       if (std::string(field.name) != "padding") made.fields.push_back(field);
@@ -229,7 +229,7 @@ void write_config(hid_t group, const std::string& name, const std::filesystem::p
 
 void write_mesh(hid_t group, const RecordedFile& mesh) {
   constexpr hsize_t kMeshChunk = hsize_t{1} << 16;
-  const hsize_t count = mesh.inside ? mesh.bytes.size() : 0;
+  const hsize_t count = mesh.embedded ? mesh.bytes.size() : 0;
   const Handle space(H5Screate_simple(1, &count, nullptr), H5Sclose);
   const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   if (count > 0) {
@@ -241,9 +241,9 @@ void write_mesh(hid_t group, const RecordedFile& mesh) {
       H5Dcreate2(group, mesh.role.c_str(), H5T_NATIVE_UINT8, space, H5P_DEFAULT, layout, H5P_DEFAULT),
       H5Dclose);
   if (count > 0) H5Dwrite(made, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data());
-  write_text(made, "file", mesh.at.string());
+  write_text(made, "file", mesh.path.string());
   write_text(made, "sha256", mesh.sha256);
-  const std::uint8_t inside = mesh.inside ? 1 : 0;
+  const std::uint8_t inside = mesh.embedded ? 1 : 0;
   write_number(made, "inside", H5T_NATIVE_UINT8, &inside);
 }
 
@@ -282,7 +282,7 @@ void write_header(hid_t file, const RecordingHeader& header) {
     if (is_mesh(one.role))
       write_mesh(meshes, one);
     else
-      write_config(config, one.role, one.at, one.bytes);
+      write_config(config, one.role, one.path, one.bytes);
   }
 }
 
@@ -290,14 +290,14 @@ void write_header(hid_t file, const RecordingHeader& header) {
 
 void RecordBatch::clear() {
   ticks.clear();
-  ranges.clear();
-  touches.clear();
+  contact_ranges.clear();
+  contacts.clear();
 }
 
 void RecordBatch::add(const TickRecord& tick, std::span<const Touch> its) {
   ticks.push_back(tick);
-  ranges.push_back({touches.size(), static_cast<std::uint32_t>(its.size())});
-  touches.insert(touches.end(), its.begin(), its.end());
+  contact_ranges.push_back({contacts.size(), static_cast<std::uint32_t>(its.size())});
+  contacts.insert(contacts.end(), its.begin(), its.end());
 }
 
 struct RecordingWriter::File {
@@ -357,7 +357,7 @@ void RecordingWriter::append(std::span<const TickRecord> records) {
 }
 
 /// The contacts first: no row of /ticks ever names one that is not there.
-void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const TouchRange> ranges,
+void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const ContactRange> ranges,
                              std::span<const Touch> touches) {
   const hsize_t first = file_->touch_rows;
   file_->rows.assign(ticks.size(), TickRow{});
@@ -456,7 +456,7 @@ RecordedFile read_mesh(const Opened& opened, hid_t set, const std::string& role)
                     {}};
   const Handle space(H5Dget_space(set), H5Sclose);
   const hssize_t count = H5Sget_simple_extent_npoints(space);
-  if (!mesh.inside || count <= 0) return mesh;
+  if (!mesh.embedded || count <= 0) return mesh;
   if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMostBytes, opened.bytes * kMostDeflated))
     opened.refuse("the mesh '" + role + "' in it cannot be as large as it says; the file is damaged");
   mesh.bytes.resize(static_cast<std::size_t>(count));
@@ -552,7 +552,7 @@ std::vector<Row> read_table(const Opened& opened, const TableKind& table) {
 
 /// Rows whose numbers were not written yet when the process died: HDF5 reads them as zeros.
 bool is_unwritten(const TickRow& row) {
-  return row.tick.now_ns == 0 && row.tick.answered_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
+  return row.tick.now_ns == 0 && row.tick.wrench_ready_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
 }
 
 }  // namespace
@@ -573,15 +573,16 @@ Recording read_recording(const std::filesystem::path& file) {
   Recording recording;
   recording.header = read_header(opened);
   std::vector<TickRow> rows = read_table<TickRow>(opened, tick_table());
-  recording.touches = read_table<Touch>(opened, touch_table());
+  recording.contacts = read_table<Touch>(opened, touch_table());
   while (rows.size() > 1 && is_unwritten(rows.back())) rows.pop_back();
   recording.ticks.reserve(rows.size());
-  recording.ranges.reserve(rows.size());
-  const std::uint64_t touches = recording.touches.size();
+  recording.contact_ranges.reserve(rows.size());
+  const std::uint64_t touches = recording.contacts.size();
   for (const TickRow& row : rows) {
     const bool there = row.first_touch <= touches && row.touch_count <= touches - row.first_touch;
     recording.ticks.push_back(row.tick);
-    recording.ranges.push_back(there ? TouchRange{row.first_touch, row.touch_count} : TouchRange{});
+    recording.contact_ranges.push_back(there ? ContactRange{row.first_touch, row.touch_count}
+                                             : ContactRange{});
   }
   return recording;
 }

@@ -23,9 +23,9 @@ class RecordingError : public std::runtime_error {
 /// A file that a run was made of.
 struct RecordedFile {
   std::string role;  ///< "hand_script", "profile_1" (a parent), "tool", "obstacle_0": what it was to the run
-  std::filesystem::path at;  ///< where it was read from
-  std::string sha256;        ///< of its bytes, in hexadecimal
-  bool inside = true;        ///< else its bytes are not in the recording: it is too large
+  std::filesystem::path path;  ///< where it was read from
+  std::string sha256;          ///< of its bytes, in hexadecimal
+  bool embedded = true;        ///< else its bytes are not in the recording: it is too large
   std::string bytes;
 };
 
@@ -49,7 +49,7 @@ struct RecordingHeader {
 };
 
 /// The rows of /touches that belong to a tick.
-struct TouchRange {
+struct ContactRange {
   std::uint64_t first = 0;
   std::uint32_t count = 0;
 };
@@ -57,8 +57,8 @@ struct TouchRange {
 /// Ticks one after the other, each with the contacts that hold it.
 struct RecordBatch {
   std::vector<TickRecord> ticks;
-  std::vector<TouchRange> ranges;  ///< one a tick, into touches
-  std::vector<Touch> touches;
+  std::vector<ContactRange> contact_ranges;  ///< one a tick, into touches
+  std::vector<Touch> contacts;
 
   void clear();
   void add(const TickRecord& tick, std::span<const Touch> its);
@@ -86,7 +86,7 @@ class RecordingWriter {
 
   /// Ticks without contacts.
   void append(std::span<const TickRecord> records);
-  void append(const RecordBatch& batch) { append(batch.ticks, batch.ranges, batch.touches); }
+  void append(const RecordBatch& batch) { append(batch.ticks, batch.contact_ranges, batch.contacts); }
   /// Brings what was appended to where it outlives this process. Throws RecordingError.
   void flush();
 
@@ -94,7 +94,7 @@ class RecordingWriter {
   static constexpr std::size_t kChunkTicks = 512;
 
  private:
-  void append(std::span<const TickRecord> ticks, std::span<const TouchRange> ranges,
+  void append(std::span<const TickRecord> ticks, std::span<const ContactRange> ranges,
               std::span<const Touch> touches);
 
   struct File;
@@ -104,12 +104,12 @@ class RecordingWriter {
 struct Recording {
   RecordingHeader header;
   std::vector<TickRecord> ticks;
-  std::vector<TouchRange> ranges;  ///< one a tick, into touches
-  std::vector<Touch> touches;
+  std::vector<ContactRange> contact_ranges;  ///< one a tick, into touches
+  std::vector<Touch> contacts;
 
   /// The contacts of the tick in that row.
-  std::span<const Touch> touches_of(std::size_t row) const {
-    return std::span(touches).subspan(ranges[row].first, ranges[row].count);
+  std::span<const Touch> contacts_of(std::size_t row) const {
+    return std::span(contacts).subspan(contact_ranges[row].first, contact_ranges[row].count);
   }
 };
 

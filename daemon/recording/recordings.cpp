@@ -37,22 +37,23 @@ std::time_t utc_now() {
 
 }  // namespace
 
-Recordings::Recordings(Station& station, EventFeed& feed, const Clock& clock, Pace pace)
-    : station_(station),
+Recordings::Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pace pace)
+    : runtime_(station),
       feed_(feed),
       clock_(clock),
-      settings_(station.plan().settings.recording),
+      settings_(station.config().settings.recording),
       directory_(recordings_directory(settings_)),
       flight_s_(pace == Pace::threads ? settings_.flight_s : 0.0),
-      state_(station.show_state()),
+      state_(station.enable_shared_state()),
       history_(room_for(flight_s_, state_.rate_Hz())) {
   status_.directory = directory_;
   status_.flight_s = flight_s_;
-  if (pace == Pace::by_hand) return;
-  if (flight_s_ > 0.0) feed_.keep_faults_by([this](Fault fault, TimePoint at) { return keep(fault, at); });
-  taker_ = std::jthread([this](const std::stop_token& stop) {
+  if (pace == Pace::manual) return;
+  if (flight_s_ > 0.0)
+    feed_.set_fault_recorder([this](Fault fault, TimePoint at) { return begin_flight(fault, at); });
+  collector_ = std::jthread([this](const std::stop_token& stop) {
     pthread_setname_np(pthread_self(), "record take");
-    for (; !stop.stop_requested(); std::this_thread::sleep_for(kTakeEvery)) take_in();
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(kTakeEvery)) collect_ticks();
   });
   writer_ = std::jthread([this](const std::stop_token& stop) {
     pthread_setname_np(pthread_self(), "record write");
@@ -63,21 +64,21 @@ Recordings::Recordings(Station& station, EventFeed& feed, const Clock& clock, Pa
 }
 
 Recordings::~Recordings() {
-  feed_.keep_faults_by({});
-  for (std::jthread* thread : {&taker_, &writer_})
+  feed_.set_fault_recorder({});
+  for (std::jthread* thread : {&collector_, &writer_})
     if (thread->joinable()) {
       thread->request_stop();
       thread->join();
     }
-  take_in();
+  collect_ticks();
   while (write_flight(true)) {
   }
   stop();
 }
 
 std::filesystem::path Recordings::start(const std::string& asked, bool anywhere) {
-  const std::string name = asked.empty() ? "run-" + stamp(utc_now()) : asked;
-  const std::filesystem::path file = place_of(name, directory_, anywhere);
+  const std::string name = asked.empty() ? "run-" + utc_stamp(utc_now()) : asked;
+  const std::filesystem::path file = recording_path(name, directory_, anywhere);
   if (file.parent_path() == directory_) make_recordings_directory(directory_);
   begin(file, file.parent_path());
   return file;
@@ -88,29 +89,29 @@ void Recordings::start_file(const std::filesystem::path& file) {
 }
 
 void Recordings::begin(const std::filesystem::path& file, const std::filesystem::path& directory) {
-  const RecordingHeader header = station_.recording_header();
-  take_in();
-  const std::scoped_lock lock(writing_);
+  const RecordingHeader header = runtime_.recording_header();
+  collect_ticks();
+  const std::scoped_lock lock(write_mutex_);
   if (running_) throw RecordingError(running_->file().string() + ": is being recorded already; end it first");
   std::error_code ignored;
-  if (std::filesystem::is_directory(directory, ignored)) check_room(directory, settings_);
-  running_ = std::make_unique<Recorder>(history_, file, header, history_.held().end);
-  missed_before_ = missed_in_all_.load();
+  if (std::filesystem::is_directory(directory, ignored)) check_free_space(directory, settings_);
+  running_ = std::make_unique<Recorder>(history_, file, header, history_.stored_range().end);
+  missed_at_start_ = missed_total_.load();
   {
-    const std::scoped_lock told(told_);
+    const std::scoped_lock told(status_mutex_);
     status_.failed.clear();
   }
   publish();
-  feed_.tell("recording", EventLevel::info, "recording: " + file.string(),
+  feed_.emit("recording", EventLevel::info, "recording: " + file.string(),
              {{"what", "started"}, {"file", file.string()}});
 }
 
-std::optional<Recordings::Written> Recordings::stop() {
-  take_in();
-  const std::scoped_lock lock(writing_);
+std::optional<Recordings::Summary> Recordings::stop() {
+  collect_ticks();
+  const std::scoped_lock lock(write_mutex_);
   if (!running_) return {};
   try {
-    while (running_ && running_->step(history_.held().end, true)) {
+    while (running_ && running_->write_next(history_.stored_range().end, true)) {
     }
   } catch (const RecordingError& error) {
     fail(error.what());
@@ -120,14 +121,14 @@ std::optional<Recordings::Written> Recordings::stop() {
 }
 
 /// With writing_ held.
-Recordings::Written Recordings::finish() {
-  const Written written{running_->file(), running_->written(),
-                        running_->lost() + missed_in_all_.load() - missed_before_};
+Recordings::Summary Recordings::finish() {
+  const Summary written{running_->file(), running_->written(),
+                        running_->lost() + missed_total_.load() - missed_at_start_};
   running_.reset();
   publish();
   std::string text = "recorded: " + written.file.string() + ", " + std::to_string(written.ticks) + " ticks";
   if (written.lost > 0) text += "; " + std::to_string(written.lost) + " are missing: the disk fell behind";
-  feed_.tell(
+  feed_.emit(
       "recording", written.lost > 0 ? EventLevel::warning : EventLevel::info, text,
       {{"what", "ended"}, {"file", written.file.string()}, {"ticks", written.ticks}, {"lost", written.lost}});
   return written;
@@ -139,33 +140,34 @@ void Recordings::fail(const std::string& why) {
   const std::uint64_t ticks = running_->written();
   running_.reset();
   {
-    const std::scoped_lock told(told_);
+    const std::scoped_lock told(status_mutex_);
     status_.failed = why;
   }
   publish();
-  feed_.tell("recording", EventLevel::error,
+  feed_.emit("recording", EventLevel::error,
              "the recording has ended after " + std::to_string(ticks) + " ticks: " + why,
              {{"what", "failed"}, {"file", file.string()}, {"ticks", ticks}, {"why", why}});
 }
 
 Recordings::Status Recordings::status() const {
-  const std::scoped_lock told(told_);
+  const std::scoped_lock told(status_mutex_);
   return status_;
 }
 
 bool Recordings::is_being_written(const std::filesystem::path& file) const {
-  const std::scoped_lock told(told_);
+  const std::scoped_lock told(status_mutex_);
   return (status_.running && status_.running->file == file) || (flight_ && flight_->file == file);
 }
 
-std::vector<RecordingFound> Recordings::list() const {
-  std::vector<RecordingFound> found = recordings_in(directory_);
-  std::erase_if(found, [this](const RecordingFound& one) { return is_being_written(directory_ / one.name); });
+std::vector<StoredRecording> Recordings::list() const {
+  std::vector<StoredRecording> found = stored_recordings(directory_);
+  std::erase_if(found,
+                [this](const StoredRecording& one) { return is_being_written(directory_ / one.name); });
   return found;
 }
 
 OwnedFd Recordings::open(const std::string& name) const {
-  const std::filesystem::path file = place_of(name, directory_, false);
+  const std::filesystem::path file = recording_path(name, directory_, false);
   if (is_being_written(file))
     throw RecordingError(file.string() +
                          ": is being written; 'record.stop' ends a recording, and a flight is "
@@ -175,49 +177,50 @@ OwnedFd Recordings::open(const std::string& name) const {
 
 /// With writing_ held.
 void Recordings::publish() {
-  const std::scoped_lock told(told_);
+  const std::scoped_lock told(status_mutex_);
   status_.running.reset();
   if (running_)
-    status_.running = Written{running_->file(), running_->written(),
-                              running_->lost() + missed_in_all_.load() - missed_before_};
+    status_.running = Summary{running_->file(), running_->written(),
+                              running_->lost() + missed_total_.load() - missed_at_start_};
 }
 
 void Recordings::pump() {
-  take_in();
+  collect_ticks();
   while (write(false)) {
   }
 }
 
 /// From the shared memory into the history.
-void Recordings::take_in() {
-  const std::scoped_lock lock(taking_);
+void Recordings::collect_ticks() {
+  const std::scoped_lock lock(collect_mutex_);
   const std::uint64_t written = state_.written();
-  while (next_ < written) {
-    if (state_.read(next_, taken_)) {
-      history_.append(taken_);
-      ++next_;
+  while (next_record_ < written) {
+    if (state_.read(next_record_, record_)) {
+      history_.append(record_);
+      ++next_record_;
       continue;
     }
     const std::uint64_t oldest = state_.written() - std::min(state_.written(), state_.slots() / 2);
-    const std::uint64_t from = std::max(oldest, next_ + 1);  // with room, so as not to be overrun at once
-    missed_ += from - next_;
-    next_ = from;
-    missed_in_all_.store(missed_);
+    const std::uint64_t from =
+        std::max(oldest, next_record_ + 1);  // with room, so as not to be overrun at once
+    missed_ += from - next_record_;
+    next_record_ = from;
+    missed_total_.store(missed_);
   }
 }
 
 /// True: there may be more to write at once.
 bool Recordings::write(bool rest) {
   const bool more = write_running(rest);
-  watch_disk();
+  check_disk_space();
   return write_flight(rest) || more;
 }
 
 bool Recordings::write_running(bool rest) {
-  const std::scoped_lock lock(writing_);
+  const std::scoped_lock lock(write_mutex_);
   if (!running_) return false;
   try {
-    const bool more = running_->step(history_.held().end, rest);
+    const bool more = running_->write_next(history_.stored_range().end, rest);
     publish();
     return more;
   } catch (const RecordingError& error) {
@@ -228,11 +231,11 @@ bool Recordings::write_running(bool rest) {
 
 /// A recording ends before it takes the last room that there is. After each piece: a disk may fill up in less
 /// than any time one would wait.
-void Recordings::watch_disk() {
-  const std::scoped_lock lock(writing_);
+void Recordings::check_disk_space() {
+  const std::scoped_lock lock(write_mutex_);
   if (!running_) return;
   try {
-    check_room(std::filesystem::absolute(running_->file()).parent_path(), settings_);
+    check_free_space(std::filesystem::absolute(running_->file()).parent_path(), settings_);
   } catch (const RecordingError& error) {
     fail(error.what());
   }
@@ -240,43 +243,43 @@ void Recordings::watch_disk() {
 
 /// From the feed's thread: names the file, which the writer makes when the second after the fault is over.
 /// What else goes wrong until then is in the same one.
-std::string Recordings::keep(Fault fault, TimePoint at) {
+std::string Recordings::begin_flight(Fault fault, TimePoint at) {
   if (directory_.empty()) return {};
-  const std::scoped_lock told(told_);
+  const std::scoped_lock told(status_mutex_);
   if (flight_) return flight_->recorder ? std::string() : flight_->file.string();
   const auto ago = std::chrono::duration_cast<std::chrono::seconds>(clock_.now() - at);
   Flight flight;
-  flight.file = flight_file(directory_, utc_now() - ago.count(), fault_row(fault).name);
+  flight.file = flight_path(directory_, utc_now() - ago.count(), fault_row(fault).name);
   flight.fault = fault;
   flight.from_ns = (at - from_seconds(flight_s_)).time_since_epoch().count();
   flight.until_ns = (at + kAfter).time_since_epoch().count();
-  flight.asked = std::chrono::steady_clock::now();
+  flight.requested_at = std::chrono::steady_clock::now();
   flight_ = std::move(flight);
   return flight_->file.string();
 }
 
 /// `rest`: no more ticks come.
 bool Recordings::write_flight(bool rest) {
-  std::unique_lock told(told_);
+  std::unique_lock told(status_mutex_);
   if (!flight_) return false;
   Flight& flight = *flight_;
-  const bool over = rest || std::chrono::steady_clock::now() - flight.asked > kPatience;
+  const bool over = rest || std::chrono::steady_clock::now() - flight.requested_at > kPatience;
   if (!flight.recorder && !over && history_.newest_ns() < flight.until_ns) return false;
   told.unlock();  // only this thread changes what is begun, and keep() leaves it alone
   try {
     if (!flight.recorder) {
       make_recordings_directory(directory_);
-      check_room(directory_, settings_);
-      keep_newest_flights(directory_, static_cast<std::size_t>(settings_.flights_kept - 1));
-      const RecordingHeader header = station_.recording_header();
-      const std::uint64_t first = history_.first_since(flight.from_ns);
-      flight.end = history_.first_since(flight.until_ns + 1);
+      check_free_space(directory_, settings_);
+      prune_flights(directory_, static_cast<std::size_t>(settings_.flights_kept - 1));
+      const RecordingHeader header = runtime_.recording_header();
+      const std::uint64_t first = history_.first_at_or_after(flight.from_ns);
+      flight.end = history_.first_at_or_after(flight.until_ns + 1);
       auto recorder = std::make_unique<Recorder>(history_, flight.file, header, first);
       told.lock();
       flight.recorder = std::move(recorder);
       told.unlock();
     }
-    if (flight.recorder->step(flight.end, true)) return true;
+    if (flight.recorder->write_next(flight.end, true)) return true;
     end_flight({});
   } catch (const RecordingError& error) {
     end_flight(error.what());
@@ -294,7 +297,7 @@ void Recordings::end_flight(const std::string& why) {
     std::filesystem::remove(file, ignored);
   }
   {
-    const std::scoped_lock told(told_);
+    const std::scoped_lock told(status_mutex_);
     flight_.reset();
     if (why.empty()) {
       status_.last_flight = file;
@@ -303,11 +306,11 @@ void Recordings::end_flight(const std::string& why) {
   }
   const std::string name(fault_row(fault).name);
   if (why.empty())
-    feed_.tell("recording", EventLevel::info,
+    feed_.emit("recording", EventLevel::info,
                "what led to " + name + " is in " + file.string() + ", " + std::to_string(ticks) + " ticks",
                {{"what", "flight"}, {"file", file.string()}, {"ticks", ticks}, {"fault", name}});
   else
-    feed_.tell("recording", EventLevel::error, "what led to " + name + " could not be kept: " + why,
+    feed_.emit("recording", EventLevel::error, "what led to " + name + " could not be kept: " + why,
                {{"what", "failed"}, {"file", file.string()}, {"why", why}, {"fault", name}});
 }
 

@@ -21,7 +21,7 @@
 
 namespace wrenchd {
 
-class Station;
+class Runtime;
 
 /// All recordings of a running daemon: the one that somebody asked for, and those of the flight recorder,
 /// which holds the last seconds in memory and writes them, and the second after, for each fault that latches
@@ -35,11 +35,11 @@ class Recordings {
  public:
   enum class Pace : std::uint8_t {
     threads,  ///< threads of its own: wall time
-    by_hand,  ///< pump() is called at least every second of the loop's time; there is no flight recorder
+    manual,   ///< pump() is called at least every second of the loop's time; there is no flight recorder
   };
 
   /// Before the loop runs. Station and feed must outlive this. Throws std::system_error.
-  Recordings(Station& station, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
+  Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
   /// What is there is written, and files are closed.
   ~Recordings();
   Recordings(const Recordings&) = delete;
@@ -52,21 +52,21 @@ class Recordings {
   /// The same to the very file, relative to the working directory, as the command line names it.
   void start_file(const std::filesystem::path& file);
 
-  struct Written {
+  struct Summary {
     std::filesystem::path file;
     std::uint64_t ticks = 0;
     std::uint64_t lost = 0;  ///< ticks that are missing in it
   };
   /// Writes the rest and closes it. Nothing: none was written.
-  std::optional<Written> stop();
+  std::optional<Summary> stop();
 
   /// What is in directory(), the oldest first; those that are being written are not.
-  std::vector<RecordingFound> list() const;
+  std::vector<StoredRecording> list() const;
   /// One of them, to be read. Throws RecordingError, also for one that is being written.
   OwnedFd open(const std::string& name) const;
 
   struct Status {
-    std::optional<Written> running;  ///< so far
+    std::optional<Summary> running;  ///< so far
     std::string failed;              ///< why the last one ended by itself; empty: it did not
     std::filesystem::path directory;
     double flight_s = 0.0;  ///< what the flight recorder holds; 0: there is none
@@ -84,25 +84,25 @@ class Recordings {
     Fault fault = Fault::none;
     std::int64_t from_ns = 0;
     std::int64_t until_ns = 0;
-    TimePoint asked{};
+    TimePoint requested_at{};
     std::unique_ptr<Recorder> recorder;  ///< once it is written
     std::uint64_t end = 0;               ///< likewise: number of the first record beyond
   };
 
   void begin(const std::filesystem::path& file, const std::filesystem::path& directory);
-  void take_in();
+  void collect_ticks();
   bool write(bool rest);
   bool write_running(bool rest);
   bool write_flight(bool rest);
-  void watch_disk();
-  Written finish();
+  void check_disk_space();
+  Summary finish();
   void fail(const std::string& why);
   void end_flight(const std::string& why);
-  std::string keep(Fault fault, TimePoint at);
+  std::string begin_flight(Fault fault, TimePoint at);
   void publish();
   bool is_being_written(const std::filesystem::path& file) const;
 
-  Station& station_;
+  Runtime& runtime_;
   EventFeed& feed_;
   const Clock& clock_;
   RecordingSettings settings_;
@@ -111,21 +111,21 @@ class Recordings {
   SharedState& state_;
   RecordHistory history_;
 
-  std::mutex taking_;         ///< of what follows
-  std::uint64_t next_ = 0;    ///< record of the shared memory to take
-  std::uint64_t missed_ = 0;  ///< that were overwritten before they were taken
-  StateRecord taken_;
+  std::mutex collect_mutex_;       ///< of what follows
+  std::uint64_t next_record_ = 0;  ///< record of the shared memory to take
+  std::uint64_t missed_ = 0;       ///< that were overwritten before they were taken
+  StateRecord record_;
 
-  std::mutex writing_;  ///< of what follows
+  std::mutex write_mutex_;  ///< of what follows
   std::unique_ptr<Recorder> running_;
-  std::uint64_t missed_before_ = 0;  ///< as of its start
+  std::uint64_t missed_at_start_ = 0;  ///< as of its start
 
-  mutable std::mutex told_;  ///< of what follows
+  mutable std::mutex status_mutex_;  ///< of what follows
   std::optional<Flight> flight_;
   Status status_;
 
-  std::atomic<std::uint64_t> missed_in_all_{0};
-  std::jthread taker_, writer_;  ///< last: they use all of the above
+  std::atomic<std::uint64_t> missed_total_{0};
+  std::jthread collector_, writer_;  ///< last: they use all of the above
 };
 
 }  // namespace wrenchd

@@ -25,7 +25,7 @@ class RecordedDevice final : public Device {
   Fault write(TimePoint, const Wrench&, bool) noexcept override {
     return static_cast<Fault>(record_->write_fault);
   }
-  std::uint64_t commands_sent() const noexcept override { return record_->commanded; }
+  std::uint64_t commands_sent() const noexcept override { return record_->last_command_sent; }
   void release(TimePoint) noexcept override {}
   void wait_readable(TimePoint) noexcept override {}
   void close() noexcept override {}
@@ -40,30 +40,31 @@ class RecordedClock final : public Clock {
   void play(const TickRecord& record) noexcept { record_ = &record; }
 
   TimePoint now() const noexcept override {
-    return TimePoint(Duration(record_ == nullptr ? 0 : record_->answered_ns));
+    return TimePoint(Duration(record_ == nullptr ? 0 : record_->wrench_ready_ns));
   }
   void sleep_until(TimePoint) noexcept override {}
-  Duration slept() const noexcept override { return Duration(record_->slept_ns); }
+  Duration time_suspended() const noexcept override { return Duration(record_->suspended_ns); }
 
  private:
   const TickRecord* record_ = nullptr;
 };
 
 /// A placer whose answers come out of a recording, at the ticks at which they came then.
-class RecordedPlacer final : public Placer {
+class RecordedPlacer final : public ProxyInitializer {
  public:
   void play(const TickRecord& record) noexcept { record_ = &record; }
 
-  void ask(const PlacementQuestion& question) noexcept override { question_ = question; }
-  bool answer(PlacementAnswer& answer) noexcept override {
-    const auto placing = static_cast<Placing>(record_->placing);
-    answer = {question_.number, placing == Placing::placed, pose_of(record_->X_WQ), question_.scene_time_s};
-    return placing == Placing::placed || placing == Placing::nowhere;
+  void request(const ProxyInitializationRequest& question) noexcept override { question_ = question; }
+  bool take_result(ProxyInitializationResult& answer) noexcept override {
+    const auto placing = static_cast<ProxyInitialization>(record_->proxy_initialization);
+    answer = {question_.id, placing == ProxyInitialization::found, pose_of(record_->X_WQ),
+              question_.scene_time_s};
+    return placing == ProxyInitialization::found || placing == ProxyInitialization::failed;
   }
 
  private:
   const TickRecord* record_ = nullptr;
-  PlacementQuestion question_;
+  ProxyInitializationRequest question_;
 };
 
 DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
@@ -74,9 +75,9 @@ DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
   sample.device_time_s = r.device_time_s;
   sample.sequence = r.sequence;
-  sample.acknowledged = r.acknowledged;
+  sample.acknowledged = r.acknowledged_command;
   sample.arrived = TimePoint(Duration(r.arrived_ns));
-  sample.skipped = r.skipped;
+  sample.superseded = r.superseded;
   sample.missing = r.missing;
   sample.rejected = r.rejected;
   sample.repeated = r.repeated;
@@ -110,13 +111,26 @@ struct Compared {
 #member, [](const TickRecord& r) { return static_cast<double>(r.member); } \
   }
 constexpr std::array kNumbers = {
-    WRENCHD_COMPARED(energy),          WRENCHD_COMPARED(kkt_residual), WRENCHD_COMPARED(authority),
-    WRENCHD_COMPARED(stiffness_share), WRENCHD_COMPARED(guard_share),  WRENCHD_COMPARED(energy_in_J),
-    WRENCHD_COMPARED(energy_out_J),    WRENCHD_COMPARED(injected_J),   WRENCHD_COMPARED(through),
-    WRENCHD_COMPARED(contacts),        WRENCHD_COMPARED(iterations),   WRENCHD_COMPARED(projection_status),
-    WRENCHD_COMPARED(placing),         WRENCHD_COMPARED(state),        WRENCHD_COMPARED(cause),
-    WRENCHD_COMPARED(motors_told),     WRENCHD_COMPARED(limit_causes), WRENCHD_COMPARED(dropped),
-    WRENCHD_COMPARED(faults),          WRENCHD_COMPARED(released),
+    WRENCHD_COMPARED(energy),
+    WRENCHD_COMPARED(kkt_residual),
+    WRENCHD_COMPARED(authority),
+    WRENCHD_COMPARED(stiffness_scale),
+    WRENCHD_COMPARED(passivity_scale),
+    WRENCHD_COMPARED(energy_in_J),
+    WRENCHD_COMPARED(energy_out_J),
+    WRENCHD_COMPARED(injected_J),
+    WRENCHD_COMPARED(contact_gain),
+    WRENCHD_COMPARED(contacts),
+    WRENCHD_COMPARED(iterations),
+    WRENCHD_COMPARED(projection_status),
+    WRENCHD_COMPARED(proxy_initialization),
+    WRENCHD_COMPARED(state),
+    WRENCHD_COMPARED(state_cause),
+    WRENCHD_COMPARED(motors_commanded),
+    WRENCHD_COMPARED(limit_causes),
+    WRENCHD_COMPARED(undriven_dofs),
+    WRENCHD_COMPARED(faults),
+    WRENCHD_COMPARED(released),
 };
 #undef WRENCHD_COMPARED
 static_assert(kFaultCount < 53);
@@ -146,7 +160,7 @@ const char* compared_fields() {
   return names.c_str();
 }
 
-std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
+std::optional<Difference> replay(const Recording& recording, const RunConfig& plan) {
   if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
     throw RecordingError("the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
                          ": what the loop had in mind by then (the stiffness it had measured, how warm the "
@@ -166,7 +180,7 @@ std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
                            " are missing in the recording, and it is the same bits up to there; record to a "
                            "disk that keeps up to replay all of it");
     last = then.tick;
-    if (then.changes > 0)
+    if (then.change_count > 0)
       throw RecordingError(
           "at tick " + std::to_string(then.tick) +
           " the scene, the workspace or a limit was changed while the loop ran, and to what is not in the "
@@ -177,14 +191,14 @@ std::optional<Difference> replay(const Recording& recording, const Plan& plan) {
     placer.play(then);
     const TimePoint now{Duration(then.now_ns)};
     // The record of a release from outside is the last tick's, with zero wrench and `released` set.
-    if ((then.commands & kLetGo) != 0) {
+    if ((then.commands & kReleasedExternally) != 0) {
       loop.release(now);
     } else {
-      loop.ask(then.commands);
+      loop.request(then.commands);
       loop.tick(now, now);
     }
     TickRecord replayed;
-    loop.latest().read(replayed);
+    loop.latest_record().read(replayed);
     if (auto difference = compare(then, replayed)) return difference;
   }
   return {};

@@ -22,7 +22,7 @@ struct Difference {
 /// came out then with what comes out now, bit for bit. Nothing: all ticks agree. Times are not compared.
 /// Scene time is that of the ticks, so obstacles move as they did. Throws RecordingError where the recording
 /// does not begin at the loop's first tick, or where ticks are missing in it.
-std::optional<Difference> replay(const Recording& recording, const Plan& plan);
+std::optional<Difference> replay(const Recording& recording, const RunConfig& plan);
 
 /// The columns that are compared, for people.
 const char* compared_fields();

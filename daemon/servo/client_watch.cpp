@@ -5,10 +5,10 @@
 
 namespace wrenchd {
 
-FaultSet ClientWatch::look(TimePoint now) const noexcept {
-  if (last_ && gone_) return bit(Fault::client_gone);
-  if (!last_ || now - *last_ <= kSilentClient) return 0;
-  return bit(beaten_ ? Fault::client_gone : Fault::client_silent);
+FaultSet ClientWatch::check(TimePoint now) const noexcept {
+  if (last_heartbeat_ && client_lost_) return bit(Fault::heartbeat_lost);
+  if (!last_heartbeat_ || now - *last_heartbeat_ <= kHeartbeatTimeout) return 0;
+  return bit(heartbeat_received_ ? Fault::heartbeat_lost : Fault::heartbeat_missing);
 }
 
 }  // namespace wrenchd

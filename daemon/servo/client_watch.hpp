@@ -13,25 +13,25 @@ namespace wrenchd {
 class ClientWatch {
  public:
   /// Somebody armed who promised to say that it lives.
-  void begin(TimePoint now) noexcept {
-    last_ = now;
-    beaten_ = gone_ = false;
+  void start(TimePoint now) noexcept {
+    last_heartbeat_ = now;
+    heartbeat_received_ = client_lost_ = false;
   }
-  void beat(TimePoint now) noexcept {
-    if (last_) last_ = now;
-    beaten_ = true;
+  void heartbeat(TimePoint now) noexcept {
+    if (last_heartbeat_) last_heartbeat_ = now;
+    heartbeat_received_ = true;
   }
   /// Its connection has ended: what the watch would find after 100 ms it finds now.
-  void hang_up() noexcept { gone_ = last_.has_value(); }
+  void client_lost() noexcept { client_lost_ = last_heartbeat_.has_value(); }
   /// Nobody is armed any more.
-  void end() noexcept { last_.reset(); }
+  void stop() noexcept { last_heartbeat_.reset(); }
 
-  FaultSet look(TimePoint now) const noexcept;
+  FaultSet check(TimePoint now) const noexcept;
 
  private:
-  std::optional<TimePoint> last_;
-  bool beaten_ = false;
-  bool gone_ = false;
+  std::optional<TimePoint> last_heartbeat_;
+  bool heartbeat_received_ = false;
+  bool client_lost_ = false;
 };
 
 }  // namespace wrenchd

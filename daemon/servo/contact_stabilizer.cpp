@@ -16,84 +16,86 @@ double report_rate_Hz(const Settings& settings, const DeviceProfile& profile) {
 
 }  // namespace
 
-SteadyContact::SteadyContact(const Settings& settings, const DeviceProfile& profile,
-                             const Stability& stability)
+ContactStabilizer::ContactStabilizer(const Settings& settings, const DeviceProfile& profile,
+                                     const StabilityAnalysis& stability)
     : stability_(stability),
-      measured_(kAssumedPeriods / report_rate_Hz(settings, profile)),
-      settled_by_(measured_),
-      guard_(stability_.guard(measured_)),
-      about_handle_(profile.wrench_point == WrenchPoint::handle),
-      acknowledges_(profile.pose_report.acknowledged.present) {}
+      measurement_(kAssumedPeriods / report_rate_Hz(settings, profile)),
+      derivation_measurement_(measurement_),
+      guard_(stability_.make_passivity_guard(measurement_)),
+      wrench_about_handle_(profile.wrench_point == WrenchPoint::handle),
+      device_acknowledges_(profile.pose_report.acknowledged.present) {}
 
-void SteadyContact::measure(const DeviceSample& sample, std::uint64_t commanded, TimePoint now) noexcept {
-  measured_.tick({now, sample.arrived, sample.device_time_s, sample.sequence, sample.fresh, acknowledges_,
-                  sample.acknowledged, commanded});
+void ContactStabilizer::update_measurement(const DeviceSample& sample, std::uint64_t commanded,
+                                           TimePoint now) noexcept {
+  measurement_.tick({now, sample.arrived, sample.device_time_s, sample.sequence, sample.fresh,
+                     device_acknowledges_, sample.acknowledged, commanded});
 }
 
-const StiffnessShare& SteadyContact::settle() noexcept {
-  settled_by_ = measured_;
-  settled_ = true;
-  share_ = bearable(stability_);
-  guard_ = stability_.guard(measured_);
-  return share_;
+const StiffnessScale& ContactStabilizer::derive_stiffness() noexcept {
+  derivation_measurement_ = measurement_;
+  stiffness_derived_ = true;
+  stiffness_scale_ = max_stable_scale(stability_);
+  guard_ = stability_.make_passivity_guard(measurement_);
+  return stiffness_scale_;
 }
 
-StiffnessShare SteadyContact::bearable(const Stability& stability) const noexcept {
-  return settled_ ? stability.settle(settled_by_, workspace_scale_) : StiffnessShare{};
+StiffnessScale ContactStabilizer::max_stable_scale(const StabilityAnalysis& stability) const noexcept {
+  return stiffness_derived_ ? stability.max_stable_scale(derivation_measurement_, workspace_scale_)
+                            : StiffnessScale{};
 }
 
 /// The guard knows the device and the delay, and no walls: it stays.
-void SteadyContact::change(const Stability& stability) noexcept {
+void ContactStabilizer::set_stability(const StabilityAnalysis& stability) noexcept {
   stability_ = stability;
-  share_ = bearable(stability_);
+  stiffness_scale_ = max_stable_scale(stability_);
 }
 
-bool SteadyContact::take_workspace_scale(double scale) noexcept {
+bool ContactStabilizer::set_workspace_scale(double scale) noexcept {
   if (scale == workspace_scale_) return false;
   workspace_scale_ = scale;
-  share_ = bearable(stability_);
+  stiffness_scale_ = max_stable_scale(stability_);
   return true;
 }
 
-Wrench SteadyContact::steadied(const Wrench& asked, const DeviceSample& sample,
-                               const Moment& moment) noexcept {
-  found_ = 0;
-  const bool risen = state_ == State::ramping && moment.state == State::active;
-  state_ = moment.state;
-  if (!is_driving(state_) || state_ == State::ramping || !about_handle_) {
-    rest(state_);
+Wrench ContactStabilizer::stabilize(const Wrench& asked, const DeviceSample& sample,
+                                    const ContactInput& moment) noexcept {
+  faults_ = 0;
+  const bool risen = last_state_ == State::ramping && moment.state == State::active;
+  last_state_ = moment.state;
+  if (!is_driving(last_state_) || last_state_ == State::ramping || !wrench_about_handle_) {
+    reset_guard(last_state_);
     return asked;
   }
-  if (risen) guard_.lend(moment.wound_up_J);
+  if (risen) guard_.credit(moment.stored_energy_J);
   double dt_s = 0.0;
-  if (moment.good) {
-    if (guarding_) dt_s = sample.device_time_s - guarded_at_s_;
-    guarding_ = true;
-    guarded_at_s_ = sample.device_time_s;
-    look_for_oscillation(calming_ * asked, sample, dt_s, moment.in_contact);
+  if (moment.sample_usable) {
+    if (guard_active_) dt_s = sample.device_time_s - guard_sample_time_s_;
+    guard_active_ = true;
+    guard_sample_time_s_ = sample.device_time_s;
+    detect_oscillation(oscillation_gain_ * asked, sample, dt_s, moment.in_contact);
   }
-  const Wrench left = guard_.guard(calming_ * asked, sample.X_BH, dt_s, moment.in_contact);
-  if (guard_.out_of_hand()) found_ |= bit(Fault::energy_made);
+  const Wrench left = guard_.limit(oscillation_gain_ * asked, sample.X_BH, dt_s, moment.in_contact);
+  if (guard_.energy_runaway()) faults_ |= bit(Fault::energy_generated);
   return left;
 }
 
 /// No force, or one that rises: nothing to guard. Whoever arms anew starts with all of the stiffness.
-void SteadyContact::rest(State state) noexcept {
+void ContactStabilizer::reset_guard(State state) noexcept {
   guard_.reset();
-  guarding_ = false;
+  guard_active_ = false;
   if (state != State::waiting) return;
-  oscillation_.restart();
-  oscillations_ = 0;
-  calming_ = 1.0;
+  oscillation_.reset();
+  oscillation_count_ = 0;
+  oscillation_gain_ = 1.0;
 }
 
-void SteadyContact::look_for_oscillation(const Wrench& asked, const DeviceSample& sample, double dt_s,
-                                         bool in_contact) noexcept {
+void ContactStabilizer::detect_oscillation(const Wrench& asked, const DeviceSample& sample, double dt_s,
+                                           bool in_contact) noexcept {
   oscillation_.update(asked, sample.V_BH, dt_s, in_contact);
   if (!oscillation_.oscillates()) return;
-  calming_ *= kCalmer;
-  oscillation_.restart();
-  found_ |= bit(++oscillations_ < kOscillations ? Fault::oscillating : Fault::still_oscillates);
+  oscillation_gain_ *= kCalmer;
+  oscillation_.reset();
+  faults_ |= bit(++oscillation_count_ < kOscillations ? Fault::oscillating : Fault::oscillation_persists);
 }
 
 }  // namespace wrenchd

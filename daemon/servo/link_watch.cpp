@@ -28,43 +28,43 @@ double lag_s(const DeviceSample& sample) noexcept {
 LinkWatch::LinkWatch(double report_rate_Hz) noexcept
     : late_after_(report_rate_Hz > 0.0 ? std::max(kLateSample, from_seconds(kLatePeriods / report_rate_Hz))
                                        : kLateSample),
-      bucket_holds_(kBucketFull_s * (report_rate_Hz > kSlowest_Hz ? report_rate_Hz : kSlowest_Hz)) {}
+      bucket_capacity_(kBucketFull_s * (report_rate_Hz > kSlowest_Hz ? report_rate_Hz : kSlowest_Hz)) {}
 
-FaultSet LinkWatch::look(const DeviceSample& sample, TimePoint now) noexcept {
+FaultSet LinkWatch::check(const DeviceSample& sample, TimePoint now) noexcept {
   FaultSet found = 0;
   if (sample.rejected > sample.repeated) found |= bit(Fault::report_malformed);
   if (sample.repeated > 0) found |= bit(Fault::report_repeated);
   if (sample.missing > 0) found |= bit(Fault::report_missing);
-  const bool first = !heard_ && sample.fresh;
-  heard_ = heard_ || sample.fresh;
-  if (!heard_) return found;
+  const bool first = !report_received_ && sample.fresh;
+  report_received_ = report_received_ || sample.fresh;
+  if (!report_received_) return found;
   if (first) {
-    least_lag_s_ = lag_s(sample);
-    lag_at_ = sample.arrived;
+    min_lag_s_ = lag_s(sample);
+    min_lag_updated_ = sample.arrived;
   }
   const double bad = static_cast<double>(sample.rejected) + static_cast<double>(sample.missing);
-  const double good = static_cast<double>(sample.skipped) + (sample.fresh ? 1.0 : 0.0);
+  const double good = static_cast<double>(sample.superseded) + (sample.fresh ? 1.0 : 0.0);
   bucket_ = std::max(bucket_ + kBad * bad - kGood * good, 0.0);
-  if (bucket_ > bucket_holds_) {
+  if (bucket_ > bucket_capacity_) {
     found |= bit(Fault::link_lossy);
     bucket_ = 0.0;  // told; what comes after somebody has looked counts anew
   }
-  if (now - sample.arrived > late_after_ || falls_behind(sample)) found |= bit(Fault::sample_late);
+  if (now - sample.arrived > late_after_ || lag_exceeded(sample)) found |= bit(Fault::sample_late);
   return found;
 }
 
 /// Reports that wait somewhere are old, however evenly they come. The shortest lag that was seen counts as
 /// none.
-bool LinkWatch::falls_behind(const DeviceSample& sample) noexcept {
+bool LinkWatch::lag_exceeded(const DeviceSample& sample) noexcept {
   const double lag = lag_s(sample);
-  least_lag_s_ = std::min(lag, least_lag_s_ + kClockDrift * seconds(sample.arrived - lag_at_));
-  lag_at_ = sample.arrived;
-  return lag - least_lag_s_ > seconds(late_after_);
+  min_lag_s_ = std::min(lag, min_lag_s_ + kClockDrift * seconds(sample.arrived - min_lag_updated_));
+  min_lag_updated_ = sample.arrived;
+  return lag - min_lag_s_ > seconds(late_after_);
 }
 
-void LinkWatch::forget() noexcept {
+void LinkWatch::reset() noexcept {
   bucket_ = 0.0;
-  heard_ = false;
+  report_received_ = false;
 }
 
 }  // namespace wrenchd

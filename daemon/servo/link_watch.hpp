@@ -13,19 +13,19 @@ class LinkWatch {
   /// report_rate_Hz: the profile's; not a number where it states none.
   explicit LinkWatch(double report_rate_Hz) noexcept;
 
-  FaultSet look(const DeviceSample& sample, TimePoint now) noexcept;
+  FaultSet check(const DeviceSample& sample, TimePoint now) noexcept;
   /// The next report is the first one.
-  void forget() noexcept;
+  void reset() noexcept;
 
  private:
-  bool falls_behind(const DeviceSample& sample) noexcept;
+  bool lag_exceeded(const DeviceSample& sample) noexcept;
 
   Duration late_after_;
-  double bucket_holds_;
+  double bucket_capacity_;
   double bucket_ = 0.0;  ///< 2 in for a bad or missing report, 1 out for a good one
-  bool heard_ = false;
-  double least_lag_s_ = 0.0;  ///< of arrival behind the device's own clock
-  TimePoint lag_at_{};
+  bool report_received_ = false;
+  double min_lag_s_ = 0.0;  ///< of arrival behind the device's own clock
+  TimePoint min_lag_updated_{};
 };
 
 }  // namespace wrenchd

@@ -10,16 +10,16 @@ namespace wrenchd {
 // Up to 32 ns one bucket a nanosecond; above, the five bits below the leading one choose the bucket in its
 // octave.
 std::size_t DurationHistogram::bucket_of(std::uint64_t ns) noexcept {
-  if (ns < kSub) return ns;
-  const unsigned shift = static_cast<unsigned>(std::bit_width(ns)) - 1 - kSubBits;
-  const std::size_t bucket = (shift + 1) * kSub + ((ns >> shift) - kSub);
-  return std::min(bucket, kSub * kOctaves - 1);
+  if (ns < kBucketsPerOctave) return ns;
+  const unsigned shift = static_cast<unsigned>(std::bit_width(ns)) - 1 - kBucketBits;
+  const std::size_t bucket = (shift + 1) * kBucketsPerOctave + ((ns >> shift) - kBucketsPerOctave);
+  return std::min(bucket, kBucketsPerOctave * kOctaves - 1);
 }
 
 std::uint64_t DurationHistogram::upper_end_ns(std::size_t bucket) noexcept {
-  if (bucket < kSub) return bucket;
-  const std::size_t shift = bucket / kSub - 1;
-  return ((bucket % kSub + kSub + 1) << shift) - 1;
+  if (bucket < kBucketsPerOctave) return bucket;
+  const std::size_t shift = bucket / kBucketsPerOctave - 1;
+  return ((bucket % kBucketsPerOctave + kBucketsPerOctave + 1) << shift) - 1;
 }
 
 void DurationHistogram::add(Duration duration) noexcept {

@@ -21,13 +21,13 @@ class DurationHistogram {
   std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
 
  private:
-  static constexpr unsigned kSubBits = 5;
-  static constexpr std::size_t kSub = std::size_t{1} << kSubBits;
+  static constexpr unsigned kBucketBits = 5;
+  static constexpr std::size_t kBucketsPerOctave = std::size_t{1} << kBucketBits;
   static constexpr std::size_t kOctaves = 36;  ///< the last bucket starts above a quarter of an hour
   static std::size_t bucket_of(std::uint64_t ns) noexcept;
   static std::uint64_t upper_end_ns(std::size_t bucket) noexcept;
 
-  std::array<std::atomic<std::uint64_t>, kSub * kOctaves> buckets_{};
+  std::array<std::atomic<std::uint64_t>, kBucketsPerOctave * kOctaves> buckets_{};
   std::atomic<std::uint64_t> count_{0};
   std::atomic<std::int64_t> max_ns_{0};
 };
@@ -42,8 +42,8 @@ struct LoopTiming {
   DurationHistogram wake_latency;  ///< from the time a tick was due to its start
   DurationHistogram tick;          ///< from its start to the end of its last stage
   std::array<DurationHistogram, kStageCount> stage;
-  std::atomic<std::uint64_t> overruns{0};  ///< ticks that were not over when the next was due
-  std::atomic<std::uint64_t> skipped{0};   ///< ticks left out because of them; they are never caught up
+  std::atomic<std::uint64_t> overruns{0};       ///< ticks that were not over when the next was due
+  std::atomic<std::uint64_t> skipped_ticks{0};  ///< ticks left out because of them; they are never caught up
 };
 
 }  // namespace wrenchd

@@ -11,25 +11,26 @@ constexpr double kStill_rad = 2e-2;
 
 }  // namespace
 
-FaultSet PinnedWatch::look(const Wrench& F, const Pose& X_BH, TimePoint now) noexcept {
-  const bool moved = !since_ || (X_BH.translation_m - X_BH_.translation_m).norm() > kStill_m ||
-                     X_BH.rotation.angularDistance(X_BH_.rotation) > kStill_rad;
-  if (!pushes_fully(F)) {
-    since_.reset();
+FaultSet MotorStallWatch::check(const Wrench& F, const Pose& X_BH, TimePoint now) noexcept {
+  const bool moved = !still_since_ ||
+                     (X_BH.translation_m - X_BH_reference_.translation_m).norm() > kStill_m ||
+                     X_BH.rotation.angularDistance(X_BH_reference_.rotation) > kStill_rad;
+  if (!force_near_limit(F)) {
+    still_since_.reset();
     return 0;
   }
   if (moved) {
-    X_BH_ = X_BH;
-    since_ = now;
+    X_BH_reference_ = X_BH;
+    still_since_ = now;
   }
-  if (now - *since_ <= kPinned) return 0;
-  since_.reset();
-  return bit(Fault::pinned);
+  if (now - *still_since_ <= kMotorsStalled) return 0;
+  still_since_.reset();
+  return bit(Fault::motors_stalled);
 }
 
-bool PinnedWatch::pushes_fully(const Wrench& F) const noexcept {
-  return (pinning_force_N_ > 0.0 && F.force_N.norm() >= pinning_force_N_) ||
-         (pinning_torque_Nm_ > 0.0 && F.torque_Nm.norm() >= pinning_torque_Nm_);
+bool MotorStallWatch::force_near_limit(const Wrench& F) const noexcept {
+  return (stall_force_N_ > 0.0 && F.force_N.norm() >= stall_force_N_) ||
+         (stall_torque_Nm_ > 0.0 && F.torque_Nm.norm() >= stall_torque_Nm_);
 }
 
 }  // namespace wrenchd

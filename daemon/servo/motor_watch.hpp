@@ -12,11 +12,11 @@ namespace wrenchd {
 class MotorWatch {
  public:
   /// driven: the last command said "motors on".
-  FaultSet look(const DeviceSample& sample, bool driven, TimePoint now) noexcept;
+  FaultSet check(const DeviceSample& sample, bool driven, TimePoint now) noexcept;
 
  private:
   bool driven_ = false;
-  bool on_ = false;        ///< they have been on since they were driven
+  bool seen_on_ = false;   ///< they have been on since they were driven
   TimePoint off_since_{};  ///< driven, and not seen on
 };
 

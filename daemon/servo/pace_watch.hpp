@@ -17,24 +17,26 @@ class PaceWatch {
       : period_(period), stopped_after_(stopped_after) {}
 
   /// slept: how long the machine has slept since it was switched on.
-  FaultSet look(TimePoint now, Duration slept) noexcept;
+  FaultSet check(TimePoint now, Duration slept) noexcept;
 
   /// Since the last tick [s]: never less than nothing, and after a gap no more than two periods, so that
   /// nothing that grows with time leaps.
   double dt_s() const noexcept { return dt_s_; }
   /// How late this tick is; nothing where it is not.
-  Duration late() const noexcept { return late_; }
+  Duration lateness() const noexcept { return lateness_; }
   /// Did a tick come late so short a time ago that old reports are nobody's fault but ours?
-  bool was_late(TimePoint now) const noexcept { return late_at_ && now - *late_at_ <= kStaleSample; }
+  bool recently_late(TimePoint now) const noexcept {
+    return last_late_tick_ && now - *last_late_tick_ <= kStaleSample;
+  }
 
  private:
   Duration period_;
   Duration stopped_after_;
-  std::optional<TimePoint> last_;
-  std::optional<TimePoint> late_at_;  ///< the last late one
-  Duration slept_{};
+  std::optional<TimePoint> last_tick_;
+  std::optional<TimePoint> last_late_tick_;  ///< the last late one
+  Duration suspended_{};
   double dt_s_ = 0.0;
-  Duration late_{};
+  Duration lateness_{};
 };
 
 }  // namespace wrenchd

@@ -23,41 +23,43 @@ constexpr double kRest_rad_per_s = 0.2;
 
 PoseWatch::PoseWatch(const DeviceProfile& profile) noexcept
     : centre_m_(profile.workspace_centre_m),
-      farthest_m_(is_finite(profile.workspace_radius_m) ? kFarOutside * profile.workspace_radius_m
-                                                        : std::numeric_limits<double>::infinity()) {}
+      max_distance_m_(is_finite(profile.workspace_radius_m) ? kFarOutside * profile.workspace_radius_m
+                                                            : std::numeric_limits<double>::infinity()) {}
 
-FaultSet PoseWatch::look(const DeviceSample& sample) noexcept {
+FaultSet PoseWatch::check(const DeviceSample& sample) noexcept {
   if (!sample.fresh) return 0;
   FaultSet found = 0;
-  no_rotations_ = sample.fault == Fault::pose_not_a_rotation ? no_rotations_ + 1 : 0;
-  if (no_rotations_ >= kNoRotations) found |= bit(Fault::pose_not_a_rotation);
+  invalid_rotations_ = sample.fault == Fault::pose_not_a_rotation ? invalid_rotations_ + 1 : 0;
+  if (invalid_rotations_ >= kNoRotations) found |= bit(Fault::pose_not_a_rotation);
   if (sample.fault != Fault::none) return found;
-  if ((sample.X_BH.translation_m - centre_m_).norm() > farthest_m_) found |= bit(Fault::pose_outside);
-  if (stuck(sample)) found |= bit(Fault::pose_stuck);
+  if ((sample.X_BH.translation_m - centre_m_).norm() > max_distance_m_)
+    found |= bit(Fault::pose_outside_workspace);
+  if (pose_stuck(sample)) found |= bit(Fault::pose_stuck);
   return found;
 }
 
-bool PoseWatch::stuck(const DeviceSample& sample) noexcept {
+bool PoseWatch::pose_stuck(const DeviceSample& sample) noexcept {
   const double now_s = sample.device_time_s;
   const double v_m_per_s = sample.V_BH.linear_m_per_s.norm(),
                w_rad_per_s = sample.V_BH.angular_rad_per_s.norm();
   const bool rests = v_m_per_s < kRest_m_per_s && w_rad_per_s < kRest_rad_per_s;
-  if (!moved_ || rests || !same_bits(sample.X_BH, X_BH_) || now_s < last_s_) {
-    X_BH_ = sample.X_BH;
-    moved_ = true;
-    stuck_at_s_ = now_s;
-    way_m_ = turn_rad_ = 0.0;
+  if (!has_reference_ || rests || !same_bits(sample.X_BH, X_BH_reference_) || now_s < last_sample_time_s_) {
+    X_BH_reference_ = sample.X_BH;
+    has_reference_ = true;
+    reference_time_s_ = now_s;
+    expected_path_m_ = expected_rotation_rad_ = 0.0;
   } else {
-    way_m_ += v_m_per_s * (now_s - last_s_);
-    turn_rad_ += w_rad_per_s * (now_s - last_s_);
+    expected_path_m_ += v_m_per_s * (now_s - last_sample_time_s_);
+    expected_rotation_rad_ += w_rad_per_s * (now_s - last_sample_time_s_);
   }
-  last_s_ = now_s;
-  return now_s - stuck_at_s_ >= seconds(kStuckPose) && (way_m_ > kUnseenWay_m || turn_rad_ > kUnseenTurn_rad);
+  last_sample_time_s_ = now_s;
+  return now_s - reference_time_s_ >= seconds(kStuckPose) &&
+         (expected_path_m_ > kUnseenWay_m || expected_rotation_rad_ > kUnseenTurn_rad);
 }
 
-void PoseWatch::forget() noexcept {
-  no_rotations_ = 0;
-  moved_ = false;
+void PoseWatch::reset() noexcept {
+  invalid_rotations_ = 0;
+  has_reference_ = false;
 }
 
 }  // namespace wrenchd

@@ -13,22 +13,22 @@ class PoseWatch {
  public:
   explicit PoseWatch(const DeviceProfile& profile) noexcept;
 
-  FaultSet look(const DeviceSample& sample) noexcept;
+  FaultSet check(const DeviceSample& sample) noexcept;
   /// The next pose is the first one.
-  void forget() noexcept;
+  void reset() noexcept;
 
  private:
-  bool stuck(const DeviceSample& sample) noexcept;
+  bool pose_stuck(const DeviceSample& sample) noexcept;
 
   Vector3d centre_m_;
-  double farthest_m_;  ///< infinite where the profile has no workspace
-  int no_rotations_ = 0;
-  Pose X_BH_;                ///< the last one that moved
-  bool moved_ = false;       ///< there is one
-  double stuck_at_s_ = 0.0;  ///< device time at which it did
-  double last_s_ = 0.0;
-  double way_m_ = 0.0;  ///< that the twist would have gone since
-  double turn_rad_ = 0.0;
+  double max_distance_m_;  ///< infinite where the profile has no workspace
+  int invalid_rotations_ = 0;
+  Pose X_BH_reference_;            ///< the last one that moved
+  bool has_reference_ = false;     ///< there is one
+  double reference_time_s_ = 0.0;  ///< device time at which it did
+  double last_sample_time_s_ = 0.0;
+  double expected_path_m_ = 0.0;  ///< that the twist would have gone since
+  double expected_rotation_rad_ = 0.0;
 };
 
 }  // namespace wrenchd

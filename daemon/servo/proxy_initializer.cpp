@@ -14,62 +14,64 @@ constexpr auto kPause = std::chrono::milliseconds(5);
 /// that a proxy can follow from it.
 constexpr PenetrationDepth::Options kNearest = {Method::exact, 47, Proxy::kClearance_m};
 
-PlacementAnswer sought(PenetrationDepth& penetration, const PlacementQuestion& question,
-                       const std::stop_token& stop) noexcept {
+ProxyInitializationResult sought(PenetrationDepth& penetration, const ProxyInitializationRequest& question,
+                                 const std::stop_token& stop) noexcept {
   const Projection q = penetration.query(question.X_WP, stop, question.scene_time_s).projection;
-  return {question.number, q.status != ProjectionStatus::infeasible, q.X_WQ, question.scene_time_s};
+  return {question.id, q.status != ProjectionStatus::infeasible, q.X_WQ, question.scene_time_s};
 }
 
 }  // namespace
 
-const char* name(Placing placing) noexcept {
+const char* name(ProxyInitialization placing) noexcept {
   switch (placing) {
-    case Placing::following:
+    case ProxyInitialization::complete:
       return "following";
-    case Placing::seeking:
+    case ProxyInitialization::searching:
       return "placing";
-    case Placing::placed:
+    case ProxyInitialization::found:
       return "placed";
-    case Placing::nowhere:
+    case ProxyInitialization::failed:
       return "no place";
   }
   return "unknown";
 }
 
-PlacerThread::PlacerThread(const Scene& scene)
+BackgroundProxyInitializer::BackgroundProxyInitializer(const Scene& scene)
     : penetration_(scene, kNearest), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-void PlacerThread::run(const std::stop_token& stop) noexcept {
-  PlacementQuestion question;
+void BackgroundProxyInitializer::run(const std::stop_token& stop) noexcept {
+  ProxyInitializationRequest question;
   while (!stop.stop_requested()) {
-    if (asked_.read(question))
-      answered_.write(sought(penetration_, question, stop));
+    if (request_.read(question))
+      result_.write(sought(penetration_, question, stop));
     else
       std::this_thread::sleep_for(kPause);
   }
 }
 
-std::shared_ptr<Placer> make_placer(std::shared_ptr<const Scene> scene, PlaceIn place_in) {
+std::shared_ptr<ProxyInitializer> make_proxy_initializer(std::shared_ptr<const Scene> scene,
+                                                         ProxySearchMode place_in) {
   const Scene& its = *scene;
   const auto with_scene = [&scene](auto placer) {
     // The scene goes after the placer that uses it.
-    return std::shared_ptr<Placer>(placer.release(), [scene = std::move(scene)](Placer* p) { delete p; });
+    return std::shared_ptr<ProxyInitializer>(placer.release(),
+                                             [scene = std::move(scene)](ProxyInitializer* p) { delete p; });
   };
-  if (place_in == PlaceIn::step) return with_scene(std::make_unique<PlacerInStep>(its));
-  return with_scene(std::make_unique<PlacerThread>(its));
+  if (place_in == ProxySearchMode::in_tick) return with_scene(std::make_unique<InTickProxyInitializer>(its));
+  return with_scene(std::make_unique<BackgroundProxyInitializer>(its));
 }
 
-PlacerInStep::PlacerInStep(const Scene& scene) : penetration_(scene, kNearest) {}
+InTickProxyInitializer::InTickProxyInitializer(const Scene& scene) : penetration_(scene, kNearest) {}
 
-void PlacerInStep::ask(const PlacementQuestion& question) noexcept {
-  question_ = question;
-  asked_ = true;
+void InTickProxyInitializer::request(const ProxyInitializationRequest& question) noexcept {
+  request_ = question;
+  request_pending_ = true;
 }
 
-bool PlacerInStep::answer(PlacementAnswer& answer) noexcept {
-  if (!asked_) return false;
-  asked_ = false;
-  answer = sought(penetration_, question_, {});
+bool InTickProxyInitializer::take_result(ProxyInitializationResult& answer) noexcept {
+  if (!request_pending_) return false;
+  request_pending_ = false;
+  answer = sought(penetration_, request_, {});
   return true;
 }
 

@@ -18,19 +18,19 @@ std::optional<int> fifo_priority(pid_t thread) noexcept {
 }  // namespace
 
 RealtimeWatch::RealtimeWatch(pid_t thread) noexcept
-    : thread_(thread), granted_(fifo_priority(thread).value_or(0)) {}
+    : thread_(thread), granted_priority_(fifo_priority(thread).value_or(0)) {}
 
-std::optional<RealtimeWatch::News> RealtimeWatch::look() {
+std::optional<RealtimeWatch::Change> RealtimeWatch::check() {
   const std::optional<int> now = fifo_priority(thread_);
-  if (!now || (*now < granted_) == lost_) return {};
+  if (!now || (*now < granted_priority_) == lost_) return {};
   lost_ = !lost_;
-  const std::string granted = "SCHED_FIFO priority " + std::to_string(granted_);
-  if (!lost_) return News{false, "the servo thread has its " + granted + " again"};
-  return News{true,
-              "somebody took the servo thread's " + granted + " (" +
-                  (*now > 0 ? "it is " + std::to_string(*now) + " now" : "it is an ordinary thread now") +
-                  "); give it back with: chrt -f -p " + std::to_string(granted_) + " " +
-                  std::to_string(thread_)};
+  const std::string granted = "SCHED_FIFO priority " + std::to_string(granted_priority_);
+  if (!lost_) return Change{false, "the servo thread has its " + granted + " again"};
+  return Change{true,
+                "somebody took the servo thread's " + granted + " (" +
+                    (*now > 0 ? "it is " + std::to_string(*now) + " now" : "it is an ordinary thread now") +
+                    "); give it back with: chrt -f -p " + std::to_string(granted_priority_) + " " +
+                    std::to_string(thread_)};
 }
 
 }  // namespace wrenchd

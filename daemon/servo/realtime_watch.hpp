@@ -17,17 +17,17 @@ class RealtimeWatch {
   /// thread: the kernel's number of it. What it has now is what it was granted.
   explicit RealtimeWatch(pid_t thread) noexcept;
 
-  struct News {
-    bool lost;         ///< else it is back
-    std::string text;  ///< what happened, and the cure
+  struct Change {
+    bool lost;            ///< else it is back
+    std::string message;  ///< what happened, and the cure
   };
   /// What became of it since the last look; nothing: nothing, also where there is no such thread any more, or
   /// where it never had a priority to lose.
-  std::optional<News> look();
+  std::optional<Change> check();
 
  private:
   pid_t thread_;
-  int granted_;  ///< SCHED_FIFO priority; 0: none
+  int granted_priority_;  ///< SCHED_FIFO priority; 0: none
   bool lost_ = false;
 };
 

@@ -21,7 +21,7 @@ constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
 constexpr auto kWarmUp = std::chrono::milliseconds(50);
 constexpr int kWarmTicks = 30;
 
-Pose pose_of(const PlacementSettings& placement) noexcept {
+Pose pose_of(const PoseSettings& placement) noexcept {
   return {rotation_from(placement.rotation_vector_rad), placement.position_m};
 }
 
@@ -46,20 +46,20 @@ class Sum {
 }  // namespace
 
 Rendering::Rendering(std::uint32_t number, const Settings& settings, const DeviceProfile& profile,
-                     std::shared_ptr<const Scene> scene, std::shared_ptr<Placer> placer)
-    : number_(number),
+                     std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> placer)
+    : id_(number),
       scene_(std::move(scene)),
-      placer_(std::move(placer)),
+      proxy_initializer_(std::move(placer)),
       X_HT_(pose_of(settings.device.tool_in_handle) * scene_->tool().X_MT()),
       M_(scene_->tool().solid.inertia),
-      spring_(settings.wrench.law),
+      spring_law_(settings.wrench.law),
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
       gains_(gains_for(settings.rendering.method, settings.wrench.gains)),
       stability_(settings, profile, M_, X_HT_),
       penetration_(*scene_,
                    {settings.rendering.method, settings.rendering.planes, 0.0, settings.rendering.friction}),
       law_(gains_) {
-  lose_place();
+  invalidate_proxy();
 }
 
 void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
@@ -72,107 +72,112 @@ void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
   });
   const Pose X_WP = X_WH * X_HT_;
   Pose X_WQ = penetration_.query(X_WP, stop.get_token(), scene_time_s).projection.X_WQ;
-  penetration_.forget(scene_time_s);
+  penetration_.clear_history(scene_time_s);
   for (int tick = 0; tick < kWarmTicks && !stop.stop_requested(); ++tick) {
     const Penetration depth = penetration_.follow(X_WP, X_WQ, scene_time_s);
     X_WQ = depth.projection.X_WQ;
-    law_.update(depth.drive, depth.contacts > 0, 1e-3);
+    law_.update(depth.spring_displacement, depth.contacts > 0, 1e-3);
   }
-  sum();
-  lose_place();
+  checksum();
+  invalidate_proxy();
 }
 
 bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept {
   X_WP_ = X_WH * X_HT_;
-  if (!has_place()) {
-    place(now, scene_time_s);
+  if (!proxy_valid()) {
+    initialize_proxy(now, scene_time_s);
     return true;
   }
-  const double since_s = placing_ == Placing::following ? scene_time_s_ : scene_time_s;
-  pushed_T_ = 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
+  const double since_s =
+      proxy_initialization_ == ProxyInitialization::complete ? scene_time_s_ : scene_time_s;
+  obstacle_work_kg_m2_ = 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
   depth_ = penetration_.follow(X_WP_, X_WQ_, scene_time_s);
-  if (scene_->moves() && depth_.projection.status == ProjectionStatus::infeasible) return false;
+  if (scene_->has_moving_obstacles() && depth_.projection.status == ProjectionStatus::infeasible)
+    return false;
   X_WQ_ = depth_.projection.X_WQ;
-  pushed_T_ += 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
+  obstacle_work_kg_m2_ += 0.5 * obstacle_work(depth_.projection, *scene_, since_s, scene_time_s);
   scene_time_s_ = scene_time_s;
-  placing_ = Placing::following;
+  proxy_initialization_ = ProxyInitialization::complete;
   return true;
 }
 
 /// There is no q to follow from. The search for one may take seconds, so another thread does it, whatever the
 /// scene: asked at one tick, it answers at a later one, with a pose near to where the hand was then. That is
 /// this tick's q, and the next follows from it, and makes up for what obstacles have moved since.
-void Rendering::place(TimePoint now, double scene_time_s) noexcept {
-  if (!asked_) {
-    if (placing_ == Placing::nowhere && now < ask_again_) return;
-    placing_ = Placing::seeking;
-    placer_->ask({++question_, seeks_near_ ? X_near_ : X_WP_, scene_time_s});
-    asked_ = true;
+void Rendering::initialize_proxy(TimePoint now, double scene_time_s) noexcept {
+  if (!request_pending_) {
+    if (proxy_initialization_ == ProxyInitialization::failed && now < retry_at_) return;
+    proxy_initialization_ = ProxyInitialization::searching;
+    proxy_initializer_->request({++request_id_, has_initial_guess_ ? X_WT_guess_ : X_WP_, scene_time_s});
+    request_pending_ = true;
     return;
   }
-  PlacementAnswer answer;
-  if (!placer_->answer(answer) || answer.number != question_)
+  ProxyInitializationResult answer;
+  if (!proxy_initializer_->take_result(answer) || answer.id != request_id_)
     return;  // one that was asked before we started over
-  asked_ = false;
-  begins_ = seeks_near_;
-  seeks_near_ = false;
-  placing_ = answer.found ? Placing::placed : Placing::nowhere;
+  request_pending_ = false;
+  starts_in_contact_ = has_initial_guess_;
+  has_initial_guess_ = false;
+  proxy_initialization_ = answer.found ? ProxyInitialization::found : ProxyInitialization::failed;
   X_WQ_ = answer.X_WQ;
-  penetration_.forget(answer.scene_time_s);
-  ask_again_ = now + kAskAgainAfter;
+  penetration_.clear_history(answer.scene_time_s);
+  retry_at_ = now + kAskAgainAfter;
 }
 
-void Rendering::press(double dt_s) noexcept {
+void Rendering::compute_wrench(double dt_s) noexcept {
   constexpr double kLongAgo_s = 1e9;
-  if (placing_ == Placing::following && std::exchange(begins_, false))
-    law_.update_damping({}, depth_.drive, in_contact(), kLongAgo_s);
-  F_T_ = spring_ == SpringLaw::pid
-             ? law_.update(depth_.drive, in_contact(), dt_s)
-             : law_.update_damping(energy_wrench(M_, spring_share_ * energy_stiffness_per_s2_, X_WP_, X_WQ_),
-                                   depth_.drive, in_contact(), dt_s);
+  if (proxy_initialization_ == ProxyInitialization::complete && std::exchange(starts_in_contact_, false))
+    law_.update_damping({}, depth_.spring_displacement, in_contact(), kLongAgo_s);
+  F_T_ = spring_law_ == SpringLaw::pid
+             ? law_.update(depth_.spring_displacement, in_contact(), dt_s)
+             : law_.update_damping(energy_wrench(M_, spring_scale_ * energy_stiffness_per_s2_, X_WP_, X_WQ_),
+                                   depth_.spring_displacement, in_contact(), dt_s);
 }
 
-void Rendering::lose_place() noexcept {
-  placing_ = Placing::seeking;
-  asked_ = false;
-  seeks_near_ = begins_ = false;
-  penetration_.forget();
+void Rendering::invalidate_proxy() noexcept {
+  proxy_initialization_ = ProxyInitialization::searching;
+  request_pending_ = false;
+  has_initial_guess_ = starts_in_contact_ = false;
+  penetration_.clear_history();
   depth_ = Penetration{};
   depth_.projection.status = ProjectionStatus::infeasible;
   F_T_ = Wrench{};
   law_.reset();
 }
 
-void Rendering::seek_near(const Pose& X_WT) noexcept {
-  seeks_near_ = true;
-  X_near_ = X_WT;
+void Rendering::initialize_near(const Pose& X_WT) noexcept {
+  has_initial_guess_ = true;
+  X_WT_guess_ = X_WT;
 }
 
-void Rendering::scale(const StiffnessShare& share) noexcept {
+void Rendering::set_stiffness_scale(const StiffnessScale& share) noexcept {
   law_.scale(share.spring, share.damper);
-  spring_share_ = share.spring;
+  spring_scale_ = share.spring;
 }
 
-Touches Rendering::touches() const noexcept {
-  return in_contact() ? wrenchd::touches(depth_.projection, *scene_, penetration_.knows_mesh_features())
+Touches Rendering::contacts() const noexcept {
+  return in_contact() ? wrenchd::touches(depth_.projection, *scene_, penetration_.uses_mesh_features())
                       : Touches{};
 }
 
-double Rendering::wound_up_J() const noexcept {
+double Rendering::stored_energy_J() const noexcept {
   if (!in_contact()) return 0.0;
-  return 0.5 * (F_T_.force_N.dot(depth_.drive.head<3>()) + F_T_.torque_Nm.dot(depth_.drive.tail<3>()));
+  return 0.5 * (F_T_.force_N.dot(depth_.spring_displacement.head<3>()) +
+                F_T_.torque_Nm.dot(depth_.spring_displacement.tail<3>()));
 }
 
 /// Half of force times way is wound_up_J() where T is what it is: the spring is that many J for a kg m^2.
-double Rendering::pushed_J() const noexcept {
+double Rendering::obstacle_work_J() const noexcept {
   const double T = depth_.projection.energy;
-  return placing_ == Placing::following && T > 0.0 ? wound_up_J() / T * pushed_T_ : 0.0;
+  return proxy_initialization_ == ProxyInitialization::complete && T > 0.0
+             ? stored_energy_J() / T * obstacle_work_kg_m2_
+             : 0.0;
 }
 
-std::uint64_t Rendering::sum() const noexcept {
+std::uint64_t Rendering::checksum() const noexcept {
   constexpr std::size_t kObstacles = 16;  // of each kind: a tick must not take longer for more
   Sum sum;
-  sum.add(std::uint64_t{number_});
+  sum.add(std::uint64_t{id_});
   sum.add(X_HT_);
   sum.add(M_.mass_kg);
   sum.add(energy_stiffness_per_s2_);

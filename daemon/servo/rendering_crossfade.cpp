@@ -5,82 +5,85 @@
 
 namespace wrenchd {
 
-Renderings::News Renderings::change(bool force) noexcept {
+RenderingCrossfade::Change RenderingCrossfade::update(bool force) noexcept {
   if (!next_) {
     next_.reset(exchange_.take());
-    if (!next_) return News::none;
-    share_ = per_s_ = 0.0;
+    if (!next_) return Change::none;
+    next_weight_ = weight_rate_per_s_ = 0.0;
     // Where the handle is the same, and the tool on the side of each wall where it was.
-    if (felt_->has_place()) next_->seek_near(felt_->X_WQ() * inverse(felt_->X_HT()) * next_->X_HT());
-    if (force) return News::comes;
+    if (active_->proxy_valid())
+      next_->initialize_near(active_->X_WQ() * inverse(active_->X_HT()) * next_->X_HT());
+    if (force) return Change::next_arrived;
   }
-  if (force && share_ < 1.0) return News::none;
-  take_over();
-  return News::taken_over;
+  if (force && next_weight_ < 1.0) return Change::none;
+  switch_to_next();
+  return Change::switched;
 }
 
 /// What goes is never destroyed here: the other side of the exchange does that.
-void Renderings::take_over() noexcept {
-  exchange_.give_back(felt_.release());
-  felt_ = std::move(next_);
-  share_ = per_s_ = given_J_ = 0.0;
+void RenderingCrossfade::switch_to_next() noexcept {
+  exchange_.retire(active_.release());
+  active_ = std::move(next_);
+  next_weight_ = weight_rate_per_s_ = crossfade_work_J_ = 0.0;
 }
 
-bool Renderings::project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept {
-  const bool kept = felt_->project(X_WH, now, scene_time_s);
+bool RenderingCrossfade::project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept {
+  const bool kept = active_->project(X_WH, now, scene_time_s);
   return (!next_ || next_->project(X_WH, now, scene_time_s)) && kept;
 }
 
-void Renderings::press(double dt_s) noexcept {
-  felt_->press(dt_s);
-  if (next_) next_->press(dt_s);
+void RenderingCrossfade::compute_wrench(double dt_s) noexcept {
+  active_->compute_wrench(dt_s);
+  if (next_) next_->compute_wrench(dt_s);
 }
 
 /// Is there something to fade to: the proxy follows, or there is no room for it?
-bool Renderings::fades() const noexcept {
+bool RenderingCrossfade::fading() const noexcept {
   return next_ &&
-         (per_s_ > 0.0 || next_->placing() == Placing::following || next_->placing() == Placing::nowhere);
+         (weight_rate_per_s_ > 0.0 || next_->proxy_initialization() == ProxyInitialization::complete ||
+          next_->proxy_initialization() == ProxyInitialization::failed);
 }
 
-Wrench Renderings::mixed(const Wrench& F_felt, const Wrench& F_next, const Pace& pace, double dt_s) noexcept {
-  given_J_ = 0.0;
-  if (!fades()) return F_felt;
-  if (per_s_ == 0.0) {
+Wrench RenderingCrossfade::blend(const Wrench& F_felt, const Wrench& F_next, const FadeLimits& pace,
+                                 double dt_s) noexcept {
+  crossfade_work_J_ = 0.0;
+  if (!fading()) return F_felt;
+  if (weight_rate_per_s_ == 0.0) {
     const auto share_of = [](double part, double whole) { return whole > 0.0 ? part / whole : 0.0; };
     const Wrench change = F_next - F_felt;
     const double far = std::max(share_of(change.force_N.norm(), pace.max_force_N),
                                 share_of(change.torque_Nm.norm(), pace.max_torque_Nm));
-    per_s_ = 1.0 / std::max(kLeastFade_s, std::min(far, 1.0) * pace.over_s);
+    weight_rate_per_s_ = 1.0 / std::max(kMinFade_s, std::min(far, 1.0) * pace.rise_time_s);
   }
-  const double last = share_;
-  share_ = std::min(share_ + per_s_ * std::max(dt_s, 0.0), 1.0);
-  given_J_ = (share_ - last) * (next_->wound_up_J() - felt_->wound_up_J());
-  return (1.0 - share_) * F_felt + share_ * F_next;
+  const double last = next_weight_;
+  next_weight_ = std::min(next_weight_ + weight_rate_per_s_ * std::max(dt_s, 0.0), 1.0);
+  crossfade_work_J_ = (next_weight_ - last) * (next_->stored_energy_J() - active_->stored_energy_J());
+  return (1.0 - next_weight_) * F_felt + next_weight_ * F_next;
 }
 
-double Renderings::wound_up_J() const noexcept {
-  if (!next_ || share_ == 0.0) return felt_->wound_up_J();
-  return (1.0 - share_) * felt_->wound_up_J() + share_ * next_->wound_up_J();
+double RenderingCrossfade::stored_energy_J() const noexcept {
+  if (!next_ || next_weight_ == 0.0) return active_->stored_energy_J();
+  return (1.0 - next_weight_) * active_->stored_energy_J() + next_weight_ * next_->stored_energy_J();
 }
 
-double Renderings::pushed_J() const noexcept {
-  if (!next_ || share_ == 0.0) return felt_->pushed_J();
-  return (1.0 - share_) * felt_->pushed_J() + share_ * next_->pushed_J();
+double RenderingCrossfade::obstacle_work_J() const noexcept {
+  if (!next_ || next_weight_ == 0.0) return active_->obstacle_work_J();
+  return (1.0 - next_weight_) * active_->obstacle_work_J() + next_weight_ * next_->obstacle_work_J();
 }
 
-bool Renderings::in_contact() const noexcept {
-  return felt_->in_contact() || (share_ > 0.0 && next_->in_contact());
+bool RenderingCrossfade::in_contact() const noexcept {
+  return active_->in_contact() || (next_weight_ > 0.0 && next_->in_contact());
 }
 
-void Renderings::lose_law() noexcept {
-  felt_->lose_law();
-  if (next_) next_->lose_law();
+void RenderingCrossfade::reset_law() noexcept {
+  active_->reset_law();
+  if (next_) next_->reset_law();
 }
 
-bool Renderings::lose_place() noexcept {
+bool RenderingCrossfade::invalidate_proxy() noexcept {
   const bool comes = next_ != nullptr;
-  if (comes) take_over();
-  felt_->lose_place();
+  if (comes) switch_to_next();
+  active_->invalidate_proxy();
   return comes;
 }
 

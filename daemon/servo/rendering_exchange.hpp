@@ -17,7 +17,7 @@ class RenderingExchange {
   RenderingExchange() = default;
   ~RenderingExchange() {
     delete offered_.load(std::memory_order_acquire);
-    clean_up();
+    destroy_retired();
   }
   RenderingExchange(const RenderingExchange&) = delete;
   RenderingExchange& operator=(const RenderingExchange&) = delete;
@@ -26,7 +26,7 @@ class RenderingExchange {
 
   /// Offers this one, in the place of one that was not taken yet. True where there was one.
   bool offer(std::unique_ptr<Rendering> rendering) noexcept {
-    clean_up();
+    destroy_retired();
     const std::unique_ptr<Rendering> forgone(
         offered_.exchange(rendering.release(), std::memory_order_acq_rel));
     return forgone != nullptr;
@@ -34,8 +34,8 @@ class RenderingExchange {
   /// Was what was offered last taken?
   bool taken() const noexcept { return offered_.load(std::memory_order_acquire) == nullptr; }
   /// Destroys what was given back.
-  void clean_up() noexcept {
-    given_back_.consume_all([](Rendering* rendering) { delete rendering; });
+  void destroy_retired() noexcept {
+    retired_.consume_all([](Rendering* rendering) { delete rendering; });
   }
 
   // --- the servo thread: RT safe ---
@@ -46,13 +46,13 @@ class RenderingExchange {
     return offered_.exchange(nullptr, std::memory_order_acq_rel);
   }
   /// There is always room: one is given back for one that was taken, and each offer() has cleaned up before.
-  void give_back(Rendering* rendering) noexcept { given_back_.push(rendering); }
+  void retire(Rendering* rendering) noexcept { retired_.push(rendering); }
 
  private:
   std::atomic<Rendering*> offered_{nullptr};
   static_assert(std::atomic<Rendering*>::is_always_lock_free);
   /// Since the last clean-up one may have been offered and taken, and another been on its way in.
-  boost::lockfree::spsc_queue<Rendering*, boost::lockfree::capacity<8>> given_back_;
+  boost::lockfree::spsc_queue<Rendering*, boost::lockfree::capacity<8>> retired_;
 };
 
 }  // namespace wrenchd

@@ -13,48 +13,49 @@ constexpr Duration kThereAndBack = std::chrono::milliseconds(20);
 /// All that can be wrong with what the device sends.
 constexpr FaultSet kUnclean = bit(Fault::report_malformed) | bit(Fault::report_repeated) |
                               bit(Fault::report_missing) | bit(Fault::sample_late) |
-                              bit(Fault::pose_not_a_rotation) | bit(Fault::pose_teleported) |
-                              bit(Fault::pose_outside) | bit(Fault::pose_stuck);
+                              bit(Fault::pose_not_a_rotation) | bit(Fault::pose_jumped) |
+                              bit(Fault::pose_outside_workspace) | bit(Fault::pose_stuck);
 
 }  // namespace
 
 SelfTest::SelfTest(const DeviceProfile& profile, double clean_for_s) noexcept
-    : clean_for_(from_seconds(clean_for_s)),
-      nominal_Hz_(profile.stream == StreamStyle::free_running && profile.pose_report.sequence.present
-                      ? profile.report_rate_Hz
-                      : 0.0),
-      trips_within_(from_seconds(profile.watchdog_s > 0.0 ? profile.watchdog_s : 0.0) + kThereAndBack),
-      can_tell_(profile.has_output && profile.watchdog_s > 0.0 && profile.pose_report.motors_on.present &&
-                profile.pose_report.watchdog_tripped.present) {}
+    : required_clean_(from_seconds(clean_for_s)),
+      nominal_rate_Hz_(profile.stream == StreamStyle::free_running && profile.pose_report.sequence.present
+                           ? profile.report_rate_Hz
+                           : 0.0),
+      watchdog_timeout_(from_seconds(profile.watchdog_s > 0.0 ? profile.watchdog_s : 0.0) + kThereAndBack),
+      reports_watchdog_(profile.has_output && profile.watchdog_s > 0.0 &&
+                        profile.pose_report.motors_on.present &&
+                        profile.pose_report.watchdog_tripped.present) {}
 
-void SelfTest::begin(TimePoint now) noexcept {
-  phase_ = clean_for_ > Duration{0} ? Phase::clean : Phase::passed;
-  begun_ = phase_since_ = now;
-  counting_ = false;
+void SelfTest::start(TimePoint now) noexcept {
+  phase_ = required_clean_ > Duration{0} ? Phase::checking_reports : Phase::passed;
+  started_ = phase_since_ = now;
+  counting_reports_ = false;
   rate_Hz_ = 0.0;
 }
 
-void SelfTest::go_on(Phase phase, TimePoint now) noexcept {
+void SelfTest::enter_phase(Phase phase, TimePoint now) noexcept {
   phase_ = phase;
   phase_since_ = now;
 }
 
-Fault SelfTest::look(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept {
+Fault SelfTest::check(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept {
   const Duration in_phase = now - phase_since_;
   switch (phase_) {
-    case Phase::clean:
-      return measure(sample, found, now);
-    case Phase::waking:
+    case Phase::checking_reports:
+      return check_reports(sample, found, now);
+    case Phase::enabling_motors:
       if (sample.fresh && sample.motors_on)
-        go_on(Phase::silent, now);
+        enter_phase(Phase::awaiting_watchdog, now);
       else if (in_phase > kThereAndBack)
-        return Fault::test_watchdog;
+        return Fault::self_test_watchdog;
       return Fault::none;
-    case Phase::silent:
+    case Phase::awaiting_watchdog:
       if (sample.fresh && sample.watchdog_tripped && !sample.motors_on)
-        go_on(Phase::passed, now);
-      else if (in_phase > trips_within_)
-        return Fault::test_watchdog;
+        enter_phase(Phase::passed, now);
+      else if (in_phase > watchdog_timeout_)
+        return Fault::self_test_watchdog;
       return Fault::none;
     case Phase::passed:
       break;
@@ -63,27 +64,28 @@ Fault SelfTest::look(const DeviceSample& sample, FaultSet found, TimePoint now) 
 }
 
 /// A bad report, and the time of good ones begins anew.
-Fault SelfTest::measure(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept {
-  if (!sample.homed) begun_ = now;  // somebody has to move it first
-  if (now - begun_ > kTestFor) return Fault::test_unclean;
+Fault SelfTest::check_reports(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept {
+  if (!sample.homed) started_ = now;  // somebody has to move it first
+  if (now - started_ > kSelfTestTimeout) return Fault::self_test_reports;
   if (!sample.homed || (found & kUnclean) != 0 || sample.fault != Fault::none) {
-    counting_ = false;
+    counting_reports_ = false;
     return Fault::none;
   }
   if (!sample.fresh) return Fault::none;
-  if (!counting_) {
-    counting_ = true;
+  if (!counting_reports_) {
+    counting_reports_ = true;
     clean_since_ = now;
     first_arrived_ = sample.arrived;
     first_sequence_ = sample.sequence;
     return Fault::none;
   }
-  if (now - clean_since_ < clean_for_) return Fault::none;
+  if (now - clean_since_ < required_clean_) return Fault::none;
   rate_Hz_ =
       static_cast<double>(sample.sequence - first_sequence_) / seconds(sample.arrived - first_arrived_);
-  if (nominal_Hz_ > 0.0 && !(rate_Hz_ >= kSlowest * nominal_Hz_ && rate_Hz_ <= kFastest * nominal_Hz_))
-    return Fault::test_rate;
-  go_on(can_tell_ ? Phase::waking : Phase::passed, now);
+  if (nominal_rate_Hz_ > 0.0 &&
+      !(rate_Hz_ >= kSlowest * nominal_rate_Hz_ && rate_Hz_ <= kFastest * nominal_rate_Hz_))
+    return Fault::self_test_rate;
+  enter_phase(reports_watchdog_ ? Phase::enabling_motors : Phase::passed, now);
   return Fault::none;
 }
 

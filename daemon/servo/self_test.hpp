@@ -19,33 +19,33 @@ class SelfTest {
   /// clean_for_s: how long the reports have to be good; 0: the whole test is left out.
   SelfTest(const DeviceProfile& profile, double clean_for_s) noexcept;
 
-  void begin(TimePoint now) noexcept;
+  void start(TimePoint now) noexcept;
   /// Once a tick, from the first one on. found: what the others found in it. Fault::none while it runs, and
   /// when it has passed.
-  Fault look(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept;
+  Fault check(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept;
   bool passed() const noexcept { return phase_ == Phase::passed; }
 
   /// What the test wants of the device in this tick.
-  bool speaks() const noexcept { return phase_ != Phase::silent; }
-  bool motors_on() const noexcept { return phase_ == Phase::waking; }
+  bool sends_commands() const noexcept { return phase_ != Phase::awaiting_watchdog; }
+  bool motors_on() const noexcept { return phase_ == Phase::enabling_motors; }
 
   /// Reports a second, as measured; 0 before that.
   double report_rate_Hz() const noexcept { return rate_Hz_; }
 
  private:
-  enum class Phase : std::uint8_t { clean, waking, silent, passed };
+  enum class Phase : std::uint8_t { checking_reports, enabling_motors, awaiting_watchdog, passed };
 
-  Fault measure(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept;
-  void go_on(Phase phase, TimePoint now) noexcept;
+  Fault check_reports(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept;
+  void enter_phase(Phase phase, TimePoint now) noexcept;
 
-  Duration clean_for_;
-  double nominal_Hz_;  ///< 0: any will do
-  Duration trips_within_;
-  bool can_tell_;  ///< the reports say whether the watchdog tripped
-  Phase phase_ = Phase::clean;
-  TimePoint begun_{};
+  Duration required_clean_;
+  double nominal_rate_Hz_;  ///< 0: any will do
+  Duration watchdog_timeout_;
+  bool reports_watchdog_;  ///< the reports say whether the watchdog tripped
+  Phase phase_ = Phase::checking_reports;
+  TimePoint started_{};
   TimePoint phase_since_{};
-  bool counting_ = false;  ///< clean_since_ and what follows are set
+  bool counting_reports_ = false;  ///< clean_since_ and what follows are set
   TimePoint clean_since_{};
   TimePoint first_arrived_{};
   std::uint64_t first_sequence_ = 0;

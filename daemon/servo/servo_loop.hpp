@@ -31,7 +31,7 @@
 namespace wrenchd {
 
 /// A handle that says nothing for this many periods is looked at all the same, when the device sets the pace.
-inline constexpr int kDevicePatience_periods = 4;
+inline constexpr int kDeviceTimeout_periods = 4;
 
 /// The servo loop: holds the hand and the virtual body together.
 ///
@@ -49,11 +49,11 @@ class ServoLoop {
             std::unique_ptr<Rendering> rendering, const Clock& clock);
   /// The same with a rendering of its own, of a scene and a placer that are kept by reference.
   ServoLoop(const Settings& settings, const DeviceProfile& profile, Device& device, const Scene& scene,
-            Placer& placer, const Clock& clock);
+            ProxyInitializer& placer, const Clock& clock);
 
   /// Shows every tick to recorders and to other processes from now on. state must outlive this. Before the
   /// loop runs.
-  void show_in(SharedState& state) noexcept { shown_ = &state; }
+  void publish_to(SharedState& state) noexcept { shown_ = &state; }
 
   /// Ticks until stop is set and the force has faded, or the device is gone, and releases the hand on every
   /// way out. Faults of every other kind are states in which it goes on. Returns device_lost, or none. clock:
@@ -69,29 +69,29 @@ class ServoLoop {
   void release(TimePoint now) noexcept;
 
   /// Asks for something at the next tick. Any thread.
-  void ask(CommandSet commands) noexcept { commands_.fetch_or(commands, std::memory_order_relaxed); }
+  void request(CommandSet commands) noexcept { commands_.fetch_or(commands, std::memory_order_relaxed); }
   /// By somebody who is there for as long as the process is: the command line.
-  void arm() noexcept { ask(kArm); }
+  void arm() noexcept { request(kArm); }
   /// By somebody who has to call live() at least every 100 ms from now on.
-  void arm_with_lease() noexcept { ask(kArm | kLease | kBeat); }
-  void live() noexcept { ask(kBeat); }
+  void arm_with_lease() noexcept { request(kArm | kLease | kHeartbeat); }
+  void heartbeat() noexcept { request(kHeartbeat); }
   /// Who armed so is gone, and cannot say so itself: the force fades now. Who armed without is not meant.
-  void hang_up() noexcept { ask(kHungUp); }
-  void disarm() noexcept { ask(kDisarm); }
-  void stop() noexcept { ask(kStop); }
-  void acknowledge() noexcept { ask(kAcknowledge); }
+  void client_lost() noexcept { request(kClientLost); }
+  void disarm() noexcept { request(kDisarm); }
+  void stop() noexcept { request(kStop); }
+  void acknowledge() noexcept { request(kAcknowledge); }
 
   /// Says that last tick's q means nothing any more: the tool or the scene was changed, an obstacle was put
   /// where the tool is. From the next tick on there is no contact force until the placer has found an
   /// admissible pose near the hand, and then the soft start runs again. Arming does the same by itself. Any
   /// thread.
-  void start_over() noexcept { ask(kStartOver); }
+  void reinitialize_proxy() noexcept { request(kReinitialize); }
 
   /// Where another rendering is handed over, to be felt from one of the next ticks on without a jump
   /// (daemon/servo/rendering_crossfade.hpp). One thread.
   RenderingExchange& exchange() noexcept { return renderings_.exchange(); }
   /// Another workspace (daemon/servo/workspace.hpp), from the next tick on and without a jump. One thread.
-  void set_workspace(const WorkspaceWish& wish) noexcept { wishes_.write(wish); }
+  void set_workspace(const WorkspaceRequest& wish) noexcept { wishes_.write(wish); }
   /// Other limits, from the next tick on. What is tighter holds whatever the state, what is looser only where
   /// nothing can go out: while the loop is armed it is left out. One thread.
   void set_limits(const LimitSettings& limits) noexcept { new_limits_.write(limits); }
@@ -99,12 +99,12 @@ class ServoLoop {
   /// wrench is not about the handle knows none. One thread.
   void set_local_models(const LocalModelSet& models) noexcept { new_models_.write(models); }
   /// Where the handle was in the world at the last tick, and when. One thread.
-  struct Whereabouts {
+  struct HandlePose {
     Pose X_WH;
     double scene_time_s = 0.0;
     TimePoint at{};
   };
-  Whereabouts whereabouts() noexcept {
+  HandlePose handle_pose() noexcept {
     whereabouts_.read(last_seen_);
     return last_seen_;
   }
@@ -114,10 +114,10 @@ class ServoLoop {
   /// What led to it.
   Fault cause() const noexcept { return seen_cause_.load(std::memory_order_relaxed); }
   /// Number of the rendering that is felt, and whether another is on its way in its place.
-  std::uint32_t rendering() const noexcept { return seen_rendering_.load(std::memory_order_relaxed); }
-  bool changing() const noexcept { return seen_changing_.load(std::memory_order_relaxed); }
+  std::uint32_t rendering_id() const noexcept { return seen_rendering_.load(std::memory_order_relaxed); }
+  bool crossfading() const noexcept { return seen_changing_.load(std::memory_order_relaxed); }
   const LoopTiming& timing() const noexcept { return timing_; }
-  LatestValue<TickRecord>& latest() noexcept { return latest_; }
+  LatestValue<TickRecord>& latest_record() noexcept { return latest_; }
   EventRing& events() noexcept { return events_; }
   std::uint64_t dropped_events() const noexcept { return dropped_events_.load(std::memory_order_relaxed); }
 
@@ -129,7 +129,7 @@ class ServoLoop {
   void take_changes(TimePoint now) noexcept;
   void change_rendering() noexcept;
   void scale_renderings() noexcept;
-  void change_workspace(const WorkspaceWish& wish) noexcept;
+  void change_workspace(const WorkspaceRequest& wish) noexcept;
   void change_limits(LimitSettings asked) noexcept;
   void let_through() noexcept;
   void project(const DeviceSample& sample) noexcept;
@@ -153,7 +153,7 @@ class ServoLoop {
   Wrench feel_local_models(const DeviceSample& sample) noexcept;
   bool calm(const DeviceSample& sample) const noexcept;
   void lose_place() noexcept;
-  const Rendering& felt() const noexcept { return renderings_.felt(); }
+  const Rendering& felt() const noexcept { return renderings_.active(); }
   void lap(Stage stage) noexcept;
   void say(Event::Kind kind, TimePoint at, std::uint32_t detail = 0, double value = 0.0) noexcept;
   void say_changes(TimePoint now) noexcept;
@@ -172,17 +172,17 @@ class ServoLoop {
   Duration period_;
 
   // The state of the rendering
-  Renderings renderings_;
+  RenderingCrossfade renderings_;
   Workspace workspace_;
   LocalModels models_;
-  LocalModels::Felt modelled_;
+  LocalModels::Evaluation modelled_;
   double models_share_ = 1.0;  ///< that the device bears of them
   GravityCompensation gravity_;
   LimitSettings limit_settings_;
   WrenchLimits limits_;
   ThermalModel heat_;
 
-  SteadyContact steady_;
+  ContactStabilizer steady_;
   Wrench F_out_;  ///< of the law chosen, as the device wants it, before limits
   Twist V_hand_;  ///< last that were numbers
   Vector3d hand_m_ = Vector3d::Zero();
@@ -222,11 +222,11 @@ class ServoLoop {
   ProjectionStatus said_status_ = ProjectionStatus::free;
   bool said_placed_ = true;
   bool said_nowhere_ = false;
-  LatestValue<WorkspaceWish> wishes_;
+  LatestValue<WorkspaceRequest> wishes_;
   LatestValue<LimitSettings> new_limits_;
   LatestValue<LocalModelSet> new_models_;
-  LatestValue<Whereabouts> whereabouts_;
-  Whereabouts last_seen_;  ///< belongs to its reader
+  LatestValue<HandlePose> whereabouts_;
+  HandlePose last_seen_;  ///< belongs to its reader
   std::atomic<CommandSet> commands_{kNoCommand};
   std::atomic<State> seen_state_{State::disconnected};
   std::atomic<Fault> seen_cause_{Fault::none};

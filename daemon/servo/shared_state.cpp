@@ -20,7 +20,7 @@
 namespace wrenchd {
 namespace {
 
-static_assert(sizeof(Touch) % 8 == 0 && offsetof(StateRecord, touches) % 8 == 0);
+static_assert(sizeof(Touch) % 8 == 0 && offsetof(StateRecord, contacts) % 8 == 0);
 constexpr std::size_t kWordsPerSlot = SharedState::kSlotBytes / 8;
 
 [[noreturn]] void refuse(const char* what) {
@@ -44,7 +44,8 @@ void copy_fields(std::span<const RecordField> fields, const void* from, std::byt
 }  // namespace
 
 SharedState::SharedState(double rate_Hz)
-    : rate_Hz_(rate_Hz), slots_(std::bit_ceil(static_cast<std::uint64_t>(std::ceil(kKept_s * rate_Hz)))) {
+    : rate_Hz_(rate_Hz),
+      slots_(std::bit_ceil(static_cast<std::uint64_t>(std::ceil(kRetention_s * rate_Hz)))) {
   Opened opened{memfd_create("wrenchd-state", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
   if (opened.descriptor < 0) refuse("memfd_create");
   if (ftruncate(opened.descriptor, static_cast<off_t>(bytes())) != 0) refuse("ftruncate");
@@ -70,22 +71,22 @@ SharedState::~SharedState() {
 }
 
 void SharedState::write(const TickRecord& tick, const Touches& touches) noexcept {
-  copy_fields(tick_fields(), &tick, next_.data() + offsetof(StateRecord, tick));
+  copy_fields(tick_fields(), &tick, record_buffer_.data() + offsetof(StateRecord, tick));
   const std::uint64_t count = touches.size();
-  std::memcpy(next_.data() + offsetof(StateRecord, touch_count), &count, sizeof(count));
-  std::byte* const told = next_.data() + offsetof(StateRecord, touches);
+  std::memcpy(record_buffer_.data() + offsetof(StateRecord, contact_count), &count, sizeof(count));
+  std::byte* const told = record_buffer_.data() + offsetof(StateRecord, contacts);
   for (std::size_t i = 0; i < touches.size(); ++i)
     std::memcpy(told + i * sizeof(Touch), &touches[i], sizeof(Touch));
-  if (touches.size() < touched_)
-    std::memset(told + touches.size() * sizeof(Touch), 0, (touched_ - touches.size()) * sizeof(Touch));
-  touched_ = touches.size();
+  if (touches.size() < contact_count_)
+    std::memset(told + touches.size() * sizeof(Touch), 0, (contact_count_ - touches.size()) * sizeof(Touch));
+  contact_count_ = touches.size();
 
   const std::uint64_t i = header_->written.load(std::memory_order_relaxed);
   std::atomic<std::uint64_t>* const slot = words_ + (i % slots_) * kWordsPerSlot;
   slot[0].store(2 * i + 1, std::memory_order_relaxed);
-  for (std::size_t k = 0; k < kWords; ++k) {
+  for (std::size_t k = 0; k < kRecordWords; ++k) {
     std::uint64_t word;
-    std::memcpy(&word, next_.data() + 8 * k, 8);
+    std::memcpy(&word, record_buffer_.data() + 8 * k, 8);
     slot[1 + k].store(word, std::memory_order_release);
   }
   slot[0].store(2 * i + 2, std::memory_order_release);
@@ -102,9 +103,9 @@ bool SharedState::read(std::uint64_t i, StateRecord& out) const noexcept {
       std::memcpy(bytes + 8 * k, &word, 8);
     }
   };
-  copy(0, offsetof(StateRecord, touches));
-  out.touch_count = std::min<std::uint64_t>(out.touch_count, kMostTouches);
-  copy(offsetof(StateRecord, touches), offsetof(StateRecord, touches) + out.touch_count * sizeof(Touch));
+  copy(0, offsetof(StateRecord, contacts));
+  out.contact_count = std::min<std::uint64_t>(out.contact_count, kMaxTouches);
+  copy(offsetof(StateRecord, contacts), offsetof(StateRecord, contacts) + out.contact_count * sizeof(Touch));
   return slot[0].load(std::memory_order_acquire) == 2 * i + 2;
 }
 

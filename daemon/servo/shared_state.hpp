@@ -14,8 +14,8 @@ namespace wrenchd {
 /// What other processes see of one tick: its record, and the contacts that hold the proxy.
 struct StateRecord {
   TickRecord tick;
-  std::uint64_t touch_count = 0;  ///< of touches; record.contacts counts those left out too
-  std::array<Touch, kMostTouches> touches{};
+  std::uint64_t contact_count = 0;  ///< of touches; record.contacts counts those left out too
+  std::array<Touch, kMaxTouches> contacts{};
 };
 
 /// The loop's state at full rate, in memory that other processes map: a ring of records in a sealed memfd.
@@ -36,7 +36,7 @@ class SharedState {
  public:
   static constexpr std::array<char, 8> kMagic = {'W', 'R', 'E', 'N', 'C', 'H', 'S', 'T'};
   static constexpr std::uint64_t kVersion = 1;  ///< of header and slots; records are described by themselves
-  static constexpr double kKept_s = 2.0;        ///< what a reader may sleep and miss nothing
+  static constexpr double kRetention_s = 2.0;   ///< what a reader may sleep and miss nothing
   static constexpr std::size_t kHeaderBytes = 4096;
   static constexpr std::size_t kSlotBytes = (8 + sizeof(StateRecord) + 63) / 64 * 64;
 
@@ -54,8 +54,8 @@ class SharedState {
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free && sizeof(std::atomic<std::uint64_t>) == 8);
   static_assert(sizeof(Header) <= kHeaderBytes && sizeof(StateRecord) % 8 == 0);
 
-  /// Room for kKept_s at this rate, touched page by page, so that no tick is the first to do so; some 2 kB a
-  /// tick. Throws std::system_error where the kernel gives no such memory.
+  /// Room for kRetention_s at this rate, touched page by page, so that no tick is the first to do so; some 2
+  /// kB a tick. Throws std::system_error where the kernel gives no such memory.
   explicit SharedState(double rate_Hz);
   ~SharedState();
   SharedState(const SharedState&) = delete;
@@ -77,7 +77,7 @@ class SharedState {
   std::uint64_t written() const noexcept { return header_->written.load(std::memory_order_acquire); }
 
  private:
-  static constexpr std::size_t kWords = sizeof(StateRecord) / 8;
+  static constexpr std::size_t kRecordWords = sizeof(StateRecord) / 8;
 
   double rate_Hz_;
   std::uint64_t slots_;
@@ -85,8 +85,9 @@ class SharedState {
   void* memory_;
   Header* header_;
   std::atomic<std::uint64_t>* words_;  ///< of the slots, and nobody's but the writer's
-  alignas(8) std::array<std::byte, sizeof(StateRecord)> next_{};  ///< what lies between fields stays zero
-  std::size_t touched_ = 0;                                       ///< touches in next_
+  alignas(8)
+      std::array<std::byte, sizeof(StateRecord)> record_buffer_{};  ///< what lies between fields stays zero
+  std::size_t contact_count_ = 0;                                   ///< touches in next_
 };
 
 }  // namespace wrenchd

@@ -18,22 +18,23 @@ Watches::Watches(const Settings& settings, const DeviceProfile& profile, double 
     : pace(from_seconds(1.0 / settings.servo.rate_Hz), stopped_after(settings.servo)),
       link(profile.report_rate_Hz),
       pose(profile),
-      pinned(max_force_N, max_torque_Nm),
+      motor_stall(max_force_N, max_torque_Nm),
       deadman_button(button_bit(profile.deadman_button)),
       stop_button(button_bit(profile.stop_button)),
       has_motors(profile.has_output) {}
 
-FaultSet Watches::look(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
-  FaultSet found = link.look(sample, now) | pose.look(sample) | motors.look(sample, driven, now);
-  found |= judged(sample.fault, state, now);
+FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
+  FaultSet found = link.check(sample, now) | pose.check(sample) | motors.check(sample, driven, now);
+  found |= classify_sample_fault(sample.fault, state, now);
   if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) found |= bit(Fault::pose_not_finite);
-  if (homed_ && !sample.homed) found |= bit(Fault::not_homed);
-  if (sample.arrived != TimePoint{}) homed_ = sample.homed;  // before the first report it is anybody's guess
-  return found | buttons(sample, state) | client.look(now);
+  if (was_homed_ && !sample.homed) found |= bit(Fault::not_homed);
+  if (sample.arrived != TimePoint{})
+    was_homed_ = sample.homed;  // before the first report it is anybody's guess
+  return found | check_buttons(sample, state) | client.check(now);
 }
 
 /// What the device found in its reports, as far as it counts here.
-FaultSet Watches::judged(Fault fault, State state, TimePoint now) const noexcept {
+FaultSet Watches::classify_sample_fault(Fault fault, State state, TimePoint now) const noexcept {
   switch (fault) {
     case Fault::none:
     case Fault::pose_not_a_rotation:  // three one after the other are one fault, which pose.look() finds
@@ -43,27 +44,27 @@ FaultSet Watches::judged(Fault fault, State state, TimePoint now) const noexcept
     // A queue that ran over while we were late is no silence of the device's; and one that pushes nobody is
     // no danger: the pose stands still by now, and goes on when it is heard again.
     case Fault::sample_stale:
-      return bit(pace.was_late(now) || !has_motors ? Fault::sample_late : fault);
+      return bit(pace.recently_late(now) || !has_motors ? Fault::sample_late : fault);
     default:
       return bit(fault);
   }
 }
 
-FaultSet Watches::buttons(const DeviceSample& sample, State state) const noexcept {
+FaultSet Watches::check_buttons(const DeviceSample& sample, State state) const noexcept {
   FaultSet found = 0;
   if ((sample.buttons & stop_button) != 0) found |= bit(Fault::stop_button);
   const bool wanted = is_driving(state) || state == State::waiting;
   if (wanted && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
-    found |= bit(Fault::deadman_open);
+    found |= bit(Fault::deadman_released);
   return found;
 }
 
-void Watches::forget() noexcept {
-  link.forget();
-  pose.forget();
+void Watches::reset() noexcept {
+  link.reset();
+  pose.reset();
   motors = MotorWatch();
-  writes.forget();
-  homed_ = false;
+  writes.reset();
+  was_homed_ = false;
 }
 
 }  // namespace wrenchd

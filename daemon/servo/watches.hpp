@@ -25,22 +25,22 @@ struct Watches {
   PoseWatch pose;
   MotorWatch motors;
   WriteWatch writes;
-  PinnedWatch pinned;
+  MotorStallWatch motor_stall;
   ClientWatch client;
   std::uint32_t deadman_button;  ///< bit; 0: there is none
   std::uint32_t stop_button;
   bool has_motors;
 
   /// What the sample says, as of now. driven: the last command switched the motors on.
-  FaultSet look(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept;
+  FaultSet check(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept;
   /// Another device may come.
-  void forget() noexcept;
+  void reset() noexcept;
 
  private:
-  FaultSet judged(Fault fault, State state, TimePoint now) const noexcept;
-  FaultSet buttons(const DeviceSample& sample, State state) const noexcept;
+  FaultSet classify_sample_fault(Fault fault, State state, TimePoint now) const noexcept;
+  FaultSet check_buttons(const DeviceSample& sample, State state) const noexcept;
 
-  bool homed_ = false;  ///< it has been
+  bool was_homed_ = false;  ///< it has been
 };
 
 }  // namespace wrenchd

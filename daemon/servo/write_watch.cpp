@@ -5,7 +5,7 @@
 
 namespace wrenchd {
 
-FaultSet WriteWatch::look(Fault written, TimePoint now) noexcept {
+FaultSet WriteWatch::check(Fault written, TimePoint now) noexcept {
   if (written == Fault::device_lost) return bit(Fault::device_lost);
   if (written != Fault::write_failed) {
     blocked_since_.reset();

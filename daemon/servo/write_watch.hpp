@@ -12,8 +12,8 @@ namespace wrenchd {
 class WriteWatch {
  public:
   /// written: what the write of this tick came to.
-  FaultSet look(Fault written, TimePoint now) noexcept;
-  void forget() noexcept { blocked_since_.reset(); }
+  FaultSet check(Fault written, TimePoint now) noexcept;
+  void reset() noexcept { blocked_since_.reset(); }
 
  private:
   std::optional<TimePoint> blocked_since_;

@@ -13,21 +13,21 @@
 namespace wrenchd {
 
 /// The device that is to be driven, as far as it is settled.
-struct WantedDevice {
-  std::string profile = {};              ///< its name; empty: any that is for a device
-  std::string serial = {};               ///< empty: any
-  std::optional<UsbDevice> before = {};  ///< the one that was driven, and was unplugged: no other will do
+struct DeviceCriteria {
+  std::string profile = {};                ///< its name; empty: any that is for a device
+  std::string serial = {};                 ///< empty: any
+  std::optional<UsbDevice> previous = {};  ///< the one that was driven, and was unplugged: no other will do
 };
 
 /// Which of the plugged-in devices it is, and why the others are not.
 struct DeviceChoice {
-  struct Pick {
+  struct Selection {
     std::size_t device = 0;   ///< index into the plugged-in ones
     std::size_t profile = 0;  ///< index into the profiles
   };
-  std::optional<Pick> pick;
+  std::optional<Selection> selection;
   /// One for each plugged-in device, in their order; empty for the one that was picked.
-  std::vector<std::string> why_not;
+  std::vector<std::string> rejections;
 };
 
 /// Picks the one device that is wanted. A device has to have one of the profiles (match_profile()), to be the
@@ -35,6 +35,6 @@ struct DeviceChoice {
 /// profile. Of several such devices none is picked, and each is told what tells it from the others. Not RT
 /// safe; speaks to no device.
 DeviceChoice choose_device(std::span<const UsbDevice> plugged, std::span<const DeviceProfile> profiles,
-                           const WantedDevice& wanted);
+                           const DeviceCriteria& wanted);
 
 }  // namespace wrenchd

@@ -23,10 +23,10 @@ bool udev_runs() {
   return std::filesystem::exists("/run/udev/control", ignored);
 }
 
-const char* name_of(PlugMonitor::Source source) {
-  if (source == PlugMonitor::Source::automatic)
-    source = udev_runs() ? PlugMonitor::Source::udev : PlugMonitor::Source::kernel;
-  return source == PlugMonitor::Source::udev ? "udev" : "kernel";
+const char* generated_mesh_name(HotplugMonitor::Source source) {
+  if (source == HotplugMonitor::Source::automatic)
+    source = udev_runs() ? HotplugMonitor::Source::udev : HotplugMonitor::Source::kernel;
+  return source == HotplugMonitor::Source::udev ? "udev" : "kernel";
 }
 
 std::string text(const char* s) {
@@ -35,7 +35,7 @@ std::string text(const char* s) {
 
 }  // namespace
 
-struct PlugMonitor::Watch {
+struct HotplugMonitor::Watch {
   Watch(Listener to, const char* source) : listener(std::move(to)) {
     context = udev_new();
     monitor = context == nullptr ? nullptr : udev_monitor_new_from_netlink(context, source);
@@ -60,7 +60,7 @@ struct PlugMonitor::Watch {
 
   void run() noexcept {
     std::array<pollfd, 2> files{pollfd{udev_monitor_get_fd(monitor), POLLIN, 0},
-                                pollfd{ending.file(), POLLIN, 0}};
+                                pollfd{ending.fd(), POLLIN, 0}};
     for (;;) {
       if (poll(files.data(), files.size(), -1) < 0) continue;
       if (files[1].revents != 0) return;
@@ -74,9 +74,9 @@ struct PlugMonitor::Watch {
   void tell(udev_device* device) noexcept {
     const std::string_view action = udev_device_get_action(device);
     if (action != "add" && action != "remove") return;
-    listener({action == "add" ? PlugEvent::Kind::plugged : PlugEvent::Kind::unplugged,
+    listener({action == "add" ? HotplugEvent::Kind::connected : HotplugEvent::Kind::disconnected,
               text(udev_device_get_subsystem(device)), text(udev_device_get_devnode(device)),
-              place_in(text(udev_device_get_devpath(device)))});
+              port_path_in(text(udev_device_get_devpath(device)))});
   }
 
   Listener listener;
@@ -85,11 +85,11 @@ struct PlugMonitor::Watch {
   WakeUp ending;
 };
 
-PlugMonitor::PlugMonitor(Listener listener, Source source)
-    : watch_(std::make_unique<Watch>(std::move(listener), name_of(source))),
+HotplugMonitor::HotplugMonitor(Listener listener, Source source)
+    : watch_(std::make_unique<Watch>(std::move(listener), generated_mesh_name(source))),
       thread_([watch = watch_.get()] { watch->run(); }) {}
 
-PlugMonitor::~PlugMonitor() {
+HotplugMonitor::~HotplugMonitor() {
   watch_->ending.wake();
   thread_.join();
 }

@@ -21,10 +21,10 @@ bool holds(const std::vector<UsbId>& ids, UsbId id) {
 }
 
 /// Empty where the device's descriptor shows this report.
-std::string why_not(const PoseReportLayout& report, const std::vector<ReportFact>& facts) {
+std::string why_not(const PoseReportLayout& report, const std::vector<InputReportSize>& facts) {
   const std::string name = report.has_id ? "in-report " + std::to_string(report.id) : "the in-report";
-  const std::size_t least = report.least_length == 0 ? report.length : report.least_length;
-  for (const ReportFact& fact : facts) {
+  const std::size_t least = report.min_length == 0 ? report.length : report.min_length;
+  for (const InputReportSize& fact : facts) {
     if (fact.id != (report.has_id ? report.id : 0)) continue;
     if (fact.length >= least && fact.length <= report.length) return {};
     return name + " of the device has " + std::to_string(fact.length) + " bytes, that of the profile " +
@@ -33,7 +33,7 @@ std::string why_not(const PoseReportLayout& report, const std::vector<ReportFact
   return name + " of the profile is not in the device's report descriptor";
 }
 
-std::string why_not_by_reports(const DeviceProfile& profile, const std::vector<ReportFact>& facts) {
+std::string why_not_by_reports(const DeviceProfile& profile, const std::vector<InputReportSize>& facts) {
   std::string why = why_not(profile.pose_report, facts);
   for (const PoseReportLayout& report : profile.more_reports)
     if (why.empty() && carries_pose(report)) why = why_not(report, facts);
@@ -47,7 +47,7 @@ std::string why_not_by_usage(const char* name, std::optional<std::uint16_t> want
          hex(*wanted);
 }
 
-std::string why_not(const PluggedDevice& device, const DeviceProfile& profile, std::string_view named) {
+std::string why_not(const DeviceIdentity& device, const DeviceProfile& profile, std::string_view named) {
   const DeviceMatch& match = profile.match;
   if (!named.empty() && profile.name != named)
     return "the configuration names the profile " + std::string(named);
@@ -65,12 +65,12 @@ std::string why_not(const PluggedDevice& device, const DeviceProfile& profile, s
   std::string why = why_not_by_usage("the usage page", match.usage_page, device.usage_page);
   if (why.empty()) why = why_not_by_usage("the usage", match.usage, device.usage);
   if (!why.empty()) return why;
-  if (!device.in_reports.empty()) return why_not_by_reports(profile, device.in_reports);
+  if (!device.input_reports.empty()) return why_not_by_reports(profile, device.input_reports);
   return by_layout ? "devices of this id differ, and the report descriptor has not been read" : "";
 }
 
 /// How closely a matching profile names the device.
-int rank(const PluggedDevice& device, const DeviceProfile& profile) {
+int rank(const DeviceIdentity& device, const DeviceProfile& profile) {
   return (profile.match.serial.empty() ? 0 : 2) + (holds(profile.match.usb, device.id) ? 1 : 0);
 }
 
@@ -85,25 +85,25 @@ std::string text(UsbId id) {
   return hex(id.vendor) + ":" + hex(id.product);
 }
 
-MatchResult match_profile(const PluggedDevice& device, std::span<const DeviceProfile> profiles,
+MatchResult match_profile(const DeviceIdentity& device, std::span<const DeviceProfile> profiles,
                           std::string_view named) {
   MatchResult result;
-  if (const KnownDevice* known = known_unusable(device.id)) {
-    result.refused = std::string(known->name) + " (" + text(device.id) + "): " + std::string(known->reason);
-    result.why_not.assign(profiles.size(), "the device cannot be used");
+  if (const UnusableDevice* known = find_unusable_device(device.id)) {
+    result.refusal = std::string(known->name) + " (" + text(device.id) + "): " + std::string(known->reason);
+    result.rejections.assign(profiles.size(), "the device cannot be used");
     return result;
   }
   int best = -1;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
-    result.why_not.push_back(why_not(device, profiles[i], named));
-    if (!result.why_not.back().empty()) continue;
+    result.rejections.push_back(why_not(device, profiles[i], named));
+    if (!result.rejections.back().empty()) continue;
     const int closeness = rank(device, profiles[i]);
     if (closeness > best) {
       result.profile = i;
-      result.refused.clear();
+      result.refusal.clear();
     } else if (closeness == best) {
       result.profile.reset();
-      result.refused = "several profiles match " + text(device.id) + ", the last of them " +
+      result.refusal = "several profiles match " + text(device.id) + ", the last of them " +
                        profiles[i].name +
                        "; name one in the configuration, or state the serial number in one";
     }

@@ -8,7 +8,7 @@
 namespace wrenchd {
 
 /// A device that wrenchd knows and cannot use, and why.
-struct KnownDevice {
+struct UnusableDevice {
   std::uint16_t vendor = 0;
   std::uint16_t first_product = 0;  ///< both ends of a range belong to it
   std::uint16_t last_product = 0;
@@ -18,6 +18,6 @@ struct KnownDevice {
 
 /// The entry for this id, or nullptr: nothing speaks against it. Such a device is never opened, whatever a
 /// profile says.
-const KnownDevice* known_unusable(UsbId id) noexcept;
+const UnusableDevice* find_unusable_device(UsbId id) noexcept;
 
 }  // namespace wrenchd

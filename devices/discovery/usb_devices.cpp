@@ -105,7 +105,7 @@ std::vector<std::uint8_t> bytes_of(const std::string& file) {
 // --- one device -------------------------------------------------------------------------------------------
 
 void take_usb_strings(UsbDevice& device, udev_device* usb) {
-  device.place = text(udev_device_get_sysname(usb));
+  device.port_path = text(udev_device_get_sysname(usb));
   device.usb_node = text(udev_device_get_devnode(usb));
   device.vendor = static_cast<std::uint16_t>(number(attribute(usb, "idVendor"), 16));
   device.product = static_cast<std::uint16_t>(number(attribute(usb, "idProduct"), 16));
@@ -166,7 +166,7 @@ std::string udev_rule(const UsbDevice& device, const std::string& node) {
 
 }  // namespace
 
-bool UsbDevice::same_device(const UsbDevice& other) const {
+bool UsbDevice::is_same_device(const UsbDevice& other) const {
   return vendor == other.vendor && product == other.product && serial == other.serial &&
          interface == other.interface && report_descriptor == other.report_descriptor;
 }
@@ -208,13 +208,13 @@ std::vector<UsbDevice> list_usb_devices() {
   }
 
   std::sort(found.begin(), found.end(), [](const UsbDevice& a, const UsbDevice& b) {
-    return std::tuple(numbers_in(a.place), a.interface, numbers_in(a.hidraw_node)) <
-           std::tuple(numbers_in(b.place), b.interface, numbers_in(b.hidraw_node));
+    return std::tuple(numbers_in(a.port_path), a.interface, numbers_in(a.hidraw_node)) <
+           std::tuple(numbers_in(b.port_path), b.interface, numbers_in(b.hidraw_node));
   });
   return found;
 }
 
-std::string plain(std::string text) {
+std::string to_printable(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
   return text;
@@ -222,18 +222,18 @@ std::string plain(std::string text) {
 
 std::string describe(const UsbDevice& device) {
   std::string s = hex4(device.vendor) + ":" + hex4(device.product);
-  if (!device.serial.empty()) s += " serial " + plain(device.serial);
-  if (!device.place.empty()) s += " in " + device.place;
+  if (!device.serial.empty()) s += " serial " + to_printable(device.serial);
+  if (!device.port_path.empty()) s += " in " + device.port_path;
   if (device.interface >= 0) s += ", interface " + std::to_string(device.interface);
   return s;
 }
 
-std::string why_not_open(const UsbDevice& device, const std::string& node) {
+std::string open_error(const UsbDevice& device, const std::string& node) {
   if (access(node.c_str(), R_OK | W_OK) == 0) return {};
-  return why_not_open(device, node, errno);
+  return open_error(device, node, errno);
 }
 
-std::string why_not_open(const UsbDevice& device, const std::string& node, int error) {
+std::string open_error(const UsbDevice& device, const std::string& node, int error) {
   const std::string what = "cannot open " + node + " (" + describe(device) + "): " + std::strerror(error);
   switch (error) {
     case EACCES:
@@ -251,7 +251,7 @@ std::string why_not_open(const UsbDevice& device, const std::string& node, int e
   }
 }
 
-std::string place_in(std::string_view sys_path) {
+std::string port_path_in(std::string_view sys_path) {
   std::string place;
   while (!sys_path.empty()) {
     const std::size_t end = std::min(sys_path.find('/'), sys_path.size());

@@ -26,7 +26,7 @@ void expect(const char* doing, int error) {
 void FtdiSerial::control(std::uint8_t request, std::uint16_t value) {
   expect("request",
          libusb_control_transfer(handle_, kVendorRequest, request, value, 0, nullptr, 0, kTimeout_ms));
-  if (request == kFtdiReset && value != kFtdiPurgeOut) waiting_.clear();
+  if (request == kFtdiReset && value != kFtdiPurgeOut) buffered_.clear();
 }
 
 void FtdiSerial::write(std::span<const std::uint8_t> bytes) {
@@ -42,17 +42,17 @@ void FtdiSerial::write(std::span<const std::uint8_t> bytes) {
 /// Where it has nothing to say the chip sends its status alone, once a latency time.
 std::vector<std::uint8_t> FtdiSerial::read(std::size_t most) {
   const auto until = std::chrono::steady_clock::now() + kPatience;
-  while (waiting_.empty() && std::chrono::steady_clock::now() < until) {
+  while (buffered_.empty() && std::chrono::steady_clock::now() < until) {
     int n = 0;
     const int error =
         libusb_bulk_transfer(handle_, in_, packet_.data(), static_cast<int>(packet_.size()), &n, kTimeout_ms);
     if (error != LIBUSB_ERROR_TIMEOUT) expect("read", error);
     if (n > static_cast<int>(kStatusBytes))
-      waiting_.insert(waiting_.end(), packet_.begin() + kStatusBytes, packet_.begin() + n);
+      buffered_.insert(buffered_.end(), packet_.begin() + kStatusBytes, packet_.begin() + n);
   }
-  const auto count = static_cast<std::ptrdiff_t>(std::min(most, waiting_.size()));
-  std::vector<std::uint8_t> bytes(waiting_.begin(), waiting_.begin() + count);
-  waiting_.erase(waiting_.begin(), waiting_.begin() + count);
+  const auto count = static_cast<std::ptrdiff_t>(std::min(most, buffered_.size()));
+  std::vector<std::uint8_t> bytes(buffered_.begin(), buffered_.begin() + count);
+  buffered_.erase(buffered_.begin(), buffered_.begin() + count);
   return bytes;
 }
 

@@ -32,8 +32,8 @@ class FtdiSerial final : public SerialChip {
  private:
   libusb_device_handle* handle_;
   std::uint8_t in_, out_;
-  std::vector<std::uint8_t> packet_;   ///< room for one
-  std::vector<std::uint8_t> waiting_;  ///< arrived, and not asked for yet
+  std::vector<std::uint8_t> packet_;    ///< room for one
+  std::vector<std::uint8_t> buffered_;  ///< arrived, and not asked for yet
 };
 
 }  // namespace wrenchd

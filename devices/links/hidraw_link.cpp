@@ -55,11 +55,11 @@ int file_opened(const std::string& node, const std::set<int>& before) {
 void check_identity(const UsbDevice& wanted) {
   for (const UsbDevice& found : list_usb_devices()) {
     if (found.hidraw_node != wanted.hidraw_node) continue;
-    if (found.same_device(wanted)) return;
+    if (found.is_same_device(wanted)) return;
     throw std::runtime_error(wanted.hidraw_node + " is " + describe(found) + ", not " + describe(wanted) +
                              ": nothing was written to it; look for the device anew");
   }
-  throw std::runtime_error(why_not_open(wanted, wanted.hidraw_node, ENODEV));
+  throw std::runtime_error(open_error(wanted, wanted.hidraw_node, ENODEV));
 }
 
 }  // namespace
@@ -81,8 +81,8 @@ void HidrawLink::open() {
     Hid hid(hid_open_path(node.c_str()));
     if (!hid) {
       const int error = errno;
-      const std::string why = why_not_open(device_, node);
-      throw std::runtime_error(why.empty() ? why_not_open(device_, node, error) : why);
+      const std::string why = open_error(device_, node);
+      throw std::runtime_error(why.empty() ? open_error(device_, node, error) : why);
     }
     return hid;
   };
@@ -94,24 +94,24 @@ void HidrawLink::open() {
     try {
       const std::set<int> before = open_files();
       reading = open_node();
-      file_ = file_opened(node, before);
+      fd_ = file_opened(node, before);
       writing = open_node();
     } catch (...) {
       lock.unlock();  // closing takes it
       throw;
     }
-    reading_ = std::move(reading);
+    reader_ = std::move(reading);
   }
-  if (file_ < 0) {
-    reading_.reset();
+  if (fd_ < 0) {
+    reader_.reset();
     throw std::runtime_error("cannot find the file that hidapi opened for " + node + "; is /proc mounted?");
   }
   // The kernel lets any number of programs write to a HID device; two hosts on one hand must not be.
-  if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
+  if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno == EWOULDBLOCK ? EBUSY : errno;
-    reading_.reset();
-    file_ = -1;
-    throw std::runtime_error(why_not_open(device_, node, error));
+    reader_.reset();
+    fd_ = -1;
+    throw std::runtime_error(open_error(device_, node, error));
   }
   try {
     check_identity(device_);
@@ -120,44 +120,45 @@ void HidrawLink::open() {
             auto report) { return write_blocking(hid.get(), numbered, report); },
         settings_);
   } catch (...) {
-    reading_.reset();
-    file_ = -1;
+    reader_.reset();
+    fd_ = -1;
     throw;
   }
-  gone_ = false;
-  last_empty_.reset();
+  disconnected_ = false;
+  last_seen_empty_.reset();
   taken_since_empty_ = 0;
 }
 
 LinkRead HidrawLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
-  if (!reading_ || gone_) return {LinkStatus::gone, 0, now};
+  if (!reader_ || disconnected_) return {LinkStatus::disconnected, 0, now};
   // hidapi polls, too, but makes a text on the heap of what it finds wrong, and after unplugging the kernel
   // still gives out what waited.
-  pollfd ready{file_, POLLIN, 0};
-  if (poll(&ready, 1, 0) > 0 && (ready.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0) return lose(now);
+  pollfd ready{fd_, POLLIN, 0};
+  if (poll(&ready, 1, 0) > 0 && (ready.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0)
+    return mark_disconnected(now);
   const int length =
-      (ready.revents & POLLIN) == 0 ? 0 : hid_read_timeout(reading_.get(), bytes_.data(), bytes_.size(), 0);
-  if (length < 0) return lose(now);
+      (ready.revents & POLLIN) == 0 ? 0 : hid_read_timeout(reader_.get(), bytes_.data(), bytes_.size(), 0);
+  if (length < 0) return mark_disconnected(now);
   if (length == 0) {
-    last_empty_ = now;
+    last_seen_empty_ = now;
     taken_since_empty_ = 0;
-    return {LinkStatus::empty, 0, now};
+    return {LinkStatus::not_ready, 0, now};
   }
   const auto n = static_cast<std::size_t>(length);
   std::copy_n(bytes_.begin(), std::min(n, buffer.size()), buffer.begin());
-  taken_since_empty_ = std::min(taken_since_empty_ + 1, kKernelRing);
-  const bool ring_was_full = taken_since_empty_ == kKernelRing && last_empty_;
-  return {LinkStatus::ok, n, ring_was_full ? *last_empty_ : now};
+  taken_since_empty_ = std::min(taken_since_empty_ + 1, kKernelRingCapacity);
+  const bool ring_was_full = taken_since_empty_ == kKernelRingCapacity && last_seen_empty_;
+  return {LinkStatus::ok, n, ring_was_full ? *last_seen_empty_ : now};
 }
 
-LinkRead HidrawLink::lose(TimePoint now) noexcept {
-  gone_ = true;
-  return {LinkStatus::gone, 0, now};
+LinkRead HidrawLink::mark_disconnected(TimePoint now) noexcept {
+  disconnected_ = true;
+  return {LinkStatus::disconnected, 0, now};
 }
 
 LinkStatus HidrawLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  if (!writer_ || gone_) return LinkStatus::gone;
-  return writer_->hand_over(now, report);
+  if (!writer_ || disconnected_) return LinkStatus::disconnected;
+  return writer_->submit(now, report);
 }
 
 /// On the writer's thread.
@@ -167,17 +168,17 @@ LinkStatus HidrawLink::write_blocking(hid_device_* hid, bool numbered, std::span
   std::copy(report.begin(), report.end(), framed.begin() + static_cast<std::ptrdiff_t>(head));
   errno = 0;
   if (hid_write(hid, framed.data(), head + report.size()) >= 0) return LinkStatus::ok;
-  return errno == ENODEV || errno == EIO ? LinkStatus::gone : LinkStatus::empty;
+  return errno == ENODEV || errno == EIO ? LinkStatus::disconnected : LinkStatus::not_ready;
 }
 
 void HidrawLink::wait_readable(TimePoint deadline) noexcept {
-  if (reading_ && !gone_) wait_for_file(file_, POLLIN, deadline);
+  if (reader_ && !disconnected_) wait_for_fd(fd_, POLLIN, deadline);
 }
 
 void HidrawLink::close() noexcept {
   writer_.reset();
-  reading_.reset();
-  file_ = -1;
+  reader_.reset();
+  fd_ = -1;
 }
 
 }  // namespace wrenchd

@@ -55,9 +55,9 @@ class HidrawLink final : public ReportLink {
 
  private:
   /// The most the kernel's HID core passes on in one report.
-  static constexpr std::size_t kLongestReport = 16384;
+  static constexpr std::size_t kMaxHidReportBytes = 16384;
   /// What the kernel keeps for one reader: a ring of 64, of which one stays free.
-  static constexpr int kKernelRing = 63;
+  static constexpr int kKernelRingCapacity = 63;
 
   struct CloseHid {
     void operator()(hid_device_* device) const noexcept;
@@ -65,16 +65,16 @@ class HidrawLink final : public ReportLink {
   using Hid = std::unique_ptr<hid_device_, CloseHid>;
 
   static LinkStatus write_blocking(hid_device_* hid, bool numbered, std::span<const std::uint8_t> report);
-  LinkRead lose(TimePoint now) noexcept;
+  LinkRead mark_disconnected(TimePoint now) noexcept;
 
   UsbDevice device_;
   LinkSettings settings_;
-  Hid reading_;
-  int file_ = -1;  ///< hidapi's, of reading_: to wait with the precision that hidapi does not offer
-  bool gone_ = false;
-  std::optional<TimePoint> last_empty_;  ///< when nothing waited
+  Hid reader_;
+  int fd_ = -1;  ///< hidapi's, of reading_: to wait with the precision that hidapi does not offer
+  bool disconnected_ = false;
+  std::optional<TimePoint> last_seen_empty_;  ///< when nothing waited
   int taken_since_empty_ = 0;
-  std::array<std::uint8_t, kLongestReport> bytes_{};
+  std::array<std::uint8_t, kMaxHidReportBytes> bytes_{};
   std::optional<LatestWriter> writer_;
 };
 

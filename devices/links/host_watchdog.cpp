@@ -14,30 +14,30 @@ bool pushes(const WrenchReportLayout& layout, const WrenchReport& report) noexce
 
 }  // namespace
 
-LastWord::LastWord(const DeviceProfile& profile, Duration after) : after_(after) {
+HostWatchdog::HostWatchdog(const DeviceProfile& profile, Duration after) : timeout_(after) {
   if (profile.has_output) layout_ = profile.wrench_report;
 }
 
 /// What is no wrench (a sign of life, a calibration) leaves the last wrench standing.
-void LastWord::heard(TimePoint now, const Packet& packet) noexcept {
+void HostWatchdog::feed(TimePoint now, const Packet& packet) noexcept {
   if (!layout_) return;
   const auto [outcome, report] = decode(*layout_, packet.report());
   if (outcome != Decoding::ok) return;
-  last_ = report;
-  said_ = 0;
-  due_ = pushes(*layout_, report) ? now + after_ : TimePoint::max();
+  last_report_ = report;
+  zeros_sent_ = 0;
+  due_ = pushes(*layout_, report) ? now + timeout_ : TimePoint::max();
 }
 
-bool LastWord::speak(TimePoint now, Packet& packet) noexcept {
+bool HostWatchdog::send_zero(TimePoint now, Packet& packet) noexcept {
   if (now < due_) return false;
-  WrenchReport nothing = last_;
+  WrenchReport nothing = last_report_;
   nothing.F = Wrench{};
   nothing.efforts = {};
   nothing.enable = false;
-  nothing.sequence += ++said_;
+  nothing.sequence += ++zeros_sent_;
   packet.length = encode(*layout_, nothing, packet.bytes);
   packet.arrives = now;
-  due_ = said_ < kTimes ? now + kBetween : TimePoint::max();
+  due_ = zeros_sent_ < kZeroReports ? now + kZeroInterval : TimePoint::max();
   return true;
 }
 

@@ -21,30 +21,30 @@ namespace wrenchd {
 /// as many of its own; it comes back with zeros (core/transitions.hpp: a late tick).
 ///
 /// Belongs to the writer's thread. Neither allocates, locks nor throws.
-class LastWord {
+class HostWatchdog {
  public:
   /// Never speaks.
-  LastWord() noexcept = default;
+  HostWatchdog() noexcept = default;
   /// after: silence of the loop until it is spoken for. Of a device without motors: never speaks.
-  LastWord(const DeviceProfile& profile, Duration after);
+  HostWatchdog(const DeviceProfile& profile, Duration after);
 
   /// The loop said that, now.
-  void heard(TimePoint now, const Packet& packet) noexcept;
+  void feed(TimePoint now, const Packet& packet) noexcept;
   /// When it is time to speak for the loop, if it says nothing until then; TimePoint::max() where there is
   /// nothing to say.
   TimePoint due() const noexcept { return due_; }
   /// What to say now, if it is time.
-  bool speak(TimePoint now, Packet& packet) noexcept;
+  bool send_zero(TimePoint now, Packet& packet) noexcept;
 
   /// Said so often, so that a lost one does not matter.
-  static constexpr unsigned kTimes = 3;
-  static constexpr Duration kBetween = std::chrono::milliseconds(1);
+  static constexpr unsigned kZeroReports = 3;
+  static constexpr Duration kZeroInterval = std::chrono::milliseconds(1);
 
  private:
   std::optional<WrenchReportLayout> layout_;
-  Duration after_{};
-  WrenchReport last_;  ///< the loop's
-  unsigned said_ = 0;  ///< since then
+  Duration timeout_{};
+  WrenchReport last_report_;  ///< the loop's
+  unsigned zeros_sent_ = 0;   ///< since then
   TimePoint due_ = TimePoint::max();
 };
 

@@ -13,9 +13,9 @@
 
 namespace wrenchd {
 
-struct LatestWriter::Work {
-  Work(Write how, const LinkSettings& settings)
-      : write(std::move(how)), slot(settings.write_deadline), last_word(settings.last_word) {}
+struct LatestWriter::SharedState {
+  SharedState(Write how, const LinkSettings& settings)
+      : write(std::move(how)), slot(settings.write_deadline), last_word(settings.host_watchdog) {}
 
   void run() noexcept;
   bool next(Packet& packet) noexcept;
@@ -23,7 +23,7 @@ struct LatestWriter::Work {
 
   Write write;
   WriteSlot slot;
-  LastWord last_word;
+  HostWatchdog last_word;
   WakeUp wake;
   std::atomic<bool> closing{false};
 
@@ -33,16 +33,16 @@ struct LatestWriter::Work {
   bool last_ok = true;  ///< the last write succeeded; the thread's, to be read when it is over
 };
 
-void LatestWriter::Work::run() noexcept {
+void LatestWriter::SharedState::run() noexcept {
   // Whether it is the end is asked before the slot is: what was handed over before the end is then seen.
-  for (bool last_round = false; !slot.gone() && !last_round;) {
+  for (bool last_round = false; !slot.disconnected() && !last_round;) {
     last_round = closing.load(std::memory_order_acquire);
     Packet packet;
     if (next(packet)) {
       write_one(packet);
       last_round = false;
     } else if (!last_round) {
-      wake.sleep_until(last_word.due());
+      wake.wait_until(last_word.due());
     }
   }
   const std::lock_guard lock(mutex);
@@ -51,27 +51,27 @@ void LatestWriter::Work::run() noexcept {
 }
 
 /// What the loop handed over, or what is said in its place.
-bool LatestWriter::Work::next(Packet& packet) noexcept {
+bool LatestWriter::SharedState::next(Packet& packet) noexcept {
   const bool heard = slot.take(packet);
   const TimePoint now = std::chrono::steady_clock::now();
-  if (heard) last_word.heard(now, packet);
-  return heard || last_word.speak(now, packet);
+  if (heard) last_word.feed(now, packet);
+  return heard || last_word.send_zero(now, packet);
 }
 
-void LatestWriter::Work::write_one(const Packet& packet) noexcept {
-  LinkStatus status = LinkStatus::empty;
+void LatestWriter::SharedState::write_one(const Packet& packet) noexcept {
+  LinkStatus status = LinkStatus::not_ready;
   try {
     status = write(packet.report());
   } catch (...) {  // a write that throws is a write that failed
   }
   last_ok = status == LinkStatus::ok;
-  slot.end(status);
+  slot.complete(status);
 }
 
 LatestWriter::LatestWriter(Write write, const LinkSettings& settings)
-    : work_(std::make_shared<Work>(std::move(write), settings)),
-      thread_([work = work_] { work->run(); }),
-      close_within_(settings.close_within),
+    : shared_(std::make_shared<SharedState>(std::move(write), settings)),
+      thread_([work = shared_] { work->run(); }),
+      close_timeout_(settings.close_timeout),
       priority_granted_(raise_priority(thread_, settings.priority)) {
   pthread_setname_np(thread_.native_handle(), "wrenchd-writer");
 }
@@ -80,24 +80,24 @@ LatestWriter::~LatestWriter() {
   close();
 }
 
-LinkStatus LatestWriter::hand_over(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  const LinkStatus status = work_->slot.hand_over(now, report);
-  if (status != LinkStatus::gone) work_->wake.wake();
+LinkStatus LatestWriter::submit(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  const LinkStatus status = shared_->slot.submit(now, report);
+  if (status != LinkStatus::disconnected) shared_->wake.wake();
   return status;
 }
 
 bool LatestWriter::close() noexcept {
-  work_->closing.store(true, std::memory_order_release);
-  work_->wake.wake();
-  std::unique_lock lock(work_->mutex);
-  const bool over = work_->changed.wait_for(lock, close_within_, [this] { return work_->over; });
+  shared_->closing.store(true, std::memory_order_release);
+  shared_->wake.wake();
+  std::unique_lock lock(shared_->mutex);
+  const bool over = shared_->changed.wait_for(lock, close_timeout_, [this] { return shared_->over; });
   lock.unlock();
   if (thread_.joinable()) over ? thread_.join() : thread_.detach();
-  return over && work_->last_ok;
+  return over && shared_->last_ok;
 }
 
 const WriteSlot& LatestWriter::slot() const noexcept {
-  return work_->slot;
+  return shared_->slot;
 }
 
 bool raise_priority(std::thread& thread, int priority) noexcept {

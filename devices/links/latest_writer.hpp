@@ -37,7 +37,7 @@ class LatestWriter {
   LatestWriter& operator=(const LatestWriter&) = delete;
 
   /// See WriteSlot::hand_over(). RT safe.
-  LinkStatus hand_over(TimePoint now, std::span<const std::uint8_t> report) noexcept;
+  LinkStatus submit(TimePoint now, std::span<const std::uint8_t> report) noexcept;
   /// Writes what waits and ends the thread, in `close_within` at most. True where all was written.
   ///
   /// Where the kernel does not give a write back in that time the thread is left alone with it: it still
@@ -50,11 +50,11 @@ class LatestWriter {
   const WriteSlot& slot() const noexcept;
 
  private:
-  struct Work;  ///< what the thread needs, kept by it until it ends
+  struct SharedState;  ///< what the thread needs, kept by it until it ends
 
-  std::shared_ptr<Work> work_;
+  std::shared_ptr<SharedState> shared_;
   std::thread thread_;
-  Duration close_within_;
+  Duration close_timeout_;
   bool priority_granted_ = true;
 };
 

@@ -18,16 +18,16 @@ std::uint8_t constant_at(const ReportFrame& report, std::size_t byte) {
 
 LinkSettings link_settings(const DeviceProfile& profile, Duration silent_after) {
   LinkSettings settings;
-  settings.last_word = LastWord(profile, silent_after);
-  settings.longest_report = profile.pose_report.length;
+  settings.host_watchdog = HostWatchdog(profile, silent_after);
+  settings.max_report_bytes = profile.pose_report.length;
   for (const PoseReportLayout& report : profile.more_reports)
-    settings.longest_report = std::max(settings.longest_report, report.length);
+    settings.max_report_bytes = std::max(settings.max_report_bytes, report.length);
   if (profile.transport != Transport::libusb) return settings;
   const UsbEndpoints& endpoints = profile.endpoints;
-  settings.in = endpoints.in;
-  settings.out = endpoints.out;
+  settings.in_endpoint = endpoints.in;
+  settings.out_endpoint = endpoints.out;
   settings.prefix_bytes = endpoints.prefix_bytes;
-  settings.longest_report += endpoints.prefix_bytes;
+  settings.max_report_bytes += endpoints.prefix_bytes;
   if (!endpoints.serial_chip) return settings;
   const PoseReportLayout& report = profile.pose_report;
   settings.frame = {report.length, constant_at(report, 0), constant_at(report, report.length - 1)};

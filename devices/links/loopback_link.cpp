@@ -12,7 +12,7 @@ namespace {
 
 double value_of(const SimulatedFault& fault) noexcept {
   if (fault.value > 0.0) return fault.value;
-  return fault.kind == Kind::lose ? 3.0 : 0.010;
+  return fault.kind == Kind::drop_reports ? 3.0 : 0.010;
 }
 
 }  // namespace
@@ -27,22 +27,22 @@ void LoopbackLink::open() {
   close();
   const TimePoint now = clock_.now();
   advance_to(now);
-  if (device_.shows(Kind::unplug, now, now))
+  if (device_.fault_active_during(Kind::unplug, now, now))
     throw std::runtime_error(
         "simulated device: unplugged by its fault plan; wait until it is plugged in again");
   reports_.clear();
-  held_.length = 0;
+  swapped_report_.length = 0;
   last_arrival_ = now;
-  passed_ = now;
+  unplug_checked_until_ = now;
   state_ = State::open;
 }
 
 LinkRead LoopbackLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
   advance_to(now);
-  stall();
-  if (state_ != State::open) return {LinkStatus::gone, 0, now};
-  const Packet* packet = reports_.arrived(now);
-  if (packet == nullptr) return {LinkStatus::empty, 0, now};
+  block_if_stalled();
+  if (state_ != State::open) return {LinkStatus::disconnected, 0, now};
+  const Packet* packet = reports_.front_if_arrived(now);
+  if (packet == nullptr) return {LinkStatus::not_ready, 0, now};
   const LinkRead read{LinkStatus::ok, packet->length, packet->arrives};
   const auto bytes = packet->report().first(std::min(packet->length, buffer.size()));
   std::copy(bytes.begin(), bytes.end(), buffer.begin());
@@ -52,9 +52,9 @@ LinkRead LoopbackLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexc
 
 LinkStatus LoopbackLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
   advance_to(now);
-  if (state_ != State::open) return LinkStatus::gone;
-  if (device_.shows(Kind::deaf, now, now)) return LinkStatus::empty;
-  if (!commands_.push(now + command_delay_, report)) return LinkStatus::empty;
+  if (state_ != State::open) return LinkStatus::disconnected;
+  if (device_.fault_active_during(Kind::refuse_commands, now, now)) return LinkStatus::not_ready;
+  if (!commands_.push(now + command_delay_, report)) return LinkStatus::not_ready;
   advance_to(now);
   return LinkStatus::ok;
 }
@@ -62,7 +62,7 @@ LinkStatus LoopbackLink::write(TimePoint now, std::span<const std::uint8_t> repo
 void LoopbackLink::wait_readable(TimePoint deadline) noexcept {
   for (TimePoint now = clock_.now(); now < deadline; now = clock_.now()) {
     advance_to(now);
-    if (state_ != State::open || reports_.arrived(now) != nullptr) return;
+    if (state_ != State::open || reports_.front_if_arrived(now) != nullptr) return;
     clock_.sleep_until(std::min(deadline, next_arrival(now)));
   }
 }
@@ -73,61 +73,63 @@ void LoopbackLink::close() noexcept {
 }
 
 void LoopbackLink::advance_to(TimePoint now) noexcept {
-  while (const Packet* command = commands_.arrived(now)) {
+  while (const Packet* command = commands_.front_if_arrived(now)) {
     device_.advance_to(command->arrives, *this);
-    if (!device_.shows(Kind::unplug, command->arrives, command->arrives) &&
-        !device_.shows(Kind::swallow, command->arrives, command->arrives))
+    if (!device_.fault_active_during(Kind::unplug, command->arrives, command->arrives) &&
+        !device_.fault_active_during(Kind::drop_commands, command->arrives, command->arrives))
       device_.take_command(command->arrives, command->report());
     commands_.pop();
   }
   device_.advance_to(now, *this);
-  if (state_ == State::open && device_.shows(Kind::unplug, passed_, now)) state_ = State::gone;
-  passed_ = std::max(passed_, now);
+  if (state_ == State::open && device_.fault_active_during(Kind::unplug, unplug_checked_until_, now))
+    state_ = State::disconnected;
+  unplug_checked_until_ = std::max(unplug_checked_until_, now);
 }
 
 void LoopbackLink::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
   if (report.size() > kMaxReportBytes) return;
-  if (!device_.shows(Kind::freeze, sent, sent) || last_.length == 0) {
-    std::copy(report.begin(), report.end(), last_.bytes.begin());
-    last_.length = report.size();
+  if (!device_.fault_active_during(Kind::freeze, sent, sent) || last_report_.length == 0) {
+    std::copy(report.begin(), report.end(), last_report_.bytes.begin());
+    last_report_.length = report.size();
   }
-  ++sent_;
-  if (state_ != State::open || device_.shows(Kind::silence, sent, sent) ||
-      device_.shows(Kind::unplug, sent, sent))
+  ++reports_sent_;
+  if (state_ != State::open || device_.fault_active_during(Kind::silence, sent, sent) ||
+      device_.fault_active_during(Kind::unplug, sent, sent))
     return;
   const FaultPlan& faults = device_.faults();
-  if (const SimulatedFault* lose = faults.at(Kind::lose, sent)) {
+  if (const SimulatedFault* lose = faults.active_at(Kind::drop_reports, sent)) {
     const auto one_in = static_cast<std::uint64_t>(value_of(*lose));
-    if (sent_ % std::max<std::uint64_t>(one_in, 1) == 0) return;
+    if (reports_sent_ % std::max<std::uint64_t>(one_in, 1) == 0) return;
   }
-  Packet packet = last_;
-  if (device_.shows(Kind::garble, sent, sent)) packet.bytes[packet.length / 2] ^= 0x10;
-  if (device_.shows(Kind::short_report, sent, sent)) packet.length /= 2;
-  if (device_.shows(Kind::long_report, sent, sent) && packet.length < Packet::kRoom)
+  Packet packet = last_report_;
+  if (device_.fault_active_during(Kind::corrupt, sent, sent)) packet.bytes[packet.length / 2] ^= 0x10;
+  if (device_.fault_active_during(Kind::short_report, sent, sent)) packet.length /= 2;
+  if (device_.fault_active_during(Kind::long_report, sent, sent) && packet.length < Packet::kMaxBytes)
     packet.bytes[packet.length++] = 0;
-  if (device_.shows(Kind::wrong_id, sent, sent)) packet.bytes[0] ^= 0x55;
+  if (device_.fault_active_during(Kind::wrong_id, sent, sent)) packet.bytes[0] ^= 0x55;
   TimePoint arrives = sent + report_delay_;
-  if (const SimulatedFault* late = faults.at(Kind::late, sent)) arrives += from_seconds(value_of(*late));
-  if (device_.shows(Kind::swap, sent, sent) && held_.length == 0) {
-    held_ = packet;
+  if (const SimulatedFault* late = faults.active_at(Kind::delay_reports, sent))
+    arrives += from_seconds(value_of(*late));
+  if (device_.fault_active_during(Kind::swap, sent, sent) && swapped_report_.length == 0) {
+    swapped_report_ = packet;
     return;
   }
-  queue(arrives, packet);
-  if (device_.shows(Kind::repeat, sent, sent)) queue(arrives, packet);
-  if (held_.length > 0) queue(arrives, held_);
-  held_.length = 0;
+  enqueue(arrives, packet);
+  if (device_.fault_active_during(Kind::repeat, sent, sent)) enqueue(arrives, packet);
+  if (swapped_report_.length > 0) enqueue(arrives, swapped_report_);
+  swapped_report_.length = 0;
 }
 
 /// Nothing overtakes on a wire: what was late keeps back what follows it.
-void LoopbackLink::queue(TimePoint arrives, const Packet& packet) noexcept {
+void LoopbackLink::enqueue(TimePoint arrives, const Packet& packet) noexcept {
   last_arrival_ = std::max(last_arrival_, arrives);
   if (!reports_.push(last_arrival_, packet.report())) ++dropped_;
 }
 
 /// A driver that does not come back: time passes, and nobody can do anything about it.
-void LoopbackLink::stall() noexcept {
+void LoopbackLink::block_if_stalled() noexcept {
   const FaultPlan& faults = device_.faults();
-  if (const SimulatedFault* stalled = faults.at(Kind::stall, clock_.now()))
+  if (const SimulatedFault* stalled = faults.active_at(Kind::stall, clock_.now()))
     clock_.sleep_until(faults.end_of(*stalled));
 }
 

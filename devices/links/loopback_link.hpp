@@ -36,11 +36,11 @@ class LoopbackLink final : public ReportLink, private ReportSink {
   std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
-  enum class State : std::uint8_t { closed, open, gone };
+  enum class State : std::uint8_t { closed, open, disconnected };
 
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override;
-  void queue(TimePoint arrives, const Packet& packet) noexcept;
-  void stall() noexcept;
+  void enqueue(TimePoint arrives, const Packet& packet) noexcept;
+  void block_if_stalled() noexcept;
   TimePoint next_arrival(TimePoint now) const noexcept;
 
   EmulatedDevice& device_;
@@ -48,12 +48,12 @@ class LoopbackLink final : public ReportLink, private ReportSink {
   Duration report_delay_{};
   Duration command_delay_{};
   State state_ = State::closed;
-  TimePoint passed_{};    ///< time up to which unplugging has been looked for
-  PacketQueue reports_;   ///< device to host
-  PacketQueue commands_;  ///< host to device
-  Packet last_;           ///< that left the device and was not frozen
-  Packet held_;           ///< that waits for the one which follows it
-  std::uint64_t sent_ = 0;
+  TimePoint unplug_checked_until_{};  ///< time up to which unplugging has been looked for
+  PacketQueue reports_;               ///< device to host
+  PacketQueue commands_;              ///< host to device
+  Packet last_report_;                ///< that left the device and was not frozen
+  Packet swapped_report_;             ///< that waits for the one which follows it
+  std::uint64_t reports_sent_ = 0;
   TimePoint last_arrival_{};
   std::uint64_t dropped_ = 0;
 };

@@ -15,8 +15,8 @@ namespace wrenchd {
 /// One report on its way.
 struct Packet {
   /// A byte more than a report may have, for one that is too long.
-  static constexpr std::size_t kRoom = kMaxReportBytes + 1;
-  std::array<std::uint8_t, kRoom> bytes{};
+  static constexpr std::size_t kMaxBytes = kMaxReportBytes + 1;
+  std::array<std::uint8_t, kMaxBytes> bytes{};
   std::size_t length = 0;
   TimePoint arrives{};
 
@@ -31,7 +31,7 @@ class PacketQueue {
 
   /// False, and nothing changes, where the queue is full or the report too long.
   bool push(TimePoint arrives, std::span<const std::uint8_t> report) noexcept {
-    if (count_ == kCapacity || report.size() > Packet::kRoom) return false;
+    if (count_ == kCapacity || report.size() > Packet::kMaxBytes) return false;
     Packet& packet = packets_[(first_ + count_++) % kCapacity];
     std::copy(report.begin(), report.end(), packet.bytes.begin());
     packet.length = report.size();
@@ -40,7 +40,7 @@ class PacketQueue {
   }
 
   /// The oldest packet if it has arrived by now, or nullptr. Valid until the next pop() or push().
-  const Packet* arrived(TimePoint now) const noexcept {
+  const Packet* front_if_arrived(TimePoint now) const noexcept {
     return count_ > 0 && packets_[first_].arrives <= now ? &packets_[first_] : nullptr;
   }
   void pop() noexcept {

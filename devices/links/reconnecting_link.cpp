@@ -8,21 +8,21 @@
 
 namespace wrenchd {
 
-PluggedLink::PluggedLink(DeviceProfile profile, std::string serial, LinkSettings settings)
+ReconnectingLink::ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings)
     : profile_(std::move(profile)),
-      wanted_{profile_.name, std::move(serial), {}},
+      criteria_{profile_.name, std::move(serial), {}},
       settings_(std::move(settings)) {}
 
-void PluggedLink::open() {
+void ReconnectingLink::open() {
   close();
   const std::vector<UsbDevice> plugged = list_usb_devices();
-  const DeviceChoice choice = choose_device(plugged, {&profile_, 1}, wanted_);
-  if (!choice.pick)
+  const DeviceChoice choice = choose_device(plugged, {&profile_, 1}, criteria_);
+  if (!choice.selection)
     throw DeviceNotFound("no device of profile " + profile_.name +
-                             (wanted_.serial.empty() ? "" : " with serial number " + wanted_.serial) +
+                             (criteria_.serial.empty() ? "" : " with serial number " + criteria_.serial) +
                              " is plugged in",
-                         seen_instead(plugged, choice));
-  const UsbDevice& device = plugged[choice.pick->device];
+                         describe_rejected(plugged, choice));
+  const UsbDevice& device = plugged[choice.selection->device];
   std::unique_ptr<ReportLink> link;
   if (profile_.transport == Transport::libusb)
     link = std::make_unique<UsbLink>(device, settings_);
@@ -30,29 +30,29 @@ void PluggedLink::open() {
     link = std::make_unique<HidrawLink>(device, settings_);
   link->open();
   link_ = std::move(link);
-  wanted_.before = device;
+  criteria_.previous = device;
 }
 
-LinkRead PluggedLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
-  return link_ ? link_->read(now, buffer) : LinkRead{LinkStatus::gone, 0, now};
+LinkRead ReconnectingLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
+  return link_ ? link_->read(now, buffer) : LinkRead{LinkStatus::disconnected, 0, now};
 }
 
-LinkStatus PluggedLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  return link_ ? link_->write(now, report) : LinkStatus::gone;
+LinkStatus ReconnectingLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  return link_ ? link_->write(now, report) : LinkStatus::disconnected;
 }
 
-void PluggedLink::wait_readable(TimePoint deadline) noexcept {
+void ReconnectingLink::wait_readable(TimePoint deadline) noexcept {
   if (link_) link_->wait_readable(deadline);
 }
 
-void PluggedLink::close() noexcept {
+void ReconnectingLink::close() noexcept {
   link_.reset();
 }
 
-std::vector<std::string> seen_instead(std::span<const UsbDevice> plugged, const DeviceChoice& choice) {
+std::vector<std::string> describe_rejected(std::span<const UsbDevice> plugged, const DeviceChoice& choice) {
   std::vector<std::string> seen;
   for (std::size_t i = 0; i < plugged.size(); ++i)
-    if (!choice.why_not[i].empty()) seen.push_back(describe(plugged[i]) + ": " + choice.why_not[i]);
+    if (!choice.rejections[i].empty()) seen.push_back(describe(plugged[i]) + ": " + choice.rejections[i]);
   return seen;
 }
 

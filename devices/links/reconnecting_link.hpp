@@ -16,23 +16,23 @@ namespace wrenchd {
 class DeviceNotFound : public std::runtime_error {
  public:
   DeviceNotFound(const std::string& what, std::vector<std::string> seen)
-      : std::runtime_error(what), seen_(std::move(seen)) {}
+      : std::runtime_error(what), rejected_devices_(std::move(seen)) {}
 
   /// What is plugged in instead, a line each: the device, and why it is not the one.
-  const std::vector<std::string>& seen() const noexcept { return seen_; }
+  const std::vector<std::string>& rejected_devices() const noexcept { return rejected_devices_; }
 
  private:
-  std::vector<std::string> seen_;
+  std::vector<std::string> rejected_devices_;
 };
 
 /// The link to the plugged-in device of a profile, by the transport that the profile names. Each open() looks
 /// for the device anew, wherever it is plugged in by then. From the first one on it is that device, by ids,
 /// serial number, interface and report descriptor, and no other is ever written to.
-class PluggedLink final : public ReportLink {
+class ReconnectingLink final : public ReportLink {
  public:
   /// serial: empty for any. The profile has to be one for a device: not transport loopback. settings: those
   /// of link_settings(), and what the caller wants else.
-  PluggedLink(DeviceProfile profile, std::string serial, LinkSettings settings);
+  ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings);
 
   /// Throws DeviceNotFound where it is not plugged in, and as HidrawLink and UsbLink do where it cannot be
   /// opened.
@@ -43,16 +43,16 @@ class PluggedLink final : public ReportLink {
   void close() noexcept override;
 
   /// The device of the last open(), while nothing else is known.
-  const std::optional<UsbDevice>& device() const noexcept { return wanted_.before; }
+  const std::optional<UsbDevice>& device() const noexcept { return criteria_.previous; }
 
  private:
   DeviceProfile profile_;
-  WantedDevice wanted_;
+  DeviceCriteria criteria_;
   LinkSettings settings_;
   std::unique_ptr<ReportLink> link_;  ///< none while closed
 };
 
 /// What is plugged in, a line each: the device, and why it was not picked. The one that was has none.
-std::vector<std::string> seen_instead(std::span<const UsbDevice> plugged, const DeviceChoice& choice);
+std::vector<std::string> describe_rejected(std::span<const UsbDevice> plugged, const DeviceChoice& choice);
 
 }  // namespace wrenchd

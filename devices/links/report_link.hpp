@@ -12,13 +12,13 @@ namespace wrenchd {
 
 /// What a read or write on a link came to.
 enum class LinkStatus : std::uint8_t {
-  ok,     ///< a report was transferred
-  empty,  ///< nothing to read now, or no room to write now
-  gone,   ///< the device is not there any more; only close() makes sense
+  ok,            ///< a report was transferred
+  not_ready,     ///< nothing to read now, or no room to write now
+  disconnected,  ///< the device is not there any more; only close() makes sense
 };
 
 struct LinkRead {
-  LinkStatus status = LinkStatus::empty;
+  LinkStatus status = LinkStatus::not_ready;
   std::size_t length = 0;  ///< of the report, even where it was longer than the buffer (then it was cut)
   TimePoint arrived{};     ///< when the report reached the host
 };
@@ -39,7 +39,7 @@ class ReportLink {
   virtual void wait_readable(TimePoint deadline) noexcept = 0;
   /// Where a pose that is steered has come to, in the base: what whoever steers sees on the screen. Only a
   /// simulated hand looks. RT safe.
-  virtual void show(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
+  virtual void show_pose(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
   /// Closes the transport; harmless when closed.
   virtual void close() noexcept = 0;
 };

@@ -66,13 +66,13 @@ bool speaks(EmulatedArm& arm, const DeviceProfile& profile) {
   std::array<std::uint8_t, kMaxReportBytes> bytes;
   const std::size_t length = encode(profile.wrench_report, command, bytes);
   if (!arm.take_command(kStart, std::span(bytes).first(length))) return false;
-  const MotorEfforts motors = arm.motors();
+  const MotorEfforts motors = arm.motor_efforts();
   for (std::size_t i = 0; i < kMaxMotors; ++i)
     if (!(std::abs(motors[i] - command.efforts[i]) < 1e-9)) return false;
   arm.advance_to(kStart + kTalk, listener);
   if (!listener.understood()) return false;
   for (std::size_t i = 0; i < profile.kinematics.joints; ++i) {
-    const std::size_t slot = profile.kinematics.slot[i];
+    const std::size_t slot = profile.kinematics.report_index[i];
     if (listener.heard().joints[slot] != kCounts[slot]) return false;
   }
   return true;
@@ -83,21 +83,21 @@ std::unique_ptr<EmulatedArm> emulated_arm(const DeviceProfile& profile) {
   return std::make_unique<EmulatedPolhem>(profile.pose_report.length);
 }
 
-std::unique_ptr<HeldDevice> held_arm(const DeviceProfile& profile, const SimulationSettings& settings) {
+std::unique_ptr<DeviceInHand> held_arm(const DeviceProfile& profile, const SimulationSettings& settings) {
   const bool delta = profile.kinematics.kind == Kinematics::Kind::delta;
   if (!profile.wrench_report.efforts.present || !speaks(*emulated_arm(profile), profile))
     refuse_layout(profile, delta ? "the Falcon" : "Polhem", delta ? "falcon" : "polhem");
-  return std::make_unique<HeldArm>(profile, settings, emulated_arm(profile));
+  return std::make_unique<SimulatedArm>(profile, settings, emulated_arm(profile));
 }
 
 /// Whether the profile finds in the reports how far the cap is pushed.
-bool speaks(const CapCoding& cap, const DeviceProfile& profile) {
+bool speaks(const PuckCoding& cap, const DeviceProfile& profile) {
   constexpr TimePoint kStart{};
   constexpr std::array<int, 6> kCounts = {11, -22, 33, -44, 55, -66};
   Listener listener(profile);
   EmulatedSpaceMouse mouse(cap.format);
   mouse.advance_to(kStart, listener);
-  mouse.push(kCounts);
+  mouse.set_deflection(kCounts);
   mouse.advance_to(kStart + kTalk, listener);
   const PoseReport& heard = listener.heard();
   bool same = listener.understood();
@@ -109,17 +109,17 @@ bool speaks(const CapCoding& cap, const DeviceProfile& profile) {
   return same;
 }
 
-std::unique_ptr<HeldDevice> held_cap(const DeviceProfile& profile, const SimulationSettings& settings) {
-  if (!speaks(cap_coding(profile), profile))
+std::unique_ptr<DeviceInHand> held_cap(const DeviceProfile& profile, const SimulationSettings& settings) {
+  if (!speaks(puck_coding(profile), profile))
     refuse_layout(profile, "a SpaceMouse", "spacemouse_split or spacemouse_combined");
-  return std::make_unique<HeldCap>(profile, settings);
+  return std::make_unique<SimulatedPuck>(profile, settings);
 }
 
 }  // namespace
 
 std::unique_ptr<SimulatedLink> make_simulated_link(const DeviceProfile& profile,
                                                    const SimulationSettings& settings, Clock& clock) {
-  std::unique_ptr<HeldDevice> device;
+  std::unique_ptr<DeviceInHand> device;
   switch (pose_source(profile)) {
     case PoseSource::pose:
       device = std::make_unique<SimulatedDevice>(profile, settings);

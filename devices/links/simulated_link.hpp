@@ -17,32 +17,32 @@ namespace wrenchd {
 class SimulatedLink final : public ReportLink {
  public:
   /// The clock must outlive the link.
-  SimulatedLink(std::unique_ptr<HeldDevice> device, Clock& clock, const SimulationSettings& settings)
-      : device_(std::move(device)), clock_(clock), wire_(*device_, clock, settings) {}
+  SimulatedLink(std::unique_ptr<DeviceInHand> device, Clock& clock, const SimulationSettings& settings)
+      : device_(std::move(device)), clock_(clock), loopback_(*device_, clock, settings) {}
 
   /// Throws std::runtime_error while the device is unplugged.
   void open() override {
-    wire_.open();
+    loopback_.open();
     device_->open(clock_.now());
   }
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
-    return wire_.read(now, buffer);
+    return loopback_.read(now, buffer);
   }
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override {
-    return wire_.write(now, report);
+    return loopback_.write(now, report);
   }
-  void wait_readable(TimePoint deadline) noexcept override { wire_.wait_readable(deadline); }
-  void show(TimePoint now, const Pose& X_BH) noexcept override { device_->see(now, X_BH); }
-  void close() noexcept override { wire_.close(); }
+  void wait_readable(TimePoint deadline) noexcept override { loopback_.wait_readable(deadline); }
+  void show_pose(TimePoint now, const Pose& X_BH) noexcept override { device_->observe_pose(now, X_BH); }
+  void close() noexcept override { loopback_.close(); }
 
   /// For faults on request, and for the truth.
-  HeldDevice& device() noexcept { return *device_; }
-  std::uint64_t dropped() const noexcept { return wire_.dropped(); }
+  DeviceInHand& device() noexcept { return *device_; }
+  std::uint64_t dropped() const noexcept { return loopback_.dropped(); }
 
  private:
-  std::unique_ptr<HeldDevice> device_;
+  std::unique_ptr<DeviceInHand> device_;
   Clock& clock_;
-  LoopbackLink wire_;
+  LoopbackLink loopback_;
 };
 
 /// The device that a profile describes, emulated and held by the hand of the settings: whole poses by the

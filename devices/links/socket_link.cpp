@@ -31,7 +31,7 @@ LinkStatus send_report(int socket, std::span<const std::uint8_t> report) noexcep
     if (send(socket, report.data(), report.size(), kNow) >= 0) return LinkStatus::ok;
     if (errno == EINTR) continue;
     const bool full = errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOBUFS;
-    return full ? LinkStatus::empty : LinkStatus::gone;
+    return full ? LinkStatus::not_ready : LinkStatus::disconnected;
   }
 }
 
@@ -55,24 +55,24 @@ void SocketLink::open() {
 }
 
 LinkRead SocketLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
-  if (!writer_) return {LinkStatus::gone, 0, now};
+  if (!writer_) return {LinkStatus::disconnected, 0, now};
   for (;;) {
     const ssize_t length = recv(socket_, buffer.data(), buffer.size(), kNow | MSG_TRUNC);
     if (length > 0) return {LinkStatus::ok, static_cast<std::size_t>(length), now};
     if (length < 0 && errno == EINTR) continue;
-    if (length < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return {LinkStatus::empty, 0, now};
+    if (length < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return {LinkStatus::not_ready, 0, now};
     // 0 is an end, or a report of no bytes.
-    if (length < 0 || other_end_is_gone(socket_)) return {LinkStatus::gone, 0, now};
+    if (length < 0 || other_end_is_gone(socket_)) return {LinkStatus::disconnected, 0, now};
     return {LinkStatus::ok, 0, now};
   }
 }
 
 LinkStatus SocketLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  return writer_ ? writer_->hand_over(now, report) : LinkStatus::gone;
+  return writer_ ? writer_->submit(now, report) : LinkStatus::disconnected;
 }
 
 void SocketLink::wait_readable(TimePoint deadline) noexcept {
-  if (writer_) wait_for_file(socket_, POLLIN, deadline);
+  if (writer_) wait_for_fd(socket_, POLLIN, deadline);
 }
 
 }  // namespace wrenchd

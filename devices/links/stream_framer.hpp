@@ -25,31 +25,31 @@ class StreamFramer {
 
   /// Takes bytes, and calls `report` with each that is whole now.
   template <class Report>
-  void take(std::span<const std::uint8_t> bytes, Report&& report) noexcept {
+  void feed(std::span<const std::uint8_t> bytes, Report&& report) noexcept {
     for (const std::uint8_t byte : bytes) {
-      held_[count_++] = byte;
-      while (count_ > 0 && held_[0] != frame_.first) drop(1);
-      if (count_ < frame_.length) continue;
-      if (held_[frame_.length - 1] != frame_.last) {
-        do drop(1);
-        while (count_ > 0 && held_[0] != frame_.first);
+      buffer_[size_++] = byte;
+      while (size_ > 0 && buffer_[0] != frame_.first) discard(1);
+      if (size_ < frame_.length) continue;
+      if (buffer_[frame_.length - 1] != frame_.last) {
+        do discard(1);
+        while (size_ > 0 && buffer_[0] != frame_.first);
         continue;
       }
-      report(std::span<const std::uint8_t>(held_).first(frame_.length));
-      count_ = 0;
+      report(std::span<const std::uint8_t>(buffer_).first(frame_.length));
+      size_ = 0;
     }
   }
 
  private:
-  void drop(std::size_t n) noexcept {
-    std::copy(held_.begin() + static_cast<std::ptrdiff_t>(n),
-              held_.begin() + static_cast<std::ptrdiff_t>(count_), held_.begin());
-    count_ -= n;
+  void discard(std::size_t n) noexcept {
+    std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(n),
+              buffer_.begin() + static_cast<std::ptrdiff_t>(size_), buffer_.begin());
+    size_ -= n;
   }
 
   Frame frame_;
-  std::array<std::uint8_t, kMaxReportBytes> held_{};
-  std::size_t count_ = 0;
+  std::array<std::uint8_t, kMaxReportBytes> buffer_{};
+  std::size_t size_ = 0;
 };
 
 }  // namespace wrenchd

@@ -33,17 +33,17 @@ constexpr std::size_t kRing = 64;
 /// processor busy.
 constexpr Duration kRetryAfter = std::chrono::milliseconds(5);
 
-std::runtime_error refusal(const UsbDevice& device, const std::string& doing, int error) {
+std::runtime_error rejection_text(const UsbDevice& device, const std::string& doing, int error) {
   if (error == LIBUSB_ERROR_ACCESS || error == LIBUSB_ERROR_NO_DEVICE || error == LIBUSB_ERROR_BUSY) {
     const int number = error == LIBUSB_ERROR_ACCESS ? EACCES : error == LIBUSB_ERROR_BUSY ? EBUSY : ENODEV;
-    return std::runtime_error(why_not_open(device, device.usb_node, number));
+    return std::runtime_error(open_error(device, device.usb_node, number));
   }
   return std::runtime_error(describe(device) + ": " + doing + ": " + libusb_strerror(error) +
                             "; unplug it and plug it in again");
 }
 
 /// Bus and ports as the kernel names them: "3-1.2".
-std::string place_of(libusb_device* device) {
+std::string recording_path(libusb_device* device) {
   std::array<std::uint8_t, 8> ports{};
   const int n = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
   std::string place = std::to_string(libusb_get_bus_number(device));
@@ -82,15 +82,15 @@ std::optional<Endpoint> find_endpoint(const libusb_interface_descriptor& setting
 }  // namespace
 
 /// Everything that speaks with libusb. Built and destroyed by an ordinary thread, run by the link's own.
-struct UsbLink::Engine {
-  Engine(const UsbDevice& device, const LinkSettings& settings);
-  ~Engine();
-  Engine(const Engine&) = delete;
-  Engine& operator=(const Engine&) = delete;
+struct UsbLink::TransferThread {
+  TransferThread(const UsbDevice& device, const LinkSettings& settings);
+  ~TransferThread();
+  TransferThread(const TransferThread&) = delete;
+  TransferThread& operator=(const TransferThread&) = delete;
 
   /// One IN transfer and its buffer.
   struct In {
-    Engine* engine = nullptr;
+    TransferThread* engine = nullptr;
     libusb_transfer* transfer = nullptr;
     std::vector<std::uint8_t> bytes;
     bool flying = false;
@@ -146,7 +146,7 @@ struct UsbLink::Engine {
   std::size_t prefix_bytes;
   bool cut;  ///< packets are a stream of bytes, out of which reports are cut
   StreamFramer framer;
-  LastWord last_word;
+  HostWatchdog last_word;
   libusb_transfer* out = nullptr;
   Packet out_packet;
   std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE + kMaxReportBytes> out_request{};
@@ -166,18 +166,18 @@ struct UsbLink::Engine {
 
 // --- opening ----------------------------------------------------------------------------------------------
 
-UsbLink::Engine::Engine(const UsbDevice& device, const LinkSettings& settings)
+UsbLink::TransferThread::TransferThread(const UsbDevice& device, const LinkSettings& settings)
     : interface(std::max(device.interface, 0)),
       numbered_reports(device.numbered_reports),
       slot(settings.write_deadline),
       prefix_bytes(settings.prefix_bytes),
       cut(settings.frame.length > 0),
       framer(settings.frame),
-      last_word(settings.last_word),
+      last_word(settings.host_watchdog),
       write_deadline(settings.write_deadline),
-      close_within(settings.close_within) {
+      close_within(settings.close_timeout) {
   try {
-    if (const int error = libusb_init(&context); error != 0) throw refusal(device, "libusb", error);
+    if (const int error = libusb_init(&context); error != 0) throw rejection_text(device, "libusb", error);
     find_and_open(device);
     check_identity(device);
     find_endpoints(device, settings);
@@ -194,46 +194,46 @@ UsbLink::Engine::Engine(const UsbDevice& device, const LinkSettings& settings)
   }
 }
 
-void UsbLink::Engine::find_and_open(const UsbDevice& device) {
+void UsbLink::TransferThread::find_and_open(const UsbDevice& device) {
   libusb_device** list = nullptr;
   const ssize_t n = libusb_get_device_list(context, &list);
-  if (n < 0) throw refusal(device, "list of devices", static_cast<int>(n));
+  if (n < 0) throw rejection_text(device, "list of devices", static_cast<int>(n));
   int error = LIBUSB_ERROR_NO_DEVICE;
   for (ssize_t i = 0; i < n; ++i)
-    if (place_of(list[i]) == device.place) error = libusb_open(list[i], &handle);
+    if (recording_path(list[i]) == device.port_path) error = libusb_open(list[i], &handle);
   libusb_free_device_list(list, 1);
-  if (error != 0) throw refusal(device, "open", error);
+  if (error != 0) throw rejection_text(device, "open", error);
 }
 
-void UsbLink::Engine::check_identity(const UsbDevice& device) const {
+void UsbLink::TransferThread::check_identity(const UsbDevice& device) const {
   libusb_device_descriptor descriptor{};
   libusb_get_device_descriptor(libusb_get_device(handle), &descriptor);
   UsbDevice found = device;
   found.vendor = descriptor.idVendor;
   found.product = descriptor.idProduct;
-  if (found.same_device(device) && !device.serial.empty()) {
+  if (found.is_same_device(device) && !device.serial.empty()) {
     std::array<unsigned char, 256> text{};
     const int n = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(),
                                                      static_cast<int>(text.size()));
     found.serial.assign(text.begin(), text.begin() + std::max(n, 0));
   }
-  if (!found.same_device(device))
-    throw std::runtime_error("in " + device.place + " is " + describe(found) + ", not " + describe(device) +
-                             ": nothing was written to it; look for the device anew");
+  if (!found.is_same_device(device))
+    throw std::runtime_error("in " + device.port_path + " is " + describe(found) + ", not " +
+                             describe(device) + ": nothing was written to it; look for the device anew");
 }
 
-void UsbLink::Engine::find_endpoints(const UsbDevice& device, const LinkSettings& settings) {
+void UsbLink::TransferThread::find_endpoints(const UsbDevice& device, const LinkSettings& settings) {
   libusb_config_descriptor* configuration = nullptr;
   if (const int error = libusb_get_active_config_descriptor(libusb_get_device(handle), &configuration);
       error != 0)
-    throw refusal(device, "configuration", error);
+    throw rejection_text(device, "configuration", error);
   std::optional<Endpoint> in;
   for (int i = 0; i < configuration->bNumInterfaces; ++i) {
     const libusb_interface& candidate = configuration->interface[i];
     if (candidate.num_altsetting < 1 || candidate.altsetting[0].bInterfaceNumber != interface) continue;
     is_hid = candidate.altsetting[0].bInterfaceClass == LIBUSB_CLASS_HID;
-    in = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_IN, settings.in);
-    out_endpoint = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_OUT, settings.out);
+    in = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_IN, settings.in_endpoint);
+    out_endpoint = find_endpoint(candidate.altsetting[0], LIBUSB_ENDPOINT_OUT, settings.out_endpoint);
   }
   libusb_free_config_descriptor(configuration);
   if (!in || in->packet_bytes == 0)
@@ -242,14 +242,14 @@ void UsbLink::Engine::find_endpoints(const UsbDevice& device, const LinkSettings
   in_endpoint = *in;
 }
 
-void UsbLink::Engine::claim(const UsbDevice& device) {
+void UsbLink::TransferThread::claim(const UsbDevice& device) {
   libusb_set_auto_detach_kernel_driver(handle, 1);
   if (const int error = libusb_claim_interface(handle, interface); error != 0)
-    throw refusal(device, "claim of the interface", error);
+    throw rejection_text(device, "claim of the interface", error);
   claimed = true;
 }
 
-void UsbLink::Engine::start_serial(const UsbDevice& device, const LinkSettings& settings) {
+void UsbLink::TransferThread::start_serial(const UsbDevice& device, const LinkSettings& settings) {
   if (!settings.start_serial) return;
   if (!out_endpoint)
     throw std::runtime_error(describe(device) + " has no OUT endpoint, so it is no serial chip");
@@ -259,9 +259,9 @@ void UsbLink::Engine::start_serial(const UsbDevice& device, const LinkSettings& 
 
 /// A transfer is as long as the longest report, in whole packets: a shorter packet ends it, a longer one
 /// could not be told from the next report.
-void UsbLink::Engine::prepare_in(const LinkSettings& settings) {
+void UsbLink::TransferThread::prepare_in(const LinkSettings& settings) {
   const std::size_t packet = in_endpoint.packet_bytes;
-  const std::size_t longest = std::max(settings.longest_report, packet);
+  const std::size_t longest = std::max(settings.max_report_bytes, packet);
   const std::size_t bytes = (longest + packet - 1) / packet * packet;
   for (In& in : ins) {
     in.engine = this;
@@ -276,7 +276,7 @@ void UsbLink::Engine::prepare_in(const LinkSettings& settings) {
 
 /// A HID device without an OUT endpoint takes its reports as SET_REPORT requests (HID 1.11 section 7.2.2):
 /// slower, and as good for what comes once in a while.
-void UsbLink::Engine::prepare_out() {
+void UsbLink::TransferThread::prepare_out() {
   if (!out_endpoint && !is_hid) return;
   out = libusb_alloc_transfer(0);
   if (out == nullptr) throw std::bad_alloc();
@@ -290,7 +290,7 @@ void UsbLink::Engine::prepare_out() {
 }
 
 /// The request that carries the report in out_packet.
-void UsbLink::Engine::write_request() noexcept {
+void UsbLink::TransferThread::write_request() noexcept {
   constexpr std::uint8_t kToInterface = 0x21, kSetReport = 9;
   constexpr unsigned kOutput = 2;
   const unsigned id = numbered_reports ? out_packet.bytes[0] : 0;
@@ -300,14 +300,14 @@ void UsbLink::Engine::write_request() noexcept {
   std::copy_n(out_packet.bytes.begin(), out_packet.length, out_request.begin() + LIBUSB_CONTROL_SETUP_SIZE);
 }
 
-UsbLink::Engine::~Engine() {
+UsbLink::TransferThread::~TransferThread() {
   closing.store(true, std::memory_order_release);
   writable.wake();
   thread.join();
   release();
 }
 
-void UsbLink::Engine::release() noexcept {
+void UsbLink::TransferThread::release() noexcept {
   for (In& in : ins) libusb_free_transfer(in.transfer);
   libusb_free_transfer(out);
   if (claimed) libusb_release_interface(handle, interface);  // the kernel's driver is attached again
@@ -317,7 +317,7 @@ void UsbLink::Engine::release() noexcept {
 
 // --- the link's thread ------------------------------------------------------------------------------------
 
-void UsbLink::Engine::run() noexcept {
+void UsbLink::TransferThread::run() noexcept {
   for (In& in : ins) submit(in);
   while (!finish()) {
     sleep();
@@ -329,8 +329,8 @@ void UsbLink::Engine::run() noexcept {
 
 /// The files to sleep on: the servo thread's wake-ups first, then libusb's. They stay the same while the
 /// device is open.
-void UsbLink::Engine::gather_files() {
-  files.push_back({writable.file(), POLLIN, 0});
+void UsbLink::TransferThread::gather_files() {
+  files.push_back({writable.fd(), POLLIN, 0});
   const libusb_pollfd** const of_libusb = libusb_get_pollfds(context);
   for (const libusb_pollfd** file = of_libusb; file != nullptr && *file != nullptr; ++file)
     files.push_back({(*file)->fd, (*file)->events, 0});
@@ -338,7 +338,7 @@ void UsbLink::Engine::gather_files() {
 }
 
 /// Until libusb has something to do, a command waits, or something is due.
-void UsbLink::Engine::sleep() noexcept {
+void UsbLink::TransferThread::sleep() noexcept {
   constexpr Duration kUnasked = std::chrono::milliseconds(100);  // if all else fails
   constexpr Duration kLookAgainAfter = std::chrono::milliseconds(2);
   const TimePoint now = std::chrono::steady_clock::now();
@@ -355,18 +355,18 @@ void UsbLink::Engine::sleep() noexcept {
   if (lost) timeout.tv_nsec = std::min<long>(timeout.tv_nsec, Duration(kLookAgainAfter).count());
   const int ready = ppoll(files.data(), lost ? 1 : files.size(), &timeout, nullptr);
   const bool written = ready > 0 && files[0].revents != 0;
-  if (written) writable.sleep();
+  if (written) writable.wait();
   if (ready > 0 && !lost && std::any_of(files.begin() + 1, files.end(), is_cut_off)) lose();
   if (ready == (written ? 1 : 0) && ready > 0) return;
   timeval none{0, 0};
   libusb_handle_events_timeout_completed(context, &none, nullptr);
 }
 
-bool UsbLink::Engine::flying() const noexcept {
+bool UsbLink::TransferThread::flying() const noexcept {
   return out_flying || std::any_of(ins.begin(), ins.end(), [](const In& in) { return in.flying; });
 }
 
-void UsbLink::Engine::submit(In& in) noexcept {
+void UsbLink::TransferThread::submit(In& in) noexcept {
   if (ending || gone.load(std::memory_order_relaxed)) return;
   const int error = libusb_submit_transfer(in.transfer);
   in.flying = error == 0;
@@ -374,9 +374,9 @@ void UsbLink::Engine::submit(In& in) noexcept {
   if (error != 0) in_failed = true;
 }
 
-void UsbLink::Engine::on_in(libusb_transfer* transfer) {
+void UsbLink::TransferThread::on_in(libusb_transfer* transfer) {
   In& in = *static_cast<In*>(transfer->user_data);
-  Engine& engine = *in.engine;
+  TransferThread& engine = *in.engine;
   in.flying = false;
   switch (transfer->status) {
     case LIBUSB_TRANSFER_COMPLETED:
@@ -397,18 +397,18 @@ void UsbLink::Engine::on_in(libusb_transfer* transfer) {
   engine.in_failed = true;
 }
 
-void UsbLink::Engine::take_packet(const libusb_transfer& transfer) noexcept {
+void UsbLink::TransferThread::take_packet(const libusb_transfer& transfer) noexcept {
   if (transfer.actual_length <= static_cast<int>(prefix_bytes)) return;
   const auto bytes =
       std::span<const std::uint8_t>(transfer.buffer, static_cast<std::size_t>(transfer.actual_length))
           .subspan(prefix_bytes);
   if (cut)
-    framer.take(bytes, [this](auto report) { take_report(report); });
+    framer.feed(bytes, [this](auto report) { take_report(report); });
   else
     take_report(bytes);
 }
 
-void UsbLink::Engine::take_report(std::span<const std::uint8_t> bytes) noexcept {
+void UsbLink::TransferThread::take_report(std::span<const std::uint8_t> bytes) noexcept {
   Packet packet;
   packet.length = bytes.size();
   std::copy_n(bytes.begin(), std::min(packet.length, packet.bytes.size()), packet.bytes.begin());
@@ -419,7 +419,7 @@ void UsbLink::Engine::take_report(std::span<const std::uint8_t> bytes) noexcept 
 
 /// Endpoints that were halted are cleared, and transfers that failed are sent again: the first time at once,
 /// but not for ever at full speed.
-void UsbLink::Engine::retry_failed() noexcept {
+void UsbLink::TransferThread::retry_failed() noexcept {
   const TimePoint now = std::chrono::steady_clock::now();
   if (ending || !(in_failed || out_halted) || now < retry_at) return;
   retry_at = now + kRetryAfter;
@@ -435,12 +435,12 @@ void UsbLink::Engine::retry_failed() noexcept {
     if (!in.flying) submit(in);
 }
 
-void UsbLink::Engine::write_newest() noexcept {
+void UsbLink::TransferThread::write_newest() noexcept {
   if (out == nullptr || out_flying || out_halted || ending || gone.load(std::memory_order_relaxed)) return;
   const bool heard = slot.take(out_packet);
   const TimePoint now = std::chrono::steady_clock::now();
-  if (heard) last_word.heard(now, out_packet);
-  if (!heard && !last_word.speak(now, out_packet)) return;
+  if (heard) last_word.feed(now, out_packet);
+  if (!heard && !last_word.send_zero(now, out_packet)) return;
   out->length = static_cast<int>(out_packet.length);
   if (!out_endpoint) {
     write_request();
@@ -451,33 +451,34 @@ void UsbLink::Engine::write_newest() noexcept {
   out_cancelled = false;
   out_until = now + write_deadline;
   if (error == LIBUSB_ERROR_NO_DEVICE) lose();
-  if (error != 0) slot.end(error == LIBUSB_ERROR_NO_DEVICE ? LinkStatus::gone : LinkStatus::empty);
+  if (error != 0)
+    slot.complete(error == LIBUSB_ERROR_NO_DEVICE ? LinkStatus::disconnected : LinkStatus::not_ready);
 }
 
 /// A command that the device does not take is old by then: the newest goes in its place. libusb's own
 /// timeouts would do the same, for two more system calls with each command.
-void UsbLink::Engine::cancel_overdue() noexcept {
+void UsbLink::TransferThread::cancel_overdue() noexcept {
   if (!out_flying || out_cancelled || std::chrono::steady_clock::now() < out_until) return;
   libusb_cancel_transfer(out);
   out_cancelled = true;
 }
 
-void UsbLink::Engine::on_out(libusb_transfer* transfer) {
-  Engine& engine = *static_cast<Engine*>(transfer->user_data);
+void UsbLink::TransferThread::on_out(libusb_transfer* transfer) {
+  TransferThread& engine = *static_cast<TransferThread*>(transfer->user_data);
   engine.out_flying = false;
   const bool whole = transfer->status == LIBUSB_TRANSFER_COMPLETED &&
                      transfer->actual_length == static_cast<int>(engine.out_packet.length);
   if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) engine.lose();
   if (transfer->status == LIBUSB_TRANSFER_STALL)
     engine.out_halted = engine.out_endpoint.has_value();  // a request that is refused halts nothing
-  engine.slot.end(whole                                           ? LinkStatus::ok
-                  : transfer->status == LIBUSB_TRANSFER_NO_DEVICE ? LinkStatus::gone
-                                                                  : LinkStatus::empty);
+  engine.slot.complete(whole                                           ? LinkStatus::ok
+                       : transfer->status == LIBUSB_TRANSFER_NO_DEVICE ? LinkStatus::disconnected
+                                                                       : LinkStatus::not_ready);
 }
 
 /// The end, step by step: what waits is written, in its time; then all transfers are called back. True when
 /// none is left.
-bool UsbLink::Engine::finish() noexcept {
+bool UsbLink::TransferThread::finish() noexcept {
   if (!closing.load(std::memory_order_acquire)) return false;
   const TimePoint now = std::chrono::steady_clock::now();
   if (!ending) {
@@ -493,7 +494,7 @@ bool UsbLink::Engine::finish() noexcept {
   return !flying();
 }
 
-void UsbLink::Engine::lose() noexcept {
+void UsbLink::TransferThread::lose() noexcept {
   gone.store(true, std::memory_order_release);
   readable.wake();
 }
@@ -509,50 +510,53 @@ UsbLink::~UsbLink() {
 
 void UsbLink::open() {
   close();
-  if (device_.place.empty()) throw std::runtime_error(describe(device_) + " is not on USB; use hidraw");
-  engine_ = std::make_unique<Engine>(device_, settings_);
+  if (device_.port_path.empty()) throw std::runtime_error(describe(device_) + " is not on USB; use hidraw");
+  transfers_ = std::make_unique<TransferThread>(device_, settings_);
 }
 
 LinkRead UsbLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
-  if (!engine_ || engine_->gone.load(std::memory_order_acquire)) return {LinkStatus::gone, 0, now};
+  if (!transfers_ || transfers_->gone.load(std::memory_order_acquire))
+    return {LinkStatus::disconnected, 0, now};
   Packet packet;
-  if (!engine_->ring.pop(packet)) return {LinkStatus::empty, 0, now};
+  if (!transfers_->ring.pop(packet)) return {LinkStatus::not_ready, 0, now};
   std::copy_n(packet.bytes.begin(), std::min({packet.length, packet.bytes.size(), buffer.size()}),
               buffer.begin());
   return {LinkStatus::ok, packet.length, packet.arrives};
 }
 
 LinkStatus UsbLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  if (!engine_ || engine_->gone.load(std::memory_order_relaxed)) return LinkStatus::gone;
-  if (engine_->out == nullptr) return LinkStatus::empty;
-  const LinkStatus status = engine_->slot.hand_over(now, report);
-  if (status != LinkStatus::gone) engine_->writable.wake();
+  if (!transfers_ || transfers_->gone.load(std::memory_order_relaxed)) return LinkStatus::disconnected;
+  if (transfers_->out == nullptr) return LinkStatus::not_ready;
+  const LinkStatus status = transfers_->slot.submit(now, report);
+  if (status != LinkStatus::disconnected) transfers_->writable.wake();
   return status;
 }
 
 void UsbLink::wait_readable(TimePoint deadline) noexcept {
-  while (engine_ && !engine_->gone.load(std::memory_order_acquire) && engine_->ring.read_available() == 0) {
-    if (wait_for_file(engine_->readable.file(), POLLIN, deadline) == 0) return;
-    engine_->readable.sleep();  // before the ring is looked at again, so that no wake-up is lost
+  while (transfers_ && !transfers_->gone.load(std::memory_order_acquire) &&
+         transfers_->ring.read_available() == 0) {
+    if (wait_for_fd(transfers_->readable.fd(), POLLIN, deadline) == 0) return;
+    transfers_->readable.wait();  // before the ring is looked at again, so that no wake-up is lost
   }
 }
 
 void UsbLink::close() noexcept {
-  engine_.reset();
+  transfers_.reset();
 }
 
 UsbLinkCounts UsbLink::counts() const noexcept {
-  if (!engine_) return {};
-  return {engine_->dropped.load(std::memory_order_relaxed), engine_->stalls.load(std::memory_order_relaxed),
-          engine_->errors.load(std::memory_order_relaxed)};
+  if (!transfers_) return {};
+  return {transfers_->dropped.load(std::memory_order_relaxed),
+          transfers_->stalls.load(std::memory_order_relaxed),
+          transfers_->errors.load(std::memory_order_relaxed)};
 }
 
 bool UsbLink::priority_granted() const noexcept {
-  return !engine_ || engine_->priority_granted;
+  return !transfers_ || transfers_->priority_granted;
 }
 
 const WriteSlot* UsbLink::slot() const noexcept {
-  return engine_ ? &engine_->slot : nullptr;
+  return transfers_ ? &transfers_->slot : nullptr;
 }
 
 }  // namespace wrenchd

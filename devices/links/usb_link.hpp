@@ -58,11 +58,11 @@ class UsbLink final : public ReportLink {
   const WriteSlot* slot() const noexcept;
 
  private:
-  struct Engine;  ///< libusb's side
+  struct TransferThread;  ///< libusb's side
 
   UsbDevice device_;
   LinkSettings settings_;
-  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<TransferThread> transfers_;
 };
 
 }  // namespace wrenchd

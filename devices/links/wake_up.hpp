@@ -17,7 +17,7 @@ namespace wrenchd {
 /// Sleeps until the file is ready for `events` (POLLIN, ...), has an error, or the deadline has passed, to
 /// the nanosecond as far as the kernel's timers go. Returns what the file is ready for, 0 for nothing. RT
 /// safe but for the sleep.
-inline short wait_for_file(int file, short events, TimePoint deadline) noexcept {
+inline short wait_for_fd(int file, short events, TimePoint deadline) noexcept {
   for (;;) {
     const Duration left = deadline - std::chrono::steady_clock::now();
     const Duration wait = left > Duration::zero() ? left : Duration::zero();
@@ -36,29 +36,29 @@ inline short wait_for_file(int file, short events, TimePoint deadline) noexcept 
 class WakeUp {
  public:
   /// Throws std::system_error where the system has no file descriptor left.
-  WakeUp() : file_(eventfd(0, EFD_CLOEXEC)) {
-    if (file_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  WakeUp() : fd_(eventfd(0, EFD_CLOEXEC)) {
+    if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   }
-  ~WakeUp() { ::close(file_); }
+  ~WakeUp() { ::close(fd_); }
   WakeUp(const WakeUp&) = delete;
   WakeUp& operator=(const WakeUp&) = delete;
 
   /// RT safe.
-  void wake() noexcept { eventfd_write(file_, 1); }
+  void wake() noexcept { eventfd_write(fd_, 1); }
   /// Sleeps until the next wake-up and takes it; at once where one waits.
-  void sleep() noexcept {
+  void wait() noexcept {
     eventfd_t ignored = 0;
-    eventfd_read(file_, &ignored);
+    eventfd_read(fd_, &ignored);
   }
   /// The same, until the deadline at most.
-  void sleep_until(TimePoint deadline) noexcept {
-    if (deadline == TimePoint::max() || wait_for_file(file_, POLLIN, deadline) != 0) sleep();
+  void wait_until(TimePoint deadline) noexcept {
+    if (deadline == TimePoint::max() || wait_for_fd(fd_, POLLIN, deadline) != 0) wait();
   }
   /// Readable while a wake-up waits.
-  int file() const noexcept { return file_; }
+  int fd() const noexcept { return fd_; }
 
  private:
-  int file_;
+  int fd_;
 };
 
 }  // namespace wrenchd

@@ -5,13 +5,13 @@
 
 namespace wrenchd {
 
-LinkStatus WriteSlot::hand_over(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  if (gone()) return LinkStatus::gone;
-  if (report.size() > kMaxReportBytes) return LinkStatus::empty;
+LinkStatus WriteSlot::submit(TimePoint now, std::span<const std::uint8_t> report) noexcept {
+  if (disconnected()) return LinkStatus::disconnected;
+  if (report.size() > kMaxReportBytes) return LinkStatus::not_ready;
 
-  const std::uint64_t ended = ended_.load(std::memory_order_acquire);
-  if (ended == handed_ || ended != ended_seen_) waiting_since_ = now;
-  ended_seen_ = ended;
+  const std::uint64_t ended = completed_.load(std::memory_order_acquire);
+  if (ended == submitted_ || ended != completed_seen_) waiting_since_ = now;
+  completed_seen_ = ended;
   const std::uint64_t failed_so_far = failed();
   const bool failed_now = failed_so_far != failed_seen_;
   failed_seen_ = failed_so_far;
@@ -20,13 +20,13 @@ LinkStatus WriteSlot::hand_over(TimePoint now, std::span<const std::uint8_t> rep
   std::copy(report.begin(), report.end(), next.packet.bytes.begin());
   next.packet.length = report.size();
   next.packet.arrives = now;
-  next.number = ++handed_;
+  next.number = ++submitted_;
   slot_.write(next);
-  return failed_now || overdue(now) ? LinkStatus::empty : LinkStatus::ok;
+  return failed_now || overdue(now) ? LinkStatus::not_ready : LinkStatus::ok;
 }
 
 bool WriteSlot::overdue(TimePoint now) const noexcept {
-  return ended_.load(std::memory_order_acquire) != handed_ && now - waiting_since_ > deadline_;
+  return completed_.load(std::memory_order_acquire) != submitted_ && now - waiting_since_ > deadline_;
 }
 
 bool WriteSlot::take(Packet& packet) noexcept {
@@ -38,10 +38,10 @@ bool WriteSlot::take(Packet& packet) noexcept {
   return true;
 }
 
-void WriteSlot::end(LinkStatus status) noexcept {
-  if (status == LinkStatus::gone) gone_.store(true, std::memory_order_relaxed);
+void WriteSlot::complete(LinkStatus status) noexcept {
+  if (status == LinkStatus::disconnected) disconnected_.store(true, std::memory_order_relaxed);
   (status == LinkStatus::ok ? written_ : failed_).fetch_add(1, std::memory_order_relaxed);
-  ended_.store(taken_, std::memory_order_release);
+  completed_.store(taken_, std::memory_order_release);
 }
 
 }  // namespace wrenchd

@@ -29,7 +29,7 @@ class WriteSlot {
   ///   empty  likewise, but the writer is overdue, or a write failed since the last report; or the report is
   ///          longer than any report may be, and was not taken
   ///   gone   the device is not there any more; the report was not taken
-  LinkStatus hand_over(TimePoint now, std::span<const std::uint8_t> report) noexcept;
+  LinkStatus submit(TimePoint now, std::span<const std::uint8_t> report) noexcept;
   /// A report waits, and no write ended for longer than the deadline.
   bool overdue(TimePoint now) const noexcept;
 
@@ -38,11 +38,11 @@ class WriteSlot {
   /// The newest report, if there is one that was not taken yet. Each one taken must be ended.
   bool take(Packet& packet) noexcept;
   /// The report taken last was written (ok), could not be (empty), or there is nobody to write to (gone).
-  void end(LinkStatus status) noexcept;
+  void complete(LinkStatus status) noexcept;
 
   // --- by anybody ---
 
-  bool gone() const noexcept { return gone_.load(std::memory_order_relaxed); }
+  bool disconnected() const noexcept { return disconnected_.load(std::memory_order_relaxed); }
   std::uint64_t written() const noexcept { return written_.load(std::memory_order_relaxed); }
   std::uint64_t failed() const noexcept { return failed_.load(std::memory_order_relaxed); }
   /// Reports that a newer one took the place of.
@@ -58,19 +58,19 @@ class WriteSlot {
   LatestValue<Numbered> slot_;
 
   // The servo thread's.
-  std::uint64_t handed_ = 0;       ///< number of the last report handed over
-  std::uint64_t ended_seen_ = 0;   ///< what ended_ was when progress was last seen
-  std::uint64_t failed_seen_ = 0;  ///< failures already told
-  TimePoint waiting_since_{};      ///< when there was last progress, or nothing waiting
+  std::uint64_t submitted_ = 0;       ///< number of the last report handed over
+  std::uint64_t completed_seen_ = 0;  ///< what completed_ was when progress was last seen
+  std::uint64_t failed_seen_ = 0;     ///< failures already told
+  TimePoint waiting_since_{};         ///< when there was last progress, or nothing waiting
 
   // The writer's.
   std::uint64_t taken_ = 0;
 
-  std::atomic<std::uint64_t> ended_{0};  ///< number of the last report whose write came to an end
+  std::atomic<std::uint64_t> completed_{0};  ///< number of the last report whose write came to an end
   std::atomic<std::uint64_t> written_{0};
   std::atomic<std::uint64_t> failed_{0};
   std::atomic<std::uint64_t> replaced_{0};
-  std::atomic<bool> gone_{false};
+  std::atomic<bool> disconnected_{false};
 };
 
 }  // namespace wrenchd

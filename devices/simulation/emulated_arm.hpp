@@ -13,13 +13,13 @@ class EmulatedArm : public EmulatedDevice {
   /// The handle is moved: where the encoders stand, to the nearest count, in the order of the report.
   virtual void set_counts(const JointCounts& counts) noexcept = 0;
   /// What the motors do, in the unit that a profile's efforts have.
-  virtual MotorEfforts motors() const noexcept = 0;
+  virtual MotorEfforts motor_efforts() const noexcept = 0;
 
   /// What a driver does with it before the first report. Not RT safe.
   virtual void start() {}
   /// Whether the person shall do now what tells the encoders where they are; home() is that.
-  virtual bool wants_homing() const noexcept { return false; }
-  virtual void home() noexcept {}
+  virtual bool homing_requested() const noexcept { return false; }
+  virtual void perform_homing() noexcept {}
 };
 
 }  // namespace wrenchd

@@ -36,8 +36,8 @@ class EmulatedDevice {
   /// std::invalid_argument where a device of this kind cannot have it. Not RT safe.
   virtual void inject(const SimulatedFault& fault) { faults_.add(fault); }
   /// Whether a fault of this kind shows at any moment from..to.
-  bool shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
-    return faults_.shows(kind, from, to);
+  bool fault_active_during(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
+    return faults_.active_during(kind, from, to);
   }
   const FaultPlan& faults() const noexcept { return faults_; }
 

@@ -35,14 +35,14 @@ void EmulatedFalcon::control(std::uint8_t request, std::uint16_t value) {
   if (request == kFtdiModemControl && (value & 0x0100u) != 0) {
     const bool up = (value & 1u) != 0;
     if (up && !dtr_) {  // the rising edge resets the processor into its loader
-      state_ = State::listening;
+      state_ = State::awaiting_handshake;
       homed_ = homing_ = false;
       firmware_.clear();
-      heard_.clear();
+      handshake_bytes_.clear();
     }
     dtr_ = up;
   }
-  if (request == kFtdiReset) answer_.clear();
+  if (request == kFtdiReset) reply_bytes_.clear();
   if (request != kFtdiBaudRate) return;
   divisor_ = value;
   if (value == kFtdiPacketSpeed && state_ == State::loading && !firmware_.empty()) state_ = State::running;
@@ -52,14 +52,14 @@ void EmulatedFalcon::write(std::span<const std::uint8_t> bytes) {
   if (state_ == State::running) {
     if (!take_command({}, bytes)) return;
     const std::array<std::uint8_t, kPacket> answer = packet();
-    answer_.assign(answer.begin(), answer.end());
+    reply_bytes_.assign(answer.begin(), answer.end());
     reply_due_ = false;
     return;
   }
-  if (state_ == State::loading && spoilt_ > 0) {
-    --spoilt_;
-    answer_.assign(bytes.begin(), bytes.end());
-    answer_.back() ^= 0x40;
+  if (state_ == State::loading && echoes_to_corrupt_ > 0) {
+    --echoes_to_corrupt_;
+    reply_bytes_.assign(bytes.begin(), bytes.end());
+    reply_bytes_.back() ^= 0x40;
     return;
   }
   for (const std::uint8_t byte : bytes) take_serial(byte);
@@ -68,45 +68,46 @@ void EmulatedFalcon::write(std::span<const std::uint8_t> bytes) {
 /// Three bytes at 9600 baud are the greeting; at the loader's speed an 'A' asks whether it is ready, and what
 /// follows is firmware, each byte echoed.
 void EmulatedFalcon::take_serial(std::uint8_t byte) {
-  if (state_ == State::listening && dtr_ && divisor_ == kFtdi9600Baud) {
-    heard_.push_back(byte);
-    if (heard_.size() > kHello.size()) heard_.erase(heard_.begin());
-    if (!std::equal(heard_.begin(), heard_.end(), kHello.begin(), kHello.end())) return;
-    heard_.clear();
-    if (ignored_ > 0)
-      --ignored_;
+  if (state_ == State::awaiting_handshake && dtr_ && divisor_ == kFtdi9600Baud) {
+    handshake_bytes_.push_back(byte);
+    if (handshake_bytes_.size() > kHello.size()) handshake_bytes_.erase(handshake_bytes_.begin());
+    if (!std::equal(handshake_bytes_.begin(), handshake_bytes_.end(), kHello.begin(), kHello.end())) return;
+    handshake_bytes_.clear();
+    if (handshakes_to_ignore_ > 0)
+      --handshakes_to_ignore_;
     else
-      answer_.assign(kHelloBack.begin(), kHelloBack.end());
+      reply_bytes_.assign(kHelloBack.begin(), kHelloBack.end());
     return;
   }
   if (divisor_ != kFtdiLoaderSpeed || dtr_) return;
-  if (state_ == State::listening && byte == kNibble) {
+  if (state_ == State::awaiting_handshake && byte == kNibble) {
     state_ = State::loading;
-    answer_.push_back(byte);
+    reply_bytes_.push_back(byte);
   } else if (state_ == State::loading) {
     firmware_.push_back(byte);
-    answer_.push_back(byte);
+    reply_bytes_.push_back(byte);
   }
 }
 
 std::vector<std::uint8_t> EmulatedFalcon::read(std::size_t most) {
-  const auto count = static_cast<std::ptrdiff_t>(std::min(most, answer_.size()));
-  std::vector<std::uint8_t> bytes(answer_.begin(), answer_.begin() + count);
-  answer_.erase(answer_.begin(), answer_.begin() + count);
+  const auto count = static_cast<std::ptrdiff_t>(std::min(most, reply_bytes_.size()));
+  std::vector<std::uint8_t> bytes(reply_bytes_.begin(), reply_bytes_.begin() + count);
+  reply_bytes_.erase(reply_bytes_.begin(), reply_bytes_.begin() + count);
   return bytes;
 }
 
 // --- running ----------------------------------------------------------------------------------------------
 
-void EmulatedFalcon::pull_out_and_push_in() noexcept {
+void EmulatedFalcon::perform_homing_motion() noexcept {
   if (homing_) homed_ = true;
 }
 
 void EmulatedFalcon::set_counts(const JointCounts& counts) noexcept {
-  for (std::size_t i = 0; i < turned_.size(); ++i) turned_[i] = static_cast<int>(std::lround(counts[i]));
+  for (std::size_t i = 0; i < true_counts_.size(); ++i)
+    true_counts_[i] = static_cast<int>(std::lround(counts[i]));
 }
 
-MotorEfforts EmulatedFalcon::motors() const noexcept {
+MotorEfforts EmulatedFalcon::motor_efforts() const noexcept {
   return {static_cast<double>(efforts_[0]), static_cast<double>(efforts_[1]),
           static_cast<double>(efforts_[2])};
 }
@@ -120,7 +121,7 @@ bool EmulatedFalcon::take_command(TimePoint, std::span<const std::uint8_t> bytes
   if (state_ != State::running || bytes.size() != kPacket || bytes.front() != kBegin || bytes.back() != kEnd)
     return false;
   for (std::size_t i = 0; i < 3; ++i)
-    efforts_[i] = std::clamp(word(bytes.subspan(1 + 4 * i, 4)), -kMostEffort, kMostEffort);
+    efforts_[i] = std::clamp(word(bytes.subspan(1 + 4 * i, 4)), -kMaxEffort, kMaxEffort);
   const unsigned bits = bytes[13] - unsigned{kNibble};
   lights_ = bits & kLights;
   homing_ = (bits & kHomingBit) != 0;
@@ -145,15 +146,15 @@ std::array<std::uint8_t, 16> EmulatedFalcon::packet() const noexcept {
   packet.front() = kBegin;
   packet.back() = kEnd;
   for (std::size_t i = 0; i < 3; ++i)
-    put_word(std::span(packet).subspan(1 + 4 * i, 4), turned_[i] - (homed_ ? 0 : began_at_[i]));
+    put_word(std::span(packet).subspan(1 + 4 * i, 4), true_counts_[i] - (homed_ ? 0 : power_on_counts_[i]));
   packet[13] = static_cast<std::uint8_t>(kNibble + buttons_ + (homed_ ? 0x70u : 0u));
   return packet;
 }
 
 void EmulatedFalcon::send(ReportSink& host) noexcept {
   reply_due_ = false;
-  const bool cut = short_ > 0;
-  if (cut) --short_;
+  const bool cut = packets_to_truncate_ > 0;
+  if (cut) --packets_to_truncate_;
   const std::array<std::uint8_t, kPacket> whole = packet();
   host.take_report(next_frame_, std::span(whole).first(cut ? kShortPacket : kPacket));
 }

@@ -18,34 +18,35 @@ int word(std::span<const std::uint8_t> bytes, std::size_t i) noexcept {
 
 void EmulatedPolhem::advance_to(TimePoint t, ReportSink& host) noexcept {
   if (!powered_) {
-    powered_ = may_send_ = true;
+    powered_ = reply_due_ = true;
     faults_.power_on(t);
     next_frame_ = t;
   }
   for (; next_frame_ <= t; next_frame_ += kFrame) {
-    if (amplifiers_on_ && next_frame_ - heard_ >= kWatchdog) {
+    if (amplifiers_on_ && next_frame_ - last_command_at_ >= kWatchdog) {
       amplifiers_on_ = false;
       currents_mA_ = {};
     }
-    if (may_send_) send(host);
+    if (reply_due_) send(host);
   }
 }
 
 void EmulatedPolhem::set_counts(const JointCounts& counts) noexcept {
-  for (std::size_t i = 0; i < turned_.size(); ++i) turned_[i] = static_cast<int>(std::lround(counts[i]));
+  for (std::size_t i = 0; i < encoder_counts_.size(); ++i)
+    encoder_counts_[i] = static_cast<int>(std::lround(counts[i]));
 }
 
-MotorEfforts EmulatedPolhem::motors() const noexcept {
+MotorEfforts EmulatedPolhem::motor_efforts() const noexcept {
   return {1e-3 * currents_mA_[0], 1e-3 * currents_mA_[1], 1e-3 * currents_mA_[2]};
 }
 
 void EmulatedPolhem::send(ReportSink& host) noexcept {
-  may_send_ = false;
+  reply_due_ = false;
   ++reports_sent_;
   std::array<int, 7> words{};
-  for (std::size_t i = 0; i < 6; ++i) words[i] = turned_[i] + offset_[i];
-  if (pressed_) words[3] += kButtonInEncoderD;
-  words[6] = info_ ? 1 : 0;
+  for (std::size_t i = 0; i < 6; ++i) words[i] = encoder_counts_[i] + counter_offsets_[i];
+  if (handle_button_) words[3] += kButtonInEncoderD;
+  words[6] = calibration_button_ ? 1 : 0;
   std::array<std::uint8_t, kMaxReportBytes> report{};
   for (std::size_t i = 0; i < words.size(); ++i) {
     const auto word = static_cast<std::uint16_t>(words[i]);
@@ -57,16 +58,16 @@ void EmulatedPolhem::send(ReportSink& host) noexcept {
 
 bool EmulatedPolhem::take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != report_bytes_ || bytes.size() < kUsedBytes) return false;
-  may_send_ = true;
-  heard_ = now;
+  reply_due_ = true;
+  last_command_at_ = now;
   amplifiers_on_ = true;
   currents_mA_ = {};
   if (word(bytes, 3) == 1) {  // attributes are counters a, b, c; where currents stand, d, e, f
     for (std::size_t i = 0; i < 3; ++i) {
-      offset_[i] = word(bytes, 4 + i) - turned_[i];
-      offset_[3 + i] = word(bytes, i) - turned_[3 + i];
+      counter_offsets_[i] = word(bytes, 4 + i) - encoder_counts_[i];
+      counter_offsets_[3 + i] = word(bytes, i) - encoder_counts_[3 + i];
     }
-    info_ = false;
+    calibration_button_ = false;
     return true;
   }
   for (std::size_t i = 0; i < 3; ++i) currents_mA_[i] = word(bytes, i);

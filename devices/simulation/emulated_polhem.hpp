@@ -21,17 +21,17 @@ class EmulatedPolhem final : public EmulatedArm {
   explicit EmulatedPolhem(std::size_t report_bytes) : report_bytes_(report_bytes) {}
 
   /// The hand turns the encoders: what they count since power-on, a to f.
-  void turn(const std::array<int, 6>& counts) noexcept { turned_ = counts; }
+  void set_encoder_counts(const std::array<int, 6>& counts) noexcept { encoder_counts_ = counts; }
   /// The button on the handle, which the host finds in encoder d, and the one on the board.
-  void press(bool pressed) noexcept { pressed_ = pressed; }
-  void ask_for_calibration() noexcept { info_ = true; }
+  void set_handle_button(bool pressed) noexcept { handle_button_ = pressed; }
+  void press_calibration_button() noexcept { calibration_button_ = true; }
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept override;
   TimePoint next_event() const noexcept override { return next_frame_; }
 
   void set_counts(const JointCounts& counts) noexcept override;
-  MotorEfforts motors() const noexcept override;  ///< [A]
+  MotorEfforts motor_efforts() const noexcept override;  ///< [A]
 
   bool amplifiers_on() const noexcept { return amplifiers_on_; }
   const std::array<int, 3>& currents_mA() const noexcept { return currents_mA_; }  ///< 0 while they are off
@@ -42,14 +42,14 @@ class EmulatedPolhem final : public EmulatedArm {
 
   std::size_t report_bytes_;
   bool powered_ = false;
-  bool may_send_ = false;   ///< it has been spoken to since the last report
+  bool reply_due_ = false;  ///< it has been spoken to since the last report
   TimePoint next_frame_{};  ///< USB asks once a millisecond
-  TimePoint heard_{};
-  std::array<int, 6> turned_{};
-  std::array<int, 6> offset_{};  ///< counters are set by command 1
+  TimePoint last_command_at_{};
+  std::array<int, 6> encoder_counts_{};
+  std::array<int, 6> counter_offsets_{};  ///< counters are set by command 1
   std::array<int, 3> currents_mA_{};
   bool amplifiers_on_ = false;
-  bool pressed_ = false, info_ = false;
+  bool handle_button_ = false, calibration_button_ = false;
   std::uint64_t reports_sent_ = 0;
 };
 

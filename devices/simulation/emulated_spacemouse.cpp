@@ -20,7 +20,7 @@ void put(std::span<std::uint8_t> bytes, std::span<const int> counts) noexcept {
 
 }  // namespace
 
-void EmulatedSpaceMouse::push(const std::array<int, 6>& counts) noexcept {
+void EmulatedSpaceMouse::set_deflection(const std::array<int, 6>& counts) noexcept {
   for (std::size_t i = 0; i < counts.size(); ++i) counts_[i] = std::clamp(counts[i], -kFullScale, kFullScale);
   zeros_left_ = kZeroPackets;
 }
@@ -30,18 +30,18 @@ void EmulatedSpaceMouse::advance_to(TimePoint t, ReportSink& host) noexcept {
   if (!powered_) {
     powered_ = true;
     faults_.power_on(t);
-    next_ = t + period;
+    next_packet_at_ = t + period;
   }
-  for (; next_ <= t; next_ += period) send(host);
+  for (; next_packet_at_ <= t; next_packet_at_ += period) send(host);
 }
 
 void EmulatedSpaceMouse::send(ReportSink& host) noexcept {
-  if (silent_) return;
+  if (sending_stopped_) return;
   if (buttons_ != buttons_sent_) {
     buttons_sent_ = buttons_;
     const std::array<std::uint8_t, 3> report = {3, static_cast<std::uint8_t>(buttons_ & 0xffu),
                                                 static_cast<std::uint8_t>(buttons_ >> 8 & 0xffu)};
-    host.take_report(next_, report);
+    host.take_report(next_packet_at_, report);
   }
   const bool at_rest = std::all_of(counts_.begin(), counts_.end(), [](int c) { return c == 0; });
   if (at_rest && zeros_left_ == 0) return;
@@ -50,13 +50,13 @@ void EmulatedSpaceMouse::send(ReportSink& host) noexcept {
   if (format_ == Format::combined) {
     std::array<std::uint8_t, 13> report = {1};
     put(std::span(report).subspan(1), counts);
-    host.take_report(next_, report);
+    host.take_report(next_packet_at_, report);
     return;
   }
   std::array<std::uint8_t, 7> report = {static_cast<std::uint8_t>(rotation_next_ ? 2 : 1)};
   put(std::span(report).subspan(1), counts.subspan(rotation_next_ ? 3 : 0, 3));
   rotation_next_ = !rotation_next_;
-  host.take_report(next_, report);
+  host.take_report(next_packet_at_, report);
 }
 
 bool EmulatedSpaceMouse::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {

@@ -20,14 +20,14 @@ class EmulatedSpaceMouse final : public EmulatedDevice {
   explicit EmulatedSpaceMouse(Format format) : format_(format) {}
 
   /// The hand pushes the cap this far, in counts: x right, y toward the user, z down; rotations about them.
-  void push(const std::array<int, 6>& counts) noexcept;
-  void press(std::uint32_t buttons) noexcept { buttons_ = buttons; }
+  void set_deflection(const std::array<int, 6>& counts) noexcept;
+  void set_buttons(std::uint32_t buttons) noexcept { buttons_ = buttons; }
   /// A fault: nothing is sent any more, zeros neither.
-  void fall_silent() noexcept { silent_ = true; }
+  void stop_sending() noexcept { sending_stopped_ = true; }
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept override;
-  TimePoint next_event() const noexcept override { return next_; }
+  TimePoint next_event() const noexcept override { return next_packet_at_; }
 
   bool led() const noexcept { return led_; }
 
@@ -35,8 +35,8 @@ class EmulatedSpaceMouse final : public EmulatedDevice {
   void send(ReportSink& host) noexcept;
 
   Format format_;
-  bool powered_ = false, silent_ = false;
-  TimePoint next_{};  ///< when the next packet may leave
+  bool powered_ = false, sending_stopped_ = false;
+  TimePoint next_packet_at_{};  ///< when the next packet may leave
   std::array<int, 6> counts_{};
   int zeros_left_ = 0;  ///< packets of zeros still to be sent
   bool rotation_next_ = false;

@@ -16,11 +16,11 @@ class FaultPlan {
   /// From here times count. RT safe.
   void power_on(TimePoint now) noexcept { power_on_ = now; }
   /// Whether a fault of this kind shows at any moment from..to. RT safe.
-  bool shows(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
+  bool active_during(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
     return find(kind, from, to) != nullptr;
   }
   /// The first fault of this kind that shows now; null where there is none. RT safe.
-  const SimulatedFault* at(SimulatedFault::Kind kind, TimePoint now) const noexcept {
+  const SimulatedFault* active_at(SimulatedFault::Kind kind, TimePoint now) const noexcept {
     return find(kind, now, now);
   }
   /// When a fault began, and when it is over.

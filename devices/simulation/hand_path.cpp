@@ -58,18 +58,18 @@ HandPath::HandPath(const std::vector<Waypoint>& waypoints, bool repeats) : repea
                          to.translation_m - from.translation_m,
                          rotation_vector(to.rotation * from.rotation.conjugate())});
   }
-  last_.X_BG = pose_of(waypoints.back());
+  final_target_.X_BG = pose_of(waypoints.back());
   end_ = from_seconds(waypoints.back().time_s);
 }
 
 HandPath::HandPath(const SimulationSettings& settings)
     : HandPath(settings.hand_path, settings.playback_path.empty() && settings.hand_repeats) {
-  if (!settings.playback_path.empty()) track_.emplace(settings.playback_path);
+  if (!settings.playback_path.empty()) spline_.emplace(settings.playback_path);
 }
 
 HandTarget HandPath::at(Duration since_start) const noexcept {
-  if (track_) return track_->at(since_start);
-  if (segments_.empty() || (!repeats_ && since_start >= end_)) return last_;
+  if (spline_) return spline_->at(since_start);
+  if (segments_.empty() || (!repeats_ && since_start >= end_)) return final_target_;
   const Duration t = std::max(since_start, Duration{0}) % end_;
   const auto next = std::upper_bound(segments_.begin(), segments_.end(), t,
                                      [](Duration time, const Segment& s) { return time < s.start; });
@@ -78,9 +78,9 @@ HandTarget HandPath::at(Duration since_start) const noexcept {
   const double u = seconds(t - segment.start) / seconds(segment.length);
   const double s = u * u * u * (10.0 + u * (-15.0 + 6.0 * u));
   const double s_rate_Hz = 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds(segment.length);
-  return {{rotation_from(s * segment.turn_rad) * segment.X_BG.rotation,
-           segment.X_BG.translation_m + s * segment.way_m},
-          {s_rate_Hz * segment.way_m, s_rate_Hz * segment.turn_rad}};
+  return {{rotation_from(s * segment.rotation_rad) * segment.X_BG.rotation,
+           segment.X_BG.translation_m + s * segment.translation_m},
+          {s_rate_Hz * segment.translation_m, s_rate_Hz * segment.rotation_rad}};
 }
 
 }  // namespace wrenchd

@@ -12,7 +12,7 @@
 namespace wrenchd {
 
 /// Whether the handle is where the path is, whatever the device pushes with.
-inline bool is_led(const SimulationSettings& settings) noexcept {
+inline bool has_prescribed_motion(const SimulationSettings& settings) noexcept {
   return !settings.playback_path.empty() && settings.playback_mode == PlaybackMode::open;
 }
 
@@ -26,7 +26,7 @@ class HandPath {
   /// strictly from 0, or a path that repeats does not end where it began (to 1e-9 in each coordinate).
   HandPath(const std::vector<Waypoint>& waypoints, bool repeats);
   /// What the settings say: the path to be played back where there is one, else the script. Throws as above
-  /// and as PoseTrack does.
+  /// and as PoseSpline does.
   explicit HandPath(const SimulationSettings& settings);
 
   /// The target this long after the path began. After the last waypoint the path starts again, or the hand
@@ -37,16 +37,16 @@ class HandPath {
   struct Segment {
     Duration start;
     Duration length;
-    Pose X_BG;          ///< at the start
-    Vector3d way_m;     ///< from the start to the end, in B
-    Vector3d turn_rad;  ///< rotation vector from the start to the end, in B
+    Pose X_BG;               ///< at the start
+    Vector3d translation_m;  ///< from the start to the end, in B
+    Vector3d rotation_rad;   ///< rotation vector from the start to the end, in B
   };
 
   std::vector<Segment> segments_;  ///< one a pair of waypoints
-  HandTarget last_;
+  HandTarget final_target_;
   Duration end_{};
   bool repeats_;
-  std::optional<PoseTrack> track_;  ///< in the place of all of the above
+  std::optional<PoseSpline> spline_;  ///< in the place of all of the above
 };
 
 }  // namespace wrenchd

@@ -21,25 +21,25 @@ constexpr int kStartSteps = 100;
 
 }  // namespace
 
-HeldArm::HeldArm(const DeviceProfile& profile, const SimulationSettings& settings,
-                 std::unique_ptr<EmulatedArm> arm)
+SimulatedArm::SimulatedArm(const DeviceProfile& profile, const SimulationSettings& settings,
+                           std::unique_ptr<EmulatedArm> arm)
     : kinematics_(profile.kinematics),
       X_BD_(profile.X_BD),
       X_DB_(inverse(profile.X_BD)),
       X_EH_(profile.X_EH),
       X_HE_(inverse(profile.X_EH)),
-      turns_(profile.kinematics.joints == kMaxJoints),
+      has_wrist_(profile.kinematics.joints == kMaxJoints),
       path_(settings),
-      led_(is_led(settings)),
+      prescribed_motion_(has_prescribed_motion(settings)),
       arm_(std::move(arm)),
-      handle_(settings, start(profile.name), seconds(kSubstep)),
-      place_(*place_of(handle_.X_BH())) {
-  stand_at(handle_.X_BH());
+      handle_(settings, start_pose(profile.name), seconds(kSubstep)),
+      configuration_(*find_configuration(handle_.X_BH())) {
+  set_encoders(handle_.X_BH());
 }
 
 /// The last place within reach on the way from home to the first waypoint.
-Pose HeldArm::start(const std::string& profile) const {
-  const std::optional<Pose> X_DE_home = home(kinematics_);
+Pose SimulatedArm::start_pose(const std::string& profile) const {
+  const std::optional<Pose> X_DE_home = home_pose(kinematics_);
   if (!X_DE_home)
     throw std::invalid_argument(
         "device profile " + profile +
@@ -51,63 +51,63 @@ Pose HeldArm::start(const std::string& profile) const {
     const double s = static_cast<double>(i) / kStartSteps;
     const Pose X_BH{X_BH_home.rotation.slerp(s, wanted.rotation),
                     (1.0 - s) * X_BH_home.translation_m + s * wanted.translation_m};
-    if (!place_of(X_BH)) break;
+    if (!find_configuration(X_BH)) break;
     reached = X_BH;
   }
   return reached;
 }
 
-void HeldArm::inject(const SimulatedFault& fault) {
+void SimulatedArm::inject(const SimulatedFault& fault) {
   if (fault.kind == SimulatedFault::Kind::bad_quaternion)
     throw std::invalid_argument("an arm sends encoder counts, and no quaternion that could be bad");
-  if (!is_of_the_wire(fault.kind) && fault.kind != SimulatedFault::Kind::teleport)
+  if (!affects_link(fault.kind) && fault.kind != SimulatedFault::Kind::jump)
     throw std::invalid_argument("an emulated arm has no such fault; the loopback device has");
   faults_.add(fault);
 }
 
-HandTarget HeldArm::target_at(Duration since_start) const noexcept {
+HandTarget SimulatedArm::target_at(Duration since_start) const noexcept {
   HandTarget target = path_.at(since_start);
-  if (turns_) return target;
+  if (has_wrist_) return target;
   target.X_BG.rotation = X_BD_.rotation * X_EH_.rotation;
   target.V_BG.angular_rad_per_s.setZero();
   return target;
 }
 
-std::optional<HeldArm::Place> HeldArm::place_of(const Pose& X_BH) const noexcept {
+std::optional<SimulatedArm::Configuration> SimulatedArm::find_configuration(const Pose& X_BH) const noexcept {
   const Pose X_DE = X_DB_ * X_BH * X_HE_;
   const std::optional<JointAngles> angles = wrenchd::inverse(kinematics_, X_DE);
   if (!angles) return {};
-  return Place{X_DE, *angles};
+  return Configuration{X_DE, *angles};
 }
 
 /// About the handle point, in the base. Where the arm is stretched out its motors hold nothing.
-Wrench HeldArm::motor_demand() const noexcept {
-  const Matrix3d J = jacobian(kinematics_, place_.angles, place_.X_DE);
+Wrench SimulatedArm::motor_demand() const noexcept {
+  const Matrix3d J = jacobian(kinematics_, configuration_.angles, configuration_.X_DE);
   Matrix3d J_inverse;
   bool invertible = false;
   J.computeInverseWithCheck(J_inverse, invertible);
-  const Vector3d tau_Nm = joint_torques(kinematics_, arm_->motors());
+  const Vector3d tau_Nm = joint_torques(kinematics_, arm_->motor_efforts());
   if (!invertible || !is_finite(tau_Nm)) return {};
   const Wrench F_D = shifted(Wrench{J_inverse.transpose() * tau_Nm, Vector3d::Zero()},
-                             place_.X_DE.rotation * X_EH_.translation_m);
+                             configuration_.X_DE.rotation * X_EH_.translation_m);
   Wrench F_B = expressed(X_BD_.rotation, F_D);
-  if (!turns_) F_B.torque_Nm.setZero();  // its bearings take it
+  if (!has_wrist_) F_B.torque_Nm.setZero();  // its bearings take it
   return F_B;
 }
 
 /// Turns the encoders. What a fault adds is halved until the arm could be there.
-void HeldArm::stand_at(const Pose& X_BH) noexcept {
-  Place seen = place_;
-  if (shows(SimulatedFault::Kind::teleport, now_, now_)) {
-    std::optional<Place> elsewhere;
+void SimulatedArm::set_encoders(const Pose& X_BH) noexcept {
+  Configuration seen = configuration_;
+  if (fault_active_during(SimulatedFault::Kind::jump, now_, now_)) {
+    std::optional<Configuration> elsewhere;
     for (double off_m = kTeleport_m; !elsewhere && off_m > kLeastTeleport_m; off_m *= 0.5)
-      elsewhere = place_of({X_BH.rotation, X_BH.translation_m + off_m * Vector3d::UnitX()});
+      elsewhere = find_configuration({X_BH.rotation, X_BH.translation_m + off_m * Vector3d::UnitX()});
     seen = elsewhere.value_or(seen);
   }
   arm_->set_counts(joint_counts(kinematics_, seen.angles));
 }
 
-void HeldArm::advance_to(TimePoint t, ReportSink& host) noexcept {
+void SimulatedArm::advance_to(TimePoint t, ReportSink& host) noexcept {
   if (!powered_) {
     powered_ = true;
     power_on_ = now_ = t;
@@ -116,7 +116,7 @@ void HeldArm::advance_to(TimePoint t, ReportSink& host) noexcept {
   }
   if (t - now_ > kMaxCatchUp) {
     now_ += (t - now_) / kSubstep * kSubstep;
-    handle_.rest();
+    handle_.stop();
   }
   for (; now_ + kSubstep <= t;) {
     substep();
@@ -124,21 +124,21 @@ void HeldArm::advance_to(TimePoint t, ReportSink& host) noexcept {
   }
 }
 
-void HeldArm::substep() noexcept {
+void SimulatedArm::substep() noexcept {
   now_ += kSubstep;
   const Pose before = handle_.X_BH();
   const HandTarget target = target_at(now_ - power_on_);
-  if (led_)
-    handle_.lead(target, motor_demand());
+  if (prescribed_motion_)
+    handle_.step_prescribed(target, motor_demand());
   else
     handle_.step(target, motor_demand());
-  if (const std::optional<Place> next = place_of(handle_.X_BH()))
-    place_ = *next;
+  if (const std::optional<Configuration> next = find_configuration(handle_.X_BH()))
+    configuration_ = *next;
   else
-    handle_.stop_at(before);
-  stand_at(handle_.X_BH());
-  asked_for_homing_ = arm_->wants_homing() ? asked_for_homing_ + kSubstep : Duration{};
-  if (asked_for_homing_ >= kHomingTakes) arm_->home();
+    handle_.reset_to(before);
+  set_encoders(handle_.X_BH());
+  homing_requested_for_ = arm_->homing_requested() ? homing_requested_for_ + kSubstep : Duration{};
+  if (homing_requested_for_ >= kHomingDelay) arm_->perform_homing();
 }
 
 }  // namespace wrenchd

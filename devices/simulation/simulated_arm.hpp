@@ -22,15 +22,16 @@ namespace wrenchd {
 ///
 /// An arm without a wrist does not turn its handle. Out of reach there is an end stop: the handle stays where
 /// it was. It starts at the first waypoint of the hand path, or as near to it as it comes from home.
-class HeldArm final : public HeldDevice {
+class SimulatedArm final : public DeviceInHand {
  public:
   /// How far advance_to() catches up in one call: after a longer gap the handle rests where it was.
   static constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
   /// How long a person takes to do what homing asks for.
-  static constexpr Duration kHomingTakes = std::chrono::milliseconds(500);
+  static constexpr Duration kHomingDelay = std::chrono::milliseconds(500);
 
   /// Throws std::invalid_argument where the settings or the kinematics make no sense.
-  HeldArm(const DeviceProfile& profile, const SimulationSettings& settings, std::unique_ptr<EmulatedArm> arm);
+  SimulatedArm(const DeviceProfile& profile, const SimulationSettings& settings,
+               std::unique_ptr<EmulatedArm> arm);
 
   void open(TimePoint) override { arm_->start(); }
   /// An orientation of half the length is not among what an arm can say.
@@ -47,31 +48,31 @@ class HeldArm final : public HeldDevice {
   HandTarget hand_target() const noexcept override { return target_at(now_ - power_on_); }
 
  private:
-  struct Place {
+  struct Configuration {
     Pose X_DE;
     JointAngles angles;
   };
 
-  Pose start(const std::string& profile) const;
+  Pose start_pose(const std::string& profile) const;
   HandTarget target_at(Duration since_start) const noexcept;
-  std::optional<Place> place_of(const Pose& X_BH) const noexcept;
+  std::optional<Configuration> find_configuration(const Pose& X_BH) const noexcept;
   Wrench motor_demand() const noexcept;
-  void stand_at(const Pose& X_BH) noexcept;
+  void set_encoders(const Pose& X_BH) noexcept;
   void substep() noexcept;
 
   Kinematics kinematics_;
   Pose X_BD_, X_DB_, X_EH_, X_HE_;
-  bool turns_;  ///< has a wrist
+  bool has_wrist_;  ///< has a wrist
   HandPath path_;
-  bool led_;  ///< the handle is on the path, whatever pushes
+  bool prescribed_motion_;  ///< the handle is on the path, whatever pushes
   std::unique_ptr<EmulatedArm> arm_;
   SimulatedHandle handle_;
-  Place place_;  ///< of the handle
+  Configuration configuration_;  ///< of the handle
 
   bool powered_ = false;
   TimePoint power_on_{};
   TimePoint now_{};
-  Duration asked_for_homing_{};  ///< for how long
+  Duration homing_requested_for_{};  ///< for how long
 };
 
 }  // namespace wrenchd

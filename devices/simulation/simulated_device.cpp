@@ -66,10 +66,10 @@ SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationS
       substeps_per_report_(kSamplesPerReport * substeps_per_sample_),
       substep_(substep_of(profile)),
       path_(settings),
-      led_(is_led(settings)),
+      prescribed_motion_(has_prescribed_motion(settings)),
       handle_(settings, path_.at(Duration{0}).X_BG, seconds(substep_)),
       firmware_(profile, settings, substep_ * static_cast<std::int64_t>(substeps_per_sample_)) {
-  firmware_.settle(handle_.X_BH());
+  firmware_.initialize_encoders(handle_.X_BH());
 }
 
 void SimulatedDevice::advance_to(TimePoint t, ReportSink& host) noexcept {
@@ -86,18 +86,18 @@ void SimulatedDevice::skip_to(TimePoint t) noexcept {
   const Duration period = substep_ * static_cast<std::int64_t>(substeps_per_report_);
   const std::int64_t periods = (t - now_) / period;
   now_ += periods * period;
-  firmware_.miss_reports(static_cast<std::uint32_t>(periods));
+  firmware_.skip_reports(static_cast<std::uint32_t>(periods));
   firmware_.trip_watchdog();
-  handle_.rest();
-  firmware_.settle(handle_.X_BH());
+  handle_.stop();
+  firmware_.initialize_encoders(handle_.X_BH());
 }
 
 void SimulatedDevice::substep(ReportSink& host) noexcept {
   now_ += substep_;
-  disturb();
+  apply_firmware_faults();
   const HandTarget target = path_.at(now_ - power_on_);
-  if (led_)
-    handle_.lead(target, motor_demand());
+  if (prescribed_motion_)
+    handle_.step_prescribed(target, motor_demand());
   else
     handle_.step(target, motor_demand());
   ++substeps_;
@@ -107,14 +107,14 @@ void SimulatedDevice::substep(ReportSink& host) noexcept {
 
 /// What the firmware tells the motors, about the handle point.
 Wrench SimulatedDevice::motor_demand() noexcept {
-  Wrench F = firmware_.motors(now_);
+  Wrench F = firmware_.motor_wrench(now_);
   const Pose& X_BH = handle_.X_BH();
   if (!same_frames_) F = shifted(expressed(X_BD_.rotation, F), -(X_BH.rotation * X_HE_.translation_m));
   return wrench_point_ == WrenchPoint::handle ? F : shifted(F, X_BH.translation_m);
 }
 
 /// From the handle in the base to the device's end in its own axes.
-void SimulatedDevice::into_own_frames(PoseReport& report) const noexcept {
+void SimulatedDevice::express_in_device_frames(PoseReport& report) const noexcept {
   const Twist V_BE = shifted(report.V_BH, report.X_BH.rotation * X_HE_.translation_m);
   report.V_BH = expressed(X_BD_.rotation.conjugate(), V_BE);
   report.X_BH = inverse(X_BD_) * report.X_BH * X_HE_;
@@ -122,10 +122,11 @@ void SimulatedDevice::into_own_frames(PoseReport& report) const noexcept {
 
 void SimulatedDevice::send_report(ReportSink& host) noexcept {
   using Kind = SimulatedFault::Kind;
-  PoseReport report = firmware_.report(now_ - power_on_);
-  if (!same_frames_) into_own_frames(report);
-  spoil(report);
-  if (shows(Kind::bad_quaternion, now_, now_)) report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
+  PoseReport report = firmware_.make_report(now_ - power_on_);
+  if (!same_frames_) express_in_device_frames(report);
+  apply_report_faults(report);
+  if (fault_active_during(Kind::bad_quaternion, now_, now_))
+    report.X_BH.rotation.coeffs() *= kBadQuaternionLength;
   std::array<std::uint8_t, kMaxReportBytes> bytes;
   host.take_report(now_, std::span(bytes).first(encode(pose_layout_, report, bytes)));
 }
@@ -135,35 +136,35 @@ bool SimulatedDevice::take_command(TimePoint, std::span<const std::uint8_t> byte
 }
 
 /// What is wrong with what the device says.
-void SimulatedDevice::spoil(PoseReport& report) noexcept {
+void SimulatedDevice::apply_report_faults(PoseReport& report) noexcept {
   using Kind = SimulatedFault::Kind;
   const auto value = [](const SimulatedFault& fault, double usual) {
     return fault.value > 0.0 ? fault.value : usual;
   };
   Vector3d& p_m = report.X_BH.translation_m;
-  if (const SimulatedFault* f = faults_.at(Kind::teleport, now_)) p_m.x() += value(*f, kTeleport_m);
-  if (const SimulatedFault* f = faults_.at(Kind::run_away, now_)) {
+  if (const SimulatedFault* f = faults_.active_at(Kind::jump, now_)) p_m.x() += value(*f, kTeleport_m);
+  if (const SimulatedFault* f = faults_.active_at(Kind::drift, now_)) {
     const double way_m = value(*f, kRunAway_m_per_s) * seconds(now_ - faults_.start_of(*f));
     p_m.x() += kTeleport_m - std::abs(std::fmod(way_m, 2.0 * kTeleport_m) - kTeleport_m);
   }
-  if (const SimulatedFault* f = faults_.at(Kind::shake, now_)) {
+  if (const SimulatedFault* f = faults_.active_at(Kind::vibrate, now_)) {
     const double swing_m = value(*f, kShake_m), w_per_s = 2.0 * std::numbers::pi * kShake_Hz;
     const double phase = w_per_s * seconds(now_ - faults_.start_of(*f));
     p_m.z() += swing_m * std::sin(phase);
     report.V_BH.linear_m_per_s.z() += swing_m * w_per_s * std::cos(phase);
   }
-  if (const SimulatedFault* f = faults_.at(Kind::press, now_))
+  if (const SimulatedFault* f = faults_.active_at(Kind::press_button, now_))
     report.buttons |= std::uint32_t{1} << (static_cast<unsigned>(f->value) & 31U);
-  if (!shows(Kind::stick, now_, now_)) moving_ = report.X_BH;
-  report.X_BH = moving_;
+  if (!fault_active_during(Kind::freeze_pose, now_, now_)) last_unstuck_pose_ = report.X_BH;
+  report.X_BH = last_unstuck_pose_;
 }
 
 /// What is wrong with the firmware, from before a command or a look at its motors.
-void SimulatedDevice::disturb() noexcept {
+void SimulatedDevice::apply_firmware_faults() noexcept {
   using Kind = SimulatedFault::Kind;
-  firmware_.keep_awake(!shows(Kind::sleepy, now_, now_));
-  if (shows(Kind::trip, now_, now_)) firmware_.trip_watchdog();
-  if (shows(Kind::dead_motors, now_, now_)) firmware_.switch_off();
+  firmware_.set_watchdog_enabled(!fault_active_during(Kind::disable_watchdog, now_, now_));
+  if (fault_active_during(Kind::trip_watchdog, now_, now_)) firmware_.trip_watchdog();
+  if (fault_active_during(Kind::motors_off, now_, now_)) firmware_.switch_motors_off();
 }
 
 TimePoint SimulatedDevice::next_event() const noexcept {

@@ -20,7 +20,7 @@ namespace wrenchd {
 /// time in between was cut into calls. Where the profile has [frames], it says where its own end is in its
 /// own axes, and takes wrenches about that in those. It starts at rest at the first waypoint of the hand
 /// path. Where the profile's wrench point is the world origin, the simulated device stands in it.
-class SimulatedDevice final : public HeldDevice {
+class SimulatedDevice final : public DeviceInHand {
  public:
   /// How far advance_to() catches up in one call, see there.
   static constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
@@ -50,10 +50,10 @@ class SimulatedDevice final : public HeldDevice {
   void skip_to(TimePoint t) noexcept;
   void substep(ReportSink& host) noexcept;
   void send_report(ReportSink& host) noexcept;
-  void spoil(PoseReport& report) noexcept;
-  void disturb() noexcept;
+  void apply_report_faults(PoseReport& report) noexcept;
+  void apply_firmware_faults() noexcept;
   Wrench motor_demand() noexcept;
-  void into_own_frames(PoseReport& report) const noexcept;
+  void express_in_device_frames(PoseReport& report) const noexcept;
 
   PoseReportLayout pose_layout_;
   WrenchPoint wrench_point_;
@@ -64,10 +64,10 @@ class SimulatedDevice final : public HeldDevice {
   Duration substep_;
 
   HandPath path_;
-  bool led_;  ///< the handle is on the path, whatever pushes
+  bool prescribed_motion_;  ///< the handle is on the path, whatever pushes
   SimulatedHandle handle_;
   SimulatedFirmware firmware_;
-  Pose moving_;  ///< what the encoders said before they got stuck
+  Pose last_unstuck_pose_;  ///< what the encoders said before they got stuck
 
   bool powered_ = false;
   TimePoint power_on_{};

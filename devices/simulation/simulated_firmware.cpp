@@ -39,7 +39,7 @@ SimulatedFirmware::Encoder SimulatedFirmware::read_encoders(const Pose& X_BH) co
           rotation_from(quantised(rotation_vector(X_BH.rotation), rotation_quantum_rad_))};
 }
 
-void SimulatedFirmware::settle(const Pose& X_BH) noexcept {
+void SimulatedFirmware::initialize_encoders(const Pose& X_BH) noexcept {
   encoder_ = read_encoders(X_BH);
   V_BH_ = {};
 }
@@ -54,7 +54,7 @@ void SimulatedFirmware::sample(const Pose& X_BH) noexcept {
   encoder_ = next;
 }
 
-PoseReport SimulatedFirmware::report(Duration since_power_on) noexcept {
+PoseReport SimulatedFirmware::make_report(Duration since_power_on) noexcept {
   PoseReport report;
   report.X_BH = {encoder_.rotation, encoder_.position_m};
   report.V_BH = V_BH_;
@@ -92,8 +92,8 @@ bool SimulatedFirmware::take_command(TimePoint now, std::span<const std::uint8_t
   return true;
 }
 
-Wrench SimulatedFirmware::motors(TimePoint until) noexcept {
-  if (awake_ && motors_on_ && until > hold_until_) trip_watchdog();
+Wrench SimulatedFirmware::motor_wrench(TimePoint until) noexcept {
+  if (watchdog_enabled_ && motors_on_ && until > hold_until_) trip_watchdog();
   return command_;
 }
 

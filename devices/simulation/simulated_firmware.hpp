@@ -24,30 +24,30 @@ class SimulatedFirmware {
   SimulatedFirmware(const DeviceProfile& profile, const SimulationSettings& settings, Duration sample_period);
 
   /// Reads the encoders with the handle at rest: where the velocity estimate starts.
-  void settle(const Pose& X_BH) noexcept;
+  void initialize_encoders(const Pose& X_BH) noexcept;
   /// Reads the encoders and updates the velocity estimate. The position is rounded to its quantum in each
   /// coordinate, the rotation in each coordinate of its rotation vector from the base.
   void sample(const Pose& X_BH) noexcept;
 
   /// The next pose report, from the last sample. Counts the sequence.
-  PoseReport report(Duration since_power_on) noexcept;
+  PoseReport make_report(Duration since_power_on) noexcept;
   /// Reports that were due and never made: the sequence goes on as if they had been sent.
-  void miss_reports(std::uint32_t count) noexcept { sequence_ += count; }
+  void skip_reports(std::uint32_t count) noexcept { sequence_ += count; }
 
   /// Takes a command that arrived now. False where it is not one, or is a repetition, or is out of order:
   /// then it has no effect and does not feed the watchdog.
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept;
   /// What the motors are told until the given time. Trips the watchdog if the command may not be held so
   /// long.
-  Wrench motors(TimePoint until) noexcept;
+  Wrench motor_wrench(TimePoint until) noexcept;
   /// Motors off, and the host is told why.
   void trip_watchdog() noexcept;
 
   // What may be wrong with a firmware, for tests.
   /// False: the watchdog never trips.
-  void keep_awake(bool awake) noexcept { awake_ = awake; }
+  void set_watchdog_enabled(bool awake) noexcept { watchdog_enabled_ = awake; }
   /// Motors off, and the watchdog has nothing to do with it.
-  void switch_off() noexcept {
+  void switch_motors_off() noexcept {
     motors_on_ = false;
     command_ = {};
   }
@@ -81,7 +81,7 @@ class SimulatedFirmware {
   std::optional<std::uint64_t> last_command_;  ///< its sequence
   bool motors_on_ = false;
   bool watchdog_tripped_ = false;
-  bool awake_ = true;
+  bool watchdog_enabled_ = true;
   std::uint64_t commands_rejected_ = 0;
 };
 

@@ -66,9 +66,10 @@ SimulatedHandle::SimulatedHandle(const SimulationSettings& s, const Pose& X_BH, 
 }
 
 //   (m + h (D + b)) v' = m v + h (F + K offset + D v_G),  then Coulomb takes at most h c / (m + h (D + b))
-SimulatedHandle::Effort SimulatedHandle::move(const Motion& motion, const Vector3d& demand,
-                                              const Vector3d& offset, const Vector3d& goal_velocity,
-                                              Vector3d& velocity) noexcept {
+SimulatedHandle::AppliedForces SimulatedHandle::integrate(const MotionParameters& motion,
+                                                          const Vector3d& demand, const Vector3d& offset,
+                                                          const Vector3d& goal_velocity,
+                                                          Vector3d& velocity) noexcept {
   const double h = step_s_;
   const Vector3d motors = within(demand, motion.actuator_max);
   const Vector3d spring = motion.hand_stiffness * offset;
@@ -88,10 +89,12 @@ SimulatedHandle::Effort SimulatedHandle::move(const Motion& motion, const Vector
 }
 
 void SimulatedHandle::step(const HandTarget& target, const Wrench& F_motors) noexcept {
-  const Effort force = move(translation_, F_motors.force_N, target.X_BG.translation_m - X_BH_.translation_m,
-                            target.V_BG.linear_m_per_s, V_BH_.linear_m_per_s);
-  const Effort torque = move(rotation_, F_motors.torque_Nm, chord(X_BH_.rotation, target.X_BG.rotation),
-                             target.V_BG.angular_rad_per_s, V_BH_.angular_rad_per_s);
+  const AppliedForces force =
+      integrate(translation_, F_motors.force_N, target.X_BG.translation_m - X_BH_.translation_m,
+                target.V_BG.linear_m_per_s, V_BH_.linear_m_per_s);
+  const AppliedForces torque =
+      integrate(rotation_, F_motors.torque_Nm, chord(X_BH_.rotation, target.X_BG.rotation),
+                target.V_BG.angular_rad_per_s, V_BH_.angular_rad_per_s);
   F_motors_ = {force.motors, torque.motors};
   F_hand_ = {force.hand, torque.hand};
   X_BH_.translation_m += step_s_ * V_BH_.linear_m_per_s;
@@ -100,7 +103,7 @@ void SimulatedHandle::step(const HandTarget& target, const Wrench& F_motors) noe
 
 /// The hand gives what is missing: its work is the change of the kinetic energy, and what friction took, and
 /// what the motors did against it.
-void SimulatedHandle::lead(const HandTarget& target, const Wrench& F_motors) noexcept {
+void SimulatedHandle::step_prescribed(const HandTarget& target, const Wrench& F_motors) noexcept {
   const double before_J = kinetic_energy_J();
   const SimulatedEnergy sums = energy_;
   X_BH_ = target.X_BG;
@@ -108,7 +111,7 @@ void SimulatedHandle::lead(const HandTarget& target, const Wrench& F_motors) noe
   F_motors_ = {within(F_motors.force_N, translation_.actuator_max),
                within(F_motors.torque_Nm, rotation_.actuator_max)};
   F_hand_ = -1.0 * F_motors_;
-  const auto rubbed_W = [](const Motion& motion, double speed) {
+  const auto rubbed_W = [](const MotionParameters& motion, double speed) {
     return speed * (motion.viscous_friction * speed + motion.coulomb_friction);
   };
   energy_.motors_J += step_s_ * (F_motors_.force_N.dot(V_BH_.linear_m_per_s) +

@@ -36,13 +36,13 @@ class SimulatedHandle {
   void step(const HandTarget& target, const Wrench& F_motors) noexcept;
   /// One substep of a handle that is led: it is where the target is, whatever pushes. What that takes of the
   /// hand is in the sums of energy. RT safe.
-  void lead(const HandTarget& target, const Wrench& F_motors) noexcept;
+  void step_prescribed(const HandTarget& target, const Wrench& F_motors) noexcept;
   /// Stops the handle where it is. RT safe.
-  void rest() noexcept { V_BH_ = {}; }
+  void stop() noexcept { V_BH_ = {}; }
   /// Puts the handle there, at rest: an end stop. What it takes is in no sum of energy. RT safe.
-  void stop_at(const Pose& X_BH) noexcept {
+  void reset_to(const Pose& X_BH) noexcept {
     X_BH_ = X_BH;
-    rest();
+    stop();
   }
 
   const Pose& X_BH() const noexcept { return X_BH_; }
@@ -54,7 +54,7 @@ class SimulatedHandle {
 
  private:
   /// One of the two halves of the motion: translation or rotation.
-  struct Motion {
+  struct MotionParameters {
     double inertia;         ///< [kg] or [kg m^2]
     double hand_stiffness;  ///< [N/m] or [N.m/rad]
     double hand_damping;    ///< per second of it
@@ -62,15 +62,15 @@ class SimulatedHandle {
     double coulomb_friction;  ///< [N] or [N.m]
     double actuator_max;      ///< [N] or [N.m]
   };
-  struct Effort {
+  struct AppliedForces {
     Vector3d motors;
     Vector3d hand;
   };
-  Effort move(const Motion& motion, const Vector3d& demand, const Vector3d& offset,
-              const Vector3d& goal_velocity, Vector3d& velocity) noexcept;
+  AppliedForces integrate(const MotionParameters& motion, const Vector3d& demand, const Vector3d& offset,
+                          const Vector3d& goal_velocity, Vector3d& velocity) noexcept;
 
-  Motion translation_;
-  Motion rotation_;
+  MotionParameters translation_;
+  MotionParameters rotation_;
   double step_s_;
   Pose X_BH_;
   Twist V_BH_;

@@ -9,7 +9,7 @@ namespace wrenchd {
 namespace {
 
 constexpr Duration kStep = std::chrono::milliseconds(1);
-/// As HeldArm::kMaxCatchUp: after a longer gap the hand takes the cap anew.
+/// As SimulatedArm::kMaxCatchUp: after a longer gap the hand takes the cap anew.
 constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
 
 const PoseReportLayout& layout(const DeviceProfile& profile, std::size_t index) noexcept {
@@ -26,9 +26,9 @@ void put(const Vector3d& wanted, std::span<int> counts) noexcept {
 
 }  // namespace
 
-CapCoding cap_coding(const DeviceProfile& profile) {
+PuckCoding puck_coding(const DeviceProfile& profile) {
   const bool combined = profile.pose_report.translation.present && profile.pose_report.rotation.present;
-  CapCoding coding{combined ? EmulatedSpaceMouse::Format::combined : EmulatedSpaceMouse::Format::split};
+  PuckCoding coding{combined ? EmulatedSpaceMouse::Format::combined : EmulatedSpaceMouse::Format::split};
   for (std::size_t i = 0; i <= profile.more_reports.size(); ++i) {
     const PoseReportLayout& report = layout(profile, i);
     if (report.translation.present) coding.translation_step_m = report.translation.step;
@@ -41,85 +41,86 @@ CapCoding cap_coding(const DeviceProfile& profile) {
   return coding;
 }
 
-HeldCap::HeldCap(const DeviceProfile& profile, const SimulationSettings& settings)
+SimulatedPuck::SimulatedPuck(const DeviceProfile& profile, const SimulationSettings& settings)
     : profile_(profile),
       path_(settings),
-      coding_(cap_coding(profile)),
-      linear_(*profile.deflection, profile.deflection->linear_gain, profile.deflection->full_m),
-      angular_(*profile.deflection, profile.deflection->angular_gain, profile.deflection->full_rad),
+      coding_(puck_coding(profile)),
+      linear_(*profile.deflection, profile.deflection->linear_gain, profile.deflection->full_deflection_m),
+      angular_(*profile.deflection, profile.deflection->angular_gain,
+               profile.deflection->full_deflection_rad),
       mouse_(coding_.format),
-      seen_(unmoved()) {}
+      displayed_pose_(initial_pose()) {}
 
-DeflectionPose HeldCap::unmoved() const noexcept {
+DeflectionPose SimulatedPuck::initial_pose() const noexcept {
   return DeflectionPose(*profile_.deflection, profile_.max_linear_speed_m_per_s,
                         profile_.max_angular_speed_rad_per_s);
 }
 
-void HeldCap::open(TimePoint now) {
-  seen_ = unmoved();
-  seen_at_ = now;
-  grasped_at_ = now + kGraspTakes;
-  said_ = {};
+void SimulatedPuck::open(TimePoint now) {
+  displayed_pose_ = initial_pose();
+  displayed_at_ = now;
+  grasped_at_ = now + kGraspDelay;
+  reported_ = {};
 }
 
-void HeldCap::inject(const SimulatedFault& fault) {
+void SimulatedPuck::inject(const SimulatedFault& fault) {
   using Kind = SimulatedFault::Kind;
-  if (fault.kind == Kind::bad_quaternion || fault.kind == Kind::teleport)
+  if (fault.kind == Kind::bad_quaternion || fault.kind == Kind::jump)
     throw std::invalid_argument("a cap sends how far it is pushed, and no pose that could be bad");
-  if (!is_of_the_wire(fault.kind))
+  if (!affects_link(fault.kind))
     throw std::invalid_argument("an emulated cap has no such fault; the loopback device has");
   faults_.add(fault);
 }
 
-void HeldCap::advance_to(TimePoint t, ReportSink& host) noexcept {
+void SimulatedPuck::advance_to(TimePoint t, ReportSink& host) noexcept {
   host_ = &host;
   if (!powered_) {
     powered_ = true;
-    power_on_ = now_ = seen_at_ = t;
-    grasped_at_ = t + kGraspTakes;
+    power_on_ = now_ = displayed_at_ = t;
+    grasped_at_ = t + kGraspDelay;
     faults_.power_on(t);
     mouse_.advance_to(t, *this);
   }
   if (t - now_ > kMaxCatchUp) {
     now_ += (t - now_) / kStep * kStep;
-    grasped_at_ = now_ + kGraspTakes;
+    grasped_at_ = now_ + kGraspDelay;
   }
   while (now_ + kStep <= t) {
     now_ += kStep;
     mouse_.advance_to(now_, *this);
-    push();
+    update_deflection();
   }
 }
 
 /// What the device says moves the tool, and goes on to the host.
-void HeldCap::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
+void SimulatedPuck::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
   for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
     const PoseReportLayout& known = layout(profile_, i);
-    if (decode_into(known, report, said_) != Decoding::ok) continue;
+    if (decode_into(known, report, reported_) != Decoding::ok) continue;
     if (!known.translation.present && !known.rotation.present) break;
-    look(sent);
+    integrate_displayed_pose(sent);
     const Quaterniond& R_BD = profile_.X_BD.rotation;
-    seen_.push(R_BD * said_.translation_m, R_BD * said_.rotation_rad);
+    displayed_pose_.set_deflection(R_BD * reported_.translation_m, R_BD * reported_.rotation_rad);
     break;
   }
   host_->take_report(sent, report);
 }
 
-void HeldCap::see(TimePoint now, const Pose& X_BH) noexcept {
-  seen_.put(X_BH);
-  seen_at_ = std::max(seen_at_, now);
+void SimulatedPuck::observe_pose(TimePoint now, const Pose& X_BH) noexcept {
+  displayed_pose_.set_pose(X_BH);
+  displayed_at_ = std::max(displayed_at_, now);
 }
 
-void HeldCap::look(TimePoint now) noexcept {
-  seen_.advance(seconds(now - seen_at_));
-  seen_at_ = std::max(seen_at_, now);
+void SimulatedPuck::integrate_displayed_pose(TimePoint now) noexcept {
+  displayed_pose_.advance(seconds(now - displayed_at_));
+  displayed_at_ = std::max(displayed_at_, now);
 }
 
-void HeldCap::push() noexcept {
-  look(now_);
+void SimulatedPuck::update_deflection() noexcept {
+  integrate_displayed_pose(now_);
   const Deflection& how = *profile_.deflection;
   const HandTarget target = hand_target();
-  const Pose& X_BH = seen_.X_BH();
+  const Pose& X_BH = displayed_pose_.X_BH();
   Vector3d linear = target.X_BG.translation_m;
   Vector3d angular = rotation_vector(target.X_BG.rotation);
   if (how.mode == Deflection::Mode::rate) {
@@ -141,7 +142,7 @@ void HeldCap::push() noexcept {
   put(R_DB * angular / coding_.rotation_step_rad, std::span(counts).last(3));
   if (counts == counts_) return;
   counts_ = counts;
-  mouse_.push(counts);
+  mouse_.set_deflection(counts);
 }
 
 }  // namespace wrenchd

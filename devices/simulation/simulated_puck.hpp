@@ -15,14 +15,14 @@
 namespace wrenchd {
 
 /// How the reports of a profile say how far a cap is pushed.
-struct CapCoding {
+struct PuckCoding {
   EmulatedSpaceMouse::Format format;
   double translation_step_m = 0.0;  ///< of a count
   double rotation_step_rad = 0.0;
 };
 
 /// Throws std::invalid_argument where they do not.
-CapCoding cap_coding(const DeviceProfile& profile);
+PuckCoding puck_coding(const DeviceProfile& profile);
 
 /// An emulated SpaceMouse in a simulated hand, which steers a tool by it along the hand path. It feels
 /// nothing, but it sees where the handle is: where see() was told, and what the reports have made of it
@@ -33,15 +33,15 @@ CapCoding cap_coding(const DeviceProfile& profile);
 ///
 /// as far as the cap goes, to the nearest count. Where the path rests and the tool is there the cap is let
 /// go.
-class HeldCap final : public HeldDevice, private ReportSink {
+class SimulatedPuck final : public DeviceInHand, private ReportSink {
  public:
   /// How much of a deviation the hand takes back in a second. Slow beside the 16 ms between two reports.
   static constexpr double kCorrection_per_s = 5.0;
   /// After a host has opened the device, until the hand has taken the cap.
-  static constexpr Duration kGraspTakes = std::chrono::milliseconds(500);
+  static constexpr Duration kGraspDelay = std::chrono::milliseconds(500);
 
   /// Throws std::invalid_argument where the settings make no sense.
-  HeldCap(const DeviceProfile& profile, const SimulationSettings& settings);
+  SimulatedPuck(const DeviceProfile& profile, const SimulationSettings& settings);
 
   void open(TimePoint now) override;
   /// What a pose says cannot be wrong: the device sends none.
@@ -52,27 +52,27 @@ class HeldCap final : public HeldDevice, private ReportSink {
     return mouse_.take_command(now, bytes);
   }
   TimePoint next_event() const noexcept override { return mouse_.next_event(); }
-  void see(TimePoint now, const Pose& X_BH) noexcept override;
+  void observe_pose(TimePoint now, const Pose& X_BH) noexcept override;
 
   /// Of the tool, as the hand sees it.
-  const Pose& X_BH() const noexcept override { return seen_.X_BH(); }
-  const Wrench& motor_wrench() const noexcept override { return nothing_; }
+  const Pose& X_BH() const noexcept override { return displayed_pose_.X_BH(); }
+  const Wrench& motor_wrench() const noexcept override { return zero_wrench_; }
   HandTarget hand_target() const noexcept override { return path_.at(now_ - power_on_); }
 
  private:
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override;
-  void look(TimePoint now) noexcept;
-  void push() noexcept;
-  DeflectionPose unmoved() const noexcept;
+  void integrate_displayed_pose(TimePoint now) noexcept;
+  void update_deflection() noexcept;
+  DeflectionPose initial_pose() const noexcept;
 
   DeviceProfile profile_;
   HandPath path_;
-  CapCoding coding_;
+  PuckCoding coding_;
   SteeringCurve linear_, angular_;
   EmulatedSpaceMouse mouse_;
-  DeflectionPose seen_;
-  TimePoint seen_at_{};
-  PoseReport said_;  ///< by the reports, together
+  DeflectionPose displayed_pose_;
+  TimePoint displayed_at_{};
+  PoseReport reported_;  ///< by the reports, together
   std::array<int, 6> counts_{};
   ReportSink* host_ = nullptr;
 
@@ -80,7 +80,7 @@ class HeldCap final : public HeldDevice, private ReportSink {
   TimePoint power_on_{};
   TimePoint now_{};
   TimePoint grasped_at_{};
-  Wrench nothing_;
+  Wrench zero_wrench_;
 };
 
 }  // namespace wrenchd

@@ -19,14 +19,14 @@ struct Options {
 };
 
 /// What is compared with what: times mean nothing without it.
-void explain(const Effort& effort, const TickScale& scale) {
+void explain(const Effort& effort, const CounterScale& scale) {
   std::cout
       << "Every pose is timed on its own, " << effort.poses
       << " of them a millisecond apart; its time is the "
       << "least of " << effort.passes << " passes.\n"
       << "Methods take turns pass by pass. p50 to max are over the poses. spread: of the passes' p50.\n"
       << "A reading of the clock takes "
-      << fixed(static_cast<double>(scale.empty_ticks) * scale.ns_per_tick, 0)
+      << fixed(static_cast<double>(scale.overhead_counts) * scale.ns_per_count, 0)
       << " ns, which is taken off; one core only: " << (pinned_to_one_core() ? "yes" : "NO, so expect noise")
       << ".\n\n"
       << "all pairs: every pair of triangles that meets at p, found anew. whole tick: from last tick's proxy "
@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   if (quick) options.effort = {20, 1, true};
   try {
-    const TickScale scale = calibrate();
+    const CounterScale scale = calibrate_counter();
     explain(options.effort, scale);
     std::vector<Table> tables;
     if (!options.growth_only) {

@@ -19,16 +19,16 @@ constexpr std::size_t kExactPoses = 10;
 constexpr int kTicksAtRest = 20;
 
 /// The value is the number of pairs of triangles that meet.
-Runner pairs_runner(const MeshPair& pair) {
-  const auto pairs = std::make_shared<MeetingPairs>();
+TimedMethod pairs_runner(const MeshPair& pair) {
+  const auto pairs = std::make_shared<IntersectingPairs>();
   return {"wrenchd all pairs", [] {},
           [pairs, &pair](std::size_t i) {
-            return Answer{static_cast<double>(meeting(*pairs, pair.scene, pair.X_WP[i]))};
+            return Answer{static_cast<double>(intersecting_pair_count(*pairs, pair.scene, pair.X_WP[i]))};
           }};
 }
 
 /// The whole tick: contacts, projection, verification and wrench. The value is the energy.
-Runner tick_runner(const MeshPair& pair) {
+TimedMethod tick_runner(const MeshPair& pair) {
   struct State {
     explicit State(const MeshPair& pair) : proxy(pair.scene), X_WQ(pair.X_start) {}
     Proxy proxy;
@@ -37,7 +37,7 @@ Runner tick_runner(const MeshPair& pair) {
   const auto state = std::make_shared<State>(pair);
   return {"wrenchd whole tick",
           [state, &pair] {
-            state->proxy.forget();
+            state->proxy.clear_history();
             // Comes to the first pose untimed: a hand was somewhere before, at rest, and does not jump.
             state->X_WQ = pair.X_start;
             for (int i = 0; i < kTicksAtRest; ++i)
@@ -56,12 +56,12 @@ Runner tick_runner(const MeshPair& pair) {
           }};
 }
 
-std::vector<Runner> peer_runners(const MeshPair& pair, const PeerModule& module) {
+std::vector<TimedMethod> peer_runners(const MeshPair& pair, const PeerModule& module) {
   const auto poses = std::make_shared<std::vector<PeerPose>>();
   for (const Pose& X_WP : pair.X_WP) poses->push_back(peer_pose(X_WP));
   const auto opened = std::make_shared<PeerModule::Pair>(
       module.open(pair.scene.tool_mesh()->surface.mesh(), pair.scene.meshes()[0].mesh->surface.mesh()));
-  std::vector<Runner> runners;
+  std::vector<TimedMethod> runners;
   for (int q = 0; q < static_cast<int>(module.queries().size()); ++q)
     runners.push_back({module.queries()[static_cast<std::size_t>(q)], [] {},
                        [opened, poses, q](std::size_t i) {
@@ -70,7 +70,7 @@ std::vector<Runner> peer_runners(const MeshPair& pair, const PeerModule& module)
   return runners;
 }
 
-double mean(const Result& result) {
+double mean(const MethodTiming& result) {
   double sum = 0.0;
   for (const Answer& answer : result.answers) sum += answer.value;
   return sum / static_cast<double>(result.answers.size());
@@ -90,21 +90,21 @@ std::string us(double ns) {
   return fixed(ns / 1000.0, 1);
 }
 
-void add_times(const std::string& of_case, const Result& r, Table& table) {
+void add_times(const std::string& of_case, const MethodTiming& r, Table& table) {
   table.add(of_case, r.name,
             {us(r.ns.p50), us(r.ns.p99), us(r.ns.p999), us(r.ns.max), fixed(r.ns.p99 / r.ns.p50, 2),
-             fixed(r.ns.max / r.ns.p50, 2), fixed(100.0 * r.spread, 1), verdict(r)});
+             fixed(r.ns.max / r.ns.p50, 2), fixed(100.0 * r.relative_spread, 1), verdict(r)});
 }
 
-void bench_pair(const MeshPair& pair, const Effort& effort, const TickScale& scale,
+void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& scale,
                 std::span<const PeerModule> peers, Tables& tables) {
-  std::vector<Runner> runners = {pairs_runner(pair), tick_runner(pair)};
+  std::vector<TimedMethod> runners = {pairs_runner(pair), tick_runner(pair)};
   for (const PeerModule& module : peers)
-    for (Runner& runner : peer_runners(pair, module)) runners.push_back(std::move(runner));
-  const std::vector<Result> results = race(runners, pair.X_WP.size(), effort.passes, scale);
-  const Result& pairs = results[0];
-  const Result& tick = results[1];
-  for (const Result& result : results) {
+    for (TimedMethod& runner : peer_runners(pair, module)) runners.push_back(std::move(runner));
+  const std::vector<MethodTiming> results = time_methods(runners, pair.X_WP.size(), effort.passes, scale);
+  const MethodTiming& pairs = results[0];
+  const MethodTiming& tick = results[1];
+  for (const MethodTiming& result : results) {
     add_times(pair.name, result, tables.times);
     if (&result == &pairs || &result == &tick) continue;
     const bool clear = verdict(result).empty() && verdict(pairs).empty() && verdict(tick).empty();
@@ -114,14 +114,14 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const TickScale& sca
   }
 
   // Accuracy before speed.
-  const test::ExactMeeting exact(pair.scene.tool_mesh()->surface.mesh(),
-                                 pair.scene.meshes()[0].mesh->surface.mesh());
+  const test::ExactIntersection exact(pair.scene.tool_mesh()->surface.mesh(),
+                                      pair.scene.meshes()[0].mesh->surface.mesh());
   const std::size_t looked_at = std::min(kExactPoses, pair.X_WP.size());
   const std::size_t stride = pair.X_WP.size() / looked_at;
   std::vector<double> truth;
   for (std::size_t k = 0; k < looked_at; ++k)
-    truth.push_back(static_cast<double>(exact.pairs(pair.X_WP[k * stride])));
-  for (const Result& result : results) {
+    truth.push_back(static_cast<double>(exact.intersecting_pairs(pair.X_WP[k * stride])));
+  for (const MethodTiming& result : results) {
     if (&result == &tick) continue;
     std::size_t wrong = 0;
     for (std::size_t k = 0; k < looked_at; ++k) wrong += result.answers[k * stride].value != truth[k] ? 1 : 0;
@@ -137,7 +137,7 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const TickScale& sca
   for (std::size_t i = 0; i < pair.X_WP.size(); ++i) {
     X_WQ = proxy.follow(pair.X_WP[i], X_WQ).X_WQ;
     if (i % stride != 0) continue;
-    overlapping += exact.meet(X_WQ) ? 1 : 0;
+    overlapping += exact.intersect(X_WQ) ? 1 : 0;
     ++looked;
   }
   for (const Answer& answer : tick.answers) {
@@ -151,7 +151,7 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const TickScale& sca
 
 }  // namespace
 
-std::vector<Table> bench_meshes(const Effort& effort, const TickScale& scale,
+std::vector<Table> bench_meshes(const Effort& effort, const CounterScale& scale,
                                 std::span<const PeerModule> peers) {
   Tables tables;
   const auto run = [&](std::string name, MeshPair pair) {
@@ -169,16 +169,16 @@ std::vector<Table> bench_meshes(const Effort& effort, const TickScale& scale,
   return {tables.times, tables.ratios, tables.answers};
 }
 
-Table bench_growth(const Effort& effort, const TickScale& scale) {
+Table bench_growth(const Effort& effort, const CounterScale& scale) {
   Table table("growth: a tool of 10k triangles on a boulder of so many [us]",
               {"triangles", "p50", "p99", "max"});
   for (const std::size_t triangles : {2000, 6000, 20000, 60000, 200000, 600000, 2000000}) {
     if (effort.quick && triangles > 6000) break;
     const MeshPair pair = sliding_bumps(9680, triangles, effort.poses);
-    const std::vector<Result> results =
-        race({pairs_runner(pair), tick_runner(pair)}, pair.X_WP.size(), effort.passes, scale);
+    const std::vector<MethodTiming> results =
+        time_methods({pairs_runner(pair), tick_runner(pair)}, pair.X_WP.size(), effort.passes, scale);
     const std::size_t count = pair.scene.meshes()[0].mesh->surface.triangles().size();
-    for (const Result& r : results)
+    for (const MethodTiming& r : results)
       table.add(std::to_string(triangles), r.name, {whole(count), us(r.ns.p50), us(r.ns.p99), us(r.ns.max)});
   }
   return table;

@@ -50,7 +50,7 @@ class Follower {
 
 /// The value is the depth that the energy is worth as a translation, T = m depth^2: for the translational
 /// method the penetration depth itself.
-Runner wrenchd_runner(std::string name, const ConvexPair& pair, Method method) {
+TimedMethod wrenchd_runner(std::string name, const ConvexPair& pair, Method method) {
   const auto follower = std::make_shared<Follower>(pair, method);
   const double mass_kg = pair.scene.tool().solid.inertia.mass_kg;
   return {std::move(name), [follower] { follower->restart(); },
@@ -63,11 +63,11 @@ Runner wrenchd_runner(std::string name, const ConvexPair& pair, Method method) {
           }};
 }
 
-std::vector<Runner> peer_runners(const ConvexPair& pair, const PeerModule& module) {
+std::vector<TimedMethod> peer_runners(const ConvexPair& pair, const PeerModule& module) {
   std::vector<PeerPose> converted;
   for (const Pose& X_WP : pair.X_WP) converted.push_back(peer_pose(X_WP));
   const auto poses = std::make_shared<const std::vector<PeerPose>>(std::move(converted));
-  std::vector<Runner> runners;
+  std::vector<TimedMethod> runners;
   for (int q = 0; q < static_cast<int>(module.queries().size()); ++q)
     runners.push_back({module.queries()[static_cast<std::size_t>(q)], [] {},
                        [opened = module.open(pair.tool_T, pair.obstacle_W), poses, q](std::size_t i) {
@@ -83,7 +83,7 @@ struct Depths {
   double shallowest = 0.0, deepest = 0.0;     ///< relative errors, the worst on either side
 };
 
-Depths compare(const Result& result, const std::vector<double>& exact_m) {
+Depths compare(const MethodTiming& result, const std::vector<double>& exact_m) {
   Depths depths;
   for (std::size_t i = 0; i < exact_m.size(); ++i) {
     const double error = result.answers[i].value / exact_m[i] - 1.0;
@@ -115,13 +115,13 @@ struct Soundness {
   double worst_residual = 0.0;
 };
 
-Soundness examine(const ConvexPair& pair, const Result& exact) {
+Soundness examine(const ConvexPair& pair, const MethodTiming& exact) {
   Soundness found;
   Follower follower(pair, Method::exact);
   follower.restart();
   for (std::size_t i = 0; i < pair.X_WP.size(); ++i) {
     const Pose X_WQ = follower.follow(i).projection.X_WQ;
-    const Overlap left = overlap(pair.tool_surface_T.moved(X_WQ), pair.obstacle_surface_W);
+    const Overlap left = overlap(pair.tool_surface_T.transformed(X_WQ), pair.obstacle_surface_W);
     found.overlapping += left.depth_m > kStillOverlapping_m ? 1 : 0;
     const Answer& answer = exact.answers[i];
     found.above_translation += answer.value <= pair.depth_m[i] * (1.0 + kSameDepth) ? 0 : 1;
@@ -146,15 +146,15 @@ struct Tables {
 
 /// The fastest by p50 among those that may be; null where there is none.
 template <class Allowed>
-const Result* fastest(std::span<const Result> results, const Allowed& allowed) {
-  const Result* best = nullptr;
-  for (const Result& result : results)
+const MethodTiming* fastest(std::span<const MethodTiming> results, const Allowed& allowed) {
+  const MethodTiming* best = nullptr;
+  for (const MethodTiming& result : results)
     if (allowed(result) && (best == nullptr || result.ns.p50 < best->ns.p50)) best = &result;
   return best;
 }
 
-void add_ratio(const std::string& of_case, const std::string& which, const Result* peer, const Result& exact,
-               const Result& translational, Table& ratios) {
+void add_ratio(const std::string& of_case, const std::string& which, const MethodTiming* peer,
+               const MethodTiming& exact, const MethodTiming& translational, Table& ratios) {
   if (peer == nullptr) {
     ratios.add(of_case, which + ": none", {"-", "-", "-", ""});
     return;
@@ -165,22 +165,22 @@ void add_ratio(const std::string& of_case, const std::string& which, const Resul
               fixed(peer->ns.p50 / translational.ns.p50, 2), clear ? "" : "inconclusive"});
 }
 
-void bench_pair(const ConvexPair& pair, const Effort& effort, const TickScale& scale,
+void bench_pair(const ConvexPair& pair, const Effort& effort, const CounterScale& scale,
                 std::span<const PeerModule> peers, Tables& tables) {
-  std::vector<Runner> runners = {wrenchd_runner("wrenchd exact", pair, Method::exact),
-                                 wrenchd_runner("wrenchd translational", pair, Method::translational)};
+  std::vector<TimedMethod> runners = {wrenchd_runner("wrenchd exact", pair, Method::exact),
+                                      wrenchd_runner("wrenchd translational", pair, Method::translational)};
   for (const PeerModule& module : peers)
-    for (Runner& runner : peer_runners(pair, module)) runners.push_back(std::move(runner));
-  const std::vector<Result> results = race(runners, pair.X_WP.size(), effort.passes, scale);
+    for (TimedMethod& runner : peer_runners(pair, module)) runners.push_back(std::move(runner));
+  const std::vector<MethodTiming> results = time_methods(runners, pair.X_WP.size(), effort.passes, scale);
 
-  const Result& exact = results[0];
+  const MethodTiming& exact = results[0];
   const std::size_t poses = pair.X_WP.size();
-  for (const Result& result : results) {
+  for (const MethodTiming& result : results) {
     tables.times.add(
         pair.name, result.name,
         {fixed(result.ns.p50, 0), fixed(result.ns.p99, 0), fixed(result.ns.p999, 0), fixed(result.ns.max, 0),
          fixed(result.ns.p50 / exact.ns.p50, 2), fixed(result.ns.p99 / exact.ns.p99, 2),
-         fixed(100.0 * result.spread, 1), verdict(result)});
+         fixed(100.0 * result.relative_spread, 1), verdict(result)});
     if (&result == &exact) continue;  // its depth is another one: rotations make it less
     const Depths depths = compare(result, pair.depth_m);
     tables.depths.add(
@@ -195,17 +195,17 @@ void bench_pair(const ConvexPair& pair, const Effort& effort, const TickScale& s
        whole(found.unconverged), scientific(found.worst_residual)});
 
   const auto of_peers = std::span(results).subspan(2);
-  add_ratio(
-      pair.name, "best right",
-      fastest(of_peers, [&](const Result& result) { return right(compare(result, pair.depth_m), poses); }),
-      exact, results[1], tables.ratios);
-  add_ratio(pair.name, "fastest, right or wrong", fastest(of_peers, [](const Result&) { return true; }),
+  add_ratio(pair.name, "best right",
+            fastest(of_peers,
+                    [&](const MethodTiming& result) { return right(compare(result, pair.depth_m), poses); }),
+            exact, results[1], tables.ratios);
+  add_ratio(pair.name, "fastest, right or wrong", fastest(of_peers, [](const MethodTiming&) { return true; }),
             exact, results[1], tables.ratios);
 }
 
 }  // namespace
 
-std::vector<Table> bench_convex(const Effort& effort, const TickScale& scale,
+std::vector<Table> bench_convex(const Effort& effort, const CounterScale& scale,
                                 std::span<const PeerModule> peers) {
   Tables tables;
   for (const std::size_t vertices : {8u, 42u, 162u, 642u}) {

@@ -44,7 +44,7 @@ double put_at_depth(const ConvexPair& pair, const Vector3d& u, double target_m, 
   double far = 1.0;
   for (int i = 0; i < 100; ++i) {
     X_WP.translation_m = distance_m * u;
-    const Overlap at = overlap(pair.tool_surface_T.moved(X_WP), pair.obstacle_surface_W);
+    const Overlap at = overlap(pair.tool_surface_T.transformed(X_WP), pair.obstacle_surface_W);
     if (std::abs(at.depth_m - target_m) < 1e-9) return at.depth_m;
     (at.depth_m > target_m ? deep : far) = distance_m;
     const double newton = distance_m + (at.depth_m - target_m) / at.n.dot(u);

@@ -27,7 +27,7 @@ Answer answer_of(const Projection& q) {
 }
 
 /// The exact method on its own, from p and knowing nothing.
-Runner exact_cold(const PressedBody& body) {
+TimedMethod exact_cold(const PressedBody& body) {
   struct State {
     explicit State(const Scene& scene) : contacts(scene), exact(scene.tool().solid.inertia) {}
     SceneContacts contacts;
@@ -42,13 +42,13 @@ Runner exact_cold(const PressedBody& body) {
 }
 
 /// The exact method on its own, with the rotation and the contacts that carried a tick before.
-Runner exact_warm(const PressedBody& body) {
+TimedMethod exact_warm(const PressedBody& body) {
   struct State {
     explicit State(const Scene& scene) : contacts(scene), exact(scene.tool().solid.inertia) {}
     SceneContacts contacts;
     ExactProjection exact;
     Pose X_last;
-    FixedList<ActiveContact, ContactSet::kCapacity> known;
+    StaticVector<ActiveContact, ContactSet::kCapacity> known;
   };
   const auto state = std::make_shared<State>(body.scene);
   const auto solve = [state](const Pose& X_WP) {
@@ -70,7 +70,7 @@ Runner exact_warm(const PressedBody& body) {
 }
 
 /// A method as the servo loop calls it: follow(), with everything around the solve itself.
-Runner followed(std::string name, const PressedBody& body, Method method) {
+TimedMethod followed(std::string name, const PressedBody& body, Method method) {
   struct State {
     std::unique_ptr<PenetrationDepth> depth;
     Pose X_last;
@@ -97,7 +97,7 @@ std::vector<double> optima(const PressedBody& body) {
   return energies;
 }
 
-std::vector<double> excess(const Result& result, const std::vector<double>& optimum) {
+std::vector<double> excess(const MethodTiming& result, const std::vector<double>& optimum) {
   std::vector<double> shares;
   for (std::size_t i = 0; i < optimum.size(); ++i)
     shares.push_back(result.answers[i].value / optimum[i] - 1.0);
@@ -105,23 +105,24 @@ std::vector<double> excess(const Result& result, const std::vector<double>& opti
 }
 
 /// Poses at which one method found a higher energy than another, or nothing.
-std::size_t above(const Result& one, const Result& other) {
+std::size_t above(const MethodTiming& one, const MethodTiming& other) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < one.answers.size(); ++i)
     count += one.answers[i].value <= other.answers[i].value * (1.0 + kSameEnergy) ? 0 : 1;
   return count;
 }
 
-void add_rows(const PressedBody& body, const std::vector<Result>& results, Table& times, Table& energies) {
+void add_rows(const PressedBody& body, const std::vector<MethodTiming>& results, Table& times,
+              Table& energies) {
   const std::vector<double> optimum = optima(body);
-  const Result& planar = results[kPlanar];
+  const MethodTiming& planar = results[kPlanar];
   for (std::size_t r = 0; r < results.size(); ++r) {
-    const Result& result = results[r];
+    const MethodTiming& result = results[r];
     times.add(
         body.name, result.name,
         {fixed(result.ns.p50, 0), fixed(result.ns.p99, 0), fixed(result.ns.p999, 0), fixed(result.ns.max, 0),
          fixed(result.ns.p50 / results[kCold].ns.p50, 2), fixed(result.ns.p50 / results[kWarm].ns.p50, 2),
-         fixed(result.ns.p50 / results[kFollow].ns.p50, 2), fixed(100.0 * result.spread, 1),
+         fixed(result.ns.p50 / results[kFollow].ns.p50, 2), fixed(100.0 * result.relative_spread, 1),
          verdict(result)});
 
     std::vector<double> active;
@@ -144,7 +145,7 @@ void add_rows(const PressedBody& body, const std::vector<Result>& results, Table
 
 }  // namespace
 
-std::vector<Table> bench_half_space(const Effort& effort, const TickScale& scale) {
+std::vector<Table> bench_half_space(const Effort& effort, const CounterScale& scale) {
   Table times("half-space: time of one solve [ns]",
               {"p50", "p99", "p99.9", "max", "/ cold", "/ warm", "/ follow", "spread %", "verdict"});
   Table energies("half-space: energy above the optimum [share]",
@@ -156,18 +157,18 @@ std::vector<Table> bench_half_space(const Effort& effort, const TickScale& scale
     if (contacts >= 3) bodies.push_back(pressed_face(contacts, effort.poses));
   }
   for (const PressedBody& body : bodies) {
-    const std::vector<Runner> runners = {exact_cold(body),
-                                         exact_warm(body),
-                                         followed("exact, follow", body, Method::exact),
-                                         followed("planar 47", body, Method::planar),
-                                         followed("descent", body, Method::descent),
-                                         followed("translational", body, Method::translational)};
-    add_rows(body, race(runners, body.X_WP.size(), effort.passes, scale), times, energies);
+    const std::vector<TimedMethod> runners = {exact_cold(body),
+                                              exact_warm(body),
+                                              followed("exact, follow", body, Method::exact),
+                                              followed("planar 47", body, Method::planar),
+                                              followed("descent", body, Method::descent),
+                                              followed("translational", body, Method::translational)};
+    add_rows(body, time_methods(runners, body.X_WP.size(), effort.passes, scale), times, energies);
   }
   return {times, energies};
 }
 
-Table bench_planar_family(const Effort& effort, const TickScale& scale) {
+Table bench_planar_family(const Effort& effort, const CounterScale& scale) {
   Table table(
       "planar family at one contact: time [ns], and cycles of the time-stamp counter",
       {"p50", "p99", "max", "ns / plane", "cycles / plane", "p99 cycles / plane", "spread %", "verdict"});
@@ -181,24 +182,24 @@ Table bench_planar_family(const Effort& effort, const TickScale& scale) {
     contacts.push_back(set[0]);
   }
   const auto planes = [&](std::string name, int count) {
-    return Runner{std::move(name), [] {},
-                  [&, count](std::size_t i) {
-                    const auto at = family.at(body.X_WP[i], contacts[i]);
-                    double least = std::numeric_limits<double>::infinity();
-                    for (int k = 0; k < count; ++k) least = std::min(least, at.solve(k).minimum.T);
-                    return Answer{least};
-                  }};
+    return TimedMethod{std::move(name), [] {},
+                       [&, count](std::size_t i) {
+                         const auto at = family.at(body.X_WP[i], contacts[i]);
+                         double least = std::numeric_limits<double>::infinity();
+                         for (int k = 0; k < count; ++k) least = std::min(least, at.solve(k).minimum.T);
+                         return Answer{least};
+                       }};
   };
   const std::vector<int> counts = {1, kPlanes};
-  const std::vector<Result> results =
-      race({planes("1 plane", 1), planes("47 planes", kPlanes)}, body.X_WP.size(), effort.passes, scale);
+  const std::vector<MethodTiming> results = time_methods({planes("1 plane", 1), planes("47 planes", kPlanes)},
+                                                         body.X_WP.size(), effort.passes, scale);
   for (std::size_t r = 0; r < results.size(); ++r) {
     const Quantiles& ns = results[r].ns;
     table.add(
         body.name, results[r].name,
         {fixed(ns.p50, 0), fixed(ns.p99, 0), fixed(ns.max, 0), fixed(ns.p50 / counts[r], 1),
-         fixed(ns.p50 / counts[r] / scale.ns_per_tick, 0), fixed(ns.p99 / counts[r] / scale.ns_per_tick, 0),
-         fixed(100.0 * results[r].spread, 1), verdict(results[r])});
+         fixed(ns.p50 / counts[r] / scale.ns_per_count, 0), fixed(ns.p99 / counts[r] / scale.ns_per_count, 0),
+         fixed(100.0 * results[r].relative_spread, 1), verdict(results[r])});
   }
   return table;
 }

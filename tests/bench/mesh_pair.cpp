@@ -9,9 +9,9 @@
 namespace wrenchd::bench {
 namespace {
 
-Scene scene_of(const MadeMesh& tool, const MadeMesh& obstacle) {
+Scene scene_of(const GeneratedMesh& tool, const GeneratedMesh& obstacle) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({obstacle.kind, TreedMesh(make_mesh(obstacle)), Pose{}});
+  obstacles.push_back({obstacle.kind, MeshBvh(make_mesh(obstacle)), Pose{}});
   return Scene(test::mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
 }
 
@@ -36,14 +36,14 @@ double path_s(int i) {
 
 }  // namespace
 
-std::size_t meeting(MeetingPairs& pairs, const Scene& scene, const Pose& X_WT) {
+std::size_t intersecting_pair_count(IntersectingPairs& pairs, const Scene& scene, const Pose& X_WT) {
   pairs.find(*scene.tool_mesh(), *scene.meshes()[0].mesh, X_WT);
   return pairs.pairs().size();
 }
 
 MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
   MeshPair pair{"", scene_of({"bumpy", tool_triangles, 1}, {"boulder", obstacle_triangles, 2}), {}, {}, {}};
-  MeetingPairs pairs;
+  IntersectingPairs pairs;
   double last_m = 0.13;
   for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
     const double t = path_s(i);
@@ -53,7 +53,9 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
     const Vector3d axis = Vector3d(0.3 + 0.2 * std::sin(t), 1.0, 0.5 * std::cos(t)).normalized();
     const Quaterniond R = rotation_from((t + 0.15 * std::sin(9.0 * t)) * axis);
     const auto at = [&](double away_m) { return Pose{R, away_m * out}; };
-    const auto overlap = [&](double away_m) { return meeting(pairs, pair.scene, at(away_m)) > 0; };
+    const auto overlap = [&](double away_m) {
+      return intersecting_pair_count(pairs, pair.scene, at(away_m)) > 0;
+    };
     double free_m = last_m + 0.002, overlapping_m = free_m;
     while (!overlap(overlapping_m)) {
       free_m = overlapping_m;
@@ -68,7 +70,7 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
 
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses) {
   MeshPair pair{"", scene_of({"peg", tool_triangles}, {"hole", obstacle_triangles}), {}, {}, {}};
-  MeetingPairs pairs;
+  IntersectingPairs pairs;
   for (int i = -kTicksBefore; i < static_cast<int>(poses); ++i) {
     const double t = path_s(i);
     const Quaterniond R =
@@ -77,7 +79,9 @@ MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles,
     const auto at = [&](double aside_m) {
       return Pose{R, {aside_m * std::cos(4.0 * t), aside_m * std::sin(4.0 * t), 0.010 * std::sin(5.0 * t)}};
     };
-    const auto overlap = [&](double aside_m) { return meeting(pairs, pair.scene, at(aside_m)) > 0; };
+    const auto overlap = [&](double aside_m) {
+      return intersecting_pair_count(pairs, pair.scene, at(aside_m)) > 0;
+    };
     double free_m = 0.0, overlapping_m = 0.0;
     while (!overlap(overlapping_m)) {
       free_m = overlapping_m;

@@ -28,6 +28,6 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses);
 
 /// How many pairs of triangles of tool and obstacle meet, found anew at each pose.
-std::size_t meeting(MeetingPairs& pairs, const Scene& scene, const Pose& X_WT);
+std::size_t intersecting_pair_count(IntersectingPairs& pairs, const Scene& scene, const Pose& X_WT);
 
 }  // namespace wrenchd::bench

@@ -11,14 +11,14 @@ namespace {
 /// Undisturbed, the passes of one method differ by a few per cent.
 constexpr double kInconclusive = 0.1;
 
-std::vector<double> timed_pass(const Runner& runner, std::size_t poses, const TickScale& scale) {
+std::vector<double> timed_pass(const TimedMethod& runner, std::size_t poses, const CounterScale& scale) {
   std::vector<double> ns(poses);
   volatile double answer = 0.0;  // so that no answer can be left out
   runner.restart();
   for (std::size_t i = 0; i < poses; ++i) {
-    const std::int64_t before = ticks();
+    const std::int64_t before = counter();
     answer = runner.solve(i).value;
-    ns[i] = scale.ns(ticks() - before);
+    ns[i] = scale.ns(counter() - before);
   }
   static_cast<void>(answer);
   return ns;
@@ -26,9 +26,9 @@ std::vector<double> timed_pass(const Runner& runner, std::size_t poses, const Ti
 
 }  // namespace
 
-std::vector<Result> race(const std::vector<Runner>& runners, std::size_t poses, int passes,
-                         const TickScale& scale) {
-  std::vector<Result> results(runners.size());
+std::vector<MethodTiming> time_methods(const std::vector<TimedMethod>& runners, std::size_t poses, int passes,
+                                       const CounterScale& scale) {
+  std::vector<MethodTiming> results(runners.size());
   for (std::size_t r = 0; r < runners.size(); ++r) {
     results[r].name = runners[r].name;
     runners[r].restart();
@@ -45,13 +45,13 @@ std::vector<Result> race(const std::vector<Runner>& runners, std::size_t poses, 
     }
   for (std::size_t r = 0; r < runners.size(); ++r) {
     results[r].ns = quantiles(least_ns[r]);
-    results[r].spread = spread(p50_ns[r]);
+    results[r].relative_spread = relative_spread(p50_ns[r]);
   }
   return results;
 }
 
-std::string verdict(const Result& result) {
-  return result.spread > kInconclusive ? "inconclusive" : "";
+std::string verdict(const MethodTiming& result) {
+  return result.relative_spread > kInconclusive ? "inconclusive" : "";
 }
 
 }  // namespace wrenchd::bench

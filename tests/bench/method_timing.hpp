@@ -27,26 +27,26 @@ struct Answer {
 };
 
 /// One method, to be timed on a row of poses.
-struct Runner {
+struct TimedMethod {
   std::string name;
   std::function<void()> restart;             ///< back to the state before the first pose; not timed
   std::function<Answer(std::size_t)> solve;  ///< the pose with this number; they come in order
 };
 
-struct Result {
+struct MethodTiming {
   std::string name;
   std::vector<Answer> answers;
-  Quantiles ns;   ///< over the poses, of the least time of each over the passes
-  double spread;  ///< of the p50 of the single passes
+  Quantiles ns;            ///< over the poses, of the least time of each over the passes
+  double relative_spread;  ///< of the p50 of the single passes
 };
 
 /// Times the methods in turn, pass after pass, so that what disturbs the machine disturbs all of them; one
 /// pass more goes before, untimed, for the answers and to warm the caches. A pose's time is the least over
 /// the passes: what the code costs, not what the neighbours cost.
-std::vector<Result> race(const std::vector<Runner>& runners, std::size_t poses, int passes,
-                         const TickScale& scale);
+std::vector<MethodTiming> time_methods(const std::vector<TimedMethod>& runners, std::size_t poses, int passes,
+                                       const CounterScale& scale);
 
 /// "inconclusive" where the passes differ by too much for the times to be compared with others.
-std::string verdict(const Result& result);
+std::string verdict(const MethodTiming& result);
 
 }  // namespace wrenchd::bench

@@ -64,7 +64,7 @@ ConvexSurface::ConvexSurface(const TriangleMesh& mesh) : vertices_(mesh.vertices
   }
 }
 
-ConvexSurface ConvexSurface::moved(const Pose& X) const {
+ConvexSurface ConvexSurface::transformed(const Pose& X) const {
   ConvexSurface out = *this;
   const Matrix3d R = X.rotation.toRotationMatrix();
   for (Vector3d& p : out.vertices_) p = R * p + X.translation_m;

@@ -29,7 +29,7 @@ class ConvexSurface {
   const std::vector<Face>& faces() const { return faces_; }
   const std::vector<Edge>& edges() const { return edges_; }
 
-  ConvexSurface moved(const Pose& X) const;
+  ConvexSurface transformed(const Pose& X) const;
 
  private:
   std::vector<Vector3d> vertices_;

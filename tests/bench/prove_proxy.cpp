@@ -38,26 +38,26 @@ ObstacleMotion random_motion(std::uint64_t seed) {
   RandomValues random(seed);
   ObstacleMotion motion;
   const double which = random.uniform(0.0, 3.0);
-  if (which < 2.0) motion.linear_m_per_s = random.decades(0.01, 2.0) * random.unit<3>();
-  if (which > 1.0) motion.angular_rad_per_s = random.decades(0.1, 20.0) * random.unit<3>();
-  motion.turn_back_s = random.decades(0.02, 0.5);
+  if (which < 2.0) motion.linear_m_per_s = random.log_uniform(0.01, 2.0) * random.unit<3>();
+  if (which > 1.0) motion.angular_rad_per_s = random.log_uniform(0.1, 20.0) * random.unit<3>();
+  motion.reverse_after_s = random.log_uniform(0.02, 0.5);
   return motion;
 }
 
 /// Did the tool come to the other side of the plate between two ticks? The plate is wider than the stabs.
-bool jumped(const Handling& handling, const Pose& X_OT_before, const Pose& X_OT_after) {
+bool jumped(const ManipulationCase& handling, const Pose& X_OT_before, const Pose& X_OT_after) {
   const double wide_m = 0.03;
   const Vector3d &before = X_OT_before.translation_m, &after = X_OT_after.translation_m;
-  return handling.motion == Motion::stab && handling.obstacle.kind == "plate" &&
+  return handling.motion == HandMotion::stab && handling.obstacle.kind == "plate" &&
          before.z() * after.z() < 0.0 && before.head<2>().norm() < wide_m && after.head<2>().norm() < wide_m;
 }
 
-Tally handle(const Handling& handling, long poses, std::uint64_t seed, const ObstacleMotion& motion) {
+Tally handle(const ManipulationCase& handling, long poses, std::uint64_t seed, const ObstacleMotion& motion) {
   const Scene scene = scene_of(handling, motion);
   const MeshObstacle& obstacle = scene.meshes()[0];
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), obstacle.mesh->surface.mesh());
+  const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), obstacle.mesh->surface.mesh());
   Proxy proxy(scene);
-  Hand hand(handling, seed);
+  HandTrajectory hand(handling, seed);
   const Pose X_OT_start = {Quaterniond::Identity(), handling.start_m};
   Pose X_WQ = obstacle.X_WO * X_OT_start, X_OQ = X_OT_start;
   Tally tally;
@@ -68,22 +68,22 @@ Tally handle(const Handling& handling, long poses, std::uint64_t seed, const Obs
     const Projection q = proxy.follow(X_WP, X_WQ, time_s);
     tally.tick_us.push_back(
         std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
-    tally.most_visits = std::max(tally.most_visits, proxy.visits());
+    tally.most_visits = std::max(tally.most_visits, proxy.node_visits());
     if (q.status == ProjectionStatus::infeasible) {  // as the loop does: it is put elsewhere
       ++tally.caught;
       X_OQ = X_OT_start;
       X_WQ = obstacle.X_WO_at(time_s) * X_OQ;
-      proxy.forget(time_s);
+      proxy.clear_history(time_s);
       continue;
     }
     X_WQ = q.X_WQ;
     const Pose X_OQ_last = X_OQ;
-    X_OQ = inverse(obstacle.X_WO_at(proxy.seen_s())) * X_WQ;
+    X_OQ = inverse(obstacle.X_WO_at(proxy.admissible_time_s())) * X_WQ;
     tally.jumps += jumped(handling, X_OQ_last, X_OQ) ? 1 : 0;
-    tally.overlaps += exact.meet(X_OQ) ? 1 : 0;
+    tally.overlaps += exact.intersect(X_OQ) ? 1 : 0;
     tally.free += q.status == ProjectionStatus::free ? 1 : 0;
     tally.budget_spent += q.status == ProjectionStatus::budget_spent ? 1 : 0;
-    if (motion.moves()) tally.latest_s = std::max(tally.latest_s, time_s - proxy.seen_s());
+    if (motion.moves()) tally.latest_s = std::max(tally.latest_s, time_s - proxy.admissible_time_s());
     if (q.status == ProjectionStatus::converged) {
       ++tally.converged;
       tally.worst_residual = std::max(tally.worst_residual, q.kkt_residual);
@@ -114,8 +114,8 @@ int main(int argc, char** argv) {
   std::atomic<std::size_t> next = 0;
   std::atomic<long> faults = 0;
   const auto work = [&] {
-    for (std::size_t i = next++; i < rough_handling().size(); i = next++) {
-      const Handling& handling = rough_handling()[i];
+    for (std::size_t i = next++; i < manipulation_cases().size(); i = next++) {
+      const ManipulationCase& handling = manipulation_cases()[i];
       if (handling.name.find(only) == std::string::npos) continue;
       const Tally t =
           handle(handling, poses, seed, moving ? random_motion(100 * seed + i) : ObstacleMotion{});

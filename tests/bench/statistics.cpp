@@ -21,7 +21,7 @@ Quantiles quantiles(const std::vector<double>& values) {
   return {quantile(values, 0.5), quantile(values, 0.99), quantile(values, 0.999), quantile(values, 1.0)};
 }
 
-double spread(const std::vector<double>& values) {
+double relative_spread(const std::vector<double>& values) {
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
   return *most / *least - 1.0;
 }

@@ -15,6 +15,6 @@ struct Quantiles {
 Quantiles quantiles(const std::vector<double>& values);
 
 /// How far the largest is above the smallest, as a share of the smallest.
-double spread(const std::vector<double>& values);
+double relative_spread(const std::vector<double>& values);
 
 }  // namespace wrenchd::bench

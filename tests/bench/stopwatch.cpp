@@ -9,20 +9,20 @@
 
 namespace wrenchd::bench {
 
-TickScale calibrate() {
+CounterScale calibrate_counter() {
   using Clock = std::chrono::steady_clock;
-  TickScale scale;
+  CounterScale scale;
   const auto began = Clock::now();
-  const std::int64_t first = ticks();
+  const std::int64_t first = counter();
   while (Clock::now() - began < std::chrono::milliseconds(100)) continue;
-  const std::int64_t last = ticks();
+  const std::int64_t last = counter();
   const std::chrono::duration<double, std::nano> passed = Clock::now() - began;
-  scale.ns_per_tick = passed.count() / static_cast<double>(last - first);
+  scale.ns_per_count = passed.count() / static_cast<double>(last - first);
 
-  scale.empty_ticks = std::numeric_limits<std::int64_t>::max();
+  scale.overhead_counts = std::numeric_limits<std::int64_t>::max();
   for (int i = 0; i < 10000; ++i) {
-    const std::int64_t before = ticks();
-    scale.empty_ticks = std::min(scale.empty_ticks, ticks() - before);
+    const std::int64_t before = counter();
+    scale.overhead_counts = std::min(scale.overhead_counts, counter() - before);
   }
   return scale;
 }

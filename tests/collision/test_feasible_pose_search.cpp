@@ -15,10 +15,10 @@ using namespace test;
 TEST_CASE("a pose is admissible where nothing overlaps and nothing is inside", "[placement]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back(
-      {"boulder", TreedMesh(make_mesh({"boulder", 2000})), Pose{Quaterniond::Identity(), {1, 0, 0}}});
+      {"boulder", MeshBvh(make_mesh({"boulder", 2000})), Pose{Quaterniond::Identity(), {1, 0, 0}}});
   const Scene scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1), {{"floor", Vector3d::UnitZ(), -0.5}}, {},
                     std::move(obstacles));
-  Placement placement(scene);
+  FeasiblePoseSearch placement(scene);
   CHECK(placement.admissible({Quaterniond::Identity(), {0.9, 0, 0}}));
   CHECK_FALSE(placement.admissible({Quaterniond::Identity(), {0.95, 0, 0}}));  // the surfaces meet
   CHECK_FALSE(placement.admissible({Quaterniond::Identity(), {1, 0, 0}}));     // wholly inside
@@ -28,29 +28,29 @@ TEST_CASE("a pose is admissible where nothing overlaps and nothing is inside", "
 
 TEST_CASE("a tool around an obstacle is not admissible either", "[placement]") {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"bolt", TreedMesh(make_mesh({"bolt", 500})), Pose{}});
+  obstacles.push_back({"bolt", MeshBvh(make_mesh({"bolt", 500})), Pose{}});
   const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
-  CHECK_FALSE(Placement(scene).admissible(Pose{}));
+  CHECK_FALSE(FeasiblePoseSearch(scene).admissible(Pose{}));
 }
 
 TEST_CASE("from inside an obstacle a way out is found, near by and admissible", "[placement]") {
   RandomValues random(9);
   for (const std::size_t i : {0, 2, 7, 11, 12}) {
-    const Handling& handling = rough_handling()[i];
+    const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
     const Scene scene = scene_of(handling);
-    const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
-    Placement placement(scene);
-    for (int n = 0; n < repeats(4); ++n) {
+    const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+    FeasiblePoseSearch placement(scene);
+    for (int n = 0; n < case_count(4); ++n) {
       const Pose X_WP = {random.rotation(),
                          random.uniform(0.0, 0.7) * handling.start_m.norm() * random.unit<3>()};
       const Projection q = placement.nearest(X_WP);
       REQUIRE(q.status != ProjectionStatus::infeasible);
       CHECK(placement.admissible(q.X_WQ));
-      CHECK_FALSE(exact.meet(q.X_WQ));
+      CHECK_FALSE(exact.intersect(q.X_WQ));
       CHECK(q.energy == Approx(energy(scene.tool().solid.inertia, X_WP, q.X_WQ)).margin(1e-15));
       // No farther than the nearest of a few thousand poses found at random.
-      for (int k = 0; k < repeats(300); ++k) {
+      for (int k = 0; k < case_count(300); ++k) {
         const Pose X = {(X_WP.rotation * random.rotation(random.uniform(0.0, 0.5))).normalized(),
                         X_WP.translation_m + random.uniform(0.0, 0.1) * random.unit<3>()};
         if (energy(scene.tool().solid.inertia, X_WP, X) < 0.999 * q.energy)
@@ -61,8 +61,8 @@ TEST_CASE("from inside an obstacle a way out is found, near by and admissible", 
 }
 
 TEST_CASE("a peg in its hole is held there, not thrown out", "[placement]") {
-  const Scene scene = scene_of(rough_handling()[15]);
-  Placement placement(scene);
+  const Scene scene = scene_of(manipulation_cases()[15]);
+  FeasiblePoseSearch placement(scene);
   const Pose X_WP = {rotation_from({0.002, 0.001, 0.3}), {0.0003, 0.0001, 0.002}};
   const Projection q = placement.nearest(X_WP);
   REQUIRE(q.status == ProjectionStatus::converged);

@@ -16,15 +16,15 @@ constexpr double kClearance_m = 1e-9;
 
 Scene two(TriangleMesh tool, TriangleMesh obstacle, Pose X_WO = {}) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"obstacle", TreedMesh(std::move(obstacle)), X_WO});
+  obstacles.push_back({"obstacle", MeshBvh(std::move(obstacle)), X_WO});
   return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
 }
 
-MeshContacts::Findings look(const Scene& scene, const Pose& from, const Pose& to) {
+MeshContacts::SweepResult add_sample(const Scene& scene, const Pose& from, const Pose& to) {
   MeshContacts contacts(scene);
-  contacts.start_at(from);
-  WalkBudget budget = {1000000};
-  return contacts.look(to, kClearance_m, budget);
+  contacts.set_start(from);
+  VisitBudget budget = {1000000};
+  return contacts.sweep(to, kClearance_m, budget);
 }
 
 Pose at(double x, double y, double z, const Vector3d& turn = Vector3d::Zero()) {
@@ -35,40 +35,40 @@ TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_c
   const Scene scene = two(make_mesh({"cube", 12}), make_mesh({"table", 12}));
   const Vector3d on_corner(0.6, 0.5, 0.0), on_edge(0.785398163, 0.0, 0.0);
   SECTION("a corner on a face") {
-    const auto found = look(scene, at(0, 0, 0.06, on_corner), at(0, 0, 0.04, on_corner));
+    const auto found = add_sample(scene, at(0, 0, 0.06, on_corner), at(0, 0, 0.04, on_corner));
     REQUIRE(found.complete);
-    REQUIRE(found.met.size() >= 1);
-    CHECK(found.met[0].kind == ContactKind::vertex_face);
-    CHECK(found.met[0].n_W.isApprox(Vector3d::UnitZ(), 1e-12));
-    CHECK(gap_m(found.met[0], at(0, 0, 0.06, on_corner)) > 0.0);
-    CHECK(gap_m(found.met[0], at(0, 0, 0.04, on_corner)) < 0.0);
+    REQUIRE(found.contacts.size() >= 1);
+    CHECK(found.contacts[0].kind == ContactKind::vertex_face);
+    CHECK(found.contacts[0].n_W.isApprox(Vector3d::UnitZ(), 1e-12));
+    CHECK(gap_m(found.contacts[0], at(0, 0, 0.06, on_corner)) > 0.0);
+    CHECK(gap_m(found.contacts[0], at(0, 0, 0.04, on_corner)) < 0.0);
   }
   SECTION("an edge over the table's edge") {
     const Vector3d across(0.785398163, 0.0, 0.0);  // its lowest edge runs along x
-    const auto found = look(scene, at(0.15, 0, 0.06, across), at(0.15, 0, 0.04, across));
-    REQUIRE(found.met.size() >= 1);
+    const auto found = add_sample(scene, at(0.15, 0, 0.06, across), at(0.15, 0, 0.04, across));
+    REQUIRE(found.contacts.size() >= 1);
     bool edges = false;
-    for (const Contact& c : found.met) edges = edges || c.kind == ContactKind::edge_edge;
+    for (const Contact& c : found.contacts) edges = edges || c.kind == ContactKind::edge_edge;
     CHECK(edges);
-    for (const Contact& c : found.met)
+    for (const Contact& c : found.contacts)
       CHECK(normal_W(c, at(0.15, 0, 0.06, across)).isApprox(Vector3d::UnitZ(), 1e-9));
   }
   SECTION("the other way round, the table's corner on a face") {
     const Scene other = two(make_mesh({"table", 12}), make_mesh({"cube", 12}), at(0, 0, 0, on_corner));
-    const auto found = look(other, at(0, 0, 0.07), at(0, 0, 0.045));
-    REQUIRE(found.met.size() >= 1);
-    CHECK(found.met[0].kind == ContactKind::face_vertex);
-    CHECK(normal_W(found.met[0], at(0, 0, 0.07)).isApprox(Vector3d::UnitZ(), 1e-9));
+    const auto found = add_sample(other, at(0, 0, 0.07), at(0, 0, 0.045));
+    REQUIRE(found.contacts.size() >= 1);
+    CHECK(found.contacts[0].kind == ContactKind::face_vertex);
+    CHECK(normal_W(found.contacts[0], at(0, 0, 0.07)).isApprox(Vector3d::UnitZ(), 1e-9));
   }
   SECTION("nothing on a way that ends above") {
-    const auto found = look(scene, at(0, 0, 0.06, on_edge), at(0.02, 0, 0.0456, on_edge));
-    CHECK(found.met.empty());
+    const auto found = add_sample(scene, at(0, 0, 0.06, on_edge), at(0.02, 0, 0.0456, on_edge));
+    CHECK(found.contacts.empty());
     CHECK_FALSE(found.overlaps);
   }
   SECTION("a way through the whole table, in one step") {
-    const auto found = look(scene, at(0, 0, 0.06), at(0.01, 0, -0.06));
-    REQUIRE(found.met.size() >= 1);
-    for (const Contact& c : found.met) CHECK(c.n_W.isApprox(Vector3d::UnitZ(), 1e-9));
+    const auto found = add_sample(scene, at(0, 0, 0.06), at(0.01, 0, -0.06));
+    REQUIRE(found.contacts.size() >= 1);
+    for (const Contact& c : found.contacts) CHECK(c.n_W.isApprox(Vector3d::UnitZ(), 1e-9));
   }
 }
 
@@ -77,10 +77,10 @@ TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
   for (const std::size_t triangles : {12, 1000, 20000}) {
     const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));
     const double z = 0.035 + kClearance_m;
-    const auto found = look(scene, at(0.001, 0.002, z), at(0.03, 0.0, z));
+    const auto found = add_sample(scene, at(0.001, 0.002, z), at(0.03, 0.0, z));
     INFO(triangles);
     CHECK(found.complete);
-    CHECK(found.met.empty());
+    CHECK(found.contacts.empty());
     CHECK_FALSE(found.overlaps);
   }
 }
@@ -88,15 +88,15 @@ TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
 TEST_CASE("what touches at the end is told, by the names of its features", "[mesh_contacts]") {
   const Scene scene = two(make_mesh({"cube", 300}), make_mesh({"table", 300}));
   MeshContacts contacts(scene);
-  WalkBudget budget = {1000000};
-  contacts.start_at(at(0, 0, 0.036));
-  const auto found = contacts.look(at(0, 0, 0.035 + kClearance_m), kClearance_m, budget);
-  CHECK(found.met.empty());
+  VisitBudget budget = {1000000};
+  contacts.set_start(at(0, 0, 0.036));
+  const auto found = contacts.sweep(at(0, 0, 0.035 + kClearance_m), kClearance_m, budget);
+  CHECK(found.contacts.empty());
   CHECK(contacts.touching().size() == 4);  // the corners, and nothing of the cuts
   for (const Contact& c : contacts.touching()) {
     CHECK(c.kind == ContactKind::vertex_face);
-    CHECK(scene.tool_mesh()->surface.vertices_m()[c.tool_feature] == c.p_TA_m);
-    CHECK(scene.meshes()[0].mesh->surface.region(c.obstacle_feature) == c.obstacle_feature);
+    CHECK(scene.tool_mesh()->surface.vertices_m()[c.tool_feature] == c.p_TCa_m);
+    CHECK(scene.meshes()[0].mesh->surface.planar_region(c.obstacle_feature) == c.obstacle_feature);
     CHECK(c.obstacle == 0);
   }
 }
@@ -106,12 +106,12 @@ TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
   sheet.vertices_m = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"sheet", TreedMesh(sheet, MeshSurface::Kind::surface), Pose{}});
+  obstacles.push_back({"sheet", MeshBvh(sheet, MeshSurface::Kind::surface), Pose{}});
   const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
   for (const double side : {1.0, -1.0}) {
-    const auto found = look(scene, at(0, 0, side * 0.04), at(0, 0, side * 0.01));
-    REQUIRE(found.met.size() >= 1);
-    for (const Contact& c : found.met) CHECK(c.n_W.isApprox(side * Vector3d::UnitZ(), 1e-12));
+    const auto found = add_sample(scene, at(0, 0, side * 0.04), at(0, 0, side * 0.01));
+    REQUIRE(found.contacts.size() >= 1);
+    for (const Contact& c : found.contacts) CHECK(c.n_W.isApprox(side * Vector3d::UnitZ(), 1e-12));
   }
 }
 
@@ -119,58 +119,59 @@ TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
 TEST_CASE("a step that ends in an obstacle is never seen as free", "[mesh_contacts]") {
   RandomValues random(12);
   for (const std::size_t i : {1, 5, 6, 8, 11, 13}) {
-    const Handling& handling = rough_handling()[i];
+    const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
     const Scene scene = scene_of(handling);
-    const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+    const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
     Proxy proxy(scene);
     MeshContacts contacts(scene);
-    Hand hand(handling, 3);
+    HandTrajectory hand(handling, 3);
     Pose X_WQ = {Quaterniond::Identity(), handling.start_m};
     int inside = 0;
-    for (int n = 0; n < repeats(300); ++n) {
+    for (int n = 0; n < case_count(300); ++n) {
       for (int k = 0; k < 4; ++k) X_WQ = proxy.follow(hand.next(), X_WQ).X_WQ;
       const Pose X_WT = {(X_WQ.rotation * random.rotation(random.uniform(0.0, 0.05))).normalized(),
-                         X_WQ.translation_m + random.decades(1e-5, 0.02) * random.unit<3>()};
-      contacts.start_at(X_WQ);
-      WalkBudget budget = {1000000};
-      const auto found = contacts.look(X_WT, kClearance_m, budget);
+                         X_WQ.translation_m + random.log_uniform(1e-5, 0.02) * random.unit<3>()};
+      contacts.set_start(X_WQ);
+      VisitBudget budget = {1000000};
+      const auto found = contacts.sweep(X_WT, kClearance_m, budget);
       REQUIRE(found.complete);
-      if (!exact.meet(X_WT)) continue;
+      if (!exact.intersect(X_WT)) continue;
       ++inside;
       INFO("step " << n);
-      CHECK((found.overlaps || !found.met.empty()));
+      CHECK((found.overlaps || !found.contacts.empty()));
     }
-    CHECK(inside > repeats(20));
+    CHECK(inside > case_count(20));
   }
 }
 
 // Turned by 0.05 rad, an edge that was held dips by 13 um and slides off the corner it lay on; no other
 // feature is met first. A shaken hand found it once in a million poses.
 TEST_CASE("a way that turns far is not free where its end overlaps", "[mesh_contacts]") {
-  const Scene scene = scene_of(rough_handling()[9]);
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+  const Scene scene = scene_of(manipulation_cases()[9]);
+  const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   const Pose from = {{-0.68298246087346626, -0.19239706033389406, 0.68845117377531961, 0.15017759700263147},
                      {0.050170555760934425, 0.032405514058705572, -0.019768710717337615}};
   const Pose to = {{-0.6992801550880553, -0.19230228262919327, 0.67051753479992138, 0.15631165126587176},
                    {0.049002937603635319, 0.030474385760468663, -0.019151829047996116}};
-  REQUIRE_FALSE(exact.meet(from));
-  REQUIRE(exact.meet(to));
-  const auto found = look(scene, from, to);
+  REQUIRE_FALSE(exact.intersect(from));
+  REQUIRE(exact.intersect(to));
+  const auto found = add_sample(scene, from, to);
   CHECK(found.complete);
-  CHECK((found.overlaps || !found.met.empty()));
+  CHECK((found.overlaps || !found.contacts.empty()));
 }
 
 TEST_CASE("ends within reach of one another need no second walk", "[mesh_contacts]") {
-  const Scene scene = scene_of(rough_handling()[7]);
+  const Scene scene = scene_of(manipulation_cases()[7]);
   MeshContacts contacts(scene);
-  WalkBudget budget = {1000000};
-  contacts.start_at(at(0.11, 0, 0));
-  contacts.look(at(0.10, 0, 0), kClearance_m, budget);
+  VisitBudget budget = {1000000};
+  contacts.set_start(at(0.11, 0, 0));
+  contacts.sweep(at(0.10, 0, 0), kClearance_m, budget);
   const auto walks = [&](const Pose& X_WT) {
-    const std::uint32_t before = budget.visits, looking = contacts.looking();
-    contacts.look(X_WT, kClearance_m, budget);
-    return before - budget.visits > contacts.looking() - looking;  // the pairs listed are looked at anew
+    const std::uint32_t before = budget.remaining, looking = contacts.sweep_visits();
+    contacts.sweep(X_WT, kClearance_m, budget);
+    return before - budget.remaining >
+           contacts.sweep_visits() - looking;  // the pairs listed are looked at anew
   };
   CHECK_FALSE(walks(at(0.10, 0.0002, 0)));
   CHECK(walks(at(0.10, 0.01, 0)));

@@ -22,15 +22,15 @@ using namespace test;
 constexpr double kTick_s = 1e-3;
 
 struct Part {
-  MadeMesh mesh;
+  GeneratedMesh mesh;
   Pose X_WO;
   ObstacleMotion motion;
 };
 
-Scene scene_with(const MadeMesh& tool, const std::vector<Part>& parts) {
+Scene scene_with(const GeneratedMesh& tool, const std::vector<Part>& parts) {
   std::vector<MeshObstacle> obstacles;
   for (const Part& part : parts)
-    obstacles.push_back({part.mesh.kind, TreedMesh(make_mesh(part.mesh)), part.X_WO, part.motion});
+    obstacles.push_back({part.mesh.kind, MeshBvh(make_mesh(part.mesh)), part.X_WO, part.motion});
   return Scene(mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
 }
 
@@ -40,8 +40,8 @@ class Watched {
  public:
   Watched(const Scene& scene, const Pose& X_WT) : X_WQ(X_WT), proxy(scene), scene_(scene) {
     for (const MeshObstacle& obstacle : scene.meshes())
-      exact_.push_back(
-          std::make_unique<ExactMeeting>(scene.tool_mesh()->surface.mesh(), obstacle.mesh->surface.mesh()));
+      exact_.push_back(std::make_unique<ExactIntersection>(scene.tool_mesh()->surface.mesh(),
+                                                           obstacle.mesh->surface.mesh()));
   }
 
   Projection follow(const Pose& X_WP, double time_s) {
@@ -52,7 +52,8 @@ class Watched {
 
   bool overlaps() const {
     for (std::size_t k = 0; k < exact_.size(); ++k)
-      if (exact_[k]->meet(inverse(scene_.meshes()[k].X_WO_at(proxy.seen_s())) * X_WQ)) return true;
+      if (exact_[k]->intersect(inverse(scene_.meshes()[k].X_WO_at(proxy.admissible_time_s())) * X_WQ))
+        return true;
     return false;
   }
 
@@ -61,13 +62,13 @@ class Watched {
 
  private:
   const Scene& scene_;
-  std::vector<std::unique_ptr<ExactMeeting>> exact_;
+  std::vector<std::unique_ptr<ExactIntersection>> exact_;
 };
 
 ObstacleMotion to_and_fro(const Vector3d& v_m_per_s, double turn_back_s) {
   ObstacleMotion motion;
   motion.linear_m_per_s = v_m_per_s;
-  motion.turn_back_s = turn_back_s;
+  motion.reverse_after_s = turn_back_s;
   return motion;
 }
 
@@ -79,7 +80,8 @@ ObstacleMotion turning(const Vector3d& w_rad_per_s) {
 
 TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exactly outside", "[moving]") {
   const double speed_m_per_s = GENERATE(0.05, 0.5, 5.0);
-  const MadeMesh tool = GENERATE(MadeMesh{"cube", 12}, MadeMesh{"bumpy", 2000}, MadeMesh{"plate", 100});
+  const GeneratedMesh tool =
+      GENERATE(GeneratedMesh{"cube", 12}, GeneratedMesh{"bumpy", 2000}, GeneratedMesh{"plate", 100});
   const double turn_back_s = 0.12 / speed_m_per_s;
   const Scene scene = scene_with(tool, {{{"plate", 100},
                                          {Quaterniond::Identity(), {0.003, 0.002, -0.07}},
@@ -90,18 +92,18 @@ TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exac
   REQUIRE_FALSE(watched.overlaps());
   int pushed = 0;
   double latest_s = 0.0;
-  const int ticks = repeats(std::min(2000, static_cast<int>(2.0 * turn_back_s / kTick_s)));
+  const int ticks = case_count(std::min(2000, static_cast<int>(2.0 * turn_back_s / kTick_s)));
   for (int i = 1; i <= ticks; ++i) {
     const Projection q = watched.follow(X_WP, i * kTick_s);
-    INFO("tick " << i << ", looks " << watched.proxy.looks());
+    INFO("tick " << i << ", looks " << watched.proxy.sweeps());
     REQUIRE(q.status != ProjectionStatus::infeasible);
     REQUIRE_FALSE(watched.overlaps());
-    const double plate_z_m = scene.meshes()[0].X_WO_at(watched.proxy.seen_s()).translation_m.z();
+    const double plate_z_m = scene.meshes()[0].X_WO_at(watched.proxy.admissible_time_s()).translation_m.z();
     REQUIRE(watched.X_WQ.translation_m.z() > plate_z_m);
     pushed += q.energy > 0.0 ? 1 : 0;
-    latest_s = std::max(latest_s, i * kTick_s - watched.proxy.seen_s());
+    latest_s = std::max(latest_s, i * kTick_s - watched.proxy.admissible_time_s());
   }
-  if (repeats(600) == 600) CHECK(pushed > ticks / 8);
+  if (case_count(600) == 600) CHECK(pushed > ticks / 8);
   CHECK(latest_s <= 0.02);
 }
 
@@ -113,23 +115,23 @@ TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactl
                  {"cube", 300},
                  {{{"cube", 12}, {}, turning({3.0, 5.0, 8.0})},
                   {{"plate", 100}, {Quaterniond::Identity(), {0, 0, -0.12}}, to_and_fro({0, 0, 0.1}, 0.5)}});
-  Hand hand(rough_handling()[gear ? 11 : 8], 3);
+  HandTrajectory hand(manipulation_cases()[gear ? 11 : 8], 3);
   Pose X_WP = hand.next();
   X_WP.translation_m = gear ? Vector3d(0.12, 0, 0) : Vector3d(0.13, 0, 0);
   const Vector3d offset_m = X_WP.translation_m;
   Watched watched(scene, X_WP);
   REQUIRE_FALSE(watched.overlaps());
   int pushed = 0, late = 0;
-  const int ticks = repeats(1500);
+  const int ticks = case_count(1500);
   for (int i = 1; i <= ticks; ++i) {
     X_WP = hand.next();
     X_WP.translation_m += std::max(0.0, 1.0 - i / 300.0) * offset_m;  // comes in
     const Projection q = watched.follow(X_WP, i * kTick_s);
-    INFO("tick " << i << ", looks " << watched.proxy.looks());
+    INFO("tick " << i << ", looks " << watched.proxy.sweeps());
     REQUIRE_FALSE(watched.overlaps());
     REQUIRE(q.status != ProjectionStatus::infeasible);
     pushed += q.energy > 0.0 ? 1 : 0;
-    late += watched.proxy.seen_s() < i * kTick_s ? 1 : 0;
+    late += watched.proxy.admissible_time_s() < i * kTick_s ? 1 : 0;
   }
   if (ticks == 1500) CHECK(pushed > 300);
   CHECK(late <= ticks / 20);
@@ -137,7 +139,7 @@ TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactl
 
 // The energy knows only p^-1 q: what rides on an obstacle feels nothing of it.
 TEST_CASE("a hand that rides with a lift feels what it feels on the ground", "[moving]") {
-  const MadeMesh tool = {"cube", 300};
+  const GeneratedMesh tool = {"cube", 300};
   const Vector3d v_m_per_s(0.02, 0.01, 0.1);
   const Scene ground = scene_with(tool, {{{"table", 1200}, {}, {}}});
   const Scene lift = scene_with(tool, {{{"table", 1200}, {}, to_and_fro(v_m_per_s, 0.0)}});
@@ -149,19 +151,19 @@ TEST_CASE("a hand that rides with a lift feels what it feels on the ground", "[m
   Watched still(ground, hand(0)), riding(lift, hand(0));
   REQUIRE_FALSE(still.overlaps());
   double most = 0.0;
-  for (int i = 1; i <= repeats(600); ++i) {
+  for (int i = 1; i <= case_count(600); ++i) {
     const Pose X = hand(i);
     const Pose X_up = {X.rotation, X.translation_m + i * kTick_s * v_m_per_s};
     const Projection q = still.follow(X, i * kTick_s);
     const Projection r = riding.follow(X_up, i * kTick_s);
     INFO("tick " << i);
     REQUIRE_FALSE(riding.overlaps());
-    REQUIRE(riding.proxy.seen_s() == i * kTick_s);
+    REQUIRE(riding.proxy.admissible_time_s() == i * kTick_s);
     CHECK(r.status == q.status);
     CHECK((log(inverse(X) * q.X_WQ) - log(inverse(X_up) * r.X_WQ)).norm() < 1e-7);
     most = std::max(most, q.energy);
   }
-  if (repeats(600) == 600) CHECK(most > 1e-8);
+  if (case_count(600) == 600) CHECK(most > 1e-8);
 }
 
 TEST_CASE("what is caught in a vice says so, and was outside until then", "[moving]") {
@@ -179,12 +181,12 @@ TEST_CASE("what is caught in a vice says so, and was outside until then", "[movi
   }
   CHECK(status == ProjectionStatus::infeasible);
   // A cube of 50 mm between tables of 20 mm: 70 - 10 - 25 leave 35 mm on either side, for 0.175 s.
-  CHECK(watched.proxy.seen_s() > 0.17);
-  CHECK(watched.proxy.seen_s() < 0.176);
+  CHECK(watched.proxy.admissible_time_s() > 0.17);
+  CHECK(watched.proxy.admissible_time_s() < 0.176);
   CHECK(i < 400);
   // Put elsewhere it follows again.
   const Pose beside = {Quaterniond::Identity(), {0.5, 0, 0}};
-  watched.proxy.forget(i * kTick_s);
+  watched.proxy.clear_history(i * kTick_s);
   watched.X_WQ = beside;
   CHECK(watched.follow(beside, (i + 1) * kTick_s).status == ProjectionStatus::free);
 }
@@ -197,7 +199,7 @@ TEST_CASE("a place that was found for an earlier time is caught up with", "[movi
   const Pose X_WP;
   const Penetration placed = depth.query(X_WP, {}, 0.0);
   REQUIRE(placed.projection.status == ProjectionStatus::free);
-  depth.forget(0.0);
+  depth.clear_history(0.0);
   Pose X_WQ = placed.projection.X_WQ;
   Penetration now;
   for (int i = 0; i < 20; ++i) {  // the table has risen by 100 mm meanwhile
@@ -225,7 +227,7 @@ TEST_CASE("with friction a tool rides on what moves, without friction it does no
                        above_m + Vector3d(0, 0, table_m - 0.001 - 0.002 * std::min(1.0, i / 10.0))};
     X_WQ = depth.follow(X_WP, X_WQ, t_s).projection.X_WQ;
     if (i == 20) X_ride = X_WQ;
-    if (i > 20) X_ride = scene.motion(0, t_s - kTick_s, t_s) * X_ride;
+    if (i > 20) X_ride = scene.obstacle_displacement(0, t_s - kTick_s, t_s) * X_ride;
   }
   CHECK(X_WQ.translation_m.z() ==
         Approx(scene.meshes()[0].X_WO_at(0.1).translation_m.z() + 0.035).margin(1e-7));
@@ -246,7 +248,7 @@ TEST_CASE("obstacles that move neither allocate nor lock", "[moving][realtime]")
   Pose X_WP = {Quaterniond::Identity(), {0.10, 0, 0}};
   Pose X_WQ = X_WP;
   const RealtimeGuard guard;
-  for (int i = 1; i < repeats(400); ++i) {
+  for (int i = 1; i < case_count(400); ++i) {
     X_WP.translation_m.x() = 0.10 - 0.0002 * i;
     X_WQ = proxy.follow(X_WP, X_WQ, i * kTick_s).X_WQ;
   }

@@ -18,7 +18,7 @@ constexpr double kTick_s = 1e-3;
 
 Scene over_a_block(const ObstacleMotion& motion, const Pose& X_WO) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"block", TreedMesh(make_mesh({"cube", 12, 1})), X_WO, motion});
+  obstacles.push_back({"block", MeshBvh(make_mesh({"cube", 12, 1})), X_WO, motion});
   return Scene(mesh_tool(make_mesh({"cube", 12, 1})), {}, {}, std::move(obstacles));
 }
 
@@ -32,7 +32,7 @@ struct Sums {
 Sums hold_still(const Scene& scene, const Pose& X_WP, double for_s) {
   PenetrationDepth depth(scene, {});
   Pose X_WQ = X_WP;
-  depth.forget(0.0);
+  depth.clear_history(0.0);
   Sums sums;
   Penetration now;
   for (double t = kTick_s; t < for_s; t += kTick_s) {
@@ -51,7 +51,7 @@ TEST_CASE("a block that rises into a hand at rest puts into T what T rises by, a
           "[obstacle_work]") {
   ObstacleMotion motion;
   motion.linear_m_per_s = {0.0, 0.0, 0.04};
-  motion.turn_back_s = 0.2;
+  motion.reverse_after_s = 0.2;
   const Pose X_WO{Quaterniond::Identity(), {0.012, 0.004, -0.054}};  // meets the cube's face off its middle
   const Scene scene = over_a_block(motion, X_WO);
   const Sums there = hold_still(scene, Pose{}, 0.2);
@@ -66,7 +66,7 @@ TEST_CASE("a block that rises into a hand at rest puts into T what T rises by, a
 TEST_CASE("a block that turns does work by its lever", "[obstacle_work]") {
   ObstacleMotion motion;
   motion.angular_rad_per_s = {0.0, 2.0, 0.0};
-  motion.turn_back_s = 0.15;
+  motion.reverse_after_s = 0.15;
   const Pose X_WO{Quaterniond::Identity(), {0.03, 0.0, -0.0501}};
   const Sums sums = hold_still(over_a_block(motion, X_WO), Pose{}, 0.15);
   CHECK(sums.last_T > 1e-7);

@@ -32,7 +32,7 @@ TEST_CASE("every method's pose is admissible, and exact is never above the other
   RandomValues random(1);
   double most_excess = 0.0;
   for (int i = 0; i < 200; ++i) {
-    const Pressed c = into_half_space(random, 0.02, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.02, 0.3);
     const double T = depth_by(Method::exact, c.scene).query(c.X_WP).projection.energy;
     const Penetration planar = depth_by(Method::planar, c.scene).query(c.X_WP);
     const Penetration translational = depth_by(Method::translational, c.scene).query(c.X_WP);
@@ -53,14 +53,14 @@ TEST_CASE("planar solves example 4.1 exactly: the rotation lies in one of its pl
   const Penetration planar = depth_by(Method::planar, scene).query(X_WP);
   CHECK(std::abs(planar.projection.energy - 9.63154218539309) < 1e-11);
   CHECK(std::abs(planar.eps[5] - 0.11328538) < 5e-9);
-  CHECK(planar.drive == planar.eps);
+  CHECK(planar.spring_displacement == planar.eps);
   CHECK(planar.contacts == 2);
 }
 
 TEST_CASE("translational is the depth along the normal, with the torque of its lever", "[penetration]") {
   RandomValues random(2);
   for (int i = 0; i < 50; ++i) {
-    const Pressed c = into_half_space(random, 0.02, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.02, 0.3);
     const double depth_m = -least_gap_m(c.scene, c.X_WP);
     const Vector3d& n = c.scene.half_spaces()[0].normal_W;
     const Penetration p = depth_by(Method::translational, c.scene).query(c.X_WP);
@@ -70,9 +70,9 @@ TEST_CASE("translational is the depth along the normal, with the torque of its l
     WrenchGains gains;
     gains.stiffness = WrenchGains::blockwise(3.0, 99.0);
     WrenchLaw law(gains_for(Method::translational, gains));
-    const Wrench F_W = spatial_wrench(c.X_WP, law.update(p.drive, true, 0.0));
+    const Wrench F_W = spatial_wrench(c.X_WP, law.update(p.spring_displacement, true, 0.0));
     REQUIRE(p.contacts == 1);
-    const Vector3d c_W = c.X_WP * p.projection.active[0].contact.p_TA_m;
+    const Vector3d c_W = c.X_WP * p.projection.active[0].contact.p_TCa_m;
     CHECK((F_W.force_N - 3.0 * depth_m * n).norm() < 1e-12);
     CHECK((F_W.torque_Nm - c_W.cross(3.0 * depth_m * n)).norm() < 1e-12);
   }
@@ -83,7 +83,7 @@ TEST_CASE("descent comes down to the optimum where one contact holds it, and sto
   RandomValues random(6);
   int met = 0;
   for (int i = 0; i < 60; ++i) {
-    const Pressed c = into_half_space(random, 0.02, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.02, 0.3);
     const Penetration exact = depth_by(Method::exact, c.scene).query(c.X_WP);
     const Penetration descent = depth_by(Method::descent, c.scene).query(c.X_WP);
     CHECK(least_gap_m(c.scene, descent.projection.X_WQ) > -1e-12);
@@ -107,9 +107,9 @@ TEST_CASE("an edge that lies flat gives translational no torque along itself", "
   const Pose X_WP{Quaterniond(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ())), {0.0, 0.5, 0.0}};
   const Penetration p = depth_by(Method::translational, scene).query(X_WP);
   CHECK(p.contacts == 2);
-  CHECK(std::abs(p.drive[3]) < 1e-14);
-  CHECK(std::abs(p.drive[4]) < 1e-14);
-  CHECK(std::abs(p.drive[5]) > 0.01);
+  CHECK(std::abs(p.spring_displacement[3]) < 1e-14);
+  CHECK(std::abs(p.spring_displacement[4]) < 1e-14);
+  CHECK(std::abs(p.spring_displacement[5]) > 0.01);
 }
 
 TEST_CASE("where there is no room the proxy stays, and draws the hand back", "[penetration]") {
@@ -128,8 +128,8 @@ TEST_CASE("where there is no room the proxy stays, and draws the hand back", "[p
 TEST_CASE("splitting the tool's faces into more triangles changes nothing", "[penetration]") {
   RandomValues random(3);
   const std::vector<HalfSpaceSettings> table = {half_space(Vector3d::UnitZ(), 0.0)};
-  const Scene coarse(tool_of(split_box(1, Vector3d::Ones())), table);
-  const Scene fine(tool_of(split_box(8, Vector3d::Ones())), table);
+  const Scene coarse(tool_of(subdivided_box_points(1, Vector3d::Ones())), table);
+  const Scene fine(tool_of(subdivided_box_points(8, Vector3d::Ones())), table);
   for (int i = 0; i < 30; ++i) {
     const Pose X_WP{random.rotation(0.2), {0.0, 0.0, 0.45}};
     const Penetration a = depth_by(Method::exact, coarse).query(X_WP);
@@ -149,8 +149,8 @@ double squared(double x) {
 TEST_CASE("convex body against convex body: admissible by every method, exact below the best translation",
           "[penetration][convex]") {
   RandomValues random(21);
-  for (int i = 0; i < repeats(100); ++i) {
-    const Pressed c = into_body(random, random.uniform(0.01, 0.2));
+  for (int i = 0; i < case_count(100); ++i) {
+    const OverlappingScene c = overlap_body(random, random.uniform(0.01, 0.2));
     const double m = c.scene.tool().solid.inertia.mass_kg;
     const double depth_m = -separation_m(c.scene, c.X_WP);
     const Penetration exact = depth_by(Method::exact, c.scene).query(c.X_WP);
@@ -173,7 +173,7 @@ TEST_CASE("no admissible pose near the answer is closer", "[penetration][convex]
   RandomValues random(22);
   int compared = 0;
   for (int i = 0; i < 40; ++i) {
-    const Pressed c = into_body(random, random.uniform(0.02, 0.2));
+    const OverlappingScene c = overlap_body(random, random.uniform(0.02, 0.2));
     const Projection q = depth_by(Method::exact, c.scene).query(c.X_WP).projection;
     const Inertia& M = c.scene.tool().solid.inertia;
     for (int k = 0; k < 300; ++k) {
@@ -192,7 +192,7 @@ TEST_CASE("a proxy that slides over a convex body is admissible at every step an
   RandomValues random(23);
   int steps = 0;
   for (int i = 0; i < 12; ++i) {
-    const Pressed c = into_body(random, 0.05);
+    const OverlappingScene c = overlap_body(random, 0.05);
     PenetrationDepth follower(c.scene, {});
     const Vector3d away = c.X_WP.translation_m.normalized();
     const Vector3d side = random.unit<3>();
@@ -278,8 +278,8 @@ TEST_CASE("a proxy among several bodies and walls stays out of all of them", "[p
 TEST_CASE("the whole pipeline knows no frame: world, mesh axes, unit of length, mass",
           "[penetration][convex]") {
   RandomValues random(24);
-  for (int i = 0; i < repeats(30); ++i) {
-    const Pressed c = into_body(random, random.uniform(0.02, 0.2));
+  for (int i = 0; i < case_count(30); ++i) {
+    const OverlappingScene c = overlap_body(random, random.uniform(0.02, 0.2));
     const Penetration p = depth_by(Method::exact, c.scene).query(c.X_WP);
 
     const Pose a{random.rotation(), random.vector<3>()};
@@ -295,7 +295,7 @@ TEST_CASE("the whole pipeline knows no frame: world, mesh axes, unit of length, 
     const double scale = 1000.0;
     ToolBody large = c.scene.tool();
     for (Vector3d& v : large.hull.vertices_T_m) v *= scale;
-    large.hull.find_faces();
+    large.hull.compute_derived_data();
     large.solid.inertia.H_kg_m2 *= scale * scale;
     const Scene in_millimetres(large, {}, placed(Pose(), scale));
     const Pose X_WP{c.X_WP.rotation, scale * c.X_WP.translation_m};
@@ -316,7 +316,7 @@ TEST_CASE("the whole pipeline knows no frame: world, mesh axes, unit of length, 
 
 TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetration][convex]") {
   const auto split = [](int n, const Vector3d& size) {
-    std::vector<Vector3d> points = split_box(n, size);
+    std::vector<Vector3d> points = subdivided_box_points(n, size);
     for (Vector3d& p : points) p = rotation_from(Vector3d(0.3, 0.5, -0.2)) * p;
     return points;
   };
@@ -326,7 +326,7 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
                      {convex_obstacle("table", convex_hull(split(1, {2.0, 3.0, 1.0})))});
   const Scene fine(tool_of(split(7, size)), {},
                    {convex_obstacle("table", convex_hull(split(9, {2.0, 3.0, 1.0})))});
-  for (int i = 0; i < repeats(60); ++i) {
+  for (int i = 0; i < case_count(60); ++i) {
     const Pose X_WP{random.rotation(), 0.9 * random.unit<3>()};
     if (separation_m(coarse, X_WP) < -0.4) continue;  // so deep that answers of equal merit lie far apart
     const Penetration a = depth_by(Method::exact, coarse).query(X_WP);
@@ -339,7 +339,7 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
 TEST_CASE("where an obstacle moves only method exact will do, and the refusal says so",
           "[penetration][moving]") {
   const ToolBody cube = tool_body(make_mesh({"cube", 12}), 1.0, 0.1);
-  const auto mesh = std::make_shared<const TreedMesh>(make_mesh({"cube", 12}));
+  const auto mesh = std::make_shared<const MeshBvh>(make_mesh({"cube", 12}));
   std::vector<MeshObstacle> meshes;
   meshes.emplace_back("post", mesh, Pose{});
   meshes.emplace_back("plunger", mesh, Pose{}, ObstacleMotion{{0, 0, 0.02}, {0, 0, 0}, 1.0});
@@ -365,12 +365,12 @@ TEST_CASE("where an obstacle moves only method exact will do, and the refusal sa
 TEST_CASE("where nothing moves the scene time does not matter", "[penetration][moving]") {
   RandomValues random(26);
   for (int i = 0; i < 20; ++i) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     PenetrationDepth a(c.scene, {}), b(c.scene, {});
     CHECK(a.query(c.X_WP).eps == b.query(c.X_WP, {}, 7.0).eps);
     const Pose X_last = a.query(c.X_WP).projection.X_WQ;
-    a.forget();
-    b.forget(8.0);
+    a.clear_history();
+    b.clear_history(8.0);
     CHECK(a.follow(c.X_WP, X_last).eps == b.follow(c.X_WP, X_last, 9.0).eps);
   }
 }

@@ -27,7 +27,7 @@ bool in_contact(const Projection& q) {
 
 /// p of the hand, followed from the start.
 struct Followed {
-  explicit Followed(const Handling& handling)
+  explicit Followed(const ManipulationCase& handling)
       : scene(scene_of(handling)), proxy(scene), X_WQ{Quaterniond::Identity(), handling.start_m} {}
 
   Projection follow(const Pose& X_WP) {
@@ -43,35 +43,36 @@ struct Followed {
 
 Scene two(TriangleMesh tool, TriangleMesh obstacle) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"obstacle", TreedMesh(std::move(obstacle)), Pose{}});
+  obstacles.push_back({"obstacle", MeshBvh(std::move(obstacle)), Pose{}});
   return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
 }
 
 TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]") {
   const auto i = GENERATE(range<std::size_t>(0, 20));
-  const Handling& handling = rough_handling()[i];
+  const ManipulationCase& handling = manipulation_cases()[i];
   INFO(handling.name);
   Followed f(handling);
-  const ExactMeeting exact(f.scene.tool_mesh()->surface.mesh(), f.scene.meshes()[0].mesh->surface.mesh());
-  Hand hand(handling);
-  REQUIRE_FALSE(exact.meet(f.X_WQ));
+  const ExactIntersection exact(f.scene.tool_mesh()->surface.mesh(),
+                                f.scene.meshes()[0].mesh->surface.mesh());
+  HandTrajectory hand(handling);
+  REQUIRE_FALSE(exact.intersect(f.X_WQ));
   int contacts = 0;
-  for (int tick = 0; tick < repeats(600); ++tick) {
+  for (int tick = 0; tick < case_count(600); ++tick) {
     const Projection q = f.follow(hand.next());
     REQUIRE(q.status != ProjectionStatus::infeasible);
-    INFO("tick " << tick << ", looks " << f.proxy.looks());
-    REQUIRE_FALSE(exact.meet(q.X_WQ));
+    INFO("tick " << tick << ", looks " << f.proxy.sweeps());
+    REQUIRE_FALSE(exact.intersect(q.X_WQ));
     contacts += in_contact(q) ? 1 : 0;
   }
-  if (repeats(600) == 600) CHECK(contacts > 10);  // a tenth of the ticks may not come so far
+  if (case_count(600) == 600) CHECK(contacts > 10);  // a tenth of the ticks may not come so far
 }
 
 TEST_CASE("a plate of a millimetre holds a stab of five metres a second", "[proxy]") {
   for (const std::size_t i : {0, 1, 2, 3, 5}) {
-    const Handling& handling = rough_handling()[i];
+    const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
     Followed f(handling);
-    Hand hand(handling);
+    HandTrajectory hand(handling);
     double deepest_m = 0.0;
     for (int tick = 0; tick < 400; ++tick) {
       const Pose X_WP = hand.next();
@@ -115,14 +116,14 @@ TEST_CASE("at rest a proxy is a local optimum, and most often the nearest of all
     CHECK(q.energy >= best);
     nearest += q.energy <= 1.001 * best ? 1 : 0;
     // No pose around it is admissible and nearer.
-    const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), cube);
+    const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), cube);
     for (int k = 0; k < 200; ++k) {
-      const double reach = random.decades(1e-6, 1e-3);
+      const double reach = random.log_uniform(1e-6, 1e-3);
       const Pose X_near = {
           (q.X_WQ.rotation * random.rotation(30.0 * reach * random.uniform(0.0, 1.0))).normalized(),
           q.X_WQ.translation_m + reach * random.uniform(0.0, 1.0) * random.unit<3>()};
       if (energy(scene.tool().solid.inertia, X_WP, X_near) < q.energy * (1.0 - 1e-4))
-        CHECK(exact.meet(X_near));
+        CHECK(exact.intersect(X_near));
     }
   }
   CHECK(nearest >= 36);
@@ -150,7 +151,7 @@ TriangleMesh sheet(std::uint32_t n) {
 
 Scene against_surface(TriangleMesh tool, TriangleMesh surface) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"surface", TreedMesh(std::move(surface), BodyKind::surface), Pose{}});
+  obstacles.push_back({"surface", MeshBvh(std::move(surface), BodyKind::surface), Pose{}});
   return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
 }
 
@@ -159,7 +160,8 @@ TEST_CASE("an open surface stops a tool on the side where it is", "[proxy]") {
     for (const std::uint32_t cells : {1, 2, 9})
       for (const double side : {1.0, -1.0}) {
         const Scene scene = against_surface(make_mesh({kind, 320}), sheet(cells));
-        const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+        const ExactIntersection exact(scene.tool_mesh()->surface.mesh(),
+                                      scene.meshes()[0].mesh->surface.mesh());
         PenetrationDepth depth(scene, {});
         RandomValues random(cells);
         Pose X_WQ = {Quaterniond::Identity(), {0, 0, 0.06 * side}};
@@ -172,7 +174,7 @@ TEST_CASE("an open surface stops a tool on the side where it is", "[proxy]") {
           INFO(kind << " " << cells << " cells, side " << side << ", tick " << tick);
           REQUIRE(last.projection.status != ProjectionStatus::infeasible);
           REQUIRE(side * X_WQ.translation_m.z() > 0.0249);
-          REQUIRE_FALSE(exact.meet(X_WQ));
+          REQUIRE_FALSE(exact.intersect(X_WQ));
         }
         CHECK(last.contacts > 0);
         CHECK(side * X_WQ.translation_m.z() < 0.0301);
@@ -189,14 +191,14 @@ TEST_CASE("the border of a surface and where it cuts through itself hold, too", 
     cross.triangles.push_back(corners);
   }
   const Scene scene = against_surface(make_mesh({"cube", 12}), std::move(cross));
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+  const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   RandomValues random(8);
   for (int run = 0; run < 6; ++run) {
     Proxy proxy(scene);
     Pose X_WQ = {random.rotation(0.3), {0.0, 0.08, 0.08}};
     Pose X_WP = X_WQ;
     int contacts = 0;
-    REQUIRE_FALSE(exact.meet(X_WQ));
+    REQUIRE_FALSE(exact.intersect(X_WQ));
     for (int tick = 0; tick < 200; ++tick) {
       X_WP.translation_m += 4e-3 * random.unit<3>() - 0.02 * (X_WP.translation_m - Vector3d(0.05, 0, 0));
       X_WP.rotation = (X_WP.rotation * random.rotation(0.03)).normalized();
@@ -204,7 +206,7 @@ TEST_CASE("the border of a surface and where it cuts through itself hold, too", 
       X_WQ = q.X_WQ;
       contacts += in_contact(q) ? 1 : 0;
       INFO("run " << run << ", tick " << tick);
-      REQUIRE_FALSE(exact.meet(X_WQ));
+      REQUIRE_FALSE(exact.intersect(X_WQ));
     }
     CHECK(contacts > 20);
   }
@@ -254,7 +256,7 @@ TEST_CASE("a proxy slides along a wall made of flush blocks without catching on 
   std::vector<MeshObstacle> blocks;
   for (int k = -3; k <= 3; ++k) {
     blocks.push_back(
-        {"block", TreedMesh(make_mesh({"cube", 12})), Pose{Quaterniond::Identity(), {0.05 * k, 0, 0}}});
+        {"block", MeshBvh(make_mesh({"cube", 12})), Pose{Quaterniond::Identity(), {0.05 * k, 0, 0}}});
   }
   const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(blocks));
   Proxy proxy(scene);
@@ -270,7 +272,7 @@ TEST_CASE("a proxy slides along a wall made of flush blocks without catching on 
 }
 
 TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as those do", "[proxy]") {
-  const auto cube = std::make_shared<const TreedMesh>(make_mesh({"cube", 12}));
+  const auto cube = std::make_shared<const MeshBvh>(make_mesh({"cube", 12}));
   std::vector<MeshObstacle> few, many;
   for (int i = 0; i < 60; ++i)
     for (int j = 0; j < 60; ++j) {
@@ -298,8 +300,7 @@ TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as thos
 
 TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back(
-      {"wall", TreedMesh(make_mesh({"cube", 12})), Pose{Quaterniond::Identity(), {0.1, 0, 0}}});
+  obstacles.push_back({"wall", MeshBvh(make_mesh({"cube", 12})), Pose{Quaterniond::Identity(), {0.1, 0, 0}}});
   const Scene scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1), {{"floor", Vector3d::UnitZ(), -0.03}}, {},
                     std::move(obstacles));
   Proxy proxy(scene);
@@ -316,15 +317,15 @@ TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
 }
 
 TEST_CASE("a proxy that is given no time stays where it is admissible, and says so", "[proxy]") {
-  const Handling& handling = rough_handling()[7];
+  const ManipulationCase& handling = manipulation_cases()[7];
   const Scene scene = scene_of(handling);
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
-  Proxy::Effort little;
-  little.looks = 3;
-  little.visits = 60;
+  const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+  Proxy::WorkLimit little;
+  little.sweeps = 3;
+  little.node_visits = 60;
   Proxy proxy(scene, little);
   Pose X_WQ = {Quaterniond::Identity(), handling.start_m};
-  Hand hand(handling);
+  HandTrajectory hand(handling);
   int spent = 0;
   Pose X_WP;
   for (int tick = 0; tick < 400; ++tick) {
@@ -332,7 +333,7 @@ TEST_CASE("a proxy that is given no time stays where it is admissible, and says 
     const Projection q = proxy.follow(X_WP, X_WQ);
     spent += q.status == ProjectionStatus::budget_spent ? 1 : 0;
     X_WQ = q.X_WQ;
-    REQUIRE_FALSE(exact.meet(X_WQ));
+    REQUIRE_FALSE(exact.intersect(X_WQ));
     if (q.status == ProjectionStatus::budget_spent)
       REQUIRE(q.energy == Approx(energy(scene.tool().solid.inertia, X_WP, X_WQ)));
   }
@@ -342,8 +343,9 @@ TEST_CASE("a proxy that is given no time stays where it is admissible, and says 
 // In visits, not in time. Among fine bodies that the hand has just begun to move, or turns back, a list of
 // pairs is missing: ticks that make it at once take tens of times what the others take.
 TEST_CASE("no tick takes far more work than most, and what is late is caught up with", "[proxy]") {
-  const Scene scene = scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, Motion::slide, {}});
-  const ExactMeeting exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
+  const Scene scene =
+      scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, HandMotion::slide, {}});
+  const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   // To and fro along the boulder, pressed into it, with stops of 20 ticks: each sets out anew.
   const auto hand = [](int tick) -> Pose {
     const int phase = tick / 60, within = std::min(tick % 60, 40);
@@ -356,8 +358,8 @@ TEST_CASE("no tick takes far more work than most, and what is late is caught up 
     std::vector<Projection> q;
   };
   const auto follow = [&](bool evenly) {
-    Proxy::Effort effort;
-    effort.evenly = evenly;
+    Proxy::WorkLimit effort;
+    effort.balanced = evenly;
     Proxy proxy(scene, effort);
     Ticks out;
     Pose X_WQ = {Quaterniond::Identity(), {0.12, 0, 0}};
@@ -368,9 +370,9 @@ TEST_CASE("no tick takes far more work than most, and what is late is caught up 
       X_WQ = q.X_WQ;
       REQUIRE(q.status != ProjectionStatus::infeasible);
       if (tick < 0) continue;
-      if (tick % 20 == 0) REQUIRE_FALSE(exact.meet(X_WQ));
-      out.visits.push_back(proxy.visits());
-      out.most = std::max(out.most, proxy.visits());
+      if (tick % 20 == 0) REQUIRE_FALSE(exact.intersect(X_WQ));
+      out.visits.push_back(proxy.node_visits());
+      out.most = std::max(out.most, proxy.node_visits());
       out.q.push_back(q);
     }
     return out;
@@ -394,7 +396,8 @@ TEST_CASE("no tick takes far more work than most, and what is late is caught up 
 
 /// From rest to 0.1 m/s, along and around a boulder at this distance from its centre.
 std::vector<Projection> slid_along(double away_m, std::vector<std::uint32_t>& visits) {
-  const Scene scene = scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, Motion::slide, {}});
+  const Scene scene =
+      scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, HandMotion::slide, {}});
   Proxy proxy(scene);
   std::vector<Projection> all;
   Pose X_WQ = {Quaterniond::Identity(), {0.13, 0, 0}};
@@ -407,7 +410,7 @@ std::vector<Projection> slid_along(double away_m, std::vector<std::uint32_t>& vi
     const Projection q = proxy.follow(X_WP, X_WQ);
     X_WQ = q.X_WQ;
     if (tick < 100) continue;
-    visits.push_back(proxy.visits());
+    visits.push_back(proxy.node_visits());
     all.push_back(q);
   }
   return all;
@@ -435,11 +438,11 @@ TEST_CASE("a tool that is not where it was expected is late now and then, not al
 
 TEST_CASE("following a hand through meshes neither allocates nor locks", "[realtime][proxy]") {
   for (const std::size_t i : {3, 7, 12, 15}) {
-    const Handling& handling = rough_handling()[i];
+    const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
     const Scene scene = scene_of(handling);
     PenetrationDepth depth(scene, {});
-    Hand hand(handling);
+    HandTrajectory hand(handling);
     Pose X_WQ = {Quaterniond::Identity(), handling.start_m};
     std::uint64_t allocations = 0, locks = 0;
     {

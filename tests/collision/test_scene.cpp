@@ -85,12 +85,12 @@ TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodie
   post.X_WM = {rotation_from({0.1, 0.2, 0.3}), {0, 0, 3}};
   settings.meshes = {post, post};
   const Scene still(settings);
-  CHECK_FALSE(still.moves());
+  CHECK_FALSE(still.has_moving_obstacles());
   CHECK(still.convex().size() == 2);
   CHECK(still.meshes()[1].X_WO_at(5.0).translation_m == post.X_WM.translation_m);
   settings.meshes[1].motion = {{0.1, 0, 0}, {0, 0, 1.0}, 2.0};
   const Scene scene(settings);
-  CHECK(scene.moves());
+  CHECK(scene.has_moving_obstacles());
   CHECK(scene.convex().empty());
   REQUIRE(scene.meshes().size() == 2);
   CHECK(scene.obstacle_count() == 3);
@@ -107,7 +107,7 @@ TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodie
   std::vector<MeshObstacle> meshes = still.meshes();
   meshes[0].motion.linear_m_per_s = {0, 0, 1};
   const Scene by_hand(still.tool(), {}, still.convex(), std::move(meshes));
-  CHECK(by_hand.moves());
+  CHECK(by_hand.has_moving_obstacles());
   CHECK(by_hand.convex().empty());
 }
 
@@ -119,12 +119,12 @@ TEST_CASE("a scene with its meshes elsewhere shares them, and what moves later m
   post.mesh = settings.tool.mesh;
   settings.meshes = {post, post};
   const Scene first(settings);
-  CHECK_FALSE(first.moves());
+  CHECK_FALSE(first.has_moving_obstacles());
   settings.meshes[0].X_WM.translation_m = {0, 0, 3};
-  settings.meshes[1].later = {
+  settings.meshes[1].scheduled = {
       5.0, {Quaterniond::Identity(), {1, 0, 0}}, {{0.1, 0, 0}, {0, 0, 0}, 0.0, 5.0, 2.0}};
   const Scene second(first, settings.meshes);
-  CHECK(second.moves());
+  CHECK(second.has_moving_obstacles());
   CHECK(second.meshes()[0].mesh == first.meshes()[0].mesh);
   CHECK(second.tool_mesh() == first.tool_mesh());
   CHECK(second.meshes()[0].X_WO_at(1.0).translation_m == Vector3d(0, 0, 3));
@@ -133,8 +133,8 @@ TEST_CASE("a scene with its meshes elsewhere shares them, and what moves later m
   CHECK(moved.X_WO_at(4.9).translation_m == Vector3d::Zero());
   CHECK((moved.X_WO_at(6.0).translation_m - Vector3d(1.1, 0, 0)).norm() < 1e-15);
   CHECK((moved.X_WO_at(60.0).translation_m - Vector3d(1.2, 0, 0)).norm() < 1e-15);
-  CHECK((second.motion(second.first_mesh() + 1, 5.5, 6.5).translation_m - Vector3d(0.1, 0, 0)).norm() <
-        1e-15);
+  CHECK((second.obstacle_displacement(second.first_mesh() + 1, 5.5, 6.5).translation_m - Vector3d(0.1, 0, 0))
+            .norm() < 1e-15);
 }
 
 }  // namespace

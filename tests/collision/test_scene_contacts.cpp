@@ -54,7 +54,7 @@ TEST_CASE("a contact tells its vertex, its face and its obstacle") {
   bool floor = false, other = false;
   for (const Contact& c : contacts) {
     const HalfSpaceSettings& obstacle = scene.half_spaces()[c.obstacle];
-    CHECK(c.p_TA_m == scene.tool().hull.vertices_T_m[c.tool_feature]);
+    CHECK(c.p_TCa_m == scene.tool().hull.vertices_T_m[c.tool_feature]);
     CHECK(c.n_W == obstacle.normal_W);
     CHECK(c.offset_m == obstacle.offset_m);
     CHECK(gap_m(c, X_WT) < 0);
@@ -171,9 +171,9 @@ TEST_CASE("an empty scene touches nothing") {
 TEST_CASE("the best plane of a survey is the separating axis of least depth") {
   RandomValues random(11);
   for (int i = 0; i < 200; ++i) {
-    const Pressed met = into_body(random, random.uniform(0.01, 0.2));
+    const OverlappingScene met = overlap_body(random, random.uniform(0.01, 0.2));
     SceneContacts contacts(met.scene);
-    REQUIRE(contacts.survey(met.X_WP) > 1);
+    REQUIRE(contacts.survey_planes(met.X_WP) > 1);
     ContactSet violated;
     REQUIRE(contacts.add_violated(met.X_WP, 0.0, violated) > 0);
     INFO("case " << i);
@@ -185,11 +185,11 @@ TEST_CASE("what the planes held admit does not overlap, whichever they are") {
   RandomValues random(12);
   int admitted = 0;
   for (int i = 0; i < 200; ++i) {
-    const Pressed met = into_body(random, 0.05);
+    const OverlappingScene met = overlap_body(random, 0.05);
     SceneContacts contacts(met.scene);
-    const std::size_t openings = contacts.survey(met.X_WP);
+    const std::size_t openings = contacts.survey_planes(met.X_WP);
     for (std::size_t k = 0; k < openings; ++k) {
-      contacts.open(k);
+      contacts.hold_survey_plane(k);
       Pose X_WT = met.X_WP;
       X_WT.translation_m += 0.1 * random.vector<3>();
       ContactSet violated;
@@ -205,11 +205,11 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
   RandomValues random(13);
   int seen[3] = {};
   for (int i = 0; i < 200; ++i) {
-    const Pressed met = into_body(random, 0.1);
+    const OverlappingScene met = overlap_body(random, 0.1);
     SceneContacts contacts(met.scene);
-    const std::size_t openings = contacts.survey(met.X_WP);
+    const std::size_t openings = contacts.survey_planes(met.X_WP);
     for (std::size_t k = 0; k < std::min<std::size_t>(openings, 12); ++k) {
-      contacts.open(k);
+      contacts.hold_survey_plane(k);
       ContactSet violated;
       if (contacts.add_violated(met.X_WP, 0.0, violated) == 0) continue;
       const Contact& contact = violated[0];
@@ -235,26 +235,26 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
 
 TEST_CASE("an obstacle out of reach is not asked") {
   RandomValues random(14);
-  const Pressed met = into_body(random, 0.1);
+  const OverlappingScene met = overlap_body(random, 0.1);
   SceneContacts contacts(met.scene);
   const Pose far{met.X_WP.rotation, {100.0, 0.0, 0.0}};
   ContactSet violated;
-  contacts.admit(far, 0.0);
+  contacts.select_admitting_planes(far, 0.0);
   CHECK(contacts.admits(far, 0.0));
-  CHECK(SceneContacts(met.scene).survey(far) == 0);
+  CHECK(SceneContacts(met.scene).survey_planes(far) == 0);
   CHECK(contacts.add_violated(far, 0.0, violated) == 0);
 }
 
 TEST_CASE("a far obstacle takes no part in what a near one does") {
   RandomValues random(15);
   for (int i = 0; i < 20; ++i) {
-    const Pressed met = into_body(random, 0.1);
+    const OverlappingScene met = overlap_body(random, 0.1);
     ConvexBody far = met.scene.convex()[0].body;
     for (Vector3d& p : far.vertices_T_m) p += Vector3d(0.0, 0.0, 50.0);
     const Scene both(met.scene.tool(), {half_space(Vector3d::UnitX(), -90.0)},
                      {convex_obstacle("far", far), met.scene.convex()[0]});
     SceneContacts contacts(both);
-    CHECK(contacts.survey(met.X_WP) > 0);
+    CHECK(contacts.survey_planes(met.X_WP) > 0);
     ContactSet violated;
     CHECK(contacts.add_violated(met.X_WP, 0.0, violated) > 0);
     for (const Contact& contact : violated) CHECK(contact.obstacle == 2);

@@ -27,7 +27,7 @@ PolygonSoup ell(double height) {
 }
 
 /// What the tool is refused with; empty when it loads.
-std::string refusal(const ToolSettings& settings) {
+std::string rejection_text(const ToolSettings& settings) {
   try {
     load_tool(settings);
   } catch (const MeshError& error) {
@@ -115,7 +115,8 @@ TEST_CASE("a body that is not convex keeps its own mass and touches with its hul
 
 TEST_CASE("a cavity weighs nothing and touches nothing; an unused vertex is no part of the body") {
   const TemporaryDirectory dir;
-  PolygonSoup soup = both(box({0, 0, 0}, {2, 3, 5}), inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})));
+  PolygonSoup soup =
+      concatenated(box({0, 0, 0}, {2, 3, 5}), inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})));
   soup.vertices.emplace_back(100, 100, 100);
   const ToolBody tool = load_tool({dir.write("hollow.off", as_off(soup)), 1.0, 1.0});
   CHECK(tool.solid.volume_m3 == Approx(29));
@@ -175,18 +176,18 @@ TEST_CASE("a tool that cannot be used is refused with its file and the cure") {
   const auto good = dir.write("box.off", as_off(box({0, 0, 0}, {2, 3, 5})));
   for (const char* text : {"1e-200", "1e-110", "1e+110", "1e+200", "0", "-1"}) {
     const double scale = std::stod(text);
-    const std::string message = refusal({good, scale, 1.0});
+    const std::string message = rejection_text({good, scale, 1.0});
     INFO(scale << ": " << message);
     CHECK(message.find(good.string() + ": has no usable volume at scale " + text) == 0);
     CHECK(message.find("give 'scale' in metres per mesh unit") != std::string::npos);
   }
-  CHECK(refusal({dir.path() / "none.off", 1.0, 1.0}).find("no such file") != std::string::npos);
+  CHECK(rejection_text({dir.path() / "none.off", 1.0, 1.0}).find("no such file") != std::string::npos);
 
   PolygonSoup open = box({0, 0, 0}, {2, 3, 5});
   open.faces.pop_back();
   open.faces.push_back({0, 1});
   const auto bad = dir.write("open.off", as_off(open));
-  const std::string message = refusal({bad, 1.0, 1.0});
+  const std::string message = rejection_text({bad, 1.0, 1.0});
   INFO(message);
   CHECK(message.find(bad.string() + ": is not a closed, consistently oriented solid:\n  the edge from (") ==
         0);

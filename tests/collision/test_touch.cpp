@@ -63,12 +63,12 @@ double shares(const Touches& touches) {
 TEST_CASE("the contacts of a proxy name features of both meshes that are where it touches", "[touch]") {
   std::array<int, 3> kinds{};
   int slid = 0;
-  for (const Handling& handling : rough_handling()) {
+  for (const ManipulationCase& handling : manipulation_cases()) {
     INFO(handling.name);
     const Scene scene = scene_of(handling);
     PenetrationDepth penetration(scene, {});
-    REQUIRE(penetration.knows_mesh_features());
-    Hand hand(handling);
+    REQUIRE(penetration.uses_mesh_features());
+    HandTrajectory hand(handling);
     Pose X_WQ{Quaterniond::Identity(), handling.start_m};
     for (int tick = 0; tick < 150; ++tick) {
       const Pose X_WP = hand.next();
@@ -110,9 +110,9 @@ TEST_CASE("the contacts of convex bodies name features of their hulls that are w
   RandomValues random(3);
   std::array<int, 3> kinds{};
   for (int i = 0; i < 60; ++i) {
-    const Pressed c = into_body(random, 0.05);
+    const OverlappingScene c = overlap_body(random, 0.05);
     PenetrationDepth penetration(c.scene, {});
-    REQUIRE_FALSE(penetration.knows_mesh_features());
+    REQUIRE_FALSE(penetration.uses_mesh_features());
     const Projection q = penetration.query(c.X_WP).projection;
     const Touches told = touches(q, c.scene, false);
     REQUIRE_FALSE(told.empty());
@@ -143,7 +143,7 @@ TEST_CASE("of more contacts than are told, those that carry most are", "[touch]"
     q.active.add({contact, static_cast<double>((i * 7) % 40)});
   }
   const Touches told = touches(q, scene, false);
-  REQUIRE(told.size() == kMostTouches);
+  REQUIRE(told.size() == kMaxTouches);
   for (std::size_t i = 0; i < told.size(); ++i) {
     CHECK(told[i].multiplier_kg_m == static_cast<double>(39 - i));
     CHECK((told[i].tool_first * 7) % 40 == 39 - i);

@@ -6,80 +6,80 @@
 namespace wrenchd {
 namespace {
 
-EvenWork after(int ticks, std::uint32_t looks, double list) {
-  EvenWork work;
-  for (int i = 0; i < ticks; ++i) work.learn(looks, list, false);
+WorkBalancer after(int ticks, std::uint32_t looks, double list) {
+  WorkBalancer work;
+  for (int i = 0; i < ticks; ++i) work.update(looks, list, false);
   return work;
 }
 
 TEST_CASE("a tick may take a few times what ticks usually take, and no more", "[even_work]") {
-  const EvenWork work = after(200, 300, 700.0);
-  CHECK(work.usual_of_looks() == Approx(300.0));
-  CHECK(work.most(1.0) > 1500);
-  CHECK(work.most(1.0) <= 4000);
+  const WorkBalancer work = after(200, 300, 700.0);
+  CHECK(work.typical_sweep_visits() == Approx(300.0));
+  CHECK(work.max_visits(1.0) > 1500);
+  CHECK(work.max_visits(1.0) <= 4000);
 }
 
 TEST_CASE("one tick that takes far more changes little", "[even_work]") {
-  EvenWork work = after(200, 300, 700.0);
-  const std::uint32_t before = work.most(1.0);
-  work.learn(3000, 700.0, false);
-  CHECK(work.most(1.0) < before * 1.2);
+  WorkBalancer work = after(200, 300, 700.0);
+  const std::uint32_t before = work.max_visits(1.0);
+  work.update(3000, 700.0, false);
+  CHECK(work.max_visits(1.0) < before * 1.2);
 }
 
 TEST_CASE("what becomes dearer for good is the usual soon", "[even_work]") {
-  EvenWork work = after(200, 100, 100.0);
-  const double before = work.even();
-  for (int i = 0; i < 1000; ++i) work.learn(500, 1000.0, false);
-  CHECK(work.even() > 5.0 * before);
-  CHECK(work.usual_of_looks() > 300.0);
+  WorkBalancer work = after(200, 100, 100.0);
+  const double before = work.target_visits();
+  for (int i = 0; i < 1000; ++i) work.update(500, 1000.0, false);
+  CHECK(work.target_visits() > 5.0 * before);
+  CHECK(work.typical_sweep_visits() > 300.0);
 }
 
 TEST_CASE("a tool that rested may move as soon as it is moved: lists count, not what rest took",
           "[even_work]") {
-  CHECK(after(10000, 1, 1700.0).most(1.0) > 2500);
+  CHECK(after(10000, 1, 1700.0).max_visits(1.0) > 2500);
 }
 
 TEST_CASE("small work is never cut, and nor is a fast hand", "[even_work]") {
-  CHECK(after(200, 5, 2.0).most(1.0) >= 100);
-  const EvenWork work = after(200, 300, 700.0);
-  CHECK(work.most(10.0) == 10 * work.most(1.0));
-  CHECK(work.most(1e30) > 1'000'000);
+  CHECK(after(200, 5, 2.0).max_visits(1.0) >= 100);
+  const WorkBalancer work = after(200, 300, 700.0);
+  CHECK(work.max_visits(10.0) == 10 * work.max_visits(1.0));
+  CHECK(work.max_visits(1e30) > 1'000'000);
 }
 
 TEST_CASE("where tick after tick is late the next may take more, and after others it is as before",
           "[even_work]") {
-  EvenWork work = after(200, 300, 700.0);
-  const std::uint32_t before = work.most(1.0);
-  for (int i = 0; i < 3; ++i) work.learn(300, 700.0, true);
-  CHECK(work.most(1.0) <= 1.01 * before);  // the hand can wait so long
-  for (int i = 0; i < 4; ++i) work.learn(300, 700.0, true);
-  const std::uint32_t after_some = work.most(1.0);
+  WorkBalancer work = after(200, 300, 700.0);
+  const std::uint32_t before = work.max_visits(1.0);
+  for (int i = 0; i < 3; ++i) work.update(300, 700.0, true);
+  CHECK(work.max_visits(1.0) <= 1.01 * before);  // the hand can wait so long
+  for (int i = 0; i < 4; ++i) work.update(300, 700.0, true);
+  const std::uint32_t after_some = work.max_visits(1.0);
   CHECK(after_some > 1.2 * before);
-  for (int i = 0; i < 100; ++i) work.learn(300, 700.0, true);
-  CHECK(work.most(1.0) > 1.5 * after_some);  // it does not fall behind for good
-  CHECK(work.most(1.0) < 6.0 * before);
-  for (int i = 0; i < 50; ++i) work.learn(300, 700.0, false);
-  CHECK(work.most(1.0) <= 1.01 * before);
+  for (int i = 0; i < 100; ++i) work.update(300, 700.0, true);
+  CHECK(work.max_visits(1.0) > 1.5 * after_some);  // it does not fall behind for good
+  CHECK(work.max_visits(1.0) < 6.0 * before);
+  for (int i = 0; i < 50; ++i) work.update(300, 700.0, false);
+  CHECK(work.max_visits(1.0) <= 1.01 * before);
 }
 
 TEST_CASE("ticks are brought up to what few need twice of: looks come and go, lists are made evenly",
           "[even_work]") {
-  EvenWork work;
-  for (int i = 0; i < 1000; ++i) work.learn(i % 10 == 0 ? 260 : 80, 50.0, false);
-  CHECK(2.0 * work.even() > 260.0 + 50.0);
-  CHECK(2.0 * work.even() <= work.most(1.0) + 1.0);
-  const EvenWork listing = after(1000, 100, 3000.0);
-  CHECK(listing.even() < 1.1 * (100.0 + 3000.0));
-  CHECK(EvenWork().even() == 0.0);  // nothing is known
+  WorkBalancer work;
+  for (int i = 0; i < 1000; ++i) work.update(i % 10 == 0 ? 260 : 80, 50.0, false);
+  CHECK(2.0 * work.target_visits() > 260.0 + 50.0);
+  CHECK(2.0 * work.target_visits() <= work.max_visits(1.0) + 1.0);
+  const WorkBalancer listing = after(1000, 100, 3000.0);
+  CHECK(listing.target_visits() < 1.1 * (100.0 + 3000.0));
+  CHECK(WorkBalancer().target_visits() == 0.0);  // nothing is known
 }
 
 TEST_CASE("a tool that is elsewhere begins anew", "[even_work]") {
-  EvenWork work = after(200, 3000, 7000.0);
-  work.forget();
-  CHECK(work.most(1.0) == EvenWork().most(1.0));
+  WorkBalancer work = after(200, 3000, 7000.0);
+  work.reset();
+  CHECK(work.max_visits(1.0) == WorkBalancer().max_visits(1.0));
   // The first list is not begun before it is late: it says nothing yet.
-  work.learn(0, 0.0, true);
-  CHECK(work.most(1.0) >= EvenWork().most(1.0));
+  work.update(0, 0.0, true);
+  CHECK(work.max_visits(1.0) >= WorkBalancer().max_visits(1.0));
 }
 
 }  // namespace

@@ -179,7 +179,7 @@ struct Bad {
 
 /// "line:column" of where the refusal must stand: in what was changed, or the only place of the whole text;
 /// an empty one is its beginning.
-std::string place_of(const std::string& text, const Bad& bad) {
+std::string recording_path(const std::string& text, const Bad& bad) {
   std::size_t found = bad.to.find(bad.at);
   if (bad.at.empty()) {
     found = 0;
@@ -209,7 +209,7 @@ std::string spoiled(const Bad& bad) {
   return text.replace(at, bad.from.size(), bad.to);
 }
 
-std::string refusal(const std::filesystem::path& file) {
+std::string rejection_text(const std::filesystem::path& file) {
   try {
     load_profile(file, SearchPath({file.parent_path()}));
   } catch (const ConfigError& error) {
@@ -219,7 +219,7 @@ std::string refusal(const std::filesystem::path& file) {
 }
 
 /// One line of the message starts with the place and holds the cure.
-bool told(const std::string& message, const std::string& start, const std::string& cure) {
+bool operator_instruction(const std::string& message, const std::string& start, const std::string& cure) {
   for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1))
     if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
   return false;
@@ -501,7 +501,7 @@ const std::vector<Bad> kTable = {
 TEST_CASE("the profiles that are about to be spoiled are good", "[config]") {
   const test::TemporaryDirectory dir;
   for (const std::string* text : {&kWhole, &kMouse, &kArm, &kDelta})
-    CHECK(refusal(dir.write("good.toml", *text)) == "it loads");
+    CHECK(rejection_text(dir.write("good.toml", *text)) == "it loads");
 }
 
 TEST_CASE("a hundred bad profiles are refused at their place, with the cure", "[config]") {
@@ -510,10 +510,10 @@ TEST_CASE("a hundred bad profiles are refused at their place, with the cure", "[
   for (const Bad& bad : kTable) {
     const std::string text = spoiled(bad);
     const auto file = dir.write("bad.toml", text);
-    const std::string message = refusal(file);
-    const std::string start = file.string() + ":" + place_of(text, bad) + ": ";
+    const std::string message = rejection_text(file);
+    const std::string start = file.string() + ":" + recording_path(text, bad) + ": ";
     INFO(bad.from << " -> " << bad.to << "\nexpected " << start << "... " << bad.cure << "\ngot " << message);
-    CHECK(told(message, start, bad.cure));
+    CHECK(operator_instruction(message, start, bad.cure));
   }
 }
 

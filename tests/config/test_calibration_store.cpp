@@ -94,7 +94,7 @@ TEST_CASE("what is written is read back, bit for bit", "[calibration]") {
     Calibration calibration{"polhem", "A-0017", {}};
     for (int k = random.integer(0, 32); k > 0; --k)
       calibration.offsets.push_back(
-          {"axis_" + std::to_string(k), random.normal() * random.decades(1e-12, 1e3)});
+          {"axis_" + std::to_string(k), random.normal() * random.log_uniform(1e-12, 1e3)});
     bench.store.write(calibration);
     CHECK(bench.holds(calibration));
   }
@@ -128,7 +128,7 @@ TEST_CASE("every change of one byte is refused, and every byte more", "[calibrat
   const std::string whole = to_text(kOld);
   const auto refused = [](const std::string& text) {
     try {
-      calibration_of(text, "a file");
+      parse_calibration(text, "a file");
     } catch (const ConfigError&) {
       return true;
     }

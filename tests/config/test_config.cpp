@@ -27,7 +27,7 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-void print(std::ostream& out, const PlacementSettings& X) {
+void print(std::ostream& out, const PoseSettings& X) {
   out << X.position_m.transpose() << '\n' << X.rotation_vector_rad.transpose() << '\n';
 }
 
@@ -166,9 +166,9 @@ TEST_CASE("the shipped plunger comes out of the table to and fro, within reach o
   const MeshObstacleSettings& plunger = scene.meshes[0];
   const double half_m = 0.025;
   const auto top_m = [&](double t_s) {
-    return plunger.motion.at(plunger.X_WM, t_s).translation_m.z() + half_m;
+    return plunger.motion.pose_at(plunger.X_WM, t_s).translation_m.z() + half_m;
   };
-  const double back_s = plunger.motion.turn_back_s;
+  const double back_s = plunger.motion.reverse_after_s;
   CHECK(top_m(0.0) == Approx(-0.010));
   CHECK(top_m(back_s) == Approx(0.012));
   CHECK(top_m(2.0 * back_s) == Approx(-0.010));
@@ -194,11 +194,11 @@ TEST_CASE("a mesh may move, and stands still unless it is told to", "[config]") 
   CHECK(all.moves());
   CHECK(all.linear_m_per_s == Vector3d(3, 0, -4));
   CHECK(all.angular_rad_per_s == Vector3d(0, 50, 0));
-  CHECK(all.turn_back_s == 1.5);
+  CHECK(all.reverse_after_s == 1.5);
   const ObstacleMotion turning = motion("kind = 'surface'\nangular_velocity_rad_per_s = [1, 0, 0]");
   CHECK(turning.moves());
   CHECK(turning.linear_m_per_s == Vector3d::Zero());
-  CHECK(turning.turn_back_s == 0.0);
+  CHECK(turning.reverse_after_s == 0.0);
 }
 
 TEST_CASE("a mesh may be made instead of read", "[config]") {
@@ -207,17 +207,17 @@ TEST_CASE("a mesh may be made instead of read", "[config]") {
       "[[obstacle]]\nmesh = { make = 'boulder', seed = 7 }\nkind = 'surface'\n"
       "[[obstacle]]\nmesh = { make = 'box', size_m = [0.1, 0.2, 0.3] }\n"
       "[[obstacle]]\nmesh = 'cube.off'\n");
-  REQUIRE(scene.tool.made.has_value());
-  CHECK(scene.tool.made->kind == "gear");
-  CHECK(scene.tool.made->triangles == 5000);
+  REQUIRE(scene.tool.generated.has_value());
+  CHECK(scene.tool.generated->kind == "gear");
+  CHECK(scene.tool.generated->triangles == 5000);
   CHECK(scene.tool.mesh == "made gear, 5000 triangles");
   CHECK(scene.tool.scale == 2.0);
   REQUIRE(scene.meshes.size() == 3);
-  CHECK(scene.meshes[0].made.value().seed == 7);
+  CHECK(scene.meshes[0].generated.value().seed == 7);
   CHECK(scene.meshes[0].mesh == "made boulder, 20000 triangles, seed 7");
   CHECK(scene.meshes[0].kind == BodyKind::surface);
-  CHECK(scene.meshes[1].made.value().size_m == Vector3d(0.1, 0.2, 0.3));
-  CHECK_FALSE(scene.meshes[2].made.has_value());
+  CHECK(scene.meshes[1].generated.value().size_m == Vector3d(0.1, 0.2, 0.3));
+  CHECK_FALSE(scene.meshes[2].generated.has_value());
 }
 
 TEST_CASE("the shipped hand moves no faster than 0.3 m/s", "[config]") {

@@ -41,7 +41,7 @@ void as_hand_script(const fs::path& file) {
 }
 
 /// What the file is refused with; empty when it loads.
-std::string refusal(Load load, const fs::path& file) {
+std::string rejection_text(Load load, const fs::path& file) {
   try {
     load(file);
   } catch (const ConfigError& error) {
@@ -58,7 +58,7 @@ struct Bad {
 };
 
 /// One line of the message starts with the place and holds the cure.
-bool told(const std::string& message, const std::string& start, const std::string& cure) {
+bool operator_instruction(const std::string& message, const std::string& start, const std::string& cure) {
   for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1)) {
     if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
   }
@@ -70,9 +70,9 @@ void check_refused(Load load, const std::vector<Bad>& table) {
   dir.write("cube.off", "");
   for (const Bad& bad : table) {
     const fs::path file = dir.write("bad.toml", bad.text);
-    const std::string message = refusal(load, file);
+    const std::string message = rejection_text(load, file);
     INFO(bad.text << "\nexpected " << bad.place << " ... " << bad.cure << "\ngot " << message);
-    CHECK(told(message, file.string() + ":" + bad.place + ": ", bad.cure));
+    CHECK(operator_instruction(message, file.string() + ":" + bad.place + ": ", bad.cure));
   }
 }
 
@@ -326,7 +326,7 @@ TEST_CASE("a velocity that is refused does not have its turning back refused as 
   const auto file = dir.write("s.toml", kTool +
                                             "[[obstacle]]\nmesh = 'cube.off'\nvelocity_m_per_s = [9, 0, 0]\n"
                                             "turn_back_after_s = 1");
-  const std::string message = refusal(as_scene, file);
+  const std::string message = rejection_text(as_scene, file);
   CHECK(message.find("velocity_m_per_s[0]") != std::string::npos);
   CHECK(message.find('\n') == std::string::npos);
 }
@@ -408,31 +408,33 @@ TEST_CASE("everything wrong with a file is told at once, in its order", "[config
     FAIL("it loaded");
   } catch (const ConfigError& error) {
     REQUIRE(error.refusals().size() == 3);
-    CHECK(error.refusals()[0].place.line == 2);
-    CHECK(error.refusals()[1].place.line == 3);
-    CHECK(error.refusals()[2].place.line == 5);
+    CHECK(error.refusals()[0].location.line == 2);
+    CHECK(error.refusals()[1].location.line == 3);
+    CHECK(error.refusals()[2].location.line == 5);
   }
 }
 
 TEST_CASE("a misspelt mandatory key is told once", "[config]") {
   const TemporaryDirectory dir;
   const auto file = dir.write("p.toml", with(kProfile, "max_force_N = 10.0", "max_force_mN = 10000"));
-  const std::string message = refusal(as_profile, file);
+  const std::string message = rejection_text(as_profile, file);
   CHECK(message.find('\n') == std::string::npos);
 }
 
 TEST_CASE("what is not a readable file of sensible size is refused", "[config]") {
   const TemporaryDirectory dir;
   const fs::path absent = dir.path() / "absent.toml";
-  CHECK(refusal(as_scene, absent) == absent.string() + ": no such file; looked for " + absent.string());
-  CHECK(told(refusal(as_scene, dir.path()), dir.path().string() + ": ", "is a directory; name a file in it"));
+  CHECK(rejection_text(as_scene, absent) ==
+        absent.string() + ": no such file; looked for " + absent.string());
+  CHECK(operator_instruction(rejection_text(as_scene, dir.path()), dir.path().string() + ": ",
+                             "is a directory; name a file in it"));
   const fs::path pipe = dir.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(told(refusal(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
-  CHECK(refusal(as_scene, "/dev/zero").find("is not a regular file") != std::string::npos);
+  CHECK(operator_instruction(rejection_text(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
+  CHECK(rejection_text(as_scene, "/dev/zero").find("is not a regular file") != std::string::npos);
   const fs::path big = dir.write("big.toml", std::string((1 << 20) + 1, '#'));
-  CHECK(told(refusal(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
-  CHECK(refusal(as_scene, std::string(5000, 'a')).find("cannot be read") != std::string::npos);
+  CHECK(operator_instruction(rejection_text(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
+  CHECK(rejection_text(as_scene, std::string(5000, 'a')).find("cannot be read") != std::string::npos);
 }
 
 TEST_CASE("a refused hand script changes nothing", "[config]") {
@@ -451,7 +453,8 @@ TEST_CASE("deep nesting through many lines of dotted keys does not overflow the 
   text += "1";
   for (int i = 0; i < 120; ++i) text += "}\n]";
   const TemporaryDirectory dir;
-  CHECK(told(refusal(as_scene, dir.write("deep.toml", text)), "deep.toml:", "is nested more than 16 deep"));
+  CHECK(operator_instruction(rejection_text(as_scene, dir.write("deep.toml", text)),
+                             "deep.toml:", "is nested more than 16 deep"));
 }
 
 TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {
@@ -473,7 +476,7 @@ TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {
     for (std::size_t n = 1 + below(4); n > 0; --n) text[below(text.size())] = static_cast<char>(below(256));
     if (below(4) == 0) text.resize(1 + below(text.size()));
     if (below(4) == 0) text.insert(below(text.size()), text.substr(below(text.size()), below(200)));
-    refused += refusal(load, dir.write("mutant.toml", text)).empty() ? 0 : 1;
+    refused += rejection_text(load, dir.write("mutant.toml", text)).empty() ? 0 : 1;
   }
   CHECK(refused > kMutants / 4);
 }

@@ -18,7 +18,7 @@ std::string inheriting(const std::string& parent, const std::string& more = "") 
   return "inherits = \"" + parent + "\"\n" + more;
 }
 
-std::string refusal(const std::filesystem::path& file, const SearchPath& search) {
+std::string rejection_text(const std::filesystem::path& file, const SearchPath& search) {
   try {
     load_profile(file, search);
   } catch (const ConfigError& error) {
@@ -77,23 +77,23 @@ TEST_CASE("profiles that inherit each other are refused with the whole way", "[i
   const SearchPath search({dir.path()});
   dir.write("profiles/a.toml", inheriting("b"));
   const auto b = dir.write("profiles/b.toml", inheriting("a"));
-  CHECK_THAT(refusal(dir.path() / "profiles/a.toml", search),
+  CHECK_THAT(rejection_text(dir.path() / "profiles/a.toml", search),
              Contains(b.string() +
                       ":1:12: key 'inherits': the profiles inherit each other (a.toml -> b.toml -> a)"));
   const auto self = dir.write("profiles/self.toml", inheriting("self"));
-  CHECK_THAT(refusal(self, search), Contains("self.toml:1:12: ") && Contains("must stand on its own"));
+  CHECK_THAT(rejection_text(self, search), Contains("self.toml:1:12: ") && Contains("must stand on its own"));
 }
 
 TEST_CASE("a parent that is not there, or has no name, is refused", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path()});
   const auto file = dir.write("profiles/a.toml", "\n" + inheriting("nobody"));
-  CHECK_THAT(refusal(file, search),
+  CHECK_THAT(rejection_text(file, search),
              Contains("a.toml:2:12: key 'inherits': no profile of this name; looked for ") &&
                  Contains("profiles/nobody.toml"));
-  CHECK_THAT(refusal(dir.write("profiles/a.toml", "inherits = 3\n"), search),
+  CHECK_THAT(rejection_text(dir.write("profiles/a.toml", "inherits = 3\n"), search),
              Contains("a.toml:1:12: key 'inherits': expected the name of a profile"));
-  CHECK_THAT(refusal(dir.write("profiles/a.toml", "inherits = \"\"\n"), search), Contains(":1:12: "));
+  CHECK_THAT(rejection_text(dir.write("profiles/a.toml", "inherits = \"\"\n"), search), Contains(":1:12: "));
 }
 
 TEST_CASE("what is wrong with a parent is told at its place in the parent", "[inherited_toml]") {
@@ -101,7 +101,7 @@ TEST_CASE("what is wrong with a parent is told at its place in the parent", "[in
   const SearchPath search({dir.path(), WRENCHD_SOURCE_DIR "/config"});
   const auto parent = dir.write("profiles/a.toml", inheriting("loopback", "name = 'a'\nwatchdog_s = 7\n"));
   const auto child = dir.write("profiles/b.toml", inheriting("a", "name = ''\n"));
-  const std::string message = refusal(child, search);
+  const std::string message = rejection_text(child, search);
   CHECK_THAT(message, Contains(child.string() + ":2:8: key 'name'"));
   CHECK_THAT(message, Contains(parent.string() + ":3:14: key 'watchdog_s'"));
   CHECK(message.find(child.string()) < message.find(parent.string()));

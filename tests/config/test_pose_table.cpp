@@ -18,7 +18,7 @@ std::vector<Pose> poses(const std::string& text) {
 }
 
 /// What the table is refused with; empty when it is read.
-std::string refusal(const std::string& text) {
+std::string rejection_text(const std::string& text) {
   try {
     poses(text);
   } catch (const PoseTableError& error) {
@@ -54,7 +54,7 @@ TEST_CASE("a table may come from any spreadsheet") {
   };
   for (const std::string& text : good) {
     INFO(text);
-    CHECK(refusal(text) == "");
+    CHECK(rejection_text(text) == "");
     const auto X = poses(text);
     REQUIRE(X.size() == 1);
     check_pose(X[0], {1.5, -2, 300}, {1, 0, 0, 0});
@@ -70,10 +70,10 @@ TEST_CASE("a quaternion is made unit when it nearly is") {
   REQUIRE(X.size() == 1);
   CHECK(X[0].rotation.norm() == Approx(1.0).epsilon(1e-15));
   CHECK(X[0].rotation.z() == Approx(std::sqrt(0.5)).epsilon(1e-15));
-  CHECK(refusal(kHeader + "0,0,0,0,0,0,1.0009\n") == "");
-  CHECK(refusal(kHeader + "0,0,0,0,0,0,0.9991\n") == "");
-  CHECK(refusal(kHeader + "0,0,0,0,0,0,1.0011\n") != "");
-  CHECK(refusal(kHeader + "0,0,0,0,0,0,0.9989\n") != "");
+  CHECK(rejection_text(kHeader + "0,0,0,0,0,0,1.0009\n") == "");
+  CHECK(rejection_text(kHeader + "0,0,0,0,0,0,0.9991\n") == "");
+  CHECK(rejection_text(kHeader + "0,0,0,0,0,0,1.0011\n") != "");
+  CHECK(rejection_text(kHeader + "0,0,0,0,0,0,0.9989\n") != "");
 }
 
 TEST_CASE("numbers have a decimal point in every locale") {
@@ -85,7 +85,7 @@ TEST_CASE("numbers have a decimal point in every locale") {
     if (std::setlocale(LC_NUMERIC, name) != nullptr) break;
   const std::locale global = std::locale::global(std::locale(std::locale(), new CommaPoint));
   const auto X = poses(kHeader + "1.5,0,0,0,0,0,1\n");
-  const std::string message = refusal(kHeader + "1,5,0,0,0,0,0,1\n");
+  const std::string message = rejection_text(kHeader + "1,5,0,0,0,0,0,1\n");
   std::locale::global(global);
   std::setlocale(LC_NUMERIC, before.c_str());
   REQUIRE(X.size() == 1);
@@ -137,7 +137,7 @@ TEST_CASE("a bad table is refused at its line and column, with the cure") {
       {kHeader + "1,2,3,0,0,0,1\r1,2,3,0,0,0,1\r", "p.csv:2:1: expected 7 numbers"},
   };
   for (const auto& [text, expected] : bad) {
-    const std::string message = refusal(text);
+    const std::string message = rejection_text(text);
     INFO(text << "\nexpected " << expected << "\ngot " << message);
     CHECK(message.find(expected) == 0);
   }
@@ -191,13 +191,13 @@ TEST_CASE("what a hand cannot do, and what is no table of times, is refused with
 }
 
 TEST_CASE("all that is wrong is told at once, up to ten lines of it") {
-  CHECK(refusal(kHeader + "x,2,3,0,0,0,y\n1,2,3,0,0,0,1\n1,2\n") ==
+  CHECK(rejection_text(kHeader + "x,2,3,0,0,0,y\n1,2,3,0,0,0,1\n1,2\n") ==
         "p.csv:2:1: px must be a finite number, found 'x'\n"
         "p.csv:2:13: qw must be a finite number, found 'y'\n"
         "p.csv:4:1: expected 7 numbers (px,py,pz,qx,qy,qz,qw), found 2");
   std::string many = kHeader;
   for (int i = 0; i < 25; ++i) many += "oh\n";
-  const std::string message = refusal(many);
+  const std::string message = rejection_text(many);
   CHECK(std::count(message.begin(), message.end(), '\n') == 10);
   CHECK(message.find("p.csv:11:1: ") != std::string::npos);
   CHECK(message.find("p.csv:12:1: ") == std::string::npos);
@@ -205,8 +205,8 @@ TEST_CASE("all that is wrong is told at once, up to ten lines of it") {
 }
 
 TEST_CASE("a message repeats no more than a glance of a bad file") {
-  CHECK(refusal(std::string(100000, 'x')).size() < 300);
-  CHECK(refusal(kHeader + std::string(100000, 'x') + ",2,3,0,0,0,1\n").size() < 300);
+  CHECK(rejection_text(std::string(100000, 'x')).size() < 300);
+  CHECK(rejection_text(kHeader + std::string(100000, 'x') + ",2,3,0,0,0,1\n").size() < 300);
 }
 
 }  // namespace

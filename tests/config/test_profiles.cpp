@@ -249,7 +249,7 @@ TEST_CASE("a million fuzzed reports are understood or dropped, and no sample is 
     explicit Noise(const DeviceProfile& profile) : profile_(profile) {}
     void open() override {}
     LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
-      if (left_ == 0) return {LinkStatus::empty, 0, now};
+      if (left_ == 0) return {LinkStatus::not_ready, 0, now};
       --left_;
       for (std::uint8_t& byte : buffer) byte = static_cast<std::uint8_t>(random_() & 0xffu);
       const PoseReportLayout& r = profile_.more_reports.empty() || random_() % 2 == 0

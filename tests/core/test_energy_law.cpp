@@ -148,7 +148,7 @@ TEST_CASE("the energy wrench is minus the gradient of the potential at fixed q",
 TEST_CASE("and it is so with q where the projection puts it", "[energy_law]") {
   RandomValues random(2);
   for (int i = 0; i < 60; ++i) {
-    const Pressed c = into_corner(random, 1, random.uniform(0.05, 0.15));
+    const OverlappingScene c = overlap_corner(random, 1, random.uniform(0.05, 0.15));
     PenetrationDepth depth(c.scene, {});
     const auto U = [&](const Pose& X) { return 0.5 * depth.query(X).projection.energy; };
     const Pose X_WQ = depth.query(c.X_WP).projection.X_WQ;
@@ -170,12 +170,12 @@ TEST_CASE("to first order it is K_P = k M", "[energy_law]") {
 
 TEST_CASE("no work is done around a closed path in contact", "[energy_law]") {
   RandomValues random(4);
-  constexpr int kLoops = repeats(1000);
+  constexpr int kLoops = case_count(1000);
   double worst = 0.0;
   double worst_pid = 0.0;
   int jumped = 0;
   for (int loops = 0; loops < kLoops;) {
-    const Pressed c = into_corner(random, random.integer(1, 2), random.uniform(0.1, 0.2));
+    const OverlappingScene c = overlap_corner(random, random.integer(1, 2), random.uniform(0.1, 0.2));
     const Loop loop{c.X_WP, 0.05 * random.unit<6>(), 0.05 * random.unit<6>(), 0.02 * random.unit<6>()};
     const Work work = around(loop, c.scene);
     if (!work.smooth) {  // q went over to another minimum, or the hand left the wall: not a closed path of U

@@ -15,12 +15,12 @@ TEST_CASE("every fault has a name of its own, a detector, a sentence, a reason a
     INFO(row.name);
     CHECK(&fault_row(row.fault) == &row);
     CHECK(row.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == std::string_view::npos);
-    for (const std::string_view text : {row.detector, row.sentence, row.why, row.cure}) {
+    for (const std::string_view text : {row.detector, row.message, row.reason, row.cure}) {
       CHECK(text.find(' ') != std::string_view::npos);
       CHECK(text.back() != '.');
     }
     names.emplace(row.name);
-    sentences.emplace(row.sentence);
+    sentences.emplace(row.message);
   }
   CHECK(names.size() == kFaultCount - 1);
   CHECK(sentences.size() == kFaultCount - 1);
@@ -29,12 +29,12 @@ TEST_CASE("every fault has a name of its own, a detector, a sentence, a reason a
 TEST_CASE("what latches takes the force at once, and its cure names the acknowledgement", "[fault]") {
   for (const FaultRow& row : fault_rows()) {
     INFO(row.name);
-    const bool latches =
-        row.trigger == Trigger::hard_fault || row.trigger == Trigger::failed || row.trigger == Trigger::stop;
+    const bool latches = row.trigger == Trigger::hard_fault || row.trigger == Trigger::self_test_failed ||
+                         row.trigger == Trigger::stop;
     if (latches) CHECK(row.reaction == Reaction::zero);
     if (latches) CHECK(row.cure.find("acknowledge") != std::string_view::npos);
-    if (row.trigger == Trigger::noted) CHECK(row.reaction == Reaction::none);
-    if (row.trigger != Trigger::noted) CHECK(row.reaction >= Reaction::fade_100ms);
+    if (row.trigger == Trigger::info) CHECK(row.reaction == Reaction::none);
+    if (row.trigger != Trigger::info) CHECK(row.reaction >= Reaction::fade_100ms);
   }
 }
 
@@ -43,7 +43,7 @@ TEST_CASE("names that stand in records", "[fault]") {
   CHECK(fault_row(Fault::device_lost).name == "device_lost");
   CHECK(fault_row(Fault::pose_not_finite).name == "pose_not_finite");
   CHECK(fault_row(Fault::sample_stale).name == "sample_stale");
-  CHECK(fault_row(Fault::test_watchdog).name == "test_watchdog");
+  CHECK(fault_row(Fault::self_test_watchdog).name == "test_watchdog");
 }
 
 TEST_CASE("a value that is no fault reads unknown", "[fault]") {
@@ -51,7 +51,7 @@ TEST_CASE("a value that is no fault reads unknown", "[fault]") {
     const FaultRow& row = fault_row(static_cast<Fault>(value));
     REQUIRE(row.name == "unknown");
     REQUIRE(row.trigger == Trigger::hard_fault);
-    REQUIRE_FALSE(row.sentence.empty());
+    REQUIRE_FALSE(row.message.empty());
     REQUIRE_FALSE(row.cure.empty());
   }
 }

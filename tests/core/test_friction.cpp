@@ -37,13 +37,13 @@ Scene cube_on(Ground ground, std::size_t triangles = 12) {
   if (ground == Ground::half_space)
     return Scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1), {half_space(Vector3d::UnitZ(), 0.0)});
   if (ground == Ground::convex) {
-    std::vector<Vector3d> corners = split_box(1, {0.4, 0.4, 0.1});
+    std::vector<Vector3d> corners = subdivided_box_points(1, {0.4, 0.4, 0.1});
     for (Vector3d& p : corners) p.z() -= 0.05;
     return Scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1), {},
                  {convex_obstacle("box", convex_hull(corners))});
   }
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"table", TreedMesh(make_mesh({"table", triangles})), Pose{}});
+  obstacles.push_back({"table", MeshBvh(make_mesh({"table", triangles})), Pose{}});
   return Scene(mesh_tool(cube), {}, {}, std::move(obstacles));
 }
 
@@ -314,7 +314,7 @@ TEST_CASE("a tool that comes through the air is not held back where it came from
   s.follow(X_on);
   CHECK(same_bits(s.X_WQ, smooth.X_WQ));  // and there it sticks
   // Nor one that is put elsewhere, or whose history is forgotten.
-  s.depth.forget();
+  s.depth.clear_history();
   s.follow(X_on);
   CHECK(s.X_WQ.translation_m.x() == Approx(5e-3).epsilon(1e-12));
   s.X_WQ.translation_m.x() -= 1e-3;
@@ -376,30 +376,31 @@ TEST_CASE("a cube on a table feels the same friction however both are cut", "[fr
 
 TEST_CASE("a proxy that rubs overlaps nothing, whatever the hand does: exactly", "[friction][proxy]") {
   const auto i = GENERATE(range<std::size_t>(0, 20));
-  const Handling& handling = rough_handling()[i];
+  const ManipulationCase& handling = manipulation_cases()[i];
   INFO(handling.name);
   Rubbed s(scene_of(handling), {0.7, 0.4}, {Quaterniond::Identity(), handling.start_m});
-  const ExactMeeting exact(s.scene.tool_mesh()->surface.mesh(), s.scene.meshes()[0].mesh->surface.mesh());
-  Hand hand(handling, 2);
+  const ExactIntersection exact(s.scene.tool_mesh()->surface.mesh(),
+                                s.scene.meshes()[0].mesh->surface.mesh());
+  HandTrajectory hand(handling, 2);
   int contacts = 0, stuck = 0, spent = 0;
-  for (int tick = 0; tick < repeats(300); ++tick) {
+  for (int tick = 0; tick < case_count(300); ++tick) {
     const Pose X_before = s.X_WQ;
     const Penetration p = s.follow(hand.next());
     INFO("tick " << tick);
     REQUIRE(p.projection.status != ProjectionStatus::infeasible);
-    REQUIRE_FALSE(exact.meet(s.X_WQ));
+    REQUIRE_FALSE(exact.intersect(s.X_WQ));
     contacts += p.contacts > 0 ? 1 : 0;
     stuck += same_bits(s.X_WQ, X_before) ? 1 : 0;
     spent += p.projection.status == ProjectionStatus::budget_spent ? 1 : 0;
   }
-  if (repeats(300) == 300) CHECK(contacts > 10);
+  if (case_count(300) == 300) CHECK(contacts > 10);
   CAPTURE(stuck, spent);
 }
 
 TEST_CASE("a convex tool that rubs on convex bodies stays out of them", "[friction][convex]") {
   RandomValues random(8);  // the 18th once came out 1.3 mm deep in the half-space
   int contacts = 0;
-  const int runs = repeats(20);
+  const int runs = case_count(20);
   for (int n = 0; n < runs; ++n) {
     const Scene scene(random_body(random, 20), {half_space(Vector3d::UnitZ(), -1.0)},
                       {convex_obstacle("body", random_body(random, 20).hull)});
@@ -422,10 +423,10 @@ TEST_CASE("a convex tool that rubs on convex bodies stays out of them", "[fricti
 
 TEST_CASE("friction neither allocates nor locks", "[realtime][friction]") {
   for (const std::size_t i : {7, 15, 16}) {
-    const Handling& handling = rough_handling()[i];
+    const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
     Rubbed s(scene_of(handling), {0.5, 0.3}, {Quaterniond::Identity(), handling.start_m});
-    Hand hand(handling);
+    HandTrajectory hand(handling);
     const RealtimeGuard guard;
     for (int tick = 0; tick < 300; ++tick) s.follow(hand.next());
     CHECK(guard.allocations() == 0);
@@ -459,15 +460,15 @@ TEST_CASE("what is about to be touched does not hold", "[friction]") {
   Projection touching = depth.follow(X_WP, X_last).projection;
   touching.X_WQ = X_last;
   Friction friction(scene.tool().solid.inertia, {0.5, 0.5}, 0.0);
-  CHECK(same_bits(friction.felt(X_WP, X_last), X_WP));  // nothing is known
-  friction.keep(touching);
-  friction.felt(X_WP, X_last);
-  CHECK(friction.holds());
+  CHECK(same_bits(friction.frictional_goal(X_WP, X_last), X_WP));  // nothing is known
+  friction.store_contacts(touching);
+  friction.frictional_goal(X_WP, X_last);
+  CHECK(friction.sticks());
   Projection above = touching;
   above.X_WQ.translation_m.z() += 1e-6;
-  friction.keep(above);
-  CHECK(same_bits(friction.felt(X_WP, above.X_WQ), X_WP));
-  CHECK_FALSE(friction.holds());
+  friction.store_contacts(above);
+  CHECK(same_bits(friction.frictional_goal(X_WP, above.X_WQ), X_WP));
+  CHECK_FALSE(friction.sticks());
 }
 
 TEST_CASE("only method exact knows friction, and the others say so", "[friction]") {

@@ -67,7 +67,7 @@ TEST_CASE("the wrench is the gradient of m g h", "[gravity]") {
     CHECK(power(gravity.wrench(X_BH), V) == Approx(rise / (2 * step_s)).margin(1e-8));
 
     // And the energy is m g h of each mass, told in the world, whose z is up.
-    const double h_H = (R_WB * X_BH.translation_m).z(), h_C = (R_WB * (X_BH * masses.p_HC_m)).z();
+    const double h_H = (R_WB * X_BH.translation_m).z(), h_C = (R_WB * (X_BH * masses.p_HHcm_m)).z();
     CHECK(gravity.potential_energy_J(X_BH) ==
           Approx(g * (masses.carried_kg * h_H + masses.handle_kg * h_C)).margin(1e-12));
   }
@@ -109,12 +109,12 @@ struct FreeHandle {
 
   void step(const Wrench& motors, double h) {
     const Vector3d g_B = R_WB.conjugate() * Vector3d(0, 0, -g);
-    const Vector3d p_CH = -(X_BH.rotation * masses.p_HC_m);
+    const Vector3d p_CH = -(X_BH.rotation * masses.p_HHcm_m);
     v_C += h * (motors.force_N / masses.handle_kg + g_B);
     w += h * (motors.torque_Nm + p_CH.cross(motors.force_N)) / inertia.H_kg_m2(0, 0);
-    const Vector3d p_BC = X_BH * masses.p_HC_m + h * v_C;
+    const Vector3d p_BC = X_BH * masses.p_HHcm_m + h * v_C;
     X_BH.rotation = (rotation_from(h * w) * X_BH.rotation).normalized();
-    X_BH.translation_m = p_BC - X_BH.rotation * masses.p_HC_m;
+    X_BH.translation_m = p_BC - X_BH.rotation * masses.p_HHcm_m;
   }
   double kinetic_J() const {
     return 0.5 * (masses.handle_kg * v_C.squaredNorm() + inertia.H_kg_m2(0, 0) * w.squaredNorm());
@@ -130,7 +130,8 @@ TEST_CASE("a handle that would fall stays where it is put, and coasts when it is
                       random.rotation(),
                       random.pose(0.1)};
     const GravityCompensation gravity(handle.masses, handle.R_WB);
-    const GravityCompensation light({0.9 * handle.masses.handle_kg, handle.masses.p_HC_m, 0.0}, handle.R_WB);
+    const GravityCompensation light({0.9 * handle.masses.handle_kg, handle.masses.p_HHcm_m, 0.0},
+                                    handle.R_WB);
     FreeHandle falling = handle, sagging = handle, pushed = handle;
     const Pose start = handle.X_BH;
     pushed.v_C = random.vector<3>(0.1);

@@ -89,10 +89,10 @@ TEST_CASE("a cube: m a^2 / 6 about every axis", "[inertia]") {
 TEST_CASE("a box: m (b^2 + c^2) / 12 about the axis along a", "[inertia]") {
   RandomValues random(1);
   for (int i = 0; i < 200; ++i) {
-    const double a = random.decades(1e-3, 10.0);
-    const double b = random.decades(1e-3, 10.0);
-    const double c = random.decades(1e-3, 10.0);
-    const double m = random.decades(0.01, 100.0);
+    const double a = random.log_uniform(1e-3, 10.0);
+    const double b = random.log_uniform(1e-3, 10.0);
+    const double c = random.log_uniform(1e-3, 10.0);
+    const double m = random.log_uniform(0.01, 100.0);
     const SolidProperties solid = solid_properties(box(a, b, c), m);
     const Vector3d closed_form = m / 12.0 * Vector3d(b * b + c * c, a * a + c * c, a * a + b * b);
     REQUIRE(solid.volume_m3 == Approx(a * b * c).epsilon(1e-13));
@@ -135,7 +135,7 @@ TEST_CASE("a tetrahedron: its second moments are those of its corners", "[inerti
   RandomValues random(2);
   for (int i = 0; i < 500; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
-    const double m = random.decades(0.1, 10.0);
+    const double m = random.log_uniform(0.1, 10.0);
     const SolidProperties solid = solid_properties(mesh, m);
     Vector3d centre = Vector3d::Zero();
     for (const Vector3d& p : mesh.vertices_m) centre += 0.25 * p;
@@ -164,7 +164,7 @@ TEST_CASE("lengths times c: volume times c^3, inertia times c^2 at equal mass", 
   RandomValues random(4);
   for (int i = 0; i < 500; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
-    const double c = random.decades(1e-6, 1e6);
+    const double c = random.log_uniform(1e-6, 1e6);
     const SolidProperties before = solid_properties(mesh, 2.0);
     const SolidProperties after = solid_properties(scaled(mesh, c), 2.0);
     REQUIRE(after.volume_m3 == Approx(c * c * c * before.volume_m3).epsilon(1e-12));
@@ -177,7 +177,7 @@ TEST_CASE("mass times c: inertia times c, and the centre stays", "[inertia]") {
   RandomValues random(5);
   for (int i = 0; i < 200; ++i) {
     const TriangleMesh mesh = random_tetrahedron(random);
-    const double c = random.decades(1e-3, 1e3);
+    const double c = random.log_uniform(1e-3, 1e3);
     const SolidProperties one = solid_properties(mesh, 1.0);
     const SolidProperties other = solid_properties(mesh, c);
     REQUIRE(other.volume_m3 == one.volume_m3);

@@ -86,7 +86,7 @@ Rows<N> admissible_rows(RandomValues& random, int count, const Vector<N>& inside
   while (rows.size() < static_cast<std::size_t>(count)) {
     const Vector<N> direction = random.unit<N>();
     if (direction.dot(out) < 0.05) continue;
-    const Vector<N> b = random.decades(1e-3, 1e3) * direction;
+    const Vector<N> b = random.log_uniform(1e-3, 1e3) * direction;
     const double slack = random.chance(0.2) ? 0.0 : random.uniform(0.0, 1.0);
     rows.push_back({b, b.dot(inside) - slack * b.norm()});
   }
@@ -146,7 +146,7 @@ TEMPLATE_TEST_CASE_SIG("the nearest point meets the optimality conditions over r
   for (int i = 0; i < 5'000; ++i) {
     const Vector<N> inside = random.vector<N>();
     const Rows<N> rows = admissible_rows<N>(random, random.integer(1, 40), inside);
-    require_optimal<N>(rows, random.vector<N>(random.decades(0.01, 100.0)), 1e-11);
+    require_optimal<N>(rows, random.vector<N>(random.log_uniform(0.01, 100.0)), 1e-11);
   }
 }
 
@@ -169,9 +169,9 @@ TEST_CASE("where nothing is violated the point stays, to the bit", "[least_dista
 TEST_CASE("one row: the foot of the perpendicular", "[least_distance]") {
   RandomValues random(3);
   for (int i = 0; i < 2'000; ++i) {
-    const Vector3d b = random.decades(1e-6, 1e6) * random.unit<3>();
+    const Vector3d b = random.log_uniform(1e-6, 1e6) * random.unit<3>();
     const Vector3d z0 = random.vector<3>();
-    const double depth = random.decades(1e-6, 1e3);
+    const double depth = random.log_uniform(1e-6, 1e3);
     auto problem = posed<3>({{b, b.dot(z0) + depth * b.norm()}});
     REQUIRE(problem.solve(z0, kTolerance) == LeastDistance<3, kCapacity>::Status::optimal);
     REQUIRE((problem.z() - z0 - depth * b.normalized()).norm() <= 1e-14 * (1.0 + depth + z0.norm()));
@@ -324,7 +324,7 @@ TEMPLATE_TEST_CASE_SIG("rows that contradict each other are found out", "[least_
       sum += weight * b;
       bounds += weight * c;
     }
-    rows.push_back({-sum, -bounds + random.decades(1e-3, 1.0)});
+    rows.push_back({-sum, -bounds + random.log_uniform(1e-3, 1.0)});
     for (int k = random.integer(0, 10); k > 0; --k)
       rows.push_back({random.unit<N>(), -random.uniform(0.0, 1.0)});
     auto problem = posed(rows);

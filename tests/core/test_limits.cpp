@@ -94,7 +94,7 @@ TEST_CASE("NaN or infinity of any kind in any slot: zero goes out, and says so",
   for (const double bad : kNotFiniteValues)
     for (int slot = 0; slot < 6; ++slot) {
       WrenchLimits limits(slew(1.0, 1.0), device(10.0, 1.0));
-      limits.follow(force(5.0, 0.0, 0.0));
+      limits.set_last_sent(force(5.0, 0.0, 0.0));
       Wrench asked{{1.0, 2.0, 3.0}, {0.1, 0.2, 0.3}};
       (slot < 3 ? asked.force_N[slot] : asked.torque_Nm[slot - 3]) = bad;
       const Limited out = limits.apply(input(asked));
@@ -142,8 +142,8 @@ TEST_CASE("too long a force or torque is shortened to its limit, in its directio
   WrenchLimits limits(without_slew(), device(10.0, 1.0));
   for (int i = 0; i < 20'000; ++i) {
     limits.reset();
-    const Wrench asked{random.decades(10.01, 1e300) * random.unit<3>(),
-                       random.decades(1.01, 1e300) * random.unit<3>()};
+    const Wrench asked{random.log_uniform(10.01, 1e300) * random.unit<3>(),
+                       random.log_uniform(1.01, 1e300) * random.unit<3>()};
     const Limited out = limits.apply(input(asked));
     REQUIRE(out.causes == (kForceMagnitude | kTorqueMagnitude));
     REQUIRE(out.F.force_N.norm() <= 10.0);
@@ -248,7 +248,7 @@ TEST_CASE("towards zero is free: letting go is never delayed", "[limits]") {
   for (int i = 0; i < 1'000; ++i) {
     WrenchLimits limits(slew(1.0, 1.0), device(10.0, 1.0));
     const Wrench full{9.0 * random.unit<3>(), 0.9 * random.unit<3>()};
-    limits.follow(full);
+    limits.set_last_sent(full);
     const double share = i % 3 == 0 ? 0.0 : random.uniform(0.0, 1.0);
     const Wrench less{share * full.force_N, share * full.torque_Nm};
     const Limited out = limits.apply(input(less, 1.0, 0.0));  // no time at all
@@ -259,7 +259,7 @@ TEST_CASE("towards zero is free: letting go is never delayed", "[limits]") {
 
 TEST_CASE("a fall of authority is free, a rise is not", "[limits]") {
   WrenchLimits limits(slew(1.0, 1.0), device(10.0, 1.0));
-  limits.follow(force(9.0, 0.0, 0.0));
+  limits.set_last_sent(force(9.0, 0.0, 0.0));
   CHECK(limits.apply(input(force(9.0, 0.0, 0.0), 0.0)).F.force_N.norm() == 0.0);
   CHECK(limits.apply(input(force(9.0, 0.0, 0.0))).F.force_N.norm() == Approx(1e-3));
 }
@@ -315,7 +315,7 @@ TEST_CASE("over the limit before does not open the limit", "[limits]") {
     const Vector3d direction = random.unit<3>();
     for (const Vector3d& way : {direction, Vector3d(-direction), Vector3d(random.unit<3>())}) {
       WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
-      limits.follow({before * direction, before * direction});
+      limits.set_last_sent({before * direction, before * direction});
       for (int tick = 0; tick < 20; ++tick) {
         const Limited out = limits.apply(input({1e3 * way, 1e3 * way}));
         INFO("before " << before << " N, tick " << tick);
@@ -329,7 +329,7 @@ TEST_CASE("over the limit before does not open the limit", "[limits]") {
 TEST_CASE("a last wrench that is not finite is none: the next grows from zero", "[limits]") {
   for (const double bad : kNotFiniteValues) {
     WrenchLimits limits(slew(2000.0, 50.0), device(10.0, 1.0));
-    limits.follow({{bad, 1.0, 1.0}, {1.0, bad, 1.0}});
+    limits.set_last_sent({{bad, 1.0, 1.0}, {1.0, bad, 1.0}});
     const Limited out = limits.apply(input({{9.0, 0.0, 0.0}, {0.9, 0.0, 0.0}}));
     CHECK(out.F.force_N.norm() == Approx(2.0));
     CHECK(out.F.torque_Nm.norm() == Approx(0.05));
@@ -337,7 +337,7 @@ TEST_CASE("a last wrench that is not finite is none: the next grows from zero", 
 }
 
 TEST_CASE("a long step is not made up for", "[limits]") {
-  for (const double dt_s : {kLongestStep_s, 0.02, 1.0, 3600.0, kMost}) {
+  for (const double dt_s : {kMaxStep_s, 0.02, 1.0, 3600.0, kMost}) {
     WrenchLimits limits(slew(500.0, 50.0), device(10.0, 1.0));
     CHECK(limits.apply(input(force(9.0, 0.0, 0.0), 1.0, dt_s)).F.force_N.norm() == Approx(5.0));
   }
@@ -357,8 +357,8 @@ TEST_CASE("what nobody stated is no licence", "[limits]") {
     CHECK(still.apply(input(force(5.0, 0.0, 0.0))).F.force_N == Vector3d::Zero());
   }
   const WrenchLimits any(without_slew(), device(1e9, 1e9));
-  CHECK(any.max_force_N() == kHighestForce_N);
-  CHECK(any.max_torque_Nm() == kHighestTorque_Nm);
+  CHECK(any.max_force_N() == kAbsoluteMaxForce_N);
+  CHECK(any.max_torque_Nm() == kAbsoluteMaxTorque_Nm);
 }
 
 TEST_CASE("a thermal ceiling cuts below the maximum, each group on its own, and never lifts it", "[limits]") {
@@ -440,7 +440,7 @@ TEST_CASE("no more power than allowed goes into the hand, by one factor for all,
   CHECK(moving({1e308, 0.0, 0.0}, {0.0, -1e308, 0.0}).F.force_N.norm() < 1e-300);
   // The slew holds back the torque that braked: the force alone would push with 3 W.
   WrenchLimits slow(slew(2000.0, 0.1), profile);
-  slow.follow(force(5.0, 0.0, 0.0));
+  slow.set_last_sent(force(5.0, 0.0, 0.0));
   LimitInput in = input({{5.0, 0.0, 0.0}, {0.0, 0.5, 0.0}});
   in.V_BH = {{0.6, 0.0, 0.0}, {0.0, -4.0, 0.0}};
   const Limited held = slow.apply(in);

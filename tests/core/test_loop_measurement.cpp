@@ -33,10 +33,10 @@ struct Link {
     t.arrived = t.now - microseconds(300);
     t.device_time_s = 1e-3 * static_cast<double>(n);
     t.sequence = 100 + n;
-    t.fresh = true;
-    t.acknowledges = acknowledges;
-    t.commanded = first + n;
-    t.taken = n >= lag ? first + n - lag : 0;
+    t.new_report = true;
+    t.has_acknowledgement = acknowledges;
+    t.sent = first + n;
+    t.acknowledged = n >= lag ? first + n - lag : 0;
     return t;
   }
 };
@@ -52,7 +52,7 @@ TEST_CASE("a steady loop is measured as it is", "[loop_measurement]") {
   CHECK(measured.longest_period_s() == Approx(1e-3).margin(1e-12));
   CHECK(measured.report_rate_Hz() == Approx(1000.0));
   CHECK(measured.device_clock_rate() == Approx(1.0));
-  CHECK(measured.unseen_share() == Approx(0.0).margin(1e-12));
+  CHECK(measured.missed_report_fraction() == Approx(0.0).margin(1e-12));
   CHECK(measured.age_s().mean_s() == Approx(0.3e-3));
   REQUIRE(measured.delay_measured());
   // Sent at n, acknowledged by the report that came 0.7 ms later.
@@ -80,16 +80,16 @@ TEST_CASE("a lost report makes the sample older, a lost command the round trip l
   for (std::uint64_t n = 0; n < 1000; ++n) {
     TickTimes t = link.tick(n);
     if (n % 20 == 10) {  // this tick got no report
-      t.fresh = false;
+      t.new_report = false;
       t.arrived = link.tick(n - 1).arrived;
       t.sequence = link.tick(n - 1).sequence;
-      t.taken = link.tick(n - 1).taken;
+      t.acknowledged = link.tick(n - 1).acknowledged;
     }
-    if (n % 20 == 5) t.taken -= 1;  // and the command before this one was lost
+    if (n % 20 == 5) t.acknowledged -= 1;  // and the command before this one was lost
     measured.tick(t);
   }
   CHECK(measured.age_s().max_s() == Approx(1.3e-3));
-  CHECK(measured.unseen_share() == Approx(0.05).margin(2e-3));
+  CHECK(measured.missed_report_fraction() == Approx(0.05).margin(2e-3));
   CHECK(measured.report_rate_Hz() == Approx(1000.0));  // what is lost was made
   CHECK(measured.round_trip_s().max_s() == Approx(1.7e-3));
   CHECK(measured.delay_s() == Approx(3.0e-3).margin(DurationStatistic::kBin_s * 2));
@@ -127,8 +127,8 @@ TEST_CASE("a device that restarts or answers nonsense is not measured by it", "[
   Link link;
   for (std::uint64_t n = 0; n < 100; ++n) {
     TickTimes t = link.tick(n);
-    if (n == 50) t.taken = 1'000'000;  // never sent
-    if (n == 60) t.taken = 0;          // backward
+    if (n == 50) t.acknowledged = 1'000'000;  // never sent
+    if (n == 60) t.acknowledged = 0;          // backward
     measured.tick(t);
   }
   CHECK(measured.round_trip_s().max_s() == Approx(0.7e-3));
@@ -138,7 +138,7 @@ TEST_CASE("nothing measured yet is no division by nothing", "[loop_measurement]"
   LoopMeasurement measured(2e-3);
   CHECK(measured.report_rate_Hz() == 0.0);
   CHECK(measured.device_clock_rate() == 1.0);
-  CHECK(measured.unseen_share() == 0.0);
+  CHECK(measured.missed_report_fraction() == 0.0);
   CHECK(measured.delay_s() == 2e-3);
   measured.tick(Link{}.tick(0));
   CHECK(measured.report_rate_Hz() == 0.0);
@@ -152,7 +152,7 @@ TEST_CASE("the statistics of durations are those of the list", "[loop_measuremen
   DurationStatistic statistic;
   std::vector<double> list;
   for (int n = 0; n < 5000; ++n) {
-    list.push_back(random.decades(1e-6, 50e-3));  // some beyond the bins
+    list.push_back(random.log_uniform(1e-6, 50e-3));  // some beyond the bins
     statistic.add(list.back());
   }
   std::sort(list.begin(), list.end());

@@ -128,7 +128,7 @@ TEST_CASE("all lengths times c: T times c^2 at equal mass", "[metric]") {
   RandomValues random(6);
   for (int i = 0; i < 5'000; ++i) {
     const auto [M, p, q] = random_case(random);
-    const double c = random.decades(1e-6, 1e6);
+    const double c = random.log_uniform(1e-6, 1e6);
     const double T = energy(with_lengths_times(c, M), with_lengths_times(c, p), with_lengths_times(c, q));
     REQUIRE(T == Approx(c * c * energy(M, p, q)).epsilon(1e-14));
   }
@@ -152,7 +152,7 @@ TEST_CASE("mass times c: T times c, and no configuration becomes nearer than ano
   for (int i = 0; i < 5'000; ++i) {
     const auto [M, p, q] = random_case(random);
     const Pose r = random.pose();
-    const double c = random.decades(1e-3, 1e3);
+    const double c = random.log_uniform(1e-3, 1e3);
     const Inertia heavier{c * M.mass_kg, c * M.H_kg_m2};
     REQUIRE(energy(heavier, p, q) == Approx(c * energy(M, p, q)).epsilon(1e-14));
     REQUIRE(energy(heavier, p, q) / energy(heavier, p, r) ==
@@ -179,8 +179,8 @@ TEST_CASE("T = 0 only if p = q: it is at least that of the least turn and the le
   for (int i = 0; i < 5'000; ++i) {
     const Inertia M = random.inertia();
     const Pose p = random.pose();
-    const double angle = random.decades(1e-7, pi);
-    const double shift = random.decades(1e-7, 1.0);
+    const double angle = random.log_uniform(1e-7, pi);
+    const double shift = random.log_uniform(1e-7, 1.0);
     const Pose turned{p.rotation * random.rotation(angle), p.translation_m};
     const Pose moved{p.rotation, p.translation_m + shift * random.unit<3>()};
     const double least_moment = Eigen::SelfAdjointEigenSolver<Matrix3d>(M.H_kg_m2).eigenvalues()[0];

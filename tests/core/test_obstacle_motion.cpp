@@ -28,7 +28,7 @@ TEST_CASE("an obstacle without velocity stands still, to the bit", "[motion]") {
   CHECK_FALSE(ObstacleMotion{}.moves());
   CHECK_FALSE(ObstacleMotion{{0, 0, 0}, {0, 0, 0}, 2.0}.moves());
   for (const double t : {-1.0, 0.0, 0.001, 1.0, kDay_s})
-    CHECK(same_bits(ObstacleMotion{}.at(kStart, t), kStart));
+    CHECK(same_bits(ObstacleMotion{}.pose_at(kStart, t), kStart));
 }
 
 TEST_CASE("at time 0, before it, and where the time means nothing, every motion is at its start",
@@ -37,32 +37,32 @@ TEST_CASE("at time 0, before it, and where the time means nothing, every motion 
     CHECK(motion.moves());
     for (const double t : {0.0, -0.0, -1e-9, -kDay_s, -std::numeric_limits<double>::infinity(),
                            std::numeric_limits<double>::quiet_NaN()})
-      CHECK(same_bits(motion.at(kStart, t), kStart));
+      CHECK(same_bits(motion.pose_at(kStart, t), kStart));
   }
 }
 
 TEST_CASE("the origin goes straight, and the body turns about it in the world's axes", "[motion]") {
-  const Pose X = ObstacleMotion{{0.1, -0.2, 0.3}, {1.0, -2.0, 0.5}, 0.0}.at(kStart, 0.5);
+  const Pose X = ObstacleMotion{{0.1, -0.2, 0.3}, {1.0, -2.0, 0.5}, 0.0}.pose_at(kStart, 0.5);
   CHECK((X.translation_m - Vector3d(0.15, 0.1, -0.15)).norm() < 1e-15);
   const Quaterniond turned = rotation_from({0.5, -1.0, 0.25}) * kStart.rotation;
   CHECK(X.rotation.angularDistance(turned) < 1e-15);
   // What only goes keeps its rotation to the bit, and what only turns its place.
-  CHECK(kStraight.at(kStart, 0.5).rotation.coeffs() == kStart.rotation.coeffs());
-  CHECK(kSpinning.at(kStart, 0.5).translation_m == kStart.translation_m);
+  CHECK(kStraight.pose_at(kStart, 0.5).rotation.coeffs() == kStart.rotation.coeffs());
+  CHECK(kSpinning.pose_at(kStart, 0.5).translation_m == kStart.translation_m);
 }
 
 TEST_CASE("to and fro: there at the turning points, back at the start, at the same speed all the time",
           "[motion]") {
   ObstacleMotion for_ever = kToAndFro;
-  for_ever.turn_back_s = 0.0;
-  const double back_s = kToAndFro.turn_back_s;
+  for_ever.reverse_after_s = 0.0;
+  const double back_s = kToAndFro.reverse_after_s;
   for (const int round : {0, 1, 2, 1000, 1000000}) {
     const double start_s = 2.0 * back_s * round;  // exact in binary
-    CHECK(same_bits(kToAndFro.at(kStart, start_s), kStart));
-    CHECK(same_bits(kToAndFro.at(kStart, start_s + back_s), for_ever.at(kStart, back_s)));
+    CHECK(same_bits(kToAndFro.pose_at(kStart, start_s), kStart));
+    CHECK(same_bits(kToAndFro.pose_at(kStart, start_s + back_s), for_ever.pose_at(kStart, back_s)));
     for (const double s : {0.125, 0.25, 0.5, 0.625}) {
-      CHECK(same_bits(kToAndFro.at(kStart, start_s + s), for_ever.at(kStart, s)));
-      CHECK(same_bits(kToAndFro.at(kStart, start_s + 2.0 * back_s - s), for_ever.at(kStart, s)));
+      CHECK(same_bits(kToAndFro.pose_at(kStart, start_s + s), for_ever.pose_at(kStart, s)));
+      CHECK(same_bits(kToAndFro.pose_at(kStart, start_s + 2.0 * back_s - s), for_ever.pose_at(kStart, s)));
     }
   }
 }
@@ -71,27 +71,28 @@ TEST_CASE("days later the pose is finite, of unit norm, and moves on smoothly", 
   for (const ObstacleMotion& motion : {kStraight, kSpinning, kToAndFro, kFastest}) {
     const double tick_m_rad = 0.001 * (motion.linear_m_per_s.norm() + motion.angular_rad_per_s.norm());
     for (const double t : {1.0, kDay_s, 30 * kDay_s, 10000 * kDay_s}) {
-      const Pose X = motion.at(kStart, t);
+      const Pose X = motion.pose_at(kStart, t);
       CHECK(is_finite(X));
       CHECK(std::abs(X.rotation.norm() - 1.0) < 1e-15);
       // No faster than it is said to be, but for the digits that the time itself has left.
       const double rounding = 100.0 * (t * 2.3e-16);
-      CHECK(apart(X, motion.at(kStart, t + 0.001)) <= tick_m_rad * (1.0 + 1e-6) + rounding);
+      CHECK(apart(X, motion.pose_at(kStart, t + 0.001)) <= tick_m_rad * (1.0 + 1e-6) + rounding);
     }
     for (const double t :
          {1e12, 1e300, std::numeric_limits<double>::max(), std::numeric_limits<double>::infinity()}) {
-      CHECK(is_finite(motion.at(kStart, t)));
-      CHECK(same_bits(motion.at(kStart, t), motion.at(kStart, ObstacleMotion::kLongest_s)));
+      CHECK(is_finite(motion.pose_at(kStart, t)));
+      CHECK(same_bits(motion.pose_at(kStart, t), motion.pose_at(kStart, ObstacleMotion::kMaxTime_s)));
     }
   }
 }
 
 TEST_CASE("after whole turns it stands as at the start, and its quaternion never leaps", "[motion]") {
   const ObstacleMotion turn = {{0, 0, 0}, {0, 0, 2.0 * std::numbers::pi}, 0.0};  // one a second
-  for (const double t : {1.0, 2.0, 3.0, 1000.0, 86401.0}) CHECK(apart(turn.at(kStart, t), kStart) < 1e-10);
+  for (const double t : {1.0, 2.0, 3.0, 1000.0, 86401.0})
+    CHECK(apart(turn.pose_at(kStart, t), kStart) < 1e-10);
   Quaterniond last = kStart.rotation;
   for (int i = 1; i < 5000; ++i) {
-    const Quaterniond now = turn.at(kStart, 0.001 * i).rotation;
+    const Quaterniond now = turn.pose_at(kStart, 0.001 * i).rotation;
     CHECK(last.dot(now) > 0.9999);
     last = now;
   }
@@ -100,19 +101,20 @@ TEST_CASE("after whole turns it stands as at the start, and its quaternion never
 TEST_CASE("a motion between two poses sets out when it is to, arrives, and stands there", "[motion]") {
   const Pose X_to = {rotation_from({0.3, -0.2, 1.0}) * kStart.rotation, {1.0, -2.0, 0.5}};
   const ObstacleMotion motion = ObstacleMotion::between(kStart, X_to, 7.0, 2.5);
-  for (const double t : {-1.0, 0.0, 6.999, 7.0}) CHECK(same_bits(motion.at(kStart, t), kStart));
-  CHECK(apart(motion.at(kStart, 9.5), X_to) < 1e-12);
-  for (const double t : {9.5001, 10.0, 1e9}) CHECK(same_bits(motion.at(kStart, t), motion.at(kStart, 9.5)));
+  for (const double t : {-1.0, 0.0, 6.999, 7.0}) CHECK(same_bits(motion.pose_at(kStart, t), kStart));
+  CHECK(apart(motion.pose_at(kStart, 9.5), X_to) < 1e-12);
+  for (const double t : {9.5001, 10.0, 1e9})
+    CHECK(same_bits(motion.pose_at(kStart, t), motion.pose_at(kStart, 9.5)));
   const double speed = motion.linear_m_per_s.norm() + motion.angular_rad_per_s.norm();
   for (double t = 6.9; t < 9.6; t += 0.01)
-    CHECK(apart(motion.at(kStart, t), motion.at(kStart, t + 0.01)) <= 0.01 * speed * (1.0 + 1e-9));
+    CHECK(apart(motion.pose_at(kStart, t), motion.pose_at(kStart, t + 0.01)) <= 0.01 * speed * (1.0 + 1e-9));
 }
 
 TEST_CASE("to and fro goes by the time since it set out", "[motion]") {
   ObstacleMotion later = kToAndFro;
-  later.begin_s = 3.0;
+  later.start_s = 3.0;
   for (const double t : {3.0, 3.5, 4.25, 6.0, 10.5})
-    CHECK(apart(later.at(kStart, t), kToAndFro.at(kStart, t - 3.0)) < 1e-12);
+    CHECK(apart(later.pose_at(kStart, t), kToAndFro.pose_at(kStart, t - 3.0)) < 1e-12);
 }
 
 }  // namespace wrenchd

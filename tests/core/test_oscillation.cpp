@@ -170,7 +170,7 @@ TEST_CASE("what dies away is no oscillation, and what was seen can be forgotten"
       amplitude_m *= kept;
     }
     CHECK(detector.oscillates() == (kept > 0.9));
-    detector.restart();
+    detector.reset();
     CHECK_FALSE(detector.oscillates());
   }
 }
@@ -191,6 +191,6 @@ TEST_CASE("looking for oscillation allocates nothing", "[oscillation][rt]") {
     detector.update({{1.0, 0.0, 0.0}, Vector3d::Zero()},
                     {{n % 20 < 10 ? 0.1 : -0.1, 0.0, 0.0}, Vector3d::Zero()}, kTick_s, true);
   CHECK(detector.oscillates());
-  detector.restart();
+  detector.reset();
   CHECK(guard.allocations() + guard.locks() == 0);
 }

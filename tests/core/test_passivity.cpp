@@ -23,8 +23,8 @@ constexpr double kTick_s = 1e-3;
 constexpr DeviceDamping kDevice{0.5, 0.002};
 constexpr DeviceDamping kFrictionless{0.0, 0.0};
 
-PassivityCaps with_delay(std::size_t ticks) {
-  PassivityCaps caps;
+PassivityLimits with_delay(std::size_t ticks) {
+  PassivityLimits caps;
   caps.delay_ticks = ticks;
   return caps;
 }
@@ -65,7 +65,7 @@ Tapped tap(double K_N_per_m, std::size_t delay, bool guarded, double speed_m_per
     const double x_m = handle.X_BH().translation_m.x();
     Wrench F = along_x(x_m < 0.0 ? -K_N_per_m * x_m : 0.0);
     out.asked_N = std::max(out.asked_N, F.force_N.x());
-    if (guarded) F = guard.guard(F, handle.X_BH(), tick == 0 ? 0.0 : kTick_s, x_m < 0.0);
+    if (guarded) F = guard.limit(F, handle.X_BH(), tick == 0 ? 0.0 : kTick_s, x_m < 0.0);
     sent[tick % sent.size()] = F;
     const Wrench acting = tick < delay ? Wrench{} : sent[(tick - delay) % sent.size()];
     for (int i = 0; i < kSubsteps; ++i) {
@@ -73,9 +73,9 @@ Tapped tap(double K_N_per_m, std::size_t delay, bool guarded, double speed_m_per
       out.net_J = std::max(out.net_J, handle.energy().motors_J - start.motors_J -
                                           (handle.energy().friction_J - start.friction_J));
     }
-    out.acted = out.acted || guard.acted();
+    out.acted = out.acted || guard.intervened();
     out.injected_J = std::max(out.injected_J, guard.injected_J());
-    out.out_of_hand = out.out_of_hand || guard.out_of_hand();
+    out.out_of_hand = out.out_of_hand || guard.energy_runaway();
   }
   return out;
 }
@@ -90,7 +90,7 @@ TEST_CASE("the guard's account is work done by the wrench that acted", "[passivi
     std::vector<Wrench> sent;
     Pose X;
     double in_J = 0.0, out_J = 0.0;
-    guard.guard({}, X, 0.0, false);
+    guard.limit({}, X, 0.0, false);
     sent.emplace_back();
     for (int n = 0; n < 300; ++n) {
       const Vector3d way = random.vector<3>(1e-4), turn = random.vector<3>(1e-3);
@@ -102,10 +102,10 @@ TEST_CASE("the guard's account is work done by the wrench that acted", "[passivi
         (work_J > 0.0 ? out_J : in_J) += std::abs(work_J);
       }
       const Wrench asked = random.wrench();
-      guard.guard(asked, X, kTick_s, false);
+      guard.limit(asked, X, kTick_s, false);
       // What the limits made of it is what counts.
       sent.push_back({0.5 * asked.force_N, 0.5 * asked.torque_Nm});
-      guard.told(sent.back());
+      guard.record_sent(sent.back());
     }
     CHECK(guard.energy_in_J() == Approx(in_J).epsilon(1e-6));
     CHECK(guard.energy_out_J() == Approx(out_J).epsilon(1e-6));
@@ -122,7 +122,7 @@ TEST_CASE("a spring that gives back what it took is left alone", "[passivity]") 
     const double next =
         -0.01 * std::sin(3.14159265358979 * (n + 1) / 1000.0) * std::sin(3.14159265358979 * (n + 1) / 1000.0);
     const Wrench asked = along_x(-0.5 * K * (x + next));
-    const Wrench out = guard.guard(asked, at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    const Wrench out = guard.limit(asked, at_x(x), n == 0 ? 0.0 : kTick_s, true);
     CHECK((out.force_N - asked.force_N).norm() <= 1e-9);
     x = next;
   }
@@ -136,15 +136,15 @@ TEST_CASE("a force that pushes along is damped, then cut to nothing", "[passivit
   double x = 0.0, most_J = 0.0;
   Wrench out;
   for (int n = 0; n < 500; ++n) {
-    out = guard.guard(along_x(2.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    out = guard.limit(along_x(2.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
     if (out.force_N.x() > 0.0) x += 0.1 * kTick_s;  // the hand follows where it is pushed
     most_J = std::max(most_J, guard.injected_J());
   }
-  CHECK(guard.acted());
+  CHECK(guard.intervened());
   CHECK(most_J > 0.5e-3);
   CHECK(most_J < 2.0e-3 + 2.0 * 0.1 * kTick_s);
   CHECK(out.force_N.norm() < 0.2);
-  CHECK_FALSE(guard.out_of_hand());
+  CHECK_FALSE(guard.energy_runaway());
 }
 
 TEST_CASE("what is earned in one contact does not pay for the next, and debts stay", "[passivity]") {
@@ -152,7 +152,7 @@ TEST_CASE("what is earned in one contact does not pay for the next, and debts st
   double x = 0.0;
   double dt_s = 0.0;
   const auto push = [&](double f_N, double step_m, bool contact) {
-    const Wrench out = guard.guard(along_x(f_N), at_x(x), dt_s, contact);
+    const Wrench out = guard.limit(along_x(f_N), at_x(x), dt_s, contact);
     x += step_m;
     dt_s = kTick_s;
     return out;
@@ -198,10 +198,10 @@ TEST_CASE("20 mJ from nowhere within 100 ms are out of hand, within a second the
     double x = 0.0;
     bool out_of_hand = false;
     for (int n = 0; n < 300; ++n) {
-      guard.guard(along_x(1.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
-      guard.told(along_x(1.0));  // somebody sends it all the same
+      guard.limit(along_x(1.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+      guard.record_sent(along_x(1.0));  // somebody sends it all the same
       x += watts * kTick_s;
-      out_of_hand = out_of_hand || guard.out_of_hand();
+      out_of_hand = out_of_hand || guard.energy_runaway();
     }
     INFO(watts << " W");
     CHECK(out_of_hand == (watts > 0.2));
@@ -212,12 +212,12 @@ TEST_CASE("letting go of a pressed spring is not out of hand", "[passivity]") {
   PassivityGuard guard(kDevice, with_delay(0));
   double x = 0.0;
   for (int n = 0; n < 100; ++n) {
-    guard.guard(along_x(-1000.0 * x), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    guard.limit(along_x(-1000.0 * x), at_x(x), n == 0 ? 0.0 : kTick_s, true);
     x -= 1e-4;
   }
   while (x < 0.0) {  // 50 mJ in 20 ms
-    guard.guard(along_x(-1000.0 * x), at_x(x), kTick_s, true);
-    CHECK_FALSE(guard.out_of_hand());
+    guard.limit(along_x(-1000.0 * x), at_x(x), kTick_s, true);
+    CHECK_FALSE(guard.energy_runaway());
     x += 5e-4;
   }
   CHECK(guard.energy_out_J() > 40e-3);
@@ -225,15 +225,15 @@ TEST_CASE("letting go of a pressed spring is not out of hand", "[passivity]") {
 
 TEST_CASE("the guard's damping is never more than the device's own, nor than its cap", "[passivity]") {
   for (const double cap : {1e9, 0.1, 0.0}) {
-    PassivityCaps caps = with_delay(0);
+    PassivityLimits caps = with_delay(0);
     caps.damping_N_s_per_m = cap;
-    caps.unseen_J = 1.0;  // damping only
-    caps.most_J = 2.0;
+    caps.scaling_start_J = 1.0;  // damping only
+    caps.scaling_end_J = 2.0;
     PassivityGuard guard(kDevice, caps);
     RandomValues random(22);
     double x = 0.0, last = 0.0, before = 0.0, most = 0.0;
     for (int n = 0; n < 200; ++n) {
-      const Wrench out = guard.guard(along_x(3.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+      const Wrench out = guard.limit(along_x(3.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
       const double v = std::abs(x - before) / (2.0 * kTick_s);
       most = std::max(most, std::abs(out.force_N.x() - 3.0));
       if (n > 1) CHECK(std::abs(out.force_N.x() - 3.0) <= std::min(0.5, cap) * v + 1e-12);
@@ -251,9 +251,9 @@ TEST_CASE("a sample that is missed is made up for by the next", "[passivity]") {
   for (int n = 0; n < 100; ++n) {
     const bool fresh = n % 3 != 1;
     if (fresh)
-      guard.guard(along_x(2.0), at_x(x), n == 0 ? 0.0 : (n % 3 == 2 ? 2.0 : 1.0) * kTick_s, false);
+      guard.limit(along_x(2.0), at_x(x), n == 0 ? 0.0 : (n % 3 == 2 ? 2.0 : 1.0) * kTick_s, false);
     else
-      guard.guard(along_x(2.0), at_x(x - 1e-4), 0.0, false);
+      guard.limit(along_x(2.0), at_x(x - 1e-4), 0.0, false);
     x += 1e-4;
   }
   CHECK(guard.energy_out_J() == Approx(2.0 * 99e-4).epsilon(1e-9));
@@ -261,19 +261,19 @@ TEST_CASE("a sample that is missed is made up for by the next", "[passivity]") {
 
 TEST_CASE("what is not finite neither harms the guard nor is hidden by it", "[passivity]") {
   PassivityGuard guard(kDevice, with_delay(0));
-  guard.guard({}, at_x(0.0), 0.0, true);
+  guard.limit({}, at_x(0.0), 0.0, true);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  CHECK(std::isnan(guard.guard(along_x(nan), at_x(0.0), kTick_s, true).force_N.x()));
-  guard.told(along_x(nan));
-  guard.guard(along_x(1.0), at_x(nan), kTick_s, true);
-  guard.guard(along_x(1.0), at_x(1e-3), nan, true);
-  CHECK(guard.guard(along_x(1.0), at_x(0.0), kTick_s, true).force_N.x() == 1.0);
+  CHECK(std::isnan(guard.limit(along_x(nan), at_x(0.0), kTick_s, true).force_N.x()));
+  guard.record_sent(along_x(nan));
+  guard.limit(along_x(1.0), at_x(nan), kTick_s, true);
+  guard.limit(along_x(1.0), at_x(1e-3), nan, true);
+  CHECK(guard.limit(along_x(1.0), at_x(0.0), kTick_s, true).force_N.x() == 1.0);
   CHECK(guard.energy_out_J() == 0.0);
 }
 
 TEST_CASE("the guard refuses caps that cannot be", "[passivity]") {
-  const auto refused = [](const std::function<void(PassivityCaps&)>& spoil) {
-    PassivityCaps caps;
+  const auto refused = [](const std::function<void(PassivityLimits&)>& spoil) {
+    PassivityLimits caps;
     spoil(caps);
     CHECK_THROWS_AS(PassivityGuard(kDevice, caps), std::invalid_argument);
   };
@@ -289,8 +289,8 @@ TEST_CASE("the guard allocates nothing", "[passivity][rt]") {
   RandomValues random(23);
   const test::RealtimeGuard realtime;
   for (int n = 0; n < 1000; ++n) {
-    guard.guard(along_x(1.0), at_x(1e-4 * n), kTick_s, n % 10 != 0);
-    guard.told(along_x(0.5));
+    guard.limit(along_x(1.0), at_x(1e-4 * n), kTick_s, n % 10 != 0);
+    guard.record_sent(along_x(0.5));
   }
   guard.reset();
   CHECK(realtime.allocations() + realtime.locks() == 0);

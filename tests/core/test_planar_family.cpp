@@ -51,8 +51,8 @@ void require_least(const PlanarSection& s) {
 
 PlanarSection random_section(RandomValues& random) {
   PlanarSection s;
-  s.m = random.decades(0.1, 10.0);
-  s.H = s.m * random.decades(0.01, 10.0);
+  s.m = random.log_uniform(0.1, 10.0);
+  s.H = s.m * random.log_uniform(0.01, 10.0);
   s.vx = random.normal();
   s.vy = random.normal();
   s.h = random.normal();
@@ -67,7 +67,7 @@ PlanarSection random_section(RandomValues& random) {
 }
 
 double barely(RandomValues& random) {
-  return random.decades(1e-18, 1e-3) * (random.chance(0.5) ? 1.0 : -1.0);
+  return random.log_uniform(1e-18, 1e-3) * (random.chance(0.5) ? 1.0 : -1.0);
 }
 
 /// A body, a pose in which its deepest vertex is below a face of the scene, and that contact.
@@ -88,7 +88,7 @@ Pressed random_pressed(RandomValues& random) {
     if (v > 0 && height >= least) continue;
     least = height;
     c.contact.tool_feature = static_cast<std::uint32_t>(v);
-    c.contact.p_TA_m = vertices[v];
+    c.contact.p_TCa_m = vertices[v];
   }
   c.contact.offset_m = least + random.uniform(0.02, 0.3);
   return c;
@@ -117,7 +117,7 @@ void require_least_of_free(const Pressed& c, const PlanarFamily& family) {
 void require_section_free(const Pressed& c, const PlanarFamily::InPlane& solution) {
   const Pose X_WQ = PlanarFamily::pose(c.X_WP, c.contact, solution);
   const auto edge = [&c](std::uint32_t neighbour) -> Vector3d {
-    return c.X_WP.rotation * (c.tool.hull.vertices_T_m[neighbour] - c.contact.p_TA_m);
+    return c.X_WP.rotation * (c.tool.hull.vertices_T_m[neighbour] - c.contact.p_TCa_m);
   };
   const auto ring = c.tool.hull.ring_of(c.contact.tool_feature);
   for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -207,7 +207,7 @@ TEST_CASE("nor with a tiny or huge moment of inertia", "[planar_family]") {
   RandomValues random(5);
   for (int i = 0; i < 3'000; ++i) {
     PlanarSection s = random_section(random);
-    s.H = s.m * random.decades(1e-15, 1e15);
+    s.H = s.m * random.log_uniform(1e-15, 1e15);
     require_least(s);
   }
 }
@@ -216,7 +216,7 @@ TEST_CASE("nor at any size", "[planar_family]") {
   RandomValues random(6);
   for (int i = 0; i < 2'000; ++i) {
     PlanarSection s = random_section(random);
-    const double c = random.decades(1e-6, 1e6);
+    const double c = random.log_uniform(1e-6, 1e6);
     s.vx *= c;
     s.vy *= c;
     s.h *= c;
@@ -322,7 +322,7 @@ TEST_CASE("nor at a vertex that is not the deepest, where the angles may lie on 
     const auto& vertices = c.tool.hull.vertices_T_m;
     c.contact.tool_feature =
         static_cast<std::uint32_t>(random.integer(0, static_cast<int>(vertices.size()) - 1));
-    c.contact.p_TA_m = vertices[c.contact.tool_feature];
+    c.contact.p_TCa_m = vertices[c.contact.tool_feature];
     const PlanarFamily family(c.tool.solid.inertia, c.tool.hull, 5);
     require_least_of_free(c, family);
     for (int k = 0; k < family.planes(); ++k) {
@@ -357,11 +357,11 @@ TEST_CASE("the energy of a shallow contact keeps its digits", "[planar_family]")
   RandomValues random(18);
   for (int i = 0; i < 1'000; ++i) {
     PlanarSection s;
-    s.m = random.decades(0.1, 10.0);
+    s.m = random.log_uniform(0.1, 10.0);
     s.H = s.m * random.uniform(0.05, 0.5);
     s.vx = random.uniform(-0.5, 0.5);
     s.vy = -random.uniform(0.3, 0.9);
-    s.h = -s.vy - random.decades(1e-11, 1e-10);
+    s.h = -s.vy - random.log_uniform(1e-11, 1e-10);
     s.theta_min = -0.5;
     s.theta_max = 0.5;
     const double depth = -(s.vy + s.h);

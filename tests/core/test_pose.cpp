@@ -69,7 +69,7 @@ TEST_CASE("exp and log of nothing are nothing", "[pose]") {
 TEST_CASE("log undoes exp over random twists", "[pose]") {
   RandomValues random(1);
   for (int i = 0; i < 20'000; ++i) {
-    const Vector6d xi = random.twist(random.decades(1e-6, 1e3), 0.999 * pi);
+    const Vector6d xi = random.twist(random.log_uniform(1e-6, 1e3), 0.999 * pi);
     REQUIRE((log(exp(xi)) - xi).norm() <= 1e-13 * (1.0 + xi.norm()));
   }
 }
@@ -77,7 +77,7 @@ TEST_CASE("log undoes exp over random twists", "[pose]") {
 TEST_CASE("exp undoes log over random poses", "[pose]") {
   RandomValues random(2);
   for (int i = 0; i < 20'000; ++i) {
-    const Pose X = random.pose(random.decades(1e-6, 1e3));
+    const Pose X = random.pose(random.log_uniform(1e-6, 1e3));
     REQUIRE(distance(exp(log(X)), X) <= 1e-14 * (1.0 + X.translation_m.norm()) * 5.0);
   }
 }
@@ -144,7 +144,7 @@ TEST_CASE("log never turns by more than half a turn, whichever sign the quaterni
 TEST_CASE("of a small turn no trigonometry is needed", "[pose]") {
   RandomValues random(12);
   for (int n = 0; n < 1000; ++n) {
-    const double angle = random.decades(1e-9, 0.5);
+    const double angle = random.log_uniform(1e-9, 0.5);
     Quaterniond turn = rotation_from(angle * random.unit<3>());
     if (random.chance(0.5)) turn.coeffs() *= -1.0;
     const Vector3d exact = rotation_vector(turn), small = small_rotation_vector(turn);

@@ -78,7 +78,7 @@ TEST_CASE("the exact projection reproduces example 4.1 of the paper", "[projecti
 TEST_CASE("against a half-space nothing found by brute force is closer", "[projection]") {
   RandomValues random(1);
   for (int i = 0; i < 60; ++i) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     INFO("case " << i);
@@ -93,7 +93,7 @@ TEST_CASE("optimality is proven in nearly every case, and a proof is never wrong
   int proven = 0;
   constexpr int kCases = 300;
   for (int i = 0; i < kCases; ++i) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     if (!q.proven_global) continue;
@@ -181,7 +181,7 @@ TEST_CASE("obstacles that leave no room are said to be infeasible", "[projection
 TEST_CASE("the unit of length changes nothing: 1e-4 m and 1e4 m", "[projection]") {
   RandomValues random(4);
   for (int i = 0; i < 40; ++i) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     for (const double scale : {1e-4, 1e4}) {
@@ -202,12 +202,12 @@ TEST_CASE("the projection moves with the world, and does not care where the mesh
           "[projection]") {
   RandomValues random(5);
   for (int i = 0; i < 40; ++i) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     const Inertia& M = c.scene.tool().solid.inertia;
     ExactProjection exact(M);
     const Projection q = exact.project_globally(c.X_WP, SceneContacts(c.scene));
     const Pose a = random.pose(3.0);
-    const Scene elsewhere(c.scene.tool(), moved(a, c.scene.half_spaces()));
+    const Scene elsewhere(c.scene.tool(), transformed(a, c.scene.half_spaces()));
     const Projection r = exact.project_globally(a * c.X_WP, SceneContacts(elsewhere));
     CHECK(r.energy == Approx(q.energy).epsilon(1e-10));
     const Pose difference = inverse(a * q.X_WQ) * r.X_WQ;
@@ -217,7 +217,7 @@ TEST_CASE("the projection moves with the world, and does not care where the mesh
 
 TEST_CASE("mass scales the energy and moves nothing", "[projection]") {
   RandomValues random(6);
-  const Pressed c = into_half_space(random, 0.05, 0.3);
+  const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
   const Inertia& M = c.scene.tool().solid.inertia;
   ExactProjection light(M);
   ExactProjection heavy({7.0 * M.mass_kg, 7.0 * M.H_kg_m2});
@@ -248,7 +248,7 @@ TEST_CASE("needles with an inertia of 1 to 1e6 converge like other bodies", "[pr
 TEST_CASE("a followed proxy is admissible at every step, and settles where the optimum is", "[projection]") {
   RandomValues random(8);
   for (int body = 0; body < 10; ++body) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     ExactProjection exact(c.scene.tool().solid.inertia);
     const Vector3d& n = c.scene.half_spaces()[0].normal_W;
     Pose X_WQ =
@@ -273,7 +273,7 @@ TEST_CASE("a followed proxy is admissible at every step, and settles where the o
 TEST_CASE("on a leash the way to the optimum is gone in parts, and only falls", "[projection]") {
   RandomValues random(10);
   for (int body = 0; body < 20; ++body) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     const Inertia M = c.scene.tool().solid.inertia;
     ExactProjection exact(M);
     const Projection whole = exact.project(c.X_WP, SceneContacts(c.scene), c.X_WP);
@@ -281,22 +281,22 @@ TEST_CASE("on a leash the way to the optimum is gone in parts, and only falls", 
     const auto& floor = c.scene.half_spaces()[0];
     for (std::size_t v = 0; v < c.scene.tool().hull.vertices_T_m.size(); ++v) {
       Contact contact;
-      contact.p_TA_m = c.scene.tool().hull.vertices_T_m[v];
+      contact.p_TCa_m = c.scene.tool().hull.vertices_T_m[v];
       contact.n_W = floor.normal_W;
-      contact.p_WB_m = floor.offset_m * floor.normal_W;
+      contact.p_WCb_m = floor.offset_m * floor.normal_W;
       contact.offset_m = floor.offset_m;
       contact.tool_feature = static_cast<std::uint32_t>(v);
       known.push_back({contact, 0.0});
     }
-    const ExactProjection::Leash leash = {0.02, 0.03};
+    const ExactProjection::StepLimit leash = {0.02, 0.03};
     Pose X_WQ = {whole.X_WQ.rotation * random.rotation(0.3), whole.X_WQ.translation_m + 3.0 * floor.normal_W};
     double T = energy(M, c.X_WP, X_WQ);
     Projection q;
     for (int step = 0; step < 1000; ++step) {
       q = exact.step(c.X_WP, X_WQ, known, leash);
       REQUIRE((q.status == ProjectionStatus::converged || q.status == ProjectionStatus::budget_spent));
-      CHECK((q.X_WQ.translation_m - X_WQ.translation_m).norm() <= leash.shift_m * (1.0 + 1e-9));
-      CHECK(q.X_WQ.rotation.angularDistance(X_WQ.rotation) <= leash.turn_rad + 1e-9);
+      CHECK((q.X_WQ.translation_m - X_WQ.translation_m).norm() <= leash.translation_m * (1.0 + 1e-9));
+      CHECK(q.X_WQ.rotation.angularDistance(X_WQ.rotation) <= leash.rotation_rad + 1e-9);
       CHECK(least_gap_m(c.scene, q.X_WQ) > -1e-12);
       CHECK(energy(M, c.X_WP, q.X_WQ) <= T * (1.0 + 1e-12));
       T = energy(M, c.X_WP, q.X_WQ);
@@ -321,20 +321,20 @@ TEST_CASE("where only rounding is left between a step and the next, it has conve
       {0.99822085862906185, 0.00043937281808227694, 0.00035483276671892475, 0.059622130480997057},
       {0.00011041140835353479, 7.0032908039778239e-05, 0.0067797300022461949}};
   Contact on_face;
-  on_face.p_TA_m = {0.0096106140468828743, 0.0019116699920376679, 0.029999999999999999};
-  on_face.p_WB_m = {0.0094502496392558158, 0.0028741318137598987, -1.6047026989022393e-05};
+  on_face.p_TCa_m = {0.0096106140468828743, 0.0019116699920376679, 0.029999999999999999};
+  on_face.p_WCb_m = {0.0094502496392558158, 0.0028741318137598987, -1.6047026989022393e-05};
   on_face.n_W = {-0.95672987638471518, -0.29097303032816207, 0.0016245782633905709};
   on_face.offset_m = -0.0098776570822334507;
   Contact edges;
   edges.kind = ContactKind::edge_edge;
-  edges.p_TA_m = {0.0090687523687773778, 0.0037564002249507226, -0.012580645161290323};
-  edges.p_WB_m = {0.0092228253057413077, 0.0038202193250358365, -0.0038709677419354852};
+  edges.p_TCa_m = {0.0090687523687773778, 0.0037564002249507226, -0.012580645161290323};
+  edges.p_WCb_m = {0.0092228253057413077, 0.0038202193250358365, -0.0038709677419354852};
   edges.d_T = {0.00087203711252448039, 0.00036120959889981069, 0.99999955453935074};
   edges.d_W = {-0.4652742741224028, 0.88516656615569866, 0.0};
   edges.n_W = {-0.88516589822310499, -0.46527392303384546, 0.0012284818186439515};
   Contact other_edges = edges;
-  other_edges.p_TA_m = {0.0069386711296257064, 0.0069386711296257047, -0.0048387096774193542};
-  other_edges.p_WB_m = {0.0070617127911089782, 0.0070617127911089764, 0.0038709677419354804};
+  other_edges.p_TCa_m = {0.0069386711296257064, 0.0069386711296257047, -0.0048387096774193542};
+  other_edges.p_WCb_m = {0.0070617127911089782, 0.0070617127911089764, 0.0038709677419354804};
   other_edges.d_T = {0.00017067915382291445, 0.00017067915382291445, 0.99999997086862613};
   other_edges.d_W = {-0.77465953089864248, 0.63237853473050087, 0.0};
   other_edges.n_W = {-0.63237853289367196, -0.77465952864853926, 7.6218568983923827e-05};
@@ -353,7 +353,7 @@ TEST_CASE("where only rounding is left between a step and the next, it has conve
 TEST_CASE("a spent budget still answers with an admissible pose, no worse than translation", "[projection]") {
   RandomValues random(9);
   for (int i = 0; i < 50; ++i) {
-    const Pressed c = into_half_space(random, 0.05, 0.3);
+    const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);
     ExactProjection hurried(c.scene.tool().solid.inertia, {1, 24});
     const Projection q = hurried.project(c.X_WP, SceneContacts(c.scene), c.X_WP);
     REQUIRE(q.status != ProjectionStatus::infeasible);

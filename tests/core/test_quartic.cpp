@@ -128,7 +128,7 @@ void require_same_as_bracketing(const std::array<double, 5>& c) {
 }
 
 double leading(RandomValues& random) {
-  return random.decades(1e-3, 1e3) * (random.chance(0.5) ? 1.0 : -1.0);
+  return random.log_uniform(1e-3, 1e3) * (random.chance(0.5) ? 1.0 : -1.0);
 }
 
 }  // namespace
@@ -229,7 +229,7 @@ TEST_CASE("roots nearly double", "[quartic]") {
   RandomValues random(7);
   for (int i = 0; i < 5'000; ++i) {
     const double r = random.normal();
-    const double apart = random.decades(1e-12, 1e-2);
+    const double apart = random.log_uniform(1e-12, 1e-2);
     Made made = Made(leading(random)).root(random.normal()).root(random.normal());
     if (i % 2 == 0)
       made.root(r).root(r + apart);
@@ -242,7 +242,7 @@ TEST_CASE("roots nearly double", "[quartic]") {
 TEST_CASE("roots of very different size", "[quartic]") {
   RandomValues random(8);
   for (int i = 0; i < 5'000; ++i) {
-    const auto any = [&random] { return random.normal() * random.decades(1e-10, 1e10); };
+    const auto any = [&random] { return random.normal() * random.log_uniform(1e-10, 1e10); };
     require_solved(Made(leading(random)).root(any()).root(any()).root(any()).root(any()));
   }
 }
@@ -252,7 +252,7 @@ TEST_CASE("coefficients of very different size: no spurious root, and one betwee
   RandomValues random(9);
   for (int i = 0; i < 5'000; ++i) {
     std::array<double, 5> c;
-    for (double& coefficient : c) coefficient = random.normal() * random.decades(1e-40, 1e40);
+    for (double& coefficient : c) coefficient = random.normal() * random.log_uniform(1e-40, 1e40);
     const RealRoots found = solve(c);
     require_no_spurious(c, found);
     double below = -1e60;
@@ -309,8 +309,8 @@ TEST_CASE("a quadratic loses no digits to cancellation", "[quartic]") {
 TEST_CASE("biquadratic: the roots come in pairs of both signs", "[quartic]") {
   RandomValues random(12);
   for (int i = 0; i < 4'000; ++i) {
-    const double r = random.decades(1e-3, 1e3);
-    const double s = random.decades(1e-3, 1e3);
+    const double r = random.log_uniform(1e-3, 1e3);
+    const double s = random.log_uniform(1e-3, 1e3);
     const Made real = Made(leading(random)).root(r).root(-r).root(s).root(-s);
     require_solved(real);
     const Made mixed = Made(leading(random)).root(r).root(-r).pair(0.0, s);
@@ -369,7 +369,7 @@ TEST_CASE("the largest and the smallest coefficients there are", "[quartic]") {
 TEST_CASE("the closed form has the roots that the search has, from known roots of any scale", "[quartic]") {
   RandomValues random(15);
   for (const double most : {1.0, 1e2, 1e4, 1e8, 1e15}) {
-    const auto any = [&] { return random.normal() * random.decades(1.0 / most, most); };
+    const auto any = [&] { return random.normal() * random.log_uniform(1.0 / most, most); };
     for (int i = 0; i < 2'000; ++i) {
       require_same_as_bracketing(
           Made(leading(random)).root(any()).root(any()).root(any()).root(any()).coefficients());
@@ -402,7 +402,7 @@ TEST_CASE("the same at multiple roots, nearly so, and where two pairs nearly agr
   for (int i = 0; i < 3'000; ++i) {
     const double r = random.normal();
     const double im = random.normal();
-    const double s = r + random.normal() * (i % 5 == 0 ? 0.0 : random.decades(1e-14, 1e-1));
+    const double s = r + random.normal() * (i % 5 == 0 ? 0.0 : random.log_uniform(1e-14, 1e-1));
     const double apart = (s - r) * random.normal();
     for (const Made& made :
          {Made(1.0).root(r).root(s).root(random.normal()).root(random.normal()),
@@ -424,8 +424,8 @@ TEST_CASE("a vertex nearly below the centre of mass: the least of the roots is n
   RandomValues random(18);
   for (int i = 0; i < 5'000; ++i) {
     const double m = 1.0, H = random.uniform(0.02, 0.5), vy = -random.uniform(0.3, 0.9);
-    const double vx = random.normal() * random.decades(1e-18, 1e-1);
-    const double h = -vy - random.decades(1e-9, 0.3);
+    const double vx = random.normal() * random.log_uniform(1e-18, 1e-1);
+    const double h = -vy - random.log_uniform(1e-9, 0.3);
     require_same_as_bracketing({m * vx * vy - m * vx * h, 2.0 * (H - m * h * vy - m * vx * vx + m * vy * vy),
                                 -6.0 * m * vx * vy, 2.0 * (H - m * h * vy + m * vx * vx - m * vy * vy),
                                 m * vx * vy + m * vx * h});

@@ -138,7 +138,7 @@ TEST_CASE("the scaled coupling just passes the inequality, wherever the tool is 
     };
     double nearest = 0.0;
     for (int m = 0; m < 200; ++m) {
-      const Twist V_H{random.vector<3>(), random.decades(0.1, 100.0) * random.unit<3>()};
+      const Twist V_H{random.vector<3>(), random.log_uniform(0.1, 100.0) * random.unit<3>()};
       CHECK(given(V_H) <= taken(V_H) * (1.0 + 1e-9));
       nearest = std::max(nearest, given(V_H) / taken(V_H));
     }

@@ -14,8 +14,8 @@ constexpr int kCalmTicks = 103;           // the first tick at which 100 ms have
 
 StateMachine disarmed(double ramp_s) {
   StateMachine machine(ramp_s);
-  machine.on(Trigger::device_there);
-  machine.on(Trigger::passed);
+  machine.on(Trigger::device_connected);
+  machine.on(Trigger::self_test_passed);
   return machine;
 }
 
@@ -199,8 +199,8 @@ TEST_CASE("a latched fault keeps its first cause until somebody acknowledges, an
     REQUIRE(machine.state() == State::fault);
     REQUIRE(machine.cause() == Fault::overspeed);
   }
-  for (const Trigger t : {Trigger::arm, Trigger::disarm, Trigger::calm, Trigger::clean, Trigger::device_there,
-                          Trigger::passed, Trigger::ramped})
+  for (const Trigger t : {Trigger::arm, Trigger::disarm, Trigger::calm, Trigger::recovered,
+                          Trigger::device_connected, Trigger::self_test_passed, Trigger::ramp_done})
     machine.on(t);
   CHECK(machine.state() == State::fault);
   machine.on(Trigger::acknowledge);
@@ -224,15 +224,15 @@ TEST_CASE("whatever happens, force is in four states, rises in one, and a latch 
       }
       const auto trigger = static_cast<Trigger>(random.integer(0, static_cast<int>(kTriggerCount) - 1));
       acknowledged = acknowledged || trigger == Trigger::acknowledge;
-      ended = ended || trigger == Trigger::end || trigger == Trigger::quit;
+      ended = ended || trigger == Trigger::process_end || trigger == Trigger::quit;
       machine.on(trigger);
     }
     if (events == 0 && machine.state() == State::disarmed) machine.on(Trigger::arm);
-    if (events == 0 && machine.state() == State::self_test) machine.on(Trigger::passed);
+    if (events == 0 && machine.state() == State::self_test) machine.on(Trigger::self_test_passed);
     if (events == 0 && !is_driving(machine.state())) {
       machine.on(Trigger::acknowledge);
       acknowledged = true;
-      machine.on(Trigger::device_there);
+      machine.on(Trigger::device_connected);
     }
     if (is_latched(was) && !acknowledged && !ended) REQUIRE(is_latched(machine.state()));
     const State in = machine.state();

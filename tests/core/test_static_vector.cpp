@@ -3,10 +3,10 @@
 
 #include "core/static_vector.hpp"
 
-using wrenchd::FixedList;
+using wrenchd::StaticVector;
 
 TEST_CASE("a fixed list takes what fits, and a copy is its own", "[fixed_list]") {
-  FixedList<int, 3> list;
+  StaticVector<int, 3> list;
   CHECK(list.empty());
   CHECK(list.add(1));
   CHECK(list.add(2));
@@ -15,7 +15,7 @@ TEST_CASE("a fixed list takes what fits, and a copy is its own", "[fixed_list]")
   CHECK_FALSE(list.add(4));
   CHECK(list.size() == 3);
 
-  FixedList<int, 3> copy = list;
+  StaticVector<int, 3> copy = list;
   copy.remove_unordered(0);
   CHECK(copy.size() == 2);
   CHECK(copy[0] == 3);

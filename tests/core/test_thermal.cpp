@@ -123,7 +123,7 @@ TEST_CASE("released, it cools for T ln(1 / 0.8) and gives the maximum again, wit
     REQUIRE(model.force_ceiling_N() == 4.0);
     model.advance(Wrench{}, kTick_s);
   }
-  CHECK(t == Approx(20.0 * std::log(heat / GroupHeat::kCooled)).margin(2.0 * kTick_s));
+  CHECK(t == Approx(20.0 * std::log(heat / MotorGroupHeat::kRecoveryHeat)).margin(2.0 * kTick_s));
   double before_N = 4.0;
   REQUIRE(model.force_ceiling_N() < 4.1);
   for (int tick = 0; tick < 1'000; ++tick) {
@@ -141,9 +141,9 @@ TEST_CASE("no duty cycle takes the heat above 1.05 of the rating, whatever the m
   double hottest = 0.0;
   int folded = 0;
   for (int device = 0; device < 300; ++device) {
-    const double max_N = random.decades(0.1, 200.0), max_Nm = random.decades(0.01, 20.0);
-    DeviceProfile profile = motors(max_N * random.decades(0.02, 1.0), max_Nm * random.decades(0.02, 1.0),
-                                   random.decades(0.1, 20.0));
+    const double max_N = random.log_uniform(0.1, 200.0), max_Nm = random.log_uniform(0.01, 20.0);
+    DeviceProfile profile = motors(max_N * random.log_uniform(0.02, 1.0),
+                                   max_Nm * random.log_uniform(0.02, 1.0), random.log_uniform(0.1, 20.0));
     ThermalModel model(profile, max_N, max_Nm);
     double share = 1.0;
     bool seen = false;
@@ -151,7 +151,7 @@ TEST_CASE("no duty cycle takes the heat above 1.05 of the rating, whatever the m
       if (random.chance(device % 3 == 0 ? 0.0 : device % 3 == 1 ? 0.001 : 0.1))
         share = random.chance(0.5) ? 1.0 : 0.0;
       if (device % 7 == 6) share = random.uniform(0.0, 1.0);
-      const double dt_s = device % 5 == 4 ? random.decades(1e-6, kLongestStep_s) : kTick_s;
+      const double dt_s = device % 5 == 4 ? random.log_uniform(1e-6, kMaxStep_s) : kTick_s;
       const Wrench F = full(model, share);
       model.advance(F, dt_s);
       if (!(model.force_heat() <= 1.05) || !(model.torque_heat() <= 1.05))

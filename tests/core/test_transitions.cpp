@@ -14,7 +14,7 @@ namespace {
 
 State after(Trigger trigger, State from) {
   const Transition& row = transition(trigger, from);
-  return row.leads ? row.to : from;
+  return row.changes_state ? row.to : from;
 }
 
 }  // namespace
@@ -29,9 +29,9 @@ TEST_CASE("every trigger in every state leads where safety wants it", "[transiti
       const Transition& row = transition(trigger, from);
       CHECK(row.trigger == trigger);
       CHECK(contains(row.from, from));
-      CHECK(row.leads == expected_to_lead(trigger, from));
+      CHECK(row.changes_state == transition_expected(trigger, from));
       CHECK(after(trigger, from) == expected_after(trigger, from));
-      CHECK(std::string(row.why).size() > 5);
+      CHECK(std::string(row.reason).size() > 5);
     }
   CHECK(pairs == 18 * 11);
 }
@@ -40,13 +40,13 @@ TEST_CASE("no row gives force: all that lead out of it take it, in this tick or 
   for (const Transition& row : transitions())
     for (std::size_t s = 0; s < kStateCount; ++s) {
       const auto from = static_cast<State>(s);
-      if (!contains(row.from, from) || !row.leads || !is_driving(from)) continue;
+      if (!contains(row.from, from) || !row.changes_state || !is_driving(from)) continue;
       INFO(name(row.trigger) << " in " << name(from));
       if (!is_driving(row.to)) CHECK(row.reaction >= Reaction::zero);
       if (row.to == State::degraded || row.to == State::releasing)
         CHECK(row.reaction >= Reaction::fade_100ms);
-      if (row.to == State::ramping) CHECK(row.trigger == Trigger::clean);
-      if (row.to == State::active) CHECK(row.trigger == Trigger::ramped);
+      if (row.to == State::ramping) CHECK(row.trigger == Trigger::recovered);
+      if (row.to == State::active) CHECK(row.trigger == Trigger::ramp_done);
     }
 }
 
@@ -55,7 +55,7 @@ TEST_CASE("a latch opens by an acknowledgement, and by the end of the process", 
     for (const State from : {State::fault, State::stopped}) {
       const auto trigger = static_cast<Trigger>(t);
       const bool opens =
-          trigger == Trigger::acknowledge || trigger == Trigger::quit || trigger == Trigger::end;
+          trigger == Trigger::acknowledge || trigger == Trigger::quit || trigger == Trigger::process_end;
       INFO(name(trigger) << " in " << name(from));
       CHECK(is_latched(after(trigger, from)) == !opens);
     }
@@ -73,11 +73,11 @@ TEST_CASE("full force is at the end of one way only: tested, armed, calm, risen"
     return ways;
   };
   using Ways = std::set<std::pair<State, Trigger>>;
-  CHECK(leading_to(State::active) == Ways{{State::ramping, Trigger::ramped}});
+  CHECK(leading_to(State::active) == Ways{{State::ramping, Trigger::ramp_done}});
   CHECK(leading_to(State::ramping) ==
-        Ways{{State::waiting, Trigger::calm}, {State::degraded, Trigger::clean}});
-  CHECK(leading_to(State::self_test) == Ways{{State::disconnected, Trigger::device_there},
-                                             {State::shutdown, Trigger::device_there},
+        Ways{{State::waiting, Trigger::calm}, {State::degraded, Trigger::recovered}});
+  CHECK(leading_to(State::self_test) == Ways{{State::disconnected, Trigger::device_connected},
+                                             {State::shutdown, Trigger::device_connected},
                                              {State::fault, Trigger::acknowledge},
                                              {State::stopped, Trigger::acknowledge}});
 }

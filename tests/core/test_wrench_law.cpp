@@ -105,7 +105,7 @@ TEST_CASE("I: the rectangle rule over real time steps", "[wrench_law]") {
     Vector6d sum = zero();
     for (int tick = 0; tick < 50; ++tick) {
       const Vector6d eps = random.vector<6>();
-      const double dt_s = random.decades(1e-4, 1e-2);
+      const double dt_s = random.log_uniform(1e-4, 1e-2);
       sum += dt_s * eps;
       REQUIRE((stacked(law.update(eps, true, dt_s)) - K * sum).norm() <= 1e-14);
     }
@@ -143,7 +143,7 @@ TEST_CASE("anti-windup holds for any coupling, path and time step", "[wrench_law
     WrenchLaw law(integral(100.0 * full(random), 1.5, 0.25));
     const Vector6d drift = random.vector<6>();
     for (int tick = 0; tick < 500; ++tick) {
-      const Wrench F = law.update(drift + random.vector<6>(), true, random.decades(1e-5, 1.0));
+      const Wrench F = law.update(drift + random.vector<6>(), true, random.log_uniform(1e-5, 1.0));
       REQUIRE(F.force_N.norm() <= 1.5 * (1.0 + 1e-13));
       REQUIRE(F.torque_Nm.norm() <= 0.25 * (1.0 + 1e-13));
     }
@@ -164,8 +164,8 @@ TEST_CASE("D: the step response of a first-order low pass by backward Euler", "[
   //   rate_n = (c/dt) (1 - (1 - a)^n),   a = dt / (dt + 1/(2 pi f))
   RandomValues random(5);
   for (int i = 0; i < 100; ++i) {
-    const double f = random.decades(1.0, 1e4);
-    const double dt_s = random.decades(1e-5, 1e-1);
+    const double f = random.log_uniform(1.0, 1e4);
+    const double dt_s = random.log_uniform(1e-5, 1e-1);
     const Matrix6d K = full(random);
     const Vector6d slope = random.vector<6>();
     WrenchLaw law(damped(K, f));
@@ -192,7 +192,7 @@ TEST_CASE("D: the filter is stable for any time step", "[wrench_law]") {
   RandomValues random(6);
   WrenchLaw law(damped(WrenchGains::scalar(1.0), 1e6));
   for (int i = 0; i < 1'000; ++i) {
-    const double dt_s = random.decades(1e-6, 1e3);
+    const double dt_s = random.log_uniform(1e-6, 1e3);
     const Wrench F = law.update(random.unit<6>(), true, dt_s);
     REQUIRE(F.force_N.norm() <= 2.1 / 1e-6);
   }
@@ -244,7 +244,7 @@ TEST_CASE("P, I and D add up: Eq. (16)", "[wrench_law]") {
   WrenchLaw all(gains), p(stiff(P)), i(integral(I)), d(damped(D, gains.derivative_cutoff_Hz));
   for (int tick = 0; tick < 200; ++tick) {
     const Vector6d eps = random.vector<6>();
-    const double dt_s = random.decades(1e-4, 1e-2);
+    const double dt_s = random.log_uniform(1e-4, 1e-2);
     const Vector6d sum = stacked(p.update(eps, true, dt_s)) + stacked(i.update(eps, true, dt_s)) +
                          stacked(d.update(eps, true, dt_s));
     REQUIRE((stacked(all.update(eps, true, dt_s)) - sum).norm() <= 1e-12 * (1.0 + sum.norm()));

@@ -59,13 +59,13 @@ TEST_CASE("what an attempt throws ends the waiting", "[device_wait]") {
 TEST_CASE("what is plugged in instead is told once, and again when it comes again", "[device_wait]") {
   DeviceWait wait;
   const Heard heard;
-  wait.tell({"a", "b"});
-  wait.tell({"a", "b"});
+  wait.log_rejected({"a", "b"});
+  wait.log_rejected({"a", "b"});
   CHECK(heard.text() == "a\nb\n");
-  wait.tell({"b"});
-  wait.tell({"a", "b"});
+  wait.log_rejected({"b"});
+  wait.log_rejected({"a", "b"});
   CHECK(heard.text() == "a\nb\na\n");
-  wait.tell({"\x1b[2J\nmine"});
+  wait.log_rejected({"\x1b[2J\nmine"});
   CHECK(heard.text() == "a\nb\na\n?[2J?mine\n");
 }
 

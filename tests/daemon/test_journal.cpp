@@ -37,50 +37,50 @@ TEST_CASE("standard error is the journal where it is the file that the journal n
 }
 
 TEST_CASE("fields hold for what is logged while they live, the innermost alone", "[journal]") {
-  CHECK(JournalFields::here().empty());
+  CHECK(JournalFields::current().empty());
   {
     const JournalFields outer(one("A", "1"));
-    CHECK(field(JournalFields::here(), "A") == "1");
+    CHECK(field(JournalFields::current(), "A") == "1");
     {
       const JournalFields inner(one("B", "2"));
-      CHECK(field(JournalFields::here(), "A") == "(none)");
-      CHECK(field(JournalFields::here(), "B") == "2");
+      CHECK(field(JournalFields::current(), "A") == "(none)");
+      CHECK(field(JournalFields::current(), "B") == "2");
     }
-    CHECK(field(JournalFields::here(), "A") == "1");
+    CHECK(field(JournalFields::current(), "A") == "1");
   }
-  CHECK(JournalFields::here().empty());
+  CHECK(JournalFields::current().empty());
 }
 
 TEST_CASE("an event can be asked for by its state, its fault and its time", "[journal]") {
   Event event;
   event.at = TimePoint(std::chrono::nanoseconds(1234));
-  event.kind = Event::Kind::fault;
+  event.kind = Event::Kind::fault_raised;
   event.detail = static_cast<std::uint32_t>(Fault::overspeed);
   JournalFieldList fields = journal_fields(event);
-  CHECK(field(fields, "MESSAGE_ID") == kFaultMessage);
+  CHECK(field(fields, "MESSAGE_ID") == kFaultMessageId);
   CHECK(field(fields, "WRENCHD_FAULT") == "overspeed");
   CHECK(field(fields, "WRENCHD_CURE") == std::string(fault_row(Fault::overspeed).cure));
   CHECK(field(fields, "WRENCHD_TIME_NS") == "1234");
 
-  event.kind = Event::Kind::state;
+  event.kind = Event::Kind::state_changed;
   event.detail = static_cast<std::uint32_t>(State::active);
   fields = journal_fields(event);
-  CHECK(field(fields, "MESSAGE_ID") == kStateMessage);
+  CHECK(field(fields, "MESSAGE_ID") == kStateMessageId);
   CHECK(field(fields, "WRENCHD_STATE") == "active");
   CHECK(field(fields, "WRENCHD_FAULT") == "(none)");
 
-  event.kind = Event::Kind::placed;
-  CHECK(field(journal_fields(event), "MESSAGE_ID") == kRenderingMessage);
+  event.kind = Event::Kind::proxy_found;
+  CHECK(field(journal_fields(event), "MESSAGE_ID") == kRenderingMessageId);
 }
 
 TEST_CASE("ids of messages are 128 bits, and three", "[journal]") {
-  for (const std::string id : {kStateMessage, kFaultMessage, kRenderingMessage}) {
+  for (const std::string id : {kStateMessageId, kFaultMessageId, kRenderingMessageId}) {
     CHECK(id.size() == 32);
     CHECK(id.find_first_not_of("0123456789abcdef") == std::string::npos);
   }
-  CHECK(std::string(kStateMessage) != kFaultMessage);
-  CHECK(std::string(kStateMessage) != kRenderingMessage);
-  CHECK(std::string(kFaultMessage) != kRenderingMessage);
+  CHECK(std::string(kStateMessageId) != kFaultMessageId);
+  CHECK(std::string(kStateMessageId) != kRenderingMessageId);
+  CHECK(std::string(kFaultMessageId) != kRenderingMessageId);
 }
 
 }  // namespace

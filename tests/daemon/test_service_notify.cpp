@@ -20,74 +20,75 @@ using namespace test;
 using namespace std::chrono_literals;
 using Catch::Contains;
 
-std::optional<LoopView> loop(State state, std::uint64_t ticks, Fault cause = Fault::none) {
-  return LoopView{state, cause, ticks};
+std::optional<LoopStatus> loop(State state, std::uint64_t ticks, Fault cause = Fault::none) {
+  return LoopStatus{state, cause, ticks};
 }
 
 TEST_CASE("the service is ready when the self-test is over, and not before", "[service_notify]") {
   ServiceReport report;
-  CHECK(report.look({}) == "STATUS=starting\n");
+  CHECK(report.next_message({}) == "STATUS=starting\n");
   report.running("loopback");
-  CHECK(report.look(loop(State::disconnected, 0)) == "STATUS=disconnected; device loopback\n");
-  CHECK(report.look(loop(State::self_test, 10)) == "STATUS=self-test; device loopback\n");
-  CHECK(report.look(loop(State::self_test, 20)) == "");
-  CHECK(report.look(loop(State::disarmed, 30)) == "READY=1\nWATCHDOG=1\nSTATUS=disarmed; device loopback\n");
-  CHECK(report.look(loop(State::disarmed, 40)) == "WATCHDOG=1\n");
+  CHECK(report.next_message(loop(State::disconnected, 0)) == "STATUS=disconnected; device loopback\n");
+  CHECK(report.next_message(loop(State::self_test, 10)) == "STATUS=self-test; device loopback\n");
+  CHECK(report.next_message(loop(State::self_test, 20)) == "");
+  CHECK(report.next_message(loop(State::disarmed, 30)) ==
+        "READY=1\nWATCHDOG=1\nSTATUS=disarmed; device loopback\n");
+  CHECK(report.next_message(loop(State::disarmed, 40)) == "WATCHDOG=1\n");
 }
 
 TEST_CASE("a self-test that fails makes it ready all the same, with the fault and its cure as status",
           "[service_notify]") {
   ServiceReport report;
   report.running("loopback");
-  report.look(loop(State::self_test, 10));
-  const FaultRow& row = fault_row(Fault::test_rate);
-  CHECK(report.look(loop(State::fault, 20, Fault::test_rate)) ==
-        "READY=1\nWATCHDOG=1\nSTATUS=fault: test_rate: " + std::string(row.sentence) + "; " +
+  report.next_message(loop(State::self_test, 10));
+  const FaultRow& row = fault_row(Fault::self_test_rate);
+  CHECK(report.next_message(loop(State::fault, 20, Fault::self_test_rate)) ==
+        "READY=1\nWATCHDOG=1\nSTATUS=fault: test_rate: " + std::string(row.message) + "; " +
             std::string(row.cure) + "; device loopback\n");
 }
 
 TEST_CASE("what waits for a device is ready and alive", "[service_notify]") {
   ServiceReport report;
   report.waiting("no device is\nplugged in");
-  CHECK(report.look({}) == "READY=1\nWATCHDOG=1\nSTATUS=waiting: no device is plugged in\n");
-  CHECK(report.look({}) == "WATCHDOG=1\n");
+  CHECK(report.next_message({}) == "READY=1\nWATCHDOG=1\nSTATUS=waiting: no device is plugged in\n");
+  CHECK(report.next_message({}) == "WATCHDOG=1\n");
 }
 
 TEST_CASE("a loop that does not tick gives no sign of life, until it ticks again", "[service_notify]") {
   ServiceReport report;
   report.running("loopback");
-  report.look(loop(State::disarmed, 7));
-  CHECK(report.look(loop(State::disarmed, 7)) == "");
-  CHECK(report.look(loop(State::disarmed, 7)) == "");
-  CHECK(report.look(loop(State::disarmed, 8)) == "WATCHDOG=1\n");
+  report.next_message(loop(State::disarmed, 7));
+  CHECK(report.next_message(loop(State::disarmed, 7)) == "");
+  CHECK(report.next_message(loop(State::disarmed, 7)) == "");
+  CHECK(report.next_message(loop(State::disarmed, 8)) == "WATCHDOG=1\n");
 }
 
 TEST_CASE("a device that comes back has its loop watched anew, and readiness is told once",
           "[service_notify]") {
   ServiceReport report;
   report.running("a");
-  report.look(loop(State::disarmed, 7));
+  report.next_message(loop(State::disarmed, 7));
   report.waiting("the device was unplugged");
-  CHECK(report.look({}) == "WATCHDOG=1\nSTATUS=waiting: the device was unplugged\n");
+  CHECK(report.next_message({}) == "WATCHDOG=1\nSTATUS=waiting: the device was unplugged\n");
   report.running("a");
-  CHECK(report.look(loop(State::self_test, 7)) == "WATCHDOG=1\nSTATUS=self-test; device a\n");
-  CHECK(report.look(loop(State::self_test, 7)) == "");
-  CHECK(report.look(loop(State::disarmed, 9)) == "WATCHDOG=1\nSTATUS=disarmed; device a\n");
+  CHECK(report.next_message(loop(State::self_test, 7)) == "WATCHDOG=1\nSTATUS=self-test; device a\n");
+  CHECK(report.next_message(loop(State::self_test, 7)) == "");
+  CHECK(report.next_message(loop(State::disarmed, 9)) == "WATCHDOG=1\nSTATUS=disarmed; device a\n");
 }
 
 TEST_CASE("reading a configuration anew and stopping are told once each", "[service_notify]") {
   ServiceReport report;
   report.running("a");
-  report.look(loop(State::disarmed, 7));
+  report.next_message(loop(State::disarmed, 7));
   report.reloading(123456);
-  CHECK(report.look(loop(State::disarmed, 8)) == "RELOADING=1\nMONOTONIC_USEC=123456\nWATCHDOG=1\n");
-  CHECK(report.look(loop(State::disarmed, 9)) == "WATCHDOG=1\n");
+  CHECK(report.next_message(loop(State::disarmed, 8)) == "RELOADING=1\nMONOTONIC_USEC=123456\nWATCHDOG=1\n");
+  CHECK(report.next_message(loop(State::disarmed, 9)) == "WATCHDOG=1\n");
   report.reloaded();
-  CHECK(report.look(loop(State::disarmed, 10)) == "READY=1\nWATCHDOG=1\n");
+  CHECK(report.next_message(loop(State::disarmed, 10)) == "READY=1\nWATCHDOG=1\n");
   report.stopping("stopping");
-  CHECK(report.look({}) == "STOPPING=1\nWATCHDOG=1\nSTATUS=stopping\n");
+  CHECK(report.next_message({}) == "STOPPING=1\nWATCHDOG=1\nSTATUS=stopping\n");
   report.stopping("refused: x.toml:1:1: no");
-  CHECK(report.look({}) == "WATCHDOG=1\nSTATUS=refused: x.toml:1:1: no\n");
+  CHECK(report.next_message({}) == "WATCHDOG=1\nSTATUS=refused: x.toml:1:1: no\n");
 }
 
 /// Stands in for the service manager: a socket, and what was sent to it.
@@ -148,14 +149,14 @@ TEST_CASE("the manager hears of it by its socket, and no more of life once the t
   CHECK(manager.hears("STATUS=starting\n"));
   service.running(
       [&] {
-        return LoopView{State::disarmed, Fault::none, ticking ? ++ticks : ticks.load()};
+        return LoopStatus{State::disarmed, Fault::none, ticking ? ++ticks : ticks.load()};
       },
       "loopback");
   CHECK(manager.hears("READY=1\n"));
   manager.forget();
   CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\nWATCHDOG=1\n"));
   ticking = false;
-  service.running([&] { return LoopView{State::disarmed, Fault::none, ticks.load()}; }, "loopback");
+  service.running([&] { return LoopStatus{State::disarmed, Fault::none, ticks.load()}; }, "loopback");
   std::this_thread::sleep_for(150ms);
   manager.forget();
   std::this_thread::sleep_for(300ms);
@@ -171,7 +172,7 @@ TEST_CASE("nobody asked: nothing is said and no thread runs", "[service_notify]"
   service.running(
       [&] {
         asked = true;
-        return LoopView{};
+        return LoopStatus{};
       },
       "loopback");
   std::this_thread::sleep_for(150ms);

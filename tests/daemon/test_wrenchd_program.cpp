@@ -236,7 +236,7 @@ TEST_CASE("a signal ends wrenchd, and the hand is released") {
   for (const int number : {SIGTERM, SIGINT}) {
     RunningProgram wrenchd("wrenchd", {"--realtime", "off", "--arm", "--live"});
     INFO(number);
-    REQUIRE(wrenchd.says("state: "));
+    REQUIRE(wrenchd.wait_for_output("state: "));
     wrenchd.signal(number);
     const ProgramResult result = wrenchd.wait(std::chrono::seconds(20));
     INFO(result.out << result.err);

@@ -31,12 +31,12 @@ Deflection steered() {
   Deflection d;
   d.linear_gain = 100.0;
   d.angular_gain = 10.0;
-  d.full_m = 1e-3;
-  d.full_rad = 0.1;
+  d.full_deflection_m = 1e-3;
+  d.full_deflection_rad = 0.1;
   d.dead_zone = 0.1;
-  d.curve = 2.0;
-  d.leash_m = 0.010;
-  d.leash_rad = 0.2;
+  d.response_exponent = 2.0;
+  d.max_proxy_distance_m = 0.010;
+  d.max_proxy_angle_rad = 0.2;
   return d;
 }
 
@@ -46,11 +46,11 @@ DeflectionPose pose_of(const Deflection& settings) {
 
 /// The world of a wall: solid where x > 0, which holds the handle at x = 0.
 void press(DeflectionPose& pose, const Vector3d& t, int ticks) {
-  pose.push(t, Vector3d::Zero());
+  pose.set_deflection(t, Vector3d::Zero());
   for (int i = 0; i < ticks; ++i) {
     Pose held = pose.X_BH();
     held.translation_m.x() = std::min(held.translation_m.x(), 0.0);
-    pose.hold(held);
+    pose.set_proxy_pose(held);
     pose.advance(kTick_s);
   }
 }
@@ -62,25 +62,25 @@ Pose pose_in(const std::array<double, 7>& x) {
 /// The shipped cube over its table, steered by hand with an emulated SpaceMouse. Counts: x right, y toward
 /// the user, z down.
 struct Steered {
-  explicit Steered(Plan shipped = shipped_plan()) : plan(std::move(shipped)) {
+  explicit Steered(RunConfig shipped = shipped_config()) : plan(std::move(shipped)) {
     plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_combined.toml",
                                 SearchPath({WRENCHD_SOURCE_DIR "/config"}));
-    station.emplace(plan, link, clock, PlaceIn::step);
+    station.emplace(plan, link, clock, ProxySearchMode::in_tick);
     station->open();
   }
   void tick() {
     clock.sleep_until(clock.now() + 1ms);
     fault = station->loop().tick(clock.now(), clock.now());
-    station->loop().latest().read(last);
+    station->loop().latest_record().read(last);
   }
   void ticks(int count) {
     for (int i = 0; i < count; ++i) tick();
   }
   void up_from_the_table() {  // it starts in the table
     ticks(100);
-    mouse.push({0, 0, -350, 0, 0, 0});
+    mouse.set_deflection({0, 0, -350, 0, 0, 0});
     ticks(500);
-    mouse.push({});
+    mouse.set_deflection({});
     ticks(100);
     REQUIRE(last.contacts == 0);
   }
@@ -91,11 +91,11 @@ struct Steered {
   double push_up_N() const { return (pose_in(last.X_WP).rotation * Vector3d(last.F_T.data())).z(); }
   State state() const { return static_cast<State>(last.state); }
 
-  Plan plan;
+  RunConfig plan;
   VirtualClock clock;
   EmulatedSpaceMouse mouse{EmulatedSpaceMouse::Format::combined};
   LoopbackLink link{mouse, clock};
-  std::optional<Station> station;
+  std::optional<Runtime> station;
   TickRecord last;
   Fault fault = Fault::none;
 };
@@ -110,7 +110,7 @@ constexpr std::array<int, 6> kUp = {0, 0, -350, 0, 0, 0};
 TEST_CASE("nothing moves in the dead zone, and the end of the way is the greatest speed",
           "[deflection_pose]") {
   const Deflection settings = steered();
-  const SteeringCurve curve(settings, settings.linear_gain, settings.full_m);
+  const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
   const Vector3d along = Vector3d(1, -2, 2) / 3.0;
   CHECK(curve.velocity(Vector3d::Zero()).isZero(0.0));
   CHECK(curve.velocity(0.1e-3 * along).norm() < 1e-12);
@@ -129,8 +129,8 @@ TEST_CASE("a velocity and its deflection belong together", "[deflection_pose]") 
   std::uniform_real_distribution<double> any(-1.0, 1.0), share(1e-3, 1.0);
   for (const double power : {1.0, 2.0, 3.5}) {
     Deflection settings = steered();
-    settings.curve = power;
-    const SteeringCurve curve(settings, settings.linear_gain, settings.full_m);
+    settings.response_exponent = power;
+    const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
     for (int i = 0; i < 1000; ++i) {
       const Vector3d v = 0.1 * share(random) * Vector3d(any(random), any(random), any(random)).normalized();
       CHECK((curve.velocity(curve.deflection(v)) - v).norm() < 1e-12);
@@ -143,7 +143,7 @@ TEST_CASE("a velocity and its deflection belong together", "[deflection_pose]") 
 TEST_CASE("without an end of the way speed is in proportion to deflection", "[deflection_pose]") {
   Deflection settings;
   settings.linear_gain = 71.0;
-  const SteeringCurve curve(settings, settings.linear_gain, settings.full_m);
+  const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
   CHECK((curve.velocity({1e-3, -2e-3, 9e-3}) - 71.0 * Vector3d(1e-3, -2e-3, 9e-3)).norm() == 0.0);
   CHECK((curve.deflection({0.071, 0, 0}) - Vector3d(1e-3, 0, 0)).norm() < 1e-15);
 }
@@ -171,7 +171,7 @@ TEST_CASE("held at a wall the pose goes as far in as the push is firm, and comes
 
   DeflectionPose free = pose_of([] {
     Deflection d = steered();
-    d.leash_m = d.leash_rad = Deflection::kNotStated;
+    d.max_proxy_distance_m = d.max_proxy_angle_rad = Deflection::kNotStated;
     return d;
   }());
   press(free, {1e-3, 0, 0}, 5000);
@@ -180,11 +180,11 @@ TEST_CASE("held at a wall the pose goes as far in as the push is firm, and comes
 
 TEST_CASE("a tool that is not allowed to turn is turned no farther than the leash", "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
-  pose.hold(Pose{});
-  pose.push(Vector3d::Zero(), {0, 0, 0.1});
+  pose.set_proxy_pose(Pose{});
+  pose.set_deflection(Vector3d::Zero(), {0, 0, 0.1});
   for (int i = 0; i < 5000; ++i) pose.advance(kTick_s);
   CHECK(rotation_vector(pose.X_BH().rotation).z() == Approx(0.2).epsilon(0.02));
-  pose.push(Vector3d::Zero(), Vector3d::Zero());
+  pose.set_deflection(Vector3d::Zero(), Vector3d::Zero());
   for (int i = 0; i < 50; ++i) pose.advance(kTick_s);
   CHECK(rotation_vector(pose.X_BH().rotation).norm() < 1e-5);
 }
@@ -196,15 +196,15 @@ TEST_CASE("whatever the cap and the world do, the pose keeps the speeds and the 
     return Vector3d(size * Vector3d(any(random), any(random), any(random)));
   };
   Deflection settings = steered();
-  settings.reach_m = Deflection::kEndless;
+  settings.reach_m = Deflection::kUnbounded;
   settings.box_min_m = {-0.01, -0.02, -0.03};
   settings.box_max_m = {0.02, 0.03, 0.0};
   DeflectionPose pose = pose_of(settings);
   double farthest_m = 0.0;
   for (int i = 0; i < 100000; ++i) {
-    if (i % 7 == 0) pose.push(vector(2e-3), vector(0.2));
-    if (i % 11 == 0) pose.hold(Pose{rotation_from(vector(3.0)), vector(0.1)});
-    if (i % 101 == 0) pose.hold({});
+    if (i % 7 == 0) pose.set_deflection(vector(2e-3), vector(0.2));
+    if (i % 11 == 0) pose.set_proxy_pose(Pose{rotation_from(vector(3.0)), vector(0.1)});
+    if (i % 101 == 0) pose.set_proxy_pose({});
     const Pose before = pose.X_BH();
     pose.advance(kTick_s);
     const Vector3d step = pose.X_BH().translation_m - before.translation_m;
@@ -222,13 +222,13 @@ TEST_CASE("whatever the cap and the world do, the pose keeps the speeds and the 
 TEST_CASE("at rest in the air, where the world holds it is where it is, to the last bit",
           "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
-  pose.push({0.7e-3, 0.3e-3, 0}, {0, 0.05, 0.02});
+  pose.set_deflection({0.7e-3, 0.3e-3, 0}, {0, 0.05, 0.02});
   for (int i = 0; i < 700; ++i) pose.advance(kTick_s);
-  pose.push(Vector3d::Zero(), Vector3d::Zero());
+  pose.set_deflection(Vector3d::Zero(), Vector3d::Zero());
   const Pose left = pose.X_BH();
   const Pose X_WB{rotation_from({0.4, 1.0, -2.0}), {0.3, -0.2, 1.0}};
   for (int i = 0; i < 1000; ++i) {
-    pose.hold(inverse(X_WB) * (X_WB * pose.X_BH()));  // but for the rounding
+    pose.set_proxy_pose(inverse(X_WB) * (X_WB * pose.X_BH()));  // but for the rounding
     pose.advance(kTick_s);
   }
   CHECK(same_bits(pose.X_BH(), left));
@@ -240,7 +240,7 @@ TEST_CASE("steered into a table the tool is pressed no deeper than the leash, an
           "[deflection_pose][servo]") {
   Steered s;
   s.up_from_the_table();
-  s.mouse.push(kDown);
+  s.mouse.set_deflection(kDown);
   double deepest_m = 0.0;
   for (int i = 0; i < 5000; ++i) {
     s.tick();
@@ -252,18 +252,18 @@ TEST_CASE("steered into a table the tool is pressed no deeper than the leash, an
   CHECK(s.push_up_N() == Approx(6.0).epsilon(0.03));  // 600 N/m
   CHECK(Vector3d(s.last.F_out.data()).norm() == 0.0);
 
-  s.mouse.push({0, 0, 175, 0, 0, 0});
+  s.mouse.set_deflection({0, 0, 175, 0, 0, 0});
   s.ticks(1000);
   const double half_m = s.depth_m();
   CHECK(half_m == Approx(0.010 * std::pow((0.5 - 0.08) / 0.92, 2.0)).epsilon(0.05));
-  s.mouse.push({});
+  s.mouse.set_deflection({});
   s.ticks(200);
   CHECK(s.depth_m() < 1e-6);
   CHECK(std::abs(s.push_up_N()) < 1e-3);
 
-  s.mouse.push(kDown);
+  s.mouse.set_deflection(kDown);
   s.ticks(2000);
-  s.mouse.push(kUp);
+  s.mouse.set_deflection(kUp);
   int ticks = 0;
   for (; s.last.contacts > 0 && ticks < 1000; ++ticks) s.tick();
   CHECK(ticks < 50);  // 16 ms to the next report, 20 for the way out
@@ -273,7 +273,7 @@ TEST_CASE("a device without motors needs no arming, and its silence is no lastin
           "[deflection_pose][servo]") {
   Steered s;
   s.up_from_the_table();
-  s.mouse.push(kDown);
+  s.mouse.set_deflection(kDown);
   s.ticks(2000);
   CHECK(s.state() == State::disarmed);
   CHECK(s.push_up_N() > 5.0);
@@ -281,7 +281,7 @@ TEST_CASE("a device without motors needs no arming, and its silence is no lastin
   s.station->loop().arm();
   s.ticks(3000);
   CHECK(s.state() == State::active);
-  s.mouse.fall_silent();
+  s.mouse.stop_sending();
   bool told = false;
   for (int i = 0; i < 2000; ++i) {
     s.tick();
@@ -295,23 +295,24 @@ TEST_CASE("a device without motors needs no arming, and its silence is no lastin
 
 TEST_CASE("the recentre button brings the tool back through whatever is in between",
           "[deflection_pose][servo]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.device.base_in_world.position_m = {0, 0, 0.05};  // half of the cube over the table
   Steered s(plan);
   s.ticks(100);
   const Pose start = pose_in(s.last.X_WQ);
-  s.mouse.push({350, 0, 0, 0, 0, 0});
+  s.mouse.set_deflection({350, 0, 0, 0, 0, 0});
   s.ticks(1000);
-  s.mouse.push({0, 0, 0, 0, 350, 0});
+  s.mouse.set_deflection({0, 0, 0, 0, 350, 0});
   s.ticks(1000);
-  s.mouse.push({});
+  s.mouse.set_deflection({});
   s.ticks(50);
   REQUIRE((pose_in(s.last.X_WQ).translation_m - start.translation_m).norm() > 0.05);
-  s.mouse.press(1);
+  s.mouse.set_buttons(1);
   bool placed = false;  // and not led there, around what it meets
   for (int i = 0; i < 50; ++i) {
     s.tick();
-    placed = placed || static_cast<Placing>(s.last.placing) == Placing::placed;
+    placed =
+        placed || static_cast<ProxyInitialization>(s.last.proxy_initialization) == ProxyInitialization::found;
   }
   CHECK(placed);
   CHECK((pose_in(s.last.X_WQ).translation_m - start.translation_m).norm() < 1e-9);
@@ -326,18 +327,18 @@ TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay
   {
     RunRecorder recorder(*s.station, file);
     s.ticks(300);
-    recorder.take();
+    recorder.append_new_ticks();
     s.station->loop().arm();
     for (const std::array<int, 6>& push :
          {kUp, kDown, {200, 40, 350, 90, 0, -200}, {}, {0, 300, 0, 350, 0, 0}}) {
-      s.mouse.push(push);
-      s.mouse.press(push == kDown ? 2 : 0);
+      s.mouse.set_deflection(push);
+      s.mouse.set_buttons(push == kDown ? 2 : 0);
       s.ticks(1200);
-      if (push == kDown) s.mouse.press(1);
+      if (push == kDown) s.mouse.set_buttons(1);
       s.ticks(100);
-      recorder.take();
+      recorder.append_new_ticks();
     }
-    REQUIRE(recorder.has_all());
+    REQUIRE(recorder.is_complete());
   }
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 6800);
@@ -355,8 +356,8 @@ TEST_CASE("to steer allocates nothing and takes no lock", "[deflection_pose][rea
   {
     const RealtimeGuard guard;
     for (int i = 0; i < 6; ++i) {
-      s.mouse.push(i % 2 == 0 ? kDown : kUp);
-      s.mouse.press(i == 4 ? 2 : 0);
+      s.mouse.set_deflection(i % 2 == 0 ? kDown : kUp);
+      s.mouse.set_buttons(i == 4 ? 2 : 0);
       s.ticks(700);
     }
     allocations = guard.allocations();
@@ -368,19 +369,19 @@ TEST_CASE("to steer allocates nothing and takes no lock", "[deflection_pose][rea
 
 TEST_CASE("the simulated hand sees where the tool has come to, and steers it along its path",
           "[deflection_pose][simulation]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_split.toml",
                               SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   VirtualClock clock;
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
-  Station station(plan, *link, clock, PlaceIn::step);
+  Runtime station(plan, *link, clock, ProxySearchMode::in_tick);
   station.open();
   TickRecord last;
   double pressed_m = 0.0, farthest_m = 0.0;
   for (int i = 0; i < 36000; ++i) {  // three times along the path: what is pressed in does not add up
     clock.sleep_until(clock.now() + 1ms);
     REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().latest().read(last);
+    station.loop().latest_record().read(last);
     if (i < 2000) continue;  // it begins in the table
     const Pose p = pose_in(last.X_WP), q = pose_in(last.X_WQ);
     pressed_m = std::max(pressed_m, (p.translation_m - q.translation_m).norm());

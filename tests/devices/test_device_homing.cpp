@@ -10,15 +10,15 @@ namespace {
 using namespace test;
 
 /// Steps until it has ended, and half a minute at most.
-HomingState home(PolhemInHand& polhem, DeviceHoming& homing, bool confirming = true) {
+HomingState home_pose(PolhemInHand& polhem, DeviceHoming& homing, bool confirming = true) {
   for (int ms = 0; ms < 30000; ++ms) {
     polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
     const HomingState before = homing.state();
     const HomingState& state = homing.step(polhem.clock.now());
-    if (state.step != before.step || state.axis != before.axis) polhem.obey(state);
+    if (state.step != before.step || state.axis != before.axis) polhem.follow_instructions(state);
     if (confirming && state.step == HomingStep::reference && state.progress == 1.0) homing.confirm();
-    polhem.live();
-    if (state.step == HomingStep::done || state.step == HomingStep::failed || homing.lost()) break;
+    polhem.step();
+    if (state.step == HomingStep::done || state.step == HomingStep::failed || homing.device_lost()) break;
   }
   return homing.state();
 }
@@ -47,12 +47,12 @@ TEST_CASE("encoders that count from anywhere are told where they are by the rest
   PolhemInHand polhem;
   polhem.device.open();
   CHECK(error(polhem)[0] > 0.01);
-  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
-  REQUIRE(home(polhem, homing).step == HomingStep::done);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
+  REQUIRE(home_pose(polhem, homing).step == HomingStep::done);
   CHECK(homing.offsets().size() == 6);
   polhem.target.translation_m += Vector3d(-0.05, 0.03, 0.02);
-  for (int ms = 0; ms < 1000; ++ms) polhem.live();
-  polhem.device.recalibrate(calibrated(polhem.profile, homing.offsets()));  // the way was no motion
+  for (int ms = 0; ms < 1000; ++ms) polhem.step();
+  polhem.device.recalibrate(apply_calibration(polhem.profile, homing.offsets()));  // the way was no motion
   CHECK(error(polhem)[0] < kResolution_m);
   CHECK(error(polhem)[1] < kResolution_rad);
   CHECK(polhem.board.currents_mA() == std::array<int, 3>{});
@@ -62,8 +62,8 @@ TEST_CASE("a device that was homed before is homed anew, and not on top of that"
   PolhemInHand polhem;
   polhem.device.open();
   for (int time = 0; time < 2; ++time) {
-    DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
-    REQUIRE(home(polhem, homing).step == HomingStep::done);
+    DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
+    REQUIRE(home_pose(polhem, homing).step == HomingStep::done);
     CHECK(error(polhem)[0] < kResolution_m);
   }
 }
@@ -71,54 +71,54 @@ TEST_CASE("a device that was homed before is homed anew, and not on top of that"
 TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
-  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::all);
-  REQUIRE(home(polhem, homing).step == HomingStep::done);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::full);
+  REQUIRE(home_pose(polhem, homing).step == HomingStep::done);
   CHECK(error(polhem)[0] < kResolution_m);
 }
 
 TEST_CASE("an axis that goes another way ends a calibration", "[device_homing]") {
   PolhemInHand polhem;
-  polhem.mixed_up = 1;
+  polhem.swapped_axis = 1;
   polhem.device.open();
-  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::all);
-  const HomingState state = home(polhem, homing);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::full);
+  const HomingState state = home_pose(polhem, homing);
   CHECK(state.step == HomingStep::failed);
-  CHECK(state.trouble == HomingTrouble::wrong_axis);
+  CHECK(state.problem == HomingProblem::wrong_axis);
 }
 
 TEST_CASE("without a confirmation there is no rest", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
-  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
-  CHECK(home(polhem, homing, false).step == HomingStep::reference);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
+  CHECK(home_pose(polhem, homing, false).step == HomingStep::reference);
   CHECK(homing.offsets().empty());
 }
 
 TEST_CASE("the button of the profile confirms the rest", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
-  polhem.board.press(true);
-  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
-  CHECK(home(polhem, homing, false).step == HomingStep::done);
+  polhem.board.set_handle_button(true);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
+  CHECK(home_pose(polhem, homing, false).step == HomingStep::done);
 }
 
 TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
-  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
   for (int i = 0; i < 10; ++i) homing.step(polhem.clock.now());
-  CHECK_FALSE(homing.lost());
+  CHECK_FALSE(homing.device_lost());
   polhem.unplug();
   polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
   homing.step(polhem.clock.now());
-  CHECK(homing.lost());
+  CHECK(homing.device_lost());
 }
 
 TEST_CASE("a device that knows where it is has nothing to be shown at a start", "[device_homing]") {
   PolhemInHand polhem;
-  polhem.profile.homing.reference = ReferenceUse::never;
+  polhem.profile.homing.reference = ReferenceSchedule::never;
   polhem.device.open();
-  const DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::rest);
+  const DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
   CHECK(homing.state().step == HomingStep::done);
 }
 

@@ -47,7 +47,7 @@ struct Bench {
     DeviceSample next = sample(V);
     spoil(next);
     homing.advance(next, now);
-    const std::string words = told(state());
+    const std::string words = operator_instruction(state());
     if (heard.empty() || heard.back() != words) heard.push_back(words);
   }
   void hold(double for_s) {
@@ -76,7 +76,7 @@ struct Bench {
   }
 };
 
-HomingPlan with_reference(ReferenceUse use) {
+HomingPlan with_reference(ReferenceSchedule use) {
   HomingPlan plan;
   plan.reference = use;
   plan.X_BR = {Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitY())), {0.1, 0.0, -0.05}};
@@ -89,7 +89,7 @@ bool holds(const std::string& text, const std::string& part) {
 
 TEST_CASE("a sound device is homed when a person does what is asked", "[homing]") {
   Bench bench;
-  CHECK(told(bench.state()) == "Waiting for the device to report.");
+  CHECK(operator_instruction(bench.state()) == "Waiting for the device to report.");
   bench.obey_all();
   CHECK(bench.homing.may_arm());
   const std::vector<std::string> expected = {
@@ -137,14 +137,15 @@ TEST_CASE("a person who errs is asked once more", "[homing]") {
   bench.hold(0.5);
   REQUIRE(bench.state().step == HomingStep::moving);
   bench.move(0, -0.03);
-  CHECK(told(bench.state()) == "That moved x the other way. Hold the handle still.");
+  CHECK(operator_instruction(bench.state()) == "That moved x the other way. Hold the handle still.");
   bench.hold(0.5);
-  CHECK(told(bench.state()) == "That moved x the other way. Push the handle straight away from you.");
+  CHECK(operator_instruction(bench.state()) ==
+        "That moved x the other way. Push the handle straight away from you.");
   bench.move(0, 0.03);
   bench.hold(0.5);
   REQUIRE(bench.state().axis == 1);
   bench.move(2, 0.03);
-  CHECK(told(bench.state()) == "That moved z, not y. Hold the handle still.");
+  CHECK(operator_instruction(bench.state()) == "That moved z, not y. Hold the handle still.");
   bench.obey_all();
   CHECK(bench.homing.may_arm());
 }
@@ -153,13 +154,13 @@ TEST_CASE("the way back to the middle is not taken for the next axis", "[homing]
   Bench bench;
   bench.hold(0.5);
   bench.move(0, 0.03);
-  REQUIRE(bench.state().step == HomingStep::settling);
+  REQUIRE(bench.state().step == HomingStep::holding_still);
   for (int i = 0; i < 300; ++i) {  // while the person brings the handle back
     bench.X_BH.translation_m.x() -= 0.0001;
     bench.tick();
   }
-  CHECK(bench.state().step == HomingStep::settling);
-  CHECK(bench.state().trouble == HomingTrouble::none);
+  CHECK(bench.state().step == HomingStep::holding_still);
+  CHECK(bench.state().problem == HomingProblem::none);
   bench.obey_all();
   CHECK(bench.homing.may_arm());
 }
@@ -173,14 +174,14 @@ TEST_CASE("a sign that is wrong in the profile is found", "[homing]") {
     };
     bench.obey_all();
     CHECK(bench.state().step == HomingStep::failed);
-    CHECK(bench.state().trouble == HomingTrouble::wrong_direction);
+    CHECK(bench.state().problem == HomingProblem::wrong_direction);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
-    CHECK(holds(told(bench.state()), "Its sign is wrong: look at it in the profile"));
+    CHECK(holds(operator_instruction(bench.state()), "Its sign is wrong: look at it in the profile"));
   }
   Bench mirrored;  // a quaternion with its y of the other sign
   mirrored.spoil = [](DeviceSample& s) { s.X_BH.rotation.y() *= -1.0; };
   mirrored.obey_all();
-  CHECK(mirrored.state().trouble == HomingTrouble::wrong_direction);
+  CHECK(mirrored.state().problem == HomingProblem::wrong_direction);
   CHECK(mirrored.state().axis == 4);
 }
 
@@ -189,8 +190,8 @@ TEST_CASE("axes that are exchanged are found", "[homing]") {
   bench.spoil = [](DeviceSample& s) { std::swap(s.X_BH.translation_m.y(), s.X_BH.translation_m.z()); };
   bench.obey_all();
   CHECK(bench.state().step == HomingStep::failed);
-  CHECK(bench.state().trouble == HomingTrouble::wrong_axis);
-  CHECK(told(bench.state()) ==
+  CHECK(bench.state().problem == HomingProblem::wrong_axis);
+  CHECK(operator_instruction(bench.state()) ==
         "Homing failed. That moved z, not y. Axes are exchanged: look at their order in the profile, and at "
         "the encoders' plugs.");
   CHECK_FALSE(bench.homing.may_arm());
@@ -198,7 +199,7 @@ TEST_CASE("axes that are exchanged are found", "[homing]") {
   Bench turns;  // y and z of the quaternion
   turns.spoil = [](DeviceSample& s) { std::swap(s.X_BH.rotation.y(), s.X_BH.rotation.z()); };
   turns.obey_all();
-  CHECK(turns.state().trouble == HomingTrouble::wrong_axis);
+  CHECK(turns.state().problem == HomingProblem::wrong_axis);
   CHECK(turns.state().moved_axis == 5);
 }
 
@@ -210,7 +211,7 @@ TEST_CASE("a velocity of the wrong sign is found, and one that is not reported i
     };
     bench.obey_all();
     CHECK(bench.state().step == HomingStep::failed);
-    CHECK(bench.state().trouble == HomingTrouble::velocity_disagrees);
+    CHECK(bench.state().problem == HomingProblem::velocity_sign_mismatch);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
   }
   Bench silent;
@@ -220,7 +221,7 @@ TEST_CASE("a velocity of the wrong sign is found, and one that is not reported i
 }
 
 TEST_CASE("in its rest a device is told where it is", "[homing]") {
-  const HomingPlan plan = with_reference(ReferenceUse::each_start);
+  const HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   RandomValues random(11);
   for (int i = 0; i < 20; ++i) {
     Bench bench(plan);
@@ -243,25 +244,25 @@ TEST_CASE("in its rest a device is told where it is", "[homing]") {
 }
 
 TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[homing]") {
-  HomingPlan plan = with_reference(ReferenceUse::each_start);
+  HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   plan.confirm_buttons = 0x4;
   Bench bench(plan);
   bench.X_BH = plan.X_BR;
   bench.X_BH.translation_m.x() += 0.2;
   bench.hold(5.0);
   CHECK(bench.state().step == HomingStep::reference);  // lying still is not enough
-  CHECK(told(bench.state()) == "Put the handle into its rest, let go of it, and confirm.");
+  CHECK(operator_instruction(bench.state()) == "Put the handle into its rest, let go of it, and confirm.");
 
   std::uint32_t buttons = 0x3;
   bench.spoil = [&](DeviceSample& s) { s.buttons = buttons; };
   bench.hold(0.1);
-  CHECK(bench.state().trouble == HomingTrouble::none);  // other buttons say nothing
+  CHECK(bench.state().problem == HomingProblem::none);  // other buttons say nothing
   buttons = 0x4;
   bench.hold(0.1);
   buttons = 0;
   CHECK(bench.state().step == HomingStep::reference);
-  CHECK(bench.state().trouble == HomingTrouble::not_in_rest);
-  CHECK(holds(told(bench.state()), "too far from its rest"));
+  CHECK(bench.state().problem == HomingProblem::not_at_reference);
+  CHECK(holds(operator_instruction(bench.state()), "too far from its rest"));
 
   for (int i = 0; i < 1000; ++i) {
     bench.X_BH.translation_m.x() -= 0.0002;
@@ -270,34 +271,34 @@ TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[ho
   bench.homing.confirm();
   bench.X_BH.translation_m.x() -= 0.002;
   bench.tick();
-  CHECK(bench.state().trouble == HomingTrouble::not_still);
+  CHECK(bench.state().problem == HomingProblem::not_still);
   bench.hold(0.9);
   CHECK(bench.state().step == HomingStep::reference);
   bench.hold(0.2);  // now it has been still for a second
-  CHECK(bench.state().step == HomingStep::settling);
+  CHECK(bench.state().step == HomingStep::holding_still);
   CHECK(bench.homing.offset().position_m.x() == Approx(-0.002));
 }
 
 TEST_CASE("a stored offset spares the rest where the encoders remember, and only there", "[homing]") {
   const PoseOffset stored{{0.01, 0, 0}, {0, 0, 0.1}};
-  Bench once(with_reference(ReferenceUse::once), stored);
+  Bench once(with_reference(ReferenceSchedule::once), stored);
   once.tick();
-  CHECK(once.state().step == HomingStep::settling);
+  CHECK(once.state().step == HomingStep::holding_still);
   CHECK(once.homing.offset().position_m == stored.position_m);
 
-  Bench first(with_reference(ReferenceUse::once));
+  Bench first(with_reference(ReferenceSchedule::once));
   first.tick();
   CHECK(first.state().step == HomingStep::reference);
 
-  Bench each(with_reference(ReferenceUse::each_start), stored);
+  Bench each(with_reference(ReferenceSchedule::each_start), stored);
   each.tick();
   CHECK(each.state().step == HomingStep::reference);
   CHECK(each.homing.offset().position_m.norm() == 0.0);
 
-  Bench foreign(with_reference(ReferenceUse::once), PoseOffset{{0.5, 0, 0}, Vector3d::Zero()});
+  Bench foreign(with_reference(ReferenceSchedule::once), PoseOffset{{0.5, 0, 0}, Vector3d::Zero()});
   foreign.tick();
   CHECK(foreign.state().step == HomingStep::failed);
-  CHECK(foreign.state().trouble == HomingTrouble::stored_offset_wrong);
+  CHECK(foreign.state().problem == HomingProblem::stored_offset_too_large);
 }
 
 TEST_CASE("an offset goes to the store and comes back", "[homing]") {
@@ -324,7 +325,7 @@ TEST_CASE("a pose that cannot be fails", "[homing]") {
   HomingPlan plan;
   plan.workspace_min_m = {-0.1, -0.2, 0.0};
   plan.workspace_max_m = {0.1, 0.2, 0.3};
-  plan.max_turn_rad = 1.0;
+  plan.max_rotation_rad = 1.0;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   struct Bad {
     Pose X_BH;
@@ -341,7 +342,7 @@ TEST_CASE("a pose that cannot be fails", "[homing]") {
     bench.X_BH = bad.X_BH;
     bench.tick();
     CHECK(bench.state().step == HomingStep::failed);
-    CHECK(bench.state().trouble == HomingTrouble::outside_workspace);
+    CHECK(bench.state().problem == HomingProblem::outside_workspace);
     CHECK(bench.state().axis == bad.axis);
     bench.X_BH = {};
     bench.hold(1.0);
@@ -359,9 +360,9 @@ TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[ho
   bench.spoil = [&](DeviceSample& s) { s.fault = fault; };
   fault = Fault::sample_stale;
   bench.tick();
-  CHECK(bench.state().step == HomingStep::listening);
-  CHECK(holds(told(bench.state()), "Waiting for the device to report."));
-  CHECK(holds(told(bench.state()), std::string(fault_row(Fault::sample_stale).sentence)));
+  CHECK(bench.state().step == HomingStep::awaiting_sample);
+  CHECK(holds(operator_instruction(bench.state()), "Waiting for the device to report."));
+  CHECK(holds(operator_instruction(bench.state()), std::string(fault_row(Fault::sample_stale).message)));
   fault = Fault::none;
   bench.hold(0.5);
   bench.move(0, 0.03);
@@ -369,17 +370,17 @@ TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[ho
   REQUIRE(bench.state().step == HomingStep::moving);
   REQUIRE(bench.state().axis == 1);
 
-  fault = Fault::pose_teleported;
+  fault = Fault::pose_jumped;
   bench.X_BH.translation_m.y() += 0.1;  // a jump is no motion of the hand
   bench.tick();
   fault = Fault::none;
   bench.tick();
-  CHECK(bench.state().step == HomingStep::settling);
+  CHECK(bench.state().step == HomingStep::holding_still);
   CHECK(bench.state().axis == 1);
 
   fault = Fault::device_lost;
   bench.tick();
-  CHECK(bench.state().step == HomingStep::listening);
+  CHECK(bench.state().step == HomingStep::awaiting_sample);
   fault = Fault::none;
   bench.obey_all();
   CHECK(bench.homing.may_arm());
@@ -443,7 +444,7 @@ TEST_CASE("the simulated device is homed through its reports, and a wrong profil
   profile.pose_report.linear_velocity.step *= -1.0;
   SimulatedBench backward(profile);
   backward.run();
-  CHECK(backward.homing.state() == HomingState{HomingStep::failed, HomingTrouble::velocity_disagrees});
+  CHECK(backward.homing.state() == HomingState{HomingStep::failed, HomingProblem::velocity_sign_mismatch});
 
   profile = reference_profile();
   profile.pose_report.position.step *= -1.0;
@@ -457,7 +458,7 @@ TEST_CASE("samples that are not fresh are no evidence", "[homing]") {
   Bench bench;
   bench.spoil = [](DeviceSample& s) { s.fresh = false; };
   bench.hold(5.0);
-  CHECK(bench.state().step == HomingStep::listening);
+  CHECK(bench.state().step == HomingStep::awaiting_sample);
 }
 
 TEST_CASE("only axes that a device senses are asked for", "[homing]") {
@@ -493,14 +494,14 @@ TEST_CASE("a plan that cannot work is refused", "[homing]") {
   CHECK(refused([](HomingPlan& p) { p.travel_rad = 3.0; }));
   CHECK(refused([](HomingPlan& p) { p.workspace_max_m.y() = -1.0; }));
   CHECK(refused([=](HomingPlan& p) { p.workspace_min_m.x() = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.max_turn_rad = 0.1; }));
-  CHECK(refused([=](HomingPlan& p) { p.most_offset_m = nan; }));
+  CHECK(refused([](HomingPlan& p) { p.max_rotation_rad = 0.1; }));
+  CHECK(refused([=](HomingPlan& p) { p.max_offset_m = nan; }));
   CHECK(refused([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
 }
 
 TEST_CASE("the servo thread may home, whatever the device says", "[homing]") {
   RandomValues random(13);
-  HomingPlan plan = with_reference(ReferenceUse::each_start);
+  HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   plan.confirm_buttons = 1;
   Homing homing(plan);
   std::uint64_t forbidden = 0;

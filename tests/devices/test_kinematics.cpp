@@ -50,7 +50,8 @@ Matrix3d differenced(const Kinematics& k, const JointAngles& at, const Pose& nea
     up[i] += h;
     down[i] -= h;
     J.col(static_cast<Eigen::Index>(i)) =
-        (forward(k, up, near)->translation_m - forward(k, down, near)->translation_m) / (2 * h);
+        (forward_kinematics(k, up, near)->translation_m - forward_kinematics(k, down, near)->translation_m) /
+        (2 * h);
   }
   return J;
 }
@@ -62,12 +63,13 @@ TEST_CASE("an arm's pose leads back to its joint angles, and they to the pose", 
   for (int i = 0; i < 20'000; ++i) {
     const JointAngles t = angles.arm();
     for (const Kinematics* k : {&kPolhem, &kWood}) {
-      const auto X_DE = forward(*k, t, {});
+      const auto X_DE = forward_kinematics(*k, t, {});
       REQUIRE(X_DE);
       const auto back = inverse(*k, *X_DE);
       REQUIRE(back);
       for (std::size_t j = 0; j < k->joints; ++j) REQUIRE(std::abs((*back)[j] - t[j]) < 1e-10);
-      REQUIRE(distance(*forward(*k, *back, {}), *X_DE) < 1e-7);  // angularDistance() of equal rotations: 1e-8
+      REQUIRE(distance(*forward_kinematics(*k, *back, {}), *X_DE) <
+              1e-7);  // angularDistance() of equal rotations: 1e-8
     }
   }
 }
@@ -80,7 +82,7 @@ TEST_CASE("a delta's position leads back from its joint angles, whatever positio
     const Pose X_DE{Quaterniond::Identity(), angles.in_falcon()};
     const auto t = inverse(kFalcon, X_DE);
     REQUIRE(t);
-    const auto back = forward(kFalcon, *t, near);
+    const auto back = forward_kinematics(kFalcon, *t, near);
     REQUIRE(back);
     REQUIRE((back->translation_m - X_DE.translation_m).norm() < 1e-12);
     near = i % 3 == 0 ? Pose{} : X_DE;
@@ -104,7 +106,7 @@ TEST_CASE("the Jacobian is what finite differences of the position say", "[kinem
   for (int i = 0; i < 2000; ++i) {
     const JointAngles t = angles.arm();
     for (const Kinematics* k : {&kPolhem, &kWood}) {
-      const Pose X_DE = *forward(*k, t, {});
+      const Pose X_DE = *forward_kinematics(*k, t, {});
       REQUIRE((jacobian(*k, t, X_DE) - differenced(*k, t, X_DE)).cwiseAbs().maxCoeff() < 1e-9);
     }
     const Pose X_DE{Quaterniond::Identity(), angles.in_falcon()};
@@ -126,8 +128,8 @@ TEST_CASE("what the motors work at their joints is what the force works at the h
   };
   for (int i = 0; i < 5000; ++i) {
     const JointAngles t = angles.arm();
-    check(kPolhem, t, *forward(kPolhem, t, {}));
-    check(kWood, t, *forward(kWood, t, {}));
+    check(kPolhem, t, *forward_kinematics(kPolhem, t, {}));
+    check(kWood, t, *forward_kinematics(kWood, t, {}));
     const Pose X_DE{Quaterniond::Identity(), angles.in_falcon()};
     check(kFalcon, *inverse(kFalcon, X_DE), X_DE);
   }
@@ -150,30 +152,30 @@ TEST_CASE("efforts are cut by one factor, so the force keeps its direction", "[k
 
 TEST_CASE("the places that the sources state by number", "[kinematics]") {
   // haptikfabrikenapi, polhem_v1: at its calibration counts body b stands upright and body c level.
-  const Pose polhem = *home(kPolhem);
+  const Pose polhem = *home_pose(kPolhem);
   CHECK(polhem.translation_m.isApprox(Vector3d(0.133 - 0.140, 0.0, 0.058 + 0.174 - 0.100), 1e-12));
   CHECK(polhem.rotation.angularDistance(Quaterniond::Identity()) < 1e-7);
-  CHECK(home(kWood)->translation_m.isApprox(Vector3d(0.245 - 0.220, 0.0, 0.080 + 0.205 - 0.080), 1e-12));
+  CHECK(home_pose(kWood)->translation_m.isApprox(Vector3d(0.245 - 0.220, 0.0, 0.080 + 0.205 - 0.080), 1e-12));
 
   // A quarter turn of body a: 2000 counts a turn, capstan 10 mm on 180 mm, so 18 motor turns a turn.
   JointCounts counts = kPolhem.home_counts;
   counts[0] = -9000;
   const JointAngles t = joint_angles(kPolhem, counts);
   CHECK(t[0] == Approx(std::numbers::pi / 2));
-  CHECK(forward(kPolhem, t, {})->translation_m.isApprox(Vector3d(-0.140, 0.133, 0.132), 1e-12));
+  CHECK(forward_kinematics(kPolhem, t, {})->translation_m.isApprox(Vector3d(-0.140, 0.133, 0.132), 1e-12));
 
   // libnifalcon: 35 degrees at count 0, and 360/1280 * 14.25/110 degrees a count.
   CHECK(joint_angles(kFalcon, {0, 100, -100})[0] == Approx(35 * std::numbers::pi / 180));
   CHECK(joint_angles(kFalcon, {0, 100, -100})[1] ==
         Approx((35 + 100 * 360.0 / 1280 * 14.25 / 110) * std::numbers::pi / 180));
-  CHECK(home(kFalcon)->translation_m.head<2>().norm() < 1e-12);  // equal legs: on the axis
-  CHECK(home(kFalcon)->translation_m.z() == Approx(0.134602).margin(1e-6));
+  CHECK(home_pose(kFalcon)->translation_m.head<2>().norm() < 1e-12);  // equal legs: on the axis
+  CHECK(home_pose(kFalcon)->translation_m.z() == Approx(0.134602).margin(1e-6));
 }
 
 TEST_CASE("1 N straight up on a Polhem at home is carried by body c alone", "[kinematics]") {
   // tau = c sin(pi/2) * 1 N = 0.133 N.m; motor: times -10/100 over 0.0538 N.m/A
   const JointAngles t = joint_angles(kPolhem, kPolhem.home_counts);
-  const MotorEfforts up = motor_efforts(kPolhem, jacobian(kPolhem, t, *home(kPolhem)), {0, 0, 1});
+  const MotorEfforts up = motor_efforts(kPolhem, jacobian(kPolhem, t, *home_pose(kPolhem)), {0, 0, 1});
   CHECK(up[0] == Approx(0).margin(1e-12));
   CHECK(up[1] == Approx(0).margin(1e-12));
   CHECK(up[2] == Approx(-0.133 * 0.1 / 0.0538));
@@ -182,17 +184,17 @@ TEST_CASE("1 N straight up on a Polhem at home is carried by body c alone", "[ki
 TEST_CASE("a place out of reach, and angles that no place has, are told", "[kinematics]") {
   CHECK_FALSE(inverse(kPolhem, {Quaterniond::Identity(), {1.0, 0.0, 0.0}}));
   CHECK_FALSE(inverse(kFalcon, {Quaterniond::Identity(), {0.0, 0.0, 0.3}}));
-  CHECK_FALSE(forward(kFalcon, {-1.5, 1.5, 1.5}, {}));
+  CHECK_FALSE(forward_kinematics(kFalcon, {-1.5, 1.5, 1.5}, {}));
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  CHECK_FALSE(forward(kFalcon, {nan, 0.5, 0.5}, {}));
+  CHECK_FALSE(forward_kinematics(kFalcon, {nan, 0.5, 0.5}, {}));
 }
 
 TEST_CASE("a button that hides in a count is taken out of it", "[kinematics]") {
   std::uint32_t buttons = 0xf0;
   JointCounts counts{1, 2, 3, 10'123, 5, 6};
-  CHECK(without_button(kPolhem, counts, buttons) == JointCounts{1, 2, 3, 123, 5, 6});
+  CHECK(strip_count_button(kPolhem, counts, buttons) == JointCounts{1, 2, 3, 123, 5, 6});
   CHECK(buttons == 0xf1);
   counts[3] = 5000;
-  CHECK(without_button(kPolhem, counts, buttons) == counts);
+  CHECK(strip_count_button(kPolhem, counts, buttons) == counts);
   CHECK(buttons == 0xf0);
 }

@@ -12,7 +12,7 @@ namespace wrenchd {
 namespace {
 
 using namespace test;
-using Lines = std::vector<std::string>;
+using LineReader = std::vector<std::string>;
 
 ReportDescriptor parsed(const Bytes& bytes) {
   return parse_report_descriptor(bytes);
@@ -35,11 +35,12 @@ TEST_CASE("the reference layout agrees with the descriptor its page gives", "[la
   REQUIRE(expected.size() == 2);
   CHECK(expected[0].fields.size() == 11);
   CHECK(expected[1].fields.size() == 6);
-  CHECK(differences(reference_device(), expected) == Lines{});
+  CHECK(find_differences(reference_device(), expected) == LineReader{});
 }
 
 TEST_CASE("a profile for another device is told apart, line by line", "[layout_check]") {
-  const Lines lines = differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
+  const LineReader lines =
+      find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
   REQUIRE(lines.size() == 13);  // no field agrees
   CHECK(lines[0] == "input report 0x01: the profile says 64 bytes, the device 13");
   CHECK(lines[1] ==
@@ -57,7 +58,9 @@ TEST_CASE("a profile for another device is told apart, line by line", "[layout_c
 
 TEST_CASE("fields of a device agree where they are, as wide as they are, with their sign", "[layout_check]") {
   const ReportDescriptor device = parsed(space_mouse_wireless());
-  const auto lines = [&](const ExpectedField& field) { return differences(device, {combined({field})}); };
+  const auto lines = [&](const ExpectedField& field) {
+    return find_differences(device, {combined({field})});
+  };
   CHECK(lines({"translation", 8, 16, 3, true}).empty());
   CHECK(lines({"all six", 8, 16, 6, true}).empty());
   CHECK(lines({"too many", 8, 16, 7, true}).size() == 1);
@@ -73,7 +76,7 @@ TEST_CASE("fields of a device agree where they are, as wide as they are, with th
 TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them", "[layout_check]") {
   const ReportDescriptor device = parsed(space_navigator());
   const auto agrees = [&](std::size_t bit, unsigned bits) {
-    return differences(device, {{ReportKind::input, 3, 3, {{"buttons", bit, bits, 1, false}}}}).empty();
+    return find_differences(device, {{ReportKind::input, 3, 3, {{"buttons", bit, bits, 1, false}}}}).empty();
   };
   CHECK(agrees(8, 1));
   CHECK(agrees(9, 1));
@@ -87,14 +90,14 @@ TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them",
   // Two axes of a byte each are two values, not one of two bytes.
   const ReportDescriptor mouse =
       parsed(from_hex("05 01 09 02 a1 01 15 81 25 7f 75 08 95 02 09 30 09 31 81 06 c0"));
-  CHECK(differences(mouse, {{ReportKind::input, {}, 2, {{"axis", 0, 8, 2, true}}}}).empty());
-  CHECK(differences(mouse, {{ReportKind::input, {}, 2, {{"both", 0, 16, 1, true}}}}).size() == 1);
+  CHECK(find_differences(mouse, {{ReportKind::input, {}, 2, {{"axis", 0, 8, 2, true}}}}).empty());
+  CHECK(find_differences(mouse, {{ReportKind::input, {}, 2, {{"both", 0, 16, 1, true}}}}).size() == 1);
 }
 
 TEST_CASE("bytes of the maker's own agree with all that lies within them", "[layout_check]") {
   const ReportDescriptor device = parsed(teensy_rawhid());
   const auto agrees = [&](const ExpectedField& field) {
-    return differences(device, {{ReportKind::input, {}, 64, {field}}}).empty();
+    return find_differences(device, {{ReportKind::input, {}, 64, {field}}}).empty();
   };
   CHECK(agrees({"encoders", 0, 16, 6, true}));
   CHECK(agrees({"a bit", 77, 1, 1, false}));
@@ -107,7 +110,7 @@ TEST_CASE("words of the maker's own may be taken by bits, but not across their e
   const ReportDescriptor device =
       parsed(from_hex("06 00 ff 09 01 a1 01 16 00 80 26 ff 7f 75 10 95 04 09 02 81 02 c0"));
   const auto agrees = [&](const ExpectedField& field) {
-    return differences(device, {{ReportKind::input, {}, 8, {field}}}).empty();
+    return find_differences(device, {{ReportKind::input, {}, 8, {field}}}).empty();
   };
   CHECK(agrees({"word", 16, 16, 3, true}));
   CHECK(agrees({"flag", 19, 1, 1, false}));
@@ -118,13 +121,14 @@ TEST_CASE("words of the maker's own may be taken by bits, but not across their e
 
 TEST_CASE("report ids that the other side does not have are told", "[layout_check]") {
   const ExpectedReport with{ReportKind::input, 1, 65, {}}, without{ReportKind::input, {}, 64, {}};
-  CHECK(differences(parsed(teensy_rawhid()), {without}).empty());
-  CHECK(differences(parsed(teensy_rawhid()), {with}) ==
-        Lines{"input report 0x01: the device has none such; its input reports: without an id"});
-  CHECK(differences(parsed(space_navigator()), {without}) ==
-        Lines{"input report without an id: the device has none such; its input reports: 0x01, 0x02, 0x03"});
-  CHECK(differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
-        Lines{"output report without an id: the device has none such; it has no output report"});
+  CHECK(find_differences(parsed(teensy_rawhid()), {without}).empty());
+  CHECK(find_differences(parsed(teensy_rawhid()), {with}) ==
+        LineReader{"input report 0x01: the device has none such; its input reports: without an id"});
+  CHECK(find_differences(parsed(space_navigator()), {without}) ==
+        LineReader{
+            "input report without an id: the device has none such; its input reports: 0x01, 0x02, 0x03"});
+  CHECK(find_differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
+        LineReader{"output report without an id: the device has none such; it has no output report"});
 }
 
 TEST_CASE("a report may be as short as is allowed, and one that need not be there may be absent",
@@ -132,18 +136,18 @@ TEST_CASE("a report may be as short as is allowed, and one that need not be ther
   const ReportDescriptor device = parsed(space_navigator());  // report 3 has 3 bytes, with 2 buttons
   const ExpectedField buttons{"buttons", 8, 32, 1, false};
   ExpectedReport report{ReportKind::input, 3, 7, {buttons}};
-  CHECK(differences(device, {report}).size() == 2);  // its length, and the field beyond its end
-  report.least_length = 3;
-  CHECK(differences(device, {report}) == Lines{});
-  report.least_length = 4;
-  CHECK(differences(device, {report}).size() == 2);
+  CHECK(find_differences(device, {report}).size() == 2);  // its length, and the field beyond its end
+  report.min_length = 3;
+  CHECK(find_differences(device, {report}) == LineReader{});
+  report.min_length = 4;
+  CHECK(find_differences(device, {report}).size() == 2);
   const ExpectedField axis{"axis", 8, 16, 6, false};  // what is there has to agree as ever
-  CHECK(differences(device, {{ReportKind::input, 1, 13, {axis}, 7, false}}).size() == 1);
+  CHECK(find_differences(device, {{ReportKind::input, 1, 13, {axis}, 7, false}}).size() == 1);
 
   report.id = 0x17;
-  CHECK(differences(device, {report}).size() == 1);
+  CHECK(find_differences(device, {report}).size() == 1);
   report.may_be_absent = true;
-  CHECK(differences(device, {report}) == Lines{});
+  CHECK(find_differences(device, {report}) == LineReader{});
 }
 
 TEST_CASE("a profile without report ids expects a device without them", "[layout_check]") {
@@ -155,23 +159,23 @@ TEST_CASE("a profile without report ids expects a device without them", "[layout
   CHECK(expected[0].length == 64);
   const ReportDescriptor device =
       parsed(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 40 09 01 81 02 95 20 09 02 91 02 c0"));
-  CHECK(differences(device, expected) == Lines{});
+  CHECK(find_differences(device, expected) == LineReader{});
 }
 
 TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layout_check]") {
   const auto differ = [&](const char* name, const Bytes& descriptor) {
-    return differences(
+    return find_differences(
         parsed(descriptor),
         expected_reports(load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name))));
   };
-  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == Lines{});
-  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == Lines{});
-  CHECK(differ("polhem.toml", teensy_rawhid()) == Lines{});
+  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == LineReader{});
+  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == LineReader{});
+  CHECK(differ("polhem.toml", teensy_rawhid()) == LineReader{});
   // Buttons of two bytes where the profile takes up to six, no battery, and a battery where there is one.
-  CHECK(differ("spacemouse_split.toml", space_navigator()) == Lines{});
-  CHECK(differ("spacemouse_split.toml", home_made_split()) == Lines{});
-  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == Lines{});
-  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == Lines{});
+  CHECK(differ("spacemouse_split.toml", space_navigator()) == LineReader{});
+  CHECK(differ("spacemouse_split.toml", home_made_split()) == LineReader{});
+  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == LineReader{});
+  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == LineReader{});
   CHECK_FALSE(differ("spacemouse_combined.toml", space_navigator()).empty());
   CHECK_FALSE(differ("spacemouse_split.toml", space_mouse_wireless()).empty());
 }

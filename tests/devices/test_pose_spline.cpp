@@ -32,7 +32,7 @@ std::vector<TimedPose> wild_way() {
 
 TEST_CASE("a path to play back goes through its poses at their times", "[playback]") {
   const auto poses = wild_way();
-  const PoseTrack track(poses);
+  const PoseSpline track(poses);
   for (const TimedPose& pose : poses) {
     const Pose X = track.at(from_seconds(pose.time_s)).X_BG;
     CHECK((X.translation_m - pose.X.translation_m).norm() < 1e-7);  // a nanosecond of the fastest step
@@ -45,7 +45,7 @@ TEST_CASE("a path to play back goes through its poses at their times", "[playbac
 
 TEST_CASE("its twist is the derivative of its pose, and does not jump", "[playback]") {
   const auto poses = wild_way();
-  const PoseTrack track(poses);
+  const PoseSpline track(poses);
   RandomValues random(5);
   const double end_s = poses.back().time_s;
   constexpr double kStep_s = 1e-6;
@@ -75,7 +75,7 @@ TEST_CASE("a steady screw is played back as such", "[playback]") {
   std::vector<TimedPose> poses;
   for (int i = 0; i <= 20; ++i)
     poses.push_back({0.05 * i, {rotation_from({0.0, 0.0, 0.06 * i}), {0.01 * i, 0.0, 0.0}}});
-  const PoseTrack track(poses);
+  const PoseSpline track(poses);
   for (double t_s = 0.2; t_s < 0.8; t_s += 0.013) {
     const HandTarget at = track.at(from_seconds(t_s));
     CHECK(at.X_BG.translation_m.x() == Approx(0.2 * t_s).epsilon(1e-9));
@@ -88,10 +88,10 @@ TEST_CASE("a path that cannot be played back is refused", "[playback]") {
   const auto turned = [](double time_s, double angle) {
     return TimedPose{time_s, {rotation_from({angle, 0.0, 0.0}), Vector3d::Zero()}};
   };
-  CHECK_THROWS_WITH(PoseTrack({}), Contains("has no pose"));
-  CHECK_THROWS_WITH(PoseTrack({turned(0.1, 0.0)}), Contains("not at time 0"));
-  CHECK_THROWS_WITH(PoseTrack({turned(0.0, 0.0), turned(0.0, 0.1)}), Contains("times must rise"));
-  CHECK_THROWS_WITH(PoseTrack({turned(0.0, 0.0), turned(0.1, 2.1)}), Contains("which way round"));
-  CHECK_THROWS_WITH(PoseTrack({turned(0.0, 0.0), turned(std::nan(""), 0.1)}), Contains("not finite"));
-  CHECK(PoseTrack({turned(0.0, 0.5)}).at(from_seconds(3.0)).X_BG.rotation.x() == Approx(std::sin(0.25)));
+  CHECK_THROWS_WITH(PoseSpline({}), Contains("has no pose"));
+  CHECK_THROWS_WITH(PoseSpline({turned(0.1, 0.0)}), Contains("not at time 0"));
+  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.0, 0.1)}), Contains("times must rise"));
+  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.1, 2.1)}), Contains("which way round"));
+  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(std::nan(""), 0.1)}), Contains("not finite"));
+  CHECK(PoseSpline({turned(0.0, 0.5)}).at(from_seconds(3.0)).X_BG.rotation.x() == Approx(std::sin(0.25)));
 }

@@ -26,8 +26,8 @@ class ScriptedLink final : public ReportLink {
  public:
   void open() override { ++opened; }
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
-    if (gone) return {LinkStatus::gone, 0, now};
-    if (reports.empty()) return {LinkStatus::empty, 0, now};
+    if (gone) return {LinkStatus::disconnected, 0, now};
+    if (reports.empty()) return {LinkStatus::not_ready, 0, now};
     const auto [bytes, arrived] = reports.front();
     reports.pop_front();
     std::copy_n(bytes.begin(), std::min(bytes.size(), buffer.size()), buffer.begin());
@@ -92,7 +92,7 @@ TEST_CASE("the newest of several waiting reports wins and the others are counted
   const DeviceSample sample = bench.device.read_newest(bench.now);
   CHECK(sample.fault == Fault::none);
   CHECK(sample.fresh);
-  CHECK(sample.skipped == 4);
+  CHECK(sample.superseded == 4);
   CHECK(sample.missing == 0);
   CHECK(sample.X_BH.translation_m.x() == Approx(5e-4));
   CHECK(sample.arrived == bench.now);
@@ -100,7 +100,7 @@ TEST_CASE("the newest of several waiting reports wins and the others are counted
   const DeviceSample none = bench.device.read_newest(bench.now);
   CHECK_FALSE(none.fresh);
   CHECK(none.fault == Fault::none);
-  CHECK(none.skipped == 0);
+  CHECK(none.superseded == 0);
   CHECK(none.X_BH.translation_m.x() == Approx(5e-4));
 }
 
@@ -108,7 +108,7 @@ TEST_CASE("a flood costs no more than one ring of reports a read") {
   Bench bench;
   for (int i = 0; i < 200; ++i) bench.push();
   bench.device.read_newest(bench.now);
-  CHECK(bench.link.reports.size() == 200 - ProfileDevice::kMostReportsPerRead);
+  CHECK(bench.link.reports.size() == 200 - ProfileDevice::kMaxReportsPerRead);
 }
 
 TEST_CASE("sequence, clock and lost reports are counted across every wrap") {
@@ -193,7 +193,7 @@ TEST_CASE("a damaged newest report leaves the one before it") {
   const DeviceSample sample = bench.device.read_newest(bench.now);
   CHECK(sample.fresh);
   CHECK(sample.rejected == 1);
-  CHECK(sample.skipped == 0);
+  CHECK(sample.superseded == 0);
   CHECK(sample.X_BH.translation_m.y() == Approx(1e-4));
 }
 
@@ -253,7 +253,7 @@ TEST_CASE("what waited in the link before the first read is thrown away") {
   DeviceSample sample = bench.device.read_newest(bench.now + 1s);
   CHECK_FALSE(sample.fresh);
   CHECK(sample.fault == Fault::none);
-  CHECK(sample.skipped == 0);
+  CHECK(sample.superseded == 0);
   bench.now += 1s;
   sample = bench.step();
   CHECK(sample.fresh);
@@ -329,12 +329,12 @@ TEST_CASE("a pose that jumps farther than any hand is a fault, there and back") 
     bench.report.X_BH.rotation = Quaterniond(Eigen::AngleAxisd(0.039, Vector3d::UnitY()));
   }
   const DeviceSample there = bench.step();
-  CHECK(there.fault == Fault::pose_teleported);
+  CHECK(there.fault == Fault::pose_jumped);
   CHECK(there.X_BH.translation_m == Vector3d::Zero());
   CHECK(there.X_BH.rotation.isApprox(Quaterniond::Identity()));
   CHECK(bench.step().fault == Fault::none);
   bench.report.X_BH = {};
-  CHECK(bench.step().fault == Fault::pose_teleported);
+  CHECK(bench.step().fault == Fault::pose_jumped);
 }
 
 TEST_CASE("a way that is long because reports were lost is no jump") {
@@ -476,9 +476,9 @@ TEST_CASE("with the motors off no wrench is sent") {
 
 TEST_CASE("a device that does not take a wrench is a fault") {
   Bench bench;
-  bench.link.write_status = LinkStatus::empty;
+  bench.link.write_status = LinkStatus::not_ready;
   CHECK(bench.device.write(bench.now, {}, true) == Fault::write_failed);
-  bench.link.write_status = LinkStatus::gone;
+  bench.link.write_status = LinkStatus::disconnected;
   CHECK(bench.device.write(bench.now, {}, true) == Fault::device_lost);
 }
 
@@ -494,7 +494,7 @@ TEST_CASE("release sends five zeros with the motors off, and does no harm in any
     CHECK(bench.link.written[i].report.F.force_N == Vector3d::Zero());
     CHECK(bench.link.written[i].report.F.torque_Nm == Vector3d::Zero());
   }
-  bench.link.write_status = LinkStatus::gone;
+  bench.link.write_status = LinkStatus::disconnected;
   bench.device.release(bench.now);
   bench.device.close();
   bench.device.release(bench.now);
@@ -558,8 +558,8 @@ TEST_CASE(
   device.read_newest(now);
   CHECK(device.write(now, {{20, 0, 0}, {0, 0.1, 0}}, true) == Fault::none);
   const DeviceSample sample = device.read_newest(now);
-  CHECK(dof_text(sample.driven) == "x y z");
-  CHECK(dof_text(sample.dropped) == "ry");
+  CHECK(dof_text(sample.driven_dofs) == "x y z");
+  CHECK(dof_text(sample.dropped_dofs) == "ry");
 
   profile = kProfile;
   profile.watchdog_s = DeviceProfile::kNotStated;

@@ -429,7 +429,7 @@ TEST_CASE("a report that may be short lacks what it lacks, and no more") {
   PoseReportLayout layout;
   layout.id = 3;
   layout.length = 5;
-  layout.least_length = 3;
+  layout.min_length = 3;
   layout.buttons = {.present = true, .byte = 1, .bits = 32};
   const std::array<std::uint8_t, 6> bytes = {3, 0x81, 0x02, 0x04, 0x80, 0xff};
   CHECK(decode(layout, std::span(bytes).first(5)).report.buttons == 0x80040281u);

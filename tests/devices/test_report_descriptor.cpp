@@ -15,7 +15,7 @@ ReportDescriptor parsed(const std::string& hex) {
 }
 
 /// Why it is refused; empty where it is not.
-std::string refusal(const Bytes& bytes) {
+std::string rejection_text(const Bytes& bytes) {
   try {
     parse_report_descriptor(bytes);
   } catch (const DescriptorError& error) {
@@ -201,8 +201,8 @@ TEST_CASE("a field of no bits, and a field that is not there, declare nothing", 
 }
 
 TEST_CASE("items of reserved types and tags are passed over, as Linux does", "[report_descriptor]") {
-  CHECK(refusal(from_hex(framed("0c 81 02 f9 01"))).empty());
-  CHECK(refusal(from_hex(framed("81 02 00 00"))).empty());
+  CHECK(rejection_text(from_hex(framed("0c 81 02 f9 01"))).empty());
+  CHECK(rejection_text(from_hex(framed("81 02 00 00"))).empty());
 }
 
 TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_descriptor]") {
@@ -271,7 +271,7 @@ TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_d
            {framed("81 02") + "a9 01", "byte 21: a delimiter is still open"},
        }) {
     INFO(bad.hex);
-    const std::string message = refusal(from_hex(bad.hex));
+    const std::string message = rejection_text(from_hex(bad.hex));
     INFO(message);
     CHECK(message.find(bad.message) != std::string::npos);
   }
@@ -279,9 +279,10 @@ TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_d
 
 TEST_CASE("every descriptor cut short is refused", "[report_descriptor]") {
   for (const Bytes& whole : sample_descriptors()) {
-    REQUIRE(refusal(whole).empty());
+    REQUIRE(rejection_text(whole).empty());
     for (std::size_t length = 0; length < whole.size(); ++length)
-      CHECK_FALSE(refusal({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}).empty());
+      CHECK_FALSE(
+          rejection_text({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}).empty());
   }
 }
 
@@ -310,7 +311,7 @@ TEST_CASE("a million mutated and random descriptors are accepted whole or refuse
   constexpr int cases = 1'000'000;  // under sanitizers too: it is memory that such bytes are after
   int accepted = 0;
   for (int i = 0; i < cases; ++i) {
-    const Bytes bytes = strange_descriptor(random);
+    const Bytes bytes = malformed_descriptor(random);
     try {
       check_sound(parse_report_descriptor(bytes));
       ++accepted;

@@ -12,15 +12,15 @@ namespace {
 
 using namespace test;
 
-SixAxesFound found_in(const Bytes& bytes) {
+SixAxisResult found_in(const Bytes& bytes) {
   return find_six_axes(parse_report_descriptor(bytes));
 }
 
-SixAxes six_axes(const Bytes& bytes) {
-  const SixAxesFound found = found_in(bytes);
-  INFO(found.why_not);
-  REQUIRE(found.device);
-  return *found.device;
+SixAxisController six_axes(const Bytes& bytes) {
+  const SixAxisResult found = found_in(bytes);
+  INFO(found.rejection);
+  REQUIRE(found.controller);
+  return *found.controller;
 }
 
 /// A multi-axis controller of these items.
@@ -38,7 +38,7 @@ TEST_CASE("split and combined layouts are told by the descriptor alone", "[six_a
 }
 
 TEST_CASE("a SpaceNavigator's axes, buttons and LED are where they are known to be", "[six_axes]") {
-  const SixAxes device = six_axes(space_navigator());
+  const SixAxisController device = six_axes(space_navigator());
   for (std::size_t i = 0; i < 6; ++i) {
     const DescribedNumber& axis = device.axes[i];
     CHECK(axis.report_id == (i < 3 ? 1 : 2));
@@ -60,8 +60,8 @@ TEST_CASE("a SpaceNavigator's axes, buttons and LED are where they are known to 
 }
 
 TEST_CASE("combined axes follow each other, on byte borders or not", "[six_axes]") {
-  const SixAxes wireless = six_axes(space_mouse_wireless());
-  const SixAxes ten = six_axes(ten_bit_axes());
+  const SixAxisController wireless = six_axes(space_mouse_wireless());
+  const SixAxisController ten = six_axes(ten_bit_axes());
   for (std::size_t i = 0; i < 6; ++i) {
     CHECK(wireless.axes[i].report_id == 1);
     CHECK(wireless.axes[i].bit == 8 + 16 * i);
@@ -79,7 +79,7 @@ TEST_CASE("combined axes follow each other, on byte borders or not", "[six_axes]
 
 TEST_CASE("steps come from physical range, exponent and unit", "[six_axes]") {
   const auto steps = [](const std::string& units) {
-    const SixAxes device = six_axes(controller(units + "19 30 29 35 95 06 81 02"));
+    const SixAxisController device = six_axes(controller(units + "19 30 29 35 95 06 81 02"));
     return std::pair(device.axes[0].step, device.axes[3].step);
   };
   CHECK(steps("65 11 55 0e").first == Approx(1e-4));  // no physical range: a count is a hundredth of a cm
@@ -109,10 +109,10 @@ TEST_CASE("what has no six axes is told apart, with the reason", "[six_axes]") {
            Other{controller("85 01 19 30 29 31 95 02 81 02 85 02 19 32 29 35 95 04 81 02"),
                  "its axes are spread over its reports otherwise"},
        }) {
-    const SixAxesFound found = found_in(other.bytes);
-    INFO(found.why_not);
-    CHECK_FALSE(found.device);
-    CHECK(found.why_not.find(other.why_not) != std::string::npos);
+    const SixAxisResult found = found_in(other.bytes);
+    INFO(found.rejection);
+    CHECK_FALSE(found.controller);
+    CHECK(found.rejection.find(other.why_not) != std::string::npos);
   }
 }
 

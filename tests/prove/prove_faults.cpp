@@ -35,15 +35,15 @@ Outcome run(std::uint64_t seed) {
     return outcome;
   }
   const auto ticks_of = [&](int n) {
-    for (int i = 0; i < n && rig.broken().empty(); ++i) {
-      if (random.integer(0, 400) == 0) rig.loop.ask(static_cast<CommandSet>(1 << random.integer(0, 7)));
-      if (random.integer(0, 40) == 0) rig.loop.live();
+    for (int i = 0; i < n && rig.violation().empty(); ++i) {
+      if (random.integer(0, 400) == 0) rig.loop.request(static_cast<CommandSet>(1 << random.integer(0, 7)));
+      if (random.integer(0, 40) == 0) rig.loop.heartbeat();
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));
-      if (rig.found(Fault::device_lost)) {  // it is opened again, as the daemon does
-        rig.spoiled.write_says = Fault::none;
+      if (rig.raised(Fault::device_lost)) {  // it is opened again, as the daemon does
+        rig.faulty_device.write_result = Fault::none;
         try {
-          rig.spoiled.open();
+          rig.faulty_device.open();
         } catch (const std::runtime_error&) {  // still unplugged
         }
       }
@@ -54,24 +54,24 @@ Outcome run(std::uint64_t seed) {
     const auto& all = injections();
     all[static_cast<std::size_t>(random.integer(0, static_cast<int>(all.size()) - 1))].begin(rig);
     ticks_of(random.integer(1, 120));
-    if (random.integer(0, 1) == 0) rig.spoiled.spoil = {};
+    if (random.integer(0, 1) == 0) rig.faulty_device.corrupt = {};
   }
-  rig.spoiled.spoil = {};
-  rig.spoiled.write_says = Fault::none;
-  rig.clock.solver_takes = Duration{0};
+  rig.faulty_device.corrupt = {};
+  rig.faulty_device.write_result = Fault::none;
+  rig.clock.solver_time = Duration{0};
   ticks_of(500);
   // All planned faults are over after six seconds at most; the device may have to be opened again.
-  for (int i = 0; i < 9000 && rig.broken().empty() && rig.state() != State::disarmed; ++i) {
-    if (i % 500 == 0) rig.loop.ask(kAcknowledge);
-    rig.loop.ask(kDisarm);
+  for (int i = 0; i < 9000 && rig.violation().empty() && rig.state() != State::disarmed; ++i) {
+    if (i % 500 == 0) rig.loop.request(kAcknowledge);
+    rig.loop.request(kDisarm);
     rig.tick();
-    if (!rig.found(Fault::device_lost)) continue;
+    if (!rig.raised(Fault::device_lost)) continue;
     try {
-      rig.spoiled.open();
+      rig.faulty_device.open();
     } catch (const std::runtime_error&) {
     }
   }
-  outcome.broken = rig.broken();
+  outcome.broken = rig.violation();
   if (outcome.broken.empty() && rig.state() != State::disarmed)
     outcome.broken = std::string("does not come back: ") + name(rig.state());
   outcome.ticks = rig.last().tick + 1;

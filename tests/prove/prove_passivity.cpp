@@ -91,10 +91,10 @@ Circumstances draw(RandomValues& random, const Options& options) {
     c.hand.viscous_friction_N_s_per_m = options.friction[0];
     c.hand.viscous_friction_Nm_s_per_rad = options.friction[1];
   }
-  c.hand.hand_stiffness_N_per_m = random.decades(30.0, 800.0);
-  c.hand.hand_damping_N_s_per_m = random.decades(0.3, 8.0);
-  c.hand.hand_stiffness_Nm_per_rad = random.decades(0.1, 3.0);
-  c.hand.hand_damping_Nm_s_per_rad = random.decades(0.001, 0.03);
+  c.hand.hand_stiffness_N_per_m = random.log_uniform(30.0, 800.0);
+  c.hand.hand_damping_N_s_per_m = random.log_uniform(0.3, 8.0);
+  c.hand.hand_stiffness_Nm_per_rad = random.log_uniform(0.1, 3.0);
+  c.hand.hand_damping_Nm_s_per_rad = random.log_uniform(0.001, 0.03);
   return c;
 }
 
@@ -121,20 +121,20 @@ HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
     switch (random.integer(0, 3)) {
       case 0:  // push and hold
         p.z() = touching_m - random.uniform(0.0, 0.02);
-        go(random.decades(0.04, 0.4));
+        go(random.log_uniform(0.04, 0.4));
         go(random.uniform(0.05, 0.3));
         break;
       case 1:  // tap
         p.z() = touching_m - random.uniform(0.002, 0.015);
-        go(random.decades(0.015, 0.1));
+        go(random.log_uniform(0.015, 0.1));
         p.z() = touching_m + random.uniform(0.0, 0.008);
-        go(random.decades(0.015, 0.1));
+        go(random.log_uniform(0.015, 0.1));
         break;
       case 2:  // drag, and turn
         p += Vector3d(random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), 0.0);
         p.z() = touching_m - random.uniform(-0.004, 0.012);
         turn += random.vector<3>(0.1);
-        go(random.decades(0.04, 0.4));
+        go(random.log_uniform(0.04, 0.4));
         break;
       default:  // let go
         way.open_hand.emplace_back(t, t + 0.15);
@@ -221,7 +221,7 @@ class Host {
     gains.stiffness = scale * coupling.stiffness;
     gains.damping = scale * coupling.damping;
     law_ = WrenchLaw(gains);
-    PassivityCaps caps;
+    PassivityLimits caps;
     caps.delay_ticks =
         static_cast<std::size_t>(std::lround(measured_.typical_delay_s() / measured_.period_s().mean_s()));
     guard_ = PassivityGuard(device, caps);
@@ -236,9 +236,9 @@ class Host {
       render(report.X_BH, dt_s);
     }
     Wrench F = F_;
-    if (options_.guarded) F = guard_.guard(F_, report.X_BH, dt_s, in_contact_);
+    if (options_.guarded) F = guard_.limit(F_, report.X_BH, dt_s, in_contact_);
     const Wrench out = limits_.apply({F, 1.0, circumstances_.period_s, {}, Vector3d::Zero()}).F;
-    if (options_.guarded) guard_.told(out);
+    if (options_.guarded) guard_.record_sent(out);
     return out;
   }
 
@@ -248,9 +248,9 @@ class Host {
     const Penetration depth = depth_.follow(X_WP, X_WQ_);
     X_WQ_ = depth.projection.X_WQ;
     in_contact_ = depth.contacts > 0;
-    const Wrench F_T = options_.pid ? law_.update(depth.drive, in_contact_, dt_s)
+    const Wrench F_T = options_.pid ? law_.update(depth.spring_displacement, in_contact_, dt_s)
                                     : law_.update_damping(energy_wrench(M_, stiffness_per_s2_, X_WP, X_WQ_),
-                                                          depth.drive, in_contact_, dt_s);
+                                                          depth.spring_displacement, in_contact_, dt_s);
     F_ = wrench_about(X_WH.translation_m, X_WP, F_T);
   }
 
@@ -360,7 +360,7 @@ class Run {
   /// Of the true pose, not the one that the encoders see.
   bool free() {
     const Pose X_WT = handle_.X_BH() * c_.X_HT;
-    touch_.admit(X_WT, 0.0);
+    touch_.select_admitting_planes(X_WT, 0.0);
     return touch_.admits(X_WT, 0.0);
   }
 

@@ -51,22 +51,22 @@ long resident_pages() {
 /// A handle on the spring of a hand that follows the shipped path, a report a tick.
 class HeldHandle final : public ReportLink {
  public:
-  explicit HeldHandle(const Plan& plan)
+  explicit HeldHandle(const RunConfig& plan)
       : layout_(plan.profile.pose_report),
         period_(from_seconds(1.0 / plan.profile.report_rate_Hz)),
         path_(plan.settings.simulation),
         firmware_(plan.profile, plan.settings.simulation, period_),
         stiffness_N_per_m_(plan.settings.simulation.hand_stiffness_N_per_m),
         stiffness_Nm_per_rad_(plan.settings.simulation.hand_stiffness_Nm_per_rad) {
-    firmware_.settle(path_.at(Duration{0}).X_BG);
+    firmware_.initialize_encoders(path_.at(Duration{0}).X_BG);
   }
 
   void open() override {}
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override {
-    if (now < next_) return {LinkStatus::empty, 0, now};
+    if (now < next_) return {LinkStatus::not_ready, 0, now};
     next_ = now + period_;
     firmware_.sample(held(now));
-    return {LinkStatus::ok, encode(layout_, firmware_.report(now.time_since_epoch()), buffer), now};
+    return {LinkStatus::ok, encode(layout_, firmware_.make_report(now.time_since_epoch()), buffer), now};
   }
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override {
     firmware_.take_command(now, report);
@@ -79,7 +79,7 @@ class HeldHandle final : public ReportLink {
   /// Where spring and motors are in balance; the wrench is smoothed, for a spring alone would ring at half
   /// the rate of the loop.
   Pose held(TimePoint now) noexcept {
-    const Wrench F = firmware_.motors(now);
+    const Wrench F = firmware_.motor_wrench(now);
     F_ = {F_.force_N + kSmoothing * (F.force_N - F_.force_N),
           F_.torque_Nm + kSmoothing * (F.torque_Nm - F_.torque_Nm)};
     const Pose X_BG = path_.at(now.time_since_epoch()).X_BG;
@@ -107,10 +107,10 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   app.add_option("--seed", seed, "unused: every run is the same");
   CLI11_PARSE(app, argc, argv);
-  const Plan plan = shipped_plan();
+  const RunConfig plan = shipped_config();
   VirtualClock clock;
   HeldHandle handle(plan);
-  Station station(plan, handle, clock, PlaceIn::step);
+  Runtime station(plan, handle, clock, ProxySearchMode::in_tick);
   station.open();
   ServoLoop& loop = station.loop();
   TickRecord last;
@@ -131,7 +131,7 @@ int main(int argc, char** argv) {
       const RealtimeGuard guard;
       clock.sleep_until(clock.now() + period);
       loop.tick(clock.now(), clock.now());
-      loop.latest().read(last);
+      loop.latest_record().read(last);
       allocations += guard.allocations();
       locks += guard.locks();
     }

@@ -54,9 +54,9 @@ struct Times {
   }
 };
 
-Plan plan_of() {
-  Plan plan = read_plan({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
-                        SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+RunConfig plan_of() {
+  RunConfig plan = load_run_config({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
+                                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   plan.settings.servo.realtime = Realtime::best_effort;
   plan.settings.servo.self_test_s = 0.0;
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()},
@@ -70,7 +70,7 @@ Plan plan_of() {
 /// Asks for one change after the other.
 class Asker {
  public:
-  Asker(Workbench& bench, const fs::path& directory, std::uint64_t seed)
+  Asker(Reconfigurator& bench, const fs::path& directory, std::uint64_t seed)
       : bench_(bench), directory_(directory), engine_(seed) {}
 
   /// True where it was taken.
@@ -79,21 +79,22 @@ class Asker {
     try {
       switch (static_cast<int>(between(0.0, 5.0))) {
         case 0:
-          bench_.load(scene(good));
+          bench_.replace_scene(scene(good));
           return true;
         case 1:
           bench_.set_rendering(toml("[wrench]\nenergy_stiffness_per_s2 = " + gain), "ask");
           return true;
         case 2:
-          bench_.move(good ? "block" : "blok",
-                      {Quaterniond::Identity(), {between(-0.08, 0.08), between(-0.08, 0.08), 0.0}}, 0.5);
+          bench_.move_obstacle(good ? "block" : "blok",
+                               {Quaterniond::Identity(), {between(-0.08, 0.08), between(-0.08, 0.08), 0.0}},
+                               0.5);
           return true;
         case 3:
-          bench_.remove(good ? "block" : "blok");
+          bench_.remove_obstacle(good ? "block" : "blok");
           return true;
         default:
           bench_.reload([&] {
-            Plan plan = plan_of();
+            RunConfig plan = plan_of();
             change_rendering(toml("[wrench]\nenergy_stiffness_per_s2 = " + gain), "ask", plan.settings);
             plan.scene = load_scene(scene(good));
             return plan;
@@ -121,7 +122,7 @@ class Asker {
     return file;
   }
 
-  Workbench& bench_;
+  Reconfigurator& bench_;
   fs::path directory_;
   std::mt19937_64 engine_;
   int scenes_ = 0;
@@ -138,13 +139,13 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
 
   const test::TemporaryDirectory directory;
-  const Plan plan = plan_of();
+  const RunConfig plan = plan_of();
   for (const RealtimeGrant& grant : lock_memory(plan.settings.servo.realtime))
-    std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.what.c_str());
+    std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.request.c_str());
   WallClock clock;
   SimulatedDevice simulated(plan.profile, plan.settings.simulation);
   LoopbackLink link(simulated, clock, plan.settings.simulation);
-  Station station(plan, link, clock);
+  Runtime station(plan, link, clock);
   station.open();
 
   std::map<std::uint32_t, std::uint64_t> sums;  // of what was handed over, by number
@@ -154,7 +155,7 @@ int main(int argc, char** argv) {
   test::Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
                                plan.settings.limits.force_slew_N_per_s,
                                plan.settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3});
-  const SharedState& state = station.show_state();
+  const SharedState& state = station.enable_shared_state();
   std::uint64_t missed = 0;
   std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, loop_faults = 0;
   std::atomic<std::uint64_t> pushed{0};
@@ -162,16 +163,16 @@ int main(int argc, char** argv) {
   std::vector<TickRecord> waiting;  // for a sum that was not told yet
   const auto judge = [&](const TickRecord& r) {
     const std::lock_guard lock(sums_mutex);
-    const auto sum = sums.find(r.rendering);
+    const auto sum = sums.find(r.rendering_id);
     if (sum == sums.end()) return false;
-    torn += sum->second == r.rendering_sum ? 0 : 1;
+    torn += sum->second == r.rendering_checksum ? 0 : 1;
     return true;
   };
 
   std::atomic<bool> stop{false};
   std::thread servo([&] {
     for (const RealtimeGrant& grant : prepare_servo_thread(plan.settings.servo))
-      std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.what.c_str());
+      std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.request.c_str());
     station.loop().run(clock, stop);
   });
   std::thread watcher([&] {
@@ -188,7 +189,7 @@ int main(int argc, char** argv) {
       const TickRecord& r = seen.tick;
       if (first) {
         const std::lock_guard lock(sums_mutex);
-        sums[0] = r.rendering_sum;
+        sums[0] = r.rendering_checksum;
         first = false;
       }
       if (const auto what = invariants.check(r)) {
@@ -199,16 +200,16 @@ int main(int argc, char** argv) {
       Times& times = changing.load() ? with : without;
       times.tick_us.push_back(tick_us);
       times.late_us.push_back(1e-3 * static_cast<double>(r.wake_latency_ns));
-      felt.insert(r.rendering);
+      felt.insert(r.rendering_id);
       in_contact += r.contacts > 0 ? 1 : 0;
       pushed += r.F_out[2] > 0.2 ? 1 : 0;
       loop_faults +=
-          (r.faults & (bit(Fault::tick_late) | bit(Fault::loop_stopped) | bit(Fault::answer_late))) != 0;
+          (r.faults & (bit(Fault::tick_late) | bit(Fault::loop_stalled) | bit(Fault::wrench_late))) != 0;
       if (!judge(r)) waiting.push_back(r);
     }
   });
 
-  Asker asker(station.workbench(), directory.path(), seed);
+  Asker asker(station.reconfigurator(), directory.path(), seed);
   int applied = 0, refused = 0, done = 0;
   // A hand that presses, before anything is changed.
   for (const TimePoint end = clock.now() + std::chrono::seconds(20); pushed == 0 && clock.now() < end;) {
@@ -222,7 +223,7 @@ int main(int argc, char** argv) {
     const TimePoint began = clock.now();
     for (int i = 0; i < kInARow && done < changes; ++i, ++done) {
       (asker.ask(done % 2 == 0) ? applied : refused) += 1;
-      const auto [number, sum] = station.workbench().handed_over();
+      const auto [number, sum] = station.reconfigurator().current_rendering();
       {
         const std::lock_guard lock(sums_mutex);
         if (number > 0) sums[number] = sum;
@@ -231,7 +232,7 @@ int main(int argc, char** argv) {
       if (is_latched(station.loop().state())) station.loop().acknowledge();
     }
     const Duration took = clock.now() - began;
-    while (station.loop().changing()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (station.loop().crossfading()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     changing.store(false);
     std::this_thread::sleep_for(took);
   }

@@ -14,19 +14,19 @@ namespace wrenchd::test {
 
 /// The shipped station with a boulder of 60 mm around the origin in the place of its table. The hand goes
 /// from one place to the next as it is told, and stays at the last.
-struct Buried {
+struct BuriedTool {
   TemporaryDirectory files;  ///< with the boulder
-  Plan plan = shipped_plan();
+  RunConfig config = shipped_config();
 
-  explicit Buried(const std::vector<Waypoint>& path, std::size_t triangles = 2000) {
+  explicit BuriedTool(const std::vector<Waypoint>& path, std::size_t triangles = 2000) {
     std::ostringstream boulder;
     write_off(boulder, make_mesh({"boulder", triangles}));
-    plan.scene.half_spaces.clear();
-    MeshObstacleSettings& obstacle = plan.scene.meshes.emplace_back();
+    config.scene.half_spaces.clear();
+    MeshObstacleSettings& obstacle = config.scene.meshes.emplace_back();
     obstacle.name = "boulder";
     obstacle.mesh = files.write("boulder.off", boulder.str());
-    plan.settings.simulation.hand_path = path;
-    plan.settings.simulation.hand_repeats = false;
+    config.settings.simulation.hand_path = path;
+    config.settings.simulation.hand_repeats = false;
   }
 };
 
@@ -41,13 +41,14 @@ inline std::vector<HalfSpaceSettings> closed_box(double half_m) {
   return walls;
 }
 
-inline Placing placing(const VirtualStation& s) {
-  return static_cast<Placing>(s.last.placing);
+inline ProxyInitialization proxy_initialization(const VirtualRuntime& s) {
+  return static_cast<ProxyInitialization>(s.last.proxy_initialization);
 }
 
 /// Gives a placer on a thread of its own time to answer, while little passes for the hand.
-inline void let_placer_work(const VirtualStation& s) {
-  if (placing(s) == Placing::seeking) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+inline void wait_for_proxy_search(const VirtualRuntime& s) {
+  if (proxy_initialization(s) == ProxyInitialization::searching)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 
 }  // namespace wrenchd::test

@@ -25,12 +25,12 @@
 namespace wrenchd::test {
 
 /// Users that a rig's clients can be.
-enum class As : uid_t { stranger = 60001, observer = 60002, operator_ = 60003, administrator = 60004 };
+enum class TestUser : uid_t { stranger = 60001, observer = 60002, operator_ = 60003, administrator = 60004 };
 
 /// A client that can misbehave. Its address tells the rig who it wants to be.
 class RigClient {
  public:
-  RigClient(const std::filesystem::path& path, As who) : RigClient(path, static_cast<uid_t>(who)) {}
+  RigClient(const std::filesystem::path& path, TestUser who) : RigClient(path, static_cast<uid_t>(who)) {}
   RigClient(const std::filesystem::path& path, uid_t uid)
       : fd_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     static std::atomic<int> number{0};
@@ -50,7 +50,7 @@ class RigClient {
   }
 
   int fd() const noexcept { return fd_.get(); }
-  void hang_up() noexcept { fd_.reset(); }
+  void disconnect() noexcept { fd_.reset(); }
 
   /// As much as goes, within a second. False: the other side has hung up, or reads no more.
   bool send(std::string_view bytes) {
@@ -69,12 +69,12 @@ class RigClient {
   }
 
   /// The next line, without its end; nothing: it did not come in time, or the other side has hung up.
-  std::optional<std::string> line(std::chrono::milliseconds limit = std::chrono::seconds(5)) {
+  std::optional<std::string> read_line(std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (true) {
-      if (const auto at = in_.find('\n'); at != std::string::npos) {
-        std::string first = in_.substr(0, at);
-        in_.erase(0, at + 1);
+      if (const auto at = received_.find('\n'); at != std::string::npos) {
+        std::string first = received_.substr(0, at);
+        received_.erase(0, at + 1);
         return first;
       }
       const auto left =
@@ -84,20 +84,20 @@ class RigClient {
       char bytes[65536];
       const ssize_t got = ::recv(fd_.get(), bytes, sizeof bytes, 0);
       if (got <= 0) {
-        over_ = true;
+        closed_by_peer_ = true;
         return {};
       }
-      in_.append(bytes, static_cast<std::size_t>(got));
+      received_.append(bytes, static_cast<std::size_t>(got));
     }
   }
   /// The other side has hung up, as far as line() has seen.
-  bool over() const noexcept { return over_; }
+  bool closed_by_peer() const noexcept { return closed_by_peer_; }
 
   /// Asks, and waits for the answer to that; events meanwhile are kept. The whole reply; null: none came.
-  Json ask(const std::string& method, const Json& params = Json::object()) {
+  Json request(const std::string& method, const Json& params = Json::object()) {
     const int id = ++last_id_;
     if (!send(request_line(id, method, params))) return nullptr;
-    while (const auto text = line()) {
+    while (const auto text = read_line()) {
       Json reply = Json::parse(*text);
       if (reply.contains("id") && reply["id"] == id) return reply;
       if (reply.contains("method")) events.push_back(reply["params"]);
@@ -105,26 +105,26 @@ class RigClient {
     return nullptr;
   }
   Json result(const std::string& method, const Json& params = Json::object()) {
-    const Json reply = ask(method, params);
+    const Json reply = request(method, params);
     if (!reply.is_object() || !reply.contains("result"))
       throw std::runtime_error(method + ": " + reply.dump());
     return reply["result"];
   }
   /// The code of the error that it answers; 0: none.
-  int code(const std::string& method, const Json& params = Json::object()) {
-    const Json reply = ask(method, params);
+  int error_code(const std::string& method, const Json& params = Json::object()) {
+    const Json reply = request(method, params);
     return reply.is_object() && reply.contains("error") ? reply["error"]["code"].get<int>() : 0;
   }
-  void beat() { send("{\"jsonrpc\":\"2.0\",\"method\":\"beat\"}\n"); }
+  void heartbeat() { send("{\"jsonrpc\":\"2.0\",\"method\":\"beat\"}\n"); }
   /// The next event of that name; null: it did not come in time.
-  Json event(const std::string& name, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
+  Json next_event(const std::string& name, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     while (true) {
       while (!events.empty()) {
         Json first = events.front();
         events.pop_front();
         if (first["name"] == name) return first;
       }
-      const auto text = line(limit);
+      const auto text = read_line(limit);
       if (!text) return nullptr;
       Json told = Json::parse(*text);
       if (told.contains("method")) events.push_back(told["params"]);
@@ -135,14 +135,14 @@ class RigClient {
 
  private:
   OwnedFd fd_;
-  std::string in_;
-  bool over_ = false;
+  std::string received_;
+  bool closed_by_peer_ = false;
   int last_id_ = 0;
 };
 
 /// Above the table, and still: one that can be armed.
-inline Plan resting_plan() {
-  Plan plan = shipped_plan();
+inline RunConfig resting_config() {
+  RunConfig plan = shipped_config();
   plan.settings.servo.realtime = Realtime::best_effort;
   plan.settings.limits.soft_start_s = 0.25;
   plan.settings.simulation.hand_path = {{0.0, Vector3d(0.0, 0.0, 0.065), Vector3d::Zero()}};
@@ -158,15 +158,15 @@ inline Plan resting_plan() {
 /// who it is.
 class ControlRig {
  public:
-  explicit ControlRig(const Plan& plan = resting_plan(), const std::vector<MethodRow>& more = {})
-      : station_(plan), feed_(station_.station.loop()), control_(station_.station, feed_) {
+  explicit ControlRig(const RunConfig& plan = resting_config(), const std::vector<MethodRow>& more = {})
+      : runtime_(plan), feed_(runtime_.runtime.loop()), control_(runtime_.runtime, feed_) {
     for (const MethodRow& row : more) control_.methods().add(row);
-    control_.open(path(), [](int socket) { return named(socket); });
+    control_.open(path(), [](int socket) { return peer_of(socket); });
     servo_ = std::thread([this] {
-      prepare_servo_thread(station_.station.plan().settings.servo);
-      station_.station.loop().run(station_.clock, stop_);
+      prepare_servo_thread(runtime_.runtime.config().settings.servo);
+      runtime_.runtime.loop().run(runtime_.clock, stop_);
     });
-    comes_to(State::disarmed);
+    wait_for_state(State::disarmed);
   }
   ~ControlRig() {
     stop_ = true;
@@ -174,13 +174,13 @@ class ControlRig {
   }
 
   std::filesystem::path path() const { return files_.path() / "control.sock"; }
-  RigClient connect(As who) const { return {path(), who}; }
-  ServoLoop& loop() { return station_.station.loop(); }
+  RigClient connect(TestUser who) const { return {path(), who}; }
+  ServoLoop& loop() { return runtime_.runtime.loop(); }
   EventFeed& feed() { return feed_; }
   State state() { return loop().state(); }
 
   /// A fault that the machine made, by letting the loop wait, is acknowledged; a stop is not.
-  bool comes_to(State state, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
+  bool wait_for_state(State state, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (loop().state() != state && std::chrono::steady_clock::now() < end) {
       if (loop().state() == State::fault) loop().acknowledge();
@@ -190,7 +190,7 @@ class ControlRig {
   }
 
  private:
-  static std::optional<Peer> named(int socket) {
+  static std::optional<Peer> peer_of(int socket) {
     sockaddr_un address{};
     socklen_t length = sizeof address;
     if (getpeername(socket, reinterpret_cast<sockaddr*>(&address), &length) != 0) return {};
@@ -198,17 +198,17 @@ class ControlRig {
     if (length <= begin) return {};
     const std::string name(address.sun_path + 1, length - begin);
     const auto uid = static_cast<uid_t>(std::stoul(name.substr(name.rfind('-') + 1)));
-    if (uid == static_cast<uid_t>(As::stranger)) return {};
+    if (uid == static_cast<uid_t>(TestUser::stranger)) return {};
     Peer peer{uid, 65534, {}, 1};
-    if (uid == static_cast<uid_t>(As::operator_)) peer.groups = {getegid()};
-    if (uid == static_cast<uid_t>(As::administrator)) peer.groups = {1};  // daemon
+    if (uid == static_cast<uid_t>(TestUser::operator_)) peer.groups = {getegid()};
+    if (uid == static_cast<uid_t>(TestUser::administrator)) peer.groups = {1};  // daemon
     return peer;
   }
 
   TemporaryDirectory files_;
-  SimulatedStation<WallClock> station_;
+  SimulatedRuntime<WallClock> runtime_;
   EventFeed feed_;
-  Control control_;
+  ControlInterface control_;
   std::atomic<bool> stop_{false};
   std::thread servo_;
 };

@@ -26,14 +26,14 @@ Exact::Point_3 exact(const Vector3d& p) {
 
 }  // namespace
 
-struct ExactMeeting::Meshes {
+struct ExactIntersection::Meshes {
   TriangleMesh a;
   RoughTriangles rough_b;
   std::vector<Exact::Triangle_3> exact_b;
   Tree tree_b;
 };
 
-ExactMeeting::ExactMeeting(const TriangleMesh& a, const TriangleMesh& b)
+ExactIntersection::ExactIntersection(const TriangleMesh& a, const TriangleMesh& b)
     : meshes_(std::make_unique<Meshes>()) {
   meshes_->a = a;
   for (const auto& [i, j, k] : b.triangles) {
@@ -48,14 +48,14 @@ ExactMeeting::ExactMeeting(const TriangleMesh& a, const TriangleMesh& b)
   meshes_->tree_b.build();
 }
 
-ExactMeeting::~ExactMeeting() = default;
+ExactIntersection::~ExactIntersection() = default;
 
-bool ExactMeeting::meet(const Pose& X_BA) const {
-  return pairs(X_BA) > 0;
+bool ExactIntersection::intersect(const Pose& X_BA) const {
+  return intersecting_pairs(X_BA) > 0;
 }
 
 /// Boxes that hold every triangle with room to spare find the few pairs that are looked at exactly.
-std::size_t ExactMeeting::pairs(const Pose& X_BA) const {
+std::size_t ExactIntersection::intersecting_pairs(const Pose& X_BA) const {
   constexpr double kRoom_m = 1e-9;
   const Quaterniond& q = X_BA.rotation;
   const Exact::FT w = q.w(), x = q.x(), y = q.y(), z = q.z();

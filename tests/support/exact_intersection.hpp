@@ -11,15 +11,15 @@ namespace wrenchd::test {
 
 /// Do two meshes have a point in common? Answered by CGAL, in exact arithmetic throughout, and by nothing of
 /// ours: the pose's numbers are taken as the fractions that they are, its rotation as q v q* / |q|^2.
-class ExactMeeting {
+class ExactIntersection {
  public:
   /// a moves, b stands still.
-  ExactMeeting(const TriangleMesh& a, const TriangleMesh& b);
-  ~ExactMeeting();
+  ExactIntersection(const TriangleMesh& a, const TriangleMesh& b);
+  ~ExactIntersection();
 
-  bool meet(const Pose& X_BA) const;
+  bool intersect(const Pose& X_BA) const;
   /// Pairs of triangles that have a point in common.
-  std::size_t pairs(const Pose& X_BA) const;
+  std::size_t intersecting_pairs(const Pose& X_BA) const;
 
  private:
   struct Meshes;

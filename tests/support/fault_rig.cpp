@@ -14,8 +14,8 @@ constexpr double kPressed_s = 0.5;  ///< by then the hand is where the phase wan
 constexpr int kDeadman = 0;
 constexpr int kStopButton = 1;
 
-Plan rig_plan(Phase phase, const std::function<void(Plan&)>& adjust) {
-  Plan plan = shipped_plan();
+RunConfig rig_plan(Phase phase, const std::function<void(RunConfig&)>& adjust) {
+  RunConfig plan = shipped_config();
   plan.settings.servo.realtime = Realtime::required;
   plan.settings.servo.self_test_s = 0.03;
   plan.settings.limits.soft_start_s = 0.05;
@@ -30,7 +30,7 @@ Plan rig_plan(Phase phase, const std::function<void(Plan&)>& adjust) {
   return plan;
 }
 
-Invariants::Limits limits_of(const Plan& plan) {
+Invariants::Limits limits_of(const RunConfig& plan) {
   return {plan.profile.max_force_N,
           plan.profile.max_torque_Nm,
           plan.settings.limits.force_slew_N_per_s,
@@ -50,7 +50,7 @@ std::function<void(FaultRig&)> wire(Kind kind, double for_s, double value = 0.0)
   return [=](FaultRig& rig) { rig.inject(kind, for_s, value); };
 }
 std::function<void(FaultRig&)> spoil(std::function<void(DeviceSample&)> how) {
-  return [how](FaultRig& rig) { rig.spoiled.spoil = how; };
+  return [how](FaultRig& rig) { rig.faulty_device.corrupt = how; };
 }
 
 }  // namespace
@@ -59,25 +59,25 @@ const char* name(Phase phase) {
   return phase == Phase::free ? "free" : phase == Phase::contact ? "contact" : "saturated";
 }
 
-FaultRig::FaultRig(Phase phase, const std::function<void(Plan&)>& adjust)
-    : plan(rig_plan(phase, adjust)),
-      scene(plan.scene),
-      simulated(plan.profile, plan.settings.simulation),
-      link(simulated, clock, plan.settings.simulation),
-      device(plan.profile, link),
-      spoiled(device),
-      placer(scene),
-      loop(plan.settings, plan.profile, spoiled, scene, placer, clock),
-      invariants_(limits_of(plan)) {
-  simulated.inject({Kind::press, Duration{0}, std::chrono::hours(1), kDeadman});
-  spoiled.open();
+FaultRig::FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust)
+    : config(rig_plan(phase, adjust)),
+      scene(config.scene),
+      simulated(config.profile, config.settings.simulation),
+      link(simulated, clock, config.settings.simulation),
+      device(config.profile, link),
+      faulty_device(device),
+      proxy_initializer(scene),
+      loop(config.settings, config.profile, faulty_device, scene, proxy_initializer, clock),
+      invariants_(limits_of(config)) {
+  simulated.inject({Kind::press_button, Duration{0}, std::chrono::hours(1), kDeadman});
+  faulty_device.open();
 }
 
 const TickRecord& FaultRig::tick(Duration after) {
   clock.step(after);
   loop.tick(clock.now(), clock.now());
-  loop.latest().read(last_);
-  if (const auto wrong = invariants_.check(last_); wrong && broken_.empty()) broken_ = *wrong;
+  loop.latest_record().read(last_);
+  if (const auto wrong = invariants_.check(last_); wrong && violation_.empty()) violation_ = *wrong;
   return last_;
 }
 
@@ -102,7 +102,7 @@ bool FaultRig::bring_to(State state) {
     case State::active:
       break;
     case State::waiting:
-      loop.start_over();
+      loop.reinitialize_proxy();
       break;
     case State::degraded:
     case State::ramping:
@@ -112,11 +112,11 @@ bool FaultRig::bring_to(State state) {
       loop.disarm();
       break;
     case State::fault:
-      spoiled.spoil = [](DeviceSample& s) {
+      faulty_device.corrupt = [](DeviceSample& s) {
         s.X_BH.translation_m.x() = std::numeric_limits<double>::quiet_NaN();
       };
       tick();
-      spoiled.spoil = {};
+      faulty_device.corrupt = {};
       break;
     case State::stopped:
       loop.stop();
@@ -160,11 +160,11 @@ const std::vector<Injection>& injections() {
     add({"a write finds nobody",
          Fault::device_lost,
          1,
-         [](FaultRig& r) { r.spoiled.write_says = Fault::device_lost; },
+         [](FaultRig& r) { r.faulty_device.write_result = Fault::device_lost; },
          {},
          not_testing});
-    add({"garbled", Fault::report_malformed, 3, wire(Kind::garble, 0.1)});
-    add({"garbled for long", Fault::sample_stale, 24, wire(Kind::garble, 0.1)});
+    add({"garbled", Fault::report_malformed, 3, wire(Kind::corrupt, 0.1)});
+    add({"garbled for long", Fault::sample_stale, 24, wire(Kind::corrupt, 0.1)});
     add({"short", Fault::report_malformed, 3, wire(Kind::short_report, 0.1)});
     add({"long", Fault::report_malformed, 3, wire(Kind::long_report, 0.1)});
     add({"of another id", Fault::report_malformed, 3, wire(Kind::wrong_id, 0.1)});
@@ -172,14 +172,14 @@ const std::vector<Injection>& injections() {
     add({"frozen for long", Fault::sample_stale, 24, wire(Kind::freeze, 0.1)});
     add({"each report twice", Fault::link_lossy, 60, wire(Kind::repeat, 0.3), {}, not_testing});
     add({"each report after the next", Fault::link_lossy, 60, wire(Kind::swap, 0.3), {}, not_testing});
-    add({"every other report lost", Fault::report_missing, 5, wire(Kind::lose, 0.3, 2)});
+    add({"every other report lost", Fault::report_missing, 5, wire(Kind::drop_reports, 0.3, 2)});
     add({"every other report lost, for long",
          Fault::link_lossy,
          100,
-         wire(Kind::lose, 0.3, 2),
+         wire(Kind::drop_reports, 0.3, 2),
          {},
          not_testing});
-    add({"late", Fault::sample_late, 6, wire(Kind::late, 0.5, 0.008)});
+    add({"late", Fault::sample_late, 6, wire(Kind::delay_reports, 0.5, 0.008)});
     add({"a moment of silence", Fault::sample_late, 6, wire(Kind::silence, 0.006)});
     add({"silence", Fault::sample_stale, 24, wire(Kind::silence, 0.1)});
     add({"NaN in the position", Fault::pose_not_finite, 1,
@@ -191,61 +191,71 @@ const std::vector<Injection>& injections() {
     add({"NaN in the twist", Fault::pose_not_finite, 1,
          spoil([](DeviceSample& s) { s.V_BH.angular_rad_per_s.x() = kNaN; })});
     add({"a quaternion that is none", Fault::pose_not_a_rotation, 5, wire(Kind::bad_quaternion, 0.05)});
-    add({"teleported", Fault::pose_teleported, 3, wire(Kind::teleport, 0.05)});
-    add({"far outside", Fault::pose_outside, 3, wire(Kind::teleport, 0.05, 0.6)});
+    add({"teleported", Fault::pose_jumped, 3, wire(Kind::jump, 0.05)});
+    add({"far outside", Fault::pose_outside_workspace, 3, wire(Kind::jump, 0.05, 0.6)});
     add({"stuck", Fault::pose_stuck, 26, [](FaultRig& r) {
-           r.spoiled.spoil = [X_BH = r.simulated.X_BH()](DeviceSample& s) {
+           r.faulty_device.corrupt = [X_BH = r.simulated.X_BH()](DeviceSample& s) {
              s.X_BH = X_BH;
              s.V_BH.linear_m_per_s = {0.1, 0, 0};
            };
          }});
-    add({"run away", Fault::overspeed, 5, wire(Kind::run_away, 0.02), {}, under_way});
+    add({"run away", Fault::overspeed, 5, wire(Kind::drift, 0.02), {}, under_way});
     add({"not homed any more", Fault::not_homed, 1, spoil([](DeviceSample& s) { s.homed = false; })});
-    add({"the watchdog trips", Fault::watchdog_tripped, 4, wire(Kind::trip, 0.002), {}, under_way});
-    add({"commands do not arrive", Fault::watchdog_tripped, 14, wire(Kind::swallow, 0.1), {}, under_way});
-    add({"the motors are off", Fault::motors_off, 26, wire(Kind::dead_motors, 0.1), {}, [](State s, Phase) {
+    add({"the watchdog trips", Fault::watchdog_tripped, 4, wire(Kind::trip_watchdog, 0.002), {}, under_way});
+    add({"commands do not arrive",
+         Fault::watchdog_tripped,
+         14,
+         wire(Kind::drop_commands, 0.1),
+         {},
+         under_way});
+    add({"the motors are off", Fault::motors_off, 26, wire(Kind::motors_off, 0.1), {}, [](State s, Phase) {
            return s == State::active;
          }});
-    add({"no room for commands", Fault::write_blocked, 4, wire(Kind::deaf, 0.1), {}, not_testing});
-    add({"no room for commands, for long", Fault::write_failed, 22, wire(Kind::deaf, 0.1), {}, not_testing});
+    add({"no room for commands", Fault::write_blocked, 4, wire(Kind::refuse_commands, 0.1), {}, not_testing});
+    add({"no room for commands, for long",
+         Fault::write_failed,
+         22,
+         wire(Kind::refuse_commands, 0.1),
+         {},
+         not_testing});
     add({"a tick late", Fault::tick_late, 1,
          [](FaultRig& r) { r.clock.step(std::chrono::milliseconds(8)); }});
-    add({"stopped", Fault::loop_stopped, 1,
+    add({"stopped", Fault::loop_stalled, 1,
          [](FaultRig& r) { r.clock.step(std::chrono::milliseconds(200)); }});
-    add({"a clock that goes back", Fault::clock_back, 1,
+    add({"a clock that goes back", Fault::clock_reversed, 1,
          [](FaultRig& r) { r.clock.step(std::chrono::milliseconds(-3)); }});
-    add({"asleep", Fault::suspended, 1, [](FaultRig& r) { r.clock.sleep += std::chrono::hours(1); }});
-    add({"a solver out of time", Fault::answer_late, 1,
-         [](FaultRig& r) { r.clock.solver_takes = std::chrono::milliseconds(4); }});
+    add({"asleep", Fault::suspended, 1, [](FaultRig& r) { r.clock.suspended += std::chrono::hours(1); }});
+    add({"a solver out of time", Fault::wrench_late, 1,
+         [](FaultRig& r) { r.clock.solver_time = std::chrono::milliseconds(4); }});
     add({"a wrench that is not a number", Fault::wrench_not_finite, 4,
          spoil([](DeviceSample& s) { s.X_BH.translation_m.z() = -1.7e308; })});
     add({"pinned",
-         Fault::pinned,
+         Fault::motors_stalled,
          1200,
          [](FaultRig&) {},
          {},
          [](State s, Phase p) { return s == State::active && p == Phase::saturated; }});
     add({"whoever armed is gone",
-         Fault::client_gone,
+         Fault::heartbeat_lost,
          103,
          [](FaultRig& r) { r.loop.arm_with_lease(); },
          {},
          [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
     add({"nobody lives",
-         Fault::client_silent,
+         Fault::heartbeat_missing,
          103,
-         [](FaultRig& r) { r.loop.ask(kArm | kLease); },
+         [](FaultRig& r) { r.loop.request(kArm | kLease); },
          {},
          [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
     add({"the dead man's button",
-         Fault::deadman_open,
+         Fault::deadman_released,
          1,
          spoil([](DeviceSample& s) { s.buttons &= ~1U; }),
          {},
          armed});
     add({"the stop button", Fault::stop_button, 1,
          spoil([](DeviceSample& s) { s.buttons |= 1U << kStopButton; })});
-    add({"somebody says stop", Fault::stop_asked, 1, [](FaultRig& r) { r.loop.stop(); }});
+    add({"somebody says stop", Fault::stop_requested, 1, [](FaultRig& r) { r.loop.stop(); }});
     add({"what comes again and again",
          Fault::degraded_too_long,
          560,
@@ -269,9 +279,24 @@ const std::vector<Injection>& injections() {
          {},
          [](State s, Phase p) { return s == State::active && p != Phase::saturated; }});
     const auto testing = [](State s, Phase) { return s == State::self_test; };
-    add({"a test that is never clean", Fault::test_unclean, 5100, wire(Kind::lose, 6.0, 10), {}, testing});
-    add({"a watchdog that sleeps", Fault::test_watchdog, 150, wire(Kind::sleepy, 2.0), {}, testing});
-    add({"another rate", Fault::test_rate, 80, spoil([](DeviceSample& s) { s.sequence *= 2; }), {}, testing});
+    add({"a test that is never clean",
+         Fault::self_test_reports,
+         5100,
+         wire(Kind::drop_reports, 6.0, 10),
+         {},
+         testing});
+    add({"a watchdog that sleeps",
+         Fault::self_test_watchdog,
+         150,
+         wire(Kind::disable_watchdog, 2.0),
+         {},
+         testing});
+    add({"another rate",
+         Fault::self_test_rate,
+         80,
+         spoil([](DeviceSample& s) { s.sequence *= 2; }),
+         {},
+         testing});
     return list;
   }();
   return all;

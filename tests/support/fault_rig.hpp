@@ -20,44 +20,44 @@ namespace wrenchd::test {
 class RigClock final : public Clock {
  public:
   TimePoint now() const noexcept override {
-    if (++looks_ > kLooksBeforeSolver) return now_ + solver_takes;
+    if (++reads_ > kReadsBeforeSolver) return now_ + solver_time;
     return now_;
   }
   void sleep_until(TimePoint t) noexcept override { now_ = std::max(now_, t); }
-  Duration slept() const noexcept override { return sleep; }
+  Duration time_suspended() const noexcept override { return suspended; }
 
   void step(Duration d) noexcept {
     now_ += d;
-    looks_ = 0;
+    reads_ = 0;
   }
 
-  Duration solver_takes{};  ///< from the end of the reading to the wrench
-  Duration sleep{};
+  Duration solver_time{};  ///< from the end of the reading to the wrench
+  Duration suspended{};
 
  private:
   /// At the start of the tick, and after the reading.
-  static constexpr int kLooksBeforeSolver = 2;
+  static constexpr int kReadsBeforeSolver = 2;
 
   TimePoint now_{};
-  mutable int looks_ = 0;
+  mutable int reads_ = 0;
 };
 
 /// A device whose samples and writes are spoiled on their way.
-class SpoiledDevice final : public Device {
+class FaultyDevice final : public Device {
  public:
-  explicit SpoiledDevice(Device& device) : device_(device) {}
+  explicit FaultyDevice(Device& device) : device_(device) {}
 
-  std::function<void(DeviceSample&)> spoil;
-  Fault write_says = Fault::none;
+  std::function<void(DeviceSample&)> corrupt;
+  Fault write_result = Fault::none;
 
   void open() override { device_.open(); }
   DeviceSample read_newest(TimePoint now) noexcept override {
     DeviceSample sample = device_.read_newest(now);
-    if (spoil) spoil(sample);
+    if (corrupt) corrupt(sample);
     return sample;
   }
   Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept override {
-    return write_says != Fault::none ? write_says : device_.write(now, F, motors_on);
+    return write_result != Fault::none ? write_result : device_.write(now, F, motors_on);
   }
   std::uint64_t commands_sent() const noexcept override { return device_.commands_sent(); }
   void release(TimePoint now) noexcept override { device_.release(now); }
@@ -69,25 +69,25 @@ class SpoiledDevice final : public Device {
 };
 
 /// A placer that finds what it is told to.
-class LyingPlacer final : public Placer {
+class OverriddenProxyInitializer final : public ProxyInitializer {
  public:
-  explicit LyingPlacer(const Scene& scene) : honest_(scene) {}
+  explicit OverriddenProxyInitializer(const Scene& scene) : initializer_(scene) {}
 
-  bool lies = false;
-  Pose lie;
+  bool override_pose = false;
+  Pose overriding_pose;
 
-  void ask(const PlacementQuestion& question) noexcept override {
-    number_ = question.number;
-    honest_.ask(question);
+  void request(const ProxyInitializationRequest& question) noexcept override {
+    number_ = question.id;
+    initializer_.request(question);
   }
-  bool answer(PlacementAnswer& answer) noexcept override {
-    if (!honest_.answer(answer)) return false;
-    if (lies) answer = {number_, true, lie, answer.scene_time_s};
+  bool take_result(ProxyInitializationResult& answer) noexcept override {
+    if (!initializer_.take_result(answer)) return false;
+    if (override_pose) answer = {number_, true, overriding_pose, answer.scene_time_s};
     return true;
   }
 
  private:
-  PlacerInStep honest_;
+  InTickProxyInitializer initializer_;
   std::uint32_t number_ = 0;
 };
 
@@ -104,7 +104,7 @@ const char* name(Phase phase);
 class FaultRig {
  public:
   /// adjust: what shall be otherwise in its plan.
-  explicit FaultRig(Phase phase, const std::function<void(Plan&)>& adjust = {});
+  explicit FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust = {});
 
   /// One period later, and the tick. Returns what it recorded.
   const TickRecord& tick(Duration after = std::chrono::milliseconds(1));
@@ -114,28 +114,28 @@ class FaultRig {
 
   const TickRecord& last() const noexcept { return last_; }
   State state() const noexcept { return static_cast<State>(last_.state); }
-  bool found(Fault fault) const noexcept { return (last_.faults & bit(fault)) != 0; }
+  bool raised(Fault fault) const noexcept { return (last_.faults & bit(fault)) != 0; }
   double force_N() const noexcept;
   /// Which invariant was broken first, and where; empty where none was.
-  const std::string& broken() const noexcept { return broken_; }
+  const std::string& violation() const noexcept { return violation_; }
 
   /// From now on, for so long.
   void inject(SimulatedFault::Kind kind, double for_s, double value = 0.0);
 
   RigClock clock;
-  Plan plan;
+  RunConfig config;
   Scene scene;
   SimulatedDevice simulated;
   LoopbackLink link;
   ProfileDevice device;
-  SpoiledDevice spoiled;
-  LyingPlacer placer;
+  FaultyDevice faulty_device;
+  OverriddenProxyInitializer proxy_initializer;
   ServoLoop loop;
 
  private:
   TickRecord last_;
   Invariants invariants_;
-  std::string broken_;
+  std::string violation_;
   bool armed_ = false;
 };
 

@@ -29,15 +29,15 @@ double heading_rad(const Pose& X) {
   return std::atan2(x.y(), x.x());
 }
 
-const TickRecord& at(const ExhibitRun& run, double time_s) {
-  const auto rate_Hz = run.plan.settings.servo.rate_Hz;
+const TickRecord& at(const GalleryRun& run, double time_s) {
+  const auto rate_Hz = run.config.settings.servo.rate_Hz;
   const auto i = static_cast<std::size_t>(std::lround(time_s * rate_Hz));
   if (!(time_s >= 0.0) || i >= run.ticks.size())
     throw std::invalid_argument("the run has no moment " + std::to_string(time_s) + " s");
   return run.ticks[i];
 }
 
-double turned_deg(const ExhibitRun& run, bool hand, double time_s) {
+double turned_deg(const GalleryRun& run, bool hand, double time_s) {
   double turned = 0.0, last = 0.0;
   const TickRecord* const end = &at(run, time_s);
   bool begun = false;
@@ -54,25 +54,26 @@ double turned_deg(const ExhibitRun& run, bool hand, double time_s) {
 
 }  // namespace
 
-Plan exhibit_plan(const std::string& name) {
-  Plan plan = read_plan({WRENCHD_SOURCE_DIR "/config/gallery/" + name + ".toml", {}, {}, false},
-                        SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+RunConfig gallery_config(const std::string& name) {
+  RunConfig plan = load_run_config({WRENCHD_SOURCE_DIR "/config/gallery/" + name + ".toml", {}, {}, false},
+                                   SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   plan.settings.servo.self_test_s = 0.0;
   return plan;
 }
 
-double script_s(const Plan& plan) {
+double script_duration_s(const RunConfig& plan) {
   return plan.settings.simulation.hand_path.back().time_s;
 }
 
-ExhibitRun run_exhibit(const std::string& name, double seconds) {
-  ExhibitRun run{exhibit_plan(name), {}, {}};
-  VirtualStation station(run.plan);
-  const double last_s = seconds > 0.0 ? std::min(seconds, script_s(run.plan)) : script_s(run.plan);
-  const auto count = static_cast<std::size_t>(std::lround(last_s * run.plan.settings.servo.rate_Hz)) + 1;
+GalleryRun run_gallery_scene(const std::string& name, double seconds) {
+  GalleryRun run{gallery_config(name), {}, {}};
+  VirtualRuntime station(run.config);
+  const double last_s =
+      seconds > 0.0 ? std::min(seconds, script_duration_s(run.config)) : script_duration_s(run.config);
+  const auto count = static_cast<std::size_t>(std::lround(last_s * run.config.settings.servo.rate_Hz)) + 1;
   TimePoint first{};
   for (std::size_t i = 0; i < count; ++i) {
-    if (i == 1) station.station.loop().arm();
+    if (i == 1) station.runtime.loop().arm();
     station.tick();
     if (i == 0) first = station.clock.now();
     run.ticks.push_back(station.last);
@@ -81,7 +82,7 @@ ExhibitRun run_exhibit(const std::string& name, double seconds) {
   return run;
 }
 
-double figure(const ExhibitRun& run, const std::string& quantity, double time_s) {
+double run_figure(const GalleryRun& run, const std::string& quantity, double time_s) {
   const auto peak = [&](std::size_t from) {
     double most = 0.0;
     for (const TickRecord& tick : run.ticks) most = std::max(most, norm3(tick.F_out, from));
@@ -105,9 +106,9 @@ double figure(const ExhibitRun& run, const std::string& quantity, double time_s)
   if (what == "turn_deg") return turned_deg(run, hand, time_s);
   static thread_local std::string scene_of;
   static thread_local Vector3d p_MT_m;
-  if (scene_of != run.plan.scene.file) {
-    p_MT_m = load_tool(run.plan.scene.tool).solid.p_MT_m;
-    scene_of = run.plan.scene.file;
+  if (scene_of != run.config.scene.file) {
+    p_MT_m = load_tool(run.config.scene.tool).solid.p_MT_m;
+    scene_of = run.config.scene.file;
   }
   const Pose& X_WT = hand ? X_WP : X_WQ;
   const Vector3d p_WM = X_WT * Vector3d(-p_MT_m);

@@ -10,20 +10,20 @@
 namespace wrenchd::test {
 
 /// A scene of the gallery, felt once from the start of its hand script to its end, in virtual time.
-struct ExhibitRun {
-  Plan plan;
+struct GalleryRun {
+  RunConfig config;
   std::vector<TickRecord> ticks;
   std::vector<double> scene_time_s;  ///< of each tick
 };
 
 /// The plan of a scene of the gallery as shipped, but for the self-test, which is left out.
-Plan exhibit_plan(const std::string& name);
+RunConfig gallery_config(const std::string& name);
 
 /// How long its hand script lasts.
-double script_s(const Plan& plan);
+double script_duration_s(const RunConfig& plan);
 
 /// Runs it armed from the start. seconds: no longer than that; 0: once through its script.
-ExhibitRun run_exhibit(const std::string& name, double seconds = 0.0);
+GalleryRun run_gallery_scene(const std::string& name, double seconds = 0.0);
 
 /// What there is to look at in a run. M is the frame of the tool's mesh.
 ///
@@ -37,13 +37,13 @@ ExhibitRun run_exhibit(const std::string& name, double seconds = 0.0);
 ///   depth_mm                       from one to the other, between centres of mass
 ///
 /// Throws std::invalid_argument where nothing is called so, or the run has no such moment.
-double figure(const ExhibitRun& run, const std::string& quantity, double time_s);
+double run_figure(const GalleryRun& run, const std::string& quantity, double time_s);
 
 /// One line of tests/data/gallery/NAME.csv: what is expected, at a moment or (time below 0) of the whole run.
 struct ExpectedFigure {
   double time_s = -1.0;
   std::string quantity;
-  double least = 0.0, most = 0.0;
+  double min = 0.0, max = 0.0;
 };
 std::vector<ExpectedFigure> expected_figures(const std::string& name);
 

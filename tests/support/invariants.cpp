@@ -41,9 +41,9 @@ std::string told(const TickRecord& r, const Parts&... parts) {
 
 std::optional<std::string> Invariants::check(const TickRecord& r) {
   const TickRecord before = last_;
-  const bool begun = begun_;
+  const bool begun = started_;
   last_ = r;
-  begun_ = true;
+  started_ = true;
   const double F = length(&r.F_out[0]), T = length(&r.F_out[3]);
   for (const double x : r.F_out)
     if (!finite_bits(x)) return told(r, "I1 not finite");
@@ -52,7 +52,7 @@ std::optional<std::string> Invariants::check(const TickRecord& r) {
   const int state = r.state;
   const bool force = F > 0.0 || T > 0.0;
   if (force && !drives(state)) return told(r, "I5 force in a state without: ", F, " N ", T, " N.m");
-  if (r.motors_told != 0 && !drives(state) && state != kSelfTest) return told(r, "I5 motors on");
+  if (r.motors_commanded != 0 && !drives(state) && state != kSelfTest) return told(r, "I5 motors on");
   if (r.authority > 0.0 && !drives(state)) return told(r, "I5 authority ", r.authority);
   if (!begun) return {};
 
@@ -73,7 +73,7 @@ std::optional<std::string> Invariants::check(const TickRecord& r) {
     return told(r, "I7 left ", static_cast<int>(before.state));
   if (latched && state == kShutdown && (r.commands & kQuitOrEnd) == 0) return told(r, "I7 ended");
   const double age_s = 1e-9 * static_cast<double>(r.now_ns - r.arrived_ns);
-  if (age_s > limits_.old_s && (F > last_F * (1.0 + 1e-9) || T > last_T * (1.0 + 1e-9)))
+  if (age_s > limits_.stale_s && (F > last_F * (1.0 + 1e-9) || T > last_T * (1.0 + 1e-9)))
     return told(r, "I8 age ", age_s, " s, from ", last_F, " to ", F, " N");
   return {};
 }

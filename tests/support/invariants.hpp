@@ -26,7 +26,7 @@ class Invariants {
     double max_force_N, max_torque_Nm;
     double force_slew_N_per_s, torque_slew_Nm_per_s;
     double period_s;
-    double old_s;  ///< age from which a pose is old
+    double stale_s;  ///< age from which a pose is old
   };
 
   explicit Invariants(const Limits& limits) : limits_(limits) {}
@@ -37,7 +37,7 @@ class Invariants {
  private:
   Limits limits_;
   TickRecord last_;
-  bool begun_ = false;
+  bool started_ = false;
 };
 
 }  // namespace wrenchd::test

@@ -27,16 +27,16 @@ std::uint64_t LimitCases::bits() noexcept {
   return z ^ (z >> 31);
 }
 
-double LimitCases::share() noexcept {
+double LimitCases::uniform01() noexcept {
   return static_cast<double>(bits() >> 11) * 0x1p-53;
 }
 
 double LimitCases::power_of_two(int from, int to) noexcept {
-  return std::ldexp(1.0 + share(), from + static_cast<int>(share() * (to - from)));
+  return std::ldexp(1.0 + uniform01(), from + static_cast<int>(uniform01() * (to - from)));
 }
 
 /// A finite number of any kind.
-double LimitCases::anything() noexcept {
+double LimitCases::any_double() noexcept {
   const double sign = chance(0.5) ? 1.0 : -1.0;
   switch (bits() % 6) {
     case 0:
@@ -60,7 +60,7 @@ double LimitCases::not_finite() noexcept {
   return std::bit_cast<double>(kExponent | (chance(0.5) ? bits() : bits() & kSign));
 }
 
-double LimitCases::beside(double x) noexcept {
+double LimitCases::adjacent_double(double x) noexcept {
   switch (bits() % 3) {
     case 0:
       return x;
@@ -77,19 +77,19 @@ Vector3d LimitCases::direction() noexcept {
   return v.norm() > 1e-3 ? v.normalized() : Vector3d(Vector3d::UnitX());
 }
 
-Vector3d LimitCases::asked(double limit, const Vector3d& last) noexcept {
+Vector3d LimitCases::requested_vector(double limit, const Vector3d& last) noexcept {
   const bool known = is_finite(last);
   switch (bits() % 10) {
     case 0:
       return Vector3d::Zero();
     case 1:
-      return beside(limit) * direction();
+      return adjacent_double(limit) * direction();
     case 2:
       return power_of_two(-3, 900) * direction();
     case 3:
-      return {anything(), anything(), anything()};
+      return {any_double(), any_double(), any_double()};
     case 4:
-      return Vector3d::Constant(anything());
+      return Vector3d::Constant(any_double());
     case 5:
       if (known) return between(-2, 2) * 0.25 * last;
       break;
@@ -106,12 +106,12 @@ Vector3d LimitCases::asked(double limit, const Vector3d& last) noexcept {
 }
 
 /// What may stand in the memory of a limiter: nothing of it has to be legal.
-Vector3d LimitCases::any_last(double limit) noexcept {
+Vector3d LimitCases::previous_vector(double limit) noexcept {
   switch (bits() % 6) {
     case 0:
-      return {anything(), anything(), anything()};
+      return {any_double(), any_double(), any_double()};
     case 1:
-      return beside(limit) * direction();
+      return adjacent_double(limit) * direction();
     case 2:
       return between(1, 10) * limit * direction();
     case 3: {
@@ -126,26 +126,26 @@ Vector3d LimitCases::any_last(double limit) noexcept {
   }
 }
 
-Vector3d LimitCases::place() noexcept {
-  const double radius = promise_.workspace_radius_m > 0 ? promise_.workspace_radius_m : 0.2;
+Vector3d LimitCases::position() noexcept {
+  const double radius = guarantees_.workspace_radius_m > 0 ? guarantees_.workspace_radius_m : 0.2;
   switch (bits() % 8) {
     case 0:
-      return promise_.workspace_centre_m + beside(radius) * direction();
+      return guarantees_.workspace_centre_m + adjacent_double(radius) * direction();
     case 1:
-      return promise_.workspace_centre_m + beside(1.1 * radius) * direction();
+      return guarantees_.workspace_centre_m + adjacent_double(1.1 * radius) * direction();
     case 2:
     case 3:
-      return promise_.workspace_centre_m + between(1, 1.1) * radius * direction();
+      return guarantees_.workspace_centre_m + between(1, 1.1) * radius * direction();
     case 4:
-      return chance(0.9) ? Vector3d(promise_.workspace_centre_m + between(1, 3) * radius * direction())
-                         : Vector3d(anything(), anything(), anything());
+      return chance(0.9) ? Vector3d(guarantees_.workspace_centre_m + between(1, 3) * radius * direction())
+                         : Vector3d(any_double(), any_double(), any_double());
     default:
-      return promise_.workspace_centre_m + between(0, 1) * radius * direction();
+      return guarantees_.workspace_centre_m + between(0, 1) * radius * direction();
   }
 }
 
 Twist LimitCases::motion() noexcept {
-  const Wrench& F = input_.asked;
+  const Wrench& F = input_.requested;
   const double f = F.force_N.cwiseAbs().maxCoeff(), tau = F.torque_Nm.cwiseAbs().maxCoeff();
   const double speed = power_of_two(-8, 4), spin = power_of_two(-5, 7);
   Twist V{speed * direction(), spin * direction()};
@@ -162,7 +162,7 @@ Twist LimitCases::motion() noexcept {
       if (f > 0 && tau > 0) V = {-F.force_N / f * speed, -F.torque_Nm / tau * spin};
       return V;
     case 4:
-      return {{anything(), anything(), anything()}, {anything(), anything(), anything()}};
+      return {{any_double(), any_double(), any_double()}, {any_double(), any_double(), any_double()}};
     case 5:
       V.linear_m_per_s *= power_of_two(0, 40);
       return V;
@@ -176,9 +176,9 @@ double LimitCases::authority() noexcept {
     case 0:
       return chance(0.5) ? 0.0 : -0.0;
     case 1:
-      return anything();
+      return any_double();
     case 2:
-      return beside(1.0);
+      return adjacent_double(1.0);
     case 3:
     case 4:
       return between(-0.2, 1.2);
@@ -192,11 +192,11 @@ double LimitCases::step_s() noexcept {
     case 0:
       return chance(0.5) ? 0.0 : -0.0;
     case 1:
-      return anything();
+      return any_double();
     case 2:
       return -between(0, 1);
     case 3:
-      return beside(kLongestStep_s);
+      return adjacent_double(kMaxStep_s);
     case 4:
       return power_of_two(-30, 4);
     default:
@@ -209,15 +209,15 @@ double LimitCases::ceiling(double maximum) noexcept {
     case 0:
       return between(0, 1) * maximum;
     case 1:
-      return beside(maximum);
+      return adjacent_double(maximum);
     case 2:
-      return chance(0.5) ? 0.0 : anything();
+      return chance(0.5) ? 0.0 : any_double();
     default:
       return maximum;
   }
 }
 
-void LimitCases::another_device() {
+void LimitCases::randomize_device() {
   LimitSettings settings;
   settings.force_slew_N_per_s = power_of_two(0, 20);
   settings.torque_slew_Nm_per_s = power_of_two(-4, 14);
@@ -229,28 +229,28 @@ void LimitCases::another_device() {
       chance(0.5) ? Vector3d(Vector3d::Zero()) : Vector3d(between(0, 1) * direction());
   profile_.max_power_W = power ? power_of_two(-6, 8) : DeviceProfile::kNotStated;
   limits_ = WrenchLimits(settings, profile_);
-  promise_ = {profile_.max_force_N,
-              profile_.max_torque_Nm,
-              profile_.max_force_N,
-              profile_.max_torque_Nm,
-              settings.force_slew_N_per_s,
-              settings.torque_slew_Nm_per_s,
-              edge ? profile_.workspace_radius_m : 0.0,
-              profile_.workspace_centre_m,
-              power ? profile_.max_power_W : 0.0};
+  guarantees_ = {profile_.max_force_N,
+                 profile_.max_torque_Nm,
+                 profile_.max_force_N,
+                 profile_.max_torque_Nm,
+                 settings.force_slew_N_per_s,
+                 settings.torque_slew_Nm_per_s,
+                 edge ? profile_.workspace_radius_m : 0.0,
+                 profile_.workspace_centre_m,
+                 power ? profile_.max_power_W : 0.0};
   last_ = Wrench{};
 }
 
 /// One number of the input is none any more.
-void LimitCases::spoil() noexcept {
+void LimitCases::corrupt() noexcept {
   const double bad = not_finite();
   const auto axis = static_cast<Eigen::Index>(bits() % 3);
   switch (bits() % 7) {
     case 0:
-      input_.asked.force_N[axis] = bad;
+      input_.requested.force_N[axis] = bad;
       break;
     case 1:
-      input_.asked.torque_Nm[axis] = bad;
+      input_.requested.torque_Nm[axis] = bad;
       break;
     case 2:
       input_.V_BH.linear_m_per_s[axis] = bad;
@@ -270,27 +270,28 @@ void LimitCases::spoil() noexcept {
 }
 
 std::string LimitCases::next() {
-  if (count_++ % kTicksEach == 0) another_device();
+  if (count_++ % kTicksEach == 0) randomize_device();
   if (chance(0.1)) {
-    const double force_N = ceiling(promise_.max_force_N), torque_Nm = ceiling(promise_.max_torque_Nm);
+    const double force_N = ceiling(guarantees_.max_force_N), torque_Nm = ceiling(guarantees_.max_torque_Nm);
     limits_.set_ceiling(force_N, torque_Nm);
-    promise_.force_ceiling_N = std::fmin(std::fmax(force_N, 0.0), promise_.max_force_N);
-    promise_.torque_ceiling_Nm = std::fmin(std::fmax(torque_Nm, 0.0), promise_.max_torque_Nm);
+    guarantees_.force_ceiling_N = std::fmin(std::fmax(force_N, 0.0), guarantees_.max_force_N);
+    guarantees_.torque_ceiling_Nm = std::fmin(std::fmax(torque_Nm, 0.0), guarantees_.max_torque_Nm);
   }
   if (chance(0.1)) {
-    last_ = {any_last(promise_.max_force_N), any_last(promise_.max_torque_Nm)};
-    limits_.follow(last_);
+    last_ = {previous_vector(guarantees_.max_force_N), previous_vector(guarantees_.max_torque_Nm)};
+    limits_.set_last_sent(last_);
   }
-  input_.asked = {asked(promise_.max_force_N, last_.force_N), asked(promise_.max_torque_Nm, last_.torque_Nm)};
+  input_.requested = {requested_vector(guarantees_.max_force_N, last_.force_N),
+                      requested_vector(guarantees_.max_torque_Nm, last_.torque_Nm)};
   input_.authority = authority();
   input_.dt_s = step_s();
   input_.V_BH = motion();
-  input_.p_BH_m = place();
-  if (chance(0.02)) spoil();
+  input_.p_BH_m = position();
+  if (chance(0.02)) corrupt();
   out_ = limits_.apply(input_);
   before_ = last_;
   last_ = out_.F;
-  return broken_invariant(promise_, before_, input_, out_);
+  return broken_invariant(guarantees_, before_, input_, out_);
 }
 
 std::string LimitCases::describe() const {
@@ -299,20 +300,21 @@ std::string LimitCases::describe() const {
   const auto show = [&](const char* name, const Vector3d& v) {
     text << name << " " << v[0] << " " << v[1] << " " << v[2] << "\n";
   };
-  text << "case " << count_ << ", max " << promise_.max_force_N << " N " << promise_.max_torque_Nm
-       << " N.m, ceiling " << promise_.force_ceiling_N << " N " << promise_.torque_ceiling_Nm << " N.m, slew "
-       << promise_.force_slew_N_per_s << " N/s " << promise_.torque_slew_Nm_per_s << " N.m/s, radius "
-       << promise_.workspace_radius_m << " m, power " << promise_.max_power_W << " W\n";
+  text << "case " << count_ << ", max " << guarantees_.max_force_N << " N " << guarantees_.max_torque_Nm
+       << " N.m, ceiling " << guarantees_.force_ceiling_N << " N " << guarantees_.torque_ceiling_Nm
+       << " N.m, slew " << guarantees_.force_slew_N_per_s << " N/s " << guarantees_.torque_slew_Nm_per_s
+       << " N.m/s, radius " << guarantees_.workspace_radius_m << " m, power " << guarantees_.max_power_W
+       << " W\n";
   text << "authority " << input_.authority << ", dt " << input_.dt_s << " s, causes "
        << limit_causes_text(out_.causes) << "\n";
-  show("centre", promise_.workspace_centre_m);
+  show("centre", guarantees_.workspace_centre_m);
   show("place", input_.p_BH_m);
   show("linear", input_.V_BH.linear_m_per_s);
   show("angular", input_.V_BH.angular_rad_per_s);
   show("last force", before_.force_N);
   show("last torque", before_.torque_Nm);
-  show("asked force", input_.asked.force_N);
-  show("asked torque", input_.asked.torque_Nm);
+  show("asked force", input_.requested.force_N);
+  show("asked torque", input_.requested.torque_Nm);
   show("out force", out_.F.force_N);
   show("out torque", out_.F.torque_Nm);
   return text.str();

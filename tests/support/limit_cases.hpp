@@ -29,28 +29,28 @@ class LimitCases {
 
  private:
   std::uint64_t bits() noexcept;
-  double share() noexcept;  ///< [0, 1)
-  bool chance(double probability) noexcept { return share() < probability; }
-  double between(double from, double to) noexcept { return from + (to - from) * share(); }
+  double uniform01() noexcept;  ///< [0, 1)
+  bool chance(double probability) noexcept { return uniform01() < probability; }
+  double between(double from, double to) noexcept { return from + (to - from) * uniform01(); }
   double power_of_two(int from, int to) noexcept;
-  double anything() noexcept;
+  double any_double() noexcept;
   double not_finite() noexcept;
-  double beside(double x) noexcept;
+  double adjacent_double(double x) noexcept;
   Vector3d direction() noexcept;
-  Vector3d asked(double limit, const Vector3d& last) noexcept;
-  Vector3d any_last(double limit) noexcept;
-  Vector3d place() noexcept;
+  Vector3d requested_vector(double limit, const Vector3d& last) noexcept;
+  Vector3d previous_vector(double limit) noexcept;
+  Vector3d position() noexcept;
   Twist motion() noexcept;
   double authority() noexcept;
   double step_s() noexcept;
   double ceiling(double maximum) noexcept;
-  void another_device();
-  void spoil() noexcept;
+  void randomize_device();
+  void corrupt() noexcept;
 
   std::uint64_t state_;
   std::uint64_t count_ = 0;
   DeviceProfile profile_;
-  Promise promise_;
+  LimitGuarantees guarantees_;
   WrenchLimits limits_;
   Wrench last_;    ///< what went out last, or what was put in its place
   Wrench before_;  ///< the same, of the case that ran

@@ -125,13 +125,15 @@ std::string broken(const Group& g) {
 }
 
 bool all_finite(const LimitInput& in) {
-  return finite(in.asked.force_N) && finite(in.asked.torque_Nm) && finite(in.authority) && finite(in.dt_s) &&
-         finite(in.V_BH.linear_m_per_s) && finite(in.V_BH.angular_rad_per_s) && finite(in.p_BH_m);
+  return finite(in.requested.force_N) && finite(in.requested.torque_Nm) && finite(in.authority) &&
+         finite(in.dt_s) && finite(in.V_BH.linear_m_per_s) && finite(in.V_BH.angular_rad_per_s) &&
+         finite(in.p_BH_m);
 }
 
 }  // namespace
 
-std::string broken_invariant(const Promise& p, const Wrench& last, const LimitInput& in, const Limited& out) {
+std::string broken_invariant(const LimitGuarantees& p, const Wrench& last, const LimitInput& in,
+                             const Limited& out) {
   const auto told = [&](unsigned cause) { return (out.causes & cause) != 0; };
   if (!finite(out.F.force_N) || !finite(out.F.torque_Nm)) return "I1 not finite";
   const V3 f = v3(out.F.force_N), tau = v3(out.F.torque_Nm);
@@ -161,11 +163,11 @@ std::string broken_invariant(const Promise& p, const Wrench& last, const LimitIn
   const Real dt_s = in.dt_s < 0 ? 0 : in.dt_s > 0.010 ? 0.010L : in.dt_s;
   const bool scaled = told(kAuthority) || told(kWorkspaceEdge);
   std::string what =
-      broken({"force", v3(in.asked.force_N), legal(last.force_N, p.max_force_N), f, p.max_force_N,
+      broken({"force", v3(in.requested.force_N), legal(last.force_N, p.max_force_N), f, p.max_force_N,
               p.force_ceiling_N, p.force_slew_N_per_s * dt_s, edge * authority, told(kForceMagnitude),
               told(kForceThermal), told(kForceSlew), scaled, told(kPower)});
   if (!what.empty()) return what;
-  what = broken({"torque", v3(in.asked.torque_Nm), legal(last.torque_Nm, p.max_torque_Nm), tau,
+  what = broken({"torque", v3(in.requested.torque_Nm), legal(last.torque_Nm, p.max_torque_Nm), tau,
                  p.max_torque_Nm, p.torque_ceiling_Nm, p.torque_slew_Nm_per_s * dt_s, edge * authority,
                  told(kTorqueMagnitude), told(kTorqueThermal), told(kTorqueSlew), scaled, told(kPower)});
   if (!what.empty()) return what;

@@ -8,7 +8,7 @@
 namespace wrenchd::test {
 
 /// What is promised to hold, whatever a limiter does inside.
-struct Promise {
+struct LimitGuarantees {
   double max_force_N = 0.0;
   double max_torque_Nm = 0.0;
   double force_ceiling_N = 0.0;
@@ -32,7 +32,7 @@ struct Promise {
 ///   I5  authority 0: zero. Else no more than authority and edge leave of what was asked for
 ///   I6  the power into the hand is no more than its maximum
 ///   I7  nothing is cut for nothing: every cause told is one, and what is cut reaches the limit that cut it
-std::string broken_invariant(const Promise& promise, const Wrench& last, const LimitInput& input,
+std::string broken_invariant(const LimitGuarantees& promise, const Wrench& last, const LimitInput& input,
                              const Limited& out);
 
 }  // namespace wrenchd::test

@@ -6,9 +6,9 @@
 
 namespace wrenchd::test {
 
-const std::vector<Handling>& rough_handling() {
+const std::vector<ManipulationCase>& manipulation_cases() {
   using enum Motion;
-  static const std::vector<Handling> all = {
+  static const std::vector<ManipulationCase> all = {
       {"cube through a plate", {"cube", 12}, {"plate", 12}, stab, {0, 0, 0.05}},
       {"fine cube through a fine plate", {"cube", 1200}, {"plate", 5000}, stab, {0, 0, 0.05}},
       {"bumpy body through a plate", {"bumpy", 2000}, {"plate", 500}, stab, {0, 0, 0.06}},
@@ -42,26 +42,26 @@ ToolBody mesh_tool(TriangleMesh mesh, double mass_kg) {
   return tool;
 }
 
-Scene scene_of(const Handling& handling, const ObstacleMotion& motion) {
+Scene scene_of(const ManipulationCase& handling, const ObstacleMotion& motion) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({handling.obstacle.kind, TreedMesh(make_mesh(handling.obstacle)), Pose{}, motion});
+  obstacles.push_back({handling.obstacle.kind, MeshBvh(make_mesh(handling.obstacle)), Pose{}, motion});
   return Scene(mesh_tool(make_mesh(handling.tool)), {}, {}, std::move(obstacles));
 }
 
-const Pose& Hand::next() {
+const Pose& HandTrajectory::next() {
   ++ticks_;
   t_s_ += 1e-3;
-  switch (handling_.motion) {
-    case Motion::stab:
+  switch (case_.motion) {
+    case HandMotion::stab:
       stab();
       break;
-    case Motion::shake:
+    case HandMotion::shake:
       shake();
       break;
-    case Motion::press:
+    case HandMotion::press:
       press();
       break;
-    case Motion::slide:
+    case HandMotion::slide:
       slide();
       break;
   }
@@ -69,19 +69,19 @@ const Pose& Hand::next() {
 }
 
 /// Down and up again: every second stab at 5 m/s, the others at a quarter of that.
-void Hand::stab() {
-  const double depth_m = 2.0 * handling_.start_m.norm();
+void HandTrajectory::stab() {
+  const double depth_m = 2.0 * case_.start_m.norm();
   const bool fast = std::fmod(t_s_, 0.4) < 0.2;
   const double period_s = 2.0 * depth_m / (fast ? 5.0 : 1.25);
   const double phase = std::fmod(t_s_, period_s) / period_s;
   const double down = phase < 0.5 ? 2.0 * phase : 2.0 - 2.0 * phase;
-  X_WP_.translation_m = handling_.start_m * (1.0 - 2.0 * down) +
+  X_WP_.translation_m = case_.start_m * (1.0 - 2.0 * down) +
                         Vector3d(0.02 * std::sin(3.0 * t_s_), 0.02 * std::sin(2.3 * t_s_), 0.0);
   X_WP_.rotation = rotation_from(0.5 * std::sin(5.0 * t_s_) * Vector3d(0.94, 0.28, 0.19));
 }
 
 /// Velocities at random, now and then as fast as a hand can be, around a place half way into the obstacle.
-void Hand::shake() {
+void HandTrajectory::shake() {
   if (ticks_ % 20 == 1) {
     const double vigour = ticks_ % 200 == 1 ? 5.0 : 1.0;
     V_.linear_m_per_s = vigour * random_.uniform(0.2, 1.0) * random_.unit<3>();
@@ -89,14 +89,14 @@ void Hand::shake() {
   }
   X_WP_.translation_m += 1e-3 * V_.linear_m_per_s;
   X_WP_.rotation = (X_WP_.rotation * rotation_from(1e-3 * V_.angular_rad_per_s)).normalized();
-  const Vector3d middle_m = 0.5 * handling_.start_m;
-  const double roam_m = 0.01 + 0.4 * handling_.start_m.norm();
+  const Vector3d middle_m = 0.5 * case_.start_m;
+  const double roam_m = 0.01 + 0.4 * case_.start_m.norm();
   const Vector3d strayed_m = X_WP_.translation_m - middle_m;
   const double pull = std::min(1.0, 1e-3 + std::max(0.0, strayed_m.norm() / roam_m - 1.0));
   X_WP_.translation_m -= pull * strayed_m;
 }
 
-void Hand::press() {
+void HandTrajectory::press() {
   const double t = t_s_;
   X_WP_.translation_m = {0.001 * std::cos(4.0 * t), 0.001 * std::sin(5.0 * t), 0.01 * std::sin(5.0 * t)};
   X_WP_.rotation =
@@ -104,10 +104,10 @@ void Hand::press() {
       rotation_from(Vector3d(0.0, 0.0, 2.0 * t));
 }
 
-void Hand::slide() {
+void HandTrajectory::slide() {
   const double t = t_s_;
-  X_WP_.translation_m = handling_.start_m + Vector3d(0.06 * std::sin(4.0 * t), 0.03 * std::sin(2.7 * t),
-                                                     -0.010 - 0.006 * std::sin(1.3 * t));
+  X_WP_.translation_m = case_.start_m + Vector3d(0.06 * std::sin(4.0 * t), 0.03 * std::sin(2.7 * t),
+                                                 -0.010 - 0.006 * std::sin(1.3 * t));
   X_WP_.rotation =
       rotation_from(0.1 * std::sin(6.0 * t) * Vector3d(std::cos(3.0 * t), std::sin(3.0 * t), 0.0)) *
       rotation_from(Vector3d(0.0, 0.0, t));

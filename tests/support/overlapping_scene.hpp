@@ -11,13 +11,14 @@
 namespace wrenchd::test {
 
 /// A scene and a pose at which its tool overlaps an obstacle.
-struct Pressed {
+struct OverlappingScene {
   Scene scene;
   Pose X_WP;
 };
 
 /// A random body pressed into a random half-space by least_m up to most_m.
-inline Pressed into_half_space(RandomValues& random, double least_m, double most_m, double least_axis = 0.2) {
+inline OverlappingScene overlap_half_space(RandomValues& random, double least_m, double most_m,
+                                           double least_axis = 0.2) {
   const Vector3d n = random.unit<3>();
   Scene scene(random_body(random, random.integer(5, 30), least_axis), {half_space(n, random.normal())});
   Pose X_WP{random.rotation(), random.vector<3>()};
@@ -26,7 +27,7 @@ inline Pressed into_half_space(RandomValues& random, double least_m, double most
 }
 
 /// A random body pressed into walls through the origin, by about depth_m into each.
-inline Pressed into_corner(RandomValues& random, int half_spaces, double depth_m) {
+inline OverlappingScene overlap_corner(RandomValues& random, int half_spaces, double depth_m) {
   std::vector<HalfSpaceSettings> walls;
   for (int i = 0; i < half_spaces; ++i) walls.push_back(half_space(random.unit<3>(), 0.0));
   Scene scene(random_body(random, random.integer(6, 20), 0.4), walls);
@@ -39,10 +40,10 @@ inline Pressed into_corner(RandomValues& random, int half_spaces, double depth_m
 
 /// Two random convex bodies, the tool moved towards the obstacle until they overlap by depth_m along their
 /// separating axis.
-inline Pressed into_body(RandomValues& random, double depth_m) {
+inline OverlappingScene overlap_body(RandomValues& random, double depth_m) {
   ToolBody tool = random_body(random, random.integer(6, 14));
   const ToolBody other = random_body(random, random.integer(6, 14));
-  Pressed met{Scene(std::move(tool), {}, {convex_obstacle("other", other.hull)}), {}};
+  OverlappingScene met{Scene(std::move(tool), {}, {convex_obstacle("other", other.hull)}), {}};
   met.X_WP.rotation = random.rotation();
   const Vector3d direction = random.unit<3>();
   double near = 0.0;

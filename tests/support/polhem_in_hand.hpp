@@ -30,13 +30,13 @@ struct PolhemInHand {
   Pose X_BH;    ///< where the handle truly is
   Pose target;  ///< where the person moves it
   JointCounts at_power_on{};
-  std::size_t mixed_up = 6;  ///< this axis the person takes for the next one
+  std::size_t swapped_axis = 6;  ///< this axis the person takes for the next one
 
   /// Switched on with the handle this far from home.
   explicit PolhemInHand(const Pose& X_home_start = {Quaterniond::Identity(), {-0.03, 0.02, 0.04}}) {
     X_BH = target = homing_plan(profile).X_BR * X_home_start;
     at_power_on = counts();
-    turn();
+    update_encoders();
   }
 
   /// For good, from now on.
@@ -48,27 +48,27 @@ struct PolhemInHand {
     const auto angles = inverse(profile.kinematics, inverse(profile.X_BD) * X_BH * inverse(profile.X_EH));
     return joint_counts(profile.kinematics, angles.value());
   }
-  void turn() {
+  void update_encoders() {
     std::array<int, 6> turned{};
     const JointCounts now = counts();
     for (std::size_t i = 0; i < 6; ++i) turned[i] = static_cast<int>(std::lround(now[i] - at_power_on[i]));
-    board.turn(turned);
+    board.set_encoder_counts(turned);
   }
   /// A millisecond of the hand's: 0.1 m/s, 1 rad/s.
-  void live() {
+  void step() {
     const Vector3d way = target.translation_m - X_BH.translation_m;
     X_BH.translation_m += way * std::min(1.0, 1e-4 / std::max(way.norm(), 1e-12));
     const Vector3d turn_left = rotation_vector(target.rotation * X_BH.rotation.conjugate());
     X_BH.rotation =
         (rotation_from(turn_left * std::min(1.0, 1e-3 / std::max(turn_left.norm(), 1e-12))) * X_BH.rotation)
             .normalized();
-    turn();
+    update_encoders();
   }
   /// Sets out to do what is asked for.
-  void obey(const HomingState& state) {
+  void follow_instructions(const HomingState& state) {
     if (state.step == HomingStep::reference) target = homing_plan(profile).X_BR;
     if (state.step != HomingStep::moving) return;
-    const std::size_t axis = state.axis == mixed_up ? state.axis + 1 : state.axis;
+    const std::size_t axis = state.axis == swapped_axis ? state.axis + 1 : state.axis;
     const auto k = static_cast<Eigen::Index>(axis % 3);
     if (axis < 3)
       target.translation_m[k] = X_BH.translation_m[k] + 0.03;

@@ -21,12 +21,12 @@ inline Matrix3d about_z(double angle) {
 
 /// haptikfabrikenapi's own formulas for polhem_v1, from encoder counts to position and orientation of its
 /// end.
-struct PolhemPlace {
+struct PolhemPose {
   Vector3d p;
   Matrix3d R;
   double tA, tB, tC;
 };
-inline PolhemPlace polhem_place(const std::array<int, 6>& counts) {
+inline PolhemPose polhem_pose(const std::array<int, 6>& counts) {
   const double turn = 2 * std::numbers::pi;
   const double tA = -turn * counts[0] / 2000 * 0.010 / 0.180, tB = -turn * counts[1] / 2000 * 0.010 / 0.100,
                tC = -turn * counts[2] / 2000 * 0.010 / 0.100;
@@ -44,7 +44,7 @@ inline PolhemPlace polhem_place(const std::array<int, 6>& counts) {
 inline const Matrix3d kHalfTurn = Vector3d(-1, -1, 1).asDiagonal();
 
 /// What the maker's software tells the motors for a force in the base.
-inline std::array<double, 3> polhem_currents_mA(const PolhemPlace& place, const Vector3d& F_N) {
+inline std::array<double, 3> polhem_currents_mA(const PolhemPose& place, const Vector3d& F_N) {
   const auto [p, R, tA, tB, tC] = place;
   const Vector3d f = kHalfTurn * F_N;
   const double r = 0.174 * std::sin(tB) + 0.133 * std::sin(tC);

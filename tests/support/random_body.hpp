@@ -41,7 +41,7 @@ inline ToolBody tool_of(const std::vector<Vector3d>& points_M, double mass_kg = 
 }
 
 /// Corners of a box whose faces are split into n x n squares.
-inline std::vector<Vector3d> split_box(int n, const Vector3d& size_m) {
+inline std::vector<Vector3d> subdivided_box_points(int n, const Vector3d& size_m) {
   std::vector<Vector3d> points;
   for (int i = 0; i <= n; ++i)
     for (int j = 0; j <= n; ++j)
@@ -56,7 +56,7 @@ inline std::vector<Vector3d> split_box(int n, const Vector3d& size_m) {
 
 /// A box with its centre at the origin of M.
 inline ToolBody box(const Vector3d& size_m, double mass_kg = 1.0) {
-  return tool_of(split_box(1, size_m), mass_kg);
+  return tool_of(subdivided_box_points(1, size_m), mass_kg);
 }
 
 /// Points on an ellipsoid of random half-axes: compact and elongated bodies alike.
@@ -82,7 +82,7 @@ inline double least_gap_m(const Scene& scene, const Pose& X_WT) {
 }
 
 /// The same scene seen from elsewhere: the world moved by a.
-inline std::vector<HalfSpaceSettings> moved(const Pose& a, std::vector<HalfSpaceSettings> half_spaces) {
+inline std::vector<HalfSpaceSettings> transformed(const Pose& a, std::vector<HalfSpaceSettings> half_spaces) {
   for (HalfSpaceSettings& h : half_spaces) {
     h.normal_W = a.rotation * h.normal_W;
     h.offset_m += h.normal_W.dot(a.translation_m);

@@ -17,11 +17,11 @@ class RandomValues {
  public:
   explicit RandomValues(std::uint64_t seed) : engine_(seed) {}
 
-  double uniform(double from, double to) { return from + (to - from) * share_(engine_); }
+  double uniform(double from, double to) { return from + (to - from) * uniform01_(engine_); }
   double normal() { return normal_(engine_); }
   /// Evenly over the decades between the two, which must be positive.
-  double decades(double from, double to) { return std::exp(uniform(std::log(from), std::log(to))); }
-  bool chance(double probability) { return share_(engine_) < probability; }
+  double log_uniform(double from, double to) { return std::exp(uniform(std::log(from), std::log(to))); }
+  bool chance(double probability) { return uniform01_(engine_) < probability; }
   /// A whole number, both ends included.
   int integer(int from, int to) { return std::uniform_int_distribution<int>(from, to)(engine_); }
   std::uint64_t bits() { return engine_(); }
@@ -51,7 +51,7 @@ class RandomValues {
   Inertia inertia(double size_m = 1.0) {
     const Matrix3d A = size_m * Matrix3d::NullaryExpr([&] { return normal(); });
     const Matrix3d C = A * A.transpose() + 0.01 * size_m * size_m * Matrix3d::Identity();
-    const double mass_kg = decades(0.1, 10.0);
+    const double mass_kg = log_uniform(0.1, 10.0);
     return {mass_kg, mass_kg * (C.trace() * Matrix3d::Identity() - C)};
   }
   Wrench wrench() { return {vector<3>(), vector<3>()}; }
@@ -59,7 +59,7 @@ class RandomValues {
 
  private:
   std::mt19937_64 engine_;
-  std::uniform_real_distribution<double> share_{0.0, 1.0};
+  std::uniform_real_distribution<double> uniform01_{0.0, 1.0};
   std::normal_distribution<double> normal_;
 };
 

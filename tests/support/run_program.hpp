@@ -65,7 +65,7 @@ class RunningProgram {
   std::string err() const { return text_of("err"); }
 
   /// True once standard error holds the text; false when `limit` has passed before.
-  bool says(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(30)) const {
+  bool wait_for_output(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(30)) const {
     for (const auto end = std::chrono::steady_clock::now() + limit; std::chrono::steady_clock::now() < end;) {
       if (err().find(text) != std::string::npos) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -12,21 +12,21 @@ namespace wrenchd::test {
 /// Records a station that a test ticks by hand. Begins before the first tick.
 class RunRecorder {
  public:
-  RunRecorder(Station& station, const std::filesystem::path& file)
-      : state_(station.show_state()), writer_(file, station.recording_header()) {}
+  RunRecorder(Runtime& station, const std::filesystem::path& file)
+      : state_(station.enable_shared_state()), writer_(file, station.recording_header()) {}
   ~RunRecorder() {
-    take();
+    append_new_ticks();
     writer_.append(batch_);
   }
   RunRecorder(const RunRecorder&) = delete;
   RunRecorder& operator=(const RunRecorder&) = delete;
 
   /// What was ticked since; within two seconds of the loop's time.
-  void take() {
+  void append_new_ticks() {
     for (; state_.read(next_, record_); ++next_)
-      batch_.add(record_.tick, std::span(record_.touches).first(record_.touch_count));
+      batch_.add(record_.tick, std::span(record_.contacts).first(record_.contact_count));
   }
-  bool has_all() const { return next_ == state_.written(); }
+  bool is_complete() const { return next_ == state_.written(); }
 
  private:
   SharedState& state_;

@@ -158,7 +158,7 @@ inline void mutate(RandomValues& random, const std::vector<Bytes>& samples, Byte
 }
 
 /// A sample with one to four mutations, or, a quarter of them, noise.
-inline Bytes strange_descriptor(RandomValues& random) {
+inline Bytes malformed_descriptor(RandomValues& random) {
   static const std::vector<Bytes> kSamples = sample_descriptors();
   Bytes bytes;
   if (random.chance(0.25)) {

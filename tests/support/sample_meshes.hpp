@@ -36,7 +36,7 @@ inline PolygonSoup inside_out(PolygonSoup soup) {
 }
 
 /// Both in one soup, no vertex shared.
-inline PolygonSoup both(PolygonSoup a, const PolygonSoup& b) {
+inline PolygonSoup concatenated(PolygonSoup a, const PolygonSoup& b) {
   const std::size_t first = a.vertices.size();
   a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
   for (auto face : b.faces) {
@@ -58,7 +58,7 @@ inline std::string point_text(const Vector3d& p) {
 }
 
 /// "3 0 1 2", with `first` added to each number.
-inline std::string corners_text(const std::vector<std::size_t>& face, std::size_t first) {
+inline std::string indices_text(const std::vector<std::size_t>& face, std::size_t first) {
   std::string text;
   for (const std::size_t v : face) text += " " + std::to_string(v + first);
   return text;
@@ -68,14 +68,14 @@ inline std::string as_off(const PolygonSoup& soup) {
   std::string text =
       "OFF\n" + std::to_string(soup.vertices.size()) + " " + std::to_string(soup.faces.size()) + " 0\n";
   for (const Vector3d& p : soup.vertices) text += point_text(p) + "\n";
-  for (const auto& face : soup.faces) text += std::to_string(face.size()) + corners_text(face, 0) + "\n";
+  for (const auto& face : soup.faces) text += std::to_string(face.size()) + indices_text(face, 0) + "\n";
   return text;
 }
 
 inline std::string as_obj(const PolygonSoup& soup) {
   std::string text = "# box\no box\n";
   for (const Vector3d& p : soup.vertices) text += "v " + point_text(p) + "\n";
-  for (const auto& face : soup.faces) text += "f" + corners_text(face, 1) + "\n";
+  for (const auto& face : soup.faces) text += "f" + indices_text(face, 1) + "\n";
   return text;
 }
 
@@ -123,7 +123,7 @@ inline std::string ply_header(const PolygonSoup& soup, const std::string& format
 inline std::string ply_body(const PolygonSoup& soup) {
   std::string text;
   for (const Vector3d& p : soup.vertices) text += point_text(p) + "\n";
-  for (const auto& face : soup.faces) text += std::to_string(face.size()) + corners_text(face, 0) + "\n";
+  for (const auto& face : soup.faces) text += std::to_string(face.size()) + indices_text(face, 0) + "\n";
   return text;
 }
 

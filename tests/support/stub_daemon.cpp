@@ -57,8 +57,8 @@ void send_line(int peer, const std::string& line, int descriptor = -1) {
   sendmsg(peer, &message, MSG_NOSIGNAL);
 }
 
-Plan shown_plan() {
-  Plan plan = shipped_plan();
+RunConfig shown_plan() {
+  RunConfig plan = shipped_config();
   plan.settings.servo.realtime = Realtime::best_effort;
   return plan;
 }
@@ -66,9 +66,11 @@ Plan shown_plan() {
 }  // namespace
 
 StubDaemon::StubDaemon()
-    : simulated_(shown_plan()), state_(simulated_.station.show_state()), listening_(listen_at(socket())) {
+    : simulated_(shown_plan()),
+      state_(simulated_.runtime.enable_shared_state()),
+      listening_(listen_at(socket())) {
   servo_ = std::thread([this] {
-    prepare_servo_thread(simulated_.station.plan().settings.servo);
+    prepare_servo_thread(simulated_.runtime.config().settings.servo);
     loop().run(simulated_.clock, stop_loop_);
   });
   while (loop().state() == State::disconnected) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -78,18 +80,18 @@ StubDaemon::StubDaemon()
 StubDaemon::~StubDaemon() {
   serving_.request_stop();
   serving_.join();
-  hang_up();
+  disconnect_all();
   close(listening_);
   stop_loop_.store(true);
   servo_.join();
 }
 
-std::vector<std::string> StubDaemon::asked() const {
+std::vector<std::string> StubDaemon::requested_methods() const {
   const std::lock_guard lock(mutex_);
-  return asked_;
+  return requested_methods_;
 }
 
-void StubDaemon::tell(const std::string& name, const std::string& level) {
+void StubDaemon::send_event(const std::string& name, const std::string& level) {
   const std::lock_guard lock(mutex_);
   ++sequence_;
   const json event = {
@@ -108,17 +110,17 @@ void StubDaemon::send_raw(const std::string& bytes) {
     for (std::size_t i = 0; i < bytes.size(); i += 3) send_line(fd, bytes.substr(i, 3));
 }
 
-void StubDaemon::end_lease() {
+void StubDaemon::expire_lease() {
   holder_.store(-1);
   loop().disarm();
 }
 
-void StubDaemon::hang_up() {
+void StubDaemon::disconnect_all() {
   const std::lock_guard lock(mutex_);
-  while (!peers_.empty()) end(peers_.begin()->first);
+  while (!peers_.empty()) disconnect(peers_.begin()->first);
 }
 
-void StubDaemon::end(int peer) {
+void StubDaemon::disconnect(int peer) {
   peers_.erase(peer);
   close(peer);
   int held = peer;
@@ -139,7 +141,7 @@ void StubDaemon::serve(const std::stop_token& stop) {
       if (one.fd == listening_)
         peers_[accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC)];
       else if (peers_.count(one.fd) == 1 && !receive(one.fd))
-        end(one.fd);
+        disconnect(one.fd);
     }
   }
 }
@@ -162,10 +164,10 @@ void StubDaemon::answer(int peer, const std::string& line) {
   const json request = json::parse(line);
   const std::string method = request.at("method");
   if (method == "beat") {
-    if (holder_.load() == peer) ++beats_;
-    loop().live();
+    if (holder_.load() == peer) ++heartbeats_;
+    loop().heartbeat();
   } else {
-    asked_.push_back(method);
+    requested_methods_.push_back(method);
   }
   if (!request.contains("id") || silent_.load()) return;
   json reply = {{"jsonrpc", "2.0"}, {"id", request["id"]}};
@@ -181,13 +183,13 @@ void StubDaemon::answer(int peer, const std::string& line) {
 json StubDaemon::status() {
   json cause;
   if (const Fault fault = loop().cause(); fault != Fault::none)
-    cause = {{"name", fault_row(fault).name}, {"sentence", fault_row(fault).sentence}};
+    cause = {{"name", fault_row(fault).name}, {"sentence", fault_row(fault).message}};
   return {{"state", name(loop().state())}, {"cause", cause}, {"sequence", sequence_}};
 }
 
 json StubDaemon::result_of(int peer, const std::string& method, const json& params, int& descriptor) {
   const auto ask = [&](CommandSet commands) {
-    loop().ask(commands);
+    loop().request(commands);
     return json::object();
   };
   if (method == "describe") return {{"protocol", 1}, {"methods", json::array()}};
@@ -217,15 +219,15 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   }
   if (method == "arm") {
     if (holder_.load() != peer) throw Refusal{-32002, "only who has the lease may arm; take it first"};
-    return ask(kArm | kLease | kBeat);
+    return ask(kArm | kLease | kHeartbeat);
   }
   if (method == "disarm") return ask(kDisarm);
   if (method == "stop") return ask(kStop);
   if (method == "acknowledge") return ask(kAcknowledge);
-  if (method == "start_over") return ask(kStartOver);
+  if (method == "start_over") return ask(kReinitialize);
   if (method == "state.open") {
     json answer;
-    open_state(state_, simulated_.station.workbench().obstacle_names(),
+    open_state(state_, simulated_.runtime.reconfigurator().obstacle_names(),
                [&](const json& result, int handed_over) {
                  answer = result;
                  descriptor = handed_over;

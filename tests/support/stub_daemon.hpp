@@ -27,22 +27,22 @@ class StubDaemon {
   ~StubDaemon();
 
   std::string socket() const { return (files_.path() / "control.sock").string(); }
-  ServoLoop& loop() { return simulated_.station.loop(); }
+  ServoLoop& loop() { return simulated_.runtime.loop(); }
 
-  int beats() const { return beats_.load(); }
+  int heartbeats() const { return heartbeats_.load(); }
   bool leased() const { return holder_.load() >= 0; }
   /// Methods asked for since the start, in order.
-  std::vector<std::string> asked() const;
+  std::vector<std::string> requested_methods() const;
   /// Sends an event to all that subscribed to its name.
-  void tell(const std::string& name, const std::string& level);
+  void send_event(const std::string& name, const std::string& level);
   /// Sends these bytes, whatever they are, to all, in parts.
   void send_raw(const std::string& bytes);
   /// From here on nothing is answered.
-  void fall_silent() { silent_.store(true); }
+  void stop_answering() { silent_.store(true); }
   /// As when a beat came too late.
-  void end_lease();
+  void expire_lease();
   /// Ends all connections.
-  void hang_up();
+  void disconnect_all();
 
  private:
   struct Peer {
@@ -57,19 +57,19 @@ class StubDaemon {
   nlohmann::json result_of(int peer, const std::string& method, const nlohmann::json& params,
                            int& descriptor);
   nlohmann::json status();
-  void end(int peer);
+  void disconnect(int peer);
 
   TemporaryDirectory files_;
-  SimulatedStation<WallClock> simulated_;
+  SimulatedRuntime<WallClock> simulated_;
   SharedState& state_;
   std::atomic<bool> stop_loop_{false};
   std::thread servo_;
   int listening_;
   mutable std::mutex mutex_;  ///< of what follows
   std::map<int, Peer> peers_;
-  std::vector<std::string> asked_;
+  std::vector<std::string> requested_methods_;
   std::uint64_t sequence_ = 0;
-  std::atomic<int> beats_{0};
+  std::atomic<int> heartbeats_{0};
   std::atomic<int> holder_{-1};
   std::atomic<bool> silent_{false};
   std::jthread serving_;

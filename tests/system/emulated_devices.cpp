@@ -44,7 +44,7 @@ const std::vector<DeviceProfile>& shipped() {
 
 /// The profile that wrenchd would give the device. Throws where it has none.
 const DeviceProfile& profile_of(const UsbDevice& device) {
-  const MatchResult match = match_profile(plugged_facts(device).device, shipped());
+  const MatchResult match = match_profile(inspect_device(device).identity, shipped());
   if (!match.profile) throw std::runtime_error("no profile matches " + describe(device));
   return shipped()[*match.profile];
 }
@@ -88,9 +88,10 @@ struct Plugged {
 
   /// What the profile and the device's own descriptor disagree about.
   std::size_t disagreements() const {
-    const PluggedFacts facts = plugged_facts(listed);
-    return facts.descriptor ? differences(*facts.descriptor, expected_reports(host.device.profile())).size()
-                            : 1;
+    const InspectedDevice facts = inspect_device(listed);
+    return facts.descriptor
+               ? find_differences(*facts.descriptor, expected_reports(host.device.profile())).size()
+               : 1;
   }
 };
 
@@ -113,7 +114,7 @@ void polhem(Backend backend) {
       "found by its profile; 400 places of the encoders come out by the maker's formulas to 1e-6, 100 "
       "forces arrive as the maker's currents; amplifiers off 0.5 s after the last report, zeros at release");
   EmulatedPolhem board(64);
-  board.turn(wandering(0));
+  board.set_encoder_counts(wandering(0));
   UsbShape shape;
   shape.report_descriptor = teensy_rawhid();
   shape.out_bytes = 64;
@@ -125,15 +126,15 @@ void polhem(Backend backend) {
 
   double worst_m = 0.0, worst_R = 0.0;
   for (int i = 0; i < 400; ++i) {
-    p.far.with([&] { board.turn(wandering(i)); });
+    p.far.with([&] { board.set_encoder_counts(wandering(i)); });
     p.host.ticks(3);
-    const PolhemPlace place = polhem_place(wandering(i));
+    const PolhemPose place = polhem_pose(wandering(i));
     worst_m = std::max(worst_m, (p.host.sample.X_BH.translation_m - kHalfTurn * place.p).norm());
     const Matrix3d R = kHalfTurn * place.R * kHalfTurn;
     worst_R = std::max(worst_R, (p.host.sample.X_BH.rotation.toRotationMatrix() - R).cwiseAbs().maxCoeff());
   }
   double worst_mA = 0.0;
-  const PolhemPlace place = polhem_place(wandering(399));
+  const PolhemPose place = polhem_pose(wandering(399));
   for (int i = 0; i < 100; ++i) {
     const Vector3d F(2 * std::sin(i), 2 * std::sin(2 * i), 2 * std::cos(3 * i));
     p.host.ticks(2, {F, Vector3d::Zero()}, true);
@@ -195,7 +196,7 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   p.host.ticks(300);
   CHECK_THAT(row,
              p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, {}) && p.host.sample.sequence == 0);
-  p.far.with([&] { mouse.push({280, 140, 70, 0, 0, -200}); });
+  p.far.with([&] { mouse.set_deflection({280, 140, 70, 0, 0, -200}); });
   p.host.ticks(50);
   const DeviceSample before = p.host.sample;
   while (p.host.sample.arrived < before.arrived + 500ms && p.host.fault == Fault::none) p.host.ticks(1);
@@ -212,7 +213,7 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   CHECK_THAT(row, (way - expected_way).norm() < 1e-6 && (turn - expected_turn).norm() < 1e-6);
 
   p.far.with([&] {
-    mouse.push({});
+    mouse.set_deflection({});
     mouse.take_command({}, std::array<std::uint8_t, 2>{4, 1});
   });
   p.host.ticks(60);
@@ -221,7 +222,7 @@ void space_mouse(Backend backend, EmulatedSpaceMouse::Format format_of, const ch
   CHECK_THAT(row, p.host.fault == Fault::none && same_bits(p.host.sample.X_BH, left.X_BH));
   CHECK_THAT(row, p.host.sample.sequence == left.sequence);
   CHECK_THAT(row, p.far.with([&] { return mouse.led(); }) && p.far.taken() == 0);
-  p.far.with([&] { mouse.press(1); });
+  p.far.with([&] { mouse.set_buttons(1); });
   p.host.ticks(60);
   CHECK_THAT(row, p.host.fault == Fault::none && p.host.sample.buttons == 1);
   CHECK_THAT(row, same_bits(p.host.sample.X_BH, {}) && !same_bits(left.X_BH, {}));
@@ -254,7 +255,7 @@ void falcon() {
       "found by its profile; handshake and firmware through its serial chip; homed; 200 places come out by "
       "the legs' equation to 1e-6, forces arrive as efforts; opened again it is not loaded again");
   EmulatedFalcon falcon;
-  falcon.spoil_loading(1);
+  falcon.corrupt_firmware_echoes(1);
   UsbShape shape;
   shape.out = 0x02;
   shape.out_bytes = 64;
@@ -283,15 +284,15 @@ void falcon() {
   CHECK_THAT(row, far.with([&] { return falcon.state() == EmulatedFalcon::State::running; }));
   CHECK_THAT(row, far.with([&] { return falcon.firmware() == firmware; }));
   p.ticks(20);
-  CHECK_THAT(row, !p.sample.homed && far.with([&] { return falcon.wants_homing(); }));
-  far.with([&] { falcon.home(); });
+  CHECK_THAT(row, !p.sample.homed && far.with([&] { return falcon.homing_requested(); }));
+  far.with([&] { falcon.perform_homing(); });
   p.ticks(20);
   CHECK_THAT(row, p.sample.homed && p.fault == Fault::none);
 
   double worst_m = 0.0;
   for (int i = 0; i < 200; ++i) {
     const std::array<int, 3> counts = {wandering(2 * i)[3], wandering(2 * i)[4], wandering(2 * i)[5]};
-    far.with([&] { falcon.turn(counts); });
+    far.with([&] { falcon.set_true_counts(counts); });
     p.ticks(3);
     for (int leg = 0; leg < 3; ++leg)
       worst_m = std::max(worst_m, std::abs(leg_error_m(p.sample.X_BH.translation_m, counts, leg)));

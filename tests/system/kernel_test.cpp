@@ -53,7 +53,7 @@ constexpr int kPort = 0;
 /// What the monitor told, to be waited for.
 class Told {
  public:
-  void hear(const PlugEvent& event) {
+  void hear(const HotplugEvent& event) {
     const std::lock_guard lock(mutex_);
     events_.push_back(event);
     changed_.notify_all();
@@ -62,11 +62,11 @@ class Told {
     const std::lock_guard lock(mutex_);
     events_.clear();
   }
-  bool await(PlugEvent::Kind kind, const std::string& subsystem, const std::string& place) {
+  bool await(HotplugEvent::Kind kind, const std::string& subsystem, const std::string& place) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, 5s, [&] {
-      return std::any_of(events_.begin(), events_.end(), [&](const PlugEvent& e) {
-        return e.kind == kind && e.subsystem == subsystem && e.place == place;
+      return std::any_of(events_.begin(), events_.end(), [&](const HotplugEvent& e) {
+        return e.kind == kind && e.subsystem == subsystem && e.port_path == place;
       });
     });
   }
@@ -74,7 +74,7 @@ class Told {
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<PlugEvent> events_;
+  std::vector<HotplugEvent> events_;
 };
 
 // --- the servo loop ---------------------------------------------------------------------------------------
@@ -153,7 +153,7 @@ class Servo {
 
         ++seen.ticks;
         seen.missing += sample.missing;
-        seen.skipped += sample.skipped;
+        seen.skipped += sample.superseded;
         seen.rejected += sample.rejected;
         if (seen.work.size() < seen.work.capacity()) seen.work.push_back(done - now);
         if (sample.fresh) {
@@ -445,7 +445,7 @@ void closed(Backend backend) {
   CHECK_THAT(row, !end.motors_on && !end.watchdog_tripped && !end.last.enable);
   CHECK_THAT(row, end.last.F.force_N == Vector3d::Zero() && end.last.F.torque_Nm == Vector3d::Zero());
   const UsbDevice again = await_listed(s.identity);  // with its hidraw node: the kernel has it back
-  CHECK_THAT(row, again.same_device(s.listed));
+  CHECK_THAT(row, again.is_same_device(s.listed));
 }
 
 void unplugged(Backend backend, Told& told) {
@@ -460,9 +460,9 @@ void unplugged(Backend backend, Told& told) {
   });
   const Seen seen = s.servo.run_for(1s);
   hand.join();
-  CHECK_THAT(row, told.await(PlugEvent::Kind::unplugged, "usb", s.listed.place));
+  CHECK_THAT(row, told.await(HotplugEvent::Kind::disconnected, "usb", s.listed.port_path));
   if (backend == Backend::hidraw)  // libusb has taken the node away when it opened the device
-    CHECK_THAT(row, told.await(PlugEvent::Kind::unplugged, "hidraw", s.listed.place));
+    CHECK_THAT(row, told.await(HotplugEvent::Kind::disconnected, "hidraw", s.listed.port_path));
   const Duration took = s.close();
   row.saw(summary(seen));
   row.saw(format("closed in %.3f ms", ms(took)));
@@ -473,10 +473,10 @@ void unplugged(Backend backend, Told& told) {
   UsbipDevice back(s.identity, 1000.0, kPriority);
   told.forget();
   back.plug(kPort);
-  CHECK_THAT(row, told.await(PlugEvent::Kind::plugged, "usb", s.listed.place));
-  CHECK_THAT(row, told.await(PlugEvent::Kind::plugged, "hidraw", s.listed.place));
+  CHECK_THAT(row, told.await(HotplugEvent::Kind::connected, "usb", s.listed.port_path));
+  CHECK_THAT(row, told.await(HotplugEvent::Kind::connected, "hidraw", s.listed.port_path));
   const UsbDevice found = await_listed(s.identity);
-  CHECK_THAT(row, found.same_device(s.listed) && found.place == s.listed.place);
+  CHECK_THAT(row, found.is_same_device(s.listed) && found.port_path == s.listed.port_path);
   CHECK_THAT(row, back.record().out_reports == 0);
   const auto link = make_link(backend, found, kPriority);
   ProfileDevice device(reference_profile(), *link);
@@ -531,7 +531,7 @@ void another_device(Backend backend, const char* what, const UsbipDevice::Identi
   const Seen seen = s.servo.run_for(20ms);
   std::this_thread::sleep_for(20ms);
   row.saw(refusal.empty() ? "opened" : refusal);
-  CHECK_THAT(row, found.place == s.listed.place);
+  CHECK_THAT(row, found.port_path == s.listed.port_path);
   CHECK_THAT(row, refusal.find("nothing was written") != std::string::npos);
   CHECK_THAT(row, seen.fault == Fault::device_lost);
   CHECK_THAT(row, stranger.record().out_reports == 0);
@@ -565,7 +565,7 @@ int main() {
   mlockall(MCL_CURRENT | MCL_FUTURE);
   try {
     Told told;
-    const PlugMonitor monitor([&told](const PlugEvent& event) { told.hear(event); });
+    const HotplugMonitor monitor([&told](const HotplugEvent& event) { told.hear(event); });
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, told);
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) emulated_devices(backend);
   } catch (const std::exception& e) {

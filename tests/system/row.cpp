@@ -59,8 +59,8 @@ UsbDevice await_listed(const UsbIdentity& identity, bool hid) {
     for (const UsbDevice& device : list_usb_devices())
       if (device.vendor == identity.vendor && device.product == identity.product &&
           device.serial == identity.serial && device.hidraw_node.empty() == !hid &&
-          (!hid || why_not_open(device, device.hidraw_node).empty()) &&
-          why_not_open(device, device.usb_node).empty())
+          (!hid || open_error(device, device.hidraw_node).empty()) &&
+          open_error(device, device.usb_node).empty())
         return device;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

@@ -106,9 +106,9 @@ void UsbipDevice::on_clear_halt() {
 
 void UsbipDevice::tick(std::uint64_t ticks, TimePoint now) {
   record_.late_ticks += ticks - 1;
-  firmware_.miss_reports(static_cast<std::uint32_t>(ticks - 1));
-  firmware_.motors(now);  // the watchdog
-  PoseReport report = firmware_.report(now - powered_);
+  firmware_.skip_reports(static_cast<std::uint32_t>(ticks - 1));
+  firmware_.motor_wrench(now);  // the watchdog
+  PoseReport report = firmware_.make_report(now - powered_);
   report.X_BH = {};
   report.X_BH.translation_m.x() = position_m(report.sequence);
   ++record_.made;

@@ -122,7 +122,7 @@ void UsbipPort::run() {
   }
   bool connected = true;
   while (connected && !pulled_) {
-    const short ready = wait_for_file(socket_, POLLIN, next);
+    const short ready = wait_for_fd(socket_, POLLIN, next);
     const TimePoint now = std::chrono::steady_clock::now();
     const std::lock_guard lock(mutex_);
     if (now >= next) next = on_time(now);

@@ -18,7 +18,7 @@ struct Obedient {
   int ms_left = 60000;
   bool unplugs = false;
 
-  Bystander person() {
+  OperatorInterface person() {
     return {[this](const std::string& words) {
               heard.push_back(words);
               const std::array<std::string, 6> asks = {
@@ -26,17 +26,17 @@ struct Obedient {
                   "top of the handle to", "top of the handle away", "Turn"};
               HomingState asked;
               asked.step = words.find("into its rest") != std::string::npos ? HomingStep::reference
-                                                                            : HomingStep::settling;
+                                                                            : HomingStep::holding_still;
               for (std::size_t axis = 0; axis < 6; ++axis) {
                 if (words.find(asks[axis]) == std::string::npos) continue;
                 asked.step = HomingStep::moving;
                 asked.axis = axis;
               }
-              polhem.obey(asked);
+              polhem.follow_instructions(asked);
             },
             [this] { return (polhem.X_BH.translation_m - polhem.target.translation_m).norm() < 1e-9; },
             [this] {
-              polhem.live();
+              polhem.step();
               if (unplugs && heard.size() == 3) polhem.unplug();
               return --ms_left <= 0;
             }};
@@ -58,7 +58,7 @@ TEST_CASE("a calibration tells a person what to do, and ends with the offsets", 
   // What the joints counted of too little when the device was switched on.
   const Kinematics& k = bench.polhem.profile.kinematics;
   for (std::size_t i = 0; i < 6; ++i) {
-    const double missing = bench.polhem.at_power_on[k.slot[i]] * k.rad_per_count[i];
+    const double missing = bench.polhem.at_power_on[k.report_index[i]] * k.rad_per_count[i];
     CHECK(found.offsets[i].offset == Approx(-missing).margin(0.01));
   }
   CHECK(bench.heard.back() == "Homed: the device may be armed.");
@@ -66,7 +66,7 @@ TEST_CASE("a calibration tells a person what to do, and ends with the offsets", 
 
 TEST_CASE("a calibration that fails says of what, and gives nothing", "[calibrate]") {
   Obedient bench;
-  bench.polhem.mixed_up = 1;
+  bench.polhem.swapped_axis = 1;
   CHECK_THROWS_WITH(bench.calibrated(), Contains("Homing failed. That moved z, not y.") &&
                                             Contains("look at their order in the profile"));
 }

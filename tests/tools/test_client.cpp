@@ -60,8 +60,8 @@ TEST_CASE("a client takes the lease, arms, and reads what the hand feels", "[cli
   StubDaemon daemon;
   Client client(daemon.socket());
   CHECK(soon([&] { return client.state() == "disarmed"; }));
-  CHECK(code_of([&] { client.arm(); }) == ClientError::kNotNow);
-  client.take_lease();
+  CHECK(code_of([&] { client.arm(); }) == ClientError::kInvalidState);
+  client.acquire_lease();
   StateReader state = client.open_state();
   TickState tick;
   std::uint64_t last = 0;
@@ -71,11 +71,11 @@ TEST_CASE("a client takes the lease, arms, and reads what the hand feels", "[cli
     if (i > 0) CHECK(tick.tick() == last + 1);
     last = tick.tick();
     if (last % 100 == 0) insist_on_arming(client);
-    pushed = tick.state() == "active" && tick.wrench()[2] > 0.1 && tick.touches().size() == 4;
+    pushed = tick.state() == "active" && tick.wrench()[2] > 0.1 && tick.contacts().size() == 4;
   }
   CHECK(pushed);
   CHECK(state.missed() == 0);
-  CHECK(daemon.beats() > 10);
+  CHECK(daemon.heartbeats() > 10);
   CHECK(soon([&] {
     client.disarm();
     return rests(client);
@@ -84,18 +84,18 @@ TEST_CASE("a client takes the lease, arms, and reads what the hand feels", "[cli
   CHECK(soon([&] { return client.state() == "stopped"; }));
   client.acknowledge();
   CHECK(soon([&] { return client.state() == "disarmed"; }));
-  client.give_lease();
+  client.release_lease();
   CHECK_FALSE(daemon.leased());
-  const int beats = daemon.beats();
+  const int beats = daemon.heartbeats();
   std::this_thread::sleep_for(100ms);
-  CHECK(daemon.beats() == beats);
+  CHECK(daemon.heartbeats() == beats);
 }
 
 TEST_CASE("a client that dies fades out: its lease ends with its connection", "[client]") {
   StubDaemon daemon;
   {
     Client client(daemon.socket());
-    client.take_lease();
+    client.acquire_lease();
     REQUIRE(soon([&] {
       insist_on_arming(client);
       return client.state() == "active";
@@ -108,20 +108,20 @@ TEST_CASE("a client that dies fades out: its lease ends with its connection", "[
 TEST_CASE("a lease that was lost is told when arming, and is given back without ado", "[client]") {
   StubDaemon daemon;
   Client client(daemon.socket());
-  client.take_lease();
-  daemon.end_lease();
-  CHECK(code_of([&] { client.arm(); }) == ClientError::kNotNow);
-  CHECK_NOTHROW(client.give_lease());
-  CHECK_NOTHROW(client.take_lease());
+  client.acquire_lease();
+  daemon.expire_lease();
+  CHECK(code_of([&] { client.arm(); }) == ClientError::kInvalidState);
+  CHECK_NOTHROW(client.release_lease());
+  CHECK_NOTHROW(client.acquire_lease());
 }
 
 TEST_CASE("what the daemon refuses comes with its sentence and its code", "[client]") {
   StubDaemon daemon;
   Client first(daemon.socket());
   Client second(daemon.socket());
-  first.take_lease();
-  CHECK(code_of([&] { second.take_lease(); }) == ClientError::kTaken);
-  CHECK(code_of([&] { second.reload(); }) == ClientError::kRefusedInput);
+  first.acquire_lease();
+  CHECK(code_of([&] { second.acquire_lease(); }) == ClientError::kLeaseHeld);
+  CHECK(code_of([&] { second.reload(); }) == ClientError::kRejected);
   CHECK(code_of([&] { second.call("dance"); }) == -32601);
   CHECK(code_of([&] { second.call("status", "no JSON"); }) == ClientError::kProtocol);
   CHECK_THROWS_WITH(second.reload(), "wrenchd.toml:3: no such key; delete it");
@@ -136,9 +136,9 @@ TEST_CASE("events come in order, those asked for only, whatever answers come in 
   const auto sequence = snapshot["sequence"].get<std::uint64_t>();
   ClientEvent event;
   CHECK_FALSE(client.poll_event(event, 1ms));
-  daemon.tell("state", "info");
-  daemon.tell("scene", "info");
-  daemon.tell("fault", "error");
+  daemon.send_event("state", "info");
+  daemon.send_event("scene", "info");
+  daemon.send_event("fault", "error");
   CHECK(client.state() == "disarmed");
   REQUIRE(client.poll_event(event));
   CHECK(event.name == "state");
@@ -153,7 +153,7 @@ TEST_CASE("events come in order, those asked for only, whatever answers come in 
   REQUIRE(client.poll_event(event));
   CHECK(event.name == "device");
   client.unsubscribe();
-  daemon.tell("state", "info");
+  daemon.send_event("state", "info");
   CHECK_FALSE(client.poll_event(event, 20ms));
 }
 
@@ -164,7 +164,7 @@ TEST_CASE("a daemon that goes, hangs or talks nonsense is an error, never a wait
   TickState tick;
   REQUIRE(state.next(tick));
   SECTION("hangs") {
-    daemon.fall_silent();
+    daemon.stop_answering();
     CHECK(code_of([&] { client.status(); }) == ClientError::kTimeout);
   }
   SECTION("talks nonsense") {
@@ -172,11 +172,11 @@ TEST_CASE("a daemon that goes, hangs or talks nonsense is an error, never a wait
     CHECK(code_of([&] { client.status(); }) == ClientError::kProtocol);
   }
   SECTION("goes") {
-    daemon.hang_up();
-    CHECK(code_of([&] { client.status(); }) == ClientError::kGone);
-    CHECK(code_of([&] { client.status(); }) == ClientError::kGone);
+    daemon.disconnect_all();
+    CHECK(code_of([&] { client.status(); }) == ClientError::kDisconnected);
+    CHECK(code_of([&] { client.status(); }) == ClientError::kDisconnected);
     ClientEvent event;
-    CHECK(code_of([&] { client.poll_event(event); }) == ClientError::kGone);
+    CHECK(code_of([&] { client.poll_event(event); }) == ClientError::kDisconnected);
     REQUIRE(state.next(tick));  // the memory is there still, and written to
   }
 }
@@ -190,7 +190,7 @@ TEST_CASE("a reader hears that the daemon is gone", "[client]") {
   daemon.reset();
   CHECK(code_of([&] {
           while (state.next(tick, 10s)) continue;
-        }) == ClientError::kGone);
+        }) == ClientError::kDisconnected);
   CHECK(state.latest(tick));  // what it left behind can be read
   CHECK(tick.integer("released") == 1);
 }
@@ -205,7 +205,7 @@ TEST_CASE("no daemon: the error names where it was looked for, and the cure", "[
 TEST_CASE("clients leave no descriptor behind, taken or not", "[client]") {
   StubDaemon daemon;
   { const Client client(daemon.socket()); }
-  CHECK(soon([&] { return daemon.asked().empty(); }));
+  CHECK(soon([&] { return daemon.requested_methods().empty(); }));
   std::this_thread::sleep_for(50ms);
   const std::size_t before = open_descriptors();
   for (int i = 0; i < 20; ++i) {

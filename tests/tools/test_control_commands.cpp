@@ -29,7 +29,8 @@ struct Daemon {
   RunningProgram program;
 
   explicit Daemon(const std::string& profile = "loopback") : program("wrenchd", arguments(profile)) {
-    const bool runs = program.says("control socket: " + socket) && program.says("state: disarmed");
+    const bool runs =
+        program.wait_for_output("control socket: " + socket) && program.wait_for_output("state: disarmed");
     INFO(program.err());
     REQUIRE(runs);
   }
@@ -129,13 +130,13 @@ TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wa
   REQUIRE(daemon.comes_to("active"));
   SECTION("killed") {
     arm.signal(SIGKILL);
-    CHECK(daemon.program.says("hung up", std::chrono::seconds(5)));
+    CHECK(daemon.program.wait_for_output("hung up", std::chrono::seconds(5)));
   }
   SECTION("stopped") {
     arm.signal(SIGSTOP);
-    CHECK(daemon.program.says("gives no sign of life", std::chrono::seconds(5)));
+    CHECK(daemon.program.wait_for_output("gives no sign of life", std::chrono::seconds(5)));
   }
-  CHECK(daemon.program.says("client_gone: ", std::chrono::seconds(5)));
+  CHECK(daemon.program.wait_for_output("client_gone: ", std::chrono::seconds(5)));
   CHECK(daemon.comes_to("disarmed"));
 }
 
@@ -203,11 +204,11 @@ TEST_CASE("a daemon armed by its command line can be disarmed by anybody who ope
   const TemporaryDirectory dir;
   const std::string socket = (dir.path() / "control.sock").string();
   const RunningProgram program("wrenchd", {"--realtime", "off", "--arm", "--control", socket});
-  REQUIRE(program.says("state: waiting"));
+  REQUIRE(program.wait_for_output("state: waiting"));
   const Json status = Json::parse(run_program("wrenchctl", {"status", "--json", "--socket", socket}).out);
   CHECK(status["armed_by"] == "command line");
   CHECK(run_program("wrenchctl", {"disarm", "--socket", socket}).exit_code == 0);
-  CHECK(program.says("state: disarmed"));
+  CHECK(program.wait_for_output("state: disarmed"));
 }
 
 }  // namespace

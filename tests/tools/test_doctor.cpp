@@ -17,7 +17,7 @@ const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/c
 /// A machine on which everything is as it should be. Each test makes one thing worse.
 struct Healthy {
   TemporaryDirectory dir;
-  Patient patient;
+  MachineState patient;
 
   Healthy() {
     dir.write("proc/sys/kernel/osrelease", "6.1.0-rt\n");
@@ -37,16 +37,16 @@ struct Healthy {
     patient.memlock_limit_bytes = ~std::uint64_t{0};
     patient.nodes = {{"polhem", "/dev/hidraw3", "3-1", "wrenchd", 0660}};
     patient.profiles = kShipped.profiles;
-    patient.wake_ups = WakeUps{true, 5us, 40us, 90us};
+    patient.wake_latency = WakeLatency{true, 5us, 40us, 90us};
   }
 
   /// The one finding that is not ok.
   Finding worst() const {
     Finding found;
-    for (const Finding& f : examine(patient)) {
+    for (const Finding& f : check_machine(patient)) {
       if (f.health == Health::ok) continue;
-      INFO(text(examine(patient)));
-      CHECK(found.what == "");  // nothing else is worse for it
+      INFO(text(check_machine(patient)));
+      CHECK(found.summary == "");  // nothing else is worse for it
       found = f;
     }
     return found;
@@ -59,45 +59,45 @@ bool has(const std::string& text, const std::string& part) {
 
 /// Of that health, about that, with that cure.
 void check(const Finding& found, Health health, const std::string& what, const std::string& cure) {
-  INFO(found.what << " -> " << found.cure);
+  INFO(found.summary << " -> " << found.cure);
   CHECK(found.health == health);
-  CHECK(has(found.what, what));
+  CHECK(has(found.summary, what));
   CHECK(has(found.cure, cure));
 }
 
 TEST_CASE("a machine that is as it should be has nothing to cure", "[doctor]") {
   const Healthy h;
-  const auto findings = examine(h.patient);
+  const auto findings = check_machine(h.patient);
   INFO(text(findings));
   CHECK(findings.size() == 13);
   for (const Finding& f : findings) {
     CHECK(f.health == Health::ok);
     CHECK(f.cure == "");
   }
-  CHECK_FALSE(unfit(findings));
+  CHECK_FALSE(has_failure(findings));
 }
 
 TEST_CASE("kernel and processors could be better, and a throttled real-time share is wrong", "[doctor]") {
   SECTION("kernel") {
     Healthy h;
     h.dir.write("sys/kernel/realtime", "0\n");
-    check(h.worst(), Health::better, "6.1.0-rt is not PREEMPT_RT", "linux-image-rt");
+    check(h.worst(), Health::warning, "6.1.0-rt is not PREEMPT_RT", "linux-image-rt");
   }
   SECTION("governor") {
     Healthy h;
     h.dir.write("sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "powersave\n");
-    check(h.worst(), Health::better, "powersave on 1 of 2", "frequency-set -g performance");
+    check(h.worst(), Health::warning, "powersave on 1 of 2", "frequency-set -g performance");
   }
   SECTION("boot options") {
     Healthy h;
     h.dir.write("proc/cmdline", "quiet\n");
-    check(h.worst(), Health::better, "no processor is kept", "isolcpus=N");
+    check(h.worst(), Health::warning, "no processor is kept", "isolcpus=N");
   }
   SECTION("share") {
     Healthy h;
     h.dir.write("proc/sys/kernel/sched_rt_runtime_us", "100000\n");
-    check(h.worst(), Health::wrong, "only 10 %", "sched_rt_runtime_us=950000");
-    CHECK(unfit(examine(h.patient)));
+    check(h.worst(), Health::failure, "only 10 %", "sched_rt_runtime_us=950000");
+    CHECK(has_failure(check_machine(h.patient)));
   }
 }
 
@@ -105,19 +105,19 @@ TEST_CASE("limits of the user are hints, those of the service are not", "[doctor
   SECTION("priority") {
     Healthy h;
     h.patient.rtprio_limit = 0;
-    check(h.worst(), Health::better, "real-time priority of ann: up to 0", "ann - rtprio 49");
+    check(h.worst(), Health::warning, "real-time priority of ann: up to 0", "ann - rtprio 49");
     h.patient.is_root = true;
-    CHECK(h.worst().what == "");
+    CHECK(h.worst().summary == "");
   }
   SECTION("memory") {
     Healthy h;
     h.patient.memlock_limit_bytes = std::uint64_t{8} << 20U;
-    check(h.worst(), Health::better, "ann may lock: 8 MiB", "ann - memlock unlimited");
+    check(h.worst(), Health::warning, "ann may lock: 8 MiB", "ann - memlock unlimited");
   }
   SECTION("unit") {
     Healthy h;
     h.dir.write("etc/systemd/system/wrenchd.service.d/mine.conf", "[Service]\nLimitRTPRIO=10\n");
-    check(h.worst(), Health::wrong, "LimitRTPRIO=10", "LimitRTPRIO=49");
+    check(h.worst(), Health::failure, "LimitRTPRIO=10", "LimitRTPRIO=49");
   }
 }
 
@@ -125,17 +125,17 @@ TEST_CASE("who may open devices, and who may arm", "[doctor]") {
   SECTION("an onlooker") {
     Healthy h;
     h.patient.groups = {"ann"};
-    check(h.worst(), Health::better, "ann is not in wrench", "usermod -aG wrench ann");
+    check(h.worst(), Health::warning, "ann is not in wrench", "usermod -aG wrench ann");
   }
   SECTION("somebody who gets past all limits") {
     Healthy h;
     h.patient.groups = {"ann", "wrench", "wrenchd"};
-    check(h.worst(), Health::wrong, "ann is in wrenchd", "gpasswd -d ann wrenchd");
+    check(h.worst(), Health::failure, "ann is in wrenchd", "gpasswd -d ann wrenchd");
   }
   SECTION("a group that is missing") {
     Healthy h;
     h.dir.write("etc/group", "root:x:0:\nwrenchds:x:1:\n");
-    check(h.worst(), Health::wrong, "no group wrenchd", "groupadd --system wrenchd");
+    check(h.worst(), Health::failure, "no group wrenchd", "groupadd --system wrenchd");
   }
 }
 
@@ -144,12 +144,12 @@ TEST_CASE("rules that are missing, or of other profiles", "[doctor]") {
   SECTION("none") {
     Healthy h;
     std::filesystem::remove(h.dir.path() / "lib/udev/rules.d/70-wrenchd.rules");
-    check(h.worst(), Health::wrong, "there are none", cure);
+    check(h.worst(), Health::failure, "there are none", cure);
   }
   SECTION("an administrator's, of before") {
     Healthy h;
     h.dir.write("etc/udev/rules.d/70-wrenchd.rules", udev_rules(std::span(kShipped.profiles).first(2)));
-    check(h.worst(), Health::wrong, "/etc/udev/rules.d/70-wrenchd.rules lacks ", cure);
+    check(h.worst(), Health::failure, "/etc/udev/rules.d/70-wrenchd.rules lacks ", cure);
   }
 }
 
@@ -158,43 +158,44 @@ TEST_CASE("nodes that the service cannot open, that everybody can, and devices t
   Healthy h;
   SECTION("root's") {
     h.patient.nodes[0].group = "root";
-    check(h.worst(), Health::wrong, "/dev/hidraw3 is of group root, mode 0660: the service cannot open it",
+    check(h.worst(), Health::failure, "/dev/hidraw3 is of group root, mode 0660: the service cannot open it",
           "udevadm trigger");
   }
   SECTION("everybody's") {
     h.patient.nodes[0].mode = 0666;
-    check(h.worst(), Health::wrong, "mode 0666: anybody may push", "0666");
+    check(h.worst(), Health::failure, "mode 0666: anybody may push", "0666");
   }
   SECTION("sleepy") {
     h.dir.write("sys/bus/usb/devices/3-1/power/control", "auto\n");
-    check(h.worst(), Health::wrong, "polhem in 3-1: it may fall asleep", "power/control");
+    check(h.worst(), Health::failure, "polhem in 3-1: it may fall asleep", "power/control");
   }
 }
 
 TEST_CASE("wake-ups are judged against the period of a tick, and not where real time was refused",
           "[doctor]") {
   Healthy h;
-  h.patient.wake_ups = WakeUps{true, 5us, 300us, 2ms};
-  check(h.worst(), Health::better, "p50 5 us, p99.9 300 us, at most 2000 us late, with SCHED_FIFO", "heavy");
-  h.patient.wake_ups = WakeUps{true, 5us, 1500us, 2ms};
-  check(h.worst(), Health::wrong, "p99.9 1500 us", "heavy");
-  h.patient.wake_ups = WakeUps{false, 5us, 1500us, 2ms};
-  check(h.worst(), Health::better, "without SCHED_FIFO", "run it as root");
+  h.patient.wake_latency = WakeLatency{true, 5us, 300us, 2ms};
+  check(h.worst(), Health::warning, "p50 5 us, p99.9 300 us, at most 2000 us late, with SCHED_FIFO", "heavy");
+  h.patient.wake_latency = WakeLatency{true, 5us, 1500us, 2ms};
+  check(h.worst(), Health::failure, "p99.9 1500 us", "heavy");
+  h.patient.wake_latency = WakeLatency{false, 5us, 1500us, 2ms};
+  check(h.worst(), Health::warning, "without SCHED_FIFO", "run it as root");
 }
 
 TEST_CASE("wake-ups are really measured", "[doctor]") {
-  const WakeUps seen = measure_wake_ups(100ms);
+  const WakeLatency seen = measure_wake_latency(100ms);
   CHECK(seen.max > 0ns);
   CHECK(seen.p50 > 0ns);
   CHECK(seen.p50 <= seen.p999);
 }
 
 TEST_CASE("findings read as lines with their cures", "[doctor]") {
-  const std::vector<Finding> findings = {
-      {Health::ok, "a: fine", ""}, {Health::better, "b: so so", "do c"}, {Health::wrong, "d: bad", "do e"}};
+  const std::vector<Finding> findings = {{Health::ok, "a: fine", ""},
+                                         {Health::warning, "b: so so", "do c"},
+                                         {Health::failure, "d: bad", "do e"}};
   CHECK(text(findings) ==
         "ok      a: fine\nbetter  b: so so\n        -> do c\nWRONG   d: bad\n        -> do e\n");
-  CHECK(unfit(findings));
+  CHECK(has_failure(findings));
 }
 
 TEST_CASE("wrenchctl doctor looks at this machine, and its exit code says whether anything is wrong",

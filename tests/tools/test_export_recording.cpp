@@ -22,7 +22,7 @@ Recording thousand_ticks() {
     tick.state = static_cast<std::uint8_t>(State::active);
     recording.ticks.push_back(tick);
   }
-  recording.ranges.resize(1000);
+  recording.contact_ranges.resize(1000);
   return recording;
 }
 

@@ -26,7 +26,7 @@ TEST_CASE("a fault that there is not is told with those that there are", "[fault
 }
 
 TEST_CASE("the machine is shown row by row", "[fault_text]") {
-  const std::string text = state_text();
+  const std::string text = state_machine_text();
   CHECK(std::count(text.begin(), text.end(), '\n') == static_cast<long>(transitions().size()) + 1);
   CHECK_THAT(text, Contains("hard fault") && Contains("somebody has to look at it"));
 }

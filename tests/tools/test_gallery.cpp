@@ -36,13 +36,13 @@ class Admissible {
  public:
   explicit Admissible(const SceneSettings& settings) : scene_(settings) {
     for (const MeshObstacle& obstacle : scene_.meshes())
-      meetings_.push_back(
-          std::make_unique<ExactMeeting>(scene_.tool_mesh()->surface.mesh(), obstacle.mesh->surface.mesh()));
+      meetings_.push_back(std::make_unique<ExactIntersection>(scene_.tool_mesh()->surface.mesh(),
+                                                              obstacle.mesh->surface.mesh()));
   }
 
   bool at(const Pose& X_WT, double scene_time_s) const {
     for (std::size_t k = 0; k < meetings_.size(); ++k)
-      if (meetings_[k]->meet(inverse(scene_.meshes()[k].X_WO_at(scene_time_s)) * X_WT)) return false;
+      if (meetings_[k]->intersect(inverse(scene_.meshes()[k].X_WO_at(scene_time_s)) * X_WT)) return false;
     for (const HalfSpaceSettings& half_space : scene_.half_spaces())
       for (const Vector3d& p : scene_.tool().hull.vertices_T_m)
         if (half_space.normal_W.dot(X_WT * p) < half_space.offset_m - kRounding_m) return false;
@@ -52,12 +52,12 @@ class Admissible {
  private:
   static constexpr double kRounding_m = 1e-12;  ///< half-spaces are touched, and not kept clear of
   Scene scene_;
-  std::vector<std::unique_ptr<ExactMeeting>> meetings_;
+  std::vector<std::unique_ptr<ExactIntersection>> meetings_;
 };
 
 std::vector<std::string> names() {
   std::vector<std::string> all;
-  for (const Exhibit& exhibit : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"})))
+  for (const GalleryScene& exhibit : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"})))
     all.push_back(exhibit.name);
   return all;
 }
@@ -72,21 +72,23 @@ std::size_t poses_of(const Scene& scene) {
 
 void check_exhibit(const std::string& name) {
   INFO(name);
-  const ExhibitRun run = run_exhibit(name, kSeconds);
+  const GalleryRun run = run_gallery_scene(name, kSeconds);
 
   std::size_t placed = 0;
   for (const TickRecord& tick : run.ticks) {
     if (tick.faults != 0) FAIL("tick " << tick.tick << ": faults " << tick.faults);
-    placed += static_cast<Placing>(tick.placing) == Placing::following ? 1 : 0;
+    placed +=
+        static_cast<ProxyInitialization>(tick.proxy_initialization) == ProxyInitialization::complete ? 1 : 0;
   }
   CHECK(placed + 10 > run.ticks.size());
   CHECK(static_cast<State>(run.ticks.back().state) == State::active);
 
-  const Admissible admissible(run.plan.scene);
-  const std::size_t step = std::max<std::size_t>(1, run.ticks.size() / poses_of(Scene(run.plan.scene)));
+  const Admissible admissible(run.config.scene);
+  const std::size_t step = std::max<std::size_t>(1, run.ticks.size() / poses_of(Scene(run.config.scene)));
   std::size_t touching = 0;
   for (std::size_t i = step / 2; i < run.ticks.size(); i += step) {
-    if (static_cast<Placing>(run.ticks[i].placing) != Placing::following) continue;
+    if (static_cast<ProxyInitialization>(run.ticks[i].proxy_initialization) != ProxyInitialization::complete)
+      continue;
     INFO("tick " << i);
     CHECK(admissible.at(pose_of(run.ticks[i].X_WQ), run.scene_time_s[i]));
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
@@ -94,7 +96,7 @@ void check_exhibit(const std::string& name) {
 
   Recording recording;
   recording.ticks = run.ticks;
-  const auto difference = replay(recording, run.plan);
+  const auto difference = replay(recording, run.config);
   if (difference) FAIL("replay: tick " << difference->tick << ' ' << difference->field);
 
   if (kSeconds > 0.0) return;
@@ -103,9 +105,9 @@ void check_exhibit(const std::string& name) {
   CHECK(expected.size() >= 6);
   for (const ExpectedFigure& e : expected) {
     INFO(e.quantity << (e.time_s >= 0.0 ? " at " + std::to_string(e.time_s) + " s" : std::string()));
-    const double found = figure(run, e.quantity, e.time_s);
-    CHECK(found >= e.least);
-    CHECK(found <= e.most);
+    const double found = run_figure(run, e.quantity, e.time_s);
+    CHECK(found >= e.min);
+    CHECK(found <= e.max);
   }
 }
 
@@ -158,7 +160,7 @@ TEST_CASE("every scene of the gallery says what it is, repeats, has a camera, an
                                         "thin_plate"});
   for (const std::string& name : all) {
     INFO(name);
-    const Plan plan = exhibit_plan(name);
+    const RunConfig plan = gallery_config(name);
     CHECK(plan.settings.description.size() > 200);
     CHECK(plan.settings.simulation.hand_repeats);
     CHECK(plan.settings.wrench.law == SpringLaw::energy);

@@ -24,7 +24,7 @@ struct Ids {
 /// A HID device in its socket; the nodes have the number of the port.
 UsbDevice hid(int port, Ids ids, const Bytes& descriptor, const std::string& name) {
   UsbDevice device;
-  device.place = "3-" + std::to_string(port);
+  device.port_path = "3-" + std::to_string(port);
   device.hidraw_node = "/dev/hidraw" + std::to_string(port);
   device.usb_node = "/dev/bus/usb/003/00" + std::to_string(port);
   device.interface = 0;
@@ -58,7 +58,7 @@ std::string open_to_all(const UsbDevice&, const std::string&) {
 }
 
 std::string open_to_root(const UsbDevice& device, const std::string& node) {
-  return why_not_open(device, node, EACCES);
+  return open_error(device, node, EACCES);
 }
 
 std::string list(const std::vector<UsbDevice>& devices, bool all = false,
@@ -248,7 +248,7 @@ TEST_CASE("of a device with several interfaces those that matter are told", "[li
 
 TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") {
   UsbDevice device = hid(9, {0x256f, 0xc63a, 1, 8}, space_mouse_wireless(), "SpaceMouse Wireless BT");
-  device.place.clear();
+  device.port_path.clear();
   device.usb_node.clear();
   device.interface = -1;
   const std::string text = list({device});
@@ -257,7 +257,7 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
   UsbDevice other = device;  // two of them are two devices, though neither has a socket
   CHECK(holds(list({device, other}), "2 devices have the profile spacemouse_combined"));
   UsbDevice keys = keyboard_in(9);
-  keys.place.clear();
+  keys.port_path.clear();
   CHECK(
       holds(list({keys, keys}), "keyboard); no profile is for it\n  /dev/hidraw9 (not on USB): 04d9:1702 "));
 }

@@ -25,16 +25,16 @@ TEST_CASE("example 4.2: similar forces, and a torque some four hundred times sma
   // An independent simulation, whose integrator may differ by a few percent: 69 steps, 3.84 and 0.112; 71
   // steps, 4.04 and 46.9.
   CHECK(planar.steps_in_contact == 69);
-  CHECK(planar.most_force_y == Approx(3.84).epsilon(0.03));
-  CHECK(planar.most_torque_z == Approx(0.112).epsilon(0.03));
+  CHECK(planar.max_force_y == Approx(3.84).epsilon(0.03));
+  CHECK(planar.max_torque_z == Approx(0.112).epsilon(0.03));
   CHECK(traditional.steps_in_contact == 71);
-  CHECK(traditional.most_force_y == Approx(4.04).epsilon(0.03));
-  CHECK(traditional.most_torque_z == Approx(46.9).epsilon(0.03));
+  CHECK(traditional.max_force_y == Approx(4.04).epsilon(0.03));
+  CHECK(traditional.max_torque_z == Approx(46.9).epsilon(0.03));
 
   // The motion is planar, so one plane of the family holds the exact answer.
   CHECK(exact.steps_in_contact == planar.steps_in_contact);
-  CHECK(exact.most_force_y == Approx(planar.most_force_y).epsilon(1e-9));
-  CHECK(exact.most_torque_z == Approx(planar.most_torque_z).epsilon(1e-9));
+  CHECK(exact.max_force_y == Approx(planar.max_force_y).epsilon(1e-9));
+  CHECK(exact.max_torque_z == Approx(planar.max_torque_z).epsilon(1e-9));
 }
 
 TEST_CASE("between contacts the cube of example 4.2 moves as a free body does", "[paper]") {

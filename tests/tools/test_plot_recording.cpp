@@ -42,7 +42,7 @@ Recording pressed() {
     tick.wake_latency_ns = 5000 + i;
     recording.ticks.push_back(tick);
   }
-  recording.ranges.resize(recording.ticks.size());
+  recording.contact_ranges.resize(recording.ticks.size());
   return recording;
 }
 
@@ -87,7 +87,7 @@ TEST_CASE("a run without contact, without arming, or of one tick is drawn too", 
   }
   CHECK(plot_recording(recording, files.path() / "still").size() == 6);
   recording.ticks.resize(1);
-  recording.ranges.resize(1);
+  recording.contact_ranges.resize(1);
   CHECK(plot_recording(recording, files.path() / "one").size() == 6);
 }
 

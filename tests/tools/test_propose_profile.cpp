@@ -30,7 +30,7 @@ bool holds(const std::string& text, const std::string& part) {
 }
 
 /// What loading it as a profile is refused with.
-std::string refusal(const std::string& text) {
+std::string rejection_text(const std::string& text) {
   const TemporaryDirectory dir;
   const auto file = dir.write("proposed.toml", text);
   CHECK_NOTHROW(read_toml_file(file));  // good TOML it is
@@ -100,7 +100,7 @@ TEST_CASE("limits are never guessed, and no proposal loads as it is", "[propose_
                              teensy_rawhid(), effects_joystick()}) {
     const std::string text = proposal(bytes);
     INFO(text);
-    const std::string why = refusal(text);
+    const std::string why = rejection_text(text);
     for (const char* key :
          {"report_rate_Hz", "limits.max_linear_speed_m_per_s", "limits.max_angular_speed_rad_per_s"})
       CHECK(holds(why, "key '" + std::string(key) + "' is missing"));
@@ -119,7 +119,7 @@ TEST_CASE("a completed proposal of a multi-axis controller loads, and agrees wit
     INFO(text);
     CHECK_FALSE(holds(text, "# FILL IN"));
     const DeviceProfile profile = loaded(text);
-    CHECK(differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
+    CHECK(find_differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
     CHECK(profile.transport == Transport::hidraw);
     CHECK(profile.stream == StreamStyle::silent_at_rest);
     CHECK_FALSE(profile.has_output);
@@ -149,9 +149,10 @@ TEST_CASE("the end of a cap's way means the same speed whatever the device count
     CHECK(profile.deflection->linear_gain * pose.translation.step * expected.counts ==
           Approx(0.1).epsilon(0.01));
     CHECK(profile.deflection->angular_gain * rotation.step * expected.counts == Approx(1.0).epsilon(0.01));
-    CHECK(profile.deflection->full_m == Approx(pose.translation.step * expected.counts).epsilon(1e-3));
-    CHECK(profile.deflection->full_rad == Approx(rotation.step * expected.counts).epsilon(1e-3));
-    CHECK(profile.deflection->has_leash());
+    CHECK(profile.deflection->full_deflection_m ==
+          Approx(pose.translation.step * expected.counts).epsilon(1e-3));
+    CHECK(profile.deflection->full_deflection_rad == Approx(rotation.step * expected.counts).epsilon(1e-3));
+    CHECK(profile.deflection->has_proxy_distance_limit());
   }
 }
 
@@ -203,7 +204,7 @@ TEST_CASE("steps of the widest axes are steps that a profile may have", "[propos
       "c0");
   const DeviceProfile profile = loaded(completed(proposal(bytes)));
   CHECK(profile.pose_report.translation.bits == 32);
-  CHECK(differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
+  CHECK(find_differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
 }
 
 TEST_CASE("buttons become a mask of 32, or are told where other things lie between them",
@@ -265,23 +266,23 @@ TEST_CASE("a completed proposal of the reference layout loads", "[propose_profil
   std::ifstream stream(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
   const std::string loopback{std::istreambuf_iterator<char>(stream), {}};
   text = text.substr(0, text.find("[pose_report]")) + loopback.substr(loopback.find("[pose_report]"));
-  CHECK(refusal(text).empty());
+  CHECK(rejection_text(text).empty());
 }
 
 TEST_CASE("a hostile name cannot leave its comment", "[propose_profile]") {
   const std::string text =
       propose_profile({space_navigator(), "a\nmax_force_N = 100", "\xff\xfe\n[limits]\r"});
   CHECK(holds(text, "# Made from a?max_force_N = 100\n# Device: ???[limits]?\n"));
-  CHECK(holds(refusal(text), "key 'limits.max_linear_speed_m_per_s' is missing"));
+  CHECK(holds(rejection_text(text), "key 'limits.max_linear_speed_m_per_s' is missing"));
 }
 
 TEST_CASE("whatever a device says of itself, a proposal is good TOML without limits", "[propose_profile]") {
   RandomValues random(21);
-  const int cases = repeats(20'000);
+  const int cases = case_count(20'000);
   int proposed = 0;
   for (int i = 0; i < cases; ++i) {
     try {
-      const std::string text = proposal(strange_descriptor(random));
+      const std::string text = proposal(malformed_descriptor(random));
       const TomlNode root = read_toml_text(text, "proposed.toml");
       for (const TomlEntry& entry : std::get<TomlNode::Table>(root.value))
         if (entry.key == "limits") CHECK(std::get<TomlNode::Table>(entry.node.value).empty());
@@ -298,20 +299,20 @@ TEST_CASE("whatever a device says of itself, a proposal is good TOML without lim
 TEST_CASE("whatever six axes a device has, a proposal with nothing left open loads and agrees with it",
           "[propose_profile]") {
   RandomValues random(22);
-  const int cases = repeats(20'000);
+  const int cases = case_count(20'000);
   int complete = 0;
   for (int i = 0; i < cases; ++i) {
-    const Bytes bytes = strange_descriptor(random);
+    const Bytes bytes = malformed_descriptor(random);
     std::string text;
     try {
-      if (!find_six_axes(parse_report_descriptor(bytes)).device) continue;
+      if (!find_six_axes(parse_report_descriptor(bytes)).controller) continue;
       text = completed(proposal(bytes));
     } catch (const DescriptorError&) {
       continue;
     }
     if (holds(text, "# FILL IN")) continue;
     INFO(text);
-    CHECK(differences(parse_report_descriptor(bytes), expected_reports(loaded(text))) ==
+    CHECK(find_differences(parse_report_descriptor(bytes), expected_reports(loaded(text))) ==
           std::vector<std::string>{});
     ++complete;
   }
@@ -332,13 +333,13 @@ TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") 
   for (const char* text :
        {"05 01 09 08", "0x05, 0x01,\n0X09, 0x08,\n", "05010908", "\t05 01 # usage page\r\n09 08",
         "0x05, 0x01,  // Usage Page (Generic Desktop)\n0x09, 0x08", "\n\n0501\n0908\n"})
-    CHECK(bytes_of_hex_text(text) == expected);
-  CHECK(bytes_of_hex_text("# nothing").empty());
-  CHECK_THROWS_WITH(bytes_of_hex_text("05 01\n 5 01"),
+    CHECK(parse_hex_text(text) == expected);
+  CHECK(parse_hex_text("# nothing").empty());
+  CHECK_THROWS_WITH(parse_hex_text("05 01\n 5 01"),
                     Catch::Contains("2:2: expected bytes of two") && Catch::Contains("found '5'"));
-  CHECK_THROWS_WITH(bytes_of_hex_text("0x"), Catch::Contains("1:1: "));
-  CHECK_THROWS_WITH(bytes_of_hex_text("05 0g"), Catch::Contains("1:4: "));
-  CHECK_THROWS_WITH(bytes_of_hex_text("05 01 / 09"), Catch::Contains("1:7: "));
+  CHECK_THROWS_WITH(parse_hex_text("0x"), Catch::Contains("1:1: "));
+  CHECK_THROWS_WITH(parse_hex_text("05 0g"), Catch::Contains("1:4: "));
+  CHECK_THROWS_WITH(parse_hex_text("05 01 / 09"), Catch::Contains("1:7: "));
 }
 
 TEST_CASE("wrenchctl profile reads bytes and hexadecimal text alike", "[propose_profile]") {

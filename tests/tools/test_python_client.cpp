@@ -77,7 +77,7 @@ TEST_CASE("all of them work with wrenchd itself", "[python][program][wall_time]"
   const std::string socket = (directory.path() / "control.sock").string();
   RunningProgram wrenchd("wrenchd", {"--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--control",
                                      socket, "--realtime", "best_effort"});
-  REQUIRE(wrenchd.says("control socket"));
+  REQUIRE(wrenchd.wait_for_output("control socket"));
   for (const std::string program :
        {"tools/python/example.py", "tests/python/consecutive_ticks.py", "tests/python/check_client.py"}) {
     const Ran ran = run_python(socket, program);

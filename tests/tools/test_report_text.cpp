@@ -133,8 +133,8 @@ TEST_CASE("bytes are read as people write them", "[report_text]") {
   CHECK(parse_bytes("01a0ff").bytes == Bytes{1, 0xa0, 0xff});
   CHECK(parse_bytes(" 0x01, 0XA0:ff\n").bytes == Bytes{1, 0xa0, 0xff});
   CHECK(parse_bytes("").bytes.empty());
-  CHECK(parse_bytes("01 g0").wrong_at == 3);
-  CHECK_FALSE(parse_bytes("01 g0").problem.empty());
-  CHECK_FALSE(parse_bytes("01 a").problem.empty());
-  CHECK_FALSE(parse_bytes("0x").problem.empty());
+  CHECK(parse_bytes("01 g0").error_index == 3);
+  CHECK_FALSE(parse_bytes("01 g0").error.empty());
+  CHECK_FALSE(parse_bytes("01 a").error.empty());
+  CHECK_FALSE(parse_bytes("0x").error.empty());
 }

@@ -21,9 +21,9 @@ constexpr double kBeatsInTime = 4.0;
 }  // namespace
 
 /// The thread that says that the program lives. It ends by itself where the connection does.
-class Client::Beating {
+class Client::HeartbeatThread {
  public:
-  Beating(std::shared_ptr<ClientConnection> connection, std::chrono::duration<double> every)
+  HeartbeatThread(std::shared_ptr<ClientConnection> connection, std::chrono::duration<double> every)
       : thread_([connection = std::move(connection), every](const std::stop_token& stop) {
           std::mutex mutex;
           std::condition_variable_any ended;
@@ -49,7 +49,7 @@ Client::Client(Client&& other) noexcept = default;
 Client& Client::operator=(Client&& other) noexcept = default;
 
 const std::string& Client::socket() const noexcept {
-  return connection_->place();
+  return connection_->socket_path();
 }
 
 namespace {
@@ -94,22 +94,22 @@ bool Client::poll_event(ClientEvent& out, std::chrono::milliseconds timeout) {
   return true;
 }
 
-void Client::take_lease() {
+void Client::acquire_lease() {
   const json lease = connection_->call("lease.take", json::object());
   const std::chrono::duration<double> within(lease.value("beat_within_s", 0.1));
-  beating_ = std::make_unique<Beating>(connection_, within / kBeatsInTime);
+  heartbeat_thread_ = std::make_unique<HeartbeatThread>(connection_, within / kBeatsInTime);
 }
 
-void Client::give_lease() {
-  beating_.reset();
+void Client::release_lease() {
+  heartbeat_thread_.reset();
   try {
     call("lease.give");
   } catch (const ClientError& error) {  // lost meanwhile: there is nothing to give back
-    if (error.code() != ClientError::kNotNow && error.code() != ClientError::kTaken) throw;
+    if (error.code() != ClientError::kInvalidState && error.code() != ClientError::kLeaseHeld) throw;
   }
 }
 
-void Client::beat() {
+void Client::heartbeat() {
   connection_->notify("beat");
 }
 
@@ -119,7 +119,7 @@ StateReader Client::open_state() {
   if (descriptor < 0 || !answer.contains("layout"))
     throw ClientError(ClientError::kProtocol, "wrenchd handed no shared memory over; see its log");
   return StateReader(
-      answer["layout"].dump(), descriptor, [connection = connection_] { return connection->is_there(); },
+      answer["layout"].dump(), descriptor, [connection = connection_] { return connection->is_connected(); },
       [connection = connection_] { return connection->call("state.names", json::object(), nullptr).dump(); });
 }
 

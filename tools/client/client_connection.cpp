@@ -26,7 +26,7 @@ constexpr std::size_t kLongestLine = 16U << 20;
 constexpr std::size_t kMostEvents = 10'000;
 
 [[noreturn]] void gone(const std::string& why) {
-  throw ClientError(ClientError::kGone,
+  throw ClientError(ClientError::kDisconnected,
                     "wrenchd ended the connection (" + why + "); connect again when it is back");
 }
 
@@ -83,34 +83,34 @@ int connected(const std::string& named, std::string& found) {
 }  // namespace
 
 ClientConnection::ClientConnection(const std::string& socket, std::chrono::milliseconds answer_within)
-    : socket_(connected(socket, place_)), answer_within_(answer_within) {}
+    : socket_(connected(socket, socket_path_)), response_timeout_(answer_within) {}
 
 ClientConnection::~ClientConnection() {
-  drop_descriptor();
+  close_descriptor();
   close(socket_);
 }
 
-void ClientConnection::drop_descriptor() noexcept {
+void ClientConnection::close_descriptor() noexcept {
   if (descriptor_ >= 0) close(descriptor_);
   descriptor_ = -1;
 }
 
 json ClientConnection::call(const std::string& method, const json& params, int* descriptor) {
-  const auto end = Clock::now() + answer_within_;
-  const std::lock_guard lock(reading_);
-  drop_descriptor();
+  const auto end = Clock::now() + response_timeout_;
+  const std::lock_guard lock(read_mutex_);
+  close_descriptor();
   const std::int64_t id = ++last_id_;
   send({{"jsonrpc", "2.0"}, {"id", id}, {"method", method}, {"params", params}});
   for (std::string line;;) {
     if (!read_line(line, end))
       throw ClientError(ClientError::kTimeout, "wrenchd did not answer '" + method + "' within " +
-                                                   std::to_string(answer_within_.count()) +
+                                                   std::to_string(response_timeout_.count()) +
                                                    " ms; see its log");
     json message = json::parse(line, nullptr, false);
     if (!message.is_object())
       throw ClientError(ClientError::kProtocol, "what answers is not wrenchd: " + line.substr(0, 80));
     if (message.contains("method")) {
-      keep_event(std::move(message));
+      queue_event(std::move(message));
       continue;
     }
     if (const auto error = message.find("error"); error != message.end()) {
@@ -130,25 +130,25 @@ void ClientConnection::notify(const std::string& method) {
 
 bool ClientConnection::poll_event(json& out, std::chrono::milliseconds timeout) {
   const auto end = Clock::now() + timeout;
-  const std::lock_guard lock(reading_);
+  const std::lock_guard lock(read_mutex_);
   for (std::string line; events_.empty();) {
     if (!read_line(line, end)) return false;
     json message = json::parse(line, nullptr, false);
-    if (message.is_object() && message.contains("method")) keep_event(std::move(message));
+    if (message.is_object() && message.contains("method")) queue_event(std::move(message));
   }
   out = std::move(events_.front());
   events_.pop_front();
   return true;
 }
 
-void ClientConnection::keep_event(json message) {
+void ClientConnection::queue_event(json message) {
   if (!message.contains("params")) return;
   if (events_.size() == kMostEvents) events_.pop_front();
   events_.push_back(std::move(message["params"]));
 }
 
 /// What has come is told even where the connection ended after it.
-bool ClientConnection::is_there() const noexcept {
+bool ClientConnection::is_connected() const noexcept {
   pollfd here = {socket_, POLLRDHUP, 0};
   return poll(&here, 1, 0) >= 0 && (here.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
 }
@@ -167,14 +167,14 @@ bool ClientConnection::wait_for(short events, Clock::time_point end) const {
 /// False where no whole line came in time.
 bool ClientConnection::read_line(std::string& line, Clock::time_point end) {
   for (;;) {
-    const std::size_t at = received_.find('\n', looked_at_);
+    const std::size_t at = received_.find('\n', scanned_);
     if (at != std::string::npos) {
       line = received_.substr(0, at);
       received_.erase(0, at + 1);
-      looked_at_ = 0;
+      scanned_ = 0;
       return true;
     }
-    looked_at_ = received_.size();
+    scanned_ = received_.size();
     if (received_.size() > kLongestLine) gone("a line without end");
     if (!wait_for(POLLIN, end)) return false;
     receive();
@@ -198,7 +198,7 @@ void ClientConnection::receive() {
   }
   for (cmsghdr* one = CMSG_FIRSTHDR(&message); one != nullptr; one = CMSG_NXTHDR(&message, one)) {
     if (one->cmsg_level != SOL_SOCKET || one->cmsg_type != SCM_RIGHTS) continue;
-    drop_descriptor();
+    close_descriptor();
     std::memcpy(&descriptor_, CMSG_DATA(one), sizeof(int));
   }
   received_.append(bytes.data(), static_cast<std::size_t>(got));
@@ -206,8 +206,8 @@ void ClientConnection::receive() {
 
 void ClientConnection::send(const json& request) {
   const std::string line = request.dump() + "\n";
-  const auto end = Clock::now() + answer_within_;
-  const std::lock_guard lock(writing_);
+  const auto end = Clock::now() + response_timeout_;
+  const std::lock_guard lock(write_mutex_);
   for (std::size_t sent = 0; sent < line.size();) {
     const ssize_t n = ::send(socket_, line.data() + sent, line.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (n > 0) {

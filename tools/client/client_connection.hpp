@@ -28,25 +28,25 @@ class ClientConnection {
   /// Wants no answer.
   void notify(const std::string& method);
   bool poll_event(nlohmann::json& out, std::chrono::milliseconds timeout);
-  bool is_there() const noexcept;
-  const std::string& place() const noexcept { return place_; }
+  bool is_connected() const noexcept;
+  const std::string& socket_path() const noexcept { return socket_path_; }
 
  private:
   bool read_line(std::string& line, Clock::time_point end);
   bool wait_for(short events, Clock::time_point end) const;
   void receive();
   void send(const nlohmann::json& request);
-  void drop_descriptor() noexcept;
-  void keep_event(nlohmann::json message);
+  void close_descriptor() noexcept;
+  void queue_event(nlohmann::json message);
 
-  std::string place_;  ///< path of the socket; before socket_, which finds it
+  std::string socket_path_;  ///< path of the socket; before socket_, which finds it
   int socket_;
-  std::chrono::milliseconds answer_within_;
-  std::mutex reading_;
-  std::mutex writing_;
+  std::chrono::milliseconds response_timeout_;
+  std::mutex read_mutex_;
+  std::mutex write_mutex_;
   std::string received_;
-  std::size_t looked_at_ = 0;  ///< of received_, without an end of line
-  int descriptor_ = -1;        ///< that came with what was received
+  std::size_t scanned_ = 0;  ///< of received_, without an end of line
+  int descriptor_ = -1;      ///< that came with what was received
   std::int64_t last_id_ = 0;
   std::deque<nlohmann::json> events_;
 };

@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
       const auto F = tick.wrench();
       std::printf("tick %8llu %-8s F %+6.2f %+6.2f %+6.2f N |", static_cast<unsigned long long>(tick.tick()),
                   tick.state().c_str(), F[0], F[1], F[2]);
-      for (const wrenchd::TouchState& touch : tick.touches())
+      for (const wrenchd::ProxyContact& touch : tick.contacts())
         std::printf(" %s on %s %s (%.0f %%)", touch.tool_feature.c_str(), touch.obstacle.c_str(),
                     touch.obstacle_feature.c_str(), 100.0 * touch.share);
       std::printf("\n");

@@ -90,7 +90,7 @@ std::uint64_t bits_of(const Field& field, const std::byte* record, std::size_t i
   return bits;
 }
 
-double number_of(const Field& field, const std::byte* record, std::size_t i) {
+double parse_number(const Field& field, const std::byte* record, std::size_t i) {
   const std::uint64_t bits = bits_of(field, record, i);
   if (field.type == 'f') return std::bit_cast<double>(bits);
   if (field.type == 'i') return static_cast<double>(static_cast<std::int64_t>(bits));
@@ -183,7 +183,7 @@ class TickState::Names {
 
 double TickState::number(std::string_view field, std::size_t i) const {
   if (!layout_) throw ClientError(ClientError::kProtocol, "no tick was read yet; call next() or latest()");
-  return number_of(field_of(layout_->fields, field), reinterpret_cast<const std::byte*>(words_.data()), i);
+  return parse_number(field_of(layout_->fields, field), reinterpret_cast<const std::byte*>(words_.data()), i);
 }
 
 std::int64_t TickState::integer(std::string_view field, std::size_t i) const {
@@ -199,16 +199,16 @@ std::string TickState::text(std::string_view field) const {
   return text_of(field_of(layout_->fields, field), reinterpret_cast<const std::byte*>(words_.data()));
 }
 
-std::vector<TouchState> TickState::touches() const {
+std::vector<ProxyContact> TickState::contacts() const {
   const auto count =
       std::min<std::size_t>(static_cast<std::size_t>(integer("touch_count")), layout_->most_touches);
-  std::vector<TouchState> out(count);
+  std::vector<ProxyContact> out(count);
   const auto rendering = static_cast<std::uint32_t>(integer("rendering"));
   for (std::size_t k = 0; k < count; ++k) {
     const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->touches_offset +
                             k * layout_->touch_bytes;
     const auto get = [&](std::string_view name, std::size_t i = 0) {
-      return number_of(field_of(layout_->touch_fields, name), from, i);
+      return parse_number(field_of(layout_->touch_fields, name), from, i);
     };
     const auto feature = [&](const std::string& body) {
       std::string name = text_of(field_of(layout_->touch_fields, body + "_feature_kind"), from);
@@ -219,7 +219,7 @@ std::vector<TouchState> TickState::touches() const {
       name += " " + number("_first");
       return name.find("edge") == std::string::npos ? name : name + "-" + number("_second");
     };
-    TouchState& touch = out[k];
+    ProxyContact& touch = out[k];
     for (std::size_t i = 0; i < 3; ++i) {
       touch.point_W_m[i] = get("point_W_m", i);
       touch.normal_W[i] = get("normal_W", i);
@@ -236,7 +236,7 @@ std::vector<TouchState> TickState::touches() const {
 
 StateReader::StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there,
                          std::function<std::string()> ask_names)
-    : is_there_(std::move(is_there)) {
+    : is_connected_(std::move(is_there)) {
   const struct Closed {
     int descriptor;
     ~Closed() { close(descriptor); }
@@ -262,7 +262,7 @@ StateReader::StateReader(const std::string& layout, int descriptor, std::functio
     unmap();
     not_understood("its memory does not begin with WRENCHST");
   }
-  next_ = behind();
+  next_ = unread();
 }
 
 StateReader::~StateReader() {
@@ -272,7 +272,7 @@ StateReader::~StateReader() {
 StateReader::StateReader(StateReader&& other) noexcept
     : layout_(std::move(other.layout_)),
       names_(std::move(other.names_)),
-      is_there_(std::move(other.is_there_)),
+      is_connected_(std::move(other.is_connected_)),
       memory_(std::exchange(other.memory_, nullptr)),
       bytes_(other.bytes_),
       next_(other.next_),
@@ -283,7 +283,7 @@ StateReader& StateReader::operator=(StateReader&& other) noexcept {
   unmap();
   layout_ = std::move(other.layout_);
   names_ = std::move(other.names_);
-  is_there_ = std::move(other.is_there_);
+  is_connected_ = std::move(other.is_connected_);
   memory_ = std::exchange(other.memory_, nullptr);
   bytes_ = other.bytes_;
   next_ = other.next_;
@@ -306,27 +306,27 @@ std::uint64_t load(const std::byte* at, std::memory_order order) {
 
 }  // namespace
 
-std::uint64_t StateReader::behind() const noexcept {
+std::uint64_t StateReader::unread() const noexcept {
   return load(memory_ + layout_->written_offset, std::memory_order_acquire) - next_;
 }
 
 /// A word of a newer record is seen together with its guard, for words are stored with release order; so two
 /// equal guards have only the words of one record between them.
-StateReader::Copied StateReader::copy(std::uint64_t i, TickState& out) const {
+StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const {
   const std::byte* slot = memory_ + layout_->header_bytes + i % layout_->slots * layout_->slot_bytes;
   const std::uint64_t whole = 2 * i + 2;
-  if (load(slot, std::memory_order_acquire) != whole) return Copied::overrun;
+  if (load(slot, std::memory_order_acquire) != whole) return CopyResult::overrun;
   out.layout_ = layout_;
   out.names_ = names_;
   out.words_.resize(layout_->record_bytes / 8);
   for (std::size_t k = 0; k < out.words_.size(); ++k)
     out.words_[k] = load(slot + layout_->record_offset + 8 * k, std::memory_order_acquire);
-  return load(slot, std::memory_order_relaxed) == whole ? Copied::whole : Copied::overrun;
+  return load(slot, std::memory_order_relaxed) == whole ? CopyResult::complete : CopyResult::overrun;
 }
 
 /// Goes on in the middle of what is there, so as not to be overrun again at once.
-void StateReader::skip() {
-  const std::uint64_t ahead = behind();
+void StateReader::skip_overwritten() {
+  const std::uint64_t ahead = unread();
   if (ahead <= layout_->slots / 2) return;
   const std::uint64_t left_out = ahead - layout_->slots / 2;
   missed_ += left_out;
@@ -339,19 +339,19 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
   const auto pause = std::chrono::duration<double>(0.25 / layout_->rate_Hz);
   auto look_around = Clock::now() + kLookAround;
   for (;;) {
-    while (behind() > 0) {
-      if (copy(next_, out) == Copied::whole) {
+    while (unread() > 0) {
+      if (copy(next_, out) == CopyResult::complete) {
         ++next_;
         return true;
       }
-      skip();
+      skip_overwritten();
     }
     const auto now = Clock::now();
     if (now >= end) return false;
     if (now >= look_around) {
       look_around = now + kLookAround;
-      if (is_there_ && !is_there_() && behind() == 0)
-        throw ClientError(ClientError::kGone, "the daemon is gone; connect again when it is back");
+      if (is_connected_ && !is_connected_() && unread() == 0)
+        throw ClientError(ClientError::kDisconnected, "the daemon is gone; connect again when it is back");
     }
     std::this_thread::sleep_for(pause);
   }
@@ -361,7 +361,7 @@ bool StateReader::latest(TickState& out) const {
   for (;;) {
     const std::uint64_t written = load(memory_ + layout_->written_offset, std::memory_order_acquire);
     if (written == 0) return false;
-    if (copy(written - 1, out) == Copied::whole) return true;
+    if (copy(written - 1, out) == CopyResult::complete) return true;
   }
 }
 

@@ -166,7 +166,7 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
       Vector3d normal = Vector3d::Zero();
       for (const std::uint32_t j : around.of(v))
         if (normals[j].dot(normals[i]) >= bend) normal += areas[j];
-      out.corners.push_back(corner(v, normal.isZero(0.0) ? normals[i] : Vector3d(normal.stableNormalized())));
+      out.indices.push_back(corner(v, normal.isZero(0.0) ? normals[i] : Vector3d(normal.stableNormalized())));
       int others = 0;
       double straightest = -1.0;
       for (const std::uint32_t j : around.of(v)) {
@@ -197,7 +197,7 @@ DisplayMesh display_mesh(std::span<const float> vertices, std::span<const Triang
                                     std::to_string(surface.vertices.size()));
   surface.triangles.assign(triangles.begin(), triangles.end());
   DisplayMesh out;
-  out.triangles_given = triangles.size();
+  out.source_triangles = triangles.size();
   const bool make_coarser = triangles.size() > most;
   if (make_coarser) surface = coarser(surface, most);
   draw(surface, make_coarser, out);

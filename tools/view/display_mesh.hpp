@@ -14,10 +14,10 @@ namespace wrenchd {
 struct DisplayMesh {
   std::vector<float> positions;        ///< 3 a corner
   std::vector<float> normals;          ///< likewise; smooth but for bends of more than kCrease_rad
-  std::vector<std::uint32_t> corners;  ///< 3 a triangle
+  std::vector<std::uint32_t> indices;  ///< 3 a triangle
   std::vector<float> lines;            ///< 6 a line
-  std::size_t triangles_given = 0;     ///< before it was made coarser
-  std::size_t triangles() const noexcept { return corners.size() / 3; }
+  std::size_t source_triangles = 0;    ///< before it was made coarser
+  std::size_t triangles() const noexcept { return indices.size() / 3; }
 };
 
 inline constexpr double kCrease_rad = 0.6;  ///< 34 degrees

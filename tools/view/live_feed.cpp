@@ -52,50 +52,50 @@ void pause(const std::stop_token& stop, std::chrono::milliseconds time) {
 }  // namespace
 
 LiveFeed::LiveFeed(std::string socket) : socket_(std::move(socket)) {
-  link_.why = "looking for wrenchd";
-  reading_ = std::jthread([this](const std::stop_token& stop) { follow(stop); });
-  scene_thread_ = std::jthread([this](const std::stop_token& stop) { follow_scene(stop); });
+  link_.error = "looking for wrenchd";
+  reader_thread_ = std::jthread([this](const std::stop_token& stop) { run_reader(stop); });
+  scene_thread_ = std::jthread([this](const std::stop_token& stop) { run_scene_fetcher(stop); });
 }
 
 LiveFeed::~LiveFeed() {
-  reading_.request_stop();
+  reader_thread_.request_stop();
   scene_thread_.request_stop();
 }
 
-void LiveFeed::disconnected(const std::string& why) {
+void LiveFeed::set_disconnected(const std::string& why) {
   connection_.store(0);
   const std::scoped_lock lock(mutex_);
-  if (link_.connected || link_.why != why) ++link_.told;
+  if (link_.connected || link_.error != why) ++link_.revision;
   link_.connected = false;
-  link_.why = why;
+  link_.error = why;
 }
 
-void LiveFeed::follow(const std::stop_token& stop) {
+void LiveFeed::run_reader(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       Client client(socket_);
       client.subscribe();
       StateReader reader = client.open_state();
-      ask_status(client);
+      request_status(client);
       {
         const std::scoped_lock lock(mutex_);
         link_.connected = true;
-        link_.why.clear();
+        link_.error.clear();
         link_.rate_Hz = reader.rate_Hz();
-        connection_.store(++link_.number);
-        ++link_.told;
-        history_ = Extremes(kStretch_ns, kKept);
-        took_ = late_ = RecentTimes{};
+        connection_.store(++link_.connection);
+        ++link_.revision;
+        history_ = MinMaxHistory(kBucket_ns, kBuckets);
+        tick_duration_ = wake_latency_ = RollingHistogram{};
       }
-      read(client, reader, stop);
+      read_ticks(client, reader, stop);
     } catch (const ClientError& error) {
-      disconnected(error.what());
+      set_disconnected(error.what());
     }
     pause(stop, kAgain);
   }
 }
 
-void LiveFeed::read(Client& client, StateReader& reader, const std::stop_token& stop) {
+void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_token& stop) {
   TickState state;
   auto ask_again = std::chrono::steady_clock::now() + kStatusEvery;
   while (!stop.stop_requested()) {
@@ -106,14 +106,14 @@ void LiveFeed::read(Client& client, StateReader& reader, const std::stop_token& 
       const ChannelValues values = tick.channels();
       const std::scoped_lock lock(mutex_);
       history_.add(tick.time_ns, values);
-      took_.add(tick.time_ns, tick.took_ns);
-      late_.add(tick.time_ns, tick.late_ns);
+      tick_duration_.add(tick.time_ns, tick.duration_ns);
+      wake_latency_.add(tick.time_ns, tick.wake_latency_ns);
     }
     if (any) {
-      Now now{view_tick(state), view_words(state), reader.missed()};
-      rendering_.store(now.tick.rendering);
+      Sample now{view_tick(state), view_status(state), reader.missed()};
+      rendering_id_.store(now.tick.rendering_id);
       const std::scoped_lock lock(mutex_);
-      now_ = std::move(now);
+      newest_sample_ = std::move(now);
     }
     bool news = std::chrono::steady_clock::now() >= ask_again;
     ClientEvent event;
@@ -124,29 +124,29 @@ void LiveFeed::read(Client& client, StateReader& reader, const std::stop_token& 
       if (events_.size() < kMostEvents) events_.push_back(event.json);
     }
     if (news) {
-      ask_status(client);
+      request_status(client);
       ask_again = std::chrono::steady_clock::now() + kStatusEvery;
     }
     std::this_thread::sleep_for(watched_.load() ? kWatched : kUnwatched);
   }
 }
 
-void LiveFeed::ask_status(Client& client) {
+void LiveFeed::request_status(Client& client) {
   Json status = Json::parse(client.status());
   const std::scoped_lock lock(mutex_);
   if (status == link_.status) return;
   link_.status = std::move(status);
-  ++link_.told;
+  ++link_.revision;
 }
 
 /// The scene is fetched with each connection, whenever the ticks are of another rendering, and after a
 /// reload, which may have changed from where it is looked at.
-void LiveFeed::follow_scene(const std::stop_token& stop) {
+void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
   std::uint64_t of_connection = 0;
   std::uint32_t of_rendering = 0, of_reload = 0;
   for (; !stop.stop_requested(); std::this_thread::sleep_for(30ms)) {
     const std::uint64_t connection = connection_.load();
-    const std::uint32_t rendering = rendering_.load();
+    const std::uint32_t rendering = rendering_id_.load();
     const std::uint32_t reload = reloads_.load();
     if (connection == 0 || (connection == of_connection && rendering == of_rendering && reload == of_reload))
       continue;
@@ -163,7 +163,7 @@ void LiveFeed::follow_scene(const std::stop_token& stop) {
     } catch (const std::exception& error) {
       {
         const std::scoped_lock lock(mutex_);
-        why_no_scene_ = error.what();
+        scene_error_ = error.what();
       }
       pause(stop, 1s);
     }
@@ -178,7 +178,7 @@ void LiveFeed::fetch_scene(Client& client) {
   auto made = std::make_shared<const ViewScene>(description, memory.bytes(), known.get());
   const std::scoped_lock lock(mutex_);
   scene_ = std::move(made);
-  why_no_scene_.clear();
+  scene_error_.clear();
 }
 
 LiveFeed::Link LiveFeed::link() const {
@@ -186,9 +186,9 @@ LiveFeed::Link LiveFeed::link() const {
   return link_;
 }
 
-std::optional<LiveFeed::Now> LiveFeed::now() const {
+std::optional<LiveFeed::Sample> LiveFeed::newest_sample() const {
   const std::scoped_lock lock(mutex_);
-  return now_;
+  return newest_sample_;
 }
 
 std::shared_ptr<const ViewScene> LiveFeed::scene() const {
@@ -196,22 +196,22 @@ std::shared_ptr<const ViewScene> LiveFeed::scene() const {
   return scene_;
 }
 
-std::string LiveFeed::why_no_scene() const {
+std::string LiveFeed::scene_error() const {
   const std::scoped_lock lock(mutex_);
-  return why_no_scene_;
+  return scene_error_;
 }
 
-RecentTimes::Sum LiveFeed::took() const {
+RollingHistogram::Summary LiveFeed::tick_duration() const {
   const std::scoped_lock lock(mutex_);
-  return took_.sum();
+  return tick_duration_.summary();
 }
 
-RecentTimes::Sum LiveFeed::late() const {
+RollingHistogram::Summary LiveFeed::wake_latency() const {
   const std::scoped_lock lock(mutex_);
-  return late_.sum();
+  return wake_latency_.summary();
 }
 
-void LiveFeed::look_at_history(const std::function<void(const Extremes&)>& look) const {
+void LiveFeed::with_history(const std::function<void(const MinMaxHistory&)>& look) const {
   const std::scoped_lock lock(mutex_);
   look(history_);
 }
@@ -223,7 +223,7 @@ std::vector<std::string> LiveFeed::events() {
 
 std::string LiveFeed::state() const {
   const std::scoped_lock lock(mutex_);
-  return now_ ? now_->words.state : std::string();
+  return newest_sample_ ? newest_sample_->words.state : std::string();
 }
 
 }  // namespace wrenchd

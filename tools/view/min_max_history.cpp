@@ -6,36 +6,36 @@
 
 namespace wrenchd {
 
-void Extremes::add(std::int64_t time_ns, const ChannelValues& values) {
-  if (begun_ && time_ns < growing_.begin_ns) {
-    first_ = end();
-    whole_.clear();
-    begun_ = false;
+void MinMaxHistory::add(std::int64_t time_ns, const ChannelValues& values) {
+  if (started_ && time_ns < current_.begin_ns) {
+    first_ = end_index();
+    complete_.clear();
+    started_ = false;
   }
-  if (begun_ && time_ns >= growing_.begin_ns + stretch_ns_) {
-    whole_.push_back(growing_);
-    if (whole_.size() > kept_) {
-      whole_.pop_front();
+  if (started_ && time_ns >= current_.begin_ns + bucket_ns_) {
+    complete_.push_back(current_);
+    if (complete_.size() > capacity_) {
+      complete_.pop_front();
       ++first_;
     }
-    begun_ = false;
+    started_ = false;
   }
-  if (!begun_) {
-    growing_ = {time_ns - time_ns % stretch_ns_, values, values};
-    begun_ = true;
+  if (!started_) {
+    current_ = {time_ns - time_ns % bucket_ns_, values, values};
+    started_ = true;
     return;
   }
-  for (std::size_t i = 0; i < kChannels; ++i) {  // fmin and fmax take the number where one of two is NaN
-    growing_.least[i] = std::fmin(growing_.least[i], values[i]);
-    growing_.most[i] = std::fmax(growing_.most[i], values[i]);
+  for (std::size_t i = 0; i < kChannelCount; ++i) {  // fmin and fmax take the number where one of two is NaN
+    current_.min[i] = std::fmin(current_.min[i], values[i]);
+    current_.max[i] = std::fmax(current_.max[i], values[i]);
   }
 }
 
-std::uint64_t Extremes::from(std::int64_t time_ns) const {
+std::uint64_t MinMaxHistory::index_at(std::int64_t time_ns) const {
   const auto found =
-      std::lower_bound(whole_.begin(), whole_.end(), time_ns,
-                       [](const Stretch& stretch, std::int64_t t) { return stretch.begin_ns < t; });
-  return first_ + static_cast<std::uint64_t>(found - whole_.begin());
+      std::lower_bound(complete_.begin(), complete_.end(), time_ns,
+                       [](const Bucket& stretch, std::int64_t t) { return stretch.begin_ns < t; });
+  return first_ + static_cast<std::uint64_t>(found - complete_.begin());
 }
 
 }  // namespace wrenchd

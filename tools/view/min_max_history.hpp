@@ -23,40 +23,42 @@ enum class Channel : std::uint8_t {
   depth,   ///< from p to q [m]
   angle,   ///< likewise [rad]
 };
-inline constexpr std::size_t kChannels = 11;
-using ChannelValues = std::array<double, kChannels>;
+inline constexpr std::size_t kChannelCount = 11;
+using ChannelValues = std::array<double, kChannelCount>;
 
 /// Curves for a screen: of each short stretch of time the least and the greatest value of each channel, so
 /// that a peak of a single tick is drawn however many ticks a pixel has. NaN where a stretch had no value.
-class Extremes {
+class MinMaxHistory {
  public:
-  struct Stretch {
+  struct Bucket {
     std::int64_t begin_ns = 0;
-    ChannelValues least, most;
+    ChannelValues min, max;
   };
 
   /// kept: so many of the newest stretches; older ones are forgotten.
-  explicit Extremes(std::int64_t stretch_ns, std::size_t kept = std::numeric_limits<std::size_t>::max())
-      : stretch_ns_(stretch_ns), kept_(kept) {}
+  explicit MinMaxHistory(std::int64_t stretch_ns, std::size_t kept = std::numeric_limits<std::size_t>::max())
+      : bucket_ns_(stretch_ns), capacity_(kept) {}
 
   /// Times never fall; where one does, as after a restart of whoever counts them, all is forgotten.
   void add(std::int64_t time_ns, const ChannelValues& values);
 
   /// Whole stretches, by their numbers, that are never used again. The one that is still growing is not among
   /// them.
-  std::uint64_t first() const noexcept { return first_; }
-  std::uint64_t end() const noexcept { return first_ + whole_.size(); }
-  const Stretch& at(std::uint64_t number) const { return whole_[static_cast<std::size_t>(number - first_)]; }
+  std::uint64_t first_index() const noexcept { return first_; }
+  std::uint64_t end_index() const noexcept { return first_ + complete_.size(); }
+  const Bucket& at(std::uint64_t number) const {
+    return complete_[static_cast<std::size_t>(number - first_)];
+  }
   /// The first stretch that begins at this time or later.
-  std::uint64_t from(std::int64_t time_ns) const;
+  std::uint64_t index_at(std::int64_t time_ns) const;
 
  private:
-  std::int64_t stretch_ns_;
-  std::size_t kept_;
+  std::int64_t bucket_ns_;
+  std::size_t capacity_;
   std::uint64_t first_ = 0;
-  std::deque<Stretch> whole_;
-  Stretch growing_;
-  bool begun_ = false;
+  std::deque<Bucket> complete_;
+  Bucket current_;
+  bool started_ = false;
 };
 
 }  // namespace wrenchd

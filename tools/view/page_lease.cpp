@@ -14,15 +14,15 @@ constexpr auto kAnswerWithin = 2s;   ///< or the lease is lost anyway
 constexpr int kFadeLooks = 20;       ///< of the time between two beats: a fade takes 100 ms
 constexpr auto kUntilArmed = 500ms;  ///< until the ticks tell of it
 
-const char* name(PageLease::Wish wish) {
+const char* name(PageLease::Request wish) {
   switch (wish) {
-    case PageLease::Wish::arm:
+    case PageLease::Request::arm:
       return "arm";
-    case PageLease::Wish::disarm:
+    case PageLease::Request::disarm:
       return "disarm";
-    case PageLease::Wish::stop:
+    case PageLease::Request::stop:
       return "stop";
-    case PageLease::Wish::acknowledge:
+    case PageLease::Request::acknowledge:
       return "acknowledge";
   }
   return "";
@@ -42,8 +42,8 @@ bool is_over(const std::string& state) {
 
 }  // namespace
 
-PageLease::PageLease(std::string socket, std::function<void(const Told&)> tell)
-    : socket_(std::move(socket)), tell_(std::move(tell)) {
+PageLease::PageLease(std::string socket, std::function<void(const Reply&)> tell)
+    : socket_(std::move(socket)), on_reply_(std::move(tell)) {
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   stop_thread_ = std::jthread([this](const std::stop_token& stop) { run_stops(stop); });
 }
@@ -55,32 +55,32 @@ PageLease::~PageLease() {
   thread_.join();
 }
 
-void PageLease::ask(std::uint64_t page, Wish wish) {
+void PageLease::submit(std::uint64_t page, Request wish) {
   {
     const std::scoped_lock lock(mutex_);
-    if (wish == Wish::stop)
-      stops_.push_back(page);
+    if (wish == Request::stop)
+      pending_stops_.push_back(page);
     else
-      asked_.push_back({page, wish});
+      pending_.push_back({page, wish});
   }
   changed_.notify_all();
 }
 
-void PageLease::lives(std::uint64_t page) noexcept {
-  if (holder_.load() == page) lived_at_ns_.store(now_ns());
+void PageLease::heartbeat(std::uint64_t page) noexcept {
+  if (holder_.load() == page) last_heartbeat_ns_.store(now_ns());
 }
 
-void PageLease::gone(std::uint64_t page) {
+void PageLease::page_closed(std::uint64_t page) {
   {
     const std::scoped_lock lock(mutex_);
-    std::erase_if(asked_, [page](const Asked& one) { return one.page == page; });
-    if (holder_.load() == page) holder_gone_ = true;
+    std::erase_if(pending_, [page](const PendingRequest& one) { return one.page == page; });
+    if (holder_.load() == page) holder_closed_ = true;
   }
   changed_.notify_all();
 }
 
-void PageLease::loop_is(const std::string& state) {
-  disarmed_.store(!is_armed(state));
+void PageLease::set_loop_state(const std::string& state) {
+  disarmed_by_daemon_.store(!is_armed(state));
 }
 
 Client& PageLease::client() {
@@ -92,98 +92,99 @@ void PageLease::arm(std::uint64_t page) {
   const std::uint64_t other = holder_.load();
   if (other == page) return;  // it was pressed twice
   if (other != 0)
-    throw ClientError(ClientError::kTaken, "Another page of this view has armed; disarm there first.");
+    throw ClientError(ClientError::kLeaseHeld, "Another page of this view has armed; disarm there first.");
   client().call("lease.take");
-  lived_at_ns_.store(now_ns());
+  last_heartbeat_ns_.store(now_ns());
   holder_.store(page);
   armed_at_ = std::chrono::steady_clock::now();
-  disarmed_.store(false);
+  disarmed_by_daemon_.store(false);
   try {
     client().call("arm");
   } catch (const ClientError&) {
-    let_go("");
+    release("");
     throw;
   }
 }
 
 /// The force fades, and others may arm. why: told to the page that held it; empty: it knows.
-void PageLease::let_go(const std::string& why) {
+void PageLease::release(const std::string& why) {
   const std::uint64_t page = holder_.exchange(0);
   if (page == 0) return;
   try {
     client().call("disarm");
     // The lease is kept until the force has faded: to the daemon, one that ends before is a client that died.
     for (int i = 0; i < kFadeLooks && !is_over(client().state()); ++i) {
-      client().beat();
+      client().heartbeat();
       std::this_thread::sleep_for(kBeatEvery);
     }
     client().call("lease.give");
   } catch (const ClientError&) {
     client_.reset();  // a connection that ends takes the lease with it
   }
-  if (!why.empty()) tell_({page, "lease", false, why});
+  if (!why.empty()) on_reply_({page, "lease", false, why});
 }
 
-void PageLease::fulfil(const Asked& asked) {
-  Told told{asked.page, name(asked.wish), true, {}};
+void PageLease::execute(const PendingRequest& asked) {
+  Reply told{asked.page, name(asked.request), true, {}};
   try {
-    switch (asked.wish) {
-      case Wish::arm:
+    switch (asked.request) {
+      case Request::arm:
         arm(asked.page);
         break;
-      case Wish::disarm:
+      case Request::disarm:
         if (holder_.load() == 0)
           client().call("disarm");
         else
-          let_go(asked.page == holder_.load() ? "" : "another page of this view disarmed");
+          release(asked.page == holder_.load() ? "" : "another page of this view disarmed");
         break;
-      case Wish::acknowledge:
+      case Request::acknowledge:
         client().call("acknowledge");
         break;
-      case Wish::stop:
+      case Request::stop:
         break;
     }
   } catch (const ClientError& error) {
-    told.done = false;
-    told.text = error.what();
+    told.accepted = false;
+    told.error = error.what();
     if (error.code() > 0) {  // the connection, not the daemon's answer
       client_.reset();
       holder_.store(0);
     }
   }
-  tell_(told);
+  on_reply_(told);
 }
 
 void PageLease::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    std::optional<Asked> asked;
+    std::optional<PendingRequest> asked;
     bool gone = false;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, stop, kBeatEvery, [this] { return !asked_.empty() || holder_gone_; });
-      gone = std::exchange(holder_gone_, false);
-      if (!asked_.empty()) {
-        asked = asked_.front();
-        asked_.pop_front();
+      changed_.wait_for(lock, stop, kBeatEvery, [this] { return !pending_.empty() || holder_closed_; });
+      gone = std::exchange(holder_closed_, false);
+      if (!pending_.empty()) {
+        asked = pending_.front();
+        pending_.pop_front();
       }
     }
-    if (gone) let_go("the page was closed");
-    const std::int64_t silent_ns = now_ns() - lived_at_ns_.load();
-    if (holder_.load() != 0 && silent_ns > std::chrono::nanoseconds(kSilentPage).count())
-      let_go("Disarmed: nobody has seen this page for a second. It was hidden, or it hung.");
-    if (holder_.load() != 0 && disarmed_.load() && std::chrono::steady_clock::now() > armed_at_ + kUntilArmed)
-      let_go("The daemon has disarmed; its state says why.");
+    if (gone) release("the page was closed");
+    const std::int64_t silent_ns = now_ns() - last_heartbeat_ns_.load();
+    if (holder_.load() != 0 && silent_ns > std::chrono::nanoseconds(kPageTimeout).count())
+      release("Disarmed: nobody has seen this page for a second. It was hidden, or it hung.");
+    if (holder_.load() != 0 && disarmed_by_daemon_.load() &&
+        std::chrono::steady_clock::now() > armed_at_ + kUntilArmed)
+      release("The daemon has disarmed; its state says why.");
     if (holder_.load() != 0) {
       try {
-        client().beat();
+        client().heartbeat();
       } catch (const ClientError& error) {
         client_.reset();
-        tell_({holder_.exchange(0), "lease", false, error.what()});
+        on_reply_({holder_.exchange(0), "lease", false, error.what()});
       }
     }
-    if (asked) fulfil(*asked);
+    if (asked) execute(*asked);
   }
-  let_go("");
+  release("");
 }
 
 void PageLease::run_stops(const std::stop_token& stop) {
@@ -191,18 +192,18 @@ void PageLease::run_stops(const std::stop_token& stop) {
     std::uint64_t page = 0;
     {
       std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop, [this] { return !stops_.empty(); })) return;
-      page = stops_.front();
-      stops_.pop_front();
+      if (!changed_.wait(lock, stop, [this] { return !pending_stops_.empty(); })) return;
+      page = pending_stops_.front();
+      pending_stops_.pop_front();
     }
-    Told told{page, name(Wish::stop), true, {}};
+    Reply told{page, name(Request::stop), true, {}};
     try {
       Client(socket_, kAnswerWithin).stop();
     } catch (const ClientError& error) {
-      told.done = false;
-      told.text = error.what();
+      told.accepted = false;
+      told.error = error.what();
     }
-    tell_(told);
+    on_reply_(told);
   }
 }
 

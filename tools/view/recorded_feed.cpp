@@ -20,7 +20,7 @@ RecordedFeed::RecordedFeed(std::string name, Recording recording, std::shared_pt
     : name_(std::move(name)),
       recording_(std::move(recording)),
       scene_(std::move(scene)),
-      why_no_scene_(std::move(why_no_scene)) {
+      scene_error_(std::move(why_no_scene)) {
   if (recording_.ticks.empty()) throw RecordingError(name_ + ": has no ticks; there is nothing to be seen");
   for (const TickRecord& record : recording_.ticks) history_.add(record.now_ns, view_tick(record).channels());
 }
@@ -45,7 +45,7 @@ std::int64_t RecordedFeed::time_ns(double t_s) const {
   return begin_ns() + std::llround(t * kNs);
 }
 
-std::size_t RecordedFeed::number_at(double t_s) const {
+std::size_t RecordedFeed::index_at(double t_s) const {
   const auto& ticks = recording_.ticks;
   const auto after = std::upper_bound(ticks.begin(), ticks.end(), time_ns(t_s),
                                       [](std::int64_t t, const TickRecord& one) { return t < one.now_ns; });
@@ -53,39 +53,40 @@ std::size_t RecordedFeed::number_at(double t_s) const {
 }
 
 Json RecordedFeed::frame(double t_s) const {
-  const std::size_t row = number_at(t_s);
+  const std::size_t row = index_at(t_s);
   const TickRecord& record = recording_.ticks[row];
-  return frame_json(view_tick(record), view_words(record, recording_.touches_of(row)), scene_.get(),
+  return frame_json(view_tick(record), view_status(record, recording_.contacts_of(row)), scene_.get(),
                     begin_ns());
 }
 
-std::pair<std::uint64_t, std::uint64_t> RecordedFeed::stretches(double t_s) const {
+std::pair<std::uint64_t, std::uint64_t> RecordedFeed::bucket_range(double t_s) const {
   const std::int64_t to = time_ns(t_s);
-  return {history_.from(to - std::llround(kHistory_s * kNs)), history_.from(to + 1)};
+  return {history_.index_at(to - std::llround(kHistory_s * kNs)), history_.index_at(to + 1)};
 }
 
-std::pair<RecentTimes::Sum, RecentTimes::Sum> RecordedFeed::times(double t_s) const {
-  RecentTimes took, late;
-  const std::size_t last = number_at(t_s);
-  const std::int64_t from = recording_.ticks[last].now_ns - RecentTimes::kSeconds * 1'000'000'000;
-  for (std::size_t i = number_at(t_s - static_cast<double>(RecentTimes::kSeconds)); i <= last; ++i) {
+std::pair<RollingHistogram::Summary, RollingHistogram::Summary> RecordedFeed::tick_times(double t_s) const {
+  RollingHistogram took, late;
+  const std::size_t last = index_at(t_s);
+  const std::int64_t from = recording_.ticks[last].now_ns - RollingHistogram::kWindow_s * 1'000'000'000;
+  for (std::size_t i = index_at(t_s - static_cast<double>(RollingHistogram::kWindow_s)); i <= last; ++i) {
     if (recording_.ticks[i].now_ns < from) continue;
     const ViewTick tick = view_tick(recording_.ticks[i]);
-    took.add(tick.time_ns, tick.took_ns);
-    late.add(tick.time_ns, tick.late_ns);
+    took.add(tick.time_ns, tick.duration_ns);
+    late.add(tick.time_ns, tick.wake_latency_ns);
   }
-  return {took.sum(), late.sum()};
+  return {took.summary(), late.summary()};
 }
 
-Json RecordedFeed::changes() const {
+Json RecordedFeed::state_changes() const {
   Json out = Json::array();
   const TickRecord* before = nullptr;
   for (const TickRecord& record : recording_.ticks) {
-    if (before == nullptr || before->state != record.state || before->cause != record.cause)
-      out.push_back({{"t", static_cast<double>(record.now_ns - begin_ns()) / kNs},
-                     {"state", wrenchd::name(static_cast<State>(record.state))},
-                     {"cause", record.cause == 0 ? std::string_view("none")
-                                                 : fault_row(static_cast<Fault>(record.cause)).name}});
+    if (before == nullptr || before->state != record.state || before->state_cause != record.state_cause)
+      out.push_back(
+          {{"t", static_cast<double>(record.now_ns - begin_ns()) / kNs},
+           {"state", wrenchd::name(static_cast<State>(record.state))},
+           {"cause", record.state_cause == 0 ? std::string_view("none")
+                                             : fault_row(static_cast<Fault>(record.state_cause)).name}});
     before = &record;
   }
   return out;

@@ -17,7 +17,7 @@ namespace wrenchd {
 /// What a recording shows, at any time within it. Only read once it is made.
 class RecordedFeed {
  public:
-  static constexpr std::int64_t kStretch_ns = 10'000'000;
+  static constexpr std::int64_t kBucket_ns = 10'000'000;
   static constexpr double kHistory_s = 10.0;
 
   /// name: for people. scene: null where it is not known; why_no_scene says why. Throws RecordingError where
@@ -28,30 +28,30 @@ class RecordedFeed {
   const std::string& name() const noexcept { return name_; }
   const std::string& version() const noexcept { return recording_.header.version; }
   const std::shared_ptr<const ViewScene>& scene() const noexcept { return scene_; }
-  const std::string& why_no_scene() const noexcept { return why_no_scene_; }
+  const std::string& scene_error() const noexcept { return scene_error_; }
   std::int64_t begin_ns() const noexcept { return recording_.ticks.front().now_ns; }
   double duration_s() const noexcept;
   double rate_Hz() const noexcept;  ///< of its ticks, by their median distance
 
   /// The last tick that began at that time [s] from the beginning, or before.
   Json frame(double t_s) const;
-  const Extremes& history() const noexcept { return history_; }
+  const MinMaxHistory& history() const noexcept { return history_; }
   /// The stretches of the last ten seconds up to then.
-  std::pair<std::uint64_t, std::uint64_t> stretches(double t_s) const;
+  std::pair<std::uint64_t, std::uint64_t> bucket_range(double t_s) const;
   /// How long ticks took and how late they began, in the ten seconds up to then.
-  std::pair<RecentTimes::Sum, RecentTimes::Sum> times(double t_s) const;
+  std::pair<RollingHistogram::Summary, RollingHistogram::Summary> tick_times(double t_s) const;
   /// When the state became another: [{t, state, cause}, ...].
-  Json changes() const;
+  Json state_changes() const;
 
  private:
-  std::size_t number_at(double t_s) const;
+  std::size_t index_at(double t_s) const;
   std::int64_t time_ns(double t_s) const;
 
   std::string name_;
   Recording recording_;
   std::shared_ptr<const ViewScene> scene_;
-  std::string why_no_scene_;
-  Extremes history_{kStretch_ns};
+  std::string scene_error_;
+  MinMaxHistory history_{kBucket_ns};
 };
 
 }  // namespace wrenchd

@@ -23,7 +23,7 @@ void serve(ViewServer& server, const ViewOptions& options) {
   std::string url = server.url();
   std::printf("%s\n", url.c_str());
   std::fflush(stdout);
-  if (options.open) {
+  if (options.open_browser) {
     std::string program = "xdg-open";
     char* const words[] = {program.data(), url.data(), nullptr};
     pid_t pid = -1;
@@ -33,16 +33,16 @@ void serve(ViewServer& server, const ViewOptions& options) {
   server.run();
 }
 
-Pose pose_of(const PlacementSettings& placed) {
+Pose pose_of(const PoseSettings& placed) {
   return {rotation_from(placed.rotation_vector_rad), placed.position_m};
 }
 
 /// The scene of a recording, as it is inside.
-std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const Plan& plan) {
+std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunConfig& plan) {
   MeshLoader meshes(cache_directory(),
                     [](const std::string& what) { std::fprintf(stderr, "wrenchctl: %s\n", what.c_str()); });
   const auto scene = std::make_shared<const Scene>(plan.scene, meshes);
-  const SceneShapes shapes(scene);
+  const SceneGeometry shapes(scene);
   Json description = shapes.description(*scene);
   const DeviceSettings& device = plan.settings.device;
   description["shapes"] = 1;
@@ -73,7 +73,7 @@ void run_view(const ViewOptions& options) {
   std::string why;
   if (!recording.ticks.empty()) try {
       const RecordedRun run(recording.header);
-      scene = scene_of(recording, run.plan());
+      scene = scene_of(recording, run.config());
     } catch (const std::exception& error) {
       why = error.what();
       std::fprintf(stderr, "wrenchctl: the scene cannot be shown: %s\n", why.c_str());

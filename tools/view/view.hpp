@@ -12,7 +12,7 @@ struct ViewOptions {
   std::filesystem::path recording;  ///< empty: the daemon that runs
   std::string socket;               ///< of that; empty: the usual places
   std::uint16_t port = 0;           ///< 0: one that is free
-  bool open = false;                ///< in a browser, by xdg-open
+  bool open_browser = false;        ///< in a browser, by xdg-open
 };
 
 /// Prints the address of the page, and serves it until a signal ends it. Throws what goes wrong at the start.

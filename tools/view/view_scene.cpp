@@ -27,8 +27,9 @@ ObstacleMotion motion_of(const Json& json) {
           json.at("last_s").get<double>()};
 }
 
-std::optional<LaterMotion> later_of(const Json& json) {
-  return LaterMotion{json.at("from_s").get<double>(), pose_of(json.at("X_WO")), motion_of(json.at("motion"))};
+std::optional<ScheduledMotion> later_of(const Json& json) {
+  return ScheduledMotion{json.at("from_s").get<double>(), pose_of(json.at("X_WO")),
+                         motion_of(json.at("motion"))};
 }
 
 template <class T>
@@ -45,12 +46,12 @@ enum class Detail : std::uint32_t { fine = 1, coarse = 3 };
 std::string message_of(Detail detail, std::uint32_t number, const DisplayMesh& mesh) {
   const auto count = [](std::size_t numbers) { return static_cast<std::uint32_t>(numbers / 3); };
   const std::array<std::uint32_t, 5> head = {static_cast<std::uint32_t>(detail), number,
-                                             count(mesh.positions.size()), count(mesh.corners.size()),
+                                             count(mesh.positions.size()), count(mesh.indices.size()),
                                              count(mesh.lines.size())};
   std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
   for (const std::vector<float>* part : {&mesh.positions, &mesh.normals})
     out.append(reinterpret_cast<const char*>(part->data()), part->size() * sizeof(float));
-  out.append(reinterpret_cast<const char*>(mesh.corners.data()), mesh.corners.size() * sizeof(std::uint32_t));
+  out.append(reinterpret_cast<const char*>(mesh.indices.data()), mesh.indices.size() * sizeof(std::uint32_t));
   out.append(reinterpret_cast<const char*>(mesh.lines.data()), mesh.lines.size() * sizeof(float));
   return out;
 }
@@ -59,15 +60,15 @@ std::string message_of(Detail detail, std::uint32_t number, const DisplayMesh& m
 
 ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, const ViewScene* known) try
     : shapes_(description.at("shapes").get<std::uint64_t>()),
-      rendering_(description.at("rendering").get<std::uint32_t>()),
-      begins_ns_(description.at("scene_time_begins_ns").get<std::int64_t>()),
+      rendering_id_(description.at("rendering").get<std::uint32_t>()),
+      start_ns_(description.at("scene_time_begins_ns").get<std::int64_t>()),
       X_WB_(pose_of(description.at("X_WB"))),
       X_HT_(pose_of(description.at("X_HT"))),
       about_handle_(description.at("wrench_about") == "handle") {
   const Json& meshes = description.at("meshes");
   std::size_t all = 0;
-  for (const Json& mesh : meshes) given_.push_back(mesh.at("triangles").get<std::size_t>());
-  for (const std::size_t one : given_) all += one;
+  for (const Json& mesh : meshes) source_triangles_.push_back(mesh.at("triangles").get<std::size_t>());
+  for (const std::size_t one : source_triangles_) all += one;
   if (known != nullptr && known->shapes_ == shapes_) {
     meshes_ = known->meshes_;
   } else {
@@ -76,20 +77,20 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
       for (const Json& mesh : meshes) {
         // Each mesh gets its share, and none is made too coarse to be known again.
         constexpr double kLeast = 2'000.0;
-        const auto triangles = static_cast<double>(given_[number]);
+        const auto triangles = static_cast<double>(source_triangles_[number]);
         const double share = static_cast<double>(most) * triangles / static_cast<double>(std::max(all, most));
         const auto vertices = part<float>(bytes, mesh.at("vertices_offset").get<std::size_t>(),
                                           3 * mesh.at("vertices").get<std::size_t>());
         const auto corners = part<std::array<std::uint32_t, 3>>(
-            bytes, mesh.at("triangles_offset").get<std::size_t>(), given_[number]);
+            bytes, mesh.at("triangles_offset").get<std::size_t>(), source_triangles_[number]);
         const DisplayMesh drawn =
             display_mesh(vertices, corners, static_cast<std::size_t>(std::max(share, kLeast)));
         meshes_.push_back(std::make_shared<const std::string>(message_of(detail, number, drawn)));
         ++number;
       }
     };
-    add_all(Detail::fine, kMostTriangles);
-    if (all > kFewTriangles) add_all(Detail::coarse, kFewTriangles);
+    add_all(Detail::fine, kMaxTriangles);
+    if (all > kReducedTriangles) add_all(Detail::coarse, kReducedTriangles);
   }
   Json obstacles = Json::array();
   std::uint32_t number = 0;
@@ -102,16 +103,16 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
       shown["mesh"] = one.at("mesh");
       shown["pose"] = one.at("X_WO");
       if (one.contains("motion") || one.contains("later"))
-        moving_.push_back({number, pose_of(one.at("X_WO")),
-                           one.contains("motion") ? motion_of(one["motion"]) : ObstacleMotion{},
-                           one.contains("later") ? later_of(one["later"]) : std::nullopt});
+        moving_obstacles_.push_back({number, pose_of(one.at("X_WO")),
+                                     one.contains("motion") ? motion_of(one["motion"]) : ObstacleMotion{},
+                                     one.contains("later") ? later_of(one["later"]) : std::nullopt});
       shown["moves"] = one.contains("motion") || one.contains("later");
     }
     obstacles.push_back(std::move(shown));
     ++number;
   }
   Json sizes = Json::array();
-  for (const std::size_t triangles : given_) sizes.push_back({{"triangles", triangles}});
+  for (const std::size_t triangles : source_triangles_) sizes.push_back({{"triangles", triangles}});
   text_ = Json{{"type", "scene"},        {"shapes", shapes_},
                {"meshes", sizes},        {"tool", description.at("tool")},
                {"obstacles", obstacles}, {"view", description.value("view", Json())}}
@@ -122,12 +123,12 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
   throw std::runtime_error(std::string("the shapes of the scene: ") + error.what());
 }
 
-Json ViewScene::moved(std::int64_t time_ns) const {
-  const double t_s = 1e-9 * static_cast<double>(time_ns - begins_ns_);
+Json ViewScene::moving_obstacle_poses(std::int64_t time_ns) const {
+  const double t_s = 1e-9 * static_cast<double>(time_ns - start_ns_);
   Json out = Json::array();
-  for (const Moving& one : moving_) {
-    const Pose X_WO = one.later && t_s >= one.later->from_s ? one.later->motion.at(one.later->X_WO, t_s)
-                                                            : one.motion.at(one.X_WO, t_s);
+  for (const MovingObstacle& one : moving_obstacles_) {
+    const Pose X_WO = one.later && t_s >= one.later->start_s ? one.later->motion.pose_at(one.later->X_WO, t_s)
+                                                             : one.motion.pose_at(one.X_WO, t_s);
     out.push_back({one.number, pose_json(X_WO)});
   }
   return out;

@@ -68,7 +68,7 @@ std::shared_ptr<const std::string> text_of(const Json& json) {
   return std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-Json sum_json(const RecentTimes::Sum& sum) {
+Json sum_json(const RollingHistogram::Summary& sum) {
   return {{"bins", sum.bins},
           {"count", sum.count},
           {"p50_us", sum.p50_us},
@@ -76,7 +76,7 @@ Json sum_json(const RecentTimes::Sum& sum) {
           {"max_us", sum.max_us}};
 }
 
-Json times_json(const RecentTimes::Sum& took, const RecentTimes::Sum& late) {
+Json times_json(const RollingHistogram::Summary& took, const RollingHistogram::Summary& late) {
   return {{"type", "times"}, {"took", sum_json(took)}, {"late", sum_json(late)}};
 }
 
@@ -84,7 +84,7 @@ Json times_json(const RecentTimes::Sum& took, const RecentTimes::Sum& late) {
 Json faults_json() {
   Json out = Json::object();
   for (const FaultRow& row : fault_rows())
-    out[std::string(row.name)] = {{"sentence", row.sentence}, {"cure", row.cure}};
+    out[std::string(row.name)] = {{"sentence", row.message}, {"cure", row.cure}};
   return out;
 }
 
@@ -111,7 +111,7 @@ struct ViewServer::Server {
   ~Server() { lease.reset(); }
   void accept();
   void push_frames();
-  void tell(const PageLease::Told& told);
+  void tell(const PageLease::Reply& told);
 
   bool is_ours(beast::string_view authority) const {
     const std::string number = ":" + std::to_string(port);
@@ -131,7 +131,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   ~Page() {
     server_.pages.erase(number_);
     --server_.connections;
-    if (server_.lease) server_.lease->gone(number_);
+    if (server_.lease) server_.lease->page_closed(number_);
   }
   Page(const Page&) = delete;
   Page& operator=(const Page&) = delete;
@@ -159,38 +159,38 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     if (!waiting_.empty()) return;
     LiveFeed& feed = *server_.live;
     const LiveFeed::Link link = feed.link();
-    if (link.told != link_told_) {
-      link_told_ = link.told;
+    if (link.revision != link_told_) {
+      link_told_ = link.revision;
       send({{"type", "link"},
             {"connected", link.connected},
-            {"why", link.why},
+            {"why", link.error},
             {"socket", feed.socket()},
             {"rate_Hz", link.rate_Hz},
             {"status", link.status}});
     }
     const auto scene = feed.scene();
     if (scene != scene_) show(scene);
-    if (const std::string why = feed.why_no_scene(); why != why_no_scene_) {
+    if (const std::string why = feed.scene_error(); why != why_no_scene_) {
       why_no_scene_ = why;
       send({{"type", "no_scene"}, {"why", why}});
     }
     if (link.connected && frame) {
       std::string history;
-      feed.look_at_history([&](const Extremes& extremes) {
-        const bool anew =
-            link.number != history_of_ || history_at_ < extremes.first() || history_at_ > extremes.end();
-        if (anew) history_at_ = extremes.first();
-        if (anew || history_at_ < extremes.end())
-          history = history_message(extremes, history_at_, extremes.end(), anew, 0);
-        history_at_ = extremes.end();
-        history_of_ = link.number;
+      feed.with_history([&](const MinMaxHistory& extremes) {
+        const bool anew = link.connection != history_of_ || history_at_ < extremes.first_index() ||
+                          history_at_ > extremes.end_index();
+        if (anew) history_at_ = extremes.first_index();
+        if (anew || history_at_ < extremes.end_index())
+          history = history_message(extremes, history_at_, extremes.end_index(), anew, 0);
+        history_at_ = extremes.end_index();
+        history_of_ = link.connection;
       });
       if (!history.empty()) send(std::make_shared<const std::string>(std::move(history)), false);
       send(frame);
     }
     if (link.connected && now >= times_at_) {
       times_at_ = now + kTimesEvery;
-      send(times_json(feed.took(), feed.late()));
+      send(times_json(feed.tick_duration(), feed.wake_latency()));
     }
   }
 
@@ -213,10 +213,10 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
                     {"recorded_by", feed->version()},
                     {"duration_s", feed->duration_s()},
                     {"rate_Hz", feed->rate_Hz()},
-                    {"changes", feed->changes()}});
+                    {"changes", feed->state_changes()}});
       send(hello);
       if (feed->scene()) show(feed->scene());
-      if (!feed->why_no_scene().empty()) send({{"type", "no_scene"}, {"why", feed->why_no_scene()}});
+      if (!feed->scene_error().empty()) send({{"type", "no_scene"}, {"why", feed->scene_error()}});
       at(0.0);
     } else {
       hello["mode"] = "live";
@@ -234,7 +234,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   /// A moment of a recording.
   void at(double t_s) {
     const RecordedFeed& feed = *server_.recorded;
-    const auto [from, to] = feed.stretches(t_s);
+    const auto [from, to] = feed.bucket_range(t_s);
     const bool goes_on = history_at_ >= from && history_at_ <= to && history_at_ > 0;
     send(std::make_shared<const std::string>(
              history_message(feed.history(), goes_on ? history_at_ : from, to, !goes_on, feed.begin_ns())),
@@ -255,7 +255,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   }
 
   void tell_times(double t_s) {
-    const auto [took, late] = server_.recorded->times(t_s);
+    const auto [took, late] = server_.recorded->tick_times(t_s);
     send(times_json(took, late));
   }
 
@@ -277,11 +277,11 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
       return;
     }
     PageLease& lease = *server_.lease;
-    if (type == "alive") lease.lives(number_);
-    if (type == "stop") lease.ask(number_, PageLease::Wish::stop);
-    if (type == "arm") lease.ask(number_, PageLease::Wish::arm);
-    if (type == "disarm") lease.ask(number_, PageLease::Wish::disarm);
-    if (type == "acknowledge") lease.ask(number_, PageLease::Wish::acknowledge);
+    if (type == "alive") lease.heartbeat(number_);
+    if (type == "stop") lease.submit(number_, PageLease::Request::stop);
+    if (type == "arm") lease.submit(number_, PageLease::Request::arm);
+    if (type == "disarm") lease.submit(number_, PageLease::Request::disarm);
+    if (type == "acknowledge") lease.submit(number_, PageLease::Request::acknowledge);
   }
 
   void write() {
@@ -430,12 +430,12 @@ void ViewServer::Server::push_frames() {
   frame_timer.async_wait([this](beast::error_code error) {
     if (!error) push_frames();
   });
-  live->watched(!pages.empty());
+  live->set_watched(!pages.empty());
   const std::vector<std::string> events = live->events();
-  lease->loop_is(live->state());
+  lease->set_loop_state(live->state());
   if (pages.empty()) return;
   std::shared_ptr<const std::string> frame;
-  if (const auto now = live->now()) {
+  if (const auto now = live->newest_sample()) {
     Json json = frame_json(now->tick, now->words, live->scene().get(), 0);
     json["missed"] = now->missed;
     json["held_by"] = lease->holder();
@@ -451,18 +451,18 @@ void ViewServer::Server::push_frames() {
   }
 }
 
-void ViewServer::Server::tell(const PageLease::Told& told) {
+void ViewServer::Server::tell(const PageLease::Reply& told) {
   const auto found = pages.find(told.page);
   if (found == pages.end()) return;
   if (const auto page = found->second.lock())
-    page->send({{"type", "told"}, {"what", told.what}, {"done", told.done}, {"text", told.text}});
+    page->send({{"type", "told"}, {"what", told.request}, {"done", told.accepted}, {"text", told.error}});
 }
 
 ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed)
     : server_(std::make_unique<Server>(port, std::move(files))) {
   server_->live = &feed;
   server_->lease =
-      std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Told& told) {
+      std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Reply& told) {
         asio::post(server->io, [server, told] { server->tell(told); });
       });
 }

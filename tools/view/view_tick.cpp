@@ -53,8 +53,9 @@ struct Held {
 };
 
 Held held(const ViewTick& tick, const ViewScene* scene) {
-  const Vector3d force(tick.F[0], tick.F[1], tick.F[2]), torque(tick.F[3], tick.F[4], tick.F[5]);
-  const Pose X_WP = pose_of(tick.p);
+  const Vector3d force(tick.F_out[0], tick.F_out[1], tick.F_out[2]),
+      torque(tick.F_out[3], tick.F_out[4], tick.F_out[5]);
+  const Pose X_WP = pose_of(tick.X_WP);
   if (scene == nullptr) return {X_WP.translation_m, force, torque};
   const Vector3d p_W = X_WP * inverse(scene->X_HT()).translation_m;  // the handle point, with the tool at p
   if (!scene->wrench_about_handle()) return {p_W, force, torque - p_W.cross(force)};
@@ -64,36 +65,37 @@ Held held(const ViewTick& tick, const ViewScene* scene) {
 
 }  // namespace
 
-bool ViewTick::has_place() const noexcept {
-  return std::all_of(q.begin(), q.end(), [](double x) { return std::isfinite(x); });
+bool ViewTick::proxy_valid() const noexcept {
+  return std::all_of(X_WQ.begin(), X_WQ.end(), [](double x) { return std::isfinite(x); });
 }
 
 double ViewTick::depth_m() const noexcept {
-  return length(q[0] - p[0], q[1] - p[1], q[2] - p[2]);
+  return length(X_WQ[0] - X_WP[0], X_WQ[1] - X_WP[1], X_WQ[2] - X_WP[2]);
 }
 
 double ViewTick::angle_rad() const noexcept {
-  if (!has_place()) return std::nan("");
-  return rotation_vector((pose_of(p).rotation.conjugate() * pose_of(q).rotation).normalized()).norm();
+  if (!proxy_valid()) return std::nan("");
+  return rotation_vector((pose_of(X_WP).rotation.conjugate() * pose_of(X_WQ).rotation).normalized()).norm();
 }
 
 ChannelValues ViewTick::channels() const noexcept {
-  return {F[0],   F[1],      F[2],       length(F[0], F[1], F[2]), F[3], F[4], F[5], length(F[3], F[4], F[5]),
-          energy, depth_m(), angle_rad()};
+  return {F_out[0],     F_out[1],  F_out[2],   length(F_out[0], F_out[1], F_out[2]),
+          F_out[3],     F_out[4],  F_out[5],   length(F_out[3], F_out[4], F_out[5]),
+          energy_kg_m2, depth_m(), angle_rad()};
 }
 
 ViewTick view_tick(const TickState& state) {
   ViewTick tick;
   tick.tick = state.tick();
   tick.time_ns = state.time_ns();
-  tick.p = state.hand_pose();
-  tick.q = state.proxy_pose();
-  tick.F = state.wrench();
-  tick.energy = state.number("energy");
-  tick.rendering = static_cast<std::uint32_t>(state.integer("rendering"));
+  tick.X_WP = state.hand_pose();
+  tick.X_WQ = state.proxy_pose();
+  tick.F_out = state.wrench();
+  tick.energy_kg_m2 = state.number("energy");
+  tick.rendering_id = static_cast<std::uint32_t>(state.integer("rendering"));
   for (std::size_t i = 0; i < std::tuple_size_v<decltype(TickRecord::stage_ns)>; ++i)
-    tick.took_ns += state.integer("stage_ns", i);
-  tick.late_ns = state.integer("wake_latency_ns");
+    tick.duration_ns += state.integer("stage_ns", i);
+  tick.wake_latency_ns = state.integer("wake_latency_ns");
   return tick;
 }
 
@@ -101,17 +103,17 @@ ViewTick view_tick(const TickRecord& record) {
   ViewTick tick;
   tick.tick = record.tick;
   tick.time_ns = record.now_ns;
-  tick.p = record.X_WP;
-  tick.q = record.X_WQ;
-  tick.F = record.F_out;
-  tick.energy = record.energy;
-  tick.rendering = record.rendering;
-  for (const std::int64_t stage : record.stage_ns) tick.took_ns += stage;
-  tick.late_ns = record.wake_latency_ns;
+  tick.X_WP = record.X_WP;
+  tick.X_WQ = record.X_WQ;
+  tick.F_out = record.F_out;
+  tick.energy_kg_m2 = record.energy;
+  tick.rendering_id = record.rendering_id;
+  for (const std::int64_t stage : record.stage_ns) tick.duration_ns += stage;
+  tick.wake_latency_ns = record.wake_latency_ns;
   return tick;
 }
 
-ViewWords view_words(const TickState& state) {
+ViewStatus view_status(const TickState& state) {
   return {state.state(),
           state.text("cause"),
           state.text("limit_causes"),
@@ -119,24 +121,24 @@ ViewWords view_words(const TickState& state) {
           static_cast<unsigned>(state.integer("contacts")),
           state.number("authority"),
           state.number("guard_share"),
-          state.touches()};
+          state.contacts()};
 }
 
-ViewWords view_words(const TickRecord& record, std::span<const Touch> touches) {
-  ViewWords words;
-  const auto cause = static_cast<Fault>(record.cause);
+ViewStatus view_status(const TickRecord& record, std::span<const Touch> touches) {
+  ViewStatus words;
+  const auto cause = static_cast<Fault>(record.state_cause);
   words.state = name(static_cast<State>(record.state));
   words.cause = cause == Fault::none ? "none" : std::string(fault_row(cause).name);
   words.limits = bits_text(record.limit_causes, ValueNames::limit_bits);
-  words.placing = name(static_cast<Placing>(record.placing));
-  words.contacts = record.contacts;
+  words.proxy_initialization = name(static_cast<ProxyInitialization>(record.proxy_initialization));
+  words.contact_count = record.contacts;
   words.authority = record.authority;
-  words.guard_share = record.guard_share;
+  words.passivity_scale = record.passivity_scale;
   for (const Touch& touch : touches) {
     const auto feature = [](std::uint8_t kind, std::uint32_t first, std::uint32_t second) {
       return text(Feature{static_cast<FeatureKind>(kind), first, second});
     };
-    TouchState one;
+    ProxyContact one;
     one.point_W_m = touch.point_W_m;
     one.normal_W = touch.normal_W;
     one.share = touch.share;
@@ -144,14 +146,15 @@ ViewWords view_words(const TickRecord& record, std::span<const Touch> touches) {
     one.obstacle_number = touch.obstacle;
     one.tool_feature = feature(touch.tool_feature_kind, touch.tool_first, touch.tool_second);
     one.obstacle_feature = feature(touch.obstacle_feature_kind, touch.obstacle_first, touch.obstacle_second);
-    words.touches.push_back(std::move(one));
+    words.contacts.push_back(std::move(one));
   }
   return words;
 }
 
-Json frame_json(const ViewTick& tick, const ViewWords& words, const ViewScene* scene, std::int64_t begin_ns) {
+Json frame_json(const ViewTick& tick, const ViewStatus& words, const ViewScene* scene,
+                std::int64_t begin_ns) {
   Json touches = Json::array();
-  for (const TouchState& touch : words.touches)
+  for (const ProxyContact& touch : words.contacts)
     touches.push_back(
         {{"p", numbers(touch.point_W_m)},
          {"n", numbers(touch.normal_W)},
@@ -165,40 +168,40 @@ Json frame_json(const ViewTick& tick, const ViewWords& words, const ViewScene* s
           {"tick", tick.tick},
           {"state", words.state},
           {"cause", words.cause},
-          {"p", numbers(tick.p)},
-          {"q", tick.has_place() ? numbers(tick.q) : Json(nullptr)},
-          {"F", numbers(tick.F)},
+          {"p", numbers(tick.X_WP)},
+          {"q", tick.proxy_valid() ? numbers(tick.X_WQ) : Json(nullptr)},
+          {"F", numbers(tick.F_out)},
           {"wrench",
            {{"at", json_of(wrench.p_W)},
             {"force", json_of(wrench.force_W)},
             {"torque", json_of(wrench.torque_W)}}},
-          {"energy", number(tick.energy)},
+          {"energy", number(tick.energy_kg_m2)},
           {"depth_m", number(tick.depth_m())},
           {"angle_rad", number(tick.angle_rad())},
-          {"contacts", words.contacts},
+          {"contacts", words.contact_count},
           {"touches", touches},
           {"authority", number(words.authority)},
-          {"guard", number(words.guard_share)},
+          {"guard", number(words.passivity_scale)},
           {"limits", words.limits},
-          {"placing", words.placing},
-          {"took_us", 1e-3 * static_cast<double>(tick.took_ns)},
-          {"late_us", 1e-3 * static_cast<double>(tick.late_ns)},
-          {"moved", scene != nullptr ? scene->moved(tick.time_ns) : Json::array()}};
+          {"placing", words.proxy_initialization},
+          {"took_us", 1e-3 * static_cast<double>(tick.duration_ns)},
+          {"late_us", 1e-3 * static_cast<double>(tick.wake_latency_ns)},
+          {"moved", scene != nullptr ? scene->moving_obstacle_poses(tick.time_ns) : Json::array()}};
 }
 
-std::string history_message(const Extremes& extremes, std::uint64_t from, std::uint64_t to, bool anew,
+std::string history_message(const MinMaxHistory& extremes, std::uint64_t from, std::uint64_t to, bool anew,
                             std::int64_t begin_ns) {
-  constexpr std::uint32_t kNumbers = 1 + 2 * kChannels;
+  constexpr std::uint32_t kNumbers = 1 + 2 * kChannelCount;
   const std::array<std::uint32_t, 4> head = {2, anew ? 1U : 0U, static_cast<std::uint32_t>(to - from),
                                              kNumbers};
   std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
   std::array<double, kNumbers> row{};
   for (std::uint64_t i = from; i < to; ++i) {
-    const Extremes::Stretch& stretch = extremes.at(i);
+    const MinMaxHistory::Bucket& stretch = extremes.at(i);
     row[0] = 1e-9 * static_cast<double>(stretch.begin_ns - begin_ns);
-    for (std::size_t k = 0; k < kChannels; ++k) {
-      row[1 + 2 * k] = stretch.least[k];
-      row[2 + 2 * k] = stretch.most[k];
+    for (std::size_t k = 0; k < kChannelCount; ++k) {
+      row[1 + 2 * k] = stretch.min[k];
+      row[2 + 2 * k] = stretch.max[k];
     }
     out.append(reinterpret_cast<const char*>(row.data()), sizeof row);
   }

@@ -310,7 +310,7 @@ void check_file(const fs::path& file, const fs::path& tool, const Expected& expe
   try {
     const Scene scene(scene_with(tool, file, BodyKind::solid), loader);
     for (const std::string& change : loader.changes()) told += change + "\n";
-    for (const std::string& remark : loader.remarks()) told += remark + "\n";
+    for (const std::string& remark : loader.warnings()) told += remark + "\n";
     INFO(told);
     CHECK(expected.outcome == (told.empty() ? accepted : repaired));
     const TriangleMesh& mesh = scene.meshes()[0].mesh->surface.mesh();

@@ -8,17 +8,17 @@ namespace {
 
 TEST_CASE("a tally tells the first, and how many", "[tally]") {
   std::vector<std::string> told;
-  Tally tally;
+  DefectCount tally;
   tally.report(told, "cure");
   tally.report(told, "removed", "face", " without area");
   CHECK(told.empty());
   CHECK_FALSE(tally.any());
-  tally.found([] { return "face 3 near " + place({1, 2.5, -1e-3}); });
+  tally.add([] { return "face 3 near " + format_point({1, 2.5, -1e-3}); });
   tally.report(told, "cure");
   tally.report(told, "removed", "face", " without area");
   CHECK(told == std::vector<std::string>{"face 3 near (1, 2.5, -0.001); cure",
                                          "removed 1 face without area: face 3 near (1, 2.5, -0.001)"});
-  tally.found([]() -> std::string { throw 1; });  // only the first is put into words
+  tally.add([]() -> std::string { throw 1; });  // only the first is put into words
   told.clear();
   tally.report(told, "cure");
   tally.report(told, "removed", "face", " without area");

@@ -15,10 +15,10 @@ TEST_CASE("every side of every face is listed, those of an edge together", "[sou
   PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
   soup.faces.push_back({0, 1, 5});
   soup.faces.push_back({7, 7});
-  const std::vector<Side> sides = sides_of(soup);
+  const std::vector<HalfEdge> sides = half_edges_of(soup);
   CHECK(sides.size() == 6 * 4 + 3 + 2);
   std::map<std::pair<std::size_t, std::size_t>, int> seen;
-  for_each_edge(sides, [&](std::span<const Side> along) {
+  for_each_edge(sides, [&](std::span<const HalfEdge> along) {
     CHECK(++seen[along[0].edge] == 1);
     for (std::size_t i = 0; i < along.size(); ++i) {
       CHECK(along[i].edge == along[0].edge);
@@ -34,7 +34,7 @@ TEST_CASE("every side of every face is listed, those of an edge together", "[sou
     }
   });
   CHECK(seen.size() == 12 + 1 + 1);  // a diagonal, and a side from a corner to itself
-  CHECK(sides_of({}).empty());
+  CHECK(half_edges_of({}).empty());
 }
 
 }  // namespace

@@ -85,13 +85,13 @@ TEST_CASE("every ray from a hare's neck leaves it once, so that it cannot cut th
 
 TEST_CASE("what is made has a name of its own", "[make_mesh]") {
   std::set<std::string> all;
-  for (const MadeMesh& made : std::initializer_list<MadeMesh>{{"gear"},
-                                                              {"gear", 300},
-                                                              {"bumpy", 300},
-                                                              {"bumpy", 300, 2},
-                                                              {"box", 12},
-                                                              {"box", 12, 1, {0.1, 0.1, 0.1}}})
-    all.insert(name_of(made));
+  for (const GeneratedMesh& made : std::initializer_list<GeneratedMesh>{{"gear"},
+                                                                        {"gear", 300},
+                                                                        {"bumpy", 300},
+                                                                        {"bumpy", 300, 2},
+                                                                        {"box", 12},
+                                                                        {"box", 12, 1, {0.1, 0.1, 0.1}}})
+    all.insert(generated_mesh_name(made));
   CHECK(all.size() == 6);
   CHECK(all.count("made gear, 300 triangles") == 1);
 }

@@ -104,10 +104,10 @@ TEST_CASE("a directory that cannot be written to is told, and no error", "[mesh_
   const fs::path file = dir.write("file", "");
   MeshCache cache(file / "cache");
   CHECK_FALSE(cache.write(MeshCache::key({"a"}), "bytes"));
-  CHECK(cache.why().find((file / "cache").string() + ": cannot be made (") == 0);
+  CHECK(cache.error().find((file / "cache").string() + ": cannot be made (") == 0);
   CHECK_FALSE(cache.read(MeshCache::key({"a"})));
   MeshCache off({});
-  CHECK(off.off());
+  CHECK(off.disabled());
   CHECK_FALSE(off.write(MeshCache::key({"a"}), "bytes"));
 }
 

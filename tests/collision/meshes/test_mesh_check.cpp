@@ -76,10 +76,10 @@ TEST_CASE("a solid may have concave faces, corners on an edge, several shells an
   corner.faces[4] = {0, 2, 3, 1, 8};
   check_good(corner, 30);
 
-  check_good(both(kBox, box({10, 0, 0}, {11, 1, 1})), 31);
-  check_good(both(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))), 29);
-  check_good(both(both(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 2.5, 4.5}))),
-                  box({0.9, 0.9, 0.9}, {1.1, 1.1, 1.1})),
+  check_good(concatenated(kBox, box({10, 0, 0}, {11, 1, 1})), 31);
+  check_good(concatenated(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))), 29);
+  check_good(concatenated(concatenated(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 2.5, 4.5}))),
+                          box({0.9, 0.9, 0.9}, {1.1, 1.1, 1.1})),
              30 - 8 + 0.008);
 }
 
@@ -199,10 +199,11 @@ TEST_CASE("a face that looks the wrong way is found") {
 TEST_CASE("a solid that is inside out is found") {
   check_defects(inside_out(kBox),
                 {"all faces look inwards (the volume is negative); flip the faces in the modeller"});
-  check_defect_with(both(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})),
+  check_defect_with(concatenated(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})),
                     {"make outer shells look outwards and cavities inwards"});
-  check_defect_with(both(kBox, inside_out(box({10, 0, 0}, {11, 1, 1}))), {"make outer shells look outwards"});
-  check_defect_with(both(inside_out(kBox), inside_out(box({10, 0, 0}, {11, 1, 1}))),
+  check_defect_with(concatenated(kBox, inside_out(box({10, 0, 0}, {11, 1, 1}))),
+                    {"make outer shells look outwards"});
+  check_defect_with(concatenated(inside_out(kBox), inside_out(box({10, 0, 0}, {11, 1, 1}))),
                     {"all faces look inwards"});
 }
 
@@ -217,7 +218,7 @@ TEST_CASE("an edge with more than two faces is found") {
   CHECK(text.find("belongs to face 12 only") != std::string::npos);
 
   // Two boxes that share the edge from vertex 1 to 5 (x = 2, y = 0).
-  PolygonSoup edge = both(kBox, box({2, -3, 0}, {4, 0, 5}));
+  PolygonSoup edge = concatenated(kBox, box({2, -3, 0}, {4, 0, 5}));
   for (auto& face : edge.faces)
     for (std::size_t& v : face) v = v == 8 + 2 ? 1 : v == 8 + 6 ? 5 : v;
   check_defect_with(edge, {"the edge from (2, 0, 0) to (2, 0, 5) belongs to 4 faces"});
@@ -229,32 +230,33 @@ TEST_CASE("an edge with more than two faces is found") {
 }
 
 TEST_CASE("parts that meet in one vertex are found") {
-  PolygonSoup soup = both(kBox, box({2, 3, 5}, {4, 4, 6}));
+  PolygonSoup soup = concatenated(kBox, box({2, 3, 5}, {4, 4, 6}));
   for (auto& face : soup.faces)
     for (std::size_t& v : face) v = v == 8 ? 7 : v;
   check_defects(soup,
                 {"parts of the surface meet only in vertex 7 at (2, 3, 5); separate them in the modeller"});
   // The same where the file has the vertex twice: the surfaces touch.
-  CHECK_FALSE(check_solid(both(kBox, box({2, 3, 5}, {4, 4, 6}))).solid());
+  CHECK_FALSE(check_solid(concatenated(kBox, box({2, 3, 5}, {4, 4, 6}))).solid());
 }
 
 TEST_CASE("faces that cut through each other are found") {
-  const PolygonSoup soup = both(kBox, box({1, 1, 1}, {3, 2, 2}));
+  const PolygonSoup soup = concatenated(kBox, box({1, 1, 1}, {3, 2, 2}));
   check_defect_with(soup, {" near (", "cut through each other", " in all); unite the parts in the modeller"});
   CHECK(check_solid(soup).self_intersecting);
   // A spike through the lid alone; numbers are the file's, not those of the triangles it is cut into.
   const PolygonSoup spike{{{1, 1, 6}, {1.5, 1, 6}, {1, 1.5, 6}, {1.1, 1.1, 4}},
                           {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}}};
   REQUIRE(check_solid(spike).solid());
-  check_defect_with(both(kBox, spike), {"faces 5 and ", "cut through each other"});
-  check_defect_with(both(kBox, kBox), {"cut through each other"});
-  check_defect_with(both(kBox, box({2, 0, 0}, {4, 3, 5})), {"cut through each other"});  // face on face
+  check_defect_with(concatenated(kBox, spike), {"faces 5 and ", "cut through each other"});
+  check_defect_with(concatenated(kBox, kBox), {"cut through each other"});
+  check_defect_with(concatenated(kBox, box({2, 0, 0}, {4, 3, 5})),
+                    {"cut through each other"});  // face on face
 }
 
 TEST_CASE("a mesh in which everything cuts through everything is refused in good time") {
   PolygonSoup soup;
   for (int i = 0; i < 300; ++i)
-    soup = both(soup, box(Vector3d::Constant(1e-4 * i), Vector3d::Constant(1 + 1e-4 * i)));
+    soup = concatenated(soup, box(Vector3d::Constant(1e-4 * i), Vector3d::Constant(1 + 1e-4 * i)));
   check_defect_with(soup, {"cut through each other (1000 or more in all)"});
 }
 
@@ -275,7 +277,7 @@ TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must hav
   CHECK(triangles_of(kBox) == 12);
   CHECK(triangles_of(inside_out(kBox)) == 12);
   CHECK(triangles_of({kBox.vertices, {kBox.faces[0], kBox.faces[3]}}) == 4);
-  CHECK(triangles_of(both(kBox, box({1, 1, 1}, {3, 2, 2}))) == 24);
+  CHECK(triangles_of(concatenated(kBox, box({1, 1, 1}, {3, 2, 2}))) == 24);
   PolygonSoup fin = triangulated(kBox);
   fin.vertices.emplace_back(1, -1, 0);
   fin.faces.push_back({0, 1, 8});

@@ -21,7 +21,7 @@ using namespace test;
 const PolygonSoup kBox = box({-1, 2, -3}, {4, 2.5, 1});
 
 /// What the file is refused with; empty when it is read. Nothing else may reach the standard streams.
-std::string refusal(const fs::path& file) {
+std::string rejection_text(const fs::path& file) {
   std::ostringstream said;
   std::streambuf* const out = std::cout.rdbuf(said.rdbuf());
   std::streambuf* const err = std::cerr.rdbuf(said.rdbuf());
@@ -182,7 +182,7 @@ void check_refused(const std::vector<Bad>& table) {
   for (const Bad& bad : table) {
     const fs::path file = dir.write(bad.name, bad.bytes);
     const auto start = std::chrono::steady_clock::now();
-    const std::string message = refusal(file);
+    const std::string message = rejection_text(file);
     INFO(bad.name << " " << bad.place << " ... " << bad.cure << "\ngot " << message);
     CHECK(message.find(file.string() + bad.place + ": ") == 0);
     CHECK(message.find(bad.cure) != std::string::npos);
@@ -192,12 +192,12 @@ void check_refused(const std::vector<Bad>& table) {
 
 TEST_CASE("what is no mesh file is refused with its name and a cure") {
   const TemporaryDirectory dir;
-  CHECK(refusal(dir.path() / "missing.off") ==
+  CHECK(rejection_text(dir.path() / "missing.off") ==
         (dir.path() / "missing.off").string() + ": no such file; check the path in the scene");
   fs::create_directory(dir.path() / "folder.off");
-  CHECK(refusal(dir.path() / "folder.off").find("is not a file; name an OFF, OBJ, STL or PLY file") !=
+  CHECK(rejection_text(dir.path() / "folder.off").find("is not a file; name an OFF, OBJ, STL or PLY file") !=
         std::string::npos);
-  CHECK(refusal("").find("no such file") != std::string::npos);
+  CHECK(rejection_text("").find("no such file") != std::string::npos);
   const std::string off = as_off(kBox);
   check_refused({
       {"empty.off", "", "", "is empty; export"},
@@ -378,7 +378,7 @@ TEST_CASE("noise in any format is refused, and crashes nothing") {
       std::string bytes(1 + random() % 3000, '\0');
       for (char& c : bytes) c = static_cast<char>(random() % 256);
       INFO(name << " " << i);
-      CHECK(refusal(dir.write(name, bytes)).find("noise") != std::string::npos);
+      CHECK(rejection_text(dir.write(name, bytes)).find("noise") != std::string::npos);
     }
   }
 }

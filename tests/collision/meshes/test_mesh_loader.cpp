@@ -38,11 +38,11 @@ TEST_CASE("what a loader changed is told once, with the file", "[mesh_loader]") 
   CHECK(loader.changes() ==
         std::vector<std::string>{file.string() + ": removed 1 duplicate face: face 6 near (0, 0.3, 0)",
                                  file.string() + ": turned 6 faces round, first face 0 near (0, 0.3, 0)"});
-  CHECK(loader.remarks().empty());
-  loader.look_at_size(*loaded, 1000.0, kToolSize);
-  loader.look_at_size(*loaded, 1000.0, kToolSize);
-  REQUIRE(loader.remarks().size() == 1);
-  CHECK(loader.remarks()[0].find(file.string() + ": its largest side is 500 m") == 0);
+  CHECK(loader.warnings().empty());
+  loader.check_size(*loaded, 1000.0, kPlausibleToolSize);
+  loader.check_size(*loaded, 1000.0, kPlausibleToolSize);
+  REQUIRE(loader.warnings().size() == 1);
+  CHECK(loader.warnings()[0].find(file.string() + ": its largest side is 500 m") == 0);
 }
 
 TEST_CASE("an open mesh is refused with the key that makes it a surface, and is one with it",
@@ -79,22 +79,22 @@ std::string bytes_of(const std::vector<T>& list) {
   return {reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T)};
 }
 
-void check_same(const TreedMesh& a, const TreedMesh& b) {
+void check_same(const MeshBvh& a, const MeshBvh& b) {
   CHECK(a.surface.mesh().triangles == b.surface.mesh().triangles);
   CHECK(a.surface.vertices_m() == b.surface.vertices_m());
   CHECK(bytes_of(a.surface.planes()) == bytes_of(b.surface.planes()));
   CHECK(bytes_of(a.surface.features()) == bytes_of(b.surface.features()));
-  CHECK(bytes_of(a.surface.edges()) == bytes_of(b.surface.edges()));
+  CHECK(bytes_of(a.surface.convex_edges()) == bytes_of(b.surface.convex_edges()));
   CHECK(a.surface.radius_m() == b.surface.radius_m());
-  CHECK(a.surface.pointed_count() == b.surface.pointed_count());
+  CHECK(a.surface.convex_vertex_count() == b.surface.convex_vertex_count());
   for (std::uint32_t v = 0; v < a.surface.vertices_m().size(); v += 97) {
-    const auto x = a.surface.around(v), y = b.surface.around(v);
+    const auto x = a.surface.ring_of(v), y = b.surface.ring_of(v);
     CHECK(std::equal(x.begin(), x.end(), y.begin(), y.end()));
   }
-  CHECK(bytes_of(a.tree.boxes()) == bytes_of(b.tree.boxes()));
-  CHECK(a.tree.nodes().size() == b.tree.nodes().size());
-  CHECK(a.tree.leaves().size() == b.tree.leaves().size());
-  CHECK(a.tree.extent_m() == b.tree.extent_m());
+  CHECK(bytes_of(a.bvh.boxes()) == bytes_of(b.bvh.boxes()));
+  CHECK(a.bvh.nodes().size() == b.bvh.nodes().size());
+  CHECK(a.bvh.leaves().size() == b.bvh.leaves().size());
+  CHECK(a.bvh.extent_m() == b.bvh.extent_m());
 }
 
 std::vector<std::string> files_of(const fs::path& directory) {
@@ -115,12 +115,12 @@ TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "
     MeshLoader loader(cache, [&](const std::string& what) { told.push_back(what); });
     const auto loaded = loader.load(file, BodyKind::solid);
     const ConvexBody hull = loader.hull(*loaded);
-    CHECK(loader.remarks().empty());
+    CHECK(loader.warnings().empty());
     CHECK(loader.changes().empty());
-    return std::tuple(loaded, hull, loader.treed(loaded->mesh, BodyKind::solid, file));
+    return std::tuple(loaded, hull, loader.build_bvh(loaded->mesh, BodyKind::solid, file));
   };
   const auto [cold, cold_hull, cold_tree] = load();
-  const std::string size = grouped(made.triangles.size());
+  const std::string size = with_thousands_separators(made.triangles.size());
   REQUIRE(told.size() == 4);
   CHECK(told[0] == "bumpy.off: reading 3 MB");
   CHECK(told[1] == "bumpy.off: " + size + " triangles, checking");
@@ -135,7 +135,7 @@ TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "
   CHECK(warm_hull.vertices_T_m == cold_hull.vertices_T_m);
   CHECK(warm_hull.ring == cold_hull.ring);
   check_same(*warm_tree, *cold_tree);
-  check_same(*warm_tree, TreedMesh(made));
+  check_same(*warm_tree, MeshBvh(made));
 
   SECTION("another file is another key") {
     dir.write("bumpy.off", off_of(make_mesh({"bumpy", 60000, 2})));
@@ -156,8 +156,9 @@ TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "
 TEST_CASE("a mesh that is made is checked and kept like one of a file", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path cache = dir.path() / "cache";
-  const MadeMesh bumpy = {"bumpy", 60000};
-  const std::string name = name_of(bumpy), size = grouped(make_mesh(bumpy).triangles.size());
+  const GeneratedMesh bumpy = {"bumpy", 60000};
+  const std::string name = generated_mesh_name(bumpy),
+                    size = with_thousands_separators(make_mesh(bumpy).triangles.size());
   std::vector<std::string> told;
   const auto load = [&] {
     told.clear();
@@ -180,9 +181,9 @@ TEST_CASE("a cache that cannot be written is a remark", "[mesh_loader]") {
   const fs::path file = dir.write("bumpy.off", off_of(make_mesh({"bumpy", 60000})));
   MeshLoader loader(dir.write("no_directory", "") / "cache", {});
   loader.hull(*loader.load(file, BodyKind::solid));
-  REQUIRE(loader.remarks().size() == 1);
-  CHECK(loader.remarks()[0].find("cannot be made") != std::string::npos);
-  CHECK(loader.remarks()[0].find("; what is made of large meshes is not kept") != std::string::npos);
+  REQUIRE(loader.warnings().size() == 1);
+  CHECK(loader.warnings()[0].find("cannot be made") != std::string::npos);
+  CHECK(loader.warnings()[0].find("; what is made of large meshes is not kept") != std::string::npos);
 }
 
 TEST_CASE("nothing is told of a small mesh, and nothing kept", "[mesh_loader]") {
@@ -190,7 +191,7 @@ TEST_CASE("nothing is told of a small mesh, and nothing kept", "[mesh_loader]") 
   const fs::path file = dir.write("box.off", as_off(kBox)), cache = dir.path() / "cache";
   MeshLoader loader(cache, [](const std::string& what) { FAIL(what); });
   const auto loaded = loader.load(file, BodyKind::solid);
-  loader.treed(loaded->mesh, BodyKind::solid, file);
+  loader.build_bvh(loaded->mesh, BodyKind::solid, file);
   CHECK_FALSE(fs::exists(cache));
 }
 
@@ -203,15 +204,15 @@ std::size_t size_of_members(T thing) {
 
 TEST_CASE("no member of what is kept is forgotten", "[mesh_loader]") {
   CHECK(size_of_members(MeshSurface()) == sizeof(MeshSurface));
-  CHECK(size_of_members(TriangleTree()) == sizeof(TriangleTree));
+  CHECK(size_of_members(TriangleBvh()) == sizeof(TriangleBvh));
 }
 
 TEST_CASE("numbers are grouped for people", "[mesh_loader]") {
-  CHECK(grouped(0) == "0");
-  CHECK(grouped(999) == "999");
-  CHECK(grouped(1000) == "1,000");
-  CHECK(grouped(1003520) == "1,003,520");
-  CHECK(grouped(12345678901) == "12,345,678,901");
+  CHECK(with_thousands_separators(0) == "0");
+  CHECK(with_thousands_separators(999) == "999");
+  CHECK(with_thousands_separators(1000) == "1,000");
+  CHECK(with_thousands_separators(1003520) == "1,003,520");
+  CHECK(with_thousands_separators(12345678901) == "12,345,678,901");
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ void check_repaired(PolygonSoup soup, const std::vector<std::string>& changes, d
 
 TEST_CASE("a good mesh is left as it is", "[mesh_repair]") {
   for (const PolygonSoup& good :
-       {kBox, triangulated(kBox), both(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))),
+       {kBox, triangulated(kBox), concatenated(kBox, inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))),
         soup_of(make_mesh({"gear", 2000}))}) {
     PolygonSoup soup = good;
     CHECK(repair(soup).empty());
@@ -187,11 +187,11 @@ TEST_CASE("a solid that is inside out is turned, with its cavities", "[mesh_repa
   const PolygonSoup cavity = inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}));
   const PolygonSoup beside = box({10, 0, 0}, {11, 1, 1});
   check_repaired(inside_out(kBox), {"turned 6 faces round, first face 0 near (0, 3, 0)"});
-  check_repaired(inside_out(both(kBox, cavity)), {"turned 12 faces round, first face 0 near (0, 3, 0)"},
-                 kVolume - 1);
-  check_repaired(both(inside_out(kBox), beside), {"turned 6 faces round, first face 0 near (0, 3, 0)"},
-                 kVolume + 1);
-  check_repaired(both(both(kBox, cavity), inside_out(beside)),
+  check_repaired(inside_out(concatenated(kBox, cavity)),
+                 {"turned 12 faces round, first face 0 near (0, 3, 0)"}, kVolume - 1);
+  check_repaired(concatenated(inside_out(kBox), beside),
+                 {"turned 6 faces round, first face 0 near (0, 3, 0)"}, kVolume + 1);
+  check_repaired(concatenated(concatenated(kBox, cavity), inside_out(beside)),
                  {"turned 6 faces round, first face 12 near (10, 1, 0)"}, kVolume);
 }
 
@@ -203,8 +203,8 @@ TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {
   PolygonSoup hole = kBox;
   hole.faces.pop_back();
   CHECK(left(hole));
-  CHECK(left(both(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))));  // a cavity, or a body in a body?
-  CHECK(left(both(kBox, box({1, 1, 1}, {3, 2, 2}))));
+  CHECK(left(concatenated(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))));  // a cavity, or a body in a body?
+  CHECK(left(concatenated(kBox, box({1, 1, 1}, {3, 2, 2}))));
   PolygonSoup fin = triangulated(kBox);
   fin.vertices.emplace_back(1, -1, 0);
   fin.faces.push_back({0, 1, 8});

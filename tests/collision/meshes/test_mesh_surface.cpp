@@ -37,7 +37,7 @@ TriangleMesh angle_iron() {
 
 double length_of_edges(const MeshSurface& surface) {
   double sum = 0.0;
-  for (const auto& edge : surface.edges())
+  for (const auto& edge : surface.convex_edges())
     sum += (surface.vertices_m()[edge.vertices[0]] - surface.vertices_m()[edge.vertices[1]]).norm();
   return sum;
 }
@@ -45,7 +45,7 @@ double length_of_edges(const MeshSurface& surface) {
 TEST_CASE("a cube has eight points and twelve edges, however finely it is cut", "[mesh_surface]") {
   for (const std::size_t triangles : {12, 300, 5000}) {
     const MeshSurface cube(make_mesh({"cube", triangles}), Kind::solid);
-    CHECK(cube.pointed_count() == 8);
+    CHECK(cube.convex_vertex_count() == 8);
     CHECK(length_of_edges(cube) == Approx(12 * 0.05));
     std::set<std::array<double, 4>> planes;
     for (const auto& [n, offset] : cube.planes()) planes.insert({n.x(), n.y(), n.z(), offset});
@@ -55,16 +55,16 @@ TEST_CASE("a cube has eight points and twelve edges, however finely it is cut", 
 
 TEST_CASE("the bottom of a groove holds neither edge nor point", "[mesh_surface]") {
   const MeshSurface iron(angle_iron(), Kind::solid);
-  CHECK(iron.pointed_count() == 10);  // the two ends of the inner edge are none
+  CHECK(iron.convex_vertex_count() == 10);  // the two ends of the inner edge are none
   CHECK(length_of_edges(iron) == Approx(2 * 8.0 + 5 * 1.0));
-  for (const auto& edge : iron.edges()) {
+  for (const auto& edge : iron.convex_edges()) {
     const Vector3d middle = 0.5 * (iron.vertices_m()[edge.vertices[0]] + iron.vertices_m()[edge.vertices[1]]);
     CHECK_FALSE((std::abs(middle.x() - 1) < 1e-9 && std::abs(middle.z() - 1) < 1e-9 &&
                  std::abs(middle.y() - 0.5) < 0.4));
   }
   // As a surface it has two sides, and all that is not flat counts.
   const MeshSurface skin(angle_iron(), Kind::surface);
-  CHECK(skin.pointed_count() == 12);
+  CHECK(skin.convex_vertex_count() == 12);
   CHECK(length_of_edges(skin) == Approx(2 * 8.0 + 6 * 1.0));
 }
 
@@ -82,13 +82,13 @@ TEST_CASE("every pointed vertex and every sharp edge belongs to one triangle, an
         }
         if (f.edges[i] != MeshSurface::kNone) {
           edges.insert(f.edges[i]);
-          CHECK(surface.edges()[f.edges[i]].triangles[0] == t);
-          CHECK(surface.edges()[f.edges[i]].vertices[0] == surface.triangles()[t][i]);
+          CHECK(surface.convex_edges()[f.edges[i]].triangles[0] == t);
+          CHECK(surface.convex_edges()[f.edges[i]].vertices[0] == surface.triangles()[t][i]);
         }
       }
     }
-    CHECK(vertices.size() == surface.pointed_count());
-    CHECK(edges.size() == surface.edges().size());
+    CHECK(vertices.size() == surface.convex_vertex_count());
+    CHECK(edges.size() == surface.convex_edges().size());
     CHECK(std::set(vertices.begin(), vertices.end()).size() == vertices.size());
     CHECK(std::set(edges.begin(), edges.end()).size() == edges.size());
   }
@@ -113,7 +113,7 @@ TEST_CASE("no vertex that could meet a plane first is left out", "[mesh_surface]
       bool pointed = false;
       for (int k = 0; k < 200 && !pointed; ++k) {
         const Vector3d n =
-            normal[v].normalized() + (k == 0 ? 0.0 : random.decades(1e-3, 1.0)) * random.unit<3>();
+            normal[v].normalized() + (k == 0 ? 0.0 : random.log_uniform(1e-3, 1.0)) * random.unit<3>();
         pointed = std::all_of(neighbours[v].begin(), neighbours[v].end(), [&](std::uint32_t w) {
           const Vector3d e = (surface.vertices_m()[w] - surface.vertices_m()[v]).normalized();
           return n.normalized().dot(e) < -1e-6;
@@ -121,11 +121,11 @@ TEST_CASE("no vertex that could meet a plane first is left out", "[mesh_surface]
       }
       if (!pointed) continue;
       ++found;
-      CHECK_FALSE(surface.around(v).empty());
-      CHECK(surface.around(v).size() == neighbours[v].size());
+      CHECK_FALSE(surface.ring_of(v).empty());
+      CHECK(surface.ring_of(v).size() == neighbours[v].size());
     }
     CHECK(found > 0);
-    CHECK(surface.pointed_count() <= found + found / 20 + 2);  // nor is much let in that could not
+    CHECK(surface.convex_vertex_count() <= found + found / 20 + 2);  // nor is much let in that could not
   }
 }
 
@@ -134,9 +134,9 @@ TEST_CASE("the border of an open mesh counts as an edge with one face", "[mesh_s
   sheet.vertices_m = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
   const MeshSurface surface(sheet, Kind::surface);
-  CHECK(surface.edges().size() == 4);
-  CHECK(surface.pointed_count() == 4);
-  for (const auto& edge : surface.edges()) CHECK(edge.triangles[1] == MeshSurface::kNone);
+  CHECK(surface.convex_edges().size() == 4);
+  CHECK(surface.convex_vertex_count() == 4);
+  for (const auto& edge : surface.convex_edges()) CHECK(edge.triangles[1] == MeshSurface::kNone);
 }
 
 }  // namespace

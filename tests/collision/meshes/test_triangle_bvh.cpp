@@ -15,10 +15,10 @@ struct Count {
 };
 
 /// Every triangle under a box lies in it, and in all boxes above.
-void descend(const TriangleTree& tree, const MeshSurface& surface, std::uint32_t node,
+void descend(const TriangleBvh& tree, const MeshSurface& surface, std::uint32_t node,
              std::vector<std::uint32_t> above, Count& count) {
   for (std::uint32_t i = 0; i < 8; ++i) {
-    const TriangleTree::Box& box = tree.boxes()[8 * node + i];
+    const TriangleBvh::Box& box = tree.boxes()[8 * node + i];
     if (box.count < 0) continue;
     std::vector<std::uint32_t> path = above;
     path.push_back(8 * node + i);
@@ -40,10 +40,10 @@ void descend(const TriangleTree& tree, const MeshSurface& surface, std::uint32_t
         }
         if (surface.features()[t].vertices !=
             std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone})
-          CHECK((features & TriangleTree::kVertices) != 0);
+          CHECK((features & TriangleBvh::kVertices) != 0);
         if (surface.features()[t].edges !=
             std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone})
-          CHECK((features & TriangleTree::kEdges) != 0);
+          CHECK((features & TriangleBvh::kEdges) != 0);
       }
     }
   }
@@ -54,7 +54,7 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it", "[trian
     for (const std::size_t triangles : {12, 500, 6000}) {
       INFO(kind << ' ' << triangles);
       const MeshSurface surface(make_mesh({kind, triangles}), Kind::solid);
-      const TriangleTree tree(surface);
+      const TriangleBvh tree(surface);
       Count count{std::vector<int>(surface.triangles().size(), 0)};
       descend(tree, surface, 0, {}, count);
       CHECK(std::all_of(count.seen.begin(), count.seen.end(), [](int n) { return n == 1; }));
@@ -65,7 +65,7 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it", "[trian
 }
 
 TEST_CASE("a tree of no triangles is no tree", "[triangle_tree]") {
-  const TriangleTree tree(MeshSurface(TriangleMesh{}, Kind::surface));
+  const TriangleBvh tree(MeshSurface(TriangleMesh{}, Kind::surface));
   CHECK(tree.nodes().empty());
 }
 

@@ -22,25 +22,25 @@ Triangle triangle(const MeshSurface& surface, std::uint32_t t, const Pose& X) {
 }
 
 /// Of the pairs that a walk lists, those that meet at a pose.
-PairSet meeting(TreeWalk& walk, const TreedMesh& a, const TreedMesh& b, const Sweep& sweep,
+PairSet meeting(BvhTraversal& walk, const MeshBvh& a, const MeshBvh& b, const Sweep& sweep,
                 const Pose& X_BA) {
-  WalkBudget budget = {1000000000};
-  REQUIRE(walk.find(a.tree, b.tree, sweep, budget));
+  VisitBudget budget = {1000000000};
+  REQUIRE(walk.find(a.bvh, b.bvh, sweep, budget));
   PairSet out;
   for (const TrianglePair& pair : walk)
-    if (triangles_meet(triangle(a.surface, pair.a, X_BA), triangle(b.surface, pair.b, Pose{})))
+    if (triangles_intersect(triangle(a.surface, pair.a, X_BA), triangle(b.surface, pair.b, Pose{})))
       out.insert({pair.a, pair.b});
   return out;
 }
 
 /// A pose at which the two touch or overlap somewhere.
-Pose near_pose(RandomValues& random, const TreedMesh& a, const TreedMesh& b) {
+Pose near_pose(RandomValues& random, const MeshBvh& a, const MeshBvh& b) {
   const double reach = a.surface.radius_m() + b.surface.radius_m();
   return {random.rotation(), random.uniform(0.3, 0.95) * reach * random.unit<3>()};
 }
 
-const std::vector<std::pair<MadeMesh, MadeMesh>>& mesh_pairs() {
-  static const std::vector<std::pair<MadeMesh, MadeMesh>> pairs = {
+const std::vector<std::pair<GeneratedMesh, GeneratedMesh>>& mesh_pairs() {
+  static const std::vector<std::pair<GeneratedMesh, GeneratedMesh>> pairs = {
       {{"bumpy", 2000}, {"boulder", 3000}}, {{"cube", 12}, {"plate", 500}},
       {{"bolt", 2000}, {"nut", 2000}},      {{"gear", 3000}, {"gear", 1000}},
       {{"peg", 1000}, {"hole", 2000}},      {{"sphere", 80}, {"boulder", 20000}},
@@ -50,17 +50,17 @@ const std::vector<std::pair<MadeMesh, MadeMesh>>& mesh_pairs() {
 
 TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of processor", "[tree_walk]") {
   RandomValues random(21);
-  TreeWalk fastest, portable(walk::walk_portable);
+  BvhTraversal fastest, portable(simd::walk_portable);
   std::size_t all = 0;
   for (const auto& [tool, obstacle] : mesh_pairs()) {
-    const TreedMesh a(make_mesh(tool)), b(make_mesh(obstacle));
-    const ExactMeeting exact(a.surface.mesh(), b.surface.mesh());
+    const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
+    const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
     for (int n = 0; n < 12; ++n) {
       const Pose X_BA = near_pose(random, a, b);
       const Sweep sweep = {X_BA, X_BA};
       const PairSet found = meeting(fastest, a, b, sweep, X_BA);
       CHECK(found == meeting(portable, a, b, sweep, X_BA));
-      CHECK(found.size() == exact.pairs(X_BA));
+      CHECK(found.size() == exact.intersecting_pairs(X_BA));
       all += found.size();
     }
   }
@@ -71,24 +71,24 @@ TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of
 // reach of its end.
 TEST_CASE("a swept walk lists whatever meets on the way and within reach of the end", "[tree_walk]") {
   RandomValues random(22);
-  TreeWalk still, swept, portable(walk::walk_portable);
+  BvhTraversal still, swept, portable(simd::walk_portable);
   std::size_t all = 0;
   for (const auto& [tool, obstacle] : mesh_pairs()) {
-    const TreedMesh a(make_mesh(tool)), b(make_mesh(obstacle));
+    const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
     const double r = a.surface.radius_m();
     for (int n = 0; n < 8; ++n) {
       Sweep sweep;
       sweep.X_BA_start = near_pose(random, a, b);
-      const double way = r * random.decades(1e-4, 0.3), turn = random.decades(1e-4, 0.05);
+      const double way = r * random.log_uniform(1e-4, 0.3), turn = random.log_uniform(1e-4, 0.05);
       sweep.X_BA_end = {(sweep.X_BA_start.rotation * random.rotation(turn)).normalized(),
                         sweep.X_BA_start.translation_m + way * random.unit<3>()};
       sweep.reach_m = 0.3 * (way + turn * r);
-      WalkBudget budget = {1000000000};
+      VisitBudget budget = {1000000000};
       std::set<std::pair<std::uint32_t, std::uint32_t>> listed, listed_portable;
-      const bool complete = swept.find(a.tree, b.tree, sweep, budget);
+      const bool complete = swept.find(a.bvh, b.bvh, sweep, budget);
       if (!complete) continue;  // too long a way for the list
       for (const TrianglePair& pair : swept) listed.insert({pair.a, pair.b});
-      CHECK(portable.find(a.tree, b.tree, sweep, budget));
+      CHECK(portable.find(a.bvh, b.bvh, sweep, budget));
       for (const TrianglePair& pair : portable) listed_portable.insert({pair.a, pair.b});
       for (int k = 0; k < 12; ++k) {
         const double s = k / 11.0;
@@ -113,15 +113,15 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
 }
 
 TEST_CASE("pairs without features that can meet first are left out when they are not wanted", "[tree_walk]") {
-  const TreedMesh a(make_mesh({"cube", 5000})), b(make_mesh({"table", 5000}));
+  const MeshBvh a(make_mesh({"cube", 5000})), b(make_mesh({"table", 5000}));
   const Pose X_BA = {Quaterniond::Identity(), {0, 0, 0.035}};
   Sweep sweep = {X_BA, X_BA, 1e-5};
-  TreeWalk walk;
-  WalkBudget budget = {1000000};
-  CHECK(walk.find(a.tree, b.tree, sweep, budget));
+  BvhTraversal walk;
+  VisitBudget budget = {1000000};
+  CHECK(walk.find(a.bvh, b.bvh, sweep, budget));
   const std::size_t all = walk.size();
   sweep.all_pairs = false;
-  CHECK(walk.find(a.tree, b.tree, sweep, budget));
+  CHECK(walk.find(a.bvh, b.bvh, sweep, budget));
   CHECK(walk.size() * 4 < all);
   const auto has = [](const std::array<std::uint32_t, 3>& features) {
     return features != std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone};
@@ -138,18 +138,18 @@ TEST_CASE("pairs without features that can meet first are left out when they are
 }
 
 TEST_CASE("a walk stops where its budget ends, and says so", "[tree_walk]") {
-  const TreedMesh a(make_mesh({"peg", 1000})), b(make_mesh({"hole", 2000}));
+  const MeshBvh a(make_mesh({"peg", 1000})), b(make_mesh({"hole", 2000}));
   const Sweep sweep = {Pose{Quaterniond::Identity(), {3e-4, 0, 0}},
                        Pose{Quaterniond::Identity(), {3e-4, 0, 0}}};
-  TreeWalk walk;
-  WalkBudget plenty = {1000000};
-  REQUIRE(walk.find(a.tree, b.tree, sweep, plenty));
-  const std::uint32_t needed = 1000000 - plenty.visits;
+  BvhTraversal walk;
+  VisitBudget plenty = {1000000};
+  REQUIRE(walk.find(a.bvh, b.bvh, sweep, plenty));
+  const std::uint32_t needed = 1000000 - plenty.remaining;
   CHECK(needed > 100);
-  WalkBudget enough = {needed}, short_of_one = {needed - 1};
-  CHECK(walk.find(a.tree, b.tree, sweep, enough));
-  CHECK(enough.visits == 0);
-  CHECK_FALSE(walk.find(a.tree, b.tree, sweep, short_of_one));
+  VisitBudget enough = {needed}, short_of_one = {needed - 1};
+  CHECK(walk.find(a.bvh, b.bvh, sweep, enough));
+  CHECK(enough.remaining == 0);
+  CHECK_FALSE(walk.find(a.bvh, b.bvh, sweep, short_of_one));
 }
 
 }  // namespace

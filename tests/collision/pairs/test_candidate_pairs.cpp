@@ -18,21 +18,21 @@ constexpr std::uint32_t kPlenty = 10000000;
 
 using PairSet = std::set<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>>;
 
-PairSet set_of(const NearPairs& list) {
+PairSet make_state_set(const CandidatePairs& list) {
   PairSet out;
-  for (const NearPair& pair : list.pairs()) out.insert({pair.a, pair.b, pair.obstacle});
+  for (const CandidatePair& pair : list.pairs()) out.insert({pair.a, pair.b, pair.obstacle});
   return out;
 }
 
-void list_all(NearPairs& list, const NearPairs::Way& way) {
-  WalkBudget budget = {kPlenty};
-  list.set_out(way);
-  REQUIRE(list.go_on(budget));
+void list_all(CandidatePairs& list, const CandidatePairs::Path& way) {
+  VisitBudget budget = {kPlenty};
+  list.start(way);
+  REQUIRE(list.resume(budget));
   REQUIRE(list.complete());
 }
 
 /// Somewhere near a way, so far from it.
-Pose near_way(RandomValues& random, const NearPairs::Way& way, double away_m, double radius_m) {
+Pose near_way(RandomValues& random, const CandidatePairs::Path& way, double away_m, double radius_m) {
   const double share = random.uniform(0.0, 1.0), of_shift = random.uniform(0.0, 1.0);
   const Pose on_way = {
       way.X_WT_start.rotation.slerp(share, way.X_WT_end.rotation),
@@ -42,22 +42,22 @@ Pose near_way(RandomValues& random, const NearPairs::Way& way, double away_m, do
 }
 
 TEST_CASE("a list made in parts is the list made at once", "[near_pairs]") {
-  const Scene scene = scene_of(rough_handling()[7]);
-  const NearPairs::Way way = {
+  const Scene scene = scene_of(manipulation_cases()[7]);
+  const CandidatePairs::Path way = {
       {Quaterniond::Identity(), {0.10, 0, 0}}, {rotation_from({0.0, 0.01, 0.0}), {0.099, 0.001, 0}}, 1e-4};
-  NearPairs at_once(scene), in_parts(scene);
+  CandidatePairs at_once(scene), in_parts(scene);
   list_all(at_once, way);
-  in_parts.set_out(way);
+  in_parts.start(way);
   int parts = 0;
-  for (WalkBudget few = {7}; !in_parts.go_on(few); few = {7}) {
-    CHECK(in_parts.under_way());
+  for (VisitBudget few = {7}; !in_parts.resume(few); few = {7}) {
+    CHECK(in_parts.in_progress());
     CHECK_FALSE(in_parts.covers(way.X_WT_start));
     ++parts;
   }
   CHECK(parts > 5);
   CHECK(in_parts.complete());
-  CHECK(in_parts.visits() == at_once.visits());
-  CHECK(set_of(in_parts) == set_of(at_once));
+  CHECK(in_parts.node_visits() == at_once.node_visits());
+  CHECK(make_state_set(in_parts) == make_state_set(at_once));
   CHECK(at_once.pairs().size() > 10);
 }
 
@@ -67,29 +67,29 @@ TEST_CASE("a list holds what meets anywhere near its way", "[near_pairs]") {
   RandomValues random(31);
   std::size_t looked_at = 0;
   for (const std::size_t i : {2, 7, 11, 14}) {
-    const Handling& handling = rough_handling()[i];
+    const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
     const Scene scene = scene_of(handling);
     const double r_m = scene.tool_radius_m();
     const MeshSurface& tool = scene.tool_mesh()->surface;
     const MeshSurface& obstacle = scene.meshes()[0].mesh->surface;
-    NearPairs list(scene), here(scene);
-    for (int n = 0; n < repeats(20); ++n) {
+    CandidatePairs list(scene), here(scene);
+    for (int n = 0; n < case_count(20); ++n) {
       const Pose X_start = {random.rotation(0.2), random.uniform(0.0, 1.0) * handling.start_m};
-      const NearPairs::Way way = {
+      const CandidatePairs::Path way = {
           X_start,
           {(X_start.rotation * random.rotation(random.uniform(0.0, 0.2))).normalized(),
            X_start.translation_m + random.uniform(0.0, 0.003) * random.unit<3>()},
-          random.decades(1e-5, 1e-3)};
+          random.log_uniform(1e-5, 1e-3)};
       list_all(list, way);
-      const PairSet listed = set_of(list);
+      const PairSet listed = make_state_set(list);
       for (int k = 0; k < 5; ++k) {
         const Pose X_WT = near_way(random, way, 0.7 * way.reach_m, r_m);
         REQUIRE(list.covers(X_WT));
         list_all(here, {X_WT, X_WT, 0.0});
-        for (const NearPair& pair : here.pairs()) {
+        for (const CandidatePair& pair : here.pairs()) {
           const auto corner = [&](int c) -> Vector3d { return X_WT * tool.corner_m(pair.a, c); };
-          if (!triangles_meet(
+          if (!triangles_intersect(
                   {corner(0), corner(1), corner(2)},
                   {obstacle.corner_m(pair.b, 0), obstacle.corner_m(pair.b, 1), obstacle.corner_m(pair.b, 2)}))
             continue;
@@ -104,11 +104,11 @@ TEST_CASE("a list holds what meets anywhere near its way", "[near_pairs]") {
 
 TEST_CASE("what is farther from the way than the reach is not covered", "[near_pairs]") {
   RandomValues random(32);
-  const Scene scene = scene_of(rough_handling()[8]);
+  const Scene scene = scene_of(manipulation_cases()[8]);
   const double r_m = scene.tool_radius_m();
-  const NearPairs::Way way = {
+  const CandidatePairs::Path way = {
       {Quaterniond::Identity(), {0.08, 0, 0}}, {rotation_from({0.0, 0.02, 0.01}), {0.08, 0.002, 0}}, 1e-4};
-  NearPairs list(scene);
+  CandidatePairs list(scene);
   CHECK_FALSE(list.covers(way.X_WT_start));  // nothing is listed yet
   list_all(list, way);
   CHECK(list.covers(way.X_WT_start));
@@ -129,16 +129,16 @@ TEST_CASE("what is farther from the way than the reach is not covered", "[near_p
 
 TEST_CASE("of thousands of obstacles only those near by are listed", "[near_pairs]") {
   std::vector<MeshObstacle> obstacles;
-  const TreedMesh cube(make_mesh({"cube", 12}));
+  const MeshBvh cube(make_mesh({"cube", 12}));
   for (int x = 0; x < 10; ++x)
     for (int y = 0; y < 10; ++y)
       obstacles.push_back({"cube", cube, Pose{Quaterniond::Identity(), {x * 1.0, y * 1.0, 0.0}}});
   const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
-  NearPairs list(scene);
+  CandidatePairs list(scene);
   const Pose X_WT = {Quaterniond::Identity(), {3.0, 4.0, 0.055}};
   list_all(list, {X_WT, X_WT, 0.01});
-  CHECK(list.near_by().size() == 1);
-  for (const NearPair& pair : list.pairs()) CHECK(pair.obstacle == 34);
+  CHECK(list.nearby_obstacles().size() == 1);
+  for (const CandidatePair& pair : list.pairs()) CHECK(pair.obstacle == 34);
   CHECK_FALSE(list.pairs().empty());
 }
 
@@ -147,12 +147,12 @@ TEST_CASE("a list for what moves holds for its time, and for where the obstacle 
           "[near_pairs]") {
   const ObstacleMotion flies = {{0.5, 0, 0}, {0, 0, 20.0}, 0.0};
   std::vector<MeshObstacle> obstacles;
-  const auto ball = std::make_shared<const TreedMesh>(make_mesh({"sphere", 320}));
+  const auto ball = std::make_shared<const MeshBvh>(make_mesh({"sphere", 320}));
   obstacles.emplace_back("ball", ball, Pose{Quaterniond::Identity(), {-0.502, 0, 0.062}}, flies);
   const Scene scene(mesh_tool(make_mesh({"sphere", 320})), {}, {}, std::move(obstacles));
   const Pose X_WT;
-  NearPairs list(scene);
-  const NearPairs::Way way = {X_WT, X_WT, 0.003, 1.000, 1.002};
+  CandidatePairs list(scene);
+  const CandidatePairs::Path way = {X_WT, X_WT, 0.003, 1.000, 1.002};
   list_all(list, way);
   CHECK(list.covers(X_WT, 1.0));
   CHECK(list.covers(X_WT, 1.001));
@@ -161,7 +161,7 @@ TEST_CASE("a list for what moves holds for its time, and for where the obstacle 
   CHECK_FALSE(list.covers(X_WT, 1.003));
   CHECK_FALSE(list.covers(Pose{Quaterniond::Identity(), {0, 0, 0.004}}, 1.001));
   // What the ball sees is a tool that turns: within the reach of the world's way is not enough.
-  const NearPairs::Way short_way = {X_WT, X_WT, 1e-5, 1.000, 1.010};
+  const CandidatePairs::Path short_way = {X_WT, X_WT, 1e-5, 1.000, 1.010};
   list_all(list, short_way);
   CHECK(list.covers(X_WT, 1.0));
   CHECK_FALSE(list.covers(X_WT, 1.005));  // from its arc to its chord it is farther than 10 um

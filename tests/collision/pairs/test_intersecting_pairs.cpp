@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-std::set<std::pair<std::uint32_t, std::uint32_t>> set_of(const MeetingPairs& pairs) {
+std::set<std::pair<std::uint32_t, std::uint32_t>> make_state_set(const IntersectingPairs& pairs) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> out;
   for (const TrianglePair& pair : pairs.pairs()) out.insert({pair.a, pair.b});
   REQUIRE(out.size() == pairs.pairs().size());  // none twice
@@ -22,26 +22,26 @@ std::set<std::pair<std::uint32_t, std::uint32_t>> set_of(const MeetingPairs& pai
 
 TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of processor",
           "[meeting_pairs]") {
-  const std::vector<std::pair<MadeMesh, MadeMesh>> cases = {
+  const std::vector<std::pair<GeneratedMesh, GeneratedMesh>> cases = {
       {{"bumpy", 2000}, {"boulder", 3000}}, {{"cube", 12}, {"plate", 500}},
       {{"bolt", 2000}, {"nut", 2000}},      {{"gear", 3000}, {"gear", 1000}},
       {{"peg", 1000}, {"hole", 2000}},      {{"sphere", 80}, {"boulder", 20000}},
   };
   RandomValues random(31);
-  MeetingPairs fastest, portable(walk::walk_portable);
+  IntersectingPairs fastest, portable(simd::walk_portable);
   std::size_t all = 0, asked = 0;
   for (const auto& [tool, obstacle] : cases) {
-    const TreedMesh a(make_mesh(tool)), b(make_mesh(obstacle));
-    const ExactMeeting exact(a.surface.mesh(), b.surface.mesh());
+    const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
+    const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
     const double reach_m = a.surface.radius_m() + b.surface.radius_m();
     for (int n = 0; n < 20; ++n) {
       const Pose X_BA = {random.rotation(), random.uniform(0.2, 0.95) * reach_m * random.unit<3>()};
       REQUIRE(fastest.find(a, b, X_BA));
       REQUIRE(portable.find(a, b, X_BA));
-      CHECK(set_of(fastest) == set_of(portable));
-      CHECK(fastest.pairs().size() == exact.pairs(X_BA));
+      CHECK(make_state_set(fastest) == make_state_set(portable));
+      CHECK(fastest.pairs().size() == exact.intersecting_pairs(X_BA));
       all += fastest.pairs().size();
-      asked += fastest.asked();
+      asked += fastest.double_precision_tests();
     }
   }
   CHECK(all > 2000);
@@ -50,56 +50,57 @@ TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of p
 
 // There one pair decides, and single precision cannot tell.
 TEST_CASE("at the verge of touching the pairs are those of exact arithmetic", "[meeting_pairs]") {
-  const TreedMesh a(make_mesh({"bumpy", 2000})), b(make_mesh({"boulder", 3000}));
-  const ExactMeeting exact(a.surface.mesh(), b.surface.mesh());
+  const MeshBvh a(make_mesh({"bumpy", 2000})), b(make_mesh({"boulder", 3000}));
+  const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
   RandomValues random(32);
-  MeetingPairs pairs, portable(walk::walk_portable);
+  IntersectingPairs pairs, portable(simd::walk_portable);
   for (int n = 0; n < 20; ++n) {
     const Quaterniond R = random.rotation();
     const Vector3d out = random.unit<3>();
     double overlapping_m = 0.3 * b.surface.radius_m(), free_m = a.surface.radius_m() + b.surface.radius_m();
     while (free_m - overlapping_m > 1e-12) {
       const double middle_m = 0.5 * (free_m + overlapping_m);
-      (exact.meet({R, middle_m * out}) ? overlapping_m : free_m) = middle_m;
+      (exact.intersect({R, middle_m * out}) ? overlapping_m : free_m) = middle_m;
     }
     for (const double m :
          {free_m + 1e-7, free_m, overlapping_m, overlapping_m - 1e-9, overlapping_m - 1e-7}) {
       const Pose X_BA = {R, m * out};
       REQUIRE(pairs.find(a, b, X_BA));
       REQUIRE(portable.find(a, b, X_BA));
-      CHECK(pairs.pairs().size() == exact.pairs(X_BA));
-      CHECK(set_of(pairs) == set_of(portable));
+      CHECK(pairs.pairs().size() == exact.intersecting_pairs(X_BA));
+      CHECK(make_state_set(pairs) == make_state_set(portable));
     }
   }
 }
 
 TEST_CASE("faces that lie on each other meet in every pair of triangles that touch", "[meeting_pairs]") {
-  const TreedMesh cube(make_mesh({"cube", 12})), large(make_mesh({"cube", 1200}));
-  const ExactMeeting exact(cube.surface.mesh(), large.surface.mesh());
+  const MeshBvh cube(make_mesh({"cube", 12})), large(make_mesh({"cube", 1200}));
+  const ExactIntersection exact(cube.surface.mesh(), large.surface.mesh());
   const double edge_m = 2.0 * cube.surface.mesh().vertices_m[0].cwiseAbs().maxCoeff();
-  MeetingPairs pairs;
+  IntersectingPairs pairs;
   for (const Vector3d& shift_m :
        {Vector3d(0, 0, edge_m), Vector3d(0.25 * edge_m, 0, edge_m), Vector3d(0, 0, 0)}) {
     const Pose X_BA = {Quaterniond::Identity(), shift_m};
     REQUIRE(pairs.find(cube, large, X_BA));
-    CHECK(pairs.pairs().size() == exact.pairs(X_BA));
+    CHECK(pairs.pairs().size() == exact.intersecting_pairs(X_BA));
     CHECK(pairs.pairs().size() > 100);
   }
 }
 
 TEST_CASE("more pairs than there is room for are not taken for all", "[meeting_pairs]") {
-  const TreedMesh bumpy(make_mesh({"bumpy", 60000}));
-  for (const walk::Kernel kernel : {walk::Kernel{nullptr}, walk::Kernel{walk::walk_portable}}) {
-    MeetingPairs pairs(kernel);
+  const MeshBvh bumpy(make_mesh({"bumpy", 60000}));
+  for (const simd::TraversalKernel kernel :
+       {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::walk_portable}}) {
+    IntersectingPairs pairs(kernel);
     CHECK_FALSE(pairs.find(bumpy, bumpy, Pose{}));  // each meets itself and its neighbours
-    CHECK(pairs.pairs().size() <= TreeWalk::kCapacity);
-    CHECK(pairs.pairs().size() > TreeWalk::kCapacity / 2);
+    CHECK(pairs.pairs().size() <= BvhTraversal::kCapacity);
+    CHECK(pairs.pairs().size() > BvhTraversal::kCapacity / 2);
   }
 }
 
 TEST_CASE("a mesh of no triangles meets nothing", "[meeting_pairs]") {
-  const TreedMesh cube(make_mesh({"cube", 12})), nothing(TriangleMesh{});
-  MeetingPairs pairs;
+  const MeshBvh cube(make_mesh({"cube", 12})), nothing(TriangleMesh{});
+  IntersectingPairs pairs;
   CHECK(pairs.find(cube, nothing, Pose{}));
   CHECK(pairs.pairs().empty());
 }

@@ -21,62 +21,62 @@ Pose hand(double t) {
 }
 
 TEST_CASE("nothing is expected to move that never did", "[expected_motion]") {
-  ExpectedMotion motion;
-  CHECK_FALSE(motion.known());
-  motion.learn(hand(3), hand(0));
-  CHECK(motion.known());
-  CHECK(apart_m(motion.after(20), hand(3)) < 1e-15);
-  CHECK(motion.bend_m(20, kRadius_m) == 0.0);
+  MotionPredictor motion;
+  CHECK_FALSE(motion.has_observation());
+  motion.observe(hand(3), hand(0));
+  CHECK(motion.has_observation());
+  CHECK(apart_m(motion.predict(20), hand(3)) < 1e-15);
+  CHECK(motion.chord_deviation_m(20, kRadius_m) == 0.0);
 }
 
 TEST_CASE("a tool that goes with the hand is expected where it will be", "[expected_motion]") {
-  ExpectedMotion motion;
-  for (int i = 0; i <= 100; ++i) motion.learn(hand(i), hand(i));
+  MotionPredictor motion;
+  for (int i = 0; i <= 100; ++i) motion.observe(hand(i), hand(i));
   const double way_m = apart_m(hand(100), hand(120));
-  CHECK(apart_m(motion.after(0), hand(100)) < 1e-15);
-  CHECK(apart_m(motion.after(20), hand(120)) < 0.02 * way_m);
+  CHECK(apart_m(motion.predict(0), hand(100)) < 1e-15);
+  CHECK(apart_m(motion.predict(20), hand(120)) < 0.02 * way_m);
   // A parabola of 2e-7 m per tick and tick leaves its chord by an eighth of that times 20^2.
-  CHECK(motion.bend_m(20, 0.0) == Approx(1e-5).epsilon(0.01));
+  CHECK(motion.chord_deviation_m(20, 0.0) == Approx(1e-5).epsilon(0.01));
 }
 
 TEST_CASE("a tool that is held drifts from the hand", "[expected_motion]") {
-  ExpectedMotion motion;
-  for (int i = 0; i <= 200; ++i) motion.learn(hand(0), hand(i));
+  MotionPredictor motion;
+  for (int i = 0; i <= 200; ++i) motion.observe(hand(0), hand(i));
   // It stays, but for what the hand gains in speed.
-  CHECK(apart_m(motion.after(10), hand(0)) < 0.1 * apart_m(hand(200), hand(210)));
+  CHECK(apart_m(motion.predict(10), hand(0)) < 0.1 * apart_m(hand(200), hand(210)));
 }
 
 TEST_CASE("a tool that jitters is expected to go with the hand", "[expected_motion]") {
   RandomValues random(61);
-  ExpectedMotion motion;
+  MotionPredictor motion;
   double farthest_m = 0.0;
   for (int i = 0; i <= 300; ++i) {
     const Pose jitters = {hand(i).rotation, hand(i).translation_m + 5e-6 * random.unit<3>()};
-    motion.learn(jitters, hand(i));
-    if (i > 100) farthest_m = std::max(farthest_m, apart_m(motion.after(20), hand(i + 20)));
+    motion.observe(jitters, hand(i));
+    if (i > 100) farthest_m = std::max(farthest_m, apart_m(motion.predict(20), hand(i + 20)));
   }
   // By its own steps alone it would be expected up to 20 steps of 1e-5 m away.
   CHECK(farthest_m < 1e-4);
 }
 
 TEST_CASE("what was forgotten is not expected to go on", "[expected_motion]") {
-  ExpectedMotion motion;
-  for (int i = 0; i <= 50; ++i) motion.learn(hand(i), hand(i));
-  motion.forget();
-  CHECK_FALSE(motion.known());
-  motion.learn(hand(0), hand(0));
-  CHECK(apart_m(motion.after(20), hand(0)) < 1e-15);
+  MotionPredictor motion;
+  for (int i = 0; i <= 50; ++i) motion.observe(hand(i), hand(i));
+  motion.reset();
+  CHECK_FALSE(motion.has_observation());
+  motion.observe(hand(0), hand(0));
+  CHECK(apart_m(motion.predict(20), hand(0)) < 1e-15);
 }
 
 TEST_CASE("a tool that is late is expected where it would have come to", "[expected_motion]") {
-  ExpectedMotion motion;
-  motion.learn_late(hand(0));
-  CHECK_FALSE(motion.known());
-  for (int i = 0; i <= 100; ++i) motion.learn(hand(i), hand(i));
-  for (int i = 101; i <= 104; ++i) motion.learn_late(hand(i));
+  MotionPredictor motion;
+  motion.observe_deferred(hand(0));
+  CHECK_FALSE(motion.has_observation());
+  for (int i = 0; i <= 100; ++i) motion.observe(hand(i), hand(i));
+  for (int i = 101; i <= 104; ++i) motion.observe_deferred(hand(i));
   const double way_m = apart_m(hand(100), hand(104));
-  CHECK(apart_m(motion.after(0), hand(104)) < 0.02 * way_m);
-  CHECK(apart_m(motion.after(20), hand(124)) < 0.02 * apart_m(hand(104), hand(124)));
+  CHECK(apart_m(motion.predict(0), hand(104)) < 0.02 * way_m);
+  CHECK(apart_m(motion.predict(20), hand(124)) < 0.02 * apart_m(hand(104), hand(124)));
 }
 
 }  // namespace

@@ -44,28 +44,28 @@ bool meet(const Bodies& bodies, std::uint32_t a, std::uint32_t b, const Frame& f
     moved[i] = (1.0 - t) * (from * p) + t * (to * p);
     still[i] = bodies.obstacle.corner_m(b, k);
   }
-  return triangles_meet(moved, still);
+  return triangles_intersect(moved, still);
 }
 
 TEST_CASE("a sieve leaves out no pair that meets on the way, on every kind of processor", "[pair_sieve]") {
   const Bodies bodies;
   RandomValues random(51);
-  PairSieve fastest(8, 1, bodies.tool.radius_m()),
-      portable(8, 1, bodies.tool.radius_m(), walk::sift_portable);
+  PairCuller fastest(8, 1, bodies.tool.radius_m()),
+      portable(8, 1, bodies.tool.radius_m(), simd::sift_portable);
   int met = 0, left_out = 0;
-  const int runs = repeats(20000);
+  const int runs = case_count(20000);
   for (int n = 0; n < runs; ++n) {
     const std::uint32_t a = bodies.any(random, bodies.tool), b = bodies.any(random, bodies.obstacle);
     const Pose X_start = near(random, bodies, a, b, 0.01);
     // The turn is so small that a chord is as good as an arc.
     const Pose X_end = {(X_start.rotation * random.rotation(1e-4)).normalized(),
-                        X_start.translation_m + random.decades(1e-6, 1e-2) * random.unit<3>()};
+                        X_start.translation_m + random.log_uniform(1e-6, 1e-2) * random.unit<3>()};
     const Frame from(X_start), to(X_end);
-    const auto left = [&](PairSieve& sieve) {
+    const auto left = [&](PairCuller& sieve) {
       sieve.clear();
       sieve.add(bodies.tool, a, bodies.obstacle, b, 0);
       std::uint32_t pair = 7;
-      const std::size_t count = sieve.sift(0, from, to, bodies.extent_m(), 1e-8, &pair).left;
+      const std::size_t count = sieve.cull(0, from, to, bodies.extent_m(), 1e-8, &pair).remaining;
       if (count == 1) CHECK(pair == 0);
       return count;
     };
@@ -89,14 +89,14 @@ TEST_CASE("a sieve leaves out what is kept apart by more than rounding and the m
   const double size_m = 2.0 * obstacle.vertices_m()[0].cwiseAbs().maxCoeff();
   constexpr double kMargin_m = 1e-4;
   const auto left = [&](const Vector3d& from_m, const Vector3d& to_m) {
-    PairSieve sieve(144, 1, tool.radius_m());
+    PairCuller sieve(144, 1, tool.radius_m());
     for (std::uint32_t a = 0; a < 12; ++a)
       for (std::uint32_t b = 0; b < 12; ++b) sieve.add(tool, a, obstacle, b, 0);
     std::array<std::uint32_t, 144> pairs;
     return sieve
-        .sift(0, Frame(Pose{Quaterniond::Identity(), from_m}), Frame(Pose{Quaterniond::Identity(), to_m}),
+        .cull(0, Frame(Pose{Quaterniond::Identity(), from_m}), Frame(Pose{Quaterniond::Identity(), to_m}),
               2.0 * size_m, kMargin_m, pairs.data())
-        .left;
+        .remaining;
   };
   for (const Vector3d& way : {Vector3d(1, 0, 0), Vector3d(0, -1, 0), Vector3d(0, 0, 1)}) {
     const Vector3d apart = (size_m + 1.1 * kMargin_m) * way, near = (size_m + 0.9 * kMargin_m) * way;
@@ -111,9 +111,8 @@ TEST_CASE("a sieve leaves out what is kept apart by more than rounding and the m
 TEST_CASE("what is left is told by its number, over all parts and in order", "[pair_sieve]") {
   const Bodies bodies;
   RandomValues random(52);
-  for (const walk::SieveKernel kernel :
-       {walk::SieveKernel{nullptr}, walk::SieveKernel{walk::sift_portable}}) {
-    PairSieve sieve(2000, 3, bodies.tool.radius_m(), kernel), alone(1, 1, bodies.tool.radius_m(), kernel);
+  for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::sift_portable}}) {
+    PairCuller sieve(2000, 3, bodies.tool.radius_m(), kernel), alone(1, 1, bodies.tool.radius_m(), kernel);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
     const Pose X = {random.rotation(), {0.05, 0.03, 0.0}};
     const Frame from(X), to(Pose{X.rotation, X.translation_m + Vector3d(0.0, 0.0, 1e-3)});
@@ -122,17 +121,17 @@ TEST_CASE("what is left is told by its number, over all parts and in order", "[p
         pairs.emplace_back(bodies.any(random, bodies.tool), bodies.any(random, bodies.obstacle));
         sieve.add(bodies.tool, pairs.back().first, bodies.obstacle, pairs.back().second, obstacle);
       }
-    REQUIRE(sieve.parts().size() == 3);
-    CHECK(sieve.parts()[1].obstacle == 1);
+    REQUIRE(sieve.groups().size() == 3);
+    CHECK(sieve.groups()[1].obstacle == 1);
     std::vector<std::uint32_t> left(2000), expected, all;
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::size_t count = sieve.sift(k, from, to, bodies.extent_m(), 2e-3, left.data()).left;
+      const std::size_t count = sieve.cull(k, from, to, bodies.extent_m(), 2e-3, left.data()).remaining;
       all.insert(all.end(), left.begin(), left.begin() + static_cast<std::ptrdiff_t>(count));
     }
     for (std::uint32_t i = 0; i < pairs.size(); ++i) {
       alone.clear();
       alone.add(bodies.tool, pairs[i].first, bodies.obstacle, pairs[i].second, 0);
-      if (alone.sift(0, from, to, bodies.extent_m(), 2e-3, left.data()).left == 1) expected.push_back(i);
+      if (alone.cull(0, from, to, bodies.extent_m(), 2e-3, left.data()).remaining == 1) expected.push_back(i);
     }
     CHECK(all == expected);
     CHECK_FALSE(expected.empty());
@@ -144,13 +143,12 @@ TEST_CASE("what is left is told by its number, over all parts and in order", "[p
 // about that place.
 TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool goes", "[pair_sieve]") {
   const Bodies bodies;
-  for (const walk::SieveKernel kernel :
-       {walk::SieveKernel{nullptr}, walk::SieveKernel{walk::sift_portable}}) {
+  for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::sift_portable}}) {
     RandomValues random(53);
-    PairSieve sieve(4000, 1, bodies.tool.radius_m(), kernel);
+    PairCuller sieve(4000, 1, bodies.tool.radius_m(), kernel);
     std::vector<std::uint32_t> left(4000);
     std::size_t asked = 0, of = 0, met = 0;
-    for (int place = 0; place < repeats(20); ++place) {
+    for (int place = 0; place < case_count(20); ++place) {
       const Pose X_near =
           near(random, bodies, bodies.any(random, bodies.tool), bodies.any(random, bodies.obstacle), 0.0);
       const Frame there(X_near);
@@ -164,16 +162,16 @@ TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool go
           }
       Pose X = X_near;
       for (int n = 0; n < 60; ++n) {
-        const double step = random.decades(1e-7, random.chance(0.1) ? 1e-2 : 1e-4);
+        const double step = random.log_uniform(1e-7, random.chance(0.1) ? 1e-2 : 1e-4);
         Pose X_next = {(X.rotation * random.rotation(step)).normalized(),
                        X.translation_m + 0.04 * step * random.unit<3>()};
         if ((X_next.translation_m - X_near.translation_m).norm() > 2e-3) X_next = X_near;
         const Frame from(X), to(X_next);
-        const PairSieve::Sifted sifted = sieve.sift(0, from, to, bodies.extent_m(), 1e-7, left.data());
-        asked += sifted.asked;
+        const PairCuller::CullResult sifted = sieve.cull(0, from, to, bodies.extent_m(), 1e-7, left.data());
+        asked += sifted.tested;
         of += pairs.size();
         const std::set<std::uint32_t> remain(left.begin(),
-                                             left.begin() + static_cast<std::ptrdiff_t>(sifted.left));
+                                             left.begin() + static_cast<std::ptrdiff_t>(sifted.remaining));
         for (std::uint32_t i = 0; i < pairs.size(); ++i) {
           if (!meet(bodies, pairs[i].first, pairs[i].second, from, to, 0.0) &&
               !meet(bodies, pairs[i].first, pairs[i].second, from, to, 1.0))
@@ -192,13 +190,13 @@ TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool go
 TEST_CASE("a sieve asks again of all pairs where the tool comes from afar", "[pair_sieve]") {
   const Bodies bodies;
   RandomValues random(54);
-  PairSieve sieve(800, 1, bodies.tool.radius_m());
+  PairCuller sieve(800, 1, bodies.tool.radius_m());
   for (int n = 0; n < 800; ++n)
     sieve.add(bodies.tool, bodies.any(random, bodies.tool), bodies.obstacle,
               bodies.any(random, bodies.obstacle), 0);
   std::vector<std::uint32_t> left(800);
   const auto asked_at = [&](const Pose& X) {
-    return sieve.sift(0, Frame(X), Frame(X), bodies.extent_m(), 1e-7, left.data()).asked;
+    return sieve.cull(0, Frame(X), Frame(X), bodies.extent_m(), 1e-7, left.data()).tested;
   };
   const Pose here = {Quaterniond::Identity(), {0.2, 0, 0}};
   CHECK(asked_at(here) == 800);
@@ -214,15 +212,15 @@ TEST_CASE("a sieve asks of all pairs that were added anew", "[pair_sieve]") {
   const Frame here(Pose{Quaterniond::Identity(), {1e-3, 0, 0}});
   std::uint32_t opposite = 0;
   while (tool.planes()[0].normal.dot(obstacle.planes()[opposite].normal) > -0.9) ++opposite;
-  PairSieve sieve(16, 1, tool.radius_m());
+  PairCuller sieve(16, 1, tool.radius_m());
   std::vector<std::uint32_t> left(16);
   for (int list = 0; list < 2; ++list) {
     sieve.clear();
     for (std::uint32_t n = 0; n < 16; ++n) sieve.add(tool, 0, obstacle, opposite, 0);
-    const auto sift = [&] { return sieve.sift(0, here, here, 0.2, 1e-7, left.data()); };
-    CHECK(sift().asked == 16);
-    REQUIRE(sift().left == 0);
-    CHECK(sift().asked == 0);
+    const auto sift = [&] { return sieve.cull(0, here, here, 0.2, 1e-7, left.data()); };
+    CHECK(sift().tested == 16);
+    REQUIRE(sift().remaining == 0);
+    CHECK(sift().tested == 0);
   }
 }
 

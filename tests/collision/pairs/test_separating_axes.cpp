@@ -12,8 +12,8 @@ namespace {
 using namespace test;
 
 std::vector<SeparatingAxes> kernels() {
-  std::vector<SeparatingAxes> all = {SeparatingAxes(walk::apart_portable)};
-  if (walk::has_avx2()) all.emplace_back(walk::apart_avx2);
+  std::vector<SeparatingAxes> all = {SeparatingAxes(simd::apart_portable)};
+  if (simd::has_avx2()) all.emplace_back(simd::apart_avx2);
   return all;
 }
 
@@ -35,22 +35,22 @@ Triangle between(const Triangle& a, const Triangle& b, double t) {
 TEST_CASE("axes keep apart no pair that meets on the way, of any size and anywhere", "[separating_axes]") {
   RandomValues random(17);
   int met = 0, apart = 0, parted = 0;
-  const int runs = repeats(20000);
+  const int runs = case_count(20000);
   for (int n = 0; n < runs; ++n) {
-    const double size_m = random.decades(1e-6, 1.0);
-    const Vector3d where = random.decades(1e-3, 1.0) * random.unit<3>();
+    const double size_m = random.log_uniform(1e-6, 1.0);
+    const Vector3d where = random.log_uniform(1e-3, 1.0) * random.unit<3>();
     const Triangle b = triangle(random, where, size_m);
     const Triangle start = triangle(random, where + 0.5 * size_m * random.unit<3>(), size_m);
-    const Vector3d way_m = size_m * random.decades(1e-4, 3.0) * random.unit<3>();
+    const Vector3d way_m = size_m * random.log_uniform(1e-4, 3.0) * random.unit<3>();
     Triangle end = moved(start, way_m);
     for (Vector3d& p : end) p += 0.1 * size_m * random.unit<3>();  // it turns, too
     bool meets = false;
-    for (int k = 0; k <= 20 && !meets; ++k) meets = triangles_meet(between(start, end, k / 20.0), b);
+    for (int k = 0; k <= 20 && !meets; ++k) meets = triangles_intersect(between(start, end, k / 20.0), b);
     met += meets;
     parted += !meets;
     bool all = true;
     for (const SeparatingAxes& axes : kernels()) {
-      const bool says_apart = axes.apart(start, end, b, 0.0);
+      const bool says_apart = axes.separated(start, end, b, 0.0);
       if (meets) CHECK_FALSE(says_apart);
       all = all && says_apart;
     }
@@ -72,13 +72,13 @@ TEST_CASE("axes keep apart by the margin, to a nanometre between small triangles
       return place + turn * (size_m * Vector3d(x, y, z));
     };
     const Triangle b = {put(-1, 0, 0), put(1, 0, 0), put(0, -1, 0)};
-    const double gap_m = random.decades(1e-8, 1e-5);
+    const double gap_m = random.log_uniform(1e-8, 1e-5);
     const double y = gap_m / size_m;
     const Triangle a = {put(0, y, 0), put(0.3, y + 1, 1), put(-0.3, y + 1, -1)};
     for (const SeparatingAxes& axes : kernels()) {
-      CHECK(axes.apart(a, a, b, 0.5 * gap_m));
-      CHECK_FALSE(axes.apart(a, a, b, 1.5 * gap_m));
-      CHECK_FALSE(axes.apart(a, moved(a, place - put(0, 2 * y, 0)), b, 0.5 * gap_m));
+      CHECK(axes.separated(a, a, b, 0.5 * gap_m));
+      CHECK_FALSE(axes.separated(a, a, b, 1.5 * gap_m));
+      CHECK_FALSE(axes.separated(a, moved(a, place - put(0, 2 * y, 0)), b, 0.5 * gap_m));
     }
   }
 }
@@ -88,10 +88,10 @@ TEST_CASE("triangles without area are never apart by mistake", "[separating_axes
   const Triangle point = {p, p, p}, line = {p, q, p};
   const Triangle b = {p - Vector3d(1e-3, 1e-3, 0), p + Vector3d(2e-3, -1e-3, 0), p + Vector3d(0, 2e-3, 0)};
   for (const SeparatingAxes& axes : kernels()) {
-    CHECK_FALSE(axes.apart(point, point, point, 0.0));
-    CHECK_FALSE(axes.apart(point, point, b, 0.0));
-    CHECK_FALSE(axes.apart(line, line, b, 0.0));
-    CHECK_FALSE(axes.apart(b, b, line, 0.0));
+    CHECK_FALSE(axes.separated(point, point, point, 0.0));
+    CHECK_FALSE(axes.separated(point, point, b, 0.0));
+    CHECK_FALSE(axes.separated(line, line, b, 0.0));
+    CHECK_FALSE(axes.separated(b, b, line, 0.0));
   }
 }
 

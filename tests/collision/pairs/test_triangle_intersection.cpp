@@ -18,7 +18,7 @@ TEST_CASE("two triangles meet where exact arithmetic says so", "[triangle_pair]"
   RandomValues random(11);
   int meeting = 0;
   for (int n = 0; n < 20000; ++n) {
-    const double far = random.decades(1e-2, 1e2), size = random.decades(1e-2, 10.0);
+    const double far = random.log_uniform(1e-2, 1e2), size = random.log_uniform(1e-2, 10.0);
     const Vector3d origin = random.vector<3>(far);
     Triangle p, q;
     for (Vector3d& v : p) v = origin + random.vector<3>();
@@ -27,10 +27,10 @@ TEST_CASE("two triangles meet where exact arithmetic says so", "[triangle_pair]"
       for (Vector3d& v : q)
         v -= (1.0 - 1e-3) * (p[1] - p[0]).cross(p[2] - p[0]).normalized() *
              (p[1] - p[0]).cross(p[2] - p[0]).normalized().dot(v - p[0]);
-    const bool exact = ExactMeeting(mesh_of(p), mesh_of(q)).meet(Pose{});
+    const bool exact = ExactIntersection(mesh_of(p), mesh_of(q)).intersect(Pose{});
     meeting += exact ? 1 : 0;
-    REQUIRE(triangles_meet(p, q) == exact);
-    REQUIRE(triangles_meet(q, p) == exact);
+    REQUIRE(triangles_intersect(p, q) == exact);
+    REQUIRE(triangles_intersect(q, p) == exact);
   }
   CHECK(meeting > 2000);
   CHECK(meeting < 18000);
@@ -43,10 +43,10 @@ TEST_CASE("triangles in one plane meet where they overlap", "[triangle_pair]") {
     for (Vector3d& v : q) v += Vector3d(x, y, 0);
     return q;
   };
-  CHECK(triangles_meet(p, shifted(0.5, 0.25)));
-  CHECK(triangles_meet(p, shifted(0.0, 0.0)));
-  CHECK_FALSE(triangles_meet(p, shifted(0.8, 0.8)));
-  CHECK_FALSE(triangles_meet(p, shifted(-1.1, 0.0)));
+  CHECK(triangles_intersect(p, shifted(0.5, 0.25)));
+  CHECK(triangles_intersect(p, shifted(0.0, 0.0)));
+  CHECK_FALSE(triangles_intersect(p, shifted(0.8, 0.8)));
+  CHECK_FALSE(triangles_intersect(p, shifted(-1.1, 0.0)));
 }
 
 }  // namespace

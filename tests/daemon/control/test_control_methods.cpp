@@ -13,9 +13,9 @@ using namespace test;
 
 /// All methods of the daemon, on a station that nobody ticks.
 struct Table {
-  VirtualStation s{resting_plan()};
-  EventFeed feed{s.station.loop()};
-  Control control{s.station, feed};
+  VirtualRuntime s{resting_config()};
+  EventFeed feed{s.runtime.loop()};
+  ControlInterface control{s.runtime, feed};
   const MethodTable& methods = control.methods();
 };
 
@@ -74,12 +74,12 @@ TEST_CASE("every method is documented, and takes its parameters and no other", "
     CHECK(static_cast<bool>(row.run));
     for (const char c : name) CHECK((std::islower(static_cast<unsigned char>(c)) || c == '.' || c == '_'));
     const Json good = good_params(row);
-    CHECK(&t.methods.look_up({name, good, 1, true}, row.least) == &row);
+    CHECK(&t.methods.look_up({name, good, 1, true}, row.min_role) == &row);
 
     Json more = good;
     more["no_such_thing"] = 1;
     const RpcError unknown = refused(t.methods, name, more, Role::administrator);
-    CHECK(unknown.code() == RpcCode::wrong_params);
+    CHECK(unknown.code() == RpcCode::invalid_params);
     CHECK(says(unknown, "'no_such_thing'"));
     for (const ParamRow& param : row.params) {
       INFO(param.name);
@@ -88,13 +88,13 @@ TEST_CASE("every method is documented, and takes its parameters and no other", "
         Json bad = good;
         bad[param.name] = wrong;
         const RpcError error = refused(t.methods, name, bad, Role::administrator);
-        CHECK(error.code() == RpcCode::wrong_params);
-        CHECK(says(error, "'" + param.name + "' has to be " + words(param.type)));
+        CHECK(error.code() == RpcCode::invalid_params);
+        CHECK(says(error, "'" + param.name + "' has to be " + type_text(param.type)));
       }
       Json less = good;
       less.erase(param.name);
       if (param.required) CHECK(says(refused(t.methods, name, less, Role::administrator), "is missing"));
-      if (!param.required) CHECK_NOTHROW(t.methods.look_up({name, less, 1, true}, row.least));
+      if (!param.required) CHECK_NOTHROW(t.methods.look_up({name, less, 1, true}, row.min_role));
     }
   }
 }
@@ -104,12 +104,12 @@ TEST_CASE("every method refuses each role below its own, whatever the parameters
   int refusals = 0;
   for (const auto& [name, row] : t.methods.methods())
     for (const Role role : {Role::observer, Role::operator_}) {
-      if (role >= row.least) continue;
+      if (role >= row.min_role) continue;
       INFO(name);
       for (const Json& params : {good_params(row), Json{{"no_such_thing", 1}}}) {
         const RpcError error = refused(t.methods, name, params, role);
-        CHECK(error.code() == RpcCode::not_allowed);
-        CHECK(error.details()["needs"] == wrenchd::name(row.least));
+        CHECK(error.code() == RpcCode::permission_denied);
+        CHECK(error.details()["needs"] == wrenchd::name(row.min_role));
         CHECK(says(error, "group '"));
         ++refusals;
       }
@@ -120,21 +120,21 @@ TEST_CASE("every method refuses each role below its own, whatever the parameters
 TEST_CASE("anybody may stop and look, operators may arm, and nobody below", "[control_methods]") {
   const Table t;
   for (const char* open : {"describe", "status", "subscribe", "unsubscribe", "stop", "devices"})
-    CHECK(t.methods.methods().at(open).least == Role::observer);
+    CHECK(t.methods.methods().at(open).min_role == Role::observer);
   for (const char* closed :
        {"lease.take", "lease.give", "beat", "arm", "disarm", "acknowledge", "start_over"})
-    CHECK(t.methods.methods().at(closed).least == Role::operator_);
+    CHECK(t.methods.methods().at(closed).min_role == Role::operator_);
 }
 
 TEST_CASE("what does not exist is told with what is nearest", "[control_methods]") {
   const Table t;
   const RpcError error = refused(t.methods, "lease_take", Json::object(), Role::observer);
-  CHECK(error.code() == RpcCode::no_such_method);
+  CHECK(error.code() == RpcCode::method_not_found);
   CHECK(says(error, "did you mean 'lease.take'?"));
   CHECK(says(refused(t.methods, "subscribe", {{"event", Json::array()}}, Role::observer),
              "there is no parameter 'event'; did you mean 'events'?"));
   CHECK(refused(t.methods, std::string(60000, 'x'), Json::object(), Role::observer).code() ==
-        RpcCode::no_such_method);
+        RpcCode::method_not_found);
 }
 
 TEST_CASE("describe tells all of the table", "[control_methods]") {
@@ -144,7 +144,7 @@ TEST_CASE("describe tells all of the table", "[control_methods]") {
   CHECK(told["methods"].size() == t.methods.methods().size());
   for (const Json& method : told["methods"]) {
     const MethodRow& row = t.methods.methods().at(method["name"].get<std::string>());
-    CHECK(method["role"] == name(row.least));
+    CHECK(method["role"] == name(row.min_role));
     CHECK(method["doc"] == row.doc);
     CHECK(method["params"].size() == row.params.size());
   }
@@ -163,8 +163,10 @@ TEST_CASE("describe tells all of the table", "[control_methods]") {
 TEST_CASE("a method that fails is answered, and its error has a kind", "[control_methods]") {
   const auto thrown = [](const auto& error) {
     MethodTable table;
-    table.add(MethodRow{
-        "fail", Role::observer, {}, "Fails.", [&](const Json&, const Caller&) -> Answer { throw error; }});
+    table.add(
+        MethodRow{"fail", Role::observer, {}, "Fails.", [&](const Json&, const Caller&) -> MethodResult {
+                    throw error;
+                  }});
     try {
       MethodTable::run(table.methods().at("fail"), Json::object(), {});
     } catch (const RpcError& told) {
@@ -172,12 +174,12 @@ TEST_CASE("a method that fails is answered, and its error has a kind", "[control
     }
     throw std::logic_error("nothing was thrown");
   };
-  CHECK(thrown(RpcError(RpcCode::taken, "Taken.")).code() == RpcCode::taken);
-  const RpcError config = thrown(ConfigError("scene.toml", Place{3, 4}, "is wrong; mend it"));
-  CHECK(config.code() == RpcCode::refused);
+  CHECK(thrown(RpcError(RpcCode::lease_held, "Taken.")).code() == RpcCode::lease_held);
+  const RpcError config = thrown(ConfigError("scene.toml", SourceLocation{3, 4}, "is wrong; mend it"));
+  CHECK(config.code() == RpcCode::rejected);
   CHECK(says(config, "scene.toml:3:4: is wrong; mend it"));
   const RpcError internal = thrown(std::runtime_error("the disk is full"));
-  CHECK(internal.code() == RpcCode::internal);
+  CHECK(internal.code() == RpcCode::internal_error);
   CHECK(says(internal, "the disk is full"));
 }
 

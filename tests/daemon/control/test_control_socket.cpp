@@ -35,16 +35,16 @@ std::string request(const std::string& method, const std::string& params = "{}",
 
 /// The code of the error in the next line; 0: it is none; -1: no line came.
 int next_code(RigClient& client) {
-  const auto line = client.line();
+  const auto line = client.read_line();
   if (!line) return -1;
   const Json told = Json::parse(*line, nullptr, false);
   return told.is_object() && told.contains("error") ? told["error"]["code"].get<int>() : 0;
 }
 
 bool hangs_up(RigClient& client) {
-  while (client.line(2000ms)) {
+  while (client.read_line(2000ms)) {
   }
-  return client.over();
+  return client.closed_by_peer();
 }
 
 std::size_t open_descriptors() {
@@ -107,17 +107,18 @@ struct Abuse {
 };
 
 /// One line from an observer, and the code of its answer.
-Abuse line_of(const std::string& name, const std::string& line, RpcCode code, As who = As::observer) {
+Abuse line_of(const std::string& name, const std::string& line, RpcCode code,
+              TestUser who = TestUser::observer) {
   return {name, [=](ControlRig& rig) {
             RigClient client = rig.connect(who);
             client.send(line);
             CHECK(next_code(client) == code_of(code));
-            CHECK(client.code("status") == 0);  // and the connection goes on
+            CHECK(client.error_code("status") == 0);  // and the connection goes on
           }};
 }
 
 Abuse forbidden(const std::string& method) {
-  return line_of("observer asks for " + method, request(method), RpcCode::not_allowed);
+  return line_of("observer asks for " + method, request(method), RpcCode::permission_denied);
 }
 
 void flood(RigClient& client, const std::string& line, int lines) {
@@ -135,72 +136,74 @@ std::vector<Abuse> abuses() {
       forbidden("beat"),
       forbidden("acknowledge"),
       forbidden("start_over"),
-      line_of("no such method", request("sudo"), RpcCode::no_such_method),
-      line_of("a method with a path in it", request("../../stop"), RpcCode::no_such_method),
-      line_of("a method of 60 kB", request(std::string(60000, 'm')), RpcCode::no_such_method),
+      line_of("no such method", request("sudo"), RpcCode::method_not_found),
+      line_of("a method with a path in it", request("../../stop"), RpcCode::method_not_found),
+      line_of("a method of 60 kB", request(std::string(60000, 'm')), RpcCode::method_not_found),
       line_of("a role in the parameters", request("arm", R"({"role":"administrator"})"),
-              RpcCode::not_allowed),
+              RpcCode::permission_denied),
       line_of("a uid in the request",
               R"({"jsonrpc":"2.0","id":1,"method":"arm","uid":0})"
               "\n",
-              RpcCode::no_request),
-      line_of("operator arms without the lease", request("arm"), RpcCode::not_now, As::operator_),
-      line_of("operator beats without the lease", request("beat"), RpcCode::not_now, As::operator_),
-      line_of("operator gives what it has not", request("lease.give"), RpcCode::not_now, As::operator_),
+              RpcCode::invalid_request),
+      line_of("operator arms without the lease", request("arm"), RpcCode::invalid_state, TestUser::operator_),
+      line_of("operator beats without the lease", request("beat"), RpcCode::invalid_state,
+              TestUser::operator_),
+      line_of("operator gives what it has not", request("lease.give"), RpcCode::invalid_state,
+              TestUser::operator_),
       line_of("operator takes the lease from another", request("lease.take", R"({"from_other":true})"),
-              RpcCode::not_allowed, As::operator_),
+              RpcCode::permission_denied, TestUser::operator_),
       line_of("a batch with stop in it", "[" + request("stop").substr(0, request("stop").size() - 1) + "]\n",
-              RpcCode::no_request),
+              RpcCode::invalid_request),
       line_of("another version",
               R"({"jsonrpc":"1.0","id":1,"method":"stop"})"
               "\n",
-              RpcCode::no_request),
+              RpcCode::invalid_request),
       line_of("no version",
               R"({"id":1,"method":"stop"})"
               "\n",
-              RpcCode::no_request),
+              RpcCode::invalid_request),
       line_of("two methods",
               R"({"jsonrpc":"2.0","id":1,"method":"status","method":"stop"})"
               "\n",
-              RpcCode::no_json),
+              RpcCode::parse_error),
       line_of("a zero byte", std::string("{\"jsonrpc\":\"2.0\",\0\"id\":1,\"method\":\"stop\"}\n", 42),
-              RpcCode::no_json),
+              RpcCode::parse_error),
       line_of("a zero byte behind the request", request("stop").insert(request("stop").size() - 1, 1, '\0'),
-              RpcCode::no_json),
-      line_of("bytes that are no UTF-8", request("stop", "{\"a\":\"\xff\xfe\"}"), RpcCode::no_json),
-      line_of("surrogates", request("stop", R"({"a":"\ud800"})"), RpcCode::no_json),
-      line_of("30,000 arrays in each other", request("stop", "{\"a\":" + nested), RpcCode::no_json),
-      line_of("a huge id", request("stop", "{}", "99999999999999999999999"), RpcCode::no_request),
+              RpcCode::parse_error),
+      line_of("bytes that are no UTF-8", request("stop", "{\"a\":\"\xff\xfe\"}"), RpcCode::parse_error),
+      line_of("surrogates", request("stop", R"({"a":"\ud800"})"), RpcCode::parse_error),
+      line_of("30,000 arrays in each other", request("stop", "{\"a\":" + nested), RpcCode::parse_error),
+      line_of("a huge id", request("stop", "{}", "99999999999999999999999"), RpcCode::invalid_request),
       line_of("an id of 60 kB", request("stop", "{}", '"' + std::string(60000, 'i') + '"'),
-              RpcCode::no_request),
-      line_of("an id that is an object", request("stop", "{}", "{}"), RpcCode::no_request),
-      line_of("a number beyond all numbers", request("stop", R"({"a":1e999})"), RpcCode::no_json),
-      line_of("parameters without names", request("stop", "[1]"), RpcCode::wrong_params),
+              RpcCode::invalid_request),
+      line_of("an id that is an object", request("stop", "{}", "{}"), RpcCode::invalid_request),
+      line_of("a number beyond all numbers", request("stop", R"({"a":1e999})"), RpcCode::parse_error),
+      line_of("parameters without names", request("stop", "[1]"), RpcCode::invalid_params),
       line_of("parameters that stop does not have", request("stop", R"({"softly":true})"),
-              RpcCode::wrong_params),
-      line_of("an empty line", "\n", RpcCode::no_json),
-      line_of("60 kB of blanks", std::string(60000, ' ') + "\n", RpcCode::no_json),
-      line_of("another protocol", "GET / HTTP/1.1\r\n", RpcCode::no_json),
+              RpcCode::invalid_params),
+      line_of("an empty line", "\n", RpcCode::parse_error),
+      line_of("60 kB of blanks", std::string(60000, ' ') + "\n", RpcCode::parse_error),
+      line_of("another protocol", "GET / HTTP/1.1\r\n", RpcCode::parse_error),
       line_of("no event of that name", request("subscribe", R"({"events":["everything"]})"),
-              RpcCode::wrong_params),
+              RpcCode::invalid_params),
       {"half a line, and hangs up",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::operator_);
+         RigClient client = rig.connect(TestUser::operator_);
          client.send(request("lease.take").substr(0, 40));
-         client.hang_up();
+         client.disconnect();
        }},
       {"a request without its end, and hangs up",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          std::string stop = request("stop");
          stop.pop_back();
          client.send(stop);
-         client.hang_up();
+         client.disconnect();
          std::this_thread::sleep_for(50ms);
        }},
       {"a byte at a time",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          for (const char byte : request("status")) {
            client.send(std::string_view(&byte, 1));
            std::this_thread::sleep_for(1ms);
@@ -209,14 +212,14 @@ std::vector<Abuse> abuses() {
        }},
       {"a line without end",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          client.send(std::string(kMaxLineBytes + 4096, 'x'));
-         CHECK(next_code(client) == code_of(RpcCode::no_json));
+         CHECK(next_code(client) == code_of(RpcCode::parse_error));
          CHECK(hangs_up(client));
        }},
       {"a line of 100 MB",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          const std::string piece(std::size_t{1} << 16, '{');
          const double before_MB = resident_MB();
          int pieces = 0;
@@ -226,69 +229,69 @@ std::vector<Abuse> abuses() {
        }},
       {"requests before the line of 100 MB still count for nothing",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          client.send(request("arm") + std::string(200000, 'y'));
-         CHECK(next_code(client) == code_of(RpcCode::not_allowed));
+         CHECK(next_code(client) == code_of(RpcCode::permission_denied));
        }},
       {"strangers",
        [](ControlRig& rig) {
          for (int i = 0; i < 100; ++i) {
-           RigClient client = rig.connect(As::stranger);
+           RigClient client = rig.connect(TestUser::stranger);
            client.send(request("stop"));
            if (i > 0) continue;
-           CHECK(next_code(client) == code_of(RpcCode::not_allowed));
+           CHECK(next_code(client) == code_of(RpcCode::permission_denied));
            CHECK(hangs_up(client));
          }
        }},
       {"a thousand connections",
        [](ControlRig& rig) {
-         for (int i = 0; i < 1000; ++i) rig.connect(As::observer);
+         for (int i = 0; i < 1000; ++i) rig.connect(TestUser::observer);
        }},
       {"more connections than there are places, all kept",
        [](ControlRig& rig) {
-         RigClient same(rig.path(), 7000U), other = rig.connect(As::observer);
-         CHECK(same.code("status") == 0);
+         RigClient same(rig.path(), 7000U), other = rig.connect(TestUser::observer);
+         CHECK(same.error_code("status") == 0);
          std::vector<RigClient> kept;
          for (int i = 0; i < 100; ++i) kept.emplace_back(rig.path(), 7000U);
-         CHECK(kept.back().code("status") == 0);
-         CHECK(same.code("status") == 0);   // who makes use of his place keeps it
-         CHECK(other.code("status") == 0);  // and who is not the one who crowds, in any case
-         CHECK(rig.connect(As::operator_).code("status") == 0);
+         CHECK(kept.back().error_code("status") == 0);
+         CHECK(same.error_code("status") == 0);   // who makes use of his place keeps it
+         CHECK(other.error_code("status") == 0);  // and who is not the one who crowds, in any case
+         CHECK(rig.connect(TestUser::operator_).error_code("status") == 0);
        }},
       {"a flood of requests whose answers nobody reads",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          flood(client, request("describe"), 3000);
-         CHECK(rig.connect(As::observer).code("status") == 0);
+         CHECK(rig.connect(TestUser::observer).error_code("status") == 0);
        }},
       {"a flood of rubbish",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          flood(client, "\x01\x02}{][\"\\\n", 20000);
        }},
       {"a flood of notifications that are not allowed",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"arm\"}\n", 5000);
          flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"lease.take\"}\n", 100);
        }},
       {"a subscriber that never reads",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          client.send(request("subscribe"));
          const double before_MB = resident_MB();
          for (int i = 0; i < 20000; ++i)
-           rig.feed().tell("log", EventLevel::info, "noise " + std::string(200, 'n'));
+           rig.feed().emit("log", EventLevel::info, "noise " + std::string(200, 'n'));
          if (!kSanitized) CHECK(resident_MB() - before_MB < 20.0);
        }},
       {"subscribes and does not, again and again",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          flood(client, request("subscribe") + request("unsubscribe"), 300);
        }},
       {"20,000 names to subscribe to",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          std::string names = "\"state\"";
          while (names.size() < 60000) names += ",\"state\"";
          client.send(request("subscribe", "{\"events\":[" + names + "]}"));
@@ -296,19 +299,19 @@ std::vector<Abuse> abuses() {
        }},
       {"open files beside the request",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          for (int i = 0; i < 20; ++i) send_files(client, 100);
          for (int i = 0; i < 20; ++i) CHECK(next_code(client) == 0);
        }},
       {"credentials beside the request",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          claim_root(client);
-         CHECK(next_code(client) == code_of(RpcCode::not_allowed));
+         CHECK(next_code(client) == code_of(RpcCode::permission_denied));
        }},
       {"bytes out of band",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          for (int i = 0; i < 10; ++i) {
            ::send(client.fd(), "!", 1, MSG_OOB | MSG_NOSIGNAL | MSG_DONTWAIT);
            client.send(request("status"));
@@ -316,19 +319,19 @@ std::vector<Abuse> abuses() {
        }},
       {"shuts down what it reads, and asks on",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          ::shutdown(client.fd(), SHUT_RD);
          flood(client, request("describe"), 200);
        }},
       {"shuts down both sides at once",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          ::shutdown(client.fd(), SHUT_RDWR);
          std::this_thread::sleep_for(20ms);
        }},
       {"hangs up over answers that it has not read",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::observer);
+         RigClient client = rig.connect(TestUser::observer);
          flood(client, request("status"), 50);
          std::this_thread::sleep_for(20ms);
        }},
@@ -336,49 +339,50 @@ std::vector<Abuse> abuses() {
        [](ControlRig& rig) {
          std::vector<RigClient> clients;
          for (int i = 0; i < 15; ++i) {
-           clients.push_back(rig.connect(As::observer));
+           clients.push_back(rig.connect(TestUser::observer));
            clients.back().send(request("devices") + request("devices") + request("devices"));
          }
-         CHECK(rig.connect(As::observer).code("status") == 0);
+         CHECK(rig.connect(TestUser::observer).error_code("status") == 0);
        }},
       {"takes and gives the lease without end",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::operator_);
+         RigClient client = rig.connect(TestUser::operator_);
          flood(client, request("lease.take") + request("lease.give"), 200);
        }},
       {"two want the lease",
        [](ControlRig& rig) {
-         RigClient first = rig.connect(As::operator_), second = rig.connect(As::operator_);
+         RigClient first = rig.connect(TestUser::operator_), second = rig.connect(TestUser::operator_);
          for (const char* method : {"lease.take", "arm", "beat", "lease.give"}) {
-           CHECK(first.code("lease.take") == 0);  // and counts as a sign of life
-           CHECK(second.code(method) == code_of(RpcCode::taken));
+           CHECK(first.error_code("lease.take") == 0);  // and counts as a sign of life
+           CHECK(second.error_code(method) == code_of(RpcCode::lease_held));
          }
-         CHECK(second.code("lease.take", {{"from_other", true}}) == code_of(RpcCode::not_allowed));
+         CHECK(second.error_code("lease.take", {{"from_other", true}}) ==
+               code_of(RpcCode::permission_denied));
        }},
       {"another process keeps the holder's connection open",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::operator_);
-         CHECK(client.code("lease.take") == 0);
-         CHECK(client.code("arm") == 0);
+         RigClient client = rig.connect(TestUser::operator_);
+         CHECK(client.error_code("lease.take") == 0);
+         CHECK(client.error_code("arm") == 0);
          const pid_t child = ::fork();
          if (child == 0) {
            ::pause();
            ::_exit(0);
          }
-         client.hang_up();  // it is still open over there
-         CHECK(rig.comes_to(State::disarmed, 2000ms));
+         client.disconnect();  // it is still open over there
+         CHECK(rig.wait_for_state(State::disarmed, 2000ms));
          ::kill(child, SIGKILL);
          ::waitpid(child, nullptr, 0);
        }},
       {"the holder hangs up in the middle of a line",
        [](ControlRig& rig) {
-         RigClient client = rig.connect(As::operator_);
+         RigClient client = rig.connect(TestUser::operator_);
          client.send(request("lease.take") + request("arm"));
          CHECK(next_code(client) == 0);
          CHECK(next_code(client) == 0);
-         CHECK(rig.comes_to(State::waiting, 500ms));
+         CHECK(rig.wait_for_state(State::waiting, 500ms));
          client.send("{\"jsonrpc\":\"2.0\",\"meth");
-         client.hang_up();
+         client.disconnect();
        }},
   };
   return table;
@@ -386,8 +390,8 @@ std::vector<Abuse> abuses() {
 
 /// Nothing was done that nobody may do, and the daemon is well: it ticks, and answers soon.
 void check_well(ControlRig& rig) {
-  CHECK(rig.comes_to(State::disarmed, 2000ms));
-  RigClient client = rig.connect(As::observer);
+  CHECK(rig.wait_for_state(State::disarmed, 2000ms));
+  RigClient client = rig.connect(TestUser::observer);
   const auto asked = std::chrono::steady_clock::now();
   const Json before = client.result("status");
   CHECK(std::chrono::steady_clock::now() - asked < 2s);
@@ -426,21 +430,21 @@ TEST_CASE("whatever is done to the socket, the daemon lives and nobody gets what
 
 TEST_CASE("anybody who may connect can stop, and only operators take it back", "[control_socket]") {
   ControlRig rig;
-  RigClient observer = rig.connect(As::observer), operating = rig.connect(As::operator_);
-  CHECK(operating.code("acknowledge") == code_of(RpcCode::not_now));
+  RigClient observer = rig.connect(TestUser::observer), operating = rig.connect(TestUser::operator_);
+  CHECK(operating.error_code("acknowledge") == code_of(RpcCode::invalid_state));
   CHECK(observer.result("stop")["asked"] == "stop");
-  CHECK(rig.comes_to(State::stopped));
-  CHECK(observer.code("acknowledge") == code_of(RpcCode::not_allowed));
-  CHECK(operating.code("lease.take") == 0);
-  CHECK(operating.code("arm") == code_of(RpcCode::not_now));
+  CHECK(rig.wait_for_state(State::stopped));
+  CHECK(observer.error_code("acknowledge") == code_of(RpcCode::permission_denied));
+  CHECK(operating.error_code("lease.take") == 0);
+  CHECK(operating.error_code("arm") == code_of(RpcCode::invalid_state));
   CHECK(rig.state() == State::stopped);
-  CHECK(operating.code("acknowledge") == 0);
-  CHECK(rig.comes_to(State::disarmed));
+  CHECK(operating.error_code("acknowledge") == 0);
+  CHECK(rig.wait_for_state(State::disarmed));
 }
 
 TEST_CASE("stop and another's beats get through while many flood", "[control_socket]") {
   ControlRig rig;
-  RigClient holder = rig.connect(As::operator_);
+  RigClient holder = rig.connect(TestUser::operator_);
   std::atomic<bool> over{false};
   std::vector<std::thread> floods;
   for (int i = 0; i < 12; ++i)
@@ -455,18 +459,18 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
   // ours.
   bool holds = false;
   for (int attempt = 0; attempt < 5 && !holds; ++attempt) {
-    REQUIRE(holder.code("lease.take") == 0);
+    REQUIRE(holder.error_code("lease.take") == 0);
     for (int beats = 0; beats < 40; ++beats) {
-      holder.beat();
+      holder.heartbeat();
       std::this_thread::sleep_for(20ms);
     }
-    holds = holder.code("beat") == 0;
+    holds = holder.error_code("beat") == 0;
   }
   if (!kSanitized) CHECK(holds);
-  RigClient observer = rig.connect(As::observer);
+  RigClient observer = rig.connect(TestUser::observer);
   const auto asked = std::chrono::steady_clock::now();
   observer.send(request("stop"));
-  CHECK(rig.comes_to(State::stopped, 2000ms));
+  CHECK(rig.wait_for_state(State::stopped, 2000ms));
   if (!kSanitized) CHECK(std::chrono::steady_clock::now() - asked < 1s);
   over = true;
   for (std::thread& flood : floods) flood.join();
@@ -475,35 +479,35 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
 TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releases it by hanging up",
           "[control_socket]") {
   ControlRig rig;
-  RigClient watcher = rig.connect(As::observer);
+  RigClient watcher = rig.connect(TestUser::observer);
   const Json first = watcher.result("subscribe");
   CHECK(first["state"] == "disarmed");
-  auto holder = std::make_optional(rig.connect(As::operator_));
+  auto holder = std::make_optional(rig.connect(TestUser::operator_));
   std::jthread heart([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
-      holder->beat();
+      holder->heartbeat();
       std::this_thread::sleep_for(10ms);
     }
   });
   // Where the machine lets a beat wait for too long it is tried again.
   for (int attempt = 0; attempt < 5 && rig.state() != State::active; ++attempt) {
     CHECK(holder->result("lease.take")["beat_within_s"] == 0.1);
-    CHECK(holder->code("arm") == 0);
-    rig.comes_to(State::active, 2000ms);
+    CHECK(holder->error_code("arm") == 0);
+    rig.wait_for_state(State::active, 2000ms);
   }
   REQUIRE(rig.state() == State::active);
   CHECK(watcher.result("status")["armed_by"].get<std::string>().find("uid 60003") != std::string::npos);
   heart.request_stop();
   heart.join();
   holder.reset();
-  CHECK(rig.comes_to(State::disarmed, 1000ms));
+  CHECK(rig.wait_for_state(State::disarmed, 1000ms));
   rig.feed().drain();
   std::uint64_t next = first["sequence"].get<std::uint64_t>() + 1;
   std::vector<std::string> states;
   for (Json event; rig.state() != State::disarmed || next <= rig.feed().snapshot().sequence;) {
     event = watcher.events.empty() ? Json(nullptr) : watcher.events.front();
     if (event.is_null()) {
-      const auto line = watcher.line();
+      const auto line = watcher.read_line();
       REQUIRE(line);
       event = Json::parse(*line)["params"];
     } else {
@@ -519,29 +523,29 @@ TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releas
 
 TEST_CASE("an administrator takes the lease from another, who is told", "[control_socket]") {
   ControlRig rig;
-  RigClient holder = rig.connect(As::operator_), administrator = rig.connect(As::administrator);
+  RigClient holder = rig.connect(TestUser::operator_), administrator = rig.connect(TestUser::administrator);
   holder.result("subscribe", {{"events", {"lease"}}});
-  CHECK(holder.code("lease.take") == 0);
-  CHECK(administrator.code("lease.take") == code_of(RpcCode::taken));
+  CHECK(holder.error_code("lease.take") == 0);
+  CHECK(administrator.error_code("lease.take") == code_of(RpcCode::lease_held));
   CHECK(administrator.result("lease.take", {{"from_other", true}})["beat_within_s"] == 0.1);
-  const Json taken = holder.event("lease");
+  const Json taken = holder.next_event("lease");
   CHECK(taken["holder"].get<std::string>().find("uid 60003") != std::string::npos);
-  CHECK(holder.event("lease")["holder"].is_null());
-  CHECK(holder.event("lease")["holder"].get<std::string>().find("uid 60004") != std::string::npos);
+  CHECK(holder.next_event("lease")["holder"].is_null());
+  CHECK(holder.next_event("lease")["holder"].get<std::string>().find("uid 60004") != std::string::npos);
 }
 
 TEST_CASE("events come in their order, and what a slow reader loses is counted", "[control_socket]") {
   ControlRig rig;
-  RigClient slow = rig.connect(As::observer), chosen = rig.connect(As::observer);
+  RigClient slow = rig.connect(TestUser::observer), chosen = rig.connect(TestUser::observer);
   const auto from = slow.result("subscribe")["sequence"].get<std::uint64_t>();
   chosen.result("subscribe", {{"events", {"lease"}}});
   constexpr int kTold = 20000;
   for (int i = 0; i < kTold; ++i)
-    rig.feed().tell("log", EventLevel::info, "event " + std::string(100, '.'), {{"i", i}});
-  rig.feed().tell("lease", EventLevel::info, "the last", {{"holder", nullptr}});
+    rig.feed().emit("log", EventLevel::info, "event " + std::string(100, '.'), {{"i", i}});
+  rig.feed().emit("lease", EventLevel::info, "the last", {{"holder", nullptr}});
   std::uint64_t got = 0, lost = 0, last = from;
   while (last < from + kTold + 1) {
-    const auto line = slow.line();
+    const auto line = slow.read_line();
     REQUIRE(line);
     const Json event = Json::parse(*line)["params"];
     const auto sequence = event["sequence"].get<std::uint64_t>();
@@ -556,22 +560,22 @@ TEST_CASE("events come in their order, and what a slow reader loses is counted",
   }
   CHECK(lost > 0);
   CHECK(got + lost == kTold + 1);
-  CHECK(chosen.event("lease")["text"] == "the last");
-  CHECK(slow.code("unsubscribe") == 0);
+  CHECK(chosen.next_event("lease")["text"] == "the last");
+  CHECK(slow.error_code("unsubscribe") == 0);
   slow.events.clear();
-  rig.feed().tell("log", EventLevel::info, "nobody hears");
-  CHECK(slow.event("log", 100ms).is_null());
+  rig.feed().emit("log", EventLevel::info, "nobody hears");
+  CHECK(slow.next_event("log", 100ms).is_null());
 }
 
 TEST_CASE("who has said its last word still gets its answers", "[control_socket]") {
   ControlRig rig;
-  RigClient client = rig.connect(As::observer);
+  RigClient client = rig.connect(TestUser::observer);
   client.send(request("status") + request("devices", "{}", "2") + request("status", "{}", "3"));
   ::shutdown(client.fd(), SHUT_WR);
   std::set<int> ids;
-  while (const auto line = client.line()) ids.insert(Json::parse(*line)["id"].get<int>());
+  while (const auto line = client.read_line()) ids.insert(Json::parse(*line)["id"].get<int>());
   CHECK(ids == std::set<int>{1, 2, 3});
-  CHECK(client.over());
+  CHECK(client.closed_by_peer());
 }
 
 TEST_CASE("what takes long keeps nobody waiting, and is answered when it is done", "[control_socket]") {
@@ -582,24 +586,24 @@ TEST_CASE("what takes long keeps nobody waiting, and is answered when it is done
                        "Waits until the test lets it go.",
                        [&go](const Json&, const Caller& caller) {
                          while (!go) std::this_thread::sleep_for(1ms);
-                         return Answer(Json{{"client", caller.client}});
+                         return MethodResult(Json{{"client", caller.client}});
                        },
                        true};
-  ControlRig rig(resting_plan(), {slow});
-  RigClient patient = rig.connect(As::observer);
+  ControlRig rig(resting_config(), {slow});
+  RigClient patient = rig.connect(TestUser::observer);
   patient.send(request("test.wait", "{}", "\"w\""));
-  CHECK(patient.code("status") == 0);
-  CHECK(patient.code("test.wait") == code_of(RpcCode::not_now));
+  CHECK(patient.error_code("status") == 0);
+  CHECK(patient.error_code("test.wait") == code_of(RpcCode::invalid_state));
   std::vector<RigClient> others;
-  for (std::size_t i = 0; i < SlowWork::kMostWaiting + 2; ++i) {
-    others.push_back(rig.connect(As::observer));
+  for (std::size_t i = 0; i < WorkerQueue::kMaxQueued + 2; ++i) {
+    others.push_back(rig.connect(TestUser::observer));
     others.back().send(request("test.wait", "{}", "\"w\""));
-    if (i >= SlowWork::kMostWaiting) CHECK(next_code(others.back()) == code_of(RpcCode::not_now));
-    CHECK(others.back().code("status") == 0);
+    if (i >= WorkerQueue::kMaxQueued) CHECK(next_code(others.back()) == code_of(RpcCode::invalid_state));
+    CHECK(others.back().error_code("status") == 0);
   }
-  others.front().hang_up();
+  others.front().disconnect();
   go = true;
-  const auto line = patient.line();
+  const auto line = patient.read_line();
   REQUIRE(line);
   CHECK(Json::parse(*line)["result"].contains("client"));
   CHECK(next_code(others[1]) == 0);
@@ -612,10 +616,10 @@ TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
   OwnedFd write_end(ends[1]);
   const MethodRow open{
       "test.open", Role::observer, {}, "Hands over the end of a pipe.", [&](const Json&, const Caller&) {
-        return Answer(Json{{"open", true}}, write_end.get());
+        return MethodResult(Json{{"open", true}}, write_end.get());
       }};
-  ControlRig rig(resting_plan(), {open});
-  RigClient client = rig.connect(As::observer);
+  ControlRig rig(resting_config(), {open});
+  RigClient client = rig.connect(TestUser::observer);
   client.send(request("status") + request("test.open", "{}", "2"));
   std::string text;
   OwnedFd got;
@@ -647,19 +651,19 @@ TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
 
 TEST_CASE("a daemon that ends tells those who listen, and hangs up", "[control_socket]") {
   auto rig = std::make_optional<ControlRig>();
-  RigClient client = rig->connect(As::operator_);
-  CHECK(client.code("lease.take") == 0);
+  RigClient client = rig->connect(TestUser::operator_);
+  CHECK(client.error_code("lease.take") == 0);
   client.result("subscribe");
   rig.reset();
   std::vector<std::string> names;
-  while (const auto line = client.line()) names.push_back(Json::parse(*line)["params"]["name"]);
-  CHECK(client.over());
+  while (const auto line = client.read_line()) names.push_back(Json::parse(*line)["params"]["name"]);
+  CHECK(client.closed_by_peer());
   CHECK(std::find(names.begin(), names.end(), "lease") != names.end());
 }
 
 TEST_CASE("an idle socket costs no time", "[control_socket]") {
   ControlRig rig;
-  RigClient client = rig.connect(As::observer);
+  RigClient client = rig.connect(TestUser::observer);
   const auto told_before = client.result("status")["sequence"].get<std::uint64_t>();
   // How often the thread, found by its name, went to sleep by itself: a busy machine does not count.
   const auto sleeps = [] {

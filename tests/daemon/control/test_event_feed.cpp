@@ -9,25 +9,26 @@ namespace {
 
 using namespace test;
 
-std::vector<Json> told(const EventFeed& feed, std::uint64_t next, const std::set<std::string>& names = {}) {
+std::vector<Json> operator_instruction(const EventFeed& feed, std::uint64_t next,
+                                       const std::set<std::string>& names = {}) {
   std::vector<Json> events;
-  for (const std::string& line : feed.since(next, names, 1 << 20).lines)
+  for (const std::string& line : feed.events_since(next, names, 1 << 20).lines)
     events.push_back(Json::parse(line)["params"]);
   return events;
 }
 
 TEST_CASE("events of the loop get numbers without a gap, their names, levels, times and fields",
           "[event_feed]") {
-  VirtualStation s{resting_plan()};
-  EventFeed feed(s.station.loop());
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
   s.run(0.05);
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   s.run(1.0);
   REQUIRE(s.state() == State::active);
-  s.station.loop().stop();
+  s.runtime.loop().stop();
   s.tick();
   feed.drain();
-  const auto events = told(feed, 1);
+  const auto events = operator_instruction(feed, 1);
   REQUIRE(events.size() > 5);
   for (std::size_t i = 0; i < events.size(); ++i) {
     CHECK(events[i]["sequence"] == i + 1);
@@ -35,34 +36,34 @@ TEST_CASE("events of the loop get numbers without a gap, their names, levels, ti
     CHECK(events[i]["time_ns"].is_number_integer());
   }
   std::vector<std::string> states;
-  for (const Json& event : told(feed, 1, {"state"})) states.push_back(event["state"]);
+  for (const Json& event : operator_instruction(feed, 1, {"state"})) states.push_back(event["state"]);
   CHECK(states == std::vector<std::string>{"disarmed", "waiting", "ramping", "active", "stopped"});
-  const auto faults = told(feed, 1, {"fault"});
+  const auto faults = operator_instruction(feed, 1, {"fault"});
   REQUIRE(faults.size() == 1);
   CHECK(faults[0]["fault"]["name"] == "stop_asked");
   CHECK(faults[0]["fault"]["cure"].get<std::string>() != "");
   CHECK(faults[0]["level"] == "error");
-  CHECK(told(feed, 1, {"state"}).back()["cause"]["name"] == "stop_asked");
-  CHECK(told(feed, 1, {"device"})[0]["present"] == true);
+  CHECK(operator_instruction(feed, 1, {"state"}).back()["cause"]["name"] == "stop_asked");
+  CHECK(operator_instruction(feed, 1, {"device"})[0]["present"] == true);
   const FeedSnapshot now = feed.snapshot();
   CHECK(now.sequence == events.size());
   CHECK(now.state == State::stopped);
-  CHECK(now.cause == Fault::stop_asked);
-  CHECK(now.placing == "placed");
+  CHECK(now.cause == Fault::stop_requested);
+  CHECK(now.proxy_initialization == "placed");
 }
 
 TEST_CASE("a snapshot and the events after it are the whole story, while the loop runs", "[event_feed]") {
-  VirtualStation s{resting_plan()};
-  EventFeed feed(s.station.loop());
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
   std::atomic<bool> stop{false};
   // The loop comes to new states, its events are drained by a thread, and snapshots are taken by this one.
   std::thread life([&] {
     while (!stop) {
-      s.station.loop().arm();
+      s.runtime.loop().arm();
       s.run(0.6);
-      s.station.loop().stop();
+      s.runtime.loop().stop();
       s.tick();
-      s.station.loop().acknowledge();
+      s.runtime.loop().acknowledge();
       s.tick();
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
@@ -78,7 +79,7 @@ TEST_CASE("a snapshot and the events after it are the whole story, while the loo
   life.join();
   feed.drain();
   std::string state = "disconnected";
-  const auto batch = feed.since(1, {}, 1 << 24);
+  const auto batch = feed.events_since(1, {}, 1 << 24);
   REQUIRE(seen.size() > 5);
   REQUIRE(batch.lost == 0);
   for (const std::string& line : batch.lines) {
@@ -93,25 +94,25 @@ TEST_CASE("a snapshot and the events after it are the whole story, while the loo
 }
 
 TEST_CASE("who asks too late is told how many events it lost, and gets those that are left", "[event_feed]") {
-  VirtualStation s{resting_plan()};
-  EventFeed feed(s.station.loop());
-  for (std::size_t i = 0; i < EventFeed::kKept + 100; ++i)
-    feed.tell(i % 2 == 0 ? "log" : "lease", EventLevel::info, "number " + std::to_string(i), {{"i", i}});
+  VirtualRuntime s{resting_config()};
+  EventFeed feed(s.runtime.loop());
+  for (std::size_t i = 0; i < EventFeed::kHistorySize + 100; ++i)
+    feed.emit(i % 2 == 0 ? "log" : "lease", EventLevel::info, "number " + std::to_string(i), {{"i", i}});
   const std::uint64_t last = feed.snapshot().sequence;
-  const auto all = feed.since(1, {}, 1 << 24);
-  CHECK(all.lines.size() == EventFeed::kKept);
-  CHECK(all.lost == last - EventFeed::kKept);
+  const auto all = feed.events_since(1, {}, 1 << 24);
+  CHECK(all.lines.size() == EventFeed::kHistorySize);
+  CHECK(all.lost == last - EventFeed::kHistorySize);
   CHECK(all.next == last + 1);
-  CHECK(feed.since(all.next, {}, 1 << 24).lines.empty());
+  CHECK(feed.events_since(all.next, {}, 1 << 24).lines.empty());
 
-  const auto some = feed.since(last - 9, {"lease"}, 1 << 24);
+  const auto some = feed.events_since(last - 9, {"lease"}, 1 << 24);
   CHECK(some.lines.size() == 5);
   CHECK(some.next == last + 1);
 
   // In pieces it is the same.
   std::vector<std::string> pieces;
   for (std::uint64_t next = last - 99; next <= last;) {
-    const auto piece = feed.since(next, {}, 1000);
+    const auto piece = feed.events_since(next, {}, 1000);
     REQUIRE(!piece.lines.empty());
     std::size_t bytes = 0;
     for (const std::string& line : piece.lines) bytes += line.size();
@@ -119,7 +120,7 @@ TEST_CASE("who asks too late is told how many events it lost, and gets those tha
     pieces.insert(pieces.end(), piece.lines.begin(), piece.lines.end());
     next = piece.next;
   }
-  CHECK(pieces == feed.since(last - 99, {}, 1 << 24).lines);
+  CHECK(pieces == feed.events_since(last - 99, {}, 1 << 24).lines);
 }
 
 }  // namespace

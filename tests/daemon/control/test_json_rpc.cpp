@@ -7,8 +7,8 @@ namespace wrenchd {
 namespace {
 
 RpcRequest request_of(const std::string& line) {
-  auto read = read_request(line);
-  if (const auto* refused = std::get_if<RefusedLine>(&read)) FAIL(line << ": " << refused->error.what());
+  auto read = parse_request(line);
+  if (const auto* refused = std::get_if<InvalidRequest>(&read)) FAIL(line << ": " << refused->error.what());
   return std::get<RpcRequest>(std::move(read));
 }
 
@@ -43,59 +43,60 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
     std::string told;
     bool has_id = false;
   } const table[] = {
-      {"", RpcCode::no_json, "it is empty; send one object a line"},
-      {" \t\r", RpcCode::no_json, "it is empty"},
-      {"{", RpcCode::no_json, "it is no JSON"},
-      {head, RpcCode::no_json, "it is no JSON"},
-      {head + "}}", RpcCode::no_json, "at byte 41"},
-      {head + "} {}", RpcCode::no_json, "it is no JSON"},
-      {"{'jsonrpc':'2.0'}", RpcCode::no_json, "at byte 2"},
-      {head + ",}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":NaN}}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":1e999}}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":01}}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":\"\xff\xfe\"}}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":\"\xc0\x80\"}}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":\"\\ud800\"}}", RpcCode::no_json, "it is no JSON"},
-      {head + ",\"params\":{\"a\":\"\t\"}}", RpcCode::no_json, "it is no JSON"},
-      {head + std::string("}\0", 2), RpcCode::no_json, "it holds a zero byte"},
-      {head + ",\"params\":{\"a\":\"x\\u0000y\"}}", RpcCode::no_json, "holds the character zero"},
-      {head + ",\"params\":{\"a\\u0000\":1}}", RpcCode::no_json, "holds the character zero"},
-      {head + ",\"id\":6}", RpcCode::no_json, "the name 'id' stands twice in one object"},
-      {head + ",\"params\":{\"a\":[{\"b\":1,\"b\":2}]}}", RpcCode::no_json, "the name 'b' stands twice"},
-      {nested(kMaxDepth - 1), RpcCode::no_json, "deeper than 16"},
-      {nested(30000), RpcCode::no_json, "deeper than 16"},
-      {head + ",\"params\":{\"a\":\"" + std::string(kMaxLineBytes, 'x') + "\"}}", RpcCode::no_json,
+      {"", RpcCode::parse_error, "it is empty; send one object a line"},
+      {" \t\r", RpcCode::parse_error, "it is empty"},
+      {"{", RpcCode::parse_error, "it is no JSON"},
+      {head, RpcCode::parse_error, "it is no JSON"},
+      {head + "}}", RpcCode::parse_error, "at byte 41"},
+      {head + "} {}", RpcCode::parse_error, "it is no JSON"},
+      {"{'jsonrpc':'2.0'}", RpcCode::parse_error, "at byte 2"},
+      {head + ",}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":NaN}}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":1e999}}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":01}}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\xff\xfe\"}}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\xc0\x80\"}}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\\ud800\"}}", RpcCode::parse_error, "it is no JSON"},
+      {head + ",\"params\":{\"a\":\"\t\"}}", RpcCode::parse_error, "it is no JSON"},
+      {head + std::string("}\0", 2), RpcCode::parse_error, "it holds a zero byte"},
+      {head + ",\"params\":{\"a\":\"x\\u0000y\"}}", RpcCode::parse_error, "holds the character zero"},
+      {head + ",\"params\":{\"a\\u0000\":1}}", RpcCode::parse_error, "holds the character zero"},
+      {head + ",\"id\":6}", RpcCode::parse_error, "the name 'id' stands twice in one object"},
+      {head + ",\"params\":{\"a\":[{\"b\":1,\"b\":2}]}}", RpcCode::parse_error, "the name 'b' stands twice"},
+      {nested(kMaxDepth - 1), RpcCode::parse_error, "deeper than 16"},
+      {nested(30000), RpcCode::parse_error, "deeper than 16"},
+      {head + ",\"params\":{\"a\":\"" + std::string(kMaxLineBytes, 'x') + "\"}}", RpcCode::parse_error,
        "longer than 65536 bytes"},
-      {"[" + head + "}]", RpcCode::no_request, "Batches are not taken"},
-      {"[]", RpcCode::no_request, "Batches are not taken"},
-      {"1", RpcCode::no_request, "A request is an object"},
-      {"\"stop\"", RpcCode::no_request, "A request is an object"},
-      {"null", RpcCode::no_request, "A request is an object"},
-      {"{}", RpcCode::no_request, "This is JSON-RPC 2.0"},
-      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::no_request, "This is JSON-RPC 2.0", true},
-      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::no_request, "This is JSON-RPC 2.0", true},
-      {R"({"jsonrpc":"2.0","id":5})", RpcCode::no_request, "names no method", true},
-      {R"({"jsonrpc":"2.0","id":5,"method":5})", RpcCode::no_request, "names no method", true},
-      {head + ",\"parms\":{}}", RpcCode::no_request, "no member 'parms'; did you mean 'params'?", true},
-      {head + ",\"params\":[1]}", RpcCode::wrong_params, "Parameters have names", true},
-      {head + ",\"params\":null}", RpcCode::wrong_params, "Parameters have names", true},
-      {R"({"jsonrpc":"2.0","id":1.5,"method":"stop"})", RpcCode::no_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":null,"method":"stop"})", RpcCode::no_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":{},"method":"stop"})", RpcCode::no_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":true,"method":"stop"})", RpcCode::no_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":9007199254740993,"method":"stop"})", RpcCode::no_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":-9007199254740993,"method":"stop"})", RpcCode::no_request,
+      {"[" + head + "}]", RpcCode::invalid_request, "Batches are not taken"},
+      {"[]", RpcCode::invalid_request, "Batches are not taken"},
+      {"1", RpcCode::invalid_request, "A request is an object"},
+      {"\"stop\"", RpcCode::invalid_request, "A request is an object"},
+      {"null", RpcCode::invalid_request, "A request is an object"},
+      {"{}", RpcCode::invalid_request, "This is JSON-RPC 2.0"},
+      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::invalid_request, "This is JSON-RPC 2.0", true},
+      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::invalid_request, "This is JSON-RPC 2.0", true},
+      {R"({"jsonrpc":"2.0","id":5})", RpcCode::invalid_request, "names no method", true},
+      {R"({"jsonrpc":"2.0","id":5,"method":5})", RpcCode::invalid_request, "names no method", true},
+      {head + ",\"parms\":{}}", RpcCode::invalid_request, "no member 'parms'; did you mean 'params'?", true},
+      {head + ",\"params\":[1]}", RpcCode::invalid_params, "Parameters have names", true},
+      {head + ",\"params\":null}", RpcCode::invalid_params, "Parameters have names", true},
+      {R"({"jsonrpc":"2.0","id":1.5,"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":null,"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":{},"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":true,"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":9007199254740993,"method":"stop"})", RpcCode::invalid_request,
        "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":99999999999999999999,"method":"stop"})", RpcCode::no_request,
+      {R"({"jsonrpc":"2.0","id":-9007199254740993,"method":"stop"})", RpcCode::invalid_request,
+       "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":99999999999999999999,"method":"stop"})", RpcCode::invalid_request,
        "The id has to be"},
       {R"({"jsonrpc":"2.0","method":"stop","id":")" + std::string(kMaxIdBytes + 1, 'i') + "\"}",
-       RpcCode::no_request, "The id has to be"},
+       RpcCode::invalid_request, "The id has to be"},
   };
   for (const auto& [line, code, told, has_id] : table) {
     INFO(line.substr(0, 200));
-    const auto read = read_request(line);
-    const auto* refused = std::get_if<RefusedLine>(&read);
+    const auto read = parse_request(line);
+    const auto* refused = std::get_if<InvalidRequest>(&read);
     REQUIRE(refused);
     CHECK(refused->error.code() == code);
     INFO(refused->error.what());
@@ -107,11 +108,10 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
 TEST_CASE("replies are one line of JSON-RPC each, whatever stands in them", "[json_rpc]") {
   CHECK(reply_line(3, {{"state", "disarmed"}}) ==
         "{\"jsonrpc\":\"2.0\",\"id\":3,\"result\":{\"state\":\"disarmed\"}}\n");
-  CHECK(error_line(nullptr, RpcError(RpcCode::taken, "Two\nlines.")) ==
+  CHECK(error_line(nullptr, RpcError(RpcCode::lease_held, "Two\nlines.")) ==
         "{\"jsonrpc\":\"2.0\",\"id\":null,\"error\":{\"code\":-32003,\"message\":\"Two\\nlines.\"}}\n");
-  CHECK(
-      error_line("a", RpcError(RpcCode::not_now, "No.", {{"state", "fault"}})).find("\"data\":{\"state\"") !=
-      std::string::npos);
+  CHECK(error_line("a", RpcError(RpcCode::invalid_state, "No.", {{"state", "fault"}}))
+            .find("\"data\":{\"state\"") != std::string::npos);
   const std::string broken = notification_line("event", {{"text", "\xff\n"}});
   CHECK(Json::parse(broken)["params"]["text"] == "\xef\xbf\xbd\n");
   CHECK(std::count(broken.begin(), broken.end(), '\n') == 1);

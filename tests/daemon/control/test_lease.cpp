@@ -14,19 +14,19 @@ const Lease::Holder kA{2, "A"}, kB{3, "B"};
 
 /// In virtual time, with the hand at rest.
 struct Rig {
-  VirtualStation s{resting_plan()};
-  EventFeed feed{s.station.loop()};
-  Lease lease{s.station.loop(), feed};
+  VirtualRuntime s{resting_config()};
+  EventFeed feed{s.runtime.loop()};
+  Lease lease{s.runtime.loop(), feed};
 
   Rig() { s.run(0.05); }
   void arm_by(const Lease::Holder& holder) {
-    lease.take(holder, s.clock.now());
+    lease.acquire(holder, s.clock.now());
     lease.arm(s.clock.now());
     for (int i = 0; i < 1000 && s.state() != State::active; ++i) beat_and_tick();
     REQUIRE(s.state() == State::active);
   }
   void beat_and_tick() {
-    lease.beat(s.clock.now());
+    lease.heartbeat(s.clock.now());
     s.tick();
   }
 };
@@ -37,8 +37,8 @@ TEST_CASE("who holds the lease and lives keeps the hand armed", "[lease]") {
   CHECK(r.lease.armed());
   for (int i = 0; i < 30; ++i) {
     r.s.run(0.09);
-    r.lease.look(r.s.clock.now());
-    r.lease.beat(r.s.clock.now());
+    r.lease.check(r.s.clock.now());
+    r.lease.heartbeat(r.s.clock.now());
   }
   CHECK(r.s.state() == State::active);
   CHECK(r.lease.held_by(kA.client));
@@ -51,53 +51,53 @@ TEST_CASE(
   Rig r;
   r.arm_by(kA);
   const TimePoint last = r.s.clock.now();
-  r.lease.beat(last);
+  r.lease.heartbeat(last);
   while (r.s.state() == State::active) r.s.tick();
   CHECK(r.s.clock.now() - last <= 103ms);
   CHECK(r.s.clock.now() - last > 99ms);
-  CHECK(r.s.cause() == Fault::client_gone);
-  r.lease.look(r.s.clock.now());
+  CHECK(r.s.cause() == Fault::heartbeat_lost);
+  r.lease.check(r.s.clock.now());
   CHECK_FALSE(r.lease.holder());
   CHECK_FALSE(r.lease.armed());
 }
 
 TEST_CASE("a lease that was not used to arm ends in silence too", "[lease]") {
   Rig r;
-  CHECK(r.lease.look_again_at() == TimePoint::max());
-  r.lease.take(kA, r.s.clock.now());
-  r.lease.look(r.s.clock.now() + 100ms);
+  CHECK(r.lease.next_check_at() == TimePoint::max());
+  r.lease.acquire(kA, r.s.clock.now());
+  r.lease.check(r.s.clock.now() + 100ms);
   CHECK(r.lease.held_by(kA.client));
-  CHECK(r.lease.look_again_at() - r.s.clock.now() == 101ms);
-  r.lease.look(r.lease.look_again_at());
+  CHECK(r.lease.next_check_at() - r.s.clock.now() == 101ms);
+  r.lease.check(r.lease.next_check_at());
   CHECK_FALSE(r.lease.holder());
 }
 
 TEST_CASE("a holder that hangs up releases the hand in the next tick", "[lease]") {
   Rig r;
   r.arm_by(kA);
-  r.lease.hung_up(kB.client);
+  r.lease.client_lost(kB.client);
   r.s.tick();
   CHECK(r.s.state() == State::active);
-  r.lease.hung_up(kA.client);
+  r.lease.client_lost(kA.client);
   CHECK_FALSE(r.lease.holder());
   r.s.tick();
   CHECK(r.s.state() == State::releasing);
-  CHECK(r.s.cause() == Fault::client_gone);
+  CHECK(r.s.cause() == Fault::heartbeat_lost);
 }
 
 TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
   Rig r;
-  r.s.station.loop().arm();
+  r.s.runtime.loop().arm();
   r.s.run(1.0);
   REQUIRE(r.s.state() == State::active);
-  r.lease.take(kA, r.s.clock.now());
+  r.lease.acquire(kA, r.s.clock.now());
   CHECK_FALSE(r.lease.armed());
-  r.lease.hung_up(kA.client);
+  r.lease.client_lost(kA.client);
   r.s.run(0.3);
-  r.lease.take(kB, r.s.clock.now());
-  r.lease.look(r.s.clock.now() + 1s);
-  r.lease.take(kB, r.s.clock.now());
-  r.lease.give("gave it back");
+  r.lease.acquire(kB, r.s.clock.now());
+  r.lease.check(r.s.clock.now() + 1s);
+  r.lease.acquire(kB, r.s.clock.now());
+  r.lease.release("gave it back");
   r.s.run(0.3);
   CHECK(r.s.state() == State::active);
 }
@@ -105,16 +105,16 @@ TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
 TEST_CASE("who takes the lease over disarms what the other armed, and can arm itself", "[lease]") {
   Rig r;
   r.arm_by(kA);
-  r.lease.take_over(kB, r.s.clock.now());
+  r.lease.preempt(kB, r.s.clock.now());
   CHECK(r.lease.held_by(kB.client));
   CHECK_FALSE(r.lease.armed());
   for (int i = 0; i < 200; ++i) r.beat_and_tick();
   CHECK(r.s.state() == State::disarmed);
   r.arm_by(kB);
-  r.lease.hung_up(kA.client);
+  r.lease.client_lost(kA.client);
   r.s.tick();
   CHECK(r.s.state() == State::active);
-  r.lease.give("gave it back");
+  r.lease.release("gave it back");
   r.s.tick();
   CHECK(r.s.state() == State::releasing);
 }
@@ -122,14 +122,14 @@ TEST_CASE("who takes the lease over disarms what the other armed, and can arm it
 TEST_CASE("every change of the lease is told", "[lease]") {
   Rig r;
   const std::uint64_t before = r.feed.snapshot().sequence;
-  r.lease.take(kA, r.s.clock.now());
-  r.lease.take(kA, r.s.clock.now());  // it has it
-  r.lease.take_over(kB, r.s.clock.now());
-  r.lease.hung_up(kB.client);
-  r.lease.take(kA, r.s.clock.now());
-  r.lease.look(r.s.clock.now() + 1s);
+  r.lease.acquire(kA, r.s.clock.now());
+  r.lease.acquire(kA, r.s.clock.now());  // it has it
+  r.lease.preempt(kB, r.s.clock.now());
+  r.lease.client_lost(kB.client);
+  r.lease.acquire(kA, r.s.clock.now());
+  r.lease.check(r.s.clock.now() + 1s);
   std::vector<Json> holders;
-  for (const std::string& line : r.feed.since(before + 1, {"lease"}, 100000).lines)
+  for (const std::string& line : r.feed.events_since(before + 1, {"lease"}, 100000).lines)
     holders.push_back(Json::parse(line)["params"]["holder"]);
   CHECK(holders == std::vector<Json>{"A", nullptr, "B", nullptr, "A", nullptr});
 }

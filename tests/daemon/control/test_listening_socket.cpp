@@ -43,7 +43,7 @@ void leave_socket(const fs::path& path) {
   REQUIRE(::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
 }
 
-std::string refusal(const fs::path& path) {
+std::string rejection_text(const fs::path& path) {
   try {
     const ListeningSocket socket(path, kOwnerOnly);
   } catch (const std::runtime_error& error) {
@@ -105,7 +105,8 @@ TEST_CASE("what a dead daemon left is replaced, what lives is not", "[listening_
   {
     const ListeningSocket first(path, kOwnerOnly);
     CHECK(connects(path));
-    CHECK(has(refusal(path), "control.sock: another wrenchd listens there; stop it, or name another path"));
+    CHECK(has(rejection_text(path),
+              "control.sock: another wrenchd listens there; stop it, or name another path"));
     CHECK(connects(path));
   }
   const ListeningSocket again(path, kOwnerOnly);
@@ -122,16 +123,16 @@ TEST_CASE("another program's socket, and what is no socket, stay as they are", "
     path.native().copy(address.sun_path, sizeof address.sun_path - 1);
     REQUIRE(::bind(other.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
     REQUIRE(::listen(other.get(), 1) == 0);
-    CHECK(has(refusal(path), "another program listens there"));
+    CHECK(has(rejection_text(path), "another program listens there"));
     CHECK(connects(path));
   }
   fs::remove(path);
   dir.write("control.sock", "mine");
-  CHECK(has(refusal(path), "is there, and is no socket; move it away"));
+  CHECK(has(rejection_text(path), "is there, and is no socket; move it away"));
   CHECK(fs::file_size(path) == 4);
   fs::remove(path);
   fs::create_symlink(dir.path() / "elsewhere", path);
-  CHECK(has(refusal(path), "is no socket"));
+  CHECK(has(rejection_text(path), "is no socket"));
   CHECK_FALSE(fs::exists(dir.path() / "elsewhere"));
 }
 
@@ -139,25 +140,25 @@ TEST_CASE("a directory in which others could put another socket is refused", "[l
   const TemporaryDirectory dir;
   fs::create_directory(dir.path() / "open");
   fs::permissions(dir.path() / "open", fs::perms::all);
-  CHECK(has(refusal(dir.path() / "open/control.sock"), "others may write there"));
+  CHECK(has(rejection_text(dir.path() / "open/control.sock"), "others may write there"));
   ::chmod((dir.path() / "open").c_str(), 01777);  // as /tmp: nobody can replace what is another's
-  CHECK(refusal(dir.path() / "open/control.sock") == "");
-  CHECK(has(refusal(dir.path() / "gone/on/control.sock"),
+  CHECK(rejection_text(dir.path() / "open/control.sock") == "");
+  CHECK(has(rejection_text(dir.path() / "gone/on/control.sock"),
             "gone/on: cannot be made: No such file or directory"));
   dir.write("file", "");
-  CHECK(has(refusal(dir.path() / "file/control.sock"), "file: is no directory"));
-  CHECK(has(refusal(dir.path() / std::string(120, 'x')), "is longer than the 107 bytes"));
+  CHECK(has(rejection_text(dir.path() / "file/control.sock"), "file: is no directory"));
+  CHECK(has(rejection_text(dir.path() / std::string(120, 'x')), "is longer than the 107 bytes"));
   if (geteuid() != 0) return;
   fs::create_directory(dir.path() / "others");
   REQUIRE(::chown((dir.path() / "others").c_str(), 65534, 65534) == 0);
-  CHECK(has(refusal(dir.path() / "others/control.sock"), "belongs to uid 65534"));
+  CHECK(has(rejection_text(dir.path() / "others/control.sock"), "belongs to uid 65534"));
 }
 
 TEST_CASE("a lock that is a link is not followed", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path victim = dir.write("victim", "kept");
   fs::create_symlink(victim, dir.path() / "control.sock.lock");
-  CHECK(has(refusal(dir.path() / "control.sock"), "control.sock.lock: cannot be made"));
+  CHECK(has(rejection_text(dir.path() / "control.sock"), "control.sock.lock: cannot be made"));
   CHECK(fs::file_size(victim) == 4);
 }
 
@@ -244,18 +245,18 @@ TEST_CASE("the place of the socket: command line, environment, configuration, sy
   } const kept;
   ControlSettings settings;
   ::unsetenv("WRENCHD_SOCKET");
-  CHECK_FALSE(socket_place("", settings).asked_for);
-  CHECK(socket_place("", settings).path.filename() == "control.sock");
+  CHECK_FALSE(choose_socket_path("", settings).explicitly_named);
+  CHECK(choose_socket_path("", settings).path.filename() == "control.sock");
   ::setenv("RUNTIME_DIRECTORY", "/run/a:/run/b", 1);
-  CHECK(socket_place("", settings).path == "/run/a/control.sock");
-  CHECK(socket_place("", settings).asked_for);
+  CHECK(choose_socket_path("", settings).path == "/run/a/control.sock");
+  CHECK(choose_socket_path("", settings).explicitly_named);
   settings.socket = "/run/c.sock";
-  CHECK(socket_place("", settings).path == "/run/c.sock");
+  CHECK(choose_socket_path("", settings).path == "/run/c.sock");
   ::setenv("WRENCHD_SOCKET", "/run/d.sock", 1);
-  CHECK(socket_place("", settings).path == "/run/d.sock");
-  CHECK(socket_place("/run/e.sock", settings).path == "/run/e.sock");
-  CHECK(socket_place("none", settings).path.empty());
-  CHECK_THROWS_WITH(socket_place("e.sock", settings),
+  CHECK(choose_socket_path("", settings).path == "/run/d.sock");
+  CHECK(choose_socket_path("/run/e.sock", settings).path == "/run/e.sock");
+  CHECK(choose_socket_path("none", settings).path.empty());
+  CHECK_THROWS_WITH(choose_socket_path("e.sock", settings),
                     "--control: expected an absolute path, or \"none\", found \"e.sock\"");
 }
 

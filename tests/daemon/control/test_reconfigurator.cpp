@@ -35,8 +35,8 @@ std::string block(const std::string& name, const std::string& position) {
 }
 
 /// The shipped cube, pressed 8 mm into its table by a hand that keeps still there.
-Plan pressing_plan() {
-  Plan plan = shipped_plan();
+RunConfig pressing_plan() {
+  RunConfig plan = shipped_config();
   plan.settings.wrench.law = SpringLaw::pid;
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()},
                                         {0.3, {0, 0, 0.065}, Vector3d::Zero()},
@@ -47,7 +47,7 @@ Plan pressing_plan() {
 }
 
 /// The station in virtual time, every tick held against the invariants.
-struct Bench : VirtualStation {
+struct Bench : VirtualRuntime {
   TemporaryDirectory files;
   Invariants invariants;
   double most_step_N = 0.0;  ///< of the force, from tick to tick
@@ -55,13 +55,13 @@ struct Bench : VirtualStation {
   double most_made_J = 0.0;
   int dropped_out = 0;  ///< ticks in which the state was not active
 
-  explicit Bench(Plan plan = pressing_plan())
-      : VirtualStation(std::move(plan)),
-        invariants({station.plan().profile.max_force_N, station.plan().profile.max_torque_Nm,
-                    station.plan().settings.limits.force_slew_N_per_s,
-                    station.plan().settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3}) {}
+  explicit Bench(RunConfig plan = pressing_plan())
+      : VirtualRuntime(std::move(plan)),
+        invariants({runtime.config().profile.max_force_N, runtime.config().profile.max_torque_Nm,
+                    runtime.config().settings.limits.force_slew_N_per_s,
+                    runtime.config().settings.limits.torque_slew_Nm_per_s, 1e-3, 20e-3}) {}
 
-  Workbench& bench() { return station.workbench(); }
+  Reconfigurator& bench() { return runtime.reconfigurator(); }
 
   void go() { REQUIRE(go_on() == Fault::none); }
   Fault go_on() {
@@ -81,7 +81,7 @@ struct Bench : VirtualStation {
   }
   /// Armed, and pressed on the table until nothing moves.
   void press() {
-    station.loop().arm();
+    runtime.loop().arm();
     go_for(3.0);
     REQUIRE(state() == State::active);
     REQUIRE(last.contacts == 4);
@@ -93,7 +93,7 @@ struct Bench : VirtualStation {
     return files.write(name, text);
   }
   /// What a tick computes from is what was handed over.
-  bool whole() { return last.rendering_sum == bench().handed_over().sum; }
+  bool whole() { return last.rendering_checksum == bench().current_rendering().checksum; }
 
  private:
   Vector3d earlier_ = Vector3d::Zero();
@@ -107,9 +107,9 @@ TEST_CASE("another scene with the same table under the hand is not felt", "[work
   Bench s;
   s.press();
   const double before_N = s.force().z();
-  s.bench().load(s.file("other.toml", scene_text(kTable + block("post", "[0.2, 0.0, 0.0]"))));
+  s.bench().replace_scene(s.file("other.toml", scene_text(kTable + block("post", "[0.2, 0.0, 0.0]"))));
   s.go_for(1.5);
-  CHECK(s.last.rendering == 1);
+  CHECK(s.last.rendering_id == 1);
   CHECK(s.whole());
   CHECK(s.dropped_out == 0);
   CHECK(s.most_step_N < 0.02);
@@ -121,17 +121,17 @@ TEST_CASE("a wall that goes away lets the hand go gently, and one that comes tak
   Bench s;
   s.press();
   REQUIRE(s.force().z() > 1.0);
-  s.bench().remove("table");
+  s.bench().remove_obstacle("table");
   s.go_for(1.5);
   CHECK(s.force().norm() < 1e-9);
   CHECK(s.dropped_out == 0);
-  const double pace_N = 1e-3 * std::max(s.station.plan().profile.max_force_N, 20.0);
+  const double pace_N = 1e-3 * std::max(s.runtime.config().profile.max_force_N, 20.0);
   CHECK(s.most_step_N < 2.0 * pace_N);
   CHECK(s.most_bend_N < 2.0 * pace_N);
   // The hand is 8 mm below where the table comes back: the cube is put on top of it, and pushed there.
   s.watch_from_here();
-  CHECK(s.bench().add(toml("name = \"table\"\nhalf_space = { normal = [0, 0, 1], offset = 0 }"), "request") ==
-        "table");
+  CHECK(s.bench().insert_obstacle(toml("name = \"table\"\nhalf_space = { normal = [0, 0, 1], offset = 0 }"),
+                                  "request") == "table");
   s.go_for(2.0);
   CHECK(s.last.contacts == 4);
   CHECK(s.force().z() > 1.0);
@@ -147,13 +147,14 @@ TEST_CASE("an obstacle that is added may be made instead of read", "[workbench]"
   const char* wall =
       "name = \"wall\"\nmesh = { make = \"box\", size_m = [0.02, 0.2, 0.2] }\n"
       "position_m = [0.034, 0.0, 0.0]";
-  CHECK(s.bench().add(toml(wall), "request") == "wall");
+  CHECK(s.bench().insert_obstacle(toml(wall), "request") == "wall");
   s.go_for(1.5);
-  CHECK(s.last.rendering == 1);
+  CHECK(s.last.rendering_id == 1);
   CHECK(s.last.X_WQ[0] < -0.0009);  // its face is at 24 mm, and the cube reaches 25
   CHECK(s.bench().scene().meshes.back().mesh == "made box 0.02 x 0.2 x 0.2 m, 20000 triangles");
   const char* unknown = "name = \"pot\"\nmesh = { make = \"teapot\" }";
-  CHECK_THROWS_WITH(s.bench().add(toml(unknown), "request"), Catch::Contains("nothing of kind 'teapot'"));
+  CHECK_THROWS_WITH(s.bench().insert_obstacle(toml(unknown), "request"),
+                    Catch::Contains("nothing of kind 'teapot'"));
 }
 
 TEST_CASE("a stiffness that is changed in contact goes over without a jump", "[workbench]") {
@@ -177,7 +178,7 @@ TEST_CASE("the method, the law and friction can be changed in contact", "[workbe
   s.press();
   s.bench().set_rendering(toml(changes), "request");
   s.go_for(1.5);
-  CHECK(s.last.rendering == 1);
+  CHECK(s.last.rendering_id == 1);
   CHECK(s.whole());
   CHECK(s.force().z() > 1.0);
   CHECK(s.most_step_N < 0.05);
@@ -187,8 +188,8 @@ TEST_CASE("the method, the law and friction can be changed in contact", "[workbe
 TEST_CASE("what is refused leaves everything as it was, and says where and what to do", "[workbench]") {
   Bench s;
   s.press();
-  const std::uint32_t changes = s.last.changes;
-  const auto handed_over = s.bench().handed_over();
+  const std::uint32_t changes = s.last.change_count;
+  const auto handed_over = s.bench().current_rendering();
   const auto says = [](auto&& act) -> std::string {
     try {
       act();
@@ -197,21 +198,23 @@ TEST_CASE("what is refused leaves everything as it was, and says where and what 
     }
     return {};
   };
-  const auto refused_load = says([&] { s.bench().load(s.file("bad.toml", scene_text("[[obstacle]]\n"))); });
+  const auto refused_load =
+      says([&] { s.bench().replace_scene(s.file("bad.toml", scene_text("[[obstacle]]\n"))); });
   CHECK(refused_load.find("bad.toml:5:") != std::string::npos);
   CHECK(says([&] {
-          s.bench().load(s.file("bad2.toml", "[tool]\nmesh = \"" +
-                                                 s.file("open.off",
-                                                        "OFF\n3 1 0\n0 0 0\n1 0 "
-                                                        "0\n0 1 0\n3 0 1 2\n")
-                                                     .string() +
-                                                 "\"\n"));
+          s.bench().replace_scene(s.file("bad2.toml", "[tool]\nmesh = \"" +
+                                                          s.file("open.off",
+                                                                 "OFF\n3 1 0\n0 0 0\n1 0 "
+                                                                 "0\n0 1 0\n3 0 1 2\n")
+                                                              .string() +
+                                                          "\"\n"));
         }).find("open.off") != std::string::npos);
-  CHECK(says([&] { s.bench().remove("tabel"); }) ==
+  CHECK(says([&] { s.bench().remove_obstacle("tabel"); }) ==
         "there is no obstacle 'tabel' in the scene; there are: table");
-  CHECK(says([&] { s.bench().move("table", Pose{}, 1.0); }).find("half_space") != std::string::npos);
+  CHECK(says([&] { s.bench().move_obstacle("table", Pose{}, 1.0); }).find("half_space") != std::string::npos);
   CHECK(says([&] {
-          s.bench().add(toml("name = \"table\"\nhalf_space = { normal = [0, 0, 1], offset = 0 }"), "request");
+          s.bench().insert_obstacle(toml("name = \"table\"\nhalf_space = { normal = [0, 0, 1], offset = 0 }"),
+                                    "request");
         }).find("there is an obstacle 'table' already") != std::string::npos);
   CHECK(says([&] {
           s.bench().set_rendering(toml("[wrench]\nstiffness = -1.0"), "request");
@@ -221,9 +224,9 @@ TEST_CASE("what is refused leaves everything as it was, and says where and what 
         }).find("exact") != std::string::npos);
   CHECK(says([&] { s.bench().set_scale(0.0); }).find("scale: expected 0.1 to 10") != std::string::npos);
   s.go_for(0.3);
-  CHECK(s.last.changes == changes);
-  CHECK(s.last.rendering == 0);
-  CHECK(s.bench().handed_over().number == handed_over.number);
+  CHECK(s.last.change_count == changes);
+  CHECK(s.last.rendering_id == 0);
+  CHECK(s.bench().current_rendering().id == handed_over.id);
   CHECK(s.most_step_N < 0.02);
 }
 
@@ -232,10 +235,10 @@ TEST_CASE("a block that is moved sets out when it is told, and pushes the tool b
   Bench s;
   s.press();
   // Beside the cube, on its left; it goes through where the cube is.
-  s.bench().load(s.file("block.toml", scene_text(kTable + block("block", "[0.0, 0.1, 0.02]"))));
+  s.bench().replace_scene(s.file("block.toml", scene_text(kTable + block("block", "[0.0, 0.1, 0.02]"))));
   s.go_for(1.2);
-  REQUIRE(s.last.rendering == 1);
-  s.bench().move("block", {Quaterniond::Identity(), {0.0, 0.03, 0.02}}, 2.0);
+  REQUIRE(s.last.rendering_id == 1);
+  s.bench().move_obstacle("block", {Quaterniond::Identity(), {0.0, 0.03, 0.02}}, 2.0);
   s.watch_from_here();
   double most_push_m = 0.0;
   bool jumped = false;
@@ -247,15 +250,16 @@ TEST_CASE("a block that is moved sets out when it is told, and pushes the tool b
   CHECK_FALSE(jumped);
   CHECK(most_push_m >
         0.01);  // the block ends where the cube's edge is 20 mm beyond its middle; the hand yields
-  CHECK(s.last.guard_share == 1.0);
+  CHECK(s.last.passivity_scale == 1.0);
   CHECK(s.dropped_out == 0);
   // Back again: it went where it was told, and begins there.
-  s.bench().move("block", {Quaterniond::Identity(), {0.0, 0.1, 0.02}}, 1.0);
+  s.bench().move_obstacle("block", {Quaterniond::Identity(), {0.0, 0.1, 0.02}}, 1.0);
   s.go_for(0.1);
-  CHECK_THROWS_AS(s.bench().move("block", {Quaterniond::Identity(), {0.0, 0.2, 0.02}}, 1.0), NotNow);
+  CHECK_THROWS_AS(s.bench().move_obstacle("block", {Quaterniond::Identity(), {0.0, 0.2, 0.02}}, 1.0),
+                  BusyError);
   s.go_for(2.0);
   CHECK(std::abs(s.last.X_WQ[1]) < 0.002);
-  CHECK_THROWS_WITH(s.bench().move("block", {Quaterniond::Identity(), {9.0, 0.1, 0.02}}, 1.0),
+  CHECK_THROWS_WITH(s.bench().move_obstacle("block", {Quaterniond::Identity(), {9.0, 0.1, 0.02}}, 1.0),
                     Catch::Contains("give it at least over_s = 1.8"));
 }
 
@@ -263,7 +267,7 @@ TEST_CASE("a tool that a wall comes down on is on the side of it where the proxy
   Bench s;
   s.press();
   // A plate in the middle of where the hand is, and just below where the proxy stands.
-  s.bench().load(
+  s.bench().replace_scene(
       s.file("plate.toml", scene_text("[[obstacle]]\nname = \"plate\"\nmesh = \"" + kMeshes +
                                       "cube.off\"\nscale = 0.001\nposition_m = [0.0, 0.0, -0.0251]\n")));
   s.go_for(2.0);
@@ -280,10 +284,10 @@ TEST_CASE("where the tool fits nowhere in the new scene the force fades, and non
   std::string box;
   for (const char* n : {"[1, 0, 0]", "[-1, 0, 0]", "[0, 1, 0]", "[0, -1, 0]", "[0, 0, 1]", "[0, 0, -1]"})
     box += std::string("[[obstacle]]\nhalf_space = { normal = ") + n + ", offset = 0.02 }\n";
-  s.bench().load(s.file("box.toml", scene_text(box)));
+  s.bench().replace_scene(s.file("box.toml", scene_text(box)));
   s.go_for(1.5);
-  CHECK(s.last.rendering == 1);
-  CHECK(static_cast<Placing>(s.last.placing) == Placing::nowhere);
+  CHECK(s.last.rendering_id == 1);
+  CHECK(static_cast<ProxyInitialization>(s.last.proxy_initialization) == ProxyInitialization::failed);
   CHECK(s.force_N() == 0.0);
   CHECK(s.state() == State::waiting);
   CHECK(s.most_step_N < 0.1);
@@ -291,7 +295,7 @@ TEST_CASE("where the tool fits nowhere in the new scene the force fades, and non
 
 TEST_CASE("with the clutch in the hand goes elsewhere without force, and goes on where the tool stood",
           "[workbench][workspace]") {
-  Plan plan = pressing_plan();
+  RunConfig plan = pressing_plan();
   auto& path = plan.settings.simulation.hand_path;
   path.push_back({3.5, {0, 0, 0.017}, Vector3d::Zero()});
   path.push_back({4.5, {0.03, 0, 0.057}, {0.0, 0.0, 0.4}});  // 40 mm up
@@ -299,14 +303,14 @@ TEST_CASE("with the clutch in the hand goes elsewhere without force, and goes on
   path.push_back({6.0, {0.03, 0, 0.049}, {0.0, 0.0, 0.4}});  // and down again by 8
   Bench s(plan);
   s.press();
-  s.bench().set_clutch(true);
+  s.bench().set_clutched(true);
   s.go_for(0.3);
   CHECK(s.force_N() == 0.0);
   CHECK(s.most_step_N < 0.2);
   const auto X_WP = s.last.X_WP;
   s.go_for(2.0);
   CHECK(s.last.X_WP == X_WP);
-  s.bench().set_clutch(false);
+  s.bench().set_clutched(false);
   s.watch_from_here();
   s.go_for(0.2);
   CHECK(s.last.X_WP[2] == Approx(0.025).margin(1e-3));  // it lies on the table, and is not pressed
@@ -338,21 +342,21 @@ TEST_CASE("the scale of the workspace changes without moving the tool, and what 
 TEST_CASE("a scale that is there at once, for it was asked with the tool called back, is borne like any",
           "[workbench][workspace]") {
   const auto share_of = [](bool recentred) {
-    Plan plan = pressing_plan();
+    RunConfig plan = pressing_plan();
     plan.settings.servo.self_test_s = 0.5;  // in which is measured what the device bears
     for (std::size_t i = 1; i < plan.settings.simulation.hand_path.size(); ++i)
       plan.settings.simulation.hand_path[i].time_s += 0.6;
     Bench s(plan);
     s.go_for(0.6);
     s.press();
-    if (recentred) s.bench().set_clutch(true);
+    if (recentred) s.bench().set_clutched(true);
     s.bench().set_scale(8.0);
     if (recentred) {
       s.bench().recentre();
-      s.bench().set_clutch(false);
+      s.bench().set_clutched(false);
     }
     s.go_for(0.5);
-    return s.last.stiffness_share;
+    return s.last.stiffness_scale;
   };
   const double gradually = share_of(false);
   CHECK(gradually < 0.9);
@@ -360,10 +364,10 @@ TEST_CASE("a scale that is there at once, for it was asked with the tool called 
 }
 
 TEST_CASE("a local model pushes, and fades out when its client is silent", "[workbench][models]") {
-  Plan plan = pressing_plan();
+  RunConfig plan = pressing_plan();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()}};
   Bench s(plan);
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   s.go_for(2.0);
   REQUIRE(s.state() == State::active);
   s.watch_from_here();
@@ -392,14 +396,14 @@ TEST_CASE("a local model pushes, and fades out when its client is silent", "[wor
 }
 
 TEST_CASE("a local model that is stiffer than the device bears is felt softer", "[workbench][models]") {
-  Plan plan = pressing_plan();
+  RunConfig plan = pressing_plan();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()}};
   Bench s(plan);
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   s.go_for(2.0);
   LocalModel spring;
   spring.kind = LocalModel::Kind::spring;
-  spring.X_WF = {Quaterniond::Identity(), {0, 0, 0.066}};
+  spring.X_WA = {Quaterniond::Identity(), {0, 0, 0.066}};
   spring.stiffness_N_per_m = 20000.0;
   s.bench().set_model(spring, 5.0);
   s.go_for(1.0);
@@ -425,9 +429,9 @@ struct Configured {
     config = files.write("wrenchd.toml", "scene = \"scene.toml\"\n" + more);
   }
   void write_scene(const std::string& obstacles) { scene = files.write("scene.toml", scene_text(obstacles)); }
-  Plan read() const {
-    Plan plan = read_plan({config, {}, {}, false}, SearchPath({WRENCHD_SOURCE_DIR "/config"}));
-    const Plan pressing = pressing_plan();
+  RunConfig read() const {
+    RunConfig plan = load_run_config({config, {}, {}, false}, SearchPath({WRENCHD_SOURCE_DIR "/config"}));
+    const RunConfig pressing = pressing_plan();
     plan.settings.servo.self_test_s = 0.0;
     plan.settings.simulation = pressing.settings.simulation;
     return plan;
@@ -455,7 +459,7 @@ TEST_CASE("a configuration that is read again is applied whole, but for what tak
   CHECK(s.force_N() <= 2.0);
   CHECK(s.force().z() == Approx(std::min(2.0, 300.0 * (0.025 - s.last.X_WP[2]))).epsilon(0.02));
   // Disarmed, what was looser is taken; what was not changed since is not told again.
-  s.station.loop().disarm();
+  s.runtime.loop().disarm();
   s.go_for(0.3);
   const ReloadResult again = s.bench().reload(read);
   CHECK(again.applied == std::vector<std::string>{"limits.force_slew_N_per_s"});
@@ -479,21 +483,21 @@ TEST_CASE("a configuration with anything wrong in it is refused whole", "[workbe
   Configured c;
   Bench s(c.read());
   s.press();
-  const std::uint32_t changes = s.last.changes;
+  const std::uint32_t changes = s.last.change_count;
   c.write("[limits]\nmax_force_N = 1.0\n[wrench]\nstiffness = \"soft\"\n");
   CHECK_THROWS_WITH(s.bench().reload([&c] { return c.read(); }), Catch::Contains("wrenchd.toml:6:"));
   c.write("[limits]\nmax_force_N = 1.0\n");
   c.write_scene("[[obstacle]]\nmesh = \"nowhere.off\"\n");
   CHECK_THROWS_WITH(s.bench().reload([&c] { return c.read(); }), Catch::Contains("scene.toml:6:"));
   s.go_for(0.2);
-  CHECK(s.last.changes == changes);
+  CHECK(s.last.change_count == changes);
   CHECK(s.force_N() > 1.2);
   // Mended, it is applied.
   c.write_scene(kTable + block("post", "[0.2, 0.0, 0.0]"));
   CHECK(s.bench().reload([&c] { return c.read(); }).applied ==
         std::vector<std::string>{"limits.max_force_N", "scene"});
   s.go_for(0.5);
-  CHECK(s.last.rendering == 1);
+  CHECK(s.last.rendering_id == 1);
   CHECK(s.force_N() <= 1.0);
 }
 
@@ -507,7 +511,7 @@ TEST_CASE("a thousand random changes under a hand that presses, half of them wro
   // The law that gives nothing of its own, however the tool turns in contact.
   Configured c;
   c.write("[wrench]\nlaw = \"energy\"\n");
-  Plan plan = c.read();
+  RunConfig plan = c.read();
   plan.settings.simulation.hand_path = {
       {0.0, {0, 0, 0.065}, Vector3d::Zero()},     {0.5, {0, 0, 0.065}, Vector3d::Zero()},
       {1.0, {0, 0, 0.017}, Vector3d::Zero()},     {1.7, {0.01, 0.01, 0.015}, {0.1, 0.1, 0.0}},
@@ -515,13 +519,13 @@ TEST_CASE("a thousand random changes under a hand that presses, half of them wro
   plan.settings.simulation.hand_repeats = true;
   const auto simulation = plan.settings.simulation;
   Bench s(plan);
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   s.go_for(2.5);
   RandomValues random(7);
   const auto number = [&random](double low, double high) { return random.uniform(low, high); };
   int refused = 0, applied = 0, torn = 0, pushed = 0, faults = 0, strange = 0;
   std::string name_of_strange = "none";
-  std::map<std::uint32_t, std::uint64_t> sums{{0, s.last.rendering_sum}};
+  std::map<std::uint32_t, std::uint64_t> sums{{0, s.last.rendering_checksum}};
   const auto obstacle = [&](bool good) {
     std::string text = kTable;
     if (number(0, 1) < 0.5)
@@ -536,31 +540,31 @@ TEST_CASE("a thousand random changes under a hand that presses, half of them wro
     try {
       switch (static_cast<int>(number(0.0, 6.0))) {
         case 0:
-          s.bench().load(s.file("scene.toml", scene_text(obstacle(good))));
+          s.bench().replace_scene(s.file("scene.toml", scene_text(obstacle(good))));
           break;
         case 1:
           s.bench().set_rendering(toml("[wrench]\nenergy_stiffness_per_s2 = " + gain()), "request");
           break;
         case 2:
-          s.bench().move(good ? "block" : "blok",
-                         {rotation_from({0, 0, number(-1, 1)}),
-                          {number(-0.08, 0.08), number(-0.08, 0.08), number(-0.03, 0.02)}},
-                         number(2.0, 4.0));
+          s.bench().move_obstacle(good ? "block" : "blok",
+                                  {rotation_from({0, 0, number(-1, 1)}),
+                                   {number(-0.08, 0.08), number(-0.08, 0.08), number(-0.03, 0.02)}},
+                                  number(2.0, 4.0));
           break;
         case 3:
-          s.bench().remove(good ? "block" : "blok");
+          s.bench().remove_obstacle(good ? "block" : "blok");
           break;
         case 4:
-          s.bench().add(toml(std::string("name = \"wall\"\nhalf_space = { normal = ") +
-                             (good ? "[0, 1, 0]" : "[0, 0, 0]") + ", offset = -0.03 }"),
-                        "request");
+          s.bench().insert_obstacle(toml(std::string("name = \"wall\"\nhalf_space = { normal = ") +
+                                         (good ? "[0, 1, 0]" : "[0, 0, 0]") + ", offset = -0.03 }"),
+                                    "request");
           break;
         default:
           c.write("[wrench]\nlaw = \"energy\"\nenergy_stiffness_per_s2 = " + gain() +
                   "\n[limits]\nforce_slew_N_per_s = " + to_text(number(1500.0, 2000.0)) + "\n");
           c.write_scene(obstacle(good));
           s.bench().reload([&] {
-            Plan read = c.read();
+            RunConfig read = c.read();
             read.settings.simulation = simulation;
             return read;
           });
@@ -569,20 +573,21 @@ TEST_CASE("a thousand random changes under a hand that presses, half of them wro
     } catch (const std::exception&) {
       ++refused;
     }
-    const auto [handed, sum] = s.bench().handed_over();
+    const auto [handed, sum] = s.bench().current_rendering();
     if (handed > 0) sums[handed] = sum;
     for (int k = static_cast<int>(number(1.0, 300.0)); k > 0; --k) {
       // A block that shoves the hand is more than the guard gives back, and ends the force: that is its
       // right.
       const Fault fault = s.go_on();
       faults += fault != Fault::none ? 1 : 0;
-      if (fault != Fault::none && fault != Fault::energy_made && fault != Fault::pinned)
+      if (fault != Fault::none && fault != Fault::energy_generated && fault != Fault::motors_stalled)
         name_of_strange = fault_row(fault).name;
-      strange += fault != Fault::none && fault != Fault::energy_made && fault != Fault::pinned ? 1 : 0;
-      if (is_latched(s.state())) s.station.loop().acknowledge();
-      torn += sums.at(s.last.rendering) == s.last.rendering_sum ? 0 : 1;
+      strange +=
+          fault != Fault::none && fault != Fault::energy_generated && fault != Fault::motors_stalled ? 1 : 0;
+      if (is_latched(s.state())) s.runtime.loop().acknowledge();
+      torn += sums.at(s.last.rendering_id) == s.last.rendering_checksum ? 0 : 1;
       pushed += s.force_N() > 0.3 ? 1 : 0;
-      if (s.state() == State::disarmed) s.station.loop().arm();
+      if (s.state() == State::disarmed) s.runtime.loop().arm();
     }
   }
   INFO("applied " << applied << ", refused " << refused << ", ticks that pushed " << pushed << ", most step "
@@ -603,7 +608,7 @@ TEST_CASE("a rendering that takes the place of another neither allocates nor loc
   std::uint64_t allocations = 0, locks = 0;
   for (int i = 0; i < 4; ++i) {
     if (i % 2 == 0)
-      s.bench().load(s.file("other.toml", scene_text(kTable + block("post", "[0.06, 0.0, 0.0]"))));
+      s.bench().replace_scene(s.file("other.toml", scene_text(kTable + block("post", "[0.06, 0.0, 0.0]"))));
     else
       s.bench().set_rendering(toml("[wrench]\nlaw = \"energy\""), "request");
     if (i == 2) s.bench().set_scale(1.5);
@@ -613,7 +618,7 @@ TEST_CASE("a rendering that takes the place of another neither allocates nor loc
     allocations += guard.allocations();
     locks += guard.locks();
   }
-  CHECK(s.last.rendering == 4);
+  CHECK(s.last.rendering_id == 4);
   CHECK(allocations == 0);
   CHECK(locks == 0);
 }

@@ -31,7 +31,7 @@ struct Daemon {
 
   explicit Daemon(std::vector<std::string> more = {}, const std::string& settings = {})
       : wrenchd("wrenchd", words(std::move(more), settings)) {
-    REQUIRE(wrenchd.says("state: active"));
+    REQUIRE(wrenchd.wait_for_output("state: active"));
   }
   std::vector<std::string> words(std::vector<std::string> more, const std::string& settings) {
     const auto config =
@@ -137,7 +137,7 @@ TEST_CASE("an emergency stop leaves a flight recording, which status and the eve
           "[recording][flight][program]") {
   const Daemon daemon;
   CHECK(daemon.ctl({"stop"}).exit_code == 0);
-  REQUIRE(daemon.wrenchd.says("what led to stop_asked is in "));
+  REQUIRE(daemon.wrenchd.wait_for_output("what led to stop_asked is in "));
   const std::string err = daemon.wrenchd.err();
   CHECK(err.find("; what led to it: " + (daemon.recordings / "flight-").string()) != std::string::npos);
   const ProgramResult status = daemon.ctl({"status", "--json"});
@@ -169,7 +169,7 @@ TEST_CASE("a recording can be read after its daemon was killed, but for the last
     INFO("ran " << ran_s << " s, has " << has_s);
     CHECK(has_s > ran_s - 2.0);
     CHECK(is_gapless(recording));
-    CHECK(recording.touches.size() > 100);
+    CHECK(recording.contacts.size() > 100);
   }
 }
 

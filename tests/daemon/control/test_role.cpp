@@ -51,15 +51,15 @@ TEST_CASE("groups are looked up by name, and one that does not exist is told wit
   ControlSettings settings;
   settings.observers = "*";
   settings.operators = "daemon";
-  const RoleRules rules = role_rules(settings, "wrenchd.toml");
-  CHECK(rules.everybody_observes);
+  const RoleRules rules = load_role_rules(settings, "wrenchd.toml");
+  CHECK(rules.anyone_may_observe);
   CHECK_FALSE(rules.observers);
   CHECK(rules.operators == gid_t{1});
   CHECK_FALSE(rules.administrators);
-  CHECK(rules.own == geteuid());
+  CHECK(rules.own_uid == geteuid());
   settings.administrators = "no-such-group-here";
   CHECK_THROWS_WITH(
-      role_rules(settings, "wrenchd.toml"),
+      load_role_rules(settings, "wrenchd.toml"),
       "wrenchd.toml: key 'control.administrators': this machine has no group 'no-such-group-here'; "
       "make it with: groupadd --system no-such-group-here");
 }

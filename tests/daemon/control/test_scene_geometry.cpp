@@ -20,20 +20,20 @@ namespace {
 /// A cube above two gears, one of which moves, and a floor.
 std::shared_ptr<const Scene> three_bodies() {
   const auto gear =
-      std::make_shared<const TreedMesh>(make_mesh({.kind = "gear", .triangles = 2000, .seed = 1}));
+      std::make_shared<const MeshBvh>(make_mesh({.kind = "gear", .triangles = 2000, .seed = 1}));
   ObstacleMotion motion;
   motion.linear_m_per_s = {0.0, 0.02, 0.0};
-  motion.turn_back_s = 1.5;
+  motion.reverse_after_s = 1.5;
   std::vector<MeshObstacle> meshes;
   meshes.emplace_back("still", gear, Pose{Quaterniond::Identity(), {0.1, 0.0, 0.0}});
   meshes.emplace_back("moving", gear, Pose{rotation_from({0.0, 0.3, 0.0}), {-0.1, 0.0, 0.0}}, motion);
-  ToolBody tool = load_tool(shipped_plan().scene.tool);
+  ToolBody tool = load_tool(shipped_config().scene.tool);
   return std::make_shared<const Scene>(std::move(tool),
                                        std::vector<HalfSpaceSettings>{{"floor", {0, 0, 1}, -0.1}},
                                        std::vector<ConvexObstacle>{}, std::move(meshes));
 }
 
-Json told(const SceneShapes& shapes, const Scene& scene) {
+Json told(const SceneGeometry& shapes, const Scene& scene) {
   Json description = shapes.description(scene);
   description["shapes"] = 1;
   description["rendering"] = 0;
@@ -48,7 +48,7 @@ Json told(const SceneShapes& shapes, const Scene& scene) {
 
 TEST_CASE("the shapes of a scene are in a memory that nobody can change", "[view]") {
   const auto scene = three_bodies();
-  const SceneShapes shapes(scene);
+  const SceneGeometry shapes(scene);
   const int fd = shapes.descriptor();
   CHECK(ftruncate(fd, 1) != 0);
   CHECK(write(fd, "x", 1) != 1);
@@ -61,7 +61,7 @@ TEST_CASE("the shapes of a scene are in a memory that nobody can change", "[view
 
 TEST_CASE("a mesh is in the shapes once, however many obstacles it is", "[view]") {
   const auto scene = three_bodies();
-  const SceneShapes shapes(scene);
+  const SceneGeometry shapes(scene);
   const Json told = shapes.description(*scene);
   REQUIRE(told["meshes"].size() == 2);
   REQUIRE(told["obstacles"].size() == 3);
@@ -84,27 +84,27 @@ TEST_CASE("a mesh is in the shapes once, however many obstacles it is", "[view]"
 
 TEST_CASE("shapes fit another scene of the same meshes, and no other", "[view]") {
   const auto scene = three_bodies();
-  const SceneShapes shapes(scene);
+  const SceneGeometry shapes(scene);
   std::vector<MeshObstacle> fewer = {scene->meshes()[1]};
   const Scene moved(scene->tool(), {}, {}, fewer);
-  CHECK(shapes.fits(moved));
+  CHECK(shapes.matches(moved));
   const Json told = shapes.description(moved);
   REQUIRE(told["obstacles"].size() == 1);
   CHECK(told["obstacles"][0]["mesh"] == 1);
-  CHECK_FALSE(shapes.fits(*three_bodies()));  // the same gear, loaded again
+  CHECK_FALSE(shapes.matches(*three_bodies()));  // the same gear, loaded again
   ToolBody other = scene->tool();
   other.mesh.vertices_m[0].x() += 1e-3;
-  CHECK_FALSE(shapes.fits(Scene(other, {}, {}, fewer)));
+  CHECK_FALSE(shapes.matches(Scene(other, {}, {}, fewer)));
 }
 
 TEST_CASE("the view draws what the daemon tells, and moves obstacles by scene time", "[view]") {
   const auto scene = three_bodies();
-  const SceneShapes shapes(scene);
+  const SceneGeometry shapes(scene);
   const ViewScene view(told(shapes, *scene), shapes.bytes());
   CHECK(view.meshes().size() == 2);
   CHECK(view.obstacle_name(2) == "moving");
   CHECK(view.obstacle_name(9) == "obstacle 9");
-  const Json moved = view.moved(5'000'000'000 + 2'000'000'000);  // at scene time 2 s
+  const Json moved = view.moving_obstacle_poses(5'000'000'000 + 2'000'000'000);  // at scene time 2 s
   REQUIRE(moved.size() == 1);
   CHECK(moved[0][0] == 2);
   const Pose X_WO = scene->meshes()[1].X_WO_at(2.0);

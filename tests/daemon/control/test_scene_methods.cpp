@@ -14,12 +14,12 @@ namespace {
 using namespace test;
 
 struct Asked {
-  VirtualStation s;
+  VirtualRuntime s;
   MethodTable table;
   int reloads = 0;
 
-  explicit Asked(const Plan& plan = shipped_plan()) : s(plan) {
-    add_scene_methods(table, s.station.workbench(), [this] {
+  explicit Asked(const RunConfig& plan = shipped_config()) : s(plan) {
+    add_scene_methods(table, s.runtime.reconfigurator(), [this] {
       ++reloads;
       return ReloadResult{{"limits"}, {"servo.rate_Hz"}, {}};
     });
@@ -82,14 +82,14 @@ TEST_CASE("a scene file is looked for, and taken whole", "[scene_methods]") {
               {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering"] == 1);
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
   const RpcError none = a.refused("scene.load", {{"file", "scenes/no_such.toml"}});
-  CHECK(none.code() == RpcCode::refused);
+  CHECK(none.code() == RpcCode::rejected);
   has(none, "scenes/no_such.toml");
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
 }
 
 TEST_CASE("the scene is told with the place from where it is seen best, one that a client loads with none",
           "[scene_methods][view]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.view = {{0.1, -0.2, 0.3}, {0.0, 0.0, 0.05}};
   const Asked a(plan);
   CHECK(a.ask("scene.shapes")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
@@ -105,7 +105,7 @@ TEST_CASE("what a scene cannot be is refused with its place, and nothing changes
     Json block = a_block();
     block[key] = value;
     const RpcError error = a.refused("scene.add", {{"obstacle", block}});
-    CHECK(error.code() == RpcCode::refused);
+    CHECK(error.code() == RpcCode::rejected);
     return error;
   };
   has(add("positon_m", {0, 0, 0}), "position_m");  // the nearest key
@@ -115,10 +115,10 @@ TEST_CASE("what a scene cannot be is refused with its place, and nothing changes
   has(add("name", "table"), "already");
   Json null = a_block();
   null["scale"] = nullptr;
-  CHECK(a.refused("scene.add", {{"obstacle", null}}).code() == RpcCode::wrong_params);
+  CHECK(a.refused("scene.add", {{"obstacle", null}}).code() == RpcCode::invalid_params);
   has(a.refused("scene.remove", {{"name", "tabel"}}), "'tabel'");
   has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"over_s", 1.0}}), "half_space");
-  CHECK(a.refused("scene.move", {{"name", "table"}, {"over_s", 1.0}}).code() == RpcCode::wrong_params);
+  CHECK(a.refused("scene.move", {{"name", "table"}, {"over_s", 1.0}}).code() == RpcCode::invalid_params);
   has(a.refused("rendering.set", {{"wrench", {{"law", "hooke"}}}}), "law");
   has(a.refused("rendering.set", {{"wrench", {{"stiffnes", 1.0}}}}), "stiffness");
   has(a.refused("rendering.set", {{"rendering", {{"method", "planar"}, {"friction", {{"static", 0.5}}}}}}),
@@ -131,7 +131,7 @@ TEST_CASE("a workspace is changed all at once or not at all", "[scene_methods]")
   const Json as_it_is = a.ask("workspace.set");
   CHECK(as_it_is == Json({{"scale", 1.0}, {"clutched", false}}));
   const RpcError error = a.refused("workspace.set", {{"scale", 100.0}, {"clutched", true}});
-  CHECK(error.code() == RpcCode::refused);
+  CHECK(error.code() == RpcCode::rejected);
   has(error, "0.1 to 10");
   CHECK(a.ask("workspace.set") == as_it_is);
   CHECK(a.ask("workspace.set", {{"scale", 2.0}, {"clutched", true}}) ==
@@ -160,17 +160,17 @@ TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
   has(with("expires_s", 11.0), "expires_s");
   has(with("normal", {0, 0, 0}), "normal");
   has(with("stiffness_N_per_m", -5.0), "stiffness_N_per_m");
-  CHECK(with("expires_s", nullptr).code() == RpcCode::wrong_params);
+  CHECK(with("expires_s", nullptr).code() == RpcCode::invalid_params);
 }
 
 TEST_CASE("who only looks on changes nothing, and only an administrator reloads", "[scene_methods]") {
   Asked a;
   for (const auto& [name, row] : a.table.methods()) {
-    if (row.least == Role::observer) continue;
+    if (row.min_role == Role::observer) continue;
     INFO(name);
-    CHECK(a.refused(name, Json::object(), Role::observer).code() == RpcCode::not_allowed);
+    CHECK(a.refused(name, Json::object(), Role::observer).code() == RpcCode::permission_denied);
   }
-  CHECK(a.refused("reload", Json::object(), Role::operator_).code() == RpcCode::not_allowed);
+  CHECK(a.refused("reload", Json::object(), Role::operator_).code() == RpcCode::permission_denied);
   CHECK(a.reloads == 0);
   const Json answer = a.ask("reload");
   CHECK(a.reloads == 1);

@@ -14,15 +14,15 @@ using namespace test;
 
 TEST_CASE("obstacles are named by the rendering that they are of, also when the scene has changed",
           "[state_methods]") {
-  VirtualStation s(shipped_plan());
+  VirtualRuntime s(shipped_config());
   MethodTable table;
-  add_state_methods(table, s.station);
-  add_scene_methods(table, s.station.workbench(), [] { return ReloadResult{}; });
+  add_state_methods(table, s.runtime);
+  add_scene_methods(table, s.runtime.reconfigurator(), [] { return ReloadResult{}; });
   const auto ask = [&](const std::string& method, const Json& params = Json::object()) {
     return MethodTable::run(table.look_up({method, params, 1, true}, Role::administrator), params, {});
   };
   CHECK(ask("state.names").result == Json({{"obstacles", {"table"}}, {"rendering", 0}}));
-  const Answer first = ask("state.open");
+  const MethodResult first = ask("state.open");
   CHECK(first.fd >= 0);
   CHECK(first.result["layout"]["rendering"] == 0);
   CHECK(first.result["layout"]["obstacles"] == Json::array({"table"}));

@@ -30,8 +30,8 @@ std::string pressing() {
 }
 
 /// The shipped station with that path, in the mode given.
-Plan plan_of(const std::filesystem::path& file, PlaybackMode mode) {
-  Plan plan = shipped_plan();
+RunConfig plan_of(const std::filesystem::path& file, PlaybackMode mode) {
+  RunConfig plan = shipped_config();
   SimulationSettings& simulation = plan.settings.simulation;
   simulation.playback = file;
   simulation.playback_mode = mode;
@@ -40,12 +40,12 @@ Plan plan_of(const std::filesystem::path& file, PlaybackMode mode) {
 }
 
 /// Armed from the first tick on; returns how far the handle was from the path at most [m], once it pushed.
-double farthest_m(const Plan& plan, double& pushed_N) {
-  VirtualStation s(plan);
+double farthest_m(const RunConfig& plan, double& pushed_N) {
+  VirtualRuntime s(plan);
   double farthest = 0.0;
   pushed_N = 0.0;
   for (int i = 0; i < 3500; ++i) {
-    if (i == 5) s.station.loop().arm();
+    if (i == 5) s.runtime.loop().arm();
     REQUIRE(s.tick() == Fault::none);
     pushed_N = std::max(pushed_N, s.force_N());
     const Pose goal = s.simulated.hand_target().X_BG;
@@ -69,11 +69,11 @@ TEST_CASE("led by a table of poses the handle is on it, whatever pushes; else th
 
 TEST_CASE("a led handle takes from the hand what the motors and friction take", "[playback]") {
   const TemporaryDirectory files;
-  VirtualStation s(plan_of(files.write("pressing.csv", pressing()), PlaybackMode::open));
+  VirtualRuntime s(plan_of(files.write("pressing.csv", pressing()), PlaybackMode::open));
   const SimulatedEnergy& energy = s.simulated.handle().energy();
   double most_kinetic_J = 0.0;
   for (int i = 0; i < 2500; ++i) {
-    if (i == 5) s.station.loop().arm();
+    if (i == 5) s.runtime.loop().arm();
     s.tick();
     const double kinetic_J = s.simulated.handle().kinetic_energy_J();
     most_kinetic_J = std::max(most_kinetic_J, kinetic_J);
@@ -88,16 +88,16 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
   const TemporaryDirectory files;
   const auto file = files.path() / "run.h5";
   {
-    VirtualStation s(shipped_plan());
-    RunRecorder recorder(s.station, file);
+    VirtualRuntime s(shipped_config());
+    RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 5000; ++i) {
-      if (i == 50) s.station.loop().arm();
+      if (i == 50) s.runtime.loop().arm();
       s.tick();
-      recorder.take();
+      recorder.append_new_ticks();
     }
   }
   const Recording before = read_recording(file);
-  VirtualStation s(plan_of(file, PlaybackMode::open));
+  VirtualRuntime s(plan_of(file, PlaybackMode::open));
   double farthest_m = 0.0;
   std::size_t compared = 0;
   double start_s = 0.0;
@@ -105,7 +105,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
     if (tick.fresh == 0) continue;
     if (compared++ == 0) start_s = tick.device_time_s;
     const Duration since = from_seconds(tick.device_time_s - start_s);
-    const Pose X = HandPath(s.station.plan().settings.simulation).at(since).X_BG;
+    const Pose X = HandPath(s.runtime.config().settings.simulation).at(since).X_BG;
     farthest_m =
         std::max(farthest_m, (X.translation_m - Vector3d(tick.X_BH[0], tick.X_BH[1], tick.X_BH[2])).norm());
     if (compared > 200) break;
@@ -117,7 +117,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
   double then_N = 0.0, now_N = 0.0;
   for (const TickRecord& tick : before.ticks) then_N = std::max(then_N, std::abs(tick.F_T[2]));
   for (int i = 0; i < 5000; ++i) {
-    if (i == 50) s.station.loop().arm();
+    if (i == 50) s.runtime.loop().arm();
     s.tick();
     now_N = std::max(now_N, std::abs(s.last.F_T[2]));
   }

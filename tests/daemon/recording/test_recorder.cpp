@@ -26,13 +26,13 @@ TEST_CASE("what the history held no more when its turn came is counted as lost",
   {
     Recorder recorder(history, files.path() / "run.h5", {}, 0);
     append(history, 0, 250);
-    CHECK(recorder.step(history.held().end, true));
+    CHECK(recorder.write_next(history.stored_range().end, true));
     CHECK(recorder.written() == 100);
     CHECK(recorder.lost() == 150);
     CHECK(recorder.next() == 250);
-    CHECK_FALSE(recorder.step(history.held().end, true));
+    CHECK_FALSE(recorder.write_next(history.stored_range().end, true));
     append(history, 250, 260);
-    CHECK(recorder.step(history.held().end, true));
+    CHECK(recorder.write_next(history.stored_range().end, true));
     CHECK(recorder.lost() == 150);
   }
   const Recording recording = read_recording(files.path() / "run.h5");
@@ -46,14 +46,14 @@ TEST_CASE("as long as more may come whole chunks are written, and up to the end 
   RecordHistory history(20 * kChunk);
   Recorder recorder(history, files.path() / "run.h5", {}, 0);
   append(history, 0, kChunk - 1);
-  CHECK_FALSE(recorder.step(history.held().end, false));
+  CHECK_FALSE(recorder.write_next(history.stored_range().end, false));
   append(history, kChunk - 1, 2 * kChunk + 7);
-  CHECK(recorder.step(history.held().end, false));
+  CHECK(recorder.write_next(history.stored_range().end, false));
   CHECK(recorder.written() == 2 * kChunk);
-  CHECK_FALSE(recorder.step(history.held().end, false));
-  CHECK(recorder.step(history.held().end, true));
+  CHECK_FALSE(recorder.write_next(history.stored_range().end, false));
+  CHECK(recorder.write_next(history.stored_range().end, true));
   CHECK(recorder.written() == 2 * kChunk + 7);
   append(history, 2 * kChunk + 7, 4 * kChunk);
-  CHECK(recorder.step(history.held().end, false));
+  CHECK(recorder.write_next(history.stored_range().end, false));
   CHECK(recorder.written() == 4 * kChunk);
 }

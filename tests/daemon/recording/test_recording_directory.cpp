@@ -33,24 +33,24 @@ RecordingSettings keeping_free(double MB) {
 
 TEST_CASE("a recording is named by a plain name, or by an administrator's path", "[recording]") {
   const std::filesystem::path there = "/var/lib/wrenchd/recordings";
-  CHECK(place_of("run", there, false) == there / "run.h5");
-  CHECK(place_of("run-2.h5", there, false) == there / "run-2.h5");
-  CHECK(place_of("a.b", there, true) == there / "a.b.h5");
-  CHECK(place_of("/data/x.h5", there, true) == "/data/x.h5");
+  CHECK(recording_path("run", there, false) == there / "run.h5");
+  CHECK(recording_path("run-2.h5", there, false) == there / "run-2.h5");
+  CHECK(recording_path("a.b", there, true) == there / "a.b.h5");
+  CHECK(recording_path("/data/x.h5", there, true) == "/data/x.h5");
   for (const char* name :
        {"/data/x.h5", "../x", "a/b", "", ".", "..", ".hidden", "a b", "a\nb", "\xC3\xA4"}) {
     INFO(name);
-    CHECK_THROWS_WITH(place_of(name, there, false), Contains("no name for a recording") &&
-                                                        Contains("only administrators") &&
-                                                        Contains(there.string()));
+    CHECK_THROWS_WITH(recording_path(name, there, false), Contains("no name for a recording") &&
+                                                              Contains("only administrators") &&
+                                                              Contains(there.string()));
   }
-  CHECK_THROWS_WITH(place_of("../x", there, true), Contains("give an absolute path"));
-  CHECK_THROWS_AS(place_of(std::string(101, 'a'), there, false), RecordingError);
+  CHECK_THROWS_WITH(recording_path("../x", there, true), Contains("give an absolute path"));
+  CHECK_THROWS_AS(recording_path(std::string(101, 'a'), there, false), RecordingError);
 }
 
 TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]") {
   const TemporaryDirectory files;
-  CHECK(recordings_in(files.path() / "none").empty());
+  CHECK(stored_recordings(files.path() / "none").empty());
   files.write("there/b.h5", "of b");
   files.write("there/a.h5", "of a");
   files.write("there/notes.txt", "x");
@@ -61,12 +61,12 @@ TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]
   REQUIRE(::mkfifo((there / "pipe.h5").c_str(), 0600) == 0);
   std::filesystem::last_write_time(there / "b.h5",
                                    std::filesystem::file_time_type::clock::now() - std::chrono::hours(1));
-  const auto found = recordings_in(there);
+  const auto found = stored_recordings(there);
   REQUIRE(found.size() == 2);
   CHECK(found[0].name == "b.h5");  // the older one
   CHECK(found[1].name == "a.h5");
   CHECK(found[0].bytes == 4);
-  CHECK(std::time(nullptr) - found[0].changed >= 3590);
+  CHECK(std::time(nullptr) - found[0].modified_at >= 3590);
   const OwnedFd open = open_recording(there, "a");
   std::array<char, 8> text{};
   CHECK(::read(open.get(), text.data(), text.size()) == 4);
@@ -117,30 +117,30 @@ TEST_CASE("nothing is recorded where the disk has less room than is to stay free
   const TemporaryDirectory files;
   const double left_MB = free_MB(files.path());
   CHECK(left_MB > 0.0);
-  CHECK_NOTHROW(check_room(files.path(), keeping_free(0.0)));
-  CHECK_THROWS_WITH(check_room(files.path(), keeping_free(2.0 * left_MB)),
+  CHECK_NOTHROW(check_free_space(files.path(), keeping_free(0.0)));
+  CHECK_THROWS_WITH(check_free_space(files.path(), keeping_free(2.0 * left_MB)),
                     Contains("MB are left") && Contains("keep_free_MB"));
   CHECK_THROWS_AS(free_MB(files.path() / "none"), RecordingError);
 }
 
 TEST_CASE("the flight recorder's files are named by time and fault, and the oldest go", "[recording]") {
   const TemporaryDirectory files;
-  CHECK(stamp(1795356901) == "20261122T141501Z");
-  const auto first = flight_file(files.path(), 1795356901, "overspeed");
+  CHECK(utc_stamp(1795356901) == "20261122T141501Z");
+  const auto first = flight_path(files.path(), 1795356901, "overspeed");
   CHECK(first == files.path() / "flight-20261122T141501Z-overspeed.h5");
   files.write(first.filename(), "1");
-  CHECK(flight_file(files.path(), 1795356901, "overspeed") ==
+  CHECK(flight_path(files.path(), 1795356901, "overspeed") ==
         files.path() / "flight-20261122T141501Z-overspeed-2.h5");
   files.write("flight-20261122T141500Z-stop_asked.h5", "2");
   files.write("flight-20261122T141502Z-pinned.h5", "3");
   files.write("run-1.h5", "4");
   files.write("flight-plan.txt", "5");
-  keep_newest_flights(files.path(), 2);
+  prune_flights(files.path(), 2);
   const auto there = [&](const char* name) { return std::filesystem::exists(files.path() / name); };
   CHECK_FALSE(there("flight-20261122T141500Z-stop_asked.h5"));
   CHECK(there("flight-20261122T141501Z-overspeed.h5"));
   CHECK(there("flight-20261122T141502Z-pinned.h5"));
   CHECK(there("run-1.h5"));
   CHECK(there("flight-plan.txt"));
-  keep_newest_flights(files.path() / "none", 2);  // nothing there is nothing to remove
+  prune_flights(files.path() / "none", 2);  // nothing there is nothing to remove
 }

@@ -21,15 +21,17 @@ TickRecord random_record(RandomValues& random) {
   const auto any = [&](auto& field) {
     field = static_cast<std::remove_reference_t<decltype(field)>>(random.bits());
   };
-  any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged), any(r.skipped);
+  any(r.tick), any(r.now_ns), any(r.arrived_ns), any(r.sequence), any(r.acknowledged_command),
+      any(r.superseded);
   any(r.missing), any(r.rejected), any(r.buttons), any(r.fresh), any(r.motors_on), any(r.watchdog_tripped);
-  any(r.commands), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.state), any(r.cause),
-      any(r.faults);
-  any(r.limit_causes), any(r.dropped), any(r.sample_fault), any(r.write_fault), any(r.motors_told),
-      any(r.homed), any(r.slept_ns), any(r.answered_ns), any(r.repeated), any(r.commanded),
-      any(r.stiffness_share), any(r.guard_share), any(r.energy_in_J), any(r.energy_out_J), any(r.injected_J),
-      any(r.released), any(r.placing), any(r.rendering), any(r.changes), any(r.rendering_sum);
-  r.next_share = random.normal(), r.through = random.normal();
+  any(r.commands), any(r.contacts), any(r.iterations), any(r.projection_status), any(r.state),
+      any(r.state_cause), any(r.faults);
+  any(r.limit_causes), any(r.undriven_dofs), any(r.sample_fault), any(r.write_fault), any(r.motors_commanded),
+      any(r.homed), any(r.suspended_ns), any(r.wrench_ready_ns), any(r.repeated), any(r.last_command_sent),
+      any(r.stiffness_scale), any(r.passivity_scale), any(r.energy_in_J), any(r.energy_out_J),
+      any(r.injected_J), any(r.released), any(r.proxy_initialization), any(r.rendering_id),
+      any(r.change_count), any(r.rendering_checksum);
+  r.next_rendering_weight = random.normal(), r.contact_gain = random.normal();
   any(r.wake_latency_ns);
   for (auto& ns : r.stage_ns) any(ns);
   for (auto* list : {&r.X_BH, &r.X_WP, &r.X_WQ})
@@ -127,12 +129,12 @@ TEST_CASE("the contacts of each tick are in a recording, whatever pieces it was 
   }
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 3000);
-  REQUIRE(recording.touches.size() == all.touches.size());
+  REQUIRE(recording.contacts.size() == all.contacts.size());
   for (std::size_t i = 0; i < 3000; ++i) {
-    const auto touches = recording.touches_of(i);
-    REQUIRE(touches.size() == all.ranges[i].count);
+    const auto touches = recording.contacts_of(i);
+    REQUIRE(touches.size() == all.contact_ranges[i].count);
     for (std::size_t k = 0; k < touches.size(); ++k)
-      REQUIRE(std::memcmp(&touches[k], &all.touches[all.ranges[i].first + k], sizeof(Touch)) == 0);
+      REQUIRE(std::memcmp(&touches[k], &all.contacts[all.contact_ranges[i].first + k], sizeof(Touch)) == 0);
   }
 }
 
@@ -166,9 +168,9 @@ TEST_CASE("what a recording says of itself reads back", "[recording]") {
   REQUIRE(read.files.size() == 3);
   for (std::size_t i = 0; i < 3; ++i) {
     CHECK(read.files[i].role == header.files[i].role);
-    CHECK(read.files[i].at == header.files[i].at);
+    CHECK(read.files[i].path == header.files[i].path);
     CHECK(read.files[i].sha256 == header.files[i].sha256);
-    CHECK(read.files[i].inside == header.files[i].inside);
+    CHECK(read.files[i].embedded == header.files[i].embedded);
     CHECK(read.files[i].bytes == header.files[i].bytes);
   }
 }
@@ -229,7 +231,7 @@ TEST_CASE("a recording with wrong bytes is read or refused, and no more", "[reco
     try {
       const Recording recording = read_recording(mutant);
       for (std::size_t row = 0; row < recording.ticks.size(); ++row)
-        REQUIRE(recording.touches_of(row).size() <= recording.touches.size());
+        REQUIRE(recording.contacts_of(row).size() <= recording.contacts.size());
     } catch (const RecordingError& error) {
       ++refused;
       REQUIRE(std::string(error.what()).find(mutant.string()) == 0);

@@ -20,8 +20,8 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-Plan plan_with(const std::filesystem::path& directory) {
-  Plan plan = shipped_plan();
+RunConfig plan_with(const std::filesystem::path& directory) {
+  RunConfig plan = shipped_config();
   plan.settings.servo.realtime = Realtime::best_effort;
   plan.settings.recording.directory = directory;
   plan.settings.recording.keep_free_MB = 0.0;
@@ -32,23 +32,23 @@ Plan plan_with(const std::filesystem::path& directory) {
 std::vector<Json> told(EventFeed& feed, const std::string& name = "recording") {
   std::vector<Json> events;
   feed.drain();
-  for (const std::string& line : feed.since(1, {name}, 1 << 20).lines)
+  for (const std::string& line : feed.events_since(1, {name}, 1 << 20).lines)
     events.push_back(Json::parse(line)["params"]);
   return events;
 }
 
 /// A loop in wall time, with its recordings.
 struct LiveRun {
-  SimulatedStation<WallClock> s;
+  SimulatedRuntime<WallClock> s;
   EventFeed feed;
   Recordings recordings;
   std::atomic<bool> stop{false};
   std::thread servo;
 
-  explicit LiveRun(const Plan& plan)
-      : s(plan), feed(s.station.loop()), recordings(s.station, feed, s.clock), servo([this] {
-          prepare_servo_thread(s.station.plan().settings.servo);
-          s.station.loop().run(s.clock, stop);
+  explicit LiveRun(const RunConfig& plan)
+      : s(plan), feed(s.runtime.loop()), recordings(s.runtime, feed, s.clock), servo([this] {
+          prepare_servo_thread(s.runtime.config().settings.servo);
+          s.runtime.loop().run(s.clock, stop);
         }) {}
   ~LiveRun() {
     stop = true;
@@ -75,9 +75,9 @@ bool is_gapless(const Recording& recording) {
 
 TEST_CASE("a recording begins and ends in mid-run, with every tick in between", "[recording]") {
   const TemporaryDirectory files;
-  VirtualStation s(plan_with(files.path()));
-  EventFeed feed(s.station.loop());
-  Recordings recordings(s.station, feed, s.clock, Recordings::Pace::by_hand);
+  VirtualRuntime s(plan_with(files.path()));
+  EventFeed feed(s.runtime.loop());
+  Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
   const auto run = [&](int ticks) {
     for (int i = 0; i < ticks; ++i) {
       s.tick();
@@ -116,9 +116,9 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
 
 TEST_CASE("ticks that nobody took in time are counted, and the recording goes on", "[recording]") {
   const TemporaryDirectory files;
-  VirtualStation s(plan_with(files.path()));
-  EventFeed feed(s.station.loop());
-  Recordings recordings(s.station, feed, s.clock, Recordings::Pace::by_hand);
+  VirtualRuntime s(plan_with(files.path()));
+  EventFeed feed(s.runtime.loop());
+  Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
   const auto file = recordings.start("mine", false);
   for (int i = 0; i < 5000; ++i) s.tick();  // the shared memory holds some two thousand
   const auto written = recordings.stop();
@@ -131,20 +131,20 @@ TEST_CASE("ticks that nobody took in time are counted, and the recording goes on
 
 TEST_CASE("a directory that cannot be written to, and a disk without room, are refused", "[recording]") {
   const TemporaryDirectory files;
-  Plan plan = plan_with(files.write("file", "") / "below");
+  RunConfig plan = plan_with(files.write("file", "") / "below");
   {
-    VirtualStation s(plan);
-    EventFeed feed(s.station.loop());
-    Recordings recordings(s.station, feed, s.clock, Recordings::Pace::by_hand);
+    VirtualRuntime s(plan);
+    EventFeed feed(s.runtime.loop());
+    Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
     CHECK_THROWS_WITH(recordings.start("mine", false), Contains("cannot be made"));
     CHECK_THROWS_WITH(recordings.start("/nowhere/x.h5", true), Contains("cannot be created"));
     CHECK_FALSE(recordings.status().running);
   }
   plan.settings.recording.directory = files.path();
   plan.settings.recording.keep_free_MB = 1e7;
-  VirtualStation s(plan);
-  EventFeed feed(s.station.loop());
-  Recordings recordings(s.station, feed, s.clock, Recordings::Pace::by_hand);
+  VirtualRuntime s(plan);
+  EventFeed feed(s.runtime.loop());
+  Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
   CHECK_THROWS_WITH(recordings.start("mine", false), Contains("MB are left"));
   CHECK_FALSE(std::filesystem::exists(files.path() / "mine.h5"));
 }
@@ -162,14 +162,14 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
   INFO("keep_free_MB " << keep_free_MB);
   std::string failed;
   {
-    Plan plan = plan_with(disk);
+    RunConfig plan = plan_with(disk);
     plan.settings.recording.keep_free_MB = keep_free_MB;
-    VirtualStation s(plan);
-    EventFeed feed(s.station.loop());
-    Recordings recordings(s.station, feed, s.clock, Recordings::Pace::by_hand);
+    VirtualRuntime s(plan);
+    EventFeed feed(s.runtime.loop());
+    Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
     recordings.start("mine", false);
     for (int i = 0; i < 40000 && recordings.status().running; ++i) {
-      if (i == 50) s.station.loop().arm();
+      if (i == 50) s.runtime.loop().arm();
       s.tick();
       if (i % 500 == 0) recordings.pump();
     }
@@ -190,19 +190,19 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
 
 TEST_CASE("the flight recorder writes what led to a fault, and the second after", "[recording][flight]") {
   const TemporaryDirectory files;
-  Plan plan = plan_with(files.path());
+  RunConfig plan = plan_with(files.path());
   plan.settings.recording.flight_s = 1.5;
   plan.settings.recording.flights_kept = 2;
   LiveRun run(plan);
   std::string last;
   for (std::uint64_t flight = 1; flight <= 3; ++flight) {
     REQUIRE(run.comes_true([&] {
-      if (run.s.station.loop().state() == State::fault) run.s.station.loop().acknowledge();
-      return run.s.station.loop().state() == State::disarmed;
+      if (run.s.runtime.loop().state() == State::fault) run.s.runtime.loop().acknowledge();
+      return run.s.runtime.loop().state() == State::disarmed;
     }));
     std::this_thread::sleep_for(1s);
     const TimePoint at = run.s.clock.now();
-    run.s.station.loop().stop();
+    run.s.runtime.loop().stop();
     const auto flights = run.recordings.status().flights;
     REQUIRE(run.comes_true([&] { return run.recordings.status().flights > flights; }));
     last = run.recordings.status().last_flight.string();
@@ -218,9 +218,9 @@ TEST_CASE("the flight recorder writes what led to a fault, and the second after"
     CHECK(after_s < 1.2);
     bool stopped = false;
     for (const TickRecord& tick : recording.ticks)
-      stopped = stopped || (tick.faults & bit(Fault::stop_asked)) != 0;
+      stopped = stopped || (tick.faults & bit(Fault::stop_requested)) != 0;
     CHECK(stopped);
-    run.s.station.loop().acknowledge();
+    run.s.runtime.loop().acknowledge();
     std::this_thread::sleep_for(1100ms);  // a name of another second
   }
   const auto faults = told(run.feed, "fault");
@@ -238,27 +238,27 @@ TEST_CASE("the flight recorder writes what led to a fault, and the second after"
 
 TEST_CASE("a flight that cannot be written is told, and the loop goes on", "[recording][flight]") {
   const TemporaryDirectory files;
-  Plan plan = plan_with(files.write("file", "") / "below");
+  RunConfig plan = plan_with(files.write("file", "") / "below");
   LiveRun run(plan);
-  REQUIRE(run.comes_true([&] { return run.s.station.loop().state() == State::disarmed; }));
-  run.s.station.loop().stop();
+  REQUIRE(run.comes_true([&] { return run.s.runtime.loop().state() == State::disarmed; }));
+  run.s.runtime.loop().stop();
   REQUIRE(run.comes_true([&] {
     const auto events = told(run.feed);
     return !events.empty() && events.back()["what"] == "failed";
   }));
   CHECK(told(run.feed).back()["why"].get<std::string>().find("cannot be made") != std::string::npos);
   CHECK(run.recordings.status().flights == 0);
-  CHECK(run.s.station.loop().state() == State::stopped);
+  CHECK(run.s.runtime.loop().state() == State::stopped);
 }
 
 TEST_CASE("what was going on when the loop ended is in the file", "[recording][flight]") {
   const TemporaryDirectory files;
   {
     LiveRun run(plan_with(files.path()));
-    REQUIRE(run.comes_true([&] { return run.s.station.loop().state() == State::disarmed; }));
+    REQUIRE(run.comes_true([&] { return run.s.runtime.loop().state() == State::disarmed; }));
     run.recordings.start("mine", false);
     std::this_thread::sleep_for(300ms);
-    run.s.station.loop().stop();
+    run.s.runtime.loop().stop();
     REQUIRE(run.comes_true([&] { return !told(run.feed, "fault").empty(); }));
     run.stop = true;
     run.servo.join();

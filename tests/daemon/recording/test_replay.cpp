@@ -15,24 +15,24 @@ using namespace wrenchd::test;
 namespace {
 
 /// A run of the shipped station with everything in it that a tick can do, recorded to a file.
-void record_run(const Plan& plan, const std::filesystem::path& file, double duration_s) {
-  VirtualStation s(plan);
-  s.inject(SimulatedFault::Kind::garble, 3.0, 0.003);
+void record_run(const RunConfig& plan, const std::filesystem::path& file, double duration_s) {
+  VirtualRuntime s(plan);
+  s.inject(SimulatedFault::Kind::corrupt, 3.0, 0.003);
   s.inject(SimulatedFault::Kind::silence, 3.5, 0.006);
   s.inject(SimulatedFault::Kind::unplug, duration_s - 0.01, 1.0);
-  RunRecorder recorder(s.station, file);
+  RunRecorder recorder(s.runtime, file);
   for (int i = 0; i < static_cast<int>(1000 * duration_s); ++i) {
-    if (i == 50 || i == 4500) s.station.loop().arm();
-    if (i == 4200) s.station.loop().disarm();
+    if (i == 50 || i == 4500) s.runtime.loop().arm();
+    if (i == 4200) s.runtime.loop().disarm();
     const bool lost = s.tick() == Fault::device_lost;
-    recorder.take();
+    recorder.append_new_ticks();
     if (lost) break;
   }
-  REQUIRE(recorder.has_all());
+  REQUIRE(recorder.is_complete());
 }
 
-Plan recording_plan(Method method) {
-  Plan plan = shipped_plan();
+RunConfig recording_plan(Method method) {
+  RunConfig plan = shipped_config();
   plan.settings.rendering.method = method;
   plan.settings.wrench.gains.integral = WrenchGains::blockwise(100.0, 0.3);
   plan.settings.limits.max_force_N = 1.2;
@@ -45,7 +45,7 @@ TEST_CASE("a replayed recording gives the same bits", "[replay]") {
   const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  const Plan plan = recording_plan(method);
+  const RunConfig plan = recording_plan(method);
   record_run(plan, file, 6.0);
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() > 5900);
@@ -58,7 +58,7 @@ TEST_CASE("a replayed recording gives the same bits", "[replay]") {
 TEST_CASE("a replay rubs as the loop did", "[replay][friction]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  Plan plan = recording_plan(Method::exact);
+  RunConfig plan = recording_plan(Method::exact);
   plan.settings.rendering.friction = {0.6, 0.4};
   record_run(plan, file, 6.0);
   const Recording recording = read_recording(file);
@@ -78,62 +78,63 @@ TEST_CASE("a replay rubs as the loop did", "[replay][friction]") {
 TEST_CASE("a replay places the proxy at the ticks at which it was placed, where it was placed",
           "[replay][placing]") {
   // Inside, out, and back against the boulder; started over on the way.
-  Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
+  BuriedTool buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   int seeking = 0;
   int placed = 0;
   {
-    VirtualStation s(buried.plan, PlaceIn::thread);  // a thread's answers come when they come
-    RunRecorder recorder(s.station, file);
+    VirtualRuntime s(buried.config, ProxySearchMode::background);  // a thread's answers come when they come
+    RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 4000; ++i) {
-      if (i == 5) s.station.loop().arm();
-      if (i == 20 || i == 3500) s.station.loop().start_over();
-      let_placer_work(s);
+      if (i == 5) s.runtime.loop().arm();
+      if (i == 20 || i == 3500) s.runtime.loop().reinitialize_proxy();
+      wait_for_proxy_search(s);
       REQUIRE(s.tick() == Fault::none);
-      recorder.take();
-      seeking += placing(s) == Placing::seeking ? 1 : 0;
-      placed += placing(s) == Placing::placed ? 1 : 0;
+      recorder.append_new_ticks();
+      seeking += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
+      placed += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;
     }
-    s.station.loop().release(s.clock.now());
+    s.runtime.loop().release(s.clock.now());
   }
   CHECK(seeking > 2);
   CHECK(placed >= 2);
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 4001);
-  auto difference = replay(recording, buried.plan);
+  auto difference = replay(recording, buried.config);
   if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
   CHECK_FALSE(difference.has_value());
 
   // Another answer, and all that follows is another.
   Recording changed = recording;
   for (TickRecord& tick : changed.ticks)
-    if (static_cast<Placing>(tick.placing) == Placing::placed) tick.X_WQ[0] += 1e-4;
-  difference = replay(changed, buried.plan);
+    if (static_cast<ProxyInitialization>(tick.proxy_initialization) == ProxyInitialization::found)
+      tick.X_WQ[0] += 1e-4;
+  difference = replay(changed, buried.config);
   REQUIRE(difference.has_value());
   CHECK(difference->field.rfind("X_WQ[", 0) == 0);
 }
 
 TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]") {
-  Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
-  buried.plan.scene.meshes[0].motion = {{0.0, 0.0, 0.01}, {0.0, 0.3, 0.0}, 0.7};
+  BuriedTool buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
+  buried.config.scene.meshes[0].motion = {{0.0, 0.0, 0.01}, {0.0, 0.3, 0.0}, 0.7};
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   {
-    VirtualStation s(buried.plan, PlaceIn::thread);
+    VirtualRuntime s(buried.config, ProxySearchMode::background);
     s.clock.sleep_until(TimePoint{from_seconds(77777.7)});  // the loop's own time begins later
-    RunRecorder recorder(s.station, file);
+    RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 3000; ++i) {
-      if (i == 5) s.station.loop().arm();
-      if (i == 2500) s.station.loop().start_over();
-      let_placer_work(s);
+      if (i == 5) s.runtime.loop().arm();
+      if (i == 2500) s.runtime.loop().reinitialize_proxy();
+      wait_for_proxy_search(s);
       REQUIRE(s.tick() == Fault::none);
-      recorder.take();
+      recorder.append_new_ticks();
     }
   }
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 3000);
-  const auto difference = replay(recording, buried.plan);
+  const auto difference = replay(recording, buried.config);
   if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
   CHECK_FALSE(difference.has_value());
 }
@@ -141,7 +142,7 @@ TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]"
 TEST_CASE("a recording without its beginning is refused", "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  const Plan plan = recording_plan(Method::exact);
+  const RunConfig plan = recording_plan(Method::exact);
   record_run(plan, file, 0.5);
   Recording recording = read_recording(file);
   recording.ticks.erase(recording.ticks.begin(), recording.ticks.begin() + 100);
@@ -158,7 +159,7 @@ TEST_CASE("a recording without its beginning is refused", "[replay]") {
 }
 
 TEST_CASE("where there was no place, there is none in the replay", "[replay][placing]") {
-  Plan plan = recording_plan(Method::exact);
+  RunConfig plan = recording_plan(Method::exact);
   plan.scene.half_spaces = closed_box(0.02);
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
@@ -169,7 +170,7 @@ TEST_CASE("where there was no place, there is none in the replay", "[replay][pla
 TEST_CASE("a replay names the first tick and field that differ", "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  Plan plan = recording_plan(Method::exact);
+  RunConfig plan = recording_plan(Method::exact);
   plan.settings.wrench.law = SpringLaw::pid;
   record_run(plan, file, 3.0);
   Recording recording = read_recording(file);
@@ -190,16 +191,17 @@ TEST_CASE("a recording in which something was changed from outside is replayed u
           "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  const Plan plan = recording_plan(Method::exact);
+  const RunConfig plan = recording_plan(Method::exact);
   {
-    VirtualStation s(plan);
-    RunRecorder recorder(s.station, file);
+    VirtualRuntime s(plan);
+    RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 3000; ++i) {
-      if (i == 50) s.station.loop().arm();
+      if (i == 50) s.runtime.loop().arm();
       if (i == 2000)
-        s.station.workbench().set_rendering(read_toml_text("[wrench]\nlaw = \"energy\"", "here"), "here");
+        s.runtime.reconfigurator().set_rendering(read_toml_text("[wrench]\nlaw = \"energy\"", "here"),
+                                                 "here");
       REQUIRE(s.tick() == Fault::none);
-      recorder.take();
+      recorder.append_new_ticks();
     }
   }
   Recording recording = read_recording(file);
@@ -212,7 +214,7 @@ TEST_CASE("a recording in which something was changed from outside is replayed u
 TEST_CASE("a recording in which ticks are missing is replayed up to there, and says so", "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  const Plan plan = recording_plan(Method::exact);
+  const RunConfig plan = recording_plan(Method::exact);
   record_run(plan, file, 1.0);
   Recording recording = read_recording(file);
   recording.ticks.erase(recording.ticks.begin() + 500, recording.ticks.begin() + 510);
@@ -235,28 +237,28 @@ TEST_CASE("a recording is replayed with what is in it alone", "[replay]") {
                   "scene = \"scenes/cube_over_plunger.toml\"\n[device]\nprofile = \"heir\"\n"
                   "[servo]\nself_test_s = 0\n[wrench]\nlaw = \"pid\"\n");
   {
-    const Plan plan = read_plan({copies / "mine.toml", {}, {}, false}, SearchPath({copies}));
+    const RunConfig plan = load_run_config({copies / "mine.toml", {}, {}, false}, SearchPath({copies}));
     record_run(plan, file, 4.0);
   }
   std::filesystem::remove_all(copies);
   const Recording recording = read_recording(file);
-  const Plan plan = recorded_plan(recording.header, directory.path() / "unpacked");
+  const RunConfig plan = unpack_run_config(recording.header, directory.path() / "unpacked");
   CHECK(plan.profile.name == "heir");
   CHECK(plan.settings.wrench.law == SpringLaw::pid);
   CHECK(plan.scene.meshes.size() == 1);
   int touching = 0;
   for (std::size_t i = 0; i < recording.ticks.size(); ++i)
-    touching += recording.touches_of(i).empty() ? 0 : 1;
+    touching += recording.contacts_of(i).empty() ? 0 : 1;
   CHECK(touching > 500);
   CHECK_FALSE(replay(recording, plan).has_value());
 
   RecordingHeader lacking = recording.header;
   std::erase_if(lacking.files, [](const RecordedFile& f) { return f.role == "tool"; });
-  CHECK_THROWS_WITH(recorded_plan(lacking, directory.path() / "lacking"),
+  CHECK_THROWS_WITH(unpack_run_config(lacking, directory.path() / "lacking"),
                     Catch::Contains("has no mesh 'tool'") && Catch::Contains("--scene"));
   RecordingHeader outside = recording.header;
   for (RecordedFile& f : outside.files)
-    if (f.role == "tool") f.inside = false;
-  CHECK_THROWS_WITH(recorded_plan(outside, directory.path() / "outside"),
+    if (f.role == "tool") f.embedded = false;
+  CHECK_THROWS_WITH(unpack_run_config(outside, directory.path() / "outside"),
                     Catch::Contains("is not there") && Catch::Contains("SHA-256"));
 }

@@ -15,14 +15,14 @@ namespace {
 /// Until when the force has to be gone, from the tick in which the fault was found.
 int ticks_to_zero(const FaultRow& row, State from) {
   const Transition& t = transition(row.trigger, from);
-  const Reaction reaction = std::max(t.reaction, t.leads ? row.reaction : Reaction::none);
+  const Reaction reaction = std::max(t.reaction, t.changes_state ? row.reaction : Reaction::none);
   return static_cast<int>(time_to_zero(reaction) / std::chrono::milliseconds(1)) +
          (reaction < Reaction::zero ? 1 : 0);
 }
 
 /// The force has to go, from that state.
 bool takes_force(const FaultRow& row, State from) {
-  return row.trigger != Trigger::noted && is_driving(from);
+  return row.trigger != Trigger::info && is_driving(from);
 }
 
 std::string run(const Injection& injection, State state, Phase phase) {
@@ -36,14 +36,14 @@ std::string run(const Injection& injection, State state, Phase phase) {
     if (++tick > injection.within_ticks) return "not found in time";
     rig.tick();
     if (injection.each_tick) injection.each_tick(rig);
-  } while (!rig.found(injection.expected));
+  } while (!rig.raised(injection.expected));
   const FaultRow& row = fault_row(injection.expected);
   // Others may have come before it, or with it; harder ones decide.
   State wanted = expected_after(row.trigger, before);
   bool harder = false;
   for (const FaultRow& other : fault_rows()) {
-    if (other.fault == injection.expected || !rig.found(other.fault)) continue;
-    harder = harder || (other.trigger != Trigger::noted && other.trigger != row.trigger);
+    if (other.fault == injection.expected || !rig.raised(other.fault)) continue;
+    harder = harder || (other.trigger != Trigger::info && other.trigger != row.trigger);
   }
   if (wanted == State::releasing && rig.state() == State::disarmed && rig.force_N() == 0.0)
     wanted = State::disarmed;
@@ -57,7 +57,7 @@ std::string run(const Injection& injection, State state, Phase phase) {
     const bool back = rig.state() == State::ramping || rig.state() == State::active;
     if (rig.force_N() != 0.0 && !back) return "force after the deadline: " + std::to_string(rig.force_N());
   }
-  return rig.broken();
+  return rig.violation();
 }
 
 TEST_CASE("every fault in every state and phase is found in time and answered as it should be", "[faults]") {
@@ -82,7 +82,7 @@ TEST_CASE("every fault in every state and phase is found in time and answered as
 // Those that take a plan of their own.
 
 TEST_CASE("motors that are warm give less, and say so", "[faults]") {
-  FaultRig rig(Phase::contact, [](Plan& plan) {
+  FaultRig rig(Phase::contact, [](RunConfig& plan) {
     plan.profile.continuous_force_N = 0.5;
     plan.profile.continuous_torque_Nm = 0.2;
     plan.profile.thermal_time_s = 4.0;
@@ -90,41 +90,41 @@ TEST_CASE("motors that are warm give less, and say so", "[faults]") {
   REQUIRE(rig.bring_to(State::active));
   CHECK(rig.force_N() > 1.0);
   int ticks = 0;
-  for (; ticks < 4000 && !rig.found(Fault::overheated); ++ticks) rig.tick();
+  for (; ticks < 4000 && !rig.raised(Fault::overheated); ++ticks) rig.tick();
   CHECK(ticks < 2000);
   for (int i = 0; i < 2000; ++i) rig.tick();
   CHECK(rig.force_N() < 0.51);
   CHECK(rig.state() == State::active);
   CHECK((rig.last().limit_causes & kForceThermal) != 0);
-  CHECK(rig.broken() == "");
+  CHECK(rig.violation() == "");
 }
 
 TEST_CASE("a contact that buzzes loses half its stiffness, twice, and then the force", "[faults]") {
   FaultRig rig(Phase::contact);
   REQUIRE(rig.bring_to(State::active));
-  rig.inject(SimulatedFault::Kind::shake, 2.0, 0.0005);
-  double share = rig.last().stiffness_share;
+  rig.inject(SimulatedFault::Kind::vibrate, 2.0, 0.0005);
+  double share = rig.last().stiffness_scale;
   for (const int time : {1, 2}) {
     int ticks = 0;
-    for (; ticks < 200 && !rig.found(Fault::oscillating); ++ticks) rig.tick();
+    for (; ticks < 200 && !rig.raised(Fault::oscillating); ++ticks) rig.tick();
     INFO("time " << time << " after " << ticks << " ticks");
     CHECK(ticks <= 55);
-    CHECK(rig.last().stiffness_share == Approx(0.5 * share));
+    CHECK(rig.last().stiffness_scale == Approx(0.5 * share));
     CHECK(rig.state() == State::active);
-    share = rig.last().stiffness_share;
+    share = rig.last().stiffness_scale;
     rig.tick();
   }
   for (int i = 0; i < 200 && rig.state() == State::active; ++i) rig.tick();
   CHECK(rig.state() == State::fault);
-  CHECK(rig.found(Fault::still_oscillates));
+  CHECK(rig.raised(Fault::oscillation_persists));
   CHECK(rig.force_N() == 0.0);
-  CHECK(rig.broken() == "");
+  CHECK(rig.violation() == "");
 }
 
 TEST_CASE("energy from nowhere, more than the guard can take back, is a fault", "[faults]") {
   // A wall far beyond what the device bears, at the limit of force; then the handle is said to be farther
   // out, along the force, than the spring had been pressed.
-  FaultRig rig(Phase::contact, [](Plan& plan) {
+  FaultRig rig(Phase::contact, [](RunConfig& plan) {
     plan.settings.servo.self_test_s = 0.0;
     plan.settings.wrench.energy_stiffness_per_s2 *= 20.0;
     plan.settings.wrench.gains.damping.setZero();
@@ -134,35 +134,35 @@ TEST_CASE("energy from nowhere, more than the guard can take back, is a fault", 
   REQUIRE(rig.bring_to(State::active));
   CHECK(rig.force_N() > 5.0);
   double out_m = 0.0;
-  rig.spoiled.spoil = [&out_m](DeviceSample& s) { s.X_BH.translation_m.z() += out_m; };
+  rig.faulty_device.corrupt = [&out_m](DeviceSample& s) { s.X_BH.translation_m.z() += out_m; };
   int ticks = 0;
-  for (; ticks < 20 && !rig.found(Fault::energy_made); ++ticks) {
+  for (; ticks < 20 && !rig.raised(Fault::energy_generated); ++ticks) {
     out_m += 0.004;
     rig.tick();
   }
   CHECK(ticks < 10);
-  CHECK(rig.found(Fault::energy_made));
+  CHECK(rig.raised(Fault::energy_generated));
   CHECK(rig.state() == State::fault);
-  CHECK(rig.broken() == "");
+  CHECK(rig.violation() == "");
 }
 
 TEST_CASE("a proxy without an admissible pose is a fault after three ticks", "[faults]") {
-  FaultRig rig(Phase::free, [](Plan& plan) {
+  FaultRig rig(Phase::free, [](RunConfig& plan) {
     for (const double side : {1.0, -1.0})  // the cube is 50 mm wide
       plan.scene.half_spaces.push_back({"wall", {side, 0.0, 0.0}, -0.02});
   });
-  rig.placer.lies = true;
-  rig.placer.lie.translation_m.z() = 0.06;
+  rig.proxy_initializer.override_pose = true;
+  rig.proxy_initializer.overriding_pose.translation_m.z() = 0.06;
   int ticks = 0;
-  for (; ticks < 100 && !rig.found(Fault::projection_failed); ++ticks) rig.tick();
+  for (; ticks < 100 && !rig.raised(Fault::projection_failed); ++ticks) rig.tick();
   CHECK(ticks < 20);
-  CHECK(rig.found(Fault::projection_failed));
+  CHECK(rig.raised(Fault::projection_failed));
   rig.loop.arm();
   for (int i = 0; i < 500; ++i) {
     rig.tick();
     REQUIRE(rig.force_N() == 0.0);
   }
-  CHECK(rig.broken() == "");
+  CHECK(rig.violation() == "");
 }
 
 }  // namespace

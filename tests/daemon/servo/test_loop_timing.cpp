@@ -15,7 +15,7 @@ TEST_CASE("quantiles are right within 3 %, the maximum exactly", "[timing]") {
   DurationHistogram histogram;
   std::vector<std::int64_t> ns;
   for (int i = 0; i < 20000; ++i) {
-    ns.push_back(static_cast<std::int64_t>(random.decades(1.0, 1e10)));
+    ns.push_back(static_cast<std::int64_t>(random.log_uniform(1.0, 1e10)));
     histogram.add(Duration(ns.back()));
   }
   std::sort(ns.begin(), ns.end());

@@ -35,14 +35,14 @@ TEST_CASE("the guard sees what it is there to see", "[realtime]") {
 TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neither allocate nor lock",
           "[realtime]") {
   const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.rendering.method = method;
   plan.settings.limits.max_force_N = 1.0;
-  VirtualStation s(plan);
-  s.station.show_state();
-  s.inject(SimulatedFault::Kind::garble, 5.0, 0.002);
+  VirtualRuntime s(plan);
+  s.runtime.enable_shared_state();
+  s.inject(SimulatedFault::Kind::corrupt, 5.0, 0.002);
   s.inject(SimulatedFault::Kind::unplug, 9.99, 1.0);
-  s.station.loop().arm();
+  s.runtime.loop().arm();
 
   int in_contact = 0;
   int saturated = 0;
@@ -87,9 +87,9 @@ TEST_CASE("no fault on its way through the loop allocates, locks or touches a pa
       const std::uint64_t here = guard.allocations();  // what follows allocates
       locks += guard.locks();
       allocations += here;
-      INFO(injection.name << ", " << name(state) << rig.broken());
+      INFO(injection.name << ", " << name(state) << rig.violation());
       CHECK(here == 0);
-      CHECK(rig.broken().empty());
+      CHECK(rig.violation().empty());
       page_faults += after.ru_minflt - before.ru_minflt + after.ru_majflt - before.ru_majflt;
     }
   CHECK(allocations == 0);
@@ -102,21 +102,22 @@ TEST_CASE("no fault on its way through the loop allocates, locks or touches a pa
 TEST_CASE("to be placed, to start over and to be armed neither allocates nor locks in the servo thread",
           "[realtime][placing]") {
   const bool boulder_moves = GENERATE(false, true);
-  Buried buried({{0.0, {0, 0, 0.03}}, {0.5, {0, 0, 0.08}}});
-  if (boulder_moves) buried.plan.scene.meshes[0].motion = {{0.0, 0.0, 0.005}, {0.0, 0.2, 0.0}, 0.3};
-  VirtualStation s(buried.plan, PlaceIn::thread);
+  BuriedTool buried({{0.0, {0, 0, 0.03}}, {0.5, {0, 0, 0.08}}});
+  if (boulder_moves) buried.config.scene.meshes[0].motion = {{0.0, 0.0, 0.005}, {0.0, 0.2, 0.0}, 0.3};
+  VirtualRuntime s(buried.config, ProxySearchMode::background);
   int seeking = 0;
   int placed = 0;
   std::uint64_t allocations = 0;
   std::uint64_t locks = 0;
   for (int ticks = 0; placed < 3 && ticks < 100000; ++ticks) {
-    let_placer_work(s);
+    wait_for_proxy_search(s);
     const RealtimeGuard guard;
-    if (placing(s) == Placing::following && placed == 1) s.station.loop().start_over();
-    if (placing(s) == Placing::following && placed == 2) s.station.loop().arm();
+    if (proxy_initialization(s) == ProxyInitialization::complete && placed == 1)
+      s.runtime.loop().reinitialize_proxy();
+    if (proxy_initialization(s) == ProxyInitialization::complete && placed == 2) s.runtime.loop().arm();
     s.tick();
-    seeking += placing(s) == Placing::seeking ? 1 : 0;
-    placed += placing(s) == Placing::placed ? 1 : 0;
+    seeking += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
+    placed += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;
     allocations += guard.allocations();
     locks += guard.locks();
   }

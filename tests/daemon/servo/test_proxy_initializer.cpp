@@ -24,37 +24,38 @@ ToolBody cube() {
 /// The cube, and a boulder around the origin.
 Scene cube_and_boulder(std::size_t triangles, std::vector<HalfSpaceSettings> walls = {}) {
   std::vector<MeshObstacle> obstacles;
-  obstacles.push_back({"boulder", TreedMesh(make_mesh({"boulder", triangles})), Pose{}});
+  obstacles.push_back({"boulder", MeshBvh(make_mesh({"boulder", triangles})), Pose{}});
   return Scene(cube(), std::move(walls), {}, std::move(obstacles));
 }
 
 const Pose kDeep = {rotation_from({0.1, 0.2, 0.3}), {0.01, 0.02, 0.03}};
 
-PlacementAnswer awaited(Placer& placer) {
-  PlacementAnswer answer;
-  while (!placer.answer(answer)) std::this_thread::sleep_for(1ms);
+ProxyInitializationResult awaited(ProxyInitializer& placer) {
+  ProxyInitializationResult answer;
+  while (!placer.take_result(answer)) std::this_thread::sleep_for(1ms);
   return answer;
 }
 
 TEST_CASE("the answer is admissible, and the same on a thread and in step", "[placer]") {
   const Scene scene = cube_and_boulder(2000);
-  PlacerThread thread(scene);
-  PlacerInStep step(scene);
-  for (Placer* placer : {static_cast<Placer*>(&thread), static_cast<Placer*>(&step)}) {
-    PlacementAnswer answer;
-    CHECK_FALSE(placer->answer(answer));  // nothing was asked
-    placer->ask({7, kDeep, 1.25});
+  BackgroundProxyInitializer thread(scene);
+  InTickProxyInitializer step(scene);
+  for (ProxyInitializer* placer :
+       {static_cast<ProxyInitializer*>(&thread), static_cast<ProxyInitializer*>(&step)}) {
+    ProxyInitializationResult answer;
+    CHECK_FALSE(placer->take_result(answer));  // nothing was asked
+    placer->request({7, kDeep, 1.25});
     answer = awaited(*placer);
-    CHECK(answer.number == 7);
+    CHECK(answer.id == 7);
     CHECK(answer.scene_time_s == 1.25);
     REQUIRE(answer.found);
-    CHECK(Placement(scene).admissible(answer.X_WQ));
+    CHECK(FeasiblePoseSearch(scene).admissible(answer.X_WQ));
     CHECK((answer.X_WQ.translation_m - kDeep.translation_m).norm() > 0.01);
-    CHECK_FALSE(placer->answer(answer));  // once
+    CHECK_FALSE(placer->take_result(answer));  // once
   }
-  thread.ask({8, kDeep});
-  step.ask({8, kDeep});
-  const PlacementAnswer a = awaited(thread), b = awaited(step);
+  thread.request({8, kDeep});
+  step.request({8, kDeep});
+  const ProxyInitializationResult a = awaited(thread), b = awaited(step);
   CHECK(a.X_WQ.translation_m == b.X_WQ.translation_m);
   CHECK(a.X_WQ.rotation.coeffs() == b.X_WQ.rotation.coeffs());
 }
@@ -64,9 +65,9 @@ TEST_CASE("a pose that is admissible is its own answer, whatever the scene is of
   const Scene boulder = cube_and_boulder(500);
   const Scene table(cube(), {{"table", Vector3d::UnitZ(), 0.0}});
   for (const Scene* scene : {&boulder, &table}) {
-    PlacerInStep placer(*scene);
-    placer.ask({1, X_WP});
-    const PlacementAnswer answer = awaited(placer);
+    InTickProxyInitializer placer(*scene);
+    placer.request({1, X_WP});
+    const ProxyInitializationResult answer = awaited(placer);
     REQUIRE(answer.found);
     CHECK((answer.X_WQ.translation_m - X_WP.translation_m).norm() < 1e-12);
   }
@@ -74,11 +75,11 @@ TEST_CASE("a pose that is admissible is its own answer, whatever the scene is of
 
 TEST_CASE("of several questions the newest is answered last", "[placer]") {
   const Scene scene = cube_and_boulder(500);
-  PlacerThread placer(scene);
-  for (std::uint32_t number = 1; number <= 5; ++number) placer.ask({number, kDeep});
-  PlacementAnswer answer;
+  BackgroundProxyInitializer placer(scene);
+  for (std::uint32_t number = 1; number <= 5; ++number) placer.request({number, kDeep});
+  ProxyInitializationResult answer;
   do answer = awaited(placer);
-  while (answer.number != 5);
+  while (answer.id != 5);
   CHECK(answer.found);
 }
 
@@ -86,8 +87,8 @@ TEST_CASE("where the tool does not fit the answer is that there is no place", "[
   const bool boulder = GENERATE(false, true);
   const auto walls = closed_box(0.02);  // the cube's half edge is 25 mm
   const Scene scene = boulder ? cube_and_boulder(100, walls) : Scene(cube(), walls);
-  PlacerThread placer(scene);
-  placer.ask({1, Pose{}});
+  BackgroundProxyInitializer placer(scene);
+  placer.request({1, Pose{}});
   CHECK_FALSE(awaited(placer).found);
 }
 
@@ -98,12 +99,12 @@ TEST_CASE("a search that is told to stop ends, and a placer with one under way i
   std::stop_source stop;
   stop.request_stop();
   const auto start = std::chrono::steady_clock::now();
-  CHECK(Placement(scene).nearest(kDeep, stop.get_token()).status == ProjectionStatus::infeasible);
-  auto placer = std::make_unique<PlacerThread>(scene);
-  placer->ask({1, kDeep});
+  CHECK(FeasiblePoseSearch(scene).nearest(kDeep, stop.get_token()).status == ProjectionStatus::infeasible);
+  auto placer = std::make_unique<BackgroundProxyInitializer>(scene);
+  placer->request({1, kDeep});
   std::this_thread::sleep_for(50ms);
-  PlacementAnswer answer;
-  CHECK_FALSE(placer->answer(answer));
+  ProxyInitializationResult answer;
+  CHECK_FALSE(placer->take_result(answer));
   placer.reset();
   CHECK(std::chrono::steady_clock::now() - start <
         1s);  // milliseconds, on a machine that has nothing else to do
@@ -111,15 +112,15 @@ TEST_CASE("a search that is told to stop ends, and a placer with one under way i
 
 TEST_CASE("to ask and to look for the answer neither allocates nor locks", "[placer][realtime]") {
   const Scene scene = cube_and_boulder(500);
-  PlacerThread placer(scene);
-  PlacementAnswer answer;
+  BackgroundProxyInitializer placer(scene);
+  ProxyInitializationResult answer;
   std::uint64_t allocations = 0, locks = 0;
   for (std::uint32_t number = 1; number <= 3; ++number) {
     bool answered = false;
     while (!answered) {
       const RealtimeGuard guard;
-      if (answer.number + 1 == number) placer.ask({number, kDeep});
-      answered = placer.answer(answer) && answer.number == number;
+      if (answer.id + 1 == number) placer.request({number, kDeep});
+      answered = placer.take_result(answer) && answer.id == number;
       allocations += guard.allocations();
       locks += guard.locks();
     }
@@ -129,10 +130,10 @@ TEST_CASE("to ask and to look for the answer neither allocates nor locks", "[pla
 }
 
 TEST_CASE("where the proxy stands has a name", "[placer]") {
-  CHECK(std::string(name(Placing::following)) == "following");
-  CHECK(std::string(name(Placing::seeking)) == "placing");
-  CHECK(std::string(name(Placing::placed)) == "placed");
-  CHECK(std::string(name(Placing::nowhere)) == "no place");
+  CHECK(std::string(name(ProxyInitialization::complete)) == "following");
+  CHECK(std::string(name(ProxyInitialization::searching)) == "placing");
+  CHECK(std::string(name(ProxyInitialization::found)) == "placed");
+  CHECK(std::string(name(ProxyInitialization::failed)) == "no place");
 }
 
 }  // namespace

@@ -32,21 +32,21 @@ TEST_CASE("a priority that is taken away is told once, and so is its return", "[
       return;
     }
     RealtimeWatch watch(gettid());
-    CHECK_FALSE(watch.look());
+    CHECK_FALSE(watch.check());
     REQUIRE(give(gettid(), 0));
-    const auto lost = watch.look();
+    const auto lost = watch.check();
     REQUIRE(lost);
     CHECK(lost->lost);
-    CHECK(lost->text.find("SCHED_FIFO priority 12") != std::string::npos);
-    CHECK(lost->text.find("chrt -f -p 12 " + std::to_string(gettid())) != std::string::npos);
-    CHECK_FALSE(watch.look());
+    CHECK(lost->message.find("SCHED_FIFO priority 12") != std::string::npos);
+    CHECK(lost->message.find("chrt -f -p 12 " + std::to_string(gettid())) != std::string::npos);
+    CHECK_FALSE(watch.check());
     REQUIRE(give(gettid(), 5));
-    CHECK_FALSE(watch.look());  // less than it was granted is still lost
+    CHECK_FALSE(watch.check());  // less than it was granted is still lost
     REQUIRE(give(gettid(), 12));
-    const auto back = watch.look();
+    const auto back = watch.check();
     REQUIRE(back);
     CHECK_FALSE(back->lost);
-    CHECK_FALSE(watch.look());
+    CHECK_FALSE(watch.check());
   })
       .join();
 }
@@ -56,9 +56,9 @@ TEST_CASE("a thread that has none has nothing to lose, nor has one that is gone"
   std::thread thread([&] { number = gettid(); });
   thread.join();
   RealtimeWatch gone(number);
-  CHECK_FALSE(gone.look());
+  CHECK_FALSE(gone.check());
   RealtimeWatch ordinary(gettid());
-  CHECK_FALSE(ordinary.look());
+  CHECK_FALSE(ordinary.check());
 }
 
 /// The kernel's number of the thread of that name in a process; 0: there is none.
@@ -76,19 +76,19 @@ TEST_CASE("a daemon whose servo thread lost its priority says so, and disarms wh
   const TemporaryDirectory files;
   const RunningProgram program(
       "wrenchd", {"--arm", "--realtime", "required", "--control", (files.path() / "s").string()});
-  if (!program.says("state: active", 10s)) {
+  if (!program.wait_for_output("state: active", 10s)) {
     WARN("this user may not have SCHED_FIFO: " << program.err());
     return;
   }
   const pid_t servo = thread_named(program.pid(), "wrenchd-servo");
   REQUIRE(servo > 0);
   REQUIRE(give(servo, 0));
-  CHECK(program.says("somebody took the servo thread's SCHED_FIFO priority 45"));
-  CHECK(program.says("; disarmed, as realtime = \"required\""));
+  CHECK(program.wait_for_output("somebody took the servo thread's SCHED_FIFO priority 45"));
+  CHECK(program.wait_for_output("; disarmed, as realtime = \"required\""));
   // Beside other work the ticks of an ordinary thread may be so late that a fault was quicker.
-  CHECK((program.says("state: releasing", 5s) || program.says("state: fault", 1s)));
+  CHECK((program.wait_for_output("state: releasing", 5s) || program.wait_for_output("state: fault", 1s)));
   REQUIRE(give(servo, 45));
-  CHECK(program.says("has its SCHED_FIFO priority 45 again"));
+  CHECK(program.wait_for_output("has its SCHED_FIFO priority 45 again"));
 }
 
 }  // namespace

@@ -14,9 +14,9 @@ using namespace test;
 
 /// Makes renderings of one scene, and counts those that are there by the users of the scene.
 struct Maker {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   std::shared_ptr<const Scene> scene = std::make_shared<const Scene>(plan.scene);
-  std::shared_ptr<Placer> placer = make_placer(scene, PlaceIn::step);
+  std::shared_ptr<ProxyInitializer> placer = make_proxy_initializer(scene, ProxySearchMode::in_tick);
   long without = scene.use_count();
 
   std::unique_ptr<Rendering> make(std::uint32_t number) {
@@ -36,15 +36,15 @@ TEST_CASE("what was not taken yet gives way to what is offered next", "[exchange
     CHECK(maker.alive() == 1);
     Rendering* taken = exchange.take();
     REQUIRE(taken != nullptr);
-    CHECK(taken->number() == 2);
+    CHECK(taken->id() == 2);
     CHECK(exchange.taken());
     CHECK(exchange.take() == nullptr);
-    exchange.give_back(taken);
+    exchange.retire(taken);
     CHECK(maker.alive() == 1);  // it is destroyed by whoever offers, and not by whoever gives back
-    exchange.clean_up();
+    exchange.destroy_retired();
     CHECK(maker.alive() == 0);
     exchange.offer(maker.make(3));
-    exchange.give_back(maker.make(4).release());
+    exchange.retire(maker.make(4).release());
   }
   CHECK(maker.alive() == 0);
 }
@@ -61,15 +61,15 @@ TEST_CASE("between two threads none is lost, and none is there twice", "[exchang
     const auto look = [&] {
       Rendering* next = exchange.take();
       if (next == nullptr) return;
-      ordered = ordered && next->number() > last;
-      last = next->number();
+      ordered = ordered && next->id() > last;
+      last = next->id();
       ++taken;
-      if (held != nullptr) exchange.give_back(held);
+      if (held != nullptr) exchange.retire(held);
       held = next;
     };
     while (!done.load()) look();
     look();
-    exchange.give_back(held);
+    exchange.retire(held);
   });
   constexpr std::uint32_t kOffers = 300;
   for (std::uint32_t i = 1; i <= kOffers; ++i) {
@@ -78,7 +78,7 @@ TEST_CASE("between two threads none is lost, and none is there twice", "[exchang
   }
   done.store(true);
   servo.join();
-  exchange.clean_up();
+  exchange.destroy_retired();
   CHECK(ordered);
   CHECK(last == kOffers);
   CHECK(taken >= static_cast<int>(kOffers) / 3);

@@ -21,7 +21,7 @@ struct Bench {
   int silent_ticks = 0;
 
   explicit Bench(bool can_tell = true) : profile(profile_of(can_tell)), test(profile, 0.5) {
-    test.begin(now);
+    test.start(now);
   }
 
   static DeviceProfile profile_of(bool can_tell) {
@@ -37,15 +37,15 @@ struct Bench {
     ++sample.sequence;
     sample.arrived = now;
     sample.fresh = true;
-    silent_ticks = test.speaks() ? 0 : silent_ticks + 1;
-    if (test.speaks()) {
+    silent_ticks = test.sends_commands() ? 0 : silent_ticks + 1;
+    if (test.sends_commands()) {
       sample.motors_on = wakes && test.motors_on();
       if (test.motors_on()) sample.watchdog_tripped = false;
     } else if (works && silent_ticks > 8) {
       sample.watchdog_tripped = sample.watchdog_tripped || sample.motors_on;
       sample.motors_on = false;
     }
-    if (said == Fault::none) said = test.look(sample, found, now);
+    if (said == Fault::none) said = test.check(sample, found, now);
   }
   int ticks_until_passed(int most) {
     for (int i = 1; i <= most; ++i) {
@@ -74,7 +74,7 @@ TEST_CASE("the motors are on for a moment only, and then nothing is said until t
   while (!bench.test.passed()) {
     bench.tick();
     driven += bench.test.motors_on() ? 1 : 0;
-    silent += bench.test.speaks() ? 0 : 1;
+    silent += bench.test.sends_commands() ? 0 : 1;
     REQUIRE(driven + silent < 60);
   }
   CHECK(driven >= 1);
@@ -98,7 +98,7 @@ TEST_CASE("a bad report, and the half second begins anew", "[self_test]") {
     unclean.found = i % 100 == 0 ? bit(Fault::report_missing) : 0;
     unclean.tick();
   }
-  CHECK(unclean.said == Fault::test_unclean);
+  CHECK(unclean.said == Fault::self_test_reports);
 }
 
 TEST_CASE("a tick that came late is no fault of the device's", "[self_test]") {
@@ -114,7 +114,7 @@ TEST_CASE("another rate than the profile's is told", "[self_test]") {
       bench.sample.sequence += i % 5 == 0 ? step : 0U;  // 1200 a second
       bench.tick();
     }
-    CHECK(bench.said == (step == 1 ? Fault::test_rate : Fault::none));
+    CHECK(bench.said == (step == 1 ? Fault::self_test_rate : Fault::none));
   }
 }
 
@@ -122,7 +122,7 @@ TEST_CASE("a watchdog that does not trip is told; where it cannot be seen it is 
   Bench asleep;
   asleep.works = false;
   CHECK(asleep.ticks_until_passed(1000) == -1);
-  CHECK(asleep.said == Fault::test_watchdog);
+  CHECK(asleep.said == Fault::self_test_watchdog);
   Bench mute(false);
   mute.works = false;
   CHECK(mute.ticks_until_passed(1000) > 0);
@@ -133,8 +133,8 @@ TEST_CASE("motors that do not come on when they are told to are told, and nothin
   Bench bench;
   bench.wakes = false;
   CHECK(bench.ticks_until_passed(2000) == -1);
-  CHECK(bench.said == Fault::test_watchdog);
-  CHECK(bench.test.speaks());  // it has not come to the silence in which the watchdog would trip
+  CHECK(bench.said == Fault::self_test_watchdog);
+  CHECK(bench.test.sends_commands());  // it has not come to the silence in which the watchdog would trip
 }
 
 TEST_CASE("a device that has to be homed first has all the time it needs", "[self_test]") {

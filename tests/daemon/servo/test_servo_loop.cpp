@@ -54,13 +54,13 @@ class StillDevice final : public Device {
 };
 
 /// Never finds a place, and keeps what it was asked.
-class Listener final : public Placer {
+class Listener final : public ProxyInitializer {
  public:
-  std::vector<PlacementQuestion> questions;
+  std::vector<ProxyInitializationRequest> questions;
 
-  void ask(const PlacementQuestion& question) noexcept override { questions.push_back(question); }
-  bool answer(PlacementAnswer& answer) noexcept override {
-    answer = {questions.back().number, false, Pose{}, questions.back().scene_time_s};
+  void request(const ProxyInitializationRequest& question) noexcept override { questions.push_back(question); }
+  bool take_result(ProxyInitializationResult& answer) noexcept override {
+    answer = {questions.back().id, false, Pose{}, questions.back().scene_time_s};
     return true;
   }
 };
@@ -69,7 +69,7 @@ class Listener final : public Placer {
 
 TEST_CASE("after every start the loop is disarmed: it measures and projects, and the hand feels nothing",
           "[servo]") {
-  VirtualStation s;
+  VirtualRuntime s;
   double most_N = 0.0;
   bool touched = false;
   for (int i = 0; i < 5000; ++i) {
@@ -84,8 +84,8 @@ TEST_CASE("after every start the loop is disarmed: it measures and projects, and
 }
 
 TEST_CASE("armed, the simulated hand presses the cube into the table and the table holds it", "[servo]") {
-  VirtualStation s;
-  s.station.loop().arm();
+  VirtualRuntime s;
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   CHECK(s.state() == State::active);
   CHECK(s.last.contacts == 4);
@@ -99,14 +99,14 @@ TEST_CASE("armed, the simulated hand presses the cube into the table and the tab
 }
 
 TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the base's axes", "[servo]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.device.base_in_world = {{0.0, 0.0, 0.0}, {0.0, 0.0, 1.2}};
   plan.settings.device.tool_in_handle = {{0.01, -0.02, 0.0}, {0.0, 0.3, 0.0}};
   plan.settings.wrench.law = SpringLaw::pid;
   plan.settings.wrench.gains.damping.setZero();
   const Matrix6d K = plan.settings.wrench.gains.stiffness;
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   int compared = 0;
   for (int i = 0; i < 8000; ++i) {
     REQUIRE(s.tick() == Fault::none);
@@ -129,12 +129,12 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
 
 TEST_CASE("a device that cannot turn the hand is armed and pushes, and the torque is dropped and told",
           "[servo]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/polhem.toml",
                               SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   VirtualClock clock;
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
-  Station station(plan, *link, clock, PlaceIn::step);
+  Runtime station(plan, *link, clock, ProxySearchMode::in_tick);
   station.open();
   station.loop().arm();
   TickRecord last;
@@ -142,10 +142,10 @@ TEST_CASE("a device that cannot turn the hand is armed and pushes, and the torqu
   for (int i = 0; i < 5000; ++i) {
     clock.sleep_until(clock.now() + std::chrono::milliseconds(1));
     REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().latest().read(last);
+    station.loop().latest_record().read(last);
     CHECK(Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm() == 0.0);
     CHECK((last.limit_causes & kTorqueMagnitude) == 0);
-    CHECK((last.dropped & ~kAngularDofs) == 0);
+    CHECK((last.undriven_dofs & ~kAngularDofs) == 0);
     pushed = pushed || last.F_out[2] > 0.5;
     told = told || live_line(last, station.loop().timing()).find("(no motor: rx ry rz)") != std::string::npos;
   }
@@ -156,15 +156,15 @@ TEST_CASE("a device that cannot turn the hand is armed and pushes, and the torqu
 
 TEST_CASE("armed, the motors hold the weight of the handle, however the base stands", "[servo]") {
   const double tilt_rad = GENERATE(0.0, 0.7);
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.06}, {0, 0.4, 0}}};  // far from the table
   plan.settings.device.base_in_world = {{0, 0, 0.05}, {tilt_rad, 0, 0}};
   plan.profile.masses = {0.2, {0.03, 0, 0}, 0.1};
   const GravityCompensation gravity(plan.profile.masses, rotation_from({tilt_rad, 0, 0}));
-  VirtualStation s(plan);
+  VirtualRuntime s(plan);
   REQUIRE(s.run(0.2) == Fault::none);
   CHECK(s.force_N() == 0.0);  // disarmed
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   REQUIRE(s.run(3.0) == Fault::none);
   REQUIRE(s.state() == State::active);
   CHECK(s.last.contacts == 0);
@@ -176,11 +176,11 @@ TEST_CASE("armed, the motors hold the weight of the handle, however the base sta
 }
 
 TEST_CASE("a profile may ask for the paper's spatial wrench about the world origin", "[servo]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.profile.wrench_point = WrenchPoint::world_origin;
   plan.settings.wrench.gains.damping.setZero();
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s + 0.6) == Fault::none);
   REQUIRE(s.last.contacts > 0);
   const Wrench W_T{{s.last.F_T[0], s.last.F_T[1], s.last.F_T[2]},
@@ -191,10 +191,10 @@ TEST_CASE("a profile may ask for the paper's spatial wrench about the world orig
 }
 
 TEST_CASE("arming in contact waits: no push until the hand has moved out and is calm", "[servo]") {
-  VirtualStation s;
+  VirtualRuntime s;
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.last.contacts > 0);
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   for (int i = 0; i < 300; ++i) {
     REQUIRE(s.tick() == Fault::none);
     CHECK(s.state() == State::waiting);
@@ -203,10 +203,10 @@ TEST_CASE("arming in contact waits: no push until the hand has moved out and is 
 }
 
 TEST_CASE("authority rises over the soft start, and the force never faster than the slew limit", "[servo]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.limits.force_slew_N_per_s = 100.0;
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   double last_N = 0.0;
   double last_authority = 0.0;
   for (int i = 0; i < 4000; ++i) {
@@ -219,10 +219,10 @@ TEST_CASE("authority rises over the soft start, and the force never faster than 
 }
 
 TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.limits.max_force_N = 0.5;
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   CHECK((s.last.limit_causes & kForceMagnitude) != 0);
   CHECK(s.force_N() <= 0.5);
@@ -231,8 +231,8 @@ TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]")
 }
 
 TEST_CASE("a device that leaves ends the loop, and the hand is released", "[servo]") {
-  VirtualStation s;
-  s.station.loop().arm();
+  VirtualRuntime s;
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   s.inject(SimulatedFault::Kind::unplug, kPressing_s, 1.0);
   CHECK(s.run(4.0) == Fault::device_lost);
@@ -245,8 +245,8 @@ TEST_CASE("a device that leaves ends the loop, and the hand is released", "[serv
 
 TEST_CASE("an old pose fades the force before it is one to look at, and what passes comes back by a ramp",
           "[servo]") {
-  VirtualStation s;
-  s.station.loop().arm();
+  VirtualRuntime s;
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.force_N() > 0.5);
   s.inject(SimulatedFault::Kind::silence, kPressing_s, 0.014);
@@ -267,13 +267,13 @@ TEST_CASE("an old pose fades the force before it is one to look at, and what pas
 
 TEST_CASE("a gap in time takes the force: no kick after a stall", "[servo]") {
   const bool required = GENERATE(true, false);
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.servo.realtime = required ? Realtime::required : Realtime::best_effort;
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.force_N() > 0.5);
-  CHECK(s.tick_after(std::chrono::milliseconds(300)) == (required ? Fault::loop_stopped : Fault::tick_late));
+  CHECK(s.tick_after(std::chrono::milliseconds(300)) == (required ? Fault::loop_stalled : Fault::tick_late));
   CHECK(s.force_N() == 0.0);
   CHECK(s.state() == (required ? State::fault : State::degraded));
   REQUIRE(s.tick() == Fault::none);
@@ -283,28 +283,29 @@ TEST_CASE("a gap in time takes the force: no kick after a stall", "[servo]") {
 TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is out, and then no kick",
           "[servo][placing]") {
   // Inside, drawn out to the side, and back against the boulder.
-  const Buried buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.075}}});
-  const PlaceIn place_in = GENERATE(PlaceIn::step, PlaceIn::thread);
-  VirtualStation s(buried.plan, place_in);
-  Placement placement(s.station.scene());
-  const double slew_N = buried.plan.settings.limits.force_slew_N_per_s * 1e-3;
-  const double most_N = buried.plan.profile.max_force_N;
-  s.station.loop().arm();
+  const BuriedTool buried(
+      {{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.075}}});
+  const ProxySearchMode place_in = GENERATE(ProxySearchMode::in_tick, ProxySearchMode::background);
+  VirtualRuntime s(buried.config, place_in);
+  FeasiblePoseSearch placement(s.runtime.scene());
+  const double slew_N = buried.config.settings.limits.force_slew_N_per_s * 1e-3;
+  const double most_N = buried.config.profile.max_force_N;
+  s.runtime.loop().arm();
   REQUIRE(s.tick() == Fault::none);
-  CHECK(placing(s) == Placing::seeking);
+  CHECK(proxy_initialization(s) == ProxyInitialization::searching);
   int seeking = 0;
   double last_N = 0.0, last_authority = 0.0;
   bool waited = false, ramped = false;
   for (const TimePoint end = s.clock.now() + from_seconds(4.0); s.clock.now() < end;) {
-    if (place_in == PlaceIn::thread) let_placer_work(s);
+    if (place_in == ProxySearchMode::background) wait_for_proxy_search(s);
     REQUIRE(s.tick() == Fault::none);
-    if (placing(s) != Placing::following) {
+    if (proxy_initialization(s) != ProxyInitialization::complete) {
       CHECK(s.force_N() == 0.0);
       CHECK(s.torque_Nm() == 0.0);
       CHECK(s.last.contacts == 0);
       CHECK(s.state() == State::waiting);
     }
-    if (placing(s) == Placing::seeking) {
+    if (proxy_initialization(s) == ProxyInitialization::searching) {
       CHECK(std::isnan(s.last.X_WQ[0]));
       CHECK(std::isnan(s.last.energy));
       ++seeking;
@@ -329,13 +330,13 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
 
 TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, and does not push",
           "[servo][placing]") {
-  const Buried buried({{0.0, {0, 0, 0.03}}});
-  VirtualStation s(buried.plan);
-  s.station.loop().arm();
+  const BuriedTool buried({{0.0, {0, 0, 0.03}}});
+  VirtualRuntime s(buried.config);
+  s.runtime.loop().arm();
   REQUIRE(s.run(0.5) == Fault::none);
-  CHECK(placing(s) == Placing::following);
+  CHECK(proxy_initialization(s) == ProxyInitialization::complete);
   CHECK(s.last.contacts > 0);
-  CHECK(Placement(s.station.scene()).admissible(pose_of(s.last.X_WQ)));
+  CHECK(FeasiblePoseSearch(s.runtime.scene()).admissible(pose_of(s.last.X_WQ)));
   CHECK(s.last.energy > 0.0);
   CHECK(s.state() == State::waiting);
   CHECK(s.force_N() == 0.0);
@@ -343,54 +344,58 @@ TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, an
 
 TEST_CASE("where the tool fits nowhere there is no force, it is said once, and tried again",
           "[servo][placing]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.scene.half_spaces = closed_box(0.02);  // the cube's half edge is 25 mm
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   int answers = 0;
   for (int i = 0; i < 1000; ++i) {
-    const Placing before = placing(s);
+    const ProxyInitialization before = proxy_initialization(s);
     REQUIRE(s.tick() == Fault::none);
-    CHECK((placing(s) == Placing::seeking || placing(s) == Placing::nowhere));
+    CHECK((proxy_initialization(s) == ProxyInitialization::searching ||
+           proxy_initialization(s) == ProxyInitialization::failed));
     CHECK(std::isnan(s.last.X_WQ[0]));
     CHECK(s.force_N() == 0.0);
     CHECK(s.state() == State::waiting);
-    answers += before == Placing::seeking && placing(s) == Placing::nowhere ? 1 : 0;
+    answers +=
+        before == ProxyInitialization::searching && proxy_initialization(s) == ProxyInitialization::failed
+            ? 1
+            : 0;
   }
   CHECK(answers >= 9);  // ten times a second
   CHECK(answers <= 11);
   int said = 0;
-  for (Event event; s.station.loop().events().pop(event);) {
-    said += event.kind == Event::Kind::nowhere ? 1 : 0;
-    CHECK(event.kind != Event::Kind::placed);
-    CHECK(event.kind != Event::Kind::no_admissible_pose);
+  for (Event event; s.runtime.loop().events().pop(event);) {
+    said += event.kind == Event::Kind::proxy_search_failed ? 1 : 0;
+    CHECK(event.kind != Event::Kind::proxy_found);
+    CHECK(event.kind != Event::Kind::projection_infeasible);
   }
   CHECK(said == 1);
 }
 
 TEST_CASE("starting over drops the force at once and comes back by the soft start", "[servo][placing]") {
-  VirtualStation s;
-  s.station.loop().arm();
+  VirtualRuntime s;
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.force_N() > 0.5);
-  s.station.loop().start_over();
+  s.runtime.loop().reinitialize_proxy();
   REQUIRE(s.tick() == Fault::none);
-  CHECK(s.last.commands == kStartOver);
-  CHECK(placing(s) == Placing::seeking);
+  CHECK(s.last.commands == kReinitialize);
+  CHECK(proxy_initialization(s) == ProxyInitialization::searching);
   CHECK(s.force_N() == 0.0);
   CHECK(s.state() == State::waiting);
   REQUIRE(s.tick() == Fault::none);
   CHECK(s.last.commands == kNoCommand);
-  CHECK(placing(s) == Placing::placed);
+  CHECK(proxy_initialization(s) == ProxyInitialization::found);
   CHECK_FALSE(std::isnan(s.last.X_WQ[0]));
   CHECK(s.force_N() == 0.0);
   REQUIRE(s.tick() == Fault::none);
-  CHECK(placing(s) == Placing::following);
+  CHECK(proxy_initialization(s) == ProxyInitialization::complete);
   CHECK(s.last.contacts == 4);
   for (double last_authority = 0.0; s.state() != State::active;) {
     REQUIRE(s.clock.now() < TimePoint{} + std::chrono::seconds(30));
     REQUIRE(s.tick() == Fault::none);
-    CHECK(s.force_N() <= s.last.authority * s.station.plan().profile.max_force_N);
+    CHECK(s.force_N() <= s.last.authority * s.runtime.config().profile.max_force_N);
     CHECK(s.last.authority <= last_authority + 0.0011);
     last_authority = s.last.authority;
   }
@@ -398,10 +403,10 @@ TEST_CASE("starting over drops the force at once and comes back by the soft star
 
 TEST_CASE("to be armed while a place is looked for does not begin the search anew", "[servo][placing]") {
   const auto ticks_until_placed = [](int armed_at) {
-    VirtualStation s;
+    VirtualRuntime s;
     int ticks = 0;
-    for (; ticks < 100 && placing(s) != Placing::placed; ++ticks) {
-      if (ticks == armed_at) s.station.loop().arm();
+    for (; ticks < 100 && proxy_initialization(s) != ProxyInitialization::found; ++ticks) {
+      if (ticks == armed_at) s.runtime.loop().arm();
       REQUIRE(s.tick() == Fault::none);
     }
     return ticks;
@@ -414,12 +419,12 @@ TEST_CASE("to be armed while a place is looked for does not begin the search ane
 TEST_CASE("what a hand goes through while it feels nothing does not hold it once it is armed",
           "[servo][placing]") {
   // From above the boulder right through it, disarmed.
-  const Buried buried({{0.0, {0, 0, 0.12}}, {1.0, {0, 0, -0.12}}});
-  VirtualStation s(buried.plan);
+  const BuriedTool buried({{0.0, {0, 0, 0.12}}, {1.0, {0, 0, -0.12}}});
+  VirtualRuntime s(buried.config);
   REQUIRE(s.run(1.5) == Fault::none);
   CHECK(s.last.X_WP[2] < -0.11);
   CHECK(s.last.X_WQ[2] > 0.05);  // it followed, and never through the boulder
-  s.station.loop().arm();
+  s.runtime.loop().arm();
   REQUIRE(s.run(1.5) == Fault::none);
   CHECK(s.state() == State::active);
   CHECK(s.last.contacts == 0);
@@ -427,60 +432,60 @@ TEST_CASE("what a hand goes through while it feels nothing does not hold it once
 }
 
 TEST_CASE("a stop while the proxy is being placed ends the loop and the search", "[servo][placing]") {
-  const Buried buried({{0.0, {0, 0, 0.03}}}, 100000);
-  auto s = std::make_unique<SimulatedStation<WallClock>>(buried.plan);
+  const BuriedTool buried({{0.0, {0, 0, 0.03}}}, 100000);
+  auto s = std::make_unique<SimulatedRuntime<WallClock>>(buried.config);
   WallClock& clock = s->clock;
   std::atomic<bool> stop{false};
   Fault fault = Fault::none;
-  std::thread servo([&] { fault = s->station.loop().run(clock, stop); });
+  std::thread servo([&] { fault = s->runtime.loop().run(clock, stop); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   stop.store(true);
   servo.join();
   TickRecord last;
-  REQUIRE(s->station.loop().latest().read(last));
+  REQUIRE(s->runtime.loop().latest_record().read(last));
   CHECK(fault == Fault::none);
   CHECK(last.released == 1);
-  CHECK(static_cast<Placing>(last.placing) == Placing::seeking);
+  CHECK(static_cast<ProxyInitialization>(last.proxy_initialization) == ProxyInitialization::searching);
   const TimePoint stopped = clock.now();
   s.reset();
   CHECK(WallClock().now() - stopped < std::chrono::seconds(1));  // milliseconds on an idle machine
 }
 
 TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
-  const Buried buried({{0.0, {0, 0, 0.03}}});
-  VirtualStation s(buried.plan);
+  const BuriedTool buried({{0.0, {0, 0, 0.03}}});
+  VirtualRuntime s(buried.config);
   REQUIRE(s.run(0.1) == Fault::none);
-  s.station.loop().start_over();
+  s.runtime.loop().reinitialize_proxy();
   s.inject(SimulatedFault::Kind::silence, 0.1, 0.008);
-  while (placing(s) == Placing::following) REQUIRE(s.tick() == Fault::none);
+  while (proxy_initialization(s) == ProxyInitialization::complete) REQUIRE(s.tick() == Fault::none);
   for (int i = 0; i < 5; ++i) {
-    const Placing before = placing(s);
+    const ProxyInitialization before = proxy_initialization(s);
     REQUIRE(s.tick() == Fault::none);
-    if (s.last.fresh == 0) CHECK(placing(s) == before);
+    if (s.last.fresh == 0) CHECK(proxy_initialization(s) == before);
     CHECK(s.force_N() == 0.0);
   }
   REQUIRE(s.run(0.05) == Fault::none);
-  CHECK(placing(s) == Placing::following);
+  CHECK(proxy_initialization(s) == ProxyInitialization::complete);
 }
 
 TEST_CASE("who stops, acknowledges and arms in one breath has stopped", "[servo]") {
-  VirtualStation s;
-  s.station.loop().arm();
+  VirtualRuntime s;
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
-  s.station.loop().ask(kStop | kAcknowledge | kArm);
-  CHECK(s.tick() == Fault::stop_asked);
+  s.runtime.loop().request(kStop | kAcknowledge | kArm);
+  CHECK(s.tick() == Fault::stop_requested);
   CHECK(s.state() == State::stopped);
   CHECK(s.force_N() == 0.0);
 }
 
 TEST_CASE("release may be called at any time, and again", "[servo]") {
-  VirtualStation s;
-  s.station.loop().release(s.clock.now());
-  s.station.loop().arm();
+  VirtualRuntime s;
+  s.runtime.loop().release(s.clock.now());
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   for (int i = 0; i < 3; ++i) {
-    s.station.loop().release(s.clock.now());
-    CHECK(s.station.loop().state() == State::shutdown);
+    s.runtime.loop().release(s.clock.now());
+    CHECK(s.runtime.loop().state() == State::shutdown);
   }
   CHECK(s.run(0.1) == Fault::none);
   CHECK(s.simulated.motor_wrench().force_N.norm() == 0.0);
@@ -490,7 +495,7 @@ TEST_CASE("release may be called at any time, and again", "[servo]") {
 
 TEST_CASE("scene time begins at the first tick and goes by the times of the ticks, whatever the loop does",
           "[servo][moving]") {
-  const Plan plan = shipped_plan();
+  const RunConfig plan = shipped_config();
   const Scene scene(plan.scene);
   StillDevice device;
   Listener placer;
@@ -502,10 +507,10 @@ TEST_CASE("scene time begins at the first tick and goes by the times of the tick
   for (int i = 0; i < 3000; ++i) {
     if (i == 700) loop.arm();
     if (i == 1200) loop.disarm();
-    if (i == 1500) loop.start_over();
+    if (i == 1500) loop.reinitialize_proxy();
     if (i == 2000) loop.release(now);
     const Fault fault = loop.tick(now, now);
-    REQUIRE((fault == Fault::none || (i == 1001 && fault == Fault::loop_stopped)));
+    REQUIRE((fault == Fault::none || (i == 1001 && fault == Fault::loop_stalled)));
     if (placer.questions.size() > expected_s.size()) expected_s.push_back(seconds(now - first));
     now += i == 1000 ? std::chrono::seconds(5) : from_seconds(0.00098 + 0.00001 * (i % 5));
   }
@@ -518,14 +523,14 @@ TEST_CASE("scene time begins at the first tick and goes by the times of the tick
 }
 
 TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the hand", "[servo][moving]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   double most_tilt = 0.0, most_lift_m = 0.0;
   for (int i = 0; i < 6000; ++i) {
     REQUIRE(s.tick() == Fault::none);
-    if (placing(s) != Placing::following) continue;
+    if (proxy_initialization(s) != ProxyInitialization::complete) continue;
     const Pose X_WQ = pose_of(s.last.X_WQ);
     const double down = X_WQ.translation_m.z() - 0.025;  // of a cube that lies on the table
     if (s.last.contacts > 0) most_lift_m = std::max(most_lift_m, down);
@@ -537,16 +542,16 @@ TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the 
 
 // The guard knows the hand's work alone: to it this would be energy from nowhere.
 TEST_CASE("a plunger that presses against a hand at rest pushes with all its force", "[servo][moving]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
   plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, {}}};
   plan.settings.simulation.hand_repeats = false;
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   double least_share = 1.0, most_N = 0.0, worst_J = 0.0, gave_J = 0.0;
   for (int i = 0; i < 20000; ++i) {
     REQUIRE(s.tick() == Fault::none);
-    least_share = std::min(least_share, s.last.guard_share);
+    least_share = std::min(least_share, s.last.passivity_scale);
     most_N = std::max(most_N, s.force_N());
     worst_J = std::max(worst_J, s.last.injected_J);
     gave_J = s.last.energy_out_J;
@@ -558,10 +563,10 @@ TEST_CASE("a plunger that presses against a hand at rest pushes with all its for
 }
 
 TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
-  VirtualStation a;
-  VirtualStation b;
-  a.station.loop().arm();
-  b.station.loop().arm();
+  VirtualRuntime a;
+  VirtualRuntime b;
+  a.runtime.loop().arm();
+  b.runtime.loop().arm();
   for (int i = 0; i < 6000; ++i) {
     REQUIRE(a.tick() == Fault::none);
     REQUIRE(b.tick() == Fault::none);
@@ -572,10 +577,10 @@ TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
 
 TEST_CASE("all three methods hold the cube", "[servo]") {
   const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.rendering.method = method;
-  VirtualStation s(plan);
-  s.station.loop().arm();
+  VirtualRuntime s(plan);
+  s.runtime.loop().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   // The traditional penalty gives energy from nowhere as the cube tips onto its face, and the guard takes it
   // back.
@@ -588,11 +593,11 @@ TEST_CASE("all three methods hold the cube", "[servo]") {
 TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device, and stops when told",
           "[servo]") {
   const Pacing pacing = GENERATE(Pacing::clock, Pacing::device);
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.servo.pacing = pacing;
-  SimulatedStation<WallClock> s(plan);
+  SimulatedRuntime<WallClock> s(plan);
   WallClock& clock = s.clock;
-  Station& station = s.station;
+  Runtime& station = s.runtime;
   station.loop().arm();
   std::atomic<bool> stop{false};
   Fault fault = Fault::none;
@@ -601,7 +606,7 @@ TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device
   stop.store(true);
   servo.join();
   TickRecord last;
-  REQUIRE(station.loop().latest().read(last));
+  REQUIRE(station.loop().latest_record().read(last));
   CHECK(fault == Fault::none);
   CHECK(last.released == 1);
   CHECK(station.loop().timing().tick.count() > 10);
@@ -609,14 +614,17 @@ TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device
 }
 
 TEST_CASE("what the servo thread says becomes lines that name the cure", "[servo]") {
-  CHECK(to_text({Event::Kind::fault, {}, static_cast<std::uint32_t>(Fault::device_lost), 0.0}) ==
+  CHECK(to_text({Event::Kind::fault_raised, {}, static_cast<std::uint32_t>(Fault::device_lost), 0.0}) ==
         "device_lost: the device left the bus; plug it in again; wrenchd comes back disarmed");
-  CHECK(to_text({Event::Kind::state, {}, static_cast<std::uint32_t>(State::active), 0.0}) == "state: active");
-  CHECK(to_text({Event::Kind::placed, {}, 0, 0.0125}) == "placed 12.5 mm from the hand");
-  CHECK(to_text({Event::Kind::placing, {}, 0, 0.0}).find("zero wrench until") != std::string::npos);
-  CHECK(to_text({Event::Kind::nowhere, {}, 0, 0.0}).find("the tool does not fit") != std::string::npos);
-  CHECK(to_text({Event::Kind::fault, {}, static_cast<std::uint32_t>(Fault::tick_late), 0.0305})
+  CHECK(to_text({Event::Kind::state_changed, {}, static_cast<std::uint32_t>(State::active), 0.0}) ==
+        "state: active");
+  CHECK(to_text({Event::Kind::proxy_found, {}, 0, 0.0125}) == "placed 12.5 mm from the hand");
+  CHECK(to_text({Event::Kind::proxy_search_started, {}, 0, 0.0}).find("zero wrench until") !=
+        std::string::npos);
+  CHECK(to_text({Event::Kind::proxy_search_failed, {}, 0, 0.0}).find("the tool does not fit") !=
+        std::string::npos);
+  CHECK(to_text({Event::Kind::fault_raised, {}, static_cast<std::uint32_t>(Fault::tick_late), 0.0305})
             .find("tick_late: a tick came some milliseconds late (30.5 ms); give wrenchd") == 0);
-  CHECK(to_text({Event::Kind::refused, {}, static_cast<std::uint32_t>(State::fault), 0.0}) ==
+  CHECK(to_text({Event::Kind::arming_refused, {}, static_cast<std::uint32_t>(State::fault), 0.0}) ==
         "not armed: acknowledge what happened first");
 }

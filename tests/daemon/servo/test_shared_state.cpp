@@ -25,9 +25,9 @@ using namespace wrenchd::test;
 
 namespace {
 
-const Workbench::ObstacleNames kTable{3, {"table"}};
+const Reconfigurator::ObstacleNames kTable{3, {"table"}};
 
-StateReader reader_of(const SharedState& state, const Workbench::ObstacleNames& obstacles = kTable) {
+StateReader reader_of(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles = kTable) {
   std::string layout;
   int descriptor = -1;
   open_state(state, obstacles, [&](const nlohmann::json& result, int handed_over) {
@@ -54,7 +54,7 @@ TickRecord record_of(std::uint64_t number) {
 
 Touches touches_of(std::uint64_t number) {
   Touches touches;
-  for (std::uint64_t i = 0; i < number % (kMostTouches + 1); ++i) {
+  for (std::uint64_t i = 0; i < number % (kMaxTouches + 1); ++i) {
     Touch touch;
     touch.point_W_m.fill(static_cast<double>(number));
     touch.share = static_cast<double>(i);
@@ -78,8 +78,8 @@ bool whole(const TickState& state) {
       std::memcpy(&expected, bytes + field.offset + i * size_of(field.type), size_of(field.type));
       if (state.integer(field.name, i) != expected) return false;
     }
-  const std::vector<TouchState> told = state.touches();
-  if (told.size() != number % (kMostTouches + 1)) return false;
+  const std::vector<ProxyContact> told = state.contacts();
+  if (told.size() != number % (kMaxTouches + 1)) return false;
   for (std::size_t i = 0; i < told.size(); ++i)
     if (told[i].point_W_m[2] != static_cast<double>(number) || told[i].share != static_cast<double>(i))
       return false;
@@ -102,7 +102,7 @@ TEST_CASE("what is written is read, every field, in order, each once", "[shared_
     REQUIRE(reader.next(tick));
     REQUIRE(tick.tick() == i);
     REQUIRE(whole(tick));
-    CHECK(reader.behind() == 0);
+    CHECK(reader.unread() == 0);
   }
   CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));
   CHECK(reader.missed() == 0);
@@ -204,9 +204,10 @@ TEST_CASE("writing neither allocates nor locks, and touches no page for the firs
 }
 
 TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][servo]") {
-  VirtualStation s;
-  StateReader reader = reader_of(s.station.show_state(), s.station.workbench().obstacle_names());
-  s.station.loop().arm();
+  VirtualRuntime s;
+  StateReader reader =
+      reader_of(s.runtime.enable_shared_state(), s.runtime.reconfigurator().obstacle_names());
+  s.runtime.loop().arm();
   TickState tick;
   for (int i = 0; i < 2400; ++i) {
     REQUIRE(s.tick() == Fault::none);
@@ -218,10 +219,10 @@ TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][
   CHECK(tick.state() == "active");
   CHECK(tick.text("projection_status") == "converged");
   CHECK(tick.text("faults").empty());
-  const std::vector<TouchState> touches = tick.touches();
+  const std::vector<ProxyContact> touches = tick.contacts();
   REQUIRE(touches.size() == 4);
   double share = 0.0;
-  for (const TouchState& touch : touches) {
+  for (const ProxyContact& touch : touches) {
     CHECK(touch.obstacle == "table");
     CHECK(touch.obstacle_feature == "plane");
     CHECK(touch.tool_feature.starts_with("hull vertex "));
@@ -231,7 +232,7 @@ TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][
     share += touch.share;
   }
   CHECK(share == Approx(1.0));
-  s.station.loop().release(s.clock.now());
+  s.runtime.loop().release(s.clock.now());
   REQUIRE(reader.next(tick));
   CHECK(tick.integer("released") == 1);
   CHECK(tick.text("commands") == "let go");
@@ -265,18 +266,18 @@ TEST_CASE(
   StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
                      [&] {
                        ++asked;
-                       if (answer.empty()) throw ClientError(ClientError::kGone, "gone");
+                       if (answer.empty()) throw ClientError(ClientError::kDisconnected, "gone");
                        return answer;
                      });
   const auto touched_in = [&](std::uint32_t rendering) {
     TickRecord record;
-    record.rendering = rendering;
+    record.rendering_id = rendering;
     Touches touches;
     touches.add(Touch{});
     state.write(record, touches);
     TickState tick;
     REQUIRE(reader.latest(tick));
-    return tick.touches().at(0).obstacle;
+    return tick.contacts().at(0).obstacle;
   };
   CHECK(touched_in(3) == "table");
   CHECK(asked == 0);

@@ -23,61 +23,61 @@ LoopMeasurement measured(Duration age, std::uint64_t ticks_to_acknowledge) {
   return loop;
 }
 
-Stability stability_of(const Plan& plan) {
+StabilityAnalysis stability_of(const RunConfig& plan) {
   const Scene scene(plan.scene);
-  return Stability(plan.settings, plan.profile, scene.tool().solid.inertia, scene.tool().X_MT());
+  return StabilityAnalysis(plan.settings, plan.profile, scene.tool().solid.inertia, scene.tool().X_MT());
 }
 
 }  // namespace
 
 TEST_CASE("what the shipped device bears is not touched, and ten times as much is scaled", "[stability]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.wrench.law = SpringLaw::pid;
   const LoopMeasurement loop = measured(500us, 1);
-  const StiffnessShare shipped = stability_of(plan).settle(loop);
-  CHECK(shipped.bounded);
+  const StiffnessScale shipped = stability_of(plan).max_stable_scale(loop);
+  CHECK(shipped.bound_known);
   CHECK(shipped.spring == 1.0);
   CHECK(shipped.damper == 1.0);
   plan.settings.wrench.gains.stiffness *= 10.0;
-  const StiffnessShare stiff = stability_of(plan).settle(loop);
+  const StiffnessScale stiff = stability_of(plan).max_stable_scale(loop);
   CHECK(stiff.spring < 0.5);
   // Passive by the formula, with the delay that was measured.
   const double b = plan.profile.damping_N_s_per_m;
   CHECK(stiff.spring * 6000.0 * (0.5 * loop.longest_period_s() + loop.delay_s()) +
             stiff.damper * plan.settings.wrench.gains.damping(0, 0) <=
         b * (1.0 + 1e-9));
-  CHECK(stability_of(plan).settle(measured(2500us, 3)).spring < stiff.spring);
+  CHECK(stability_of(plan).max_stable_scale(measured(2500us, 3)).spring < stiff.spring);
 }
 
 TEST_CASE("a profile that states no damping bounds nothing, and its own maximum does", "[stability]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.wrench.law = SpringLaw::pid;
   plan.settings.wrench.gains.stiffness *= 10.0;
   plan.profile.damping_N_s_per_m = DeviceProfile::kNotStated;
-  const StiffnessShare unknown = stability_of(plan).settle(measured(500us, 1));
-  CHECK_FALSE(unknown.bounded);
+  const StiffnessScale unknown = stability_of(plan).max_stable_scale(measured(500us, 1));
+  CHECK_FALSE(unknown.bound_known);
   CHECK(unknown.spring == 1.0);
   plan.profile.max_stiffness_N_per_m = 1500.0;
-  CHECK(stability_of(plan).settle(measured(500us, 1)).spring == Approx(0.25));
+  CHECK(stability_of(plan).max_stable_scale(measured(500us, 1)).spring == Approx(0.25));
 }
 
 TEST_CASE("the encoders that a profile states bound the stiffness too", "[stability]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.profile.encoder_step_m = 200e-6;
-  const StiffnessShare coarse = stability_of(plan).settle(measured(500us, 1));
-  CHECK(coarse.bounded);
+  const StiffnessScale coarse = stability_of(plan).max_stable_scale(measured(500us, 1));
+  CHECK(coarse.bound_known);
   CHECK(coarse.spring * 600.0 <= 51.0);
   plan.profile.encoder_step_m = DeviceProfile::kNotStated;
-  CHECK(stability_of(plan).settle(measured(500us, 1)).spring == 1.0);
+  CHECK(stability_of(plan).max_stable_scale(measured(500us, 1)).spring == 1.0);
 }
 
 TEST_CASE("the energy law is bound by its own stiffness", "[stability]") {
-  Plan plan = shipped_plan();
+  RunConfig plan = shipped_config();
   plan.settings.wrench.law = SpringLaw::energy;
   const LoopMeasurement loop = measured(500us, 1);
-  CHECK(stability_of(plan).settle(loop).spring == 1.0);
+  CHECK(stability_of(plan).max_stable_scale(loop).spring == 1.0);
   plan.settings.wrench.energy_stiffness_per_s2 *= 20.0;
-  CHECK(stability_of(plan).settle(loop).spring < 0.3);
+  CHECK(stability_of(plan).max_stable_scale(loop).spring < 0.3);
 }
 
 TEST_CASE("wrenchd scales what is too stiff for the device, and says so", "[stability]") {

@@ -21,7 +21,7 @@ TEST_CASE("a workspace that nobody touched is the pose of the base", "[workspace
   Workspace workspace(X_WB);
   for (int i = 0; i < 100; ++i) {
     const Pose X_BH = random.pose();
-    CHECK(same_bits(workspace.follow(X_BH, kTick_s), X_WB * X_BH));
+    CHECK(same_bits(workspace.update(X_BH, kTick_s), X_WB * X_BH));
   }
 }
 
@@ -30,16 +30,16 @@ TEST_CASE("the scale changes over a tenth of a second, and moves nothing by itse
   const double to = GENERATE(0.3, 3.0);
   Workspace workspace(random.pose());
   const Pose X_BH = random.pose();
-  const Pose X_WH = workspace.follow(X_BH, kTick_s);
+  const Pose X_WH = workspace.update(X_BH, kTick_s);
   workspace.set_scale(to);
   int ticks = 0;
   for (; workspace.scale() != to && ticks < 1000; ++ticks)
-    CHECK(distance(workspace.follow(X_BH, kTick_s), X_WH) < 1e-12);
+    CHECK(distance(workspace.update(X_BH, kTick_s), X_WH) < 1e-12);
   CHECK(ticks >= 99);
   CHECK(ticks <= 101);
   // From there on a way of the handle is so many times as long.
   const Pose further = {X_BH.rotation, X_BH.translation_m + Vector3d(0.01, 0.02, -0.01)};
-  CHECK((workspace.follow(further, kTick_s).translation_m - X_WH.translation_m).norm() ==
+  CHECK((workspace.update(further, kTick_s).translation_m - X_WH.translation_m).norm() ==
         Approx(to * Vector3d(0.01, 0.02, -0.01).norm()));
 }
 
@@ -49,17 +49,17 @@ TEST_CASE("the wrench has the same power on the hand as in the world, whatever t
     Workspace workspace(random.pose());
     workspace.set_scale(random.uniform(0.1, 10.0));
     const Pose X_BH = random.pose();
-    for (int k = 0; k < 200; ++k) workspace.follow(X_BH, kTick_s);
+    for (int k = 0; k < 200; ++k) workspace.update(X_BH, kTick_s);
     const Wrench F_W = random.wrench();
     const Twist V_BH = random.velocity();
-    const Twist V_W = workspace.in_world(V_BH);
-    const Wrench F_B = workspace.on_the_hand(F_W);
+    const Twist V_W = workspace.twist_in_world(V_BH);
+    const Wrench F_B = workspace.wrench_on_hand(F_W);
     CHECK(F_B.force_N.dot(V_BH.linear_m_per_s) + F_B.torque_Nm.dot(V_BH.angular_rad_per_s) ==
           Approx(F_W.force_N.dot(V_W.linear_m_per_s) + F_W.torque_Nm.dot(V_W.angular_rad_per_s)));
     // And the twist is that of follow().
     const double dt = 1e-7;
-    const Pose now = workspace.follow(X_BH, 0.0);
-    const Pose then = workspace.follow({X_BH.rotation, X_BH.translation_m + dt * V_BH.linear_m_per_s}, 0.0);
+    const Pose now = workspace.update(X_BH, 0.0);
+    const Pose then = workspace.update({X_BH.rotation, X_BH.translation_m + dt * V_BH.linear_m_per_s}, 0.0);
     CHECK((then.translation_m - now.translation_m - dt * V_W.linear_m_per_s).norm() < 1e-12);
   }
 }
@@ -68,15 +68,15 @@ TEST_CASE("the clutch holds the tool, and lets it go on from where it is told", 
   RandomValues random(4);
   Workspace workspace(random.pose());
   workspace.set_scale(2.0);
-  const Pose X_WH = workspace.follow(random.pose(), kTick_s);
-  workspace.clutch_in();
-  for (int i = 0; i < 10; ++i) CHECK(same_bits(workspace.follow(random.pose(), kTick_s), X_WH));
+  const Pose X_WH = workspace.update(random.pose(), kTick_s);
+  workspace.engage_clutch();
+  for (int i = 0; i < 10; ++i) CHECK(same_bits(workspace.update(random.pose(), kTick_s), X_WH));
   const Pose X_on = random.pose();
-  workspace.clutch_out(X_on);
+  workspace.disengage_clutch(X_on);
   const Pose X_BH = random.pose();
-  CHECK(distance(workspace.follow(X_BH, kTick_s), X_on) < 1e-12);
+  CHECK(distance(workspace.update(X_BH, kTick_s), X_on) < 1e-12);
   const Pose turned = {X_BH.rotation * rotation_from({0.0, 0.1, 0.0}), X_BH.translation_m};
-  CHECK(distance(workspace.follow(turned, kTick_s),
+  CHECK(distance(workspace.update(turned, kTick_s),
                  {X_on.rotation * rotation_from({0.0, 0.1, 0.0}), workspace.X_WH().translation_m}) < 1e-9);
 }
 
@@ -84,12 +84,12 @@ TEST_CASE("recentred, the base is where the configuration has it", "[workspace]"
   RandomValues random(5);
   const Pose X_WB = random.pose();
   Workspace workspace(X_WB);
-  workspace.clutch_in();
-  workspace.clutch_out(random.pose());
-  workspace.follow(random.pose(), kTick_s);
+  workspace.engage_clutch();
+  workspace.disengage_clutch(random.pose());
+  workspace.update(random.pose(), kTick_s);
   workspace.recentre();
   const Pose X_BH = random.pose();
-  CHECK(distance(workspace.follow(X_BH, kTick_s), X_WB * X_BH) < 1e-15);
+  CHECK(distance(workspace.update(X_BH, kTick_s), X_WB * X_BH) < 1e-15);
 }
 
 }  // namespace

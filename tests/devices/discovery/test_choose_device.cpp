@@ -16,7 +16,7 @@ const std::vector<DeviceProfile> kShipped =
 
 UsbDevice reference(const std::string& serial) {
   UsbDevice device;
-  device.place = "3-1";
+  device.port_path = "3-1";
   device.hidraw_node = "/dev/hidraw1";
   device.usb_node = "/dev/bus/usb/003/001";
   device.interface = 0;
@@ -31,7 +31,7 @@ UsbDevice reference(const std::string& serial) {
 
 UsbDevice falcon() {
   UsbDevice device;
-  device.place = "3-2";
+  device.port_path = "3-2";
   device.usb_node = "/dev/bus/usb/003/002";
   device.interface = 0;
   device.vendor = 0x0403;
@@ -39,12 +39,12 @@ UsbDevice falcon() {
   return device;
 }
 
-DeviceChoice choose(const std::vector<UsbDevice>& plugged, const WantedDevice& wanted) {
+DeviceChoice choose(const std::vector<UsbDevice>& plugged, const DeviceCriteria& wanted) {
   return choose_device(plugged, kShipped, wanted);
 }
 
 std::string picked(const DeviceChoice& choice) {
-  return choice.pick ? kShipped[choice.pick->profile].name : "none";
+  return choice.selection ? kShipped[choice.selection->profile].name : "none";
 }
 
 }  // namespace
@@ -52,9 +52,9 @@ std::string picked(const DeviceChoice& choice) {
 TEST_CASE("the device of the profile that is named is picked", "[choose_device]") {
   const DeviceChoice choice = choose({falcon(), reference("A")}, {.profile = "reference_full_speed"});
   REQUIRE(picked(choice) == "reference_full_speed");
-  CHECK(choice.pick->device == 1);
-  CHECK_THAT(choice.why_not[0], Contains("reference_full_speed") && Contains("0403:cb48"));
-  CHECK(choice.why_not[1].empty());
+  CHECK(choice.selection->device == 1);
+  CHECK_THAT(choice.rejections[0], Contains("reference_full_speed") && Contains("0403:cb48"));
+  CHECK(choice.rejections[1].empty());
 }
 
 TEST_CASE("without a name any device is picked that has a profile", "[choose_device]") {
@@ -67,32 +67,32 @@ TEST_CASE("what no profile is for is told where to look", "[choose_device]") {
   UsbDevice stranger = reference("A");
   stranger.vendor = 0x1234;
   const DeviceChoice choice = choose({stranger}, {});
-  CHECK_FALSE(choice.pick);
-  CHECK_THAT(choice.why_not[0], Contains("wrenchctl devices"));
+  CHECK_FALSE(choice.selection);
+  CHECK_THAT(choice.rejections[0], Contains("wrenchctl devices"));
 }
 
 TEST_CASE("two equal devices are told apart by serial number alone", "[choose_device]") {
   const std::vector<UsbDevice> two = {reference("A"), reference("B")};
   const DeviceChoice either = choose(two, {.profile = "reference_full_speed"});
-  CHECK_FALSE(either.pick);
-  CHECK_THAT(either.why_not[0], Contains("serial number A") && Contains("not alone"));
-  CHECK_THAT(either.why_not[1], Contains("serial number B"));
+  CHECK_FALSE(either.selection);
+  CHECK_THAT(either.rejections[0], Contains("serial number A") && Contains("not alone"));
+  CHECK_THAT(either.rejections[1], Contains("serial number B"));
   const DeviceChoice second = choose(two, {.profile = "reference_full_speed", .serial = "B"});
-  REQUIRE(second.pick);
-  CHECK(second.pick->device == 1);
-  CHECK_THAT(second.why_not[0], Contains("wants serial number B"));
-  CHECK_FALSE(choose(two, {.profile = "reference_full_speed", .serial = "C"}).pick);
+  REQUIRE(second.selection);
+  CHECK(second.selection->device == 1);
+  CHECK_THAT(second.rejections[0], Contains("wants serial number B"));
+  CHECK_FALSE(choose(two, {.profile = "reference_full_speed", .serial = "C"}).selection);
 }
 
 TEST_CASE("after an unplugging only the same device is picked", "[choose_device]") {
-  const WantedDevice wanted = {.profile = "reference_full_speed", .serial = {}, .before = reference("A")};
+  const DeviceCriteria wanted = {.profile = "reference_full_speed", .serial = {}, .previous = reference("A")};
   UsbDevice elsewhere = reference("A");
-  elsewhere.place = "1-7";
+  elsewhere.port_path = "1-7";
   elsewhere.hidraw_node = "/dev/hidraw9";
-  CHECK(choose({elsewhere}, wanted).pick);
+  CHECK(choose({elsewhere}, wanted).selection);
   const DeviceChoice other = choose({reference("B")}, wanted);
-  CHECK_FALSE(other.pick);
-  CHECK_THAT(other.why_not[0],
+  CHECK_FALSE(other.selection);
+  CHECK_THAT(other.rejections[0],
              Contains("not the device that was unplugged") && Contains("start wrenchd anew"));
 }
 
@@ -101,19 +101,20 @@ TEST_CASE("a device whose reports are not those of its profile is not picked", "
   other_reports.report_descriptor = from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 0f 91 02 c0");
   const DeviceChoice choice = choose({other_reports}, {.profile = "reference_full_speed"});
-  CHECK_FALSE(choice.pick);
-  CHECK_THAT(choice.why_not[0], Contains("disagrees") && Contains("output report"));
+  CHECK_FALSE(choice.selection);
+  CHECK_THAT(choice.rejections[0], Contains("disagrees") && Contains("output report"));
   other_reports.report_descriptor = {0x75};
-  CHECK_THAT(choose({other_reports}, {.profile = "reference_full_speed"}).why_not[0], Contains("is refused"));
+  CHECK_THAT(choose({other_reports}, {.profile = "reference_full_speed"}).rejections[0],
+             Contains("is refused"));
 }
 
 TEST_CASE("a profile for endpoints takes the interface it names and no other", "[choose_device]") {
   UsbDevice second = falcon();
   second.interface = 1;
   const DeviceChoice choice = choose({second, falcon()}, {.profile = "falcon"});
-  REQUIRE(choice.pick);
-  CHECK(choice.pick->device == 1);
-  CHECK_THAT(choice.why_not[0], Contains("interface 0 of the device, this is 1"));
+  REQUIRE(choice.selection);
+  CHECK(choice.selection->device == 1);
+  CHECK_THAT(choice.rejections[0], Contains("interface 0 of the device, this is 1"));
 }
 
 TEST_CASE("a closed device is refused by name, whatever is wanted", "[choose_device]") {
@@ -121,8 +122,8 @@ TEST_CASE("a closed device is refused by name, whatever is wanted", "[choose_dev
   touch.vendor = 0x2988;
   touch.product = 0x0302;
   const DeviceChoice choice = choose({touch}, {});
-  CHECK_FALSE(choice.pick);
-  CHECK_FALSE(choice.why_not[0].empty());
+  CHECK_FALSE(choice.selection);
+  CHECK_FALSE(choice.rejections[0].empty());
 }
 
 }  // namespace wrenchd

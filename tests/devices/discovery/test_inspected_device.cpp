@@ -26,19 +26,19 @@ using Reports = std::vector<std::pair<int, std::size_t>>;  ///< id and length
 
 Reports in_reports(const Bytes& descriptor) {
   Reports reports;
-  for (const ReportFact& fact : plugged_facts(usb(descriptor, 1, 8)).device.in_reports)
+  for (const InputReportSize& fact : inspect_device(usb(descriptor, 1, 8)).identity.input_reports)
     reports.emplace_back(fact.id, fact.length);
   return reports;
 }
 
 TEST_CASE("a HID device has its ids, strings, usage and in-reports", "[plugged_device]") {
-  const PluggedFacts facts = plugged_facts(usb(space_navigator(), 0x01, 0x08));
-  CHECK(text(facts.device.id) == "046d:c626");
-  CHECK(facts.device.serial == "A1");
-  CHECK(facts.device.product == "SpaceNavigator");
-  CHECK(facts.device.usage_page == 0x01);
-  CHECK(facts.device.usage == 0x08);
-  CHECK(facts.unreadable.empty());
+  const InspectedDevice facts = inspect_device(usb(space_navigator(), 0x01, 0x08));
+  CHECK(text(facts.identity.id) == "046d:c626");
+  CHECK(facts.identity.serial == "A1");
+  CHECK(facts.identity.product == "SpaceNavigator");
+  CHECK(facts.identity.usage_page == 0x01);
+  CHECK(facts.identity.usage == 0x08);
+  CHECK(facts.descriptor_error.empty());
   REQUIRE(facts.descriptor);
   CHECK(facts.descriptor->find(ReportKind::output, 4) != nullptr);
 
@@ -49,30 +49,30 @@ TEST_CASE("a HID device has its ids, strings, usage and in-reports", "[plugged_d
 }
 
 TEST_CASE("what is not HID has no usage, and nothing is wrong with it", "[plugged_device]") {
-  const PluggedFacts facts = plugged_facts(usb({}, 0, 0));
-  CHECK_FALSE(facts.device.usage_page);
-  CHECK_FALSE(facts.device.usage);
-  CHECK(facts.device.in_reports.empty());
+  const InspectedDevice facts = inspect_device(usb({}, 0, 0));
+  CHECK_FALSE(facts.identity.usage_page);
+  CHECK_FALSE(facts.identity.usage);
+  CHECK(facts.identity.input_reports.empty());
   CHECK_FALSE(facts.descriptor);
-  CHECK(facts.unreadable.empty());
+  CHECK(facts.descriptor_error.empty());
 }
 
 TEST_CASE("of a device whose descriptor is refused the rest is known, and why", "[plugged_device]") {
   Bytes cut = space_navigator();
   cut.pop_back();
-  const PluggedFacts facts = plugged_facts(usb(cut, 0x01, 0x08));
-  CHECK(facts.device.usage == 0x08);
-  CHECK(facts.device.in_reports.empty());
+  const InspectedDevice facts = inspect_device(usb(cut, 0x01, 0x08));
+  CHECK(facts.identity.usage == 0x08);
+  CHECK(facts.identity.input_reports.empty());
   CHECK_FALSE(facts.descriptor);
-  CHECK(facts.unreadable.find("byte 216: ") == 0);
+  CHECK(facts.descriptor_error.find("byte 216: ") == 0);
 }
 
 TEST_CASE("whatever a descriptor holds, there are facts or a reason", "[plugged_device]") {
   RandomValues random(31);
-  for (int i = 0; i < repeats(20'000); ++i) {
-    const Bytes bytes = strange_descriptor(random);
-    const PluggedFacts facts = plugged_facts(usb(bytes, 1, 8));
-    if (facts.descriptor.has_value() == !facts.unreadable.empty()) CHECK(bytes.empty());
+  for (int i = 0; i < case_count(20'000); ++i) {
+    const Bytes bytes = malformed_descriptor(random);
+    const InspectedDevice facts = inspect_device(usb(bytes, 1, 8));
+    if (facts.descriptor.has_value() == !facts.descriptor_error.empty()) CHECK(bytes.empty());
   }
 }
 

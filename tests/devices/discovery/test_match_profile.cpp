@@ -23,8 +23,8 @@ std::vector<DeviceProfile> shipped() {
 
 const std::vector<DeviceProfile> kProfiles = shipped();
 
-PluggedDevice plugged(int vendor, int product, std::uint16_t page = 0x01, std::uint16_t usage = 0x08) {
-  PluggedDevice device;
+DeviceIdentity plugged(int vendor, int product, std::uint16_t page = 0x01, std::uint16_t usage = 0x08) {
+  DeviceIdentity device;
   device.id = {static_cast<std::uint16_t>(vendor), static_cast<std::uint16_t>(product)};
   device.usage_page = page;
   device.usage = usage;
@@ -32,17 +32,17 @@ PluggedDevice plugged(int vendor, int product, std::uint16_t page = 0x01, std::u
 }
 
 /// The name of the matching profile, or why there is none.
-std::string matched(const PluggedDevice& device, std::string_view named = {}) {
+std::string matched(const DeviceIdentity& device, std::string_view named = {}) {
   const MatchResult result = match_profile(device, kProfiles, named);
-  REQUIRE(result.why_not.size() == kProfiles.size());
-  return result.profile ? kProfiles[*result.profile].name : result.refused;
+  REQUIRE(result.rejections.size() == kProfiles.size());
+  return result.profile ? kProfiles[*result.profile].name : result.refusal;
 }
 
-std::string why_not(const PluggedDevice& device, const std::string& profile) {
+std::string why_not(const DeviceIdentity& device, const std::string& profile) {
   const auto found = std::find_if(kProfiles.begin(), kProfiles.end(),
                                   [&](const DeviceProfile& p) { return p.name == profile; });
   REQUIRE(found != kProfiles.end());
-  return match_profile(device, kProfiles).why_not[static_cast<std::size_t>(found - kProfiles.begin())];
+  return match_profile(device, kProfiles).rejections[static_cast<std::size_t>(found - kProfiles.begin())];
 }
 
 }  // namespace
@@ -55,72 +55,73 @@ TEST_CASE("each device of the table has its profile", "[match_profile]") {
     CHECK(matched(plugged(0x256f, pid)) == "spacemouse_combined");
   CHECK(matched(plugged(0x16c0, 0x0486, 0xffab, 0x0200)) == "polhem");
   CHECK(matched(plugged(0x1234, 0x0006, 0xffab, 0x0200)) == "polhem_lpc1768");
-  PluggedDevice falcon = plugged(0x0403, 0xcb48);
+  DeviceIdentity falcon = plugged(0x0403, 0xcb48);
   falcon.usage_page.reset();
   falcon.usage.reset();
   CHECK(matched(falcon) == "falcon");
 }
 
 TEST_CASE("the report descriptor decides between split and combined, not the id", "[match_profile]") {
-  PluggedDevice by_hand = plugged(0x046d, 0xc62b);  // passes for a SpaceMouse Pro, speaks the combined format
-  by_hand.in_reports = {{1, 13}, {3, 5}};
+  DeviceIdentity by_hand =
+      plugged(0x046d, 0xc62b);  // passes for a SpaceMouse Pro, speaks the combined format
+  by_hand.input_reports = {{1, 13}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_combined");
   CHECK(why_not(by_hand, "spacemouse_split") ==
         "in-report 1 of the device has 13 bytes, that of the profile 7");
-  by_hand.in_reports = {{1, 7}, {2, 7}, {3, 5}};
+  by_hand.input_reports = {{1, 7}, {2, 7}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_split");
 
-  PluggedDevice old = plugged(0x046d, 0xc623);
+  DeviceIdentity old = plugged(0x046d, 0xc623);
   CHECK(matched(old).empty());
   CHECK_THAT(why_not(old, "spacemouse_split"), Contains("the report descriptor has not been read"));
-  old.in_reports = {{1, 7}, {2, 7}};
+  old.input_reports = {{1, 7}, {2, 7}};
   CHECK(matched(old) == "spacemouse_split");
-  old.in_reports = {{1, 7}, {3, 7}};
+  old.input_reports = {{1, 7}, {3, 7}};
   CHECK(matched(old).empty());
   CHECK(why_not(old, "spacemouse_split") ==
         "in-report 2 of the profile is not in the device's report descriptor");
 }
 
 TEST_CASE("a device without ids is told by the length of its report", "[match_profile]") {
-  PluggedDevice polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
-  polhem.in_reports = {{0, 64}};
+  DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
+  polhem.input_reports = {{0, 64}};
   CHECK(matched(polhem) == "polhem");
-  polhem.in_reports = {{0, 8}};
+  polhem.input_reports = {{0, 8}};
   CHECK(matched(polhem).empty());
 }
 
 TEST_CASE("every profile that does not match says why", "[match_profile]") {
-  const PluggedDevice stranger = plugged(0x1d50, 0x6018);
+  const DeviceIdentity stranger = plugged(0x1d50, 0x6018);
   const MatchResult result = match_profile(stranger, kProfiles);
   CHECK_FALSE(result.profile);
-  CHECK(result.refused.empty());
-  for (const std::string& why : result.why_not) CHECK_FALSE(why.empty());
+  CHECK(result.refusal.empty());
+  for (const std::string& why : result.rejections) CHECK_FALSE(why.empty());
   CHECK(why_not(stranger, "falcon") == "its ids do not include 1d50:6018");
   CHECK(why_not(stranger, "loopback") == "it is for the simulated device");
   CHECK(why_not(plugged(0x16c0, 0x0486, 0xff00, 1), "polhem") ==
         "the usage page is ff00, the profile is for ffab");
   CHECK(why_not(plugged(0x16c0, 0x0486, 0xffab, 1), "polhem") ==
         "the usage is 0001, the profile is for 0200");
-  PluggedDevice unread;
+  DeviceIdentity unread;
   unread.id = {0x16c0, 0x0486};
   CHECK(why_not(unread, "polhem") == "the usage page is not known, the profile is for ffab");
 }
 
 TEST_CASE("a profile that shares its ids is used only where the configuration names it", "[match_profile]") {
-  const PluggedDevice board = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
+  const DeviceIdentity board = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
   CHECK(why_not(board, "woodenhaptics") == "it is used only where the configuration names it");
   CHECK(matched(board, "woodenhaptics") == "woodenhaptics");
   CHECK(matched(board, "falcon").empty());
 }
 
 TEST_CASE("over libusb a profile is for one interface of a device", "[match_profile]") {
-  PluggedDevice falcon = plugged(0x0403, 0xcb48);
+  DeviceIdentity falcon = plugged(0x0403, 0xcb48);
   CHECK(matched(falcon) == "falcon");  // as far as is known
   falcon.interface = 0;
   CHECK(matched(falcon) == "falcon");
   falcon.interface = 1;
   CHECK_THAT(why_not(falcon, "falcon"), Contains("speaks over interface 0") && Contains("this is 1"));
-  PluggedDevice polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are told apart by usage
+  DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are told apart by usage
   polhem.interface = 3;
   CHECK(matched(polhem) == "polhem");
 }
@@ -138,8 +139,8 @@ TEST_CASE("closed devices, and those that only share a vendor, are refused by na
        {0xc650, 0xc651, 0xc654, 0xc655, 0xc656, 0xc657, 0xc658, 0xc664, 0xc665, 0xc668, 0xc62c})
     CHECK_THAT(matched(plugged(0x256f, pid)), Contains("no six-axis device"));
   CHECK_THAT(matched(plugged(0x256f, 0xc641)), Contains("sources disagree"));
-  CHECK(known_unusable({0x256f, 0xc652}) == nullptr);
-  CHECK(known_unusable({0x256f, 0xc653}) == nullptr);
+  CHECK(find_unusable_device({0x256f, 0xc652}) == nullptr);
+  CHECK(find_unusable_device({0x256f, 0xc653}) == nullptr);
 }
 
 TEST_CASE("a refused device stays refused when a profile claims it", "[match_profile]") {
@@ -161,17 +162,18 @@ TEST_CASE("two equal devices are told apart by serial number", "[match_profile]"
   right.match.serial = "B2";
   any.name = "any";
   const std::vector<DeviceProfile> profiles = {any, left, right};
-  PluggedDevice device = plugged(0x1209, 0x0007);
+  DeviceIdentity device = plugged(0x1209, 0x0007);
   device.serial = "B2";
   CHECK(match_profile(device, profiles).profile == 2u);
-  CHECK(match_profile(device, profiles).why_not[1] == "it is for serial number A1, not B2");
+  CHECK(match_profile(device, profiles).rejections[1] == "it is for serial number A1, not B2");
   device.serial = "C3";
   CHECK(match_profile(device, profiles).profile == 0u);
   device.serial.clear();
   CHECK(match_profile(device, profiles).profile == 0u);
-  CHECK(match_profile(device, profiles).why_not[1] == "it is for serial number A1, not a device without one");
+  CHECK(match_profile(device, profiles).rejections[1] ==
+        "it is for serial number A1, not a device without one");
 
   const std::vector<DeviceProfile> same = {any, any};
   CHECK_FALSE(match_profile(device, same).profile);
-  CHECK_THAT(match_profile(device, same).refused, Contains("several profiles match 1209:0007"));
+  CHECK_THAT(match_profile(device, same).refusal, Contains("several profiles match 1209:0007"));
 }

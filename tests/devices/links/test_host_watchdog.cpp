@@ -40,13 +40,13 @@ WrenchReport push(std::uint64_t sequence) {
 /// A writer that has heard that, at kStart.
 struct Said {
   DeviceProfile profile;
-  LastWord word;
+  HostWatchdog word;
   Packet packet;
 
   Said(const DeviceProfile& of, const WrenchReport& report) : profile(of), word(profile, kAfter) {
-    word.heard(kStart, packet_of(profile, report));
+    word.feed(kStart, packet_of(profile, report));
   }
-  bool speaks(TimePoint now) { return word.speak(now, packet); }
+  bool speaks(TimePoint now) { return word.send_zero(now, packet); }
   WrenchReport spoken() const { return decode(profile.wrench_report, packet.report()).report; }
 };
 
@@ -55,7 +55,7 @@ TEST_CASE("a loop that pushes and falls silent is spoken for: zero wrench, motor
   CHECK(said.word.due() == kStart + kAfter);
   CHECK_FALSE(said.speaks(kStart + kAfter - 1ns));
   TimePoint now = kStart + kAfter;
-  for (unsigned n = 1; n <= LastWord::kTimes; ++n, now += LastWord::kBetween) {
+  for (unsigned n = 1; n <= HostWatchdog::kZeroReports; ++n, now += HostWatchdog::kZeroInterval) {
     REQUIRE(said.word.due() == now);
     REQUIRE(said.speaks(now));
     const WrenchReport report = said.spoken();
@@ -76,11 +76,11 @@ TEST_CASE("whoever goes on speaking is not interrupted", "[last_word]") {
   for (std::uint64_t n = 2; n < 100; ++n) {
     now += 1ms;
     CHECK_FALSE(said.speaks(now));
-    said.word.heard(now, packet_of(said.profile, push(n)));
+    said.word.feed(now, packet_of(said.profile, push(n)));
   }
   CHECK(said.speaks(now + kAfter));
   // One that comes back is heard again, and spoken for again.
-  said.word.heard(now + 1s, packet_of(said.profile, push(7)));
+  said.word.feed(now + 1s, packet_of(said.profile, push(7)));
   CHECK_FALSE(said.speaks(now + 1s));
   REQUIRE(said.speaks(now + 1s + kAfter));
   CHECK(said.spoken().sequence == 8);
@@ -95,11 +95,11 @@ TEST_CASE("a silence without a push is nobody's business", "[last_word]") {
   WrenchReport off = push(1);
   off.enable = false;
   CHECK(Said(profile, off).word.due() == TimePoint::max());
-  CHECK(LastWord().due() == TimePoint::max());
+  CHECK(HostWatchdog().due() == TimePoint::max());
   // A device without motors.
   DeviceProfile mouse = shipped("spacemouse_split");
   REQUIRE_FALSE(mouse.has_output);
-  CHECK(LastWord(mouse, kAfter).due() == TimePoint::max());
+  CHECK(HostWatchdog(mouse, kAfter).due() == TimePoint::max());
 }
 
 TEST_CASE("what is no wrench leaves the last one standing", "[last_word]") {
@@ -107,7 +107,7 @@ TEST_CASE("what is no wrench leaves the last one standing", "[last_word]") {
   Packet other;
   other.length = 3;
   other.bytes[0] = 0x7f;
-  said.word.heard(kStart + 5ms, other);
+  said.word.feed(kStart + 5ms, other);
   CHECK(said.word.due() == kStart + kAfter);
   CHECK(said.speaks(kStart + kAfter));
 }
@@ -130,7 +130,7 @@ TEST_CASE("the last word neither allocates nor locks", "[last_word]") {
   std::uint64_t allocations = 0, locks = 0;
   {
     const test::RealtimeGuard guard;
-    said.word.heard(kStart, packet);
+    said.word.feed(kStart, packet);
     said.speaks(kStart + kAfter);
     allocations = guard.allocations(), locks = guard.locks();
   }

@@ -67,10 +67,10 @@ struct Bench {
   LatestWriter writer;
   TimePoint now{1h};
 
-  explicit Bench(const LinkSettings& settings = {.close_within = 1h})
+  explicit Bench(const LinkSettings& settings = {.close_timeout = 1h})
       : writer([gate = gate](auto report) { return gate->write(report); }, settings) {}
 
-  LinkStatus hand_over(std::uint8_t n) { return writer.hand_over(now, std::array{n}); }
+  LinkStatus hand_over(std::uint8_t n) { return writer.submit(now, std::array{n}); }
 };
 
 using Bytes = std::vector<std::uint8_t>;
@@ -96,7 +96,7 @@ TEST_CASE("while a write is stuck the newest report waits, the others are droppe
   bench.gate->await_begun(1);
   for (std::uint8_t n = 2; n <= 9; ++n) {
     bench.now += 1ms;
-    CHECK(bench.hand_over(n) == (n > 5 ? LinkStatus::empty : LinkStatus::ok));
+    CHECK(bench.hand_over(n) == (n > 5 ? LinkStatus::not_ready : LinkStatus::ok));
   }
   bench.gate->set_open(true);
   CHECK(bench.writer.close());
@@ -108,9 +108,9 @@ TEST_CASE("the last report handed over is the last one written, at every close",
   for (int round = 0; round < 200; ++round) {
     auto gate = std::make_shared<Gate>();
     {
-      LatestWriter writer([gate](auto report) { return gate->write(report); }, {.close_within = 1h});
-      for (std::uint8_t n = 1; n <= 20; ++n) writer.hand_over(TimePoint{1h}, std::array{n});
-      writer.hand_over(TimePoint{1h}, std::array<std::uint8_t, 1>{0});  // the zeros
+      LatestWriter writer([gate](auto report) { return gate->write(report); }, {.close_timeout = 1h});
+      for (std::uint8_t n = 1; n <= 20; ++n) writer.submit(TimePoint{1h}, std::array{n});
+      writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{0});  // the zeros
     }
     REQUIRE_FALSE(gate->taken().empty());
     REQUIRE(gate->taken().back() == 0);
@@ -118,7 +118,7 @@ TEST_CASE("the last report handed over is the last one written, at every close",
 }
 
 TEST_CASE("close does not wait for ever, and the last report is written once it can be", "[usb]") {
-  Bench bench({.close_within = 1ms});
+  Bench bench({.close_timeout = 1ms});
   bench.gate->set_open(false);
   bench.hand_over(1);
   bench.gate->await_begun(1);
@@ -136,8 +136,8 @@ TEST_CASE("what a write needs is kept until the write is over", "[usb]") {
   auto gate = std::make_shared<Gate>();
   gate->set_open(false);
   {
-    LatestWriter writer([gate](auto report) { return gate->write(report); }, {.close_within = 1ms});
-    writer.hand_over(TimePoint{1h}, std::array<std::uint8_t, 1>{7});
+    LatestWriter writer([gate](auto report) { return gate->write(report); }, {.close_timeout = 1ms});
+    writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{7});
     gate->await_begun(1);
   }
   CHECK(gate.use_count() > 1);
@@ -148,10 +148,10 @@ TEST_CASE("what a write needs is kept until the write is over", "[usb]") {
 
 TEST_CASE("a device that is gone ends the writing", "[usb]") {
   Bench bench;
-  bench.gate->status = LinkStatus::gone;
+  bench.gate->status = LinkStatus::disconnected;
   bench.hand_over(1);
-  while (!bench.writer.slot().gone()) std::this_thread::yield();
-  CHECK(bench.hand_over(2) == LinkStatus::gone);
+  while (!bench.writer.slot().disconnected()) std::this_thread::yield();
+  CHECK(bench.hand_over(2) == LinkStatus::disconnected);
   CHECK_FALSE(bench.writer.close());
   CHECK(bench.gate->taken() == Bytes{1});
 }
@@ -163,20 +163,20 @@ TEST_CASE("a loop that is stuck while it pushes is spoken for by the writer", "[
   push.enable = true;
   std::array<std::uint8_t, kMaxReportBytes> bytes{};
   const std::size_t length = encode(profile.wrench_report, push, bytes);
-  Bench bench({.close_within = 1h, .last_word = LastWord(profile, 6ms)});
+  Bench bench({.close_timeout = 1h, .host_watchdog = HostWatchdog(profile, 6ms)});
   for (const std::size_t stalls : {1U, 2U}) {
     const TimePoint start = std::chrono::steady_clock::now();
-    bench.writer.hand_over(start, std::span(bytes).first(length));
-    bench.gate->await_taken(stalls * (1 + LastWord::kTimes));
+    bench.writer.submit(start, std::span(bytes).first(length));
+    bench.gate->await_taken(stalls * (1 + HostWatchdog::kZeroReports));
     CHECK(std::chrono::steady_clock::now() - start >= 6ms);
     std::this_thread::sleep_for(20ms);
-    CHECK(bench.gate->taken().size() == stalls * (1 + LastWord::kTimes));
+    CHECK(bench.gate->taken().size() == stalls * (1 + HostWatchdog::kZeroReports));
   }
 }
 
 TEST_CASE("a write that throws is a write that failed", "[usb]") {
-  LatestWriter writer([](auto) -> LinkStatus { throw std::runtime_error("no"); }, {.close_within = 1h});
-  writer.hand_over(TimePoint{1h}, std::array<std::uint8_t, 1>{1});
+  LatestWriter writer([](auto) -> LinkStatus { throw std::runtime_error("no"); }, {.close_timeout = 1h});
+  writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{1});
   CHECK_FALSE(writer.close());
   CHECK(writer.slot().failed() == 1);
 }

@@ -119,7 +119,7 @@ Resolution resolution_at(const DeviceProfile& profile, const Pose& X_BH) {
     const double half_count_rad = 0.5 * std::abs(k.rad_per_count[i]);
     JointAngles off = *angles;
     off[i] += half_count_rad;
-    const auto moved = forward(k, off, X_DE);
+    const auto moved = forward_kinematics(k, off, X_DE);
     REQUIRE(moved);
     sum.m += 1.02 * (moved->translation_m - X_DE.translation_m).norm();
     if (k.joints == kMaxJoints) sum.rad += half_count_rad;
@@ -134,7 +134,7 @@ Pose on_counts(const DeviceProfile& profile, const Pose& X_BH) {
   const Pose X_DE = inverse(profile.X_BD) * X_BH * inverse(profile.X_EH);
   JointCounts counts = joint_counts(k, *wrenchd::inverse(k, X_DE));
   for (double& count : counts) count = std::round(count);
-  return profile.X_BD * *forward(k, joint_angles(k, counts), X_DE) * profile.X_EH;
+  return profile.X_BD * *forward_kinematics(k, joint_angles(k, counts), X_DE) * profile.X_EH;
 }
 
 double apart_m(const Pose& a, const Pose& b) {
@@ -205,7 +205,7 @@ TEST_CASE("a wrench arrives as force on the simulated handle, for every shipped 
     const Vector3d moved = s.link->device().X_BH().translation_m - before.translation_m;
     if (driven == kNoDof) {
       CHECK(felt.force_N.isZero());
-      CHECK(s.sample.dropped == kAllDofs);
+      CHECK(s.sample.dropped_dofs == kAllDofs);
       continue;
     }
     // Efforts are counts too: a milliampere, or a count of 4096.
@@ -272,8 +272,8 @@ TEST_CASE("a host that hangs: the watchdog of the profile frees the hand, where 
 
 TEST_CASE("faults of the wire show on every shipped profile as they do on the simulated device",
           "[simulation]") {
-  const Kind kind =
-      GENERATE(Kind::unplug, Kind::silence, Kind::freeze, Kind::garble, Kind::short_report, Kind::deaf);
+  const Kind kind = GENERATE(Kind::unplug, Kind::silence, Kind::freeze, Kind::corrupt, Kind::short_report,
+                             Kind::refuse_commands);
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name << ", fault " << static_cast<int>(kind));
     SimulationSettings settings = moving();
@@ -292,7 +292,7 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
       if (written == Fault::none) written = s.written;
     });
     const PoseReportLayout& report = profile.pose_report;
-    const std::size_t least = report.least_length == 0 ? report.length : report.least_length;
+    const std::size_t least = report.min_length == 0 ? report.length : report.min_length;
     switch (kind) {
       case Kind::unplug:
         CHECK(fault == Fault::device_lost);
@@ -305,13 +305,13 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
       case Kind::freeze:  // without a sequence nobody can tell
         CHECK((rejected > 400) == report.sequence.present);
         break;
-      case Kind::garble:  // nor without a checksum
+      case Kind::corrupt:  // nor without a checksum
         CHECK((rejected > 400) == (report.checksum != Checksum::none));
         break;
       case Kind::short_report:
         CHECK((rejected > 25) == (report.length / 2 < least));
         break;
-      case Kind::deaf:
+      case Kind::refuse_commands:
         CHECK((written == Fault::write_failed) == profile.has_output);
         break;
       default:
@@ -336,20 +336,20 @@ TEST_CASE("a pose that is wrong on request shows where a device can tell one", "
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, still());
-    HeldDevice& device = s.link->device();
+    DeviceInHand& device = s.link->device();
     const bool tells_pose = pose_source(profile) == PoseSource::pose;
     if (!tells_pose)
       CHECK_THROWS_WITH(device.inject({Kind::bad_quaternion, 0s, 1s}), Contains("that could be bad"));
     if (is_cap(profile)) {
-      CHECK_THROWS_WITH(device.inject({Kind::teleport, 0s, 1s}), Contains("that could be bad"));
+      CHECK_THROWS_WITH(device.inject({Kind::jump, 0s, 1s}), Contains("that could be bad"));
       continue;
     }
-    device.inject({Kind::teleport, 2500ms, 100ms});
+    device.inject({Kind::jump, 2500ms, 100ms});
     if (tells_pose) device.inject({Kind::bad_quaternion, 2800ms, 100ms});
     s.settle();
     int teleported = 0, bad = 0;
     s.run(1s, [&] {
-      teleported += s.sample.fault == Fault::pose_teleported ? 1 : 0;
+      teleported += s.sample.fault == Fault::pose_jumped ? 1 : 0;
       bad += s.sample.fault == Fault::pose_not_a_rotation ? 1 : 0;
     });
     CHECK(teleported == 2);

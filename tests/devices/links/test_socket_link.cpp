@@ -68,7 +68,7 @@ TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_
   SocketLink link(pair.near);
   link.open();
   std::array<std::uint8_t, 4> buffer{};
-  CHECK(link.read(kNow, buffer).status == LinkStatus::empty);
+  CHECK(link.read(kNow, buffer).status == LinkStatus::not_ready);
   pair.say({1, 2, 3});
   pair.say({4, 5, 6, 7, 8, 9});
   pair.say({});
@@ -86,7 +86,7 @@ TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_
   CHECK(read.status == LinkStatus::ok);  // a report of no bytes is no end
   CHECK(read.length == 0);
   CHECK(link.read(kNow, buffer).length == 1);
-  CHECK(link.read(kNow, buffer).status == LinkStatus::empty);
+  CHECK(link.read(kNow, buffer).status == LinkStatus::not_ready);
 
   CHECK(link.write(kNow, Bytes{7, 8}) == LinkStatus::ok);
   CHECK(pair.hear() == Bytes{7, 8});
@@ -99,7 +99,7 @@ TEST_CASE("a device that does not read makes a write fail and not wait", "[socke
   SocketLink link(pair.near);
   link.open();
   const Bytes report(32, 1);
-  CHECK(written_until(link, report, LinkStatus::empty));
+  CHECK(written_until(link, report, LinkStatus::not_ready));
   CHECK(pair.hear() == report);
   CHECK(written_until(link, report, LinkStatus::ok));  // there is room again
 }
@@ -112,8 +112,8 @@ TEST_CASE("when the other end of a socket is gone, so is the device", "[socket_l
   pair.say({1});
   pair.hang_up();
   CHECK(link.read(kNow, buffer).status == LinkStatus::ok);  // what it said before
-  CHECK(link.read(kNow, buffer).status == LinkStatus::gone);
-  CHECK(written_until(link, Bytes{1}, LinkStatus::gone));
+  CHECK(link.read(kNow, buffer).status == LinkStatus::disconnected);
+  CHECK(written_until(link, Bytes{1}, LinkStatus::disconnected));
   CHECK_THROWS_WITH(link.open(), Catch::Contains("nobody is at its other end"));
 }
 
@@ -121,11 +121,11 @@ TEST_CASE("a closed socket link is silent, and speaks again when it is opened", 
   const Pair pair;
   SocketLink link(pair.near);
   std::array<std::uint8_t, 4> buffer{};
-  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::gone);
+  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::disconnected);
   link.open();
   link.close();
-  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::gone);
-  CHECK(link.read(kNow, buffer).status == LinkStatus::gone);
+  CHECK(link.write(kNow, Bytes{1}) == LinkStatus::disconnected);
+  CHECK(link.read(kNow, buffer).status == LinkStatus::disconnected);
   CHECK(pair.hear_now().empty());
   link.open();
   CHECK(link.write(kNow, Bytes{1}) == LinkStatus::ok);

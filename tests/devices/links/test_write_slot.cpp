@@ -30,27 +30,27 @@ TEST_CASE("the newest report wins the slot and those before it are counted", "[u
   WriteSlot slot(4ms);
   Packet packet;
   CHECK_FALSE(slot.take(packet));
-  for (int n = 1; n <= 5; ++n) CHECK(slot.hand_over(kStart, report(n)) == LinkStatus::ok);
+  for (int n = 1; n <= 5; ++n) CHECK(slot.submit(kStart, report(n)) == LinkStatus::ok);
   REQUIRE(slot.take(packet));
   CHECK(number_in(packet) == 5);
   CHECK(packet.length == 3);
   CHECK(slot.replaced() == 4);
   CHECK_FALSE(slot.take(packet));
-  slot.end(LinkStatus::ok);
+  slot.complete(LinkStatus::ok);
   CHECK(slot.written() == 1);
 }
 
 TEST_CASE("a write without end is told after the deadline, however often one hands over", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
-  slot.hand_over(kStart, report(0));
+  slot.submit(kStart, report(0));
   REQUIRE(slot.take(packet));
   for (int n = 1; n <= 10; ++n)
-    CHECK(slot.hand_over(kStart + n * 1ms, report(n)) == (n > 4 ? LinkStatus::empty : LinkStatus::ok));
+    CHECK(slot.submit(kStart + n * 1ms, report(n)) == (n > 4 ? LinkStatus::not_ready : LinkStatus::ok));
   CHECK(slot.overdue(kStart + 11ms));
 
-  slot.end(LinkStatus::ok);  // at last: what is written next is the newest
-  CHECK(slot.hand_over(kStart + 12ms, report(12)) == LinkStatus::ok);
+  slot.complete(LinkStatus::ok);  // at last: what is written next is the newest
+  CHECK(slot.submit(kStart + 12ms, report(12)) == LinkStatus::ok);
   REQUIRE(slot.take(packet));
   CHECK(number_in(packet) == 12);
   CHECK(slot.replaced() == 10);
@@ -59,7 +59,7 @@ TEST_CASE("a write without end is told after the deadline, however often one han
 TEST_CASE("a writer that never takes anything is overdue as well", "[usb]") {
   WriteSlot slot(4ms);
   CHECK_FALSE(slot.overdue(kStart + 1h));
-  slot.hand_over(kStart, report(1));
+  slot.submit(kStart, report(1));
   CHECK_FALSE(slot.overdue(kStart + 4ms));
   CHECK(slot.overdue(kStart + 4ms + 1ns));
 }
@@ -68,9 +68,9 @@ TEST_CASE("a slow writer that comes along is not overdue", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   for (int n = 0; n < 1000; ++n) {
-    REQUIRE(slot.hand_over(kStart + n * 1ms, report(n)) == LinkStatus::ok);
+    REQUIRE(slot.submit(kStart + n * 1ms, report(n)) == LinkStatus::ok);
     if (n % 3 != 0) continue;
-    if (n > 0) slot.end(LinkStatus::ok);
+    if (n > 0) slot.complete(LinkStatus::ok);
     REQUIRE(slot.take(packet));
     REQUIRE(number_in(packet) == n);
   }
@@ -79,21 +79,21 @@ TEST_CASE("a slow writer that comes along is not overdue", "[usb]") {
 TEST_CASE("silence between two commands is not held against the writer", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
-  slot.hand_over(kStart, report(1));
+  slot.submit(kStart, report(1));
   slot.take(packet);
-  slot.end(LinkStatus::ok);
-  CHECK(slot.hand_over(kStart + 1h, report(2)) == LinkStatus::ok);
+  slot.complete(LinkStatus::ok);
+  CHECK(slot.submit(kStart + 1h, report(2)) == LinkStatus::ok);
 }
 
 TEST_CASE("a failed write is told once, with the next report", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
-  slot.hand_over(kStart, report(1));
+  slot.submit(kStart, report(1));
   slot.take(packet);
-  slot.end(LinkStatus::empty);
+  slot.complete(LinkStatus::not_ready);
   CHECK(slot.failed() == 1);
-  CHECK(slot.hand_over(kStart + 1ms, report(2)) == LinkStatus::empty);
-  CHECK(slot.hand_over(kStart + 2ms, report(3)) == LinkStatus::ok);
+  CHECK(slot.submit(kStart + 1ms, report(2)) == LinkStatus::not_ready);
+  CHECK(slot.submit(kStart + 2ms, report(3)) == LinkStatus::ok);
   REQUIRE(slot.take(packet));
   CHECK(number_in(packet) == 3);
 }
@@ -101,18 +101,18 @@ TEST_CASE("a failed write is told once, with the next report", "[usb]") {
 TEST_CASE("once there is nobody to write to, no report is taken", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
-  slot.hand_over(kStart, report(1));
+  slot.submit(kStart, report(1));
   slot.take(packet);
-  slot.end(LinkStatus::gone);
-  CHECK(slot.hand_over(kStart + 1ms, report(2)) == LinkStatus::gone);
+  slot.complete(LinkStatus::disconnected);
+  CHECK(slot.submit(kStart + 1ms, report(2)) == LinkStatus::disconnected);
   CHECK_FALSE(slot.take(packet));
 }
 
 TEST_CASE("a report that is too long is refused and the one before it stays", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
-  slot.hand_over(kStart, report(1));
-  CHECK(slot.hand_over(kStart, std::vector<std::uint8_t>(kMaxReportBytes + 1)) == LinkStatus::empty);
+  slot.submit(kStart, report(1));
+  CHECK(slot.submit(kStart, std::vector<std::uint8_t>(kMaxReportBytes + 1)) == LinkStatus::not_ready);
   REQUIRE(slot.take(packet));
   CHECK(number_in(packet) == 1);
 }
@@ -124,10 +124,10 @@ TEST_CASE("handing over and taking neither allocate nor lock", "[usb][realtime]"
   {
     const RealtimeGuard guard;
     for (int n = 0; n < 1000; ++n) {
-      slot.hand_over(kStart + n * 1ms, report(n));
-      slot.hand_over(kStart + n * 1ms, report(n));
+      slot.submit(kStart + n * 1ms, report(n));
+      slot.submit(kStart + n * 1ms, report(n));
       slot.take(packet);
-      slot.end(n % 7 == 0 ? LinkStatus::empty : LinkStatus::ok);
+      slot.complete(n % 7 == 0 ? LinkStatus::not_ready : LinkStatus::ok);
     }
     seen = guard.allocations() + guard.locks();
   }

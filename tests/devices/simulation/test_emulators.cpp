@@ -75,8 +75,8 @@ TEST_CASE("a SpaceMouse that nobody touches is silent, and that is no fault", "[
     }
     CHECK(same_bits(bench.sample.X_BH, {}));
     CHECK(bench.sample.sequence == 0);
-    CHECK(bench.sample.sensed == kAllDofs);
-    CHECK(bench.sample.driven == kNoDof);
+    CHECK(bench.sample.sensed_dofs == kAllDofs);
+    CHECK(bench.sample.driven_dofs == kNoDof);
   }
 }
 
@@ -88,7 +88,7 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
     Bench<Mouse> bench(name, format);
     bench.open();
     bench.steps(100);
-    bench.emulator.push({280, 140, 70, 0, 0, 0});
+    bench.emulator.set_deflection({280, 140, 70, 0, 0, 0});
     const TimePoint pushed = bench.clock.now();
     while (bench.sample.V_BH.linear_m_per_s.isZero()) bench.step();
     CHECK(bench.clock.now() - pushed <= 17ms);
@@ -101,7 +101,7 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
     CHECK((way - expected).norm() < 1e-6);
     CHECK(bench.sample.X_BH.rotation.angularDistance(Quaterniond::Identity()) < 1e-9);
 
-    bench.emulator.push({0, 0, 0, 0, 0, -200});  // about z down: the other way about z up
+    bench.emulator.set_deflection({0, 0, 0, 0, 0, -200});  // about z down: the other way about z up
     bench.steps(40);
     const Quaterniond before = bench.sample.X_BH.rotation;
     bench.steps(500);
@@ -114,25 +114,25 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
 TEST_CASE("a cap's buttons bring the pose back to where it began, and make it slow", "[emulators]") {
   Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
   bench.open();
-  bench.emulator.push({0, -350, 0, 0, 0, 100});
+  bench.emulator.set_deflection({0, -350, 0, 0, 0, 100});
   bench.steps(500);
   const double fast_m_per_s = bench.sample.V_BH.linear_m_per_s.norm();
   CHECK(fast_m_per_s == Approx(71.0 * 1.4e-3));
   REQUIRE(bench.sample.X_BH.translation_m.x() > 0.02);
 
-  bench.emulator.press(2);
+  bench.emulator.set_buttons(2);
   bench.steps(20);
   CHECK(bench.sample.V_BH.linear_m_per_s.norm() == Approx(0.2 * fast_m_per_s));
-  bench.emulator.press(0);
+  bench.emulator.set_buttons(0);
   bench.steps(20);
   CHECK(bench.sample.V_BH.linear_m_per_s.norm() == Approx(fast_m_per_s));
 
-  bench.emulator.push({});
+  bench.emulator.set_deflection({});
   bench.steps(60);
-  bench.emulator.press(1);
+  bench.emulator.set_buttons(1);
   bench.steps(20);
   CHECK(same_bits(bench.sample.X_BH, {}));
-  bench.emulator.push({0, -350, 0, 0, 0, 0});  // pressed as it is, the pose goes on from there
+  bench.emulator.set_deflection({0, -350, 0, 0, 0, 0});  // pressed as it is, the pose goes on from there
   bench.steps(500);
   CHECK(bench.sample.X_BH.translation_m.x() > 0.02);
 }
@@ -140,9 +140,9 @@ TEST_CASE("a cap's buttons bring the pose back to where it began, and make it sl
 TEST_CASE("a cap let go sends three packets of zeros and the pose stays", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
-  bench.emulator.push({100, 0, 0, 50, 0, 0});
+  bench.emulator.set_deflection({100, 0, 0, 50, 0, 0});
   bench.steps(100);
-  bench.emulator.push({});
+  bench.emulator.set_deflection({});
   bench.steps(40);
   const std::uint64_t heard = bench.sample.sequence;
   const Pose left = bench.sample.X_BH;
@@ -156,10 +156,10 @@ TEST_CASE("a SpaceMouse that falls silent while it is pushed stops the tool, and
           "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
-  bench.emulator.push({100, 0, 0, 0, 0, 0});
+  bench.emulator.set_deflection({100, 0, 0, 0, 0, 0});
   bench.steps(100);
   REQUIRE_FALSE(bench.sample.V_BH.linear_m_per_s.isZero());
-  bench.emulator.fall_silent();  // its battery, or the radio
+  bench.emulator.stop_sending();  // its battery, or the radio
   int faults = 0;
   for (int i = 0; i < 1000; ++i) {
     bench.step();
@@ -173,10 +173,10 @@ TEST_CASE("a SpaceMouse that falls silent while it is pushed stops the tool, and
 TEST_CASE("buttons come through, the LED is switched off at the end", "[emulators]") {
   Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
   bench.open();
-  bench.emulator.press(2);
+  bench.emulator.set_buttons(2);
   bench.steps(20);
   CHECK(bench.sample.buttons == 2);
-  bench.emulator.press(0);
+  bench.emulator.set_buttons(0);
   bench.steps(20);
   CHECK(bench.sample.buttons == 0);
   CHECK(bench.emulator.take_command(bench.clock.now(), std::array<std::uint8_t, 2>{4, 1}));
@@ -191,9 +191,9 @@ TEST_CASE("a wrench for a device without motors is dropped, and told", "[emulato
   bench.step({{1, 0, 0}, {0, 0, 0.1}}, true);
   CHECK(bench.last_write == Fault::none);
   bench.step();
-  CHECK(dof_text(bench.sample.dropped) == "x rz");  // of the write before
+  CHECK(dof_text(bench.sample.dropped_dofs) == "x rz");  // of the write before
   bench.step();
-  CHECK(bench.sample.dropped == kNoDof);
+  CHECK(bench.sample.dropped_dofs == kNoDof);
 }
 
 // --- Polhem -----------------------------------------------------------------------------------------------
@@ -205,7 +205,7 @@ TEST_CASE("encoders put in come out as the pose that the maker's formulas give",
   };
   for (const auto& [name, bytes] : {std::pair("polhem", 64u), {"polhem_lpc1768", 14u}}) {
     Bench<EmulatedPolhem> bench(name, bytes);
-    bench.emulator.turn({0, 0, -5000, 0, 0, 0});
+    bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
     bench.open();
     bench.steps(5);
     std::array<int, 6> counts = {0, 0, -5000, 0, 0, 0};
@@ -216,11 +216,11 @@ TEST_CASE("encoders put in come out as the pose that the maker's formulas give",
         auto& wrist = counts[static_cast<std::size_t>(j + 3)];
         wrist = std::clamp(wrist + between(-1, 1), -300, 300);
       }
-      bench.emulator.turn(counts);
-      bench.emulator.press(i % 100 < 50);
+      bench.emulator.set_encoder_counts(counts);
+      bench.emulator.set_handle_button(i % 100 < 50);
       bench.steps(2);
       REQUIRE(bench.sample.fault == Fault::none);
-      const PolhemPlace place = polhem_place(counts);
+      const PolhemPose place = polhem_pose(counts);
       REQUIRE((bench.sample.X_BH.translation_m - kHalfTurn * place.p).norm() < 1e-9);
       const Matrix3d R = kHalfTurn * place.R * kHalfTurn;
       REQUIRE((bench.sample.X_BH.rotation.toRotationMatrix() - R).cwiseAbs().maxCoeff() < 1e-9);
@@ -235,10 +235,10 @@ TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas",
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   Bench<EmulatedPolhem> bench("polhem", 64u);
   const std::array<int, 6> counts = {700, -400, -4600, 20, 60, -40};
-  bench.emulator.turn(counts);
+  bench.emulator.set_encoder_counts(counts);
   bench.open();
   bench.steps(5);
-  const PolhemPlace place = polhem_place(counts);
+  const PolhemPose place = polhem_pose(counts);
   for (int i = 0; i < 500; ++i) {
     const Vector3d F(2 * unit(random), 2 * unit(random), 2 * unit(random));
     bench.step({F, {0, 0, 0}}, true);
@@ -247,12 +247,12 @@ TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas",
       REQUIRE(std::abs(bench.emulator.currents_mA()[j] - expected_mA[j]) <= 0.5 + 1e-6);
   }
   bench.step({{1, 0, 0}, {0, 0.2, 0}}, true);
-  CHECK(dof_text(bench.device.read_newest(bench.clock.now()).dropped) == "ry");
+  CHECK(dof_text(bench.device.read_newest(bench.clock.now()).dropped_dofs) == "ry");
 }
 
 TEST_CASE("a Polhem speaks only when spoken to, and wrenchd speaks first", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
-  bench.emulator.turn({0, 0, -5000, 0, 0, 0});
+  bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   struct Nobody final : ReportSink {
     void take_report(TimePoint, std::span<const std::uint8_t>) noexcept override {}
   } nobody;
@@ -276,7 +276,7 @@ TEST_CASE("a Polhem speaks only when spoken to, and wrenchd speaks first", "[emu
 TEST_CASE("a Polhem's amplifiers are off half a second after the last report, and at once after a release",
           "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
-  bench.emulator.turn({0, 0, -5000, 0, 0, 0});
+  bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   bench.open();
   bench.steps(5);
   bench.step({{0, 0, 1}, {0, 0, 0}}, true);
@@ -304,8 +304,8 @@ TEST_CASE("a Polhem's amplifiers are off half a second after the last report, an
 
 TEST_CASE("the profile's calibration sets the counters to home", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
-  bench.emulator.turn({12, 34, 56, 7, 8, 9});  // powered on at home, counters anywhere
-  bench.emulator.ask_for_calibration();
+  bench.emulator.set_encoder_counts({12, 34, 56, 7, 8, 9});  // powered on at home, counters anywhere
+  bench.emulator.press_calibration_button();
   bench.link.open();
   CHECK(bench.link.write(bench.clock.now(), bench.profile.calibration.bytes) == LinkStatus::ok);
   CHECK(bench.emulator.currents_mA() == std::array<int, 3>{});
@@ -324,7 +324,7 @@ TEST_CASE("a Falcon is started: handshake, firmware with its echo, speed", "[emu
   EmulatedFalcon falcon;
   SECTION("at once") {}
   SECTION("with blocks that come back wrong, as real ones do") {
-    falcon.spoil_loading(3);
+    falcon.corrupt_firmware_echoes(3);
   }
   SECTION("with a loader that is slow to answer") {
     falcon.ignore_handshakes(42);
@@ -342,7 +342,7 @@ TEST_CASE("a Falcon that cannot be started is given up with a reason", "[emulato
   CHECK_THROWS_WITH(falcon_start(dead, firmware, 2),
                     Contains("its loader does not answer") && Contains("2 tries"));
   EmulatedFalcon deaf;
-  deaf.spoil_loading(1'000'000);
+  deaf.corrupt_firmware_echoes(1'000'000);
   CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("came back wrong"));
   CHECK_THROWS_WITH(falcon_start(deaf, {}), Contains("the firmware is empty"));
   CHECK(deaf.state() != EmulatedFalcon::State::running);
@@ -361,7 +361,7 @@ TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it 
   CHECK(falcon.firmware() == std::vector<std::uint8_t>(700, 'x'));
   falcon.write(std::vector<std::uint8_t>{'<', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'B',
                                          'A', '>'});
-  falcon.home();
+  falcon.perform_homing();
   falcon_open(falcon, "");  // it runs one, and knows where it is
   CHECK(falcon.homed());
   CHECK(falcon.firmware().size() == 700);
@@ -370,25 +370,25 @@ TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it 
 
 TEST_CASE("what the Falcon's profile says of its link", "[emulators]") {
   const LinkSettings settings = link_settings(shipped("falcon"));
-  CHECK(settings.in == 0x81);
-  CHECK(settings.out == 0x02);
+  CHECK(settings.in_endpoint == 0x81);
+  CHECK(settings.out_endpoint == 0x02);
   CHECK(settings.prefix_bytes == 2);
-  CHECK(settings.longest_report == 18);
+  CHECK(settings.max_report_bytes == 18);
   CHECK(settings.frame.length == 16);
   CHECK(settings.frame.first == '<');
   CHECK(settings.frame.last == '>');
   CHECK(settings.start_serial);
   const LinkSettings polhem = link_settings(shipped("polhem"));
-  CHECK(polhem.longest_report == 64);
-  CHECK(polhem.in == 0);
+  CHECK(polhem.max_report_bytes == 64);
+  CHECK(polhem.in_endpoint == 0);
   CHECK_FALSE(polhem.start_serial);
 }
 
 TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
-  bench.emulator.turn({100, 100, 100});
-  bench.emulator.begin_at({500, -200, 30});
+  bench.emulator.set_true_counts({100, 100, 100});
+  bench.emulator.set_power_on_counts({500, -200, 30});
   bench.open();
   for (int i = 0; i < 50; ++i) {
     bench.step({{1, 0, 0}, {0, 0, 0}}, true);
@@ -397,7 +397,7 @@ TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulat
     REQUIRE(bench.emulator.efforts() == std::array<int, 3>{});
   }
   CHECK_FALSE(bench.sample.homed);
-  bench.emulator.pull_out_and_push_in();
+  bench.emulator.perform_homing_motion();
   CHECK(bench.emulator.homed());
   bench.steps(2);
   CHECK(bench.sample.homed);
@@ -413,15 +413,15 @@ TEST_CASE("a Falcon's handle comes out where it was put, and what it is not driv
   bench.emulator.run();
   bench.open();
   bench.steps(3);
-  bench.emulator.pull_out_and_push_in();
+  bench.emulator.perform_homing_motion();
   bench.steps(3);
   std::mt19937 random(9);
   std::array<int, 3> counts{};
   for (int i = 0; i < 2000; ++i) {
     for (int& count : counts)
       count = std::clamp(count + std::uniform_int_distribution<int>(-15, 15)(random), -350, 350);
-    bench.emulator.turn(counts);
-    bench.emulator.press(static_cast<unsigned>(i / 10) & 0xfu);
+    bench.emulator.set_true_counts(counts);
+    bench.emulator.set_buttons(static_cast<unsigned>(i / 10) & 0xfu);
     bench.steps(2);
     REQUIRE(bench.sample.fault == Fault::none);
     REQUIRE(bench.sample.buttons == (static_cast<unsigned>(i / 10) & 0xfu));
@@ -441,8 +441,8 @@ TEST_CASE("a Falcon's handle comes out where it was put, and what it is not driv
     }
     REQUIRE(bench.sample.X_BH.rotation.angularDistance(Quaterniond::Identity()) < 1e-7);
   }
-  CHECK(dof_text(bench.sample.sensed) == "x y z");
-  CHECK(dof_text(bench.sample.driven) == "x y z");
+  CHECK(dof_text(bench.sample.sensed_dofs) == "x y z");
+  CHECK(dof_text(bench.sample.driven_dofs) == "x y z");
 }
 
 TEST_CASE("short packets of a Falcon are dropped, and its buttons do not flicker", "[emulators]") {
@@ -450,11 +450,11 @@ TEST_CASE("short packets of a Falcon are dropped, and its buttons do not flicker
   bench.emulator.run();
   bench.open();
   bench.steps(3);
-  bench.emulator.pull_out_and_push_in();
-  bench.emulator.press(5);
+  bench.emulator.perform_homing_motion();
+  bench.emulator.set_buttons(5);
   bench.steps(3);
   REQUIRE(bench.sample.buttons == 5);
-  bench.emulator.send_short(4);
+  bench.emulator.truncate_packets(4);
   std::uint32_t rejected = 0;
   for (int i = 0; i < 10; ++i) {
     bench.step();
@@ -472,7 +472,7 @@ TEST_CASE(
   bench.emulator.run();
   bench.open();
   bench.steps(3);
-  bench.emulator.pull_out_and_push_in();
+  bench.emulator.perform_homing_motion();
   bench.steps(3);
   bench.step({{100, 0, 0}, {0, 0, 0}}, true);
   const std::array<int, 3> most = bench.emulator.efforts();
@@ -484,7 +484,7 @@ TEST_CASE(
 
 TEST_CASE("a device that is unplugged is lost, and is heard again after it was opened anew", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
-  bench.emulator.turn({0, 0, -5000, 0, 0, 0});
+  bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   bench.emulator.inject({SimulatedFault::Kind::unplug, 10500us, 100ms});
   bench.open();
   bench.steps(10);

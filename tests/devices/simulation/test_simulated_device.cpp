@@ -170,7 +170,7 @@ TEST_CASE("one report a millisecond, after its delay, none lost") {
     sample = rig.read_after(1ms);
     REQUIRE(sample.fault == Fault::none);
     REQUIRE(sample.fresh);
-    REQUIRE(sample.missing + sample.skipped + sample.rejected == 0);
+    REQUIRE(sample.missing + sample.superseded + sample.rejected == 0);
     REQUIRE(sample.sequence == i);
     REQUIRE(sample.device_time_s == Approx(1e-3 * static_cast<double>(i)));
     REQUIRE(sample.arrived == TimePoint{} + i * 1ms + 200us);
@@ -472,7 +472,7 @@ TEST_CASE("a host that stops reading finds the oldest reports, as behind hidraw"
   Rig rig(still_hand());
   const DeviceSample sample = rig.read_after(500ms);
   CHECK(sample.sequence == PacketQueue::kCapacity);
-  CHECK(sample.skipped == PacketQueue::kCapacity - 1);
+  CHECK(sample.superseded == PacketQueue::kCapacity - 1);
   CHECK(sample.fault == Fault::sample_stale);
   CHECK(rig.link.dropped() == 500 - PacketQueue::kCapacity);
   CHECK(rig.read_after(2ms).missing == 500 - PacketQueue::kCapacity);
@@ -505,7 +505,7 @@ TEST_CASE("each fault on request shows as what it is, for as long as it was aske
   };
   for (const Case& c :
        {Case{Kind::silence, Fault::sample_stale, 0}, Case{Kind::freeze, Fault::sample_stale, 1},
-        Case{Kind::garble, Fault::sample_stale, 1}, Case{Kind::short_report, Fault::sample_stale, 1},
+        Case{Kind::corrupt, Fault::sample_stale, 1}, Case{Kind::short_report, Fault::sample_stale, 1},
         Case{Kind::bad_quaternion, Fault::pose_not_a_rotation, 0}}) {
     Rig rig(moving_hand());
     rig.simulation.inject({c.kind, 100ms, 50ms});
@@ -523,15 +523,15 @@ TEST_CASE("each fault on request shows as what it is, for as long as it was aske
 
 TEST_CASE("a teleport on request shows at both its ends") {
   Rig rig(still_hand());
-  rig.simulation.inject({Kind::teleport, 50ms, 20ms});
+  rig.simulation.inject({Kind::jump, 50ms, 20ms});
   int teleports = 0;
-  for (int i = 0; i < 200; ++i) teleports += rig.read_after(1ms).fault == Fault::pose_teleported ? 1 : 0;
+  for (int i = 0; i < 200; ++i) teleports += rig.read_after(1ms).fault == Fault::pose_jumped ? 1 : 0;
   CHECK(teleports == 2);
 }
 
 TEST_CASE("a deaf device takes no command and its watchdog trips") {
   Rig rig(still_hand());
-  rig.simulation.inject({Kind::deaf, 50ms, 50ms});
+  rig.simulation.inject({Kind::refuse_commands, 50ms, 50ms});
   DeviceSample sample;
   for (int i = 1; i < 50; ++i) {
     sample = rig.read_after(1ms);
@@ -574,7 +574,7 @@ TEST_CASE("two simulated minutes with commands every millisecond stay whole and 
   std::uint64_t lost = 0;
   for (int i = 0; i < 120'000; ++i) {
     const DeviceSample sample = rig.read_after(1ms);
-    lost += sample.missing + sample.skipped + sample.rejected;
+    lost += sample.missing + sample.superseded + sample.rejected;
     const Vector3d pull = -0.5 * sample.V_BH.linear_m_per_s;
     if (sample.fault != Fault::none || rig.write({pull, Vector3d::Zero()}) != Fault::none)
       FAIL("fault at tick " << i);

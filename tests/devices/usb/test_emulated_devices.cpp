@@ -49,7 +49,7 @@ struct Wire {
 
   Wire(bool over_hidraw, bool numbered_reports) : numbered(numbered_reports) {
     const MockIdentity identity{.numbered_reports = numbered};
-    const LinkSettings patient{.write_deadline = 1h, .close_within = 10s};
+    const LinkSettings patient{.write_deadline = 1h, .close_timeout = 10s};
     if (over_hidraw) {
       hidraw = std::make_unique<MockHidraw>(machine, identity);
       link = std::make_unique<HidrawLink>(list_usb_devices().at(0), patient);
@@ -85,7 +85,7 @@ TEST_CASE("a Polhem over the mock kernel: encoders come out as poses, forces arr
   Wire wire(over_hidraw, false);
   EmulatedPolhem board(64);
   std::array<int, 6> counts = {0, 0, -5000, 30, 40, -20};
-  board.turn(counts);
+  board.set_encoder_counts(counts);
   ProfileDevice device(timeless("polhem"), *wire.link);
   ToHost host(wire);
   TimePoint t{};
@@ -99,7 +99,7 @@ TEST_CASE("a Polhem over the mock kernel: encoders come out as poses, forces arr
     sample = device.read_newest(now());
     REQUIRE(sample.fresh);
     REQUIRE(sample.fault == Fault::none);
-    const PolhemPlace place = polhem_place(counts);
+    const PolhemPose place = polhem_pose(counts);
     REQUIRE((sample.X_BH.translation_m - kHalfTurn * place.p).norm() < 1e-6);
     REQUIRE(
         (sample.X_BH.rotation.toRotationMatrix() - kHalfTurn * place.R * kHalfTurn).cwiseAbs().maxCoeff() <
@@ -113,7 +113,7 @@ TEST_CASE("a Polhem over the mock kernel: encoders come out as poses, forces arr
       REQUIRE(std::abs(board.currents_mA()[j] - expected_mA[j]) <= 0.5 + 1e-6);
 
     counts[static_cast<std::size_t>(i % 3)] += i % 5 < 3 ? 1 : -1;  // slow enough for any machine
-    board.turn(counts);
+    board.set_encoder_counts(counts);
     board.advance_to(t += 1ms, host);
   }
   CHECK(host.sent == 301);
@@ -131,7 +131,7 @@ TEST_CASE(
   TimePoint t{};
   device.open();
   device.read_newest(now());
-  mouse.push({280, 140, 70, 0, 0, -200});
+  mouse.set_deflection({280, 140, 70, 0, 0, -200});
   DeviceSample first, sample;
   for (int i = 0; i < 20; ++i) {
     for (const int before = host.sent; host.sent == before;) mouse.advance_to(t += 1ms, host);

@@ -29,7 +29,7 @@ struct Bench {
   HidrawLink link;
 
   explicit Bench(const MockIdentity& identity = {})
-      : mock(machine, identity), link(list_usb_devices().at(0), {.close_within = 1h}) {
+      : mock(machine, identity), link(list_usb_devices().at(0), {.close_timeout = 1h}) {
     link.open();
   }
 };
@@ -54,10 +54,10 @@ std::pair<LinkRead, Bytes> read_one(ReportLink& link, std::size_t room = 64) {
 TEST_CASE("hidraw: nothing to read is told at once", "[usb]") {
   Bench bench;
   std::array<std::uint8_t, 64> buffer{};
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::empty);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
   bench.link.wait_readable(now() - 1s);
   bench.link.wait_readable(now() + 1ms);
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::empty);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
 }
 
 TEST_CASE("hidraw: a report is read as it was sent, however long it is", "[usb]") {
@@ -79,7 +79,7 @@ TEST_CASE("hidraw: a report longer than the buffer is cut, and its length is tol
   CHECK(read.length == 200);
   CHECK(bytes == numbered(64, 1));
   std::array<std::uint8_t, 64> buffer{};
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::empty);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
 }
 
 TEST_CASE("hidraw: a report is written with its id first where the device has ids", "[usb]") {
@@ -114,7 +114,7 @@ TEST_CASE("hidraw: the last report handed over is written before the link is clo
   CHECK(last == Bytes(32, 0));
   CHECK(written >= 1);
   CHECK(written <= replaced_at_most + 1);
-  CHECK(bench.link.write(now(), numbered(32, 2)) == LinkStatus::gone);
+  CHECK(bench.link.write(now(), numbered(32, 2)) == LinkStatus::disconnected);
 }
 
 TEST_CASE("hidraw: an unplugged device is gone at once and stays so", "[usb]") {
@@ -122,9 +122,9 @@ TEST_CASE("hidraw: an unplugged device is gone at once and stays so", "[usb]") {
   bench.mock.unplug();
   std::array<std::uint8_t, 64> buffer{};
   bench.link.wait_readable(now() + 1h);
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::gone);
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::gone);
-  CHECK(bench.link.write(now(), numbered(32, 2)) == LinkStatus::gone);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::disconnected);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::disconnected);
+  CHECK(bench.link.write(now(), numbered(32, 2)) == LinkStatus::disconnected);
   bench.link.wait_readable(now() + 1h);
   bench.link.close();
   bench.link.close();
@@ -142,7 +142,7 @@ TEST_CASE("hidraw: unplugging is found without the heap, which hidapi would use"
     read = bench.link.read(TimePoint{1h}, buffer);
     allocations = guard.allocations();
   }
-  CHECK(read.status == LinkStatus::gone);
+  CHECK(read.status == LinkStatus::disconnected);
   CHECK(allocations == 0);
 }
 
@@ -163,7 +163,7 @@ TEST_CASE("hidraw: another device behind the same node is refused, and nothing i
   }
   const MockHidraw other(machine, identity);
   CHECK_THROWS_WITH(link.open(), Contains("/dev/hidraw0") && Contains("nothing was written"));
-  CHECK(link.write(now(), numbered(32, 2)) == LinkStatus::gone);
+  CHECK(link.write(now(), numbered(32, 2)) == LinkStatus::disconnected);
   CHECK_FALSE(other.anything_received());
 }
 
@@ -176,7 +176,7 @@ TEST_CASE("hidraw: the same device plugged in again is opened again", "[usb]") {
     mock->send(numbered(64, 1));
     CHECK(read_one(link).first.status == LinkStatus::ok);
     mock->unplug();
-    CHECK(read_one(link).first.status == LinkStatus::gone);
+    CHECK(read_one(link).first.status == LinkStatus::disconnected);
     mock = std::make_unique<MockHidraw>(machine, MockIdentity{});
   }
 }
@@ -202,7 +202,7 @@ TEST_CASE("hidraw: two equal devices are each read and written for themselves", 
 
 TEST_CASE("hidraw: a device without a node is refused with the alternative", "[usb]") {
   UsbDevice device;
-  device.place = "1-1";
+  device.port_path = "1-1";
   CHECK_THROWS_WITH(HidrawLink(device).open(), Contains("1-1") && Contains("use libusb"));
 }
 

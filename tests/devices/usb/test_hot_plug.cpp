@@ -107,23 +107,23 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   const std::string config = files.write("lenient.toml", kLenient).string();
   RunningProgram wrenchd("wrenchd",
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
-  REQUIRE(wrenchd.says("no device of profile patient is plugged in; waiting for it"));
+  REQUIRE(wrenchd.wait_for_output("no device of profile patient is plugged in; waiting for it"));
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
-  REQUIRE(wrenchd.says("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
+  REQUIRE(wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
   REQUIRE(soon([&] { return handle->was_pushed(); }));  // --arm armed it
   handle->unplug();
-  REQUIRE(wrenchd.says("device_lost: "));
+  REQUIRE(wrenchd.wait_for_output("device_lost: "));
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-3", .number = 4, .serial = "B2"});
-  REQUIRE(wrenchd.says("serial B2 in 1-3, interface 0: it is not the device that was unplugged"));
+  REQUIRE(wrenchd.wait_for_output("serial B2 in 1-3, interface 0: it is not the device that was unplugged"));
   CHECK(handle->commands() == 0);
   handle->unplug();
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
-  REQUIRE(wrenchd.says("the device is back, disarmed: 1209:6d0f serial A1 in 1-4"));
+  REQUIRE(wrenchd.wait_for_output("the device is back, disarmed: 1209:6d0f serial A1 in 1-4"));
   REQUIRE(soon([&] { return handle->commands() > 300; }));
   CHECK_FALSE(handle->was_pushed());
 
@@ -138,7 +138,7 @@ TEST_CASE("without a profile's name wrenchd takes the one that the device has", 
   MockMachine machine;
   const LiveHandle handle(machine, {.vendor = "1209", .product = "0001"});
   RunningProgram wrenchd("wrenchd", {"--profile", "auto", "--realtime", "best_effort"});
-  CHECK(wrenchd.says("device reference_full_speed"));
+  CHECK(wrenchd.wait_for_output("device reference_full_speed"));
   CHECK(soon([&] { return handle.commands() > 10; }));
   wrenchd.signal(SIGTERM);
   CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
@@ -161,7 +161,8 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
   if (calibrated) {
     CHECK(soon([&] { return handle.was_pushed(); }));
   } else {
-    CHECK(wrenchd.says("may not be armed: it was never calibrated; run wrenchctl calibrate patient"));
+    CHECK(wrenchd.wait_for_output(
+        "may not be armed: it was never calibrated; run wrenchctl calibrate patient"));
     CHECK(soon([&] { return handle.commands() > 300; }));
     CHECK_FALSE(handle.was_pushed());
   }

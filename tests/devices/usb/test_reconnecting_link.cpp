@@ -29,15 +29,15 @@ DeviceProfile profile_for(Transport transport) {
 }
 
 LinkSettings patient() {
-  return {.write_deadline = 1h, .close_within = 10s};
+  return {.write_deadline = 1h, .close_timeout = 10s};
 }
 
-std::string refusal(PluggedLink& link) {
+std::string refusal(ReconnectingLink& link) {
   try {
     link.open();
   } catch (const DeviceNotFound& missing) {
     std::string text = missing.what();
-    for (const std::string& seen : missing.seen()) text += "\n" + seen;
+    for (const std::string& seen : missing.rejected_devices()) text += "\n" + seen;
     return text;
   }
   return {};
@@ -47,11 +47,11 @@ std::string refusal(PluggedLink& link) {
 
 TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
   MockMachine machine;
-  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
   CHECK(refusal(link) == "no device of profile reference is plugged in");
   std::array<std::uint8_t, 64> buffer{};
-  CHECK(link.read(now(), buffer).status == LinkStatus::gone);
-  CHECK(link.write(now(), buffer) == LinkStatus::gone);
+  CHECK(link.read(now(), buffer).status == LinkStatus::disconnected);
+  CHECK(link.write(now(), buffer) == LinkStatus::disconnected);
 
   std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{});
   link.open();
@@ -60,7 +60,7 @@ TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
   link.wait_readable(now() + 1h);
   CHECK(link.read(now(), buffer).status == LinkStatus::ok);
   mock->unplug();
-  while (link.read(now(), buffer).status != LinkStatus::gone) std::this_thread::yield();
+  while (link.read(now(), buffer).status != LinkStatus::disconnected) std::this_thread::yield();
   mock.reset();
   CHECK_THAT(refusal(link), Contains("no device of profile reference"));
 }
@@ -68,14 +68,14 @@ TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
 TEST_CASE("a device that is plugged in elsewhere is the same device", "[usb]") {
   MockMachine machine;
   std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{.place = "1-1", .number = 0});
-  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
   link.open();
   mock->unplug();
   link.close();
   mock.reset();
   mock.emplace(machine, MockIdentity{.place = "2-1.4", .number = 5});
   link.open();
-  CHECK(link.device()->place == "2-1.4");
+  CHECK(link.device()->port_path == "2-1.4");
   CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::ok);
   CHECK(mock->receive(32) == Bytes(32, 7));
 }
@@ -83,14 +83,14 @@ TEST_CASE("a device that is plugged in elsewhere is the same device", "[usb]") {
 TEST_CASE("another device in its place is not opened, and nothing is written to it", "[usb]") {
   MockMachine machine;
   std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{.serial = "A1"});
-  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
   link.open();
   mock->unplug();
   link.close();
   mock.reset();
   mock.emplace(machine, MockIdentity{.serial = "B2"});
   CHECK_THAT(refusal(link), Contains("serial B2") && Contains("not the device that was unplugged"));
-  CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::gone);
+  CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::disconnected);
   CHECK_FALSE(mock->anything_received());
 }
 
@@ -98,9 +98,9 @@ TEST_CASE("of two equal devices the serial number decides", "[usb]") {
   MockMachine machine;
   MockHidraw first(machine, {.place = "1-1", .number = 0, .serial = "A1"});
   MockHidraw second(machine, {.place = "1-2", .number = 1, .serial = "B2"});
-  PluggedLink either(profile_for(Transport::hidraw), {}, patient());
+  ReconnectingLink either(profile_for(Transport::hidraw), {}, patient());
   CHECK_THAT(refusal(either), Contains("serial number A1") && Contains("serial number B2"));
-  PluggedLink link(profile_for(Transport::hidraw), "B2", patient());
+  ReconnectingLink link(profile_for(Transport::hidraw), "B2", patient());
   link.open();
   CHECK(link.write(now(), Bytes(32, 7)) == LinkStatus::ok);
   CHECK(second.receive(32) == Bytes(32, 7));
@@ -110,7 +110,7 @@ TEST_CASE("of two equal devices the serial number decides", "[usb]") {
 TEST_CASE("the profile says by which transport", "[usb]") {
   MockMachine machine;
   MockUsb mock(machine, {.hid = false});
-  PluggedLink link(profile_for(Transport::libusb), {}, patient());
+  ReconnectingLink link(profile_for(Transport::libusb), {}, patient());
   link.open();
   CHECK(mock.claimed());
   mock.send(Bytes(64, 3));
@@ -125,7 +125,7 @@ TEST_CASE("the profile says by which transport", "[usb]") {
 TEST_CASE("reading and writing over it allocate nothing", "[usb]") {
   MockMachine machine;
   MockHidraw mock(machine, {});
-  PluggedLink link(profile_for(Transport::hidraw), {}, patient());
+  ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
   link.open();
   mock.send(Bytes(64, 1));
   std::array<std::uint8_t, 64> buffer{};

@@ -22,7 +22,7 @@ TEST_CASE("a HID device is listed with everything it says of itself", "[usb]") {
   REQUIRE(found.size() == 1);
   CHECK(found[0].hidraw_node == "/dev/hidraw4");
   CHECK(found[0].usb_node == "/dev/bus/usb/003/006");
-  CHECK(found[0].place == "3-1.2");
+  CHECK(found[0].port_path == "3-1.2");
   CHECK(found[0].interface == 0);
   CHECK(found[0].vendor == 0x1209);
   CHECK(found[0].product == 0x6d0f);
@@ -51,7 +51,7 @@ TEST_CASE("an interface that is not HID has no node, descriptor or usage", "[usb
   CHECK(found[0].report_descriptor.empty());
   CHECK(found[0].usage_page == 0);
   CHECK(found[0].vendor == 0x0403);
-  CHECK(found[0].place == "1-4");
+  CHECK(found[0].port_path == "1-4");
 }
 
 TEST_CASE("devices are listed by place, numbers as numbers, in whatever order they came", "[usb]") {
@@ -71,15 +71,15 @@ TEST_CASE("two equal devices are told apart by their serial numbers", "[usb]") {
   const MockHidraw right(machine, {.place = "1-2", .number = 1, .serial = "R"});
   const auto found = list_usb_devices();
   REQUIRE(found.size() == 2);
-  CHECK_FALSE(found[0].same_device(found[1]));
+  CHECK_FALSE(found[0].is_same_device(found[1]));
   UsbDevice moved = found[1];
-  moved.place = "1-9";
+  moved.port_path = "1-9";
   moved.hidraw_node = "/dev/hidraw9";
-  CHECK(moved.same_device(found[1]));
+  CHECK(moved.is_same_device(found[1]));
   moved.serial = "L";
-  CHECK(moved.same_device(found[0]));
+  CHECK(moved.is_same_device(found[0]));
   moved.report_descriptor.pop_back();
-  CHECK_FALSE(moved.same_device(found[0]));
+  CHECK_FALSE(moved.is_same_device(found[0]));
 }
 
 TEST_CASE("what was unplugged is not listed any more", "[usb]") {
@@ -96,31 +96,31 @@ TEST_CASE("where permission is refused the udev rule is told word for word", "[u
   device.product = 0xc635;
   device.hidraw_node = "/dev/hidraw3";
   device.usb_node = "/dev/bus/usb/001/002";
-  CHECK_THAT(why_not_open(device, device.hidraw_node, EACCES),
+  CHECK_THAT(open_error(device, device.hidraw_node, EACCES),
              Contains("/dev/hidraw3") && Contains("256f:c635") &&
                  Contains(R"(SUBSYSTEM=="hidraw", ATTRS{idVendor}=="256f", ATTRS{idProduct}=="c635", )"
                           R"(GROUP="wrenchd", MODE="0660")"));
-  CHECK_THAT(why_not_open(device, device.usb_node, EACCES),
+  CHECK_THAT(open_error(device, device.usb_node, EACCES),
              Contains(R"(SUBSYSTEM=="usb", ATTR{idVendor}=="256f", ATTR{idProduct}=="c635")"));
-  CHECK_THAT(why_not_open(device, device.hidraw_node, ENODEV), Contains("not plugged in any more"));
-  CHECK_THAT(why_not_open(device, device.usb_node, EBUSY), Contains("another program holds it"));
+  CHECK_THAT(open_error(device, device.hidraw_node, ENODEV), Contains("not plugged in any more"));
+  CHECK_THAT(open_error(device, device.usb_node, EBUSY), Contains("another program holds it"));
 }
 
 TEST_CASE("whether a node can be opened is asked of the system", "[usb]") {
   MockMachine machine;
   MockHidraw mock(machine, {});
   const UsbDevice device = list_usb_devices().at(0);
-  CHECK(why_not_open(device, device.hidraw_node).empty());
+  CHECK(open_error(device, device.hidraw_node).empty());
   mock.unplug();
-  CHECK_THAT(why_not_open(device, "/dev/hidraw77"), Contains("/dev/hidraw77"));
+  CHECK_THAT(open_error(device, "/dev/hidraw77"), Contains("/dev/hidraw77"));
 }
 
 TEST_CASE("bus and ports stand in the path of everything below them", "[usb]") {
-  CHECK(place_in(
+  CHECK(port_path_in(
             "/devices/pci0000:00/0000:00:14.0/usb3/3-1/3-1.2/3-1.2:1.0/0003:1209:6D0F.0001/hidraw/hidraw0") ==
         "3-1.2");
-  CHECK(place_in("/devices/platform/vhci_hcd.0/usb1/1-1") == "1-1");
-  CHECK(place_in("/devices/virtual/misc/uhid/0005:1209:6D0F.0001/hidraw/hidraw0").empty());
-  CHECK(place_in("").empty());
-  CHECK(place_in("-/1-/-1/1-a/a-1").empty());
+  CHECK(port_path_in("/devices/platform/vhci_hcd.0/usb1/1-1") == "1-1");
+  CHECK(port_path_in("/devices/virtual/misc/uhid/0005:1209:6D0F.0001/hidraw/hidraw0").empty());
+  CHECK(port_path_in("").empty());
+  CHECK(port_path_in("-/1-/-1/1-a/a-1").empty());
 }

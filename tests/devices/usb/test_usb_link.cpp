@@ -23,7 +23,7 @@ TimePoint now() {
 
 /// No deadline of the link's passes in a test unless it is asked to, however slow the machine is.
 LinkSettings patient() {
-  return {.write_deadline = 1h, .close_within = 10s};
+  return {.write_deadline = 1h, .close_timeout = 10s};
 }
 
 struct Bench {
@@ -58,9 +58,9 @@ TEST_CASE("libusb: several transfers wait at the device", "[usb]") {
   while (bench.mock.in_flight() < 8) std::this_thread::yield();
   CHECK(bench.mock.claimed());
   std::array<std::uint8_t, 64> buffer{};
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::empty);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
   bench.link.wait_readable(now() + 1ms);
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::empty);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
 }
 
 TEST_CASE("libusb: the kernel's driver is detached while the link is open, and given back", "[usb]") {
@@ -94,7 +94,7 @@ TEST_CASE("libusb: a host that does not read loses the newest, and it is counted
   for (int i = 0; i < 64; ++i)
     REQUIRE(read_one(bench.link).second == Bytes(64, static_cast<std::uint8_t>(i)));
   std::array<std::uint8_t, 64> buffer{};
-  CHECK(bench.link.read(now(), buffer).status == LinkStatus::empty);
+  CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
   CHECK(bench.link.counts().dropped == 36);
 }
 
@@ -133,7 +133,7 @@ TEST_CASE("libusb: to a HID interface without an OUT endpoint reports go as SET_
 
 TEST_CASE("libusb: a device that is not HID and has no OUT endpoint takes nothing", "[usb]") {
   Bench bench({.hid = false, .out_endpoint = false});
-  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::empty);
+  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::not_ready);
 }
 
 TEST_CASE("libusb: what stands before each packet is taken off, and packets of nothing else are none",
@@ -166,7 +166,7 @@ TEST_CASE("libusb: the endpoints that the settings name are taken, or the link i
   MockMachine machine;
   MockUsb mock(machine, {});
   LinkSettings settings = patient();
-  settings.in = 0x82;
+  settings.in_endpoint = 0x82;
   UsbLink link(list_usb_devices().at(0), settings);
   CHECK_THROWS_WITH(link.open(), Contains("no interrupt or bulk IN endpoint"));
 }
@@ -186,11 +186,11 @@ TEST_CASE("libusb: while the device takes nothing the newest report waits", "[us
 
 TEST_CASE("libusb: a report not taken by the deadline is called back, and the newest goes in its place",
           "[usb]") {
-  Bench bench({}, {.write_deadline = 2ms, .close_within = 10s});
+  Bench bench({}, {.write_deadline = 2ms, .close_timeout = 10s});
   bench.mock.set_deaf(true);
   bench.link.write(now(), Bytes(32, 1));
   while (bench.link.slot()->failed() == 0) std::this_thread::yield();
-  CHECK(bench.link.write(now(), Bytes(32, 2)) == LinkStatus::empty);  // tells of the one before
+  CHECK(bench.link.write(now(), Bytes(32, 2)) == LinkStatus::not_ready);  // tells of the one before
   while (bench.link.slot()->failed() < 2) std::this_thread::yield();
   bench.mock.set_deaf(false);
   bench.link.write(now(), Bytes(32, 3));
@@ -207,7 +207,7 @@ TEST_CASE("libusb: the last report handed over is written before the link is clo
   while (last != Bytes(32, 0));
   CHECK(bench.mock.in_flight() == 0);
   CHECK_FALSE(bench.mock.claimed());
-  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::gone);
+  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::disconnected);
 }
 
 TEST_CASE("libusb: closing waits for a device that takes the last report late", "[usb]") {
@@ -225,7 +225,7 @@ TEST_CASE("libusb: closing waits for a device that takes the last report late", 
 }
 
 TEST_CASE("libusb: closing does not wait for a device that takes nothing", "[usb]") {
-  Bench bench({}, {.write_deadline = 1h, .close_within = 1ms});
+  Bench bench({}, {.write_deadline = 1h, .close_timeout = 1ms});
   bench.mock.set_deaf(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.close();
@@ -248,9 +248,9 @@ TEST_CASE("libusb: an unplugged device is gone, whatever still waits", "[usb]") 
   bench.mock.send(numbered(64, 1));
   bench.mock.unplug();
   std::array<std::uint8_t, 64> buffer{};
-  while (bench.link.read(now(), buffer).status != LinkStatus::gone) std::this_thread::yield();
+  while (bench.link.read(now(), buffer).status != LinkStatus::disconnected) std::this_thread::yield();
   bench.link.wait_readable(now() + 1h);
-  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::gone);
+  CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::disconnected);
   bench.link.close();
   bench.link.close();
   CHECK_THROWS_WITH(bench.link.open(), Contains("not plugged in any more"));

@@ -28,12 +28,12 @@ Vector3d third(const std::vector<float>& xs, std::size_t i) {
 
 /// Of a corner of a triangle.
 Vector3d position(const DisplayMesh& mesh, std::size_t i) {
-  return third(mesh.positions, mesh.corners[i]);
+  return third(mesh.positions, mesh.indices[i]);
 }
 
 double volume(const DisplayMesh& mesh) {
   double six = 0.0;
-  for (std::size_t i = 0; i < mesh.corners.size(); i += 3)
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
     six += position(mesh, i).dot(position(mesh, i + 1).cross(position(mesh, i + 2)));
   return six / 6.0;
 }
@@ -47,7 +47,7 @@ TEST_CASE("a cube is drawn flat, with its twelve edges", "[view]") {
     const Vector3d a = position(cube, 3 * t), b = position(cube, 3 * t + 1), c = position(cube, 3 * t + 2);
     const Vector3d n = (b - a).cross(c - a).normalized();
     for (std::size_t k = 0; k < 3; ++k)
-      CHECK((third(cube.normals, cube.corners[3 * t + k]) - n).norm() < 1e-5);
+      CHECK((third(cube.normals, cube.indices[3 * t + k]) - n).norm() < 1e-5);
   }
   double length = 0.0, side = 0.0;
   for (std::size_t i = 0; i + 1 < cube.lines.size() / 3; i += 2)
@@ -72,7 +72,7 @@ TEST_CASE("a large mesh is drawn with fewer triangles, and keeps its shape", "[v
     const double whole = volume(drawn(fine));
     const DisplayMesh coarse = drawn(fine, 8'000);
     INFO(kind);
-    CHECK(coarse.triangles_given == fine.triangles.size());
+    CHECK(coarse.source_triangles == fine.triangles.size());
     CHECK(coarse.triangles() <= 8'000);
     CHECK(coarse.triangles() > 2'000);
     CHECK(volume(coarse) == Approx(whole).epsilon(0.01));

@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-using Wish = PageLease::Wish;
+using Wish = PageLease::Request;
 
 template <class Done>
 bool soon(const Done& done) {
@@ -30,8 +30,8 @@ bool soon(const Done& done) {
 struct Rig {
   StubDaemon daemon;
   std::mutex mutex;
-  std::vector<PageLease::Told> told;
-  PageLease lease{daemon.socket(), [this](const PageLease::Told& one) {
+  std::vector<PageLease::Reply> told;
+  PageLease lease{daemon.socket(), [this](const PageLease::Reply& one) {
                     const std::scoped_lock lock(mutex);
                     told.push_back(one);
                   }};
@@ -42,16 +42,16 @@ struct Rig {
   bool was_told(std::uint64_t page, const std::string& what, bool done) {
     return soon([&] {
       const std::scoped_lock lock(mutex);
-      for (const PageLease::Told& one : told)
-        if (one.page == page && one.what == what && one.done == done) return true;
+      for (const PageLease::Reply& one : told)
+        if (one.page == page && one.request == what && one.accepted == done) return true;
       return false;
     });
   }
   /// Lives for so long, at a frame's pace.
   void live(std::uint64_t page, std::chrono::milliseconds time) {
     for (const auto end = std::chrono::steady_clock::now() + time; std::chrono::steady_clock::now() < end;) {
-      lease.lives(page);
-      lease.loop_is(name(daemon.loop().state()));
+      lease.heartbeat(page);
+      lease.set_loop_state(name(daemon.loop().state()));
       std::this_thread::sleep_for(16ms);
     }
   }
@@ -61,42 +61,42 @@ struct Rig {
 
 TEST_CASE("a page holds the lease for as long as it says that it lives", "[view]") {
   Rig rig;
-  rig.lease.ask(1, Wish::arm);
+  rig.lease.submit(1, Wish::arm);
   REQUIRE(rig.was_told(1, "arm", true));
-  rig.live(1, 2 * PageLease::kSilentPage);
+  rig.live(1, 2 * PageLease::kPageTimeout);
   CHECK(rig.daemon.leased());
-  CHECK(rig.daemon.beats() > 20);
+  CHECK(rig.daemon.heartbeats() > 20);
   CHECK(rig.lease.holder() == 1);
   const auto silent = std::chrono::steady_clock::now();
   CHECK(soon([&] { return !rig.daemon.leased(); }));
-  CHECK(std::chrono::steady_clock::now() - silent > PageLease::kSilentPage / 2);
+  CHECK(std::chrono::steady_clock::now() - silent > PageLease::kPageTimeout / 2);
   CHECK(rig.was_told(1, "lease", false));
   CHECK(rig.lease.holder() == 0);
 }
 
 TEST_CASE("a page that is closed lets go at once", "[view]") {
   Rig rig;
-  rig.lease.ask(1, Wish::arm);
+  rig.lease.submit(1, Wish::arm);
   REQUIRE(rig.was_told(1, "arm", true));
-  rig.lease.lives(1);
+  rig.lease.heartbeat(1);
   const auto closed = std::chrono::steady_clock::now();
-  rig.lease.gone(1);
+  rig.lease.page_closed(1);
   CHECK(soon([&] { return !rig.daemon.leased(); }));
-  CHECK(std::chrono::steady_clock::now() - closed < PageLease::kSilentPage);
+  CHECK(std::chrono::steady_clock::now() - closed < PageLease::kPageTimeout);
 }
 
 TEST_CASE("only the page that armed keeps it armed, and any page disarms", "[view]") {
   Rig rig;
-  rig.lease.ask(1, Wish::arm);
+  rig.lease.submit(1, Wish::arm);
   REQUIRE(rig.was_told(1, "arm", true));
   rig.live(1, 200ms);
-  rig.lease.ask(2, Wish::arm);
+  rig.lease.submit(2, Wish::arm);
   CHECK(rig.was_told(2, "arm", false));
   CHECK(rig.lease.holder() == 1);
-  rig.lease.gone(2);  // it has nothing to let go of
+  rig.lease.page_closed(2);  // it has nothing to let go of
   rig.live(1, 200ms);
   CHECK(rig.daemon.leased());
-  rig.lease.ask(3, Wish::disarm);
+  rig.lease.submit(3, Wish::disarm);
   CHECK(rig.was_told(3, "disarm", true));
   CHECK(rig.was_told(1, "lease", false));
   CHECK(soon([&] { return !rig.daemon.leased(); }));
@@ -104,28 +104,28 @@ TEST_CASE("only the page that armed keeps it armed, and any page disarms", "[vie
 
 TEST_CASE("a stop goes to the daemon whoever asks, with or without the lease", "[view]") {
   Rig rig;
-  rig.lease.ask(7, Wish::stop);
+  rig.lease.submit(7, Wish::stop);
   CHECK(rig.was_told(7, "stop", true));
-  const auto asked = rig.daemon.asked();
+  const auto asked = rig.daemon.requested_methods();
   CHECK(std::find(asked.begin(), asked.end(), "stop") != asked.end());
 }
 
 TEST_CASE("a daemon that is not there is told to the page that asked", "[view]") {
   Rig rig;
-  std::vector<PageLease::Told> told;
+  std::vector<PageLease::Reply> told;
   std::mutex mutex;
-  PageLease lost("/nowhere/control.sock", [&](const PageLease::Told& one) {
+  PageLease lost("/nowhere/control.sock", [&](const PageLease::Reply& one) {
     const std::scoped_lock lock(mutex);
     told.push_back(one);
   });
-  for (const Wish wish : {Wish::arm, Wish::stop}) lost.ask(1, wish);
+  for (const Wish wish : {Wish::arm, Wish::stop}) lost.submit(1, wish);
   CHECK(soon([&] {
     const std::scoped_lock lock(mutex);
     return told.size() == 2;
   }));
   const std::scoped_lock lock(mutex);
-  for (const PageLease::Told& one : told) {
-    CHECK_FALSE(one.done);
-    CHECK(one.text.find("/nowhere/control.sock") != std::string::npos);
+  for (const PageLease::Reply& one : told) {
+    CHECK_FALSE(one.accepted);
+    CHECK(one.error.find("/nowhere/control.sock") != std::string::npos);
   }
 }

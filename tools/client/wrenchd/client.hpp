@@ -56,26 +56,27 @@ class Client {
   bool poll_event(ClientEvent& out, std::chrono::milliseconds timeout = std::chrono::seconds(1));
 
   /// The right to arm, which one client has at a time. From here on a thread of this object's says that the
-  /// program lives, until give_lease(); where the program ends or loses its connection, the force fades out.
-  /// A program that may hang while it lives should do that itself: call("lease.take"), and beat() in time.
-  void take_lease();
-  void give_lease();
-  void beat();
+  /// program lives, until release_lease(); where the program ends or loses its connection, the force fades
+  /// out. A program that may hang while it lives should do that itself: call("lease.take"), and beat() in
+  /// time.
+  void acquire_lease();
+  void release_lease();
+  void heartbeat();
 
   void arm() { call("arm"); }  ///< only with the lease
   void disarm() { call("disarm"); }
   void stop() { call("stop"); }  ///< emergency stop; anybody may
   void acknowledge() { call("acknowledge"); }
-  void start_over() { call("start_over"); }
+  void reinitialize_proxy() { call("start_over"); }
 
   /// The state of every tick, through shared memory.
   StateReader open_state();
 
  private:
-  class Beating;
+  class HeartbeatThread;
 
   std::shared_ptr<class ClientConnection> connection_;
-  std::unique_ptr<Beating> beating_;
+  std::unique_ptr<HeartbeatThread> heartbeat_thread_;
 };
 
 }  // namespace wrenchd

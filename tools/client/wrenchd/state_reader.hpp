@@ -16,7 +16,7 @@
 namespace wrenchd {
 
 /// A contact that holds the proxy.
-struct TouchState {
+struct ProxyContact {
   std::array<double, 3> point_W_m{};  ///< where tool and obstacle touch, in the world
   std::array<double, 3> normal_W{};   ///< unit, from the obstacle to the tool
   double share = 0.0;                 ///< of what all contacts carry, 0 to 1
@@ -39,7 +39,7 @@ class TickState {
   std::array<double, 6> wrench() const { return numbers<6>("F_out"); }     ///< told to the device
   /// The contacts that carry most first. Where the scene was changed the daemon is asked once for the names
   /// of its obstacles.
-  std::vector<TouchState> touches() const;
+  std::vector<ProxyContact> contacts() const;
 
   /// The i-th number of a field. Throws ClientError where there is none of that name.
   double number(std::string_view field, std::size_t i = 0) const;
@@ -79,7 +79,7 @@ class StateReader {
 
   /// Waits for the tick after the last one taken; at first, for the first after this object was made. False
   /// where none came in time. A reader that was overrun goes on with newer ones, and missed() grows. Throws
-  /// ClientError::kGone where the daemon is gone.
+  /// ClientError::kDisconnected where the daemon is gone.
   bool next(TickState& out, std::chrono::milliseconds timeout = std::chrono::seconds(1));
 
   /// The newest tick, whatever was taken before. False where there was none at all.
@@ -88,22 +88,22 @@ class StateReader {
   /// Ticks that were overwritten before they were taken by next(), since this object was made.
   std::uint64_t missed() const noexcept { return missed_; }
   /// Ticks that were written and not taken by next() yet.
-  std::uint64_t behind() const noexcept;
+  std::uint64_t unread() const noexcept;
 
   double rate_Hz() const noexcept;  ///< of the servo loop, as configured
   /// Every field by name, with its unit in brackets and what it means.
   std::vector<std::string> describe() const;
 
  private:
-  enum class Copied : std::uint8_t { whole, overrun };
+  enum class CopyResult : std::uint8_t { complete, overrun };
 
-  Copied copy(std::uint64_t i, TickState& out) const;
-  void skip();
+  CopyResult copy(std::uint64_t i, TickState& out) const;
+  void skip_overwritten();
   void unmap() noexcept;
 
   std::shared_ptr<const TickState::Layout> layout_;
   std::shared_ptr<TickState::Names> names_;
-  std::function<bool()> is_there_;
+  std::function<bool()> is_connected_;
   const std::byte* memory_ = nullptr;
   std::size_t bytes_ = 0;
   std::uint64_t next_ = 0;
