@@ -21,7 +21,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::uint64_t kVersion = 1;
-/// How often a reader that waits asks whether the daemon is there still.
+/// Interval at which a waiting reader checks whether the daemon is still connected.
 constexpr auto kLookAround = std::chrono::milliseconds(50);
 
 [[noreturn]] void not_understood(const std::string& what) {
@@ -31,7 +31,7 @@ constexpr auto kLookAround = std::chrono::milliseconds(50);
 
 struct Field {
   std::string name, unit, doc;
-  char type = 'f';  ///< f, i or u
+  char type = 'f';  ///< 'f', 'i' or 'u'
   std::size_t width = 8;
   std::size_t count = 1;
   std::size_t offset = 0;
@@ -85,7 +85,7 @@ std::uint64_t bits_of(const Field& field, const std::byte* record, std::size_t i
     throw ClientError(ClientError::kProtocol, "field '" + field.name + "' has " +
                                                   std::to_string(field.count) + " numbers, and number " +
                                                   std::to_string(i) + " was asked for");
-  std::uint64_t bits = 0;  // of a little-endian machine, as the reader has made sure
+  std::uint64_t bits = 0;  // value on a little-endian machine, which the constructor requires
   std::memcpy(&bits, record + field.offset + i * field.width, field.width);
   return bits;
 }
@@ -150,7 +150,7 @@ struct TickState::Layout {
   }
 };
 
-/// Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more.
+/// Caches the names of obstacles by rendering, because a tick may belong to an earlier rendering.
 class TickState::Names {
  public:
   Names(const json& layout, std::function<std::string()> ask) : ask_(std::move(ask)) { keep(layout); }
@@ -160,7 +160,8 @@ class TickState::Names {
     if (rendering > known_.rbegin()->first && ask_) {
       try {
         keep(json::parse(ask_()));
-      } catch (const std::exception&) {  // the daemon is gone, or busy: a number tells which one, too
+      } catch (const std::exception&) {  // the daemon is gone or busy; the obstacle number identifies the
+                                         // obstacle instead
       }
     }
     const auto found = known_.find(rendering);
@@ -248,7 +249,7 @@ StateReader::StateReader(const std::string& layout, int descriptor, std::functio
   } catch (const json::exception& error) {
     not_understood(error.what());
   }
-  // Memory that could shrink would end this process where it is read.
+  // The memory must be sealed: if it shrank, a read would end this process.
   const int seals = fcntl(descriptor, F_GET_SEALS);
   struct stat file {};
   if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || fstat(descriptor, &file) != 0 ||
@@ -298,7 +299,8 @@ void StateReader::unmap() noexcept {
 
 namespace {
 
-/// A word that another process writes. Loads of lock-free atomics write nothing, so read-only memory will do.
+/// Loads a word that another process writes. A load of a lock-free atomic does not write, so read-only memory
+/// suffices.
 std::uint64_t load(const std::byte* at, std::memory_order order) {
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
   return reinterpret_cast<const std::atomic<std::uint64_t>*>(at)->load(order);
@@ -310,8 +312,8 @@ std::uint64_t StateReader::unread() const noexcept {
   return load(memory_ + layout_->written_offset, std::memory_order_acquire) - next_;
 }
 
-/// A word of a newer record is seen together with its guard, for words are stored with release order; so two
-/// equal guards have only the words of one record between them.
+/// The daemon stores words with release order, so a word of a newer record becomes visible together with the
+/// record's guard. Therefore two equal guards enclose words of one record only.
 StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const {
   const std::byte* slot = memory_ + layout_->header_bytes + i % layout_->slots * layout_->slot_bytes;
   const std::uint64_t whole = 2 * i + 2;
@@ -324,7 +326,7 @@ StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const
   return load(slot, std::memory_order_relaxed) == whole ? CopyResult::complete : CopyResult::overrun;
 }
 
-/// Goes on in the middle of what is there, so as not to be overrun again at once.
+/// Continues in the middle of the available ticks, so that the next overrun is not immediate.
 void StateReader::skip_overwritten() {
   const std::uint64_t ahead = unread();
   if (ahead <= layout_->slots / 2) return;
