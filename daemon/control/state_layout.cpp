@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The only field of StateRecord beside those of TickRecord and the contacts.
+/// The only field of StateRecord besides the tick and the contacts.
 constexpr RecordField kContactCount = {
     "contact_count",
     FieldType::u64,
@@ -24,7 +24,7 @@ constexpr RecordField kContactCount = {
     "contacts in this record, those with the largest multipliers; `contacts` counts all contacts",
     ValueNames::none};
 
-json described(const RecordField& field, std::size_t base) {
+json field_json(const RecordField& field, std::size_t base) {
   json out = {{"name", field.name},       {"offset", base + field.offset},
               {"type", name(field.type)}, {"count", field.count},
               {"unit", field.unit},       {"frame", field.frame},
@@ -34,17 +34,17 @@ json described(const RecordField& field, std::size_t base) {
   return out;
 }
 
-json described(std::span<const RecordField> fields, std::size_t base) {
+json fields_json(std::span<const RecordField> fields, std::size_t base) {
   json out = json::array();
-  for (const RecordField& field : fields) out.push_back(described(field, base));
+  for (const RecordField& field : fields) out.push_back(field_json(field, base));
   return out;
 }
 
 }  // namespace
 
 json state_layout(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles) {
-  json fields = described(tick_fields(), offsetof(StateRecord, tick));
-  fields.push_back(described(kContactCount, 0));
+  json fields = fields_json(tick_fields(), offsetof(StateRecord, tick));
+  fields.push_back(field_json(kContactCount, 0));
   return {{"version", SharedState::kVersion},
           {"magic", std::string(SharedState::kMagic.begin(), SharedState::kMagic.end())},
           {"bytes", state.bytes()},
@@ -61,7 +61,7 @@ json state_layout(const SharedState& state, const Reconfigurator::ObstacleNames&
            {{"offset", offsetof(StateRecord, contacts)},
             {"bytes", sizeof(Touch)},
             {"max_count", kMaxTouches},
-            {"fields", described(contact_fields(), 0)}}},
+            {"fields", fields_json(contact_fields(), 0)}}},
           {"obstacles", obstacles.names},
           {"rendering_id", obstacles.rendering_id}};
 }
