@@ -109,10 +109,7 @@ TEST_CASE("a reader gets every field of every record, in order, once", "[shared_
   CHECK(reader.missed() == 0);
 }
 
-TEST_CASE(
-    "a reader that slept for two seconds of ticks has missed none; one that slept longer is contacts how "
-    "many",
-    "[shared_state]") {
+TEST_CASE("a reader that pauses for 2 s misses nothing; a longer pause is counted", "[shared_state]") {
   SharedState state(4000.0);
   REQUIRE(state.slots() >= 8000);
   StateReader reader = reader_of(state);
@@ -257,9 +254,8 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
   CHECK(layout["rendering_id"] == 3);
 }
 
-TEST_CASE(
-    "contacts have the names of their own rendering's obstacles, and the daemon is asked once a rendering",
-    "[shared_state]") {
+TEST_CASE("contacts have the obstacle names of their rendering, requested from the daemon once per rendering",
+          "[shared_state]") {
   SharedState state(4.0);
   int asked = 0;
   std::string answer = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
@@ -295,7 +291,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") {
+TEST_CASE("a layout that does not fit its memory is rejected", "[shared_state]") {
   SharedState state(4.0);
   const nlohmann::json good = state_layout(state, kTable);
   const auto open = [&](const nlohmann::json& layout) {
