@@ -168,11 +168,12 @@ std::optional<Difference> replay(const Recording& recording, const RunConfig& pl
                          "wrong before, where obstacles that move stood) is not in it, and arming does not "
                          "begin it anew; what is "
                          "replayed is a recording from the start on, as by wrenchd --record");
-  const Scene scene(plan.scene);
+  const auto scene = std::make_shared<const Scene>(plan.scene);
+  const auto placer = std::make_shared<RecordedPlacer>();
   RecordedClock clock;
   RecordedDevice device;
-  RecordedPlacer placer;
-  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  ServoLoop loop(plan.settings, plan.profile, device,
+                 std::make_unique<Rendering>(0, plan.settings, plan.profile, scene, placer), clock);
   std::uint64_t last = 0;  // a release from outside has the number of the tick before
   for (const TickRecord& then : recording.ticks) {
     if (then.tick != last && then.tick != last + 1)
@@ -188,17 +189,17 @@ std::optional<Difference> replay(const Recording& recording, const RunConfig& pl
           "changes to replay all of it");
     clock.play(then);
     device.play(then);
-    placer.play(then);
+    placer->play(then);
     const TimePoint now{Duration(then.now_ns)};
     // The record of a release from outside is the last tick's, with zero wrench and `released` set.
     if ((then.commands & kReleasedExternally) != 0) {
       loop.release(now);
     } else {
-      loop.request(then.commands);
+      loop.requests().request(then.commands);
       loop.tick(now, now);
     }
     TickRecord replayed;
-    loop.latest_record().read(replayed);
+    loop.telemetry().latest_record().read(replayed);
     if (auto difference = compare(then, replayed)) return difference;
   }
   return {};

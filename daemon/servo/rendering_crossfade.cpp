@@ -5,7 +5,7 @@
 
 namespace wrenchd {
 
-RenderingCrossfade::Change RenderingCrossfade::update(bool force) noexcept {
+RenderingCrossfade::Change RenderingCrossfade::update(bool driving) noexcept {
   if (!next_) {
     next_.reset(exchange_.take());
     if (!next_) return Change::none;
@@ -13,9 +13,9 @@ RenderingCrossfade::Change RenderingCrossfade::update(bool force) noexcept {
     // The guess keeps the handle pose of the active proxy, and so the tool on its side of each wall.
     if (active_->proxy_valid())
       next_->initialize_near(active_->X_WQ() * inverse(active_->X_HT()) * next_->X_HT());
-    if (force) return Change::next_arrived;
+    if (driving) return Change::next_arrived;
   }
-  if (force && next_weight_ < 1.0) return Change::none;
+  if (driving && next_weight_ < 1.0) return Change::none;
   switch_to_next();
   return Change::switched;
 }

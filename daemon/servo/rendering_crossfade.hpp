@@ -43,7 +43,7 @@ class RenderingCrossfade {
   };
   /// Takes an offered rendering and completes a finished cross-fade. force: true if force may act on the
   /// hand; otherwise the change is immediate. Call once per tick, before project(). RT-safe.
-  Change update(bool force) noexcept;
+  Change update(bool driving) noexcept;
 
   /// Calls Rendering::project() for both renderings. Returns false if either proxy is trapped. RT-safe.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;

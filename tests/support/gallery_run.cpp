@@ -73,7 +73,7 @@ GalleryRun run_gallery_scene(const std::string& name, double seconds) {
   const auto count = static_cast<std::size_t>(std::lround(last_s * run.config.settings.servo.rate_Hz)) + 1;
   TimePoint first{};
   for (std::size_t i = 0; i < count; ++i) {
-    if (i == 1) station.runtime.loop().arm();
+    if (i == 1) station.runtime.loop().requests().arm();
     station.tick();
     if (i == 0) first = station.clock.now();
     run.ticks.push_back(station.last);
