@@ -12,7 +12,7 @@ constexpr Range kLength_m = {1e-4, 2};
 constexpr Range kOffset_m = {-2, 2};
 constexpr Range kCounts = {-1e6, 1e6};
 
-/// Which integer of the report is which joint: each one once.
+/// Reads the index of each joint among the integers of the report; each index appears once.
 void read_slots(const TomlValue& value, Kinematics& k) {
   std::array<double, kMaxJoints> slots{};
   if (!value.numbers({slots.data(), k.joints}, {0, static_cast<double>(k.joints - 1)})) return;
@@ -34,7 +34,7 @@ void read_count_button(TomlTable& table, Kinematics& k) {
   table.optional("button").integer(b.button, {0, 31});
 }
 
-/// +1 or -1 each.
+/// Reads directions, each +1 or -1.
 bool read_directions(const TomlValue& value, std::span<double> out) {
   if (!value.numbers(out, {-1, 1})) return false;
   if (std::all_of(out.begin(), out.end(), [](double d) { return d == 1.0 || d == -1.0; })) return true;

@@ -12,7 +12,7 @@ using Kind = SimulatedFault::Kind;
 
 constexpr Range kTime_s{0, 86400};
 
-/// The largest `value` of a kind, and the smallest; nothing where it has none.
+/// Valid range of `value` for a kind; an empty range if the kind has no value.
 Range value_range(Kind kind) {
   switch (kind) {
     case Kind::drop_reports:

@@ -21,7 +21,7 @@ constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kTurn = {-10.0, 10.0};
 constexpr Range kTurnBack = {0.0, 86400.0};
 
-/// Shorter than this a normal is a slip of the keyboard rather than a direction.
+/// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
 
 void read_kind(const TomlValue& value, GeneratedMesh& made) {
@@ -52,7 +52,7 @@ void read_made(TomlTable& table, GeneratedMesh& made) {
     size.refuse("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
 }
 
-/// A file, or what is to be made instead of one.
+/// Reads a mesh file name, or a table that describes a generated mesh.
 void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
                std::optional<GeneratedMesh>& made) {
   if (value.is_table()) {
@@ -70,7 +70,7 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
       "= \"gear\" }");
 }
 
-/// The mass may stand in [tool] or at the top of the file.
+/// The mass may be in [tool] or at the top of the file.
 void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
   read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.generated);
   table.optional("scale", "m").number(scene.tool.scale, kScale);
@@ -80,8 +80,8 @@ void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass
   if (mass && top_mass) mass.refuse("is also given at the top of the file; keep one of the two");
 }
 
-/// Solid where normal . x < offset. A normal of another length is made unit, and the offset with it, so that
-/// the solid stays the same set of points.
+/// Reads normal . x < offset. Scales normal and offset to a unit normal, so the set of points does not
+/// change.
 void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   table.mandatory("offset", "m").number(half_space.offset_m, kAny);
   const TomlValue normal = table.mandatory("normal");
@@ -92,13 +92,13 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   half_space.offset_m /= length;
 }
 
-/// What goes with `mesh` and means nothing to a half-space.
+/// Keys that require `mesh`; a half-space rejects them.
 struct MeshKeys {
   TomlValue scale, position, rotation, kind;
   TomlValue velocity, angular_velocity, turn_back_after;
 };
 
-/// Of any direction, and no faster than that. True where it is good, or not given.
+/// Reads a velocity and rejects a length above `fastest`. Returns true if the key is valid or absent.
 bool read_velocity(const TomlValue& key, double fastest, Vector3d& velocity) {
   if (!key) return true;
   if (!key.vector(velocity, {-fastest, fastest})) return false;
@@ -136,7 +136,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
   scene.meshes.push_back(obstacle);
 }
 
-/// One shape each: half_space or mesh.
+/// Each obstacle has one shape: half_space or mesh.
 void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
   std::string name = place;
   table.optional("name").text(name);
@@ -175,7 +175,7 @@ bool has_name(const SceneSettings& scene, const std::string& name) {
          std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it);
 }
 
-/// By its name it is moved and removed, so it has one of its own.
+/// Reads an added obstacle. It needs a unique name, because clients move and remove it by name.
 void read_added(TomlTable& table, SceneSettings& scene) {
   std::string name;
   const TomlValue key = table.optional("name");

@@ -9,9 +9,10 @@ namespace {
 
 constexpr int kIterations = 200;
 constexpr int kHalvings = 30;
-/// The gradient has vanished, relative to that of the start: less would be lost in the last digits of T.
+/// Convergence: gradient norm relative to that of the first iterate. A smaller value changes only the last
+/// digits of T.
 constexpr double kSmall = 1e-6;
-/// Armijo's constant, the usual value.
+/// Armijo constant, usual value.
 constexpr double kFairShare = 1e-4;
 
 bool admissible(const Projection& projection) noexcept {
@@ -32,8 +33,8 @@ Vector3d Descent::gradient(const Pose& X_WP, const Projection& at) const noexcep
   return g;
 }
 
-// Directions are conjugate in the metric of H (Polak and Ribiere), in which a body turns as easily about each
-// axis; they start anew where they do not descend.
+// Polak-Ribiere directions, METHOD (58), conjugate in the metric of H, in which all rotation axes have equal
+// weight. A direction that does not descend is replaced by the negative gradient.
 Projection Descent::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept {
   const Matrix3d H_inverse = M_.H_kg_m2.inverse();
   Projection best = translations_.translate(X_WP, scene, X_start);
@@ -42,7 +43,7 @@ Projection Descent::project(const Pose& X_WP, const ContactSource& scene, const 
   Vector3d g = gradient(X_WP, best);
   const double small = kSmall * std::sqrt(g.dot(H_inverse * g));
   Vector3d direction = -(H_inverse * g);
-  double step = 0.25;  // in units of a Newton step on 2 H, the curvature of T alone
+  double step = 0.25;  // in units of a Newton step on 2 H, the Hessian of T without contacts
   best.status = ProjectionStatus::budget_spent;
   for (int i = 0; i < kIterations; ++i) {
     if (std::sqrt(g.dot(H_inverse * g)) <= small) {
@@ -54,7 +55,7 @@ Projection Descent::project(const Pose& X_WP, const ContactSource& scene, const 
       direction = -(H_inverse * g);
       slope = g.dot(direction);
     }
-    step = std::min(2.0 * step, 1.0 / std::max(direction.norm(), 1e-300));  // never more than a radian
+    step = std::min(2.0 * step, 1.0 / std::max(direction.norm(), 1e-300));  // at most 1 rad
     Projection trial;
     bool fell = false;
     for (int halving = 0; halving < kHalvings && !fell; ++halving) {

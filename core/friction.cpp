@@ -15,18 +15,17 @@
 namespace wrenchd {
 namespace {
 
-/// A gap no wider than this touches [m]: a proxy's clearance, and rounding.
+/// A contact with at most this gap touches [m]: clearance of the proxy plus rounding.
 constexpr double kTouching_m = 1e-8;
-/// Levers shorter than the square root of this, in radii of gyration, hold no turn: rounding would be most of
-/// them.
+/// Squared lever, in radii of gyration, below which a contact resists no rotation: rounding would dominate.
 constexpr double kLeastLever = 1e-6;
-/// Shorter ways than this are none [m]: the tool stays to the bit. Nothing adds up, for the way to where it
-/// would turn to is that from where it has been left.
+/// Shorter displacements count as zero [m], and the tool stays bit for bit. No drift results: the next tick
+/// measures from the same pose.
 constexpr double kNoWay_m = 1e-10;
-/// And it sticks where it would go so small a share of the way to q*.
+/// The tool sticks if it would cover no more than this fraction of the path to q*.
 constexpr double kNoShare = 1e-9;
-/// A tool that has stuck for so many ticks is held by static friction. Not at once: a hand that moves slowly
-/// stands still between the steps of its encoder, 10 um at a time, and would be caught at each of them.
+/// Ticks at rest before static friction applies. A slow hand rests between the encoder steps of, for example,
+/// 10 um; without this delay static friction would hold it at every step.
 constexpr int kTicksToSettle = 20;
 
 double way_m(const Pose& from, const Pose& to, double lever_m) noexcept {
@@ -34,21 +33,22 @@ double way_m(const Pose& from, const Pose& to, double lever_m) noexcept {
          lever_m * from.rotation.angularDistance(to.rotation);
 }
 
-/// T = m |s|^2 + theta' H theta for a small turn theta in T: with theta = A y it is m |y|^2.
+/// T = m |s|^2 + theta' H theta for a small rotation theta in T. Returns A with T = m |s|^2 + m |y|^2 for
+/// theta = A y.
 Matrix3d unit_turns(const Inertia& M) {
   const Eigen::LLT<Matrix3d> root(M.H_kg_m2 / M.mass_kg);
   return root.matrixU().solve(Matrix3d::Identity());
 }
 
-/// A sum N of squares of levers, and its pseudo-inverse.
+/// Pseudo-inverse of N, a sum of squared contact Jacobians, METHOD (72).
 class Levers {
  public:
   explicit Levers(const Matrix6d& N) noexcept : eigen_(N) {
-    const Vector6d& squares = eigen_.eigenvalues();  // the shortest first
+    const Vector6d& squares = eigen_.eigenvalues();  // ascending
     for (int i = 0; i < 6; ++i) inverse_[i] = squares[i] > kLeastLever * squares[5] ? 1.0 / squares[i] : 0.0;
   }
 
-  bool hold_all() const noexcept { return inverse_[0] > 0.0; }  ///< six directions
+  bool hold_all() const noexcept { return inverse_[0] > 0.0; }  ///< all six directions are held
   Vector6d solve(const Vector6d& sum) const noexcept {
     return eigen_.eigenvectors() * inverse_.cwiseProduct(eigen_.eigenvectors().transpose() * sum);
   }
@@ -74,7 +74,7 @@ void Friction::reset() noexcept {
 }
 
 void Friction::store_contacts(const Projection& answer) noexcept {
-  last_contacts_.clear();  // where time was up, contacts may be among them that are yet to be reached
+  last_contacts_.clear();  // after an iteration limit, `active` may contain contacts that do not touch yet
   for (const ActiveContact& active : answer.active)
     if (gap_m(active.contact, answer.X_WQ) <= kTouching_m) last_contacts_.add(active);
   X_WQ_last_ = answer.X_WQ;
@@ -110,14 +110,15 @@ Pose Friction::frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_ho
   return X_WP;
 }
 
-/// dT by a small turn of the body in its own axes, E = p^-1 q: 4 (w H v - v x H v).
+/// Gradient of T with respect to a small rotation of the body in its own axes, E = p^-1 q: 4 (w H v - v x H
+/// v).
 Vector3d Friction::rotational_gradient(const Quaterniond& E) const noexcept {
-  const double sign = E.w() < 0.0 ? -1.0 : 1.0;  // the shorter way round
+  const double sign = E.w() < 0.0 ? -1.0 : 1.0;  // the shorter rotation
   const Vector3d Hv = M_.H_kg_m2 * E.vec();
   return 4.0 * (std::abs(E.w()) * sign * Hv - E.vec().cross(Hv));
 }
 
-/// What touches at q*, and how it came there from X_last.
+/// Collects the contacts at q* and the displacement of their points since X_last.
 void Friction::collect_points(const Pose& X_last) noexcept {
   points_.clear();
   const Pose& X_WQ = frictionless_.X_WQ;
@@ -139,8 +140,8 @@ void Friction::collect_points(const Pose& X_last) noexcept {
   }
 }
 
-/// What a pose has to undo, so that a point that carries is where it was at X_last, but for its way into or
-/// out of the obstacle, and the gap is that of q*. What touches idly does not rub: its gap alone counts.
+/// Displacement that a pose must undo at one contact: the tangential displacement of the point since X_last,
+/// and the change of the gap since q*. A contact without load has no friction; only its gap counts.
 Vector3d Friction::stick_error_m(const FrictionPoint& touch, const Pose& X_WT) const noexcept {
   const Vector3d& n = touch.n_W;
   Vector3d opened = n * (gap_m(touch.contact, X_WT) - touch.gap_m);
@@ -149,9 +150,10 @@ Vector3d Friction::stick_error_m(const FrictionPoint& touch, const Pose& X_WT) c
   return way - n * n.dot(way) + opened;
 }
 
-/// q_0: from q* by the least displacement, as the metric measures it, that brings back the points that carry.
-/// With y that displacement in units of which M is m times one, lever_i y = strayed_i is solved for the
-/// shortest y. Newton's method with the levers of q*: what is left falls by the angle turned, each time.
+/// The stuck pose q_0, METHOD (73): the least displacement from q*, in the metric, that returns the loaded
+/// contact points. y is the displacement in units in which M is m times identity: jacobian_i y =
+/// stick_error_i, solved for the shortest y. Newton's method with the Jacobians of q*; each step scales the
+/// error by the angle rotated.
 Pose Friction::stick_pose(const Pose& X_last) const noexcept {
   Matrix6d N = Matrix6d::Zero();
   double longest_m = 0.0;
@@ -180,21 +182,22 @@ Pose Friction::stick_pose(const Pose& X_last) const noexcept {
   return way_m(X_last, X, longest_m) < kNoWay_m ? X_last : X;
 }
 
-/// What contact i carries so far from q* to q_0.
+/// Multiplier of contact i at the fraction `held` of the path from q* to q_0.
 double Friction::normal_multiplier(std::size_t i, double held) const noexcept {
   return std::max(0.0, points_[i].multiplier + held * multiplier_increase_[i]);
 }
 
-/// 1 - s. Also finds what each contact carries more at q_0 than at q*: all forces of the contacts together,
-/// friction's among them, keep the tool there against p. Of many sets of them, that next to those at q*.
+/// The fraction 1 - s, METHOD (75). Also computes the increase of each multiplier from q* to q_0: at q_0 all
+/// contact forces, including friction, balance the pull towards p. Among the solutions it takes the one
+/// nearest to the multipliers at q*.
 double Friction::stick_fraction(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept {
-  Vector6d lacking;  // of grad T
+  Vector6d lacking;  // the part of grad T that the multipliers of q* do not balance
   lacking << 2.0 * M_.mass_kg * (X_stuck.translation_m - X_WP.translation_m),
       rotation_scale_.transpose() * rotational_gradient(X_WP.rotation.conjugate() * X_stuck.rotation);
   const Matrix3d turn_W = X_stuck.rotation * rotation_scale_;
   Matrix6d N = Matrix6d::Zero();
   std::array<Vector6d, ContactSet::kCapacity> normal;   // gradients of the gaps
-  std::array<Vector6d, ContactSet::kCapacity> sliding;  // and of the ways towards q*
+  std::array<Vector6d, ContactSet::kCapacity> sliding;  // gradients of the slip towards q*
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const FrictionPoint& touch = points_[i];
     Eigen::Matrix<double, 3, 6> lever;
@@ -224,13 +227,13 @@ double Friction::stick_fraction(double mu, const Pose& X_WP, const Pose& X_stuck
   return mu * D_stuck < drawn ? std::min(1.0, mu * D / (drawn + mu * (D - D_stuck))) : 1.0;
 }
 
-/// p' for q = q_s, whose contacts press as they do there against p: grad T(p', q) = sum lambda_i grad
-/// gap_i(q). In the axes of T at q, with (w, v) the unit quaternion of p'^-1 q,
+/// The frictional goal p' for q = q_s, METHOD (76): grad T(p', q) = sum lambda_i grad gap_i(q) with the
+/// multipliers lambda_i at q_s. In the axes of T at q, with (w, v) the unit quaternion of p'^-1 q,
 ///
 ///   2 m R_q' (x_q - x_p') = sum lambda_i R_q' n_i
 ///   4 (w H v - v x H v)   = sum lambda_i (lever_i x R_q' n_i) = g
 ///
-/// the second solved for v by iterating v = H^-1 (g/4 + v x H v) / w.
+/// The second equation is solved by the fixed point v = H^-1 (g/4 + v x H v) / w.
 Pose Friction::goal_for_pose(const Pose& X_WQ, double held) const noexcept {
   Vector3d force = Vector3d::Zero();
   Vector3d torque = Vector3d::Zero();
@@ -241,8 +244,10 @@ Pose Friction::goal_for_pose(const Pose& X_WQ, double held) const noexcept {
     torque += (contact_point_W(contact, X_WQ) - X_WQ.translation_m).cross(carried);
   }
   const Vector3d g = X_WQ.rotation.conjugate() * torque;
-  constexpr int kSteps = 30;          // each leaves a share of the angle: two digits at 0.1 rad
-  constexpr double kFarTurned = 0.9;  // sin(theta/2) for 128 degrees: the hand has let go of it long before
+  // each iteration reduces the error by a factor of about the angle: two digits at 0.1 rad
+  constexpr int kSteps = 30;
+  // sin(theta/2) for theta = 128 degrees; friction in a real session ends long before
+  constexpr double kFarTurned = 0.9;
   Quaterniond E = Quaterniond::Identity();
   for (int step = 0; step < kSteps; ++step) {
     Vector3d v = H_inverse_ * (0.25 * g + E.vec().cross(M_.H_kg_m2 * E.vec())) / E.w();

@@ -10,11 +10,10 @@
 namespace wrenchd {
 namespace {
 
-/// A handle that a person moves about for hours weighs less than one kilogram; what is above is a mistake of
-/// units.
+/// A hand-held handle weighs less than 1 kg. A larger mass than this is a mistake of units.
 constexpr double kMostMass_kg = 20.0;
 constexpr double kFarthestCentre_m = 1.0;
-constexpr double kUnitNorm = 1e-6;  ///< of a quaternion as people write it down, squared norm
+constexpr double kUnitNorm = 1e-6;  ///< tolerance on the squared norm of a quaternion with few printed digits
 
 void check_mass(const char* which, double mass_kg) {
   if (is_finite(mass_kg) && mass_kg >= 0.0 && mass_kg <= kMostMass_kg) return;
@@ -35,14 +34,18 @@ GravityCompensation::GravityCompensation(const MovingMasses& masses, const Quate
   g_B_m_per_s2_ = R_WB.normalized().conjugate() * Vector3d(0.0, 0.0, -kGravity_m_per_s2);
 }
 
-//   f = -(m_c + m_h) g_B,   tau = -(R_BH p_HC) x m_h g_B
+// METHOD (89)
+//
+//   f = -(m_c + m_h) g_B,   tau = -(R_BH p_HHcm) x m_h g_B
 Wrench GravityCompensation::wrench(const Pose& X_BH) const noexcept {
   const Vector3d lever_B = X_BH.rotation * masses_.p_HHcm_m;
   return {-(masses_.carried_kg + masses_.handle_kg) * g_B_m_per_s2_,
           -lever_B.cross(masses_.handle_kg * g_B_m_per_s2_)};
 }
 
-//   U = -g_B . (m_c p_BH + m_h p_BC)
+// METHOD (88)
+//
+//   U = -g_B . (m_c p_BH + m_h p_BHcm)
 double GravityCompensation::potential_energy_J(const Pose& X_BH) const noexcept {
   return -g_B_m_per_s2_.dot(masses_.carried_kg * X_BH.translation_m +
                             masses_.handle_kg * (X_BH * masses_.p_HHcm_m));

@@ -13,22 +13,22 @@ namespace wrenchd {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kBelow = 1.0 - 4.0 * kEpsilon;  ///< keeps a product below its limit when it is rounded up
+constexpr double kBelow = 1.0 - 4.0 * kEpsilon;  ///< keeps a product below its limit if rounding increases it
 
-/// x where it is a number from 0 to `most`; 0 where it is none, or below.
+/// x clamped to 0 ... `most`; 0 if x is not finite.
 double within(double x, double most) noexcept {
   return is_finite(x) ? std::clamp(x, 0.0, most) : 0.0;
 }
 
-/// A setting of 0, or one that is no number, leaves the profile's. A profile that states nothing allows
-/// nothing.
+/// The smaller of a setting and the profile's value. A setting that is 0 or not finite selects the profile's
+/// value. A profile value that is not stated gives 0.
 double within_profile(double setting, double profile, double highest) noexcept {
   const double own = within(profile, highest);
   return is_finite(setting) && setting > 0.0 ? std::min(setting, own) : own;
 }
 
-/// Shortens v to the limit, direction kept, and stays below it by what rounding may add. Taken apart into its
-/// largest component and the rest, because the length of a finite vector may be infinite.
+/// Clamps the length of v to the limit and keeps the direction. Returns true if it changed v. Divides by the
+/// largest component first, because the length of a finite vector may overflow.
 bool saturate(Vector3d& v, double limit) noexcept {
   const double largest = v.cwiseAbs().maxCoeff();
   if (!(largest > 0.0)) return false;
@@ -39,10 +39,11 @@ bool saturate(Vector3d& v, double limit) noexcept {
   return true;
 }
 
-/// Lets v grow from what went out last by at most `growth`; shrinking along the last direction is free.
+/// Limits the growth of v relative to the last wrench; a decrease along the last direction is not limited.
+/// Returns true if it changed v.
 ///
-///   keep = the part of v along last, between 0 and |last|        (free)
-///   rest = v - keep                                              (new: at most `growth` long)
+///   keep = component of v along last, clamped to 0 ... |last|
+///   rest = v - keep                                              clamped to the length `growth`
 bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
   const double last_length = last.norm();
   Vector3d keep = Vector3d::Zero();
@@ -57,8 +58,7 @@ bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
   return true;
 }
 
-/// What went out last, as far as it could have: a vector that is none was nothing, a longer one was the
-/// limit.
+/// The last wrench, clamped to the limit; zero if it is not finite.
 Vector3d legal(const Vector3d& last, double limit) noexcept {
   if (!is_finite(last)) return Vector3d::Zero();
   Vector3d v = last;
@@ -148,7 +148,7 @@ void WrenchLimits::set_ceiling(double force_N, double torque_Nm) noexcept {
   torque_ceiling_Nm_ = within(torque_Nm, max_torque_Nm_);
 }
 
-/// 1 within the radius, then along a straight line down to 0 at kWorkspaceFadeEnd of it.
+/// 1 inside of the workspace radius; decreases linearly to 0 at kWorkspaceFadeEnd radii.
 double WrenchLimits::workspace_scale(const Vector3d& p_BH_m) const noexcept {
   if (!is_finite(workspace_radius_m_)) return 1.0;
   const double distance_m = (p_BH_m - workspace_centre_m_).norm();
@@ -158,11 +158,11 @@ double WrenchLimits::workspace_scale(const Vector3d& p_BH_m) const noexcept {
   return (end_m - distance_m) / (end_m - workspace_radius_m_);
 }
 
-/// By how much the wrench has to shrink so that no more than max_power_W goes into the hand.
+/// Factor on the wrench that limits the power into the hand to max_power_W.
 ///
-///   P = f . v + tau . w,  and what its rounding may hide
+///   P = f . v + tau . w + bound of its rounding
 ///
-/// The twist is taken apart into its largest component and the rest, as P may be infinite otherwise.
+/// Divides the twist by its largest component first, because P may overflow.
 double WrenchLimits::power_scale(const Wrench& F, const Twist& V) const noexcept {
   if (!is_finite(max_power_W_)) return 1.0;
   const double largest =
@@ -203,7 +203,7 @@ Limited WrenchLimits::apply(const LimitInput& in) noexcept {
   mark(slew(force_N, legal(last_sent_.force_N, max_force_N_), force_slew_N_per_s_ * dt_s), kForceSlew);
   mark(slew(torque_Nm, legal(last_sent_.torque_Nm, max_torque_Nm_), torque_slew_Nm_per_s_ * dt_s),
        kTorqueSlew);
-  // Between two vectors within the limit lies no longer one, but for rounding.
+  // A vector between two vectors within the limit is within the limit, up to rounding.
   saturate(force_N, force_ceiling_N_);
   saturate(torque_Nm, torque_ceiling_Nm_);
   scale(power_scale(out.F, in.V_BH), kPower);

@@ -44,7 +44,7 @@ PassivityGuard::PassivityGuard(const DeviceDamping& device, const PassivityLimit
 }
 
 void PassivityGuard::reset() noexcept {
-  *this = PassivityGuard(device_, limits_);  // which were accepted once
+  *this = PassivityGuard(device_, limits_);  // accepted by the constructor before
 }
 
 Wrench PassivityGuard::limit(const Wrench& asked_B, const Pose& X_BH, double dt_s, bool in_contact) noexcept {
@@ -82,6 +82,8 @@ void PassivityGuard::record_sent(const Wrench& sent_B) noexcept {
   sent_[tick_ % kSentHistory] = is_finite(sent_B) ? sent_B : Wrench{};
 }
 
+// METHOD (84)
+//
 //   E <- E + F . dx + tau . dtheta - (b |v|^2 + b_rot |w|^2) dt
 void PassivityGuard::observe(const Motion& step) noexcept {
   Motion& oldest = motion_[++steps_ % kVelocityWindow];
@@ -97,7 +99,7 @@ void PassivityGuard::observe(const Motion& step) noexcept {
   check_energy_runaway(step.dt_s);
 }
 
-/// The mean of the wrenches that acted over the interval: as many ticks of them as it took for a new sample.
+/// Mean of the wrenches that acted since the previous sample, one per tick.
 Wrench PassivityGuard::acting_wrench() const noexcept {
   const std::size_t ticks = std::clamp<std::size_t>(ticks_since_sample_, 1, kSentHistory - kMaxDelay_ticks);
   Wrench sum;
@@ -109,7 +111,8 @@ Wrench PassivityGuard::acting_wrench() const noexcept {
   return {share * sum.force_N, share * sum.torque_Nm};
 }
 
-/// The work of the wrenches that were sent and have not shown in a sample yet, at the speed of the last two.
+/// Work of the wrenches that were sent but have not acted in a sample yet, at the velocity of the last two
+/// samples, METHOD (85).
 double PassivityGuard::pending_work_J() const noexcept {
   const Motion& step = motion_[steps_ % kVelocityWindow];
   const Motion& before = motion_[(steps_ + kVelocityWindow - 1) % kVelocityWindow];
@@ -118,12 +121,13 @@ double PassivityGuard::pending_work_J() const noexcept {
   const std::uint64_t ticks = std::min<std::uint64_t>(limits_.delay_ticks, tick_);
   Wrench sum;
   for (std::uint64_t i = 0; i < ticks; ++i) sum = sum + sent_[(tick_ - i) % kSentHistory];
-  // A sample comes about as often as a tick.
+  // Assumes one sample per tick.
   return 0.5 * (sum.force_N.dot(step.displacement_m + before.displacement_m) +
                 sum.torque_Nm.dot(step.rotation_rad + before.rotation_rad));
 }
 
-/// |way|^2 / time of the whole window is at most the integral of v^2 over it, by Cauchy and Schwarz.
+/// Energy that the device's friction dissipates. |displacement|^2 / time of the window is at most the
+/// integral of v^2 (Cauchy-Schwarz), so this never overestimates.
 double PassivityGuard::device_dissipation_J(double dt_s) const noexcept {
   if (!(window_motion_.dt_s > 0.0)) return 0.0;
   const double rate_W = (device_.linear_N_s_per_m * window_motion_.displacement_m.squaredNorm() +
@@ -132,7 +136,7 @@ double PassivityGuard::device_dissipation_J(double dt_s) const noexcept {
   return rate_W * dt_s;
 }
 
-/// Nothing is under way that could still push.
+/// True if all pending wrenches are zero.
 bool PassivityGuard::no_wrench_pending() const noexcept {
   const std::uint64_t look = std::min<std::uint64_t>(limits_.delay_ticks + 1, tick_);
   for (std::uint64_t i = 0; i < look; ++i) {
@@ -142,7 +146,7 @@ bool PassivityGuard::no_wrench_pending() const noexcept {
   return true;
 }
 
-/// Holds E against the least it was within the last kRunawayWindow_s.
+/// Compares E with its minimum over the last kRunawayWindow_s.
 void PassivityGuard::check_energy_runaway(double dt_s) noexcept {
   min_injected_J_[slice_] = std::min(min_injected_J_[slice_], injected_J());
   slice_time_s_ += dt_s;
@@ -155,11 +159,13 @@ void PassivityGuard::check_energy_runaway(double dt_s) noexcept {
       injected_J() - *std::min_element(min_injected_J_.begin(), min_injected_J_.end()) > kRunawayEnergy_J;
 }
 
+// METHOD (87)
+//
 //   F_guard = -alpha (b v, b_rot w),   alpha = E / ((b |v|^2 + b_rot |w|^2) dt)
 Wrench PassivityGuard::damping_wrench(double dt_s) const noexcept {
   const Motion& step = motion_[steps_ % kVelocityWindow];
   const Motion& before = motion_[(steps_ + kVelocityWindow - 1) % kVelocityWindow];
-  const double over_s = step.dt_s + before.dt_s;  // two samples: half the noise of an encoder's steps
+  const double over_s = step.dt_s + before.dt_s;  // two samples halve the quantization noise of the velocity
   if (!(over_s > 0.0)) return {};
   const Vector3d f = device_.linear_N_s_per_m * (step.displacement_m + before.displacement_m) / over_s;
   const Vector3d t = device_.angular_Nm_s_per_rad * (step.rotation_rad + before.rotation_rad) / over_s;

@@ -11,31 +11,30 @@
 namespace wrenchd {
 namespace {
 
-/// A gap this far below zero, in units of L, counts as closed: rounding of one rotation and one dot product.
+/// A gap down to minus this value, in units of L, counts as closed: rounding of one rotation and one dot
+/// product.
 constexpr double kGapTolerance = 2e-15;
-/// Wedged between opposite contacts only one translation is left, and rounding must not make it none: where
-/// it does, contacts that are held open give way by this share of it.
+/// Between opposite contacts only one translation may be left, and rounding could remove it. Then contacts
+/// with a clearance may violate it by this share.
 constexpr double kSlack = 1e-3;
-/// A contact this near, in units of L, touches at q.
+/// A contact with at most this gap, in units of L, touches at q.
 constexpr double kTouching = 1e-9;
-/// Converged: the step left is this short, in units of L and rad, and the KKT residual this small before it
-/// is taken.
+/// Convergence: length of the remaining step, in units of L and rad, and KKT residual before that step.
 constexpr double kShortStep = 1e-7;
 constexpr double kSmallResidual = 2e-10;
-/// Where a short step no longer halves the residual, what is left is rounding, if it is no more than this.
+/// If a short step no longer halves the residual, the rest is rounding if it is below this value.
 constexpr double kRoundedResidual = 1e-8;
-/// Curvature of the Lagrangian, relative to the metric's, that a step may count on where there is less.
+/// Least curvature of the Lagrangian, relative to the metric, that a step assumes.
 constexpr double kLeastCurvature = 1e-3;
-/// The gradient of a penetration of half a millionth of L: below it, the residual is measured against this.
+/// Gradient of a penetration of half a millionth of L: lower bound of the denominator of the residual.
 constexpr double kLeastGradient = 1e-6;
-/// With more contacts than this, idle ones are dropped.
+/// Above this number of contacts, contacts without load are dropped.
 constexpr std::size_t kCrowded = 24;
-/// How many times the budget of a tick a query without history may take for each of its starts.
+/// Factor on the iteration limit for each start of a query without history.
 constexpr int kPatience = 5;
 
-/// Lower triangular root of a symmetric matrix, inverted:  A = L D L',  (L sqrt D)^-1 = D^-1/2 L^-1.  False
-/// where the matrix is not safely positive definite: a pivot that is all rounding would make the step all
-/// rounding.
+/// Inverse of the lower triangular root of a symmetric matrix: A = L D L', (L sqrt D)^-1 = D^-1/2 L^-1.
+/// Returns false if the matrix is not positive definite or a pivot is dominated by rounding.
 bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
   constexpr double kLeastPivot = 1e-13;
   const auto safe = [](double pivot, double diagonal) { return pivot > kLeastPivot * std::abs(diagonal); };
@@ -103,7 +102,7 @@ Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene
 
 Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
                                  const StepLimit& leash) noexcept {
-  /// The contacts are all known: nothing is asked.
+  /// All contacts are known: the scene has none.
   class Nothing final : public ContactSource {
    public:
     std::size_t add_violated(const Pose&, double, ContactSet&) const noexcept override { return 0; }
@@ -126,7 +125,7 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
     return free_projection();
   }
   state_ = step_start_;
-  if (contacts_.empty()) {  // straight to p
+  if (contacts_.empty()) {  // no contacts: straight towards p
     const double turn_rad = step_start_.E.angularDistance(Quaterniond::Identity());
     const double share =
         std::min(leash.translation_m / std::max(step_start_.u.norm() * L_, leash.translation_m),
@@ -139,7 +138,8 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
     step_limit_ = StepLimit{};
     return make_projection(LocalResult::budget_spent);
   }
-  // What is pushed from two sides may have to turn. Nothing else has to: where it starts is allowed.
+  // A tool between two obstacles may have to rotate. In all other cases the rotation of X_start is
+  // admissible.
   const bool pushed = leash.rotation_rad == std::numeric_limits<double>::infinity();
   if (!translate(state_) && !(pushed && find_feasible_rotation(state_))) {
     step_limit_ = StepLimit{};
@@ -147,8 +147,8 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   }
   LocalResult local = LocalResult::budget_spent;
   if (exceeds_step_limit(state_)) {
-    // At one rotation the gaps are affine and T is convex: the way to the nearest translation is open, and
-    // falls.
+    // At a fixed rotation the gaps are affine and T is convex: the straight path to the nearest translation
+    // is admissible, and T falls along it.
     const Vector3d way = state_.u - step_start_.u;
     state_.u = step_start_.u + way * (leash.translation_m / (L_ * way.norm()));
     state_.T = scaled_energy(state_);
@@ -161,7 +161,7 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   return make_projection(local);
 }
 
-/// Is a state beyond the leash?
+/// True if a state is beyond the step limit.
 bool ExactProjection::exceeds_step_limit(const Iterate& state) const noexcept {
   return (state.u - step_start_.u).norm() * L_ > step_limit_.translation_m ||
          state.E.angularDistance(step_start_.E) > step_limit_.rotation_rad;
@@ -206,8 +206,8 @@ Projection ExactProjection::multistart() noexcept {
         }
   };
 
-  // Where the dual bound is attained; then rotations about the axes of a cube's faces, edges and corners,
-  // both ways, near and far from p; then the same around the best of these.
+  // First the rotation at which the dual bound is attained; then rotations about the 26 directions of a
+  // cube's faces, edges and corners, at several angles from p; then the same around the best result.
   try_from(dual_optimum);
   for (const double angle : {0.25, 0.6, 1.2, 2.2}) try_around(Quaterniond::Identity(), angle);
   const Quaterniond best_E = relative_rotation(best.X_WQ.rotation);
@@ -215,12 +215,12 @@ Projection ExactProjection::multistart() noexcept {
   return best;
 }
 
-// Rounding of the world coordinates counts too: a body far from the origin has coarser gaps.
+// Includes the rounding of world coordinates, which grows with the distance from the origin.
 double ExactProjection::gap_tolerance_m(const Pose& X_WT) const noexcept {
   return 4.0 * kGapTolerance * (L_ + X_WT.translation_m.lpNorm<Eigen::Infinity>());
 }
 
-/// What all attempts at one p share.
+/// Prepares a query at one p.
 void ExactProjection::begin_query(const Pose& X_WP, const ContactSource& scene) noexcept {
   X_WP_ = X_WP;
   scene_ = &scene;
@@ -233,7 +233,7 @@ Quaterniond ExactProjection::relative_rotation(const Quaterniond& R_WT) const no
   return (X_WP_.rotation.conjugate() * R_WT).normalized();
 }
 
-/// Without history: the contacts to begin with are those that p violates.
+/// Solves without history, from the contacts that p violates.
 Projection ExactProjection::solve(const Quaterniond& E_start, Freedom freedom) noexcept {
   if (scene_->admits(X_WP_, tolerance_m_)) return free_projection();
   contacts_.clear();
@@ -250,7 +250,7 @@ Projection ExactProjection::solve(const Quaterniond& E_start, Freedom freedom) n
                                                                : LocalResult::infeasible);
 }
 
-/// Begins with these contacts and their multipliers. True where p violates none of them.
+/// Loads the known contacts and their multipliers. Returns true if p violates none of them.
 bool ExactProjection::load_known_contacts(std::span<const ActiveContact> known) noexcept {
   contacts_.clear();
   for (const ActiveContact& active : known) contacts_.add(active.contact);
@@ -263,8 +263,8 @@ bool ExactProjection::load_known_contacts(std::span<const ActiveContact> known) 
   return apart;
 }
 
-/// From an admissible pose and the contacts that hold it. Most often one of them tells without asking the
-/// scene that p is not admissible.
+/// Solves from an admissible pose and its contacts. Usually a known contact shows without a scene query that
+/// p is not admissible.
 Projection ExactProjection::solve_from_known(const Pose& X_start,
                                              std::span<const ActiveContact> known) noexcept {
   if (load_known_contacts(known) && scene_->admits(X_WP_, tolerance_m_)) return free_projection();
@@ -284,7 +284,7 @@ Projection ExactProjection::free_projection() const noexcept {
   return out;
 }
 
-/// What became of the attempt.
+/// Makes the projection of the current state.
 Projection ExactProjection::make_projection(LocalResult local) noexcept {
   Projection out;
   out.X_WQ = X_WP_;
@@ -300,7 +300,7 @@ Pose ExactProjection::to_pose(const Iterate& state) const noexcept {
   return {(X_WP_.rotation * state.E).normalized(), X_WP_.translation_m + X_WP_.rotation * (L_ * state.u)};
 }
 
-/// Contacts number `first` and up as p sees them: directions in p's axes, lengths in units of L.
+/// Transforms the contacts from index `first` on to the axes of p and units of L, METHOD (20).
 void ExactProjection::update_local_contacts(std::size_t first) noexcept {
   if (first == contacts_.size()) return;
   const Matrix3d R_PW = X_WP_.rotation.toRotationMatrix().transpose();
@@ -338,8 +338,8 @@ ExactProjection::AffineGap ExactProjection::affine_gap(const LocalContact& seen,
   return {seen.n, seen.n.dot(R * seen.a) + seen.c - clearance_};
 }
 
-/// Is a contact certainly nearer at p than it may be? Without clearance the gap of two edges is looked at
-/// without the length of their normal, whose sign is the same.
+/// True if a contact violates its clearance at p beyond rounding. Without clearance the sign of an edge-edge
+/// gap needs no normalization.
 bool ExactProjection::overlaps_at_p(const LocalContact& seen) const noexcept {
   const double least = -tolerance_m_ / L_;
   switch (seen.kind) {
@@ -360,21 +360,21 @@ double ExactProjection::scaled_energy(const Iterate& state) const noexcept {
   return state.u.squaredNorm() + 4.0 * v.dot(H_hat_ * v);
 }
 
-/// E <- E o (1, eta/2), normalised: a retraction that agrees with exp to second order.
+/// E <- E o (1, eta/2), normalized: a retraction that agrees with exp to second order, METHOD (13).
 void ExactProjection::rotate(Iterate& state, const Vector3d& eta) const noexcept {
   const Quaterniond step(1.0, 0.5 * eta.x(), 0.5 * eta.y(), 0.5 * eta.z());
   state.E = (state.E * step).normalized();
   state.R = state.E.toRotationMatrix();
 }
 
-/// The nearest translation for the state's rotation, exactly:  min |u|^2  s.t.  n_i . u >= -h_i, over the
-/// contacts at hand. False where no translation helps.
+/// The nearest translation for the rotation of the state over the known contacts, METHOD (36): min |u|^2 s.t.
+/// n_i . u >= -h_i. Returns false if no translation is admissible.
 bool ExactProjection::translate(Iterate& state) noexcept {
   translation_problem_.clear();
   return extend_translation(state);
 }
 
-/// The same with contacts that have come since.
+/// Solves the translation problem again with the contacts added since.
 bool ExactProjection::extend_translation(Iterate& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
   for (std::size_t i = translation_problem_.count(); i < contacts_.size(); ++i) {
@@ -391,10 +391,10 @@ bool ExactProjection::extend_translation(Iterate& state) noexcept {
   return true;
 }
 
-/// The same over all contacts of the scene by constraint generation: solve on the contacts at hand, ask the
-/// scene what the answer violates, add it, repeat. Idle contacts make room for new ones: |u| only grows from
-/// round to round, so none comes back for ever. False where no translation helps, or none was found in the
-/// rounds allowed.
+/// The nearest translation over all contacts of the scene by constraint generation: solves for the known
+/// contacts, adds those that the solution violates, and repeats. Contacts without load may be dropped: |u|
+/// increases from round to round, so no cycle is possible. Returns false if no translation is admissible or
+/// the rounds are used up.
 bool ExactProjection::restore_admissibility(Iterate& state) noexcept {
   translation_problem_.clear();
   for (std::uint16_t round = 0; round < budget_.constraint_rounds; ++round) {
@@ -402,21 +402,15 @@ bool ExactProjection::restore_admissibility(Iterate& state) noexcept {
     if (contacts_.size() > kCrowded) drop_idle_contacts(state);
     const std::size_t known = contacts_.size();
     if (scene_->add_violated(to_pose(state), tolerance_m_, contacts_) == 0)
-      return !contacts_.full();  // a full set cannot tell of what it has no room for
+      return !contacts_.full();  // a full set may lack further violated contacts
     update_local_contacts(known);
   }
   return false;
 }
 
-// For E <- E o (1, eta/2) and n_Q = R'n, r = R'(u - b) + a, all in the axes of q, the gradient of a gap is
-//
-//   J_i = [ n_i ; a x n_Q + (how the normal turns) ]
-//
-//   vertex_face   nothing
-//   face_vertex   d x r                                      n_Q = d
-//   edge_edge     d x (dB_Q x r_t) / s                       r_t: r without its part along n,  s = |d x dB_Q|
+// Gaps and gradients of all contacts, METHOD (22).
 void ExactProjection::linearise(const Iterate& state) noexcept {
-  // Most often this very rotation has just been translated.
+  // Usually translation_problem_ has this rotation already.
   const bool known =
       translation_problem_.count() == contacts_.size() && E_translated_.coeffs() == state.E.coeffs();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
@@ -440,7 +434,7 @@ void ExactProjection::linearise(const Iterate& state) noexcept {
   }
 }
 
-/// With G = (w I + v^)/2, so that dv = G eta:    g = [ 2 u ; 8 G' H^ v ]
+/// METHOD (14), with G = (w I + v^)/2, so that dv = G eta: g = [ 2 u ; 8 G' H^ v ]
 Vector6d ExactProjection::gradient(const Iterate& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Vector3d Hv = H_hat_ * v;
@@ -450,7 +444,7 @@ Vector6d ExactProjection::gradient(const Iterate& state) const noexcept {
   return g;
 }
 
-/// Hessian of T:  [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ]
+/// Hessian of T, METHOD (15): [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ]
 ExactProjection::HessianBlocks ExactProjection::metric_hessian(const Iterate& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Matrix3d G = 0.5 * (state.E.w() * Matrix3d::Identity() + hat(v));
@@ -460,8 +454,8 @@ ExactProjection::HessianBlocks ExactProjection::metric_hessian(const Iterate& st
   return W;
 }
 
-/// Hessian of the Lagrangian T - sum multiplier_i gap_i: that of T, less sum multiplier_i K_i. K is linear in
-/// what contacts of the same normal differ in, so each normal bends once.
+/// Hessian of the Lagrangian T - sum multiplier_i gap_i, METHOD (38). The gap curvature is linear in a, b and
+/// J, so contacts with the same normal are summed first.
 ExactProjection::HessianBlocks ExactProjection::lagrangian_hessian(const Iterate& state) const noexcept {
   HessianBlocks W = metric_hessian(state);
   const auto carries = [&](std::size_t i) { return multiplier_[i] > 0.0; };
@@ -528,8 +522,8 @@ void ExactProjection::add_contact_curvature(const Iterate& state, std::size_t i,
   W.C -= (load.m / s) * (state.R * seen.d * dB.transpose() + cosine * (n * n_Q.transpose() - state.R));
 }
 
-/// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. False where it is not
-/// positive definite.
+/// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. Returns false if it is
+/// not positive definite.
 bool ExactProjection::factorise(const HessianBlocks& W, CholeskyFactor& root) const noexcept {
   constexpr double kSqrtHalf = 0.70710678118654752440;
   if (!inverse_root(W.B - 0.5 * W.C.transpose() * W.C, root.S_inverse)) return false;
@@ -538,11 +532,10 @@ bool ExactProjection::factorise(const HessianBlocks& W, CholeskyFactor& root) co
   return true;
 }
 
-/// Where the Hessian is not positive definite it is made so, so that the step is a descent: the active
-/// gradients are added first, which changes it only across the constraints, where the step is not free, and
-/// keeps the convergence quadratic. If that is not enough (far from a minimum), negative eigenvalues are
-/// turned over, taken relative to the metric diag(2 I, 2 H^): a needle's roll is a soft direction, not a flat
-/// one.
+/// Makes the Hessian positive definite, so that the step is a descent, METHOD (40). First it adds the active
+/// gradients. They change the Hessian only across the constraints, so convergence stays quadratic. If that is
+/// not enough, it replaces negative eigenvalues, relative to the metric diag(2 I, 2 H^), by their absolute
+/// values.
 void ExactProjection::factorise_convexified(const HessianBlocks& curvature,
                                             CholeskyFactor& root) const noexcept {
   Matrix6d W;
@@ -591,10 +584,10 @@ Vector6d ExactProjection::CholeskyFactor::solve_transposed(const Vector6d& z) co
   return y;
 }
 
-/// Takes the curvature of the Lagrangian.
+/// Factorises the Hessian of the Lagrangian.
 ///
-/// The first multipliers are those of a pure translation, too large where a rotation will do: a Lagrangian
-/// that they bend too far gives way to the metric alone.
+/// The first multipliers come from a pure translation and may be too large. If they make the Hessian
+/// indefinite, the first steps use the Hessian of T alone.
 void ExactProjection::factorise_model(const Iterate& state) noexcept {
   constexpr int kEarly = 2;
   const HessianBlocks W = lagrangian_hessian(state);
@@ -602,12 +595,12 @@ void ExactProjection::factorise_model(const Iterate& state) noexcept {
   if (iterations_ > kEarly || !factorise(metric_hessian(state), factor_)) factorise_convexified(W, factor_);
 }
 
-/// The step that minimises the quadratic model within the linearised gaps:
+/// Step dy that minimizes the quadratic model within the linearised gaps, METHOD (37):
 ///
 ///   min 1/2 dy' W dy + g' dy   s.t.   J_i dy >= -gap_i
 ///
-/// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g. At an
-/// admissible state dy = 0 is allowed, so there always is an answer. Leaves the multipliers.
+/// With W = root root' and z = root' dy this is a least-distance problem from z0 = -root^-1 g, METHOD (39).
+/// At an admissible state dy = 0 is feasible, so a solution exists. Updates the multipliers.
 bool ExactProjection::newton_step(const Vector6d& g, Vector6d& dy) noexcept {
   newton_problem_.clear();
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -619,7 +612,7 @@ bool ExactProjection::newton_step(const Vector6d& g, Vector6d& dy) noexcept {
   return true;
 }
 
-/// The nearest translation out, with its multipliers.
+/// Nearest admissible translation with its multipliers.
 bool ExactProjection::project_translation(Iterate& state) noexcept {
   if (!restore_admissibility(state)) return false;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -629,16 +622,17 @@ bool ExactProjection::project_translation(Iterate& state) noexcept {
   return true;
 }
 
-/// The same, from another rotation where no translation helps at this one.
+/// Nearest admissible translation, after a rotation if there is none at the current rotation.
 bool ExactProjection::project_translation_or_rotate(Iterate& state) noexcept {
   return project_translation(state) || (find_feasible_rotation(state) && project_translation(state));
 }
 
-/// Newton's method, with first guesses of the multipliers. Leaves the gaps of the last state. asked: the
-/// scene has been asked about this state, and is about every next. A proxy begins without: the contacts that
-/// held it are taken for all there are until they have an answer, or one of them lets go.
+/// Newton's method from a state and first multipliers; leaves the gaps of the last state. asked: the scene
+/// was queried for this state and is queried for each next one. Following a proxy starts without: until the
+/// known contacts give a result or one of them loses its load, they count as all contacts.
 ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool asked) noexcept {
-  double before_short_step = std::numeric_limits<double>::infinity();  // the residual
+  // KKT residual before the last short step
+  double before_short_step = std::numeric_limits<double>::infinity();
   for (;;) {
     linearise(state);
     const Vector6d g = gradient(state);
@@ -657,30 +651,29 @@ ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool aske
     factorise_model(state);
     Vector6d dy;
     const bool stepped = newton_step(g, dy);
-    const double promised = stepped ? -g.dot(dy) : 0.0;  // first-order fall of T
-    const bool ask = asked || has_idle_contact();        // another has to take its place
+    const double promised = stepped ? -g.dot(dy) : 0.0;  // first-order decrease of T
+    const bool ask = asked || has_idle_contact();        // a contact without load may have to be replaced
     const LineSearchResult moved =
         stepped ? line_search(state, dy, promised, ask) : LineSearchResult::no_decrease;
     if (moved == LineSearchResult::decreased) asked = ask;
     const bool short_step = moved == LineSearchResult::decreased && dy.norm() < kShortStep;
     before_short_step = short_step ? residual_ : std::numeric_limits<double>::infinity();
-    if (moved != LineSearchResult::no_decrease)
-      continue;  // contacts met: the same state, with a model that knows them
+    if (moved != LineSearchResult::no_decrease) continue;  // decreased, or found contacts: next model
     if (at_step_limit_) continue;
     if (!asked) {
       if (!project_translation_or_rotate(state)) return LocalResult::infeasible;
       asked = true;
       continue;
     }
-    linearise(state);  // contacts may have made room for others
+    linearise(state);  // contacts may have been dropped
     residual_ = residual(gradient(state));
-    // Rounding hides the fall of T where the promise is smaller than T's own last digits.
+    // Rounding hides a decrease of T below its last digits.
     return stepped && promised <= 1e-13 * state.T ? LocalResult::converged : LocalResult::budget_spent;
   }
 }
 
-/// |g - sum multiplier_i J_i| / |g|, at the state that was linearised last. A contact that is apart carries
-/// nothing: what it seems to carry counts as missing.
+/// KKT residual |g - sum multiplier_i J_i| / |g|, METHOD (42), at the state linearised last. A multiplier of
+/// an open contact does not count.
 double ExactProjection::residual(const Vector6d& g) const noexcept {
   Vector6d rest = g;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -688,7 +681,8 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
   return std::sqrt(rest.squaredNorm() / std::max(g.squaredNorm(), kLeastGradient * kLeastGradient));
 }
 
-/// At the state linearised last. One that was not asked about may overlap what a trial from it has met.
+/// True if all gaps of the state linearised last are open. A state without a scene query may overlap a
+/// contact found in a later trial.
 bool ExactProjection::all_gaps_open() const noexcept {
   const double least = -2.0 * (gap_slack_ + rounding_m_ / L_);
   return std::all_of(gap_.begin(), gap_.begin() + contacts_.size(), [=](double gap) { return gap >= least; });
@@ -699,18 +693,17 @@ bool ExactProjection::has_idle_contact() const noexcept {
                      [](double m) { return !(m > 0.0); });
 }
 
-/// Moves along dy, halving it until T falls by a fair share of what the slope promises. A trial that fails
-/// and has met contacts the model did not know ends the search: with them the next step will be a better one.
+/// Line search along dy, METHOD (41): halves the step until T decreases by kArmijo times the predicted
+/// decrease. A failed trial that found new contacts ends the search; the next step includes them.
 ExactProjection::LineSearchResult ExactProjection::line_search(Iterate& state, const Vector6d& dy,
                                                                double promised, bool ask) noexcept {
-  constexpr double kFairShare = 1e-4;  // Armijo's constant, the usual value
-  constexpr int kHalvings = 20;        // below a millionth of a step the model is not to be trusted
+  constexpr double kFairShare = 1e-4;  // Armijo constant, usual value
+  constexpr int kHalvings = 20;        // below a millionth of a step the model is not accurate
   const Vector3d eta = dy.tail<3>();
-  // What T may seem to rise by: its own rounding, and that of the translation, which meets its gaps to
-  // gap_slack_ only.
+  // Apparent increase of T by rounding of T and by the tolerance gap_slack_ of the translation.
   const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * gap_slack_ * state.u.norm() : 0.0;
   double fraction =
-      1.0 / std::max(1.0, eta.norm() / std::min(1.0, step_limit_.rotation_rad));  // one radian at most
+      1.0 / std::max(1.0, eta.norm() / std::min(1.0, step_limit_.rotation_rad));  // at most one radian
   for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
     Iterate trial = state;
     rotate(trial, fraction * eta);
@@ -729,13 +722,14 @@ ExactProjection::LineSearchResult ExactProjection::line_search(Iterate& state, c
   return LineSearchResult::no_decrease;
 }
 
-/// Looks for a rotation from which a translation leads out, by Gauss-Newton on the deepest violation t:
+/// Searches a rotation at which a translation is admissible, by Gauss-Newton on the deepest violation t,
+/// METHOD (43):
 ///
 ///   min  t^2 + small |dy|^2   s.t.   J_i dy + t >= -gap_i
 ///
-/// a least-distance problem in seven dimensions that always has an answer.
+/// A least-distance problem in seven dimensions that always has a solution.
 bool ExactProjection::find_feasible_rotation(Iterate& state) noexcept {
-  constexpr double kRegularisation = 1e-3;  // weight of dy against t: small, so that t is what falls
+  constexpr double kRegularisation = 1e-3;  // weight of dy relative to t; small, so that t decreases
   constexpr int kSteps = 30;
   using Vector7d = Eigen::Matrix<double, 7, 1>;
   for (int step = 0; step < kSteps; ++step) {
@@ -759,8 +753,7 @@ bool ExactProjection::find_feasible_rotation(Iterate& state) noexcept {
   return false;
 }
 
-/// Drops contacts that are apart and carry nothing, neither of the last step nor of the translation just
-/// solved.
+/// Drops open contacts without a multiplier in the last step and in the last translation.
 void ExactProjection::drop_idle_contacts(const Iterate& state) noexcept {
   for (std::size_t i = contacts_.size(); i-- > 0;) {
     const AffineGap gap = affine_gap(local_contacts_[i], state.R);
@@ -775,8 +768,7 @@ void ExactProjection::drop_idle_contacts(const Iterate& state) noexcept {
   }
 }
 
-/// Adds what touches idly. False, and nothing is added, where it is not idle: where something that was not
-/// known overlaps.
+/// Adds contacts that touch without load. Returns false and adds nothing if one of them overlaps.
 bool ExactProjection::add_touching_contacts(const Iterate& state) noexcept {
   const std::size_t known = contacts_.size();
   const Pose X_WQ = to_pose(state);
@@ -788,14 +780,13 @@ bool ExactProjection::add_touching_contacts(const Iterate& state) noexcept {
     gap_[i] = at.n.dot(state.u) + at.h;
     touching_added_ = gap_[i] * L_ >= -rounding_m_;
   }
-  // A full set cannot tell of what it has no room for.
+  // A full set may lack further contacts.
   if (contacts_.full() && touching_added_) touching_added_ = scene_->admits(X_WQ, tolerance_m_);
   if (!touching_added_) contacts_.truncate(known);
   return touching_added_;
 }
 
-/// Fills in what is known of the answer: energy, contacts that touch with their multipliers, and the
-/// residual.
+/// Fills in energy, touching contacts, multipliers and residual of the result.
 void ExactProjection::fill_projection(Projection& out) noexcept {
   out.X_WQ = to_pose(state_);
   out.kkt_residual = residual_;

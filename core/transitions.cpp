@@ -100,7 +100,7 @@ constexpr bool each_pair_has_one_row() {
 }
 static_assert(each_pair_has_one_row(), "every trigger has exactly one row for every state");
 
-/// The same by trigger and state, so that a lookup is one.
+/// Index of the row for each trigger and state.
 constexpr auto kRowOf = [] {
   std::array<std::array<std::uint8_t, kStateCount>, kTriggerCount> index{};
   for (std::size_t i = 0; i < kTransitions.size(); ++i)
