@@ -203,7 +203,7 @@ struct Kinematics {
   };
   Kind kind = Kind::none;
   std::size_t joints = 0;  ///< number of sensed joints; the first kMaxMotors of them are driven
-                           /// index of joint i among the integers of the report
+  /// index of joint i among the integers of the report
   std::array<std::size_t, kMaxJoints> report_index = {0, 1, 2, 3, 4, 5};
   std::array<double, kMaxJoints> rad_per_count{};
   std::array<double, kMaxJoints> zero_rad{};

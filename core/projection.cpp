@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+
+#include "core/optimality_certificate.hpp"
 
 namespace wrenchd {
 namespace {
@@ -32,28 +35,6 @@ constexpr double kLeastGradient = 1e-6;
 constexpr std::size_t kCrowded = 24;
 /// Factor on the iteration limit for each start of a query without history.
 constexpr int kPatience = 5;
-
-/// Inverse of the lower triangular root of a symmetric matrix: A = L D L', (L sqrt D)^-1 = D^-1/2 L^-1.
-/// Returns false if the matrix is not positive definite or a pivot is dominated by rounding.
-bool inverse_root(const Matrix3d& A, Matrix3d& inverse) noexcept {
-  constexpr double kLeastPivot = 1e-13;
-  const auto safe = [](double pivot, double diagonal) { return pivot > kLeastPivot * std::abs(diagonal); };
-  const double d0 = A(0, 0);
-  if (!(d0 > 0.0)) return false;
-  const double l10 = A(1, 0) / d0;
-  const double l20 = A(2, 0) / d0;
-  const double d1 = A(1, 1) - l10 * A(1, 0);
-  if (!safe(d1, A(1, 1))) return false;
-  const double a21 = A(2, 1) - l20 * A(1, 0);
-  const double l21 = a21 / d1;
-  const double d2 = A(2, 2) - l20 * A(2, 0) - l21 * a21;
-  if (!safe(d2, A(2, 2))) return false;
-  const double i0 = 1.0 / std::sqrt(d0);
-  const double i1 = 1.0 / std::sqrt(d1);
-  const double i2 = 1.0 / std::sqrt(d2);
-  inverse << i0, 0.0, 0.0, -l10 * i1, i1, 0.0, (l10 * l21 - l20) * i2, -l21 * i2, i2;
-  return true;
-}
 
 double positive_length(const Inertia& M) {
   const double squared = M.H_kg_m2.trace() / (2.0 * M.mass_kg);
@@ -186,8 +167,10 @@ Projection ExactProjection::multistart() noexcept {
   if (best.status == ProjectionStatus::free) return best;
   best.proven_global = best.status == ProjectionStatus::converged && certify_global();
   if (best.proven_global) return best;
-  const Quaterniond dual_optimum =
-      best.status == ProjectionStatus::infeasible ? Quaterniond::Identity() : dual_rotation();
+  const Quaterniond dual_optimum = best.status == ProjectionStatus::infeasible
+                                       ? Quaterniond::Identity()
+                                       : dual_rotation(H_hat_, {local_contacts_.data(), contacts_.size()},
+                                                       {multiplier_.data(), contacts_.size()});
 
   const auto try_from = [&](const Quaterniond& E) noexcept {
     Projection other = solve(E);
@@ -258,7 +241,7 @@ bool ExactProjection::load_known_contacts(std::span<const ActiveContact> known) 
   bool apart = true;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     multiplier_[i] = known[i].multiplier / (M_.mass_kg * L_);
-    apart = apart && !overlaps_at_p(local_contacts_[i]);
+    apart = apart && !gap_at_p_below(local_contacts_[i], -tolerance_m_ / L_);
   }
   return apart;
 }
@@ -305,54 +288,9 @@ void ExactProjection::update_local_contacts(std::size_t first) noexcept {
   if (first == contacts_.size()) return;
   const Matrix3d R_PW = X_WP_.rotation.toRotationMatrix().transpose();
   for (std::size_t i = first; i < contacts_.size(); ++i) {
-    const Contact& contact = contacts_[i];
-    LocalContact& seen = local_contacts_[i];
-    seen.kind = contact.kind;
-    seen.n = R_PW * contact.n_W;
-    seen.a = contact.p_TCa_m / L_;
-    seen.b.setZero();
-    seen.c = (contact.n_W.dot(X_WP_.translation_m) - contact.offset_m) / L_;
+    make_local(contacts_[i], X_WP_, R_PW, L_, local_contacts_[i]);
     multiplier_[i] = 0.0;
-    if (contact.kind == ContactKind::vertex_face) continue;
-    seen.b = R_PW * (contact.p_WCb_m - X_WP_.translation_m) / L_;
-    seen.d = contact.d_T;
-    seen.dB = R_PW * contact.d_W;
   }
-}
-
-ExactProjection::AffineGap ExactProjection::affine_gap(const LocalContact& seen,
-                                                       const Matrix3d& R) const noexcept {
-  switch (seen.kind) {
-    case ContactKind::vertex_face:
-      break;
-    case ContactKind::face_vertex: {
-      const Vector3d n = R * seen.d;
-      return {n, seen.d.dot(seen.a) - n.dot(seen.b) - clearance_};
-    }
-    case ContactKind::edge_edge: {
-      const Vector3d N = (R * seen.d).cross(seen.dB);
-      const Vector3d n = N * (1.0 / N.norm());
-      return {n, n.dot(R * seen.a - seen.b) - clearance_};
-    }
-  }
-  return {seen.n, seen.n.dot(R * seen.a) + seen.c - clearance_};
-}
-
-/// True if a contact violates its clearance at p beyond rounding. Without clearance the sign of an edge-edge
-/// gap needs no normalization.
-bool ExactProjection::overlaps_at_p(const LocalContact& seen) const noexcept {
-  const double least = -tolerance_m_ / L_;
-  switch (seen.kind) {
-    case ContactKind::vertex_face:
-      break;
-    case ContactKind::face_vertex:
-      return seen.d.dot(seen.a - seen.b) < least;
-    case ContactKind::edge_edge: {
-      const Vector3d N = seen.d.cross(seen.dB);
-      return N.dot(seen.a - seen.b) < (least > 0.0 ? least * N.norm() : least);
-    }
-  }
-  return seen.n.dot(seen.a) + seen.c < least;
 }
 
 double ExactProjection::scaled_energy(const Iterate& state) const noexcept {
@@ -378,7 +316,7 @@ bool ExactProjection::translate(Iterate& state) noexcept {
 bool ExactProjection::extend_translation(Iterate& state) noexcept {
   using Status = LeastDistance<3, ContactSet::kCapacity>::Status;
   for (std::size_t i = translation_problem_.count(); i < contacts_.size(); ++i) {
-    const AffineGap gap = affine_gap(local_contacts_[i], state.R);
+    const AffineGap gap = affine_gap(local_contacts_[i], state.R, clearance_);
     translation_problem_.add_unit(gap.n, -gap.h);
   }
   E_translated_ = state.E;
@@ -414,23 +352,11 @@ void ExactProjection::linearise(const Iterate& state) noexcept {
   const bool known =
       translation_problem_.count() == contacts_.size() && E_translated_.coeffs() == state.E.coeffs();
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    const LocalContact& seen = local_contacts_[i];
+    const LocalContact& contact = local_contacts_[i];
     const AffineGap at = known ? AffineGap{translation_problem_.normal(i), -translation_problem_.bound(i)}
-                               : affine_gap(seen, state.R);
-    const Vector3d n_Q = state.R.transpose() * at.n;
+                               : affine_gap(contact, state.R, clearance_);
     gap_[i] = at.n.dot(state.u) + at.h;
-    Vector3d turning = seen.a.cross(n_Q);
-    if (seen.kind != ContactKind::vertex_face) {
-      const Vector3d r = state.R.transpose() * (state.u - seen.b) + seen.a;
-      if (seen.kind == ContactKind::face_vertex) {
-        turning += seen.d.cross(r);
-      } else {
-        const Vector3d dB = state.R.transpose() * seen.dB;
-        turning += seen.d.cross(dB.cross(r - (gap_[i] + clearance_) * n_Q)) / seen.d.cross(dB).norm();
-      }
-    }
-    J_[i].head<3>() = at.n;
-    J_[i].tail<3>() = turning;
+    J_[i] = gap_gradient(contact, at.n, gap_[i] + clearance_, state.u, state.R);
   }
 }
 
@@ -445,7 +371,7 @@ Vector6d ExactProjection::gradient(const Iterate& state) const noexcept {
 }
 
 /// Hessian of T, METHOD (15): [ 2 I, 0; 0, 8 G' H^ G - 2 (v' H^ v) I ]
-ExactProjection::HessianBlocks ExactProjection::metric_hessian(const Iterate& state) const noexcept {
+HessianBlocks ExactProjection::metric_hessian(const Iterate& state) const noexcept {
   const Vector3d v = state.E.vec();
   const Matrix3d G = 0.5 * (state.E.w() * Matrix3d::Identity() + hat(v));
   HessianBlocks W;
@@ -456,7 +382,7 @@ ExactProjection::HessianBlocks ExactProjection::metric_hessian(const Iterate& st
 
 /// Hessian of the Lagrangian T - sum multiplier_i gap_i, METHOD (38). The gap curvature is linear in a, b and
 /// J, so contacts with the same normal are summed first.
-ExactProjection::HessianBlocks ExactProjection::lagrangian_hessian(const Iterate& state) const noexcept {
+HessianBlocks ExactProjection::lagrangian_hessian(const Iterate& state) const noexcept {
   HessianBlocks W = metric_hessian(state);
   const auto carries = [&](std::size_t i) { return multiplier_[i] > 0.0; };
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
@@ -473,63 +399,9 @@ ExactProjection::HessianBlocks ExactProjection::lagrangian_hessian(const Iterate
       load.b += multiplier_[j] * local_contacts_[j].b;
       load.angular_gradient += multiplier_[j] * J_[j].tail<3>();
     }
-    add_contact_curvature(state, i, load, W);
+    subtract_gap_curvature(local_contacts_[i], J_[i].head<3>(), load, state.u, state.R, W);
   }
   return W;
-}
-
-// K_i, the curvature of gap i, for R = I + eta^ + eta^^2/2, in the axes of q. With
-// sym(x, y) = (x y' + y x')/2 and M(x, y) = sym(x, y) - (x . y) I, which is the Hessian of x . R y:
-//
-//   vertex_face   eta eta: M(n, a)
-//   face_vertex   eta eta: M(d, w), w = R'(u - b)            eta u: d^ R' = -(n^ R)'
-//   edge_edge     gap = f/s with f = (d x dB) . r, s = |d x dB|:
-//     f:  eta eta: M(dB x r, d) - 2 sym(dB, d x a) + M(d x dB, a)
-//         eta u: d^ dB^ R' = (R d dB' - (d . dB) R)'
-//     s:  gradient g_s = -(d . dB) n
-//     gap: (K_f - J g_s' - g_s J')/s, but for a term with the gap itself, which is zero where it matters
-//
-// load: a, b and J of all contacts with this normal, and 1, each times its multiplier.
-void ExactProjection::add_contact_curvature(const Iterate& state, std::size_t i,
-                                            const WeightedContactSum& load, HessianBlocks& W) const noexcept {
-  const LocalContact& seen = local_contacts_[i];
-  const Vector3d n = J_[i].head<3>();
-  const auto R_T = state.R.transpose();
-  const Vector3d n_Q = R_T * n;
-  // B -= M(x, y), with sym(x, y) as x y' until all are in
-  const auto bend_by = [&](const Matrix3d& xy, double trace) {
-    W.B -= 0.5 * (xy + xy.transpose());
-    W.B.diagonal().array() += trace;
-  };
-  if (seen.kind == ContactKind::vertex_face) {
-    bend_by(n_Q * load.a.transpose(), n_Q.dot(load.a));
-    return;
-  }
-  const Vector3d w = R_T * (load.m * state.u - load.b);
-  if (seen.kind == ContactKind::face_vertex) {
-    bend_by(seen.d * w.transpose(), seen.d.dot(w));
-    for (int j = 0; j < 3; ++j) W.C.col(j) += load.m * n.cross(state.R.col(j));
-    return;
-  }
-  const Vector3d dB = R_T * seen.dB;
-  const double cosine = seen.d.dot(dB);
-  const double s = seen.d.cross(dB).norm();
-  const Vector3d lever = dB.cross(w + load.a) / s;
-  const Vector3d across = seen.d.cross(load.a) * (2.0 / s);
-  const Vector3d tilting = load.a + (2.0 / s * cosine) * load.angular_gradient;
-  bend_by(lever * seen.d.transpose() - dB * across.transpose() + n_Q * tilting.transpose(),
-          lever.dot(seen.d) + n_Q.dot(load.a));
-  W.C -= (load.m / s) * (state.R * seen.d * dB.transpose() + cosine * (n * n_Q.transpose() - state.R));
-}
-
-/// [2 I, C; C', B] = root root' with P = sqrt(2) I, Q = C'/sqrt(2), S S' = B - C'C/2. Returns false if it is
-/// not positive definite.
-bool ExactProjection::factorise(const HessianBlocks& W, CholeskyFactor& root) const noexcept {
-  constexpr double kSqrtHalf = 0.70710678118654752440;
-  if (!inverse_root(W.B - 0.5 * W.C.transpose() * W.C, root.S_inverse)) return false;
-  root.P_inverse = kSqrtHalf * Matrix3d::Identity();
-  root.Q = kSqrtHalf * W.C.transpose();
-  return true;
 }
 
 /// Makes the Hessian positive definite, so that the step is a descent, METHOD (40). First it adds the active
@@ -566,22 +438,6 @@ void ExactProjection::factorise_convexified(const HessianBlocks& curvature,
   const Matrix6d factor = metric_root_ * eigen.eigenvectors();
   if (split(factor * turned_over.asDiagonal() * factor.transpose())) return;
   split(metric_root_ * metric_root_.transpose());
-}
-
-Vector6d ExactProjection::CholeskyFactor::solve(const Vector6d& y) const noexcept {
-  Vector6d z;
-  const Vector3d upper = P_inverse * y.head<3>();
-  z.head<3>() = upper;
-  z.tail<3>() = S_inverse * (y.tail<3>() - Q * upper);
-  return z;
-}
-
-Vector6d ExactProjection::CholeskyFactor::solve_transposed(const Vector6d& z) const noexcept {
-  Vector6d y;
-  const Vector3d lower = S_inverse.transpose() * z.tail<3>();
-  y.head<3>() = P_inverse.transpose() * (z.head<3>() - Q.transpose() * lower);
-  y.tail<3>() = lower;
-  return y;
 }
 
 /// Factorises the Hessian of the Lagrangian.
@@ -756,7 +612,7 @@ bool ExactProjection::find_feasible_rotation(Iterate& state) noexcept {
 /// Drops open contacts without a multiplier in the last step and in the last translation.
 void ExactProjection::drop_idle_contacts(const Iterate& state) noexcept {
   for (std::size_t i = contacts_.size(); i-- > 0;) {
-    const AffineGap gap = affine_gap(local_contacts_[i], state.R);
+    const AffineGap gap = affine_gap(local_contacts_[i], state.R, clearance_);
     if (multiplier_[i] > 0.0 || translation_problem_.multiplier(i) > 0.0 ||
         gap.n.dot(state.u) + gap.h < kTouching)
       continue;
@@ -776,7 +632,7 @@ bool ExactProjection::add_touching_contacts(const Iterate& state) noexcept {
   update_local_contacts(known);
   touching_added_ = true;
   for (std::size_t i = known; i < contacts_.size() && touching_added_; ++i) {
-    const AffineGap at = affine_gap(local_contacts_[i], state.R);
+    const AffineGap at = affine_gap(local_contacts_[i], state.R, clearance_);
     gap_[i] = at.n.dot(state.u) + at.h;
     touching_added_ = gap_[i] * L_ >= -rounding_m_;
   }
@@ -796,44 +652,10 @@ void ExactProjection::fill_projection(Projection& out) noexcept {
     if (gap_[i] <= kTouching) out.active.add({contacts_[i], multiplier_[i] * M_.mass_kg * L_});
 }
 
-// Weak duality gives a proof of global optimality. For any multipliers m_i >= 0, the least value of the
-// Lagrangian over all u and all unit quaternions q bounds T from below. A vertex-face gap is quadratic in q,
-// n . R(q) a = q' A q with
-//
-//   A = [ n.a      (a x n)'              ]
-//       [ a x n    n a' + a n' - (n.a) I ]
-//
-// so the Lagrangian is |u|^2 - sum m_i n_i . u - sum m_i c_i + q' Z q with Z = 4 diag(0, H^) - sum m_i A_i.
-// At a KKT point u is its minimiser and q an eigenvector of Z. The bound meets T, and no admissible pose is
-// closer, where the eigenvalue is the least one: where q' Z q curves upwards on the sphere at q, in all three
-// directions. That is the eta block of the Lagrangian's Hessian, so the proof costs one Cholesky factor.
 bool ExactProjection::certify_global() noexcept {
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    if (multiplier_[i] > 0.0 && contacts_[i].kind != ContactKind::vertex_face) return false;
-  CholeskyFactor root;
-  return factorise(lagrangian_hessian(state_), root);
-}
-
-/// The rotation at which the dual bound is attained, the eigenvector of the least eigenvalue of Z: where it
-/// is not the optimum it is at least where the Lagrangian would rather be.
-Quaterniond ExactProjection::dual_rotation() const noexcept {
-  Eigen::Matrix4d Z = Eigen::Matrix4d::Zero();
-  Z.bottomRightCorner<3, 3>() = 4.0 * H_hat_;
-  for (std::size_t i = 0; i < contacts_.size(); ++i) {
-    const double m = multiplier_[i];
-    if (!(m > 0.0)) continue;
-    const Vector3d& n = local_contacts_[i].n;
-    const Vector3d& a = local_contacts_[i].a;
-    const Vector3d an = a.cross(n);
-    const Matrix3d na = n * a.transpose();
-    Z(0, 0) -= m * n.dot(a);
-    Z.topRightCorner<1, 3>() -= m * an.transpose();
-    Z.bottomLeftCorner<3, 1>() -= m * an;
-    Z.bottomRightCorner<3, 3>() -= m * (na + na.transpose() - n.dot(a) * Matrix3d::Identity());
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(Z);
-  const Eigen::Vector4d q = eigen.eigenvectors().col(0);
-  return {q[0], q[1], q[2], q[3]};
+  const std::span<const LocalContact> contacts(local_contacts_.data(), contacts_.size());
+  const std::span<const double> multipliers(multiplier_.data(), contacts_.size());
+  return has_dual_bound(contacts, multipliers) && meets_dual_bound(lagrangian_hessian(state_));
 }
 
 }  // namespace wrenchd

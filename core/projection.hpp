@@ -7,6 +7,8 @@
 #include <span>
 
 #include "core/contact.hpp"
+#include "core/contact_gap.hpp"
+#include "core/hessian.hpp"
 #include "core/inertia.hpp"
 #include "core/least_distance.hpp"
 #include "core/pose.hpp"
@@ -105,45 +107,11 @@ class ExactProjection {
   double gap_tolerance_m(const Pose& X_WT) const noexcept;
 
  private:
-  /// A contact relative to p: directions in the axes of p, lengths in units of L, METHOD (20).
-  struct LocalContact {
-    Vector3d n;   ///< normal of a vertex_face contact
-    Vector3d a;   ///< point a on the tool feature, in T
-    Vector3d b;   ///< point b on the obstacle feature; not used for vertex_face
-    double c;     ///< n . (x_p - b) of a vertex_face contact
-    Vector3d d;   ///< d_T of the contact
-    Vector3d dB;  ///< d_W of the contact, in the axes of p
-    ContactKind kind;
-  };
-  /// A gap at a fixed rotation, minus the clearance: n . u + h, METHOD (21).
-  struct AffineGap {
-    Vector3d n;
-    double h;
-  };
   struct Iterate {
     Vector3d u = Vector3d::Zero();
     Quaterniond E = Quaterniond::Identity();
     Matrix3d R = Matrix3d::Identity();  ///< rotation matrix of E
     double T = 0.0;                     ///< scaled energy T/(m L^2)
-  };
-  /// Blocks of a Hessian in (u, eta): [2 I, C; C', B].
-  struct HessianBlocks {
-    Matrix3d C = Matrix3d::Zero();
-    Matrix3d B = Matrix3d::Zero();
-  };
-  /// Sums over the contacts with one normal, weighted with their multipliers.
-  struct WeightedContactSum {
-    double m = 0.0;
-    Vector3d a = Vector3d::Zero();
-    Vector3d b = Vector3d::Zero();
-    Vector3d angular_gradient = Vector3d::Zero();  ///< sum of the angular parts of the gradients
-  };
-  /// Triangular root [P 0; Q S] of a positive definite matrix, with P and S inverted.
-  struct CholeskyFactor {
-    Matrix3d P_inverse, Q, S_inverse;
-
-    Vector6d solve(const Vector6d& y) const noexcept;             ///< inverse of the root times y
-    Vector6d solve_transposed(const Vector6d& z) const noexcept;  ///< inverse of the transposed root times z
   };
   enum class LocalResult : std::uint8_t { converged, budget_spent, infeasible };
   enum class LineSearchResult : std::uint8_t { decreased, found_contacts, no_decrease };
@@ -159,8 +127,6 @@ class ExactProjection {
   Projection make_projection(LocalResult local) noexcept;
   Pose to_pose(const Iterate& state) const noexcept;
   void update_local_contacts(std::size_t first) noexcept;
-  AffineGap affine_gap(const LocalContact& seen, const Matrix3d& R) const noexcept;
-  bool overlaps_at_p(const LocalContact& seen) const noexcept;
   double scaled_energy(const Iterate& state) const noexcept;
   void rotate(Iterate& state, const Vector3d& eta) const noexcept;
   bool translate(Iterate& state) noexcept;
@@ -177,10 +143,7 @@ class ExactProjection {
   Vector6d gradient(const Iterate& state) const noexcept;
   HessianBlocks metric_hessian(const Iterate& state) const noexcept;
   HessianBlocks lagrangian_hessian(const Iterate& state) const noexcept;
-  void add_contact_curvature(const Iterate& state, std::size_t i, const WeightedContactSum& load,
-                             HessianBlocks& W) const noexcept;
   void linearise(const Iterate& state) noexcept;
-  bool factorise(const HessianBlocks& W, CholeskyFactor& root) const noexcept;
   void factorise_convexified(const HessianBlocks& W, CholeskyFactor& root) const noexcept;
   void factorise_model(const Iterate& state) noexcept;
   bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
@@ -189,7 +152,6 @@ class ExactProjection {
   bool add_touching_contacts(const Iterate& state) noexcept;
   void fill_projection(Projection& out) noexcept;
   bool certify_global() noexcept;
-  Quaterniond dual_rotation() const noexcept;
 
   Inertia M_;
   Budget budget_;
