@@ -19,7 +19,7 @@ constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kTurn = {-10.0, 10.0};
-constexpr Range kTurnBack = {0.0, 86400.0};
+constexpr Range kReversal_s = {0.0, 86400.0};
 
 /// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
@@ -95,7 +95,7 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
 /// Keys that require `mesh`; a half-space rejects them.
 struct MeshKeys {
   TomlValue scale, position, rotation, kind;
-  TomlValue velocity, angular_velocity, turn_back_after;
+  TomlValue velocity, angular_velocity, reverse_after;
 };
 
 /// Reads a velocity and rejects a length above `fastest`. Returns true if the key is valid or absent.
@@ -114,9 +114,9 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
       read_velocity(keys.velocity, ObstacleMotion::kMaxSpeed_m_per_s, motion.linear_m_per_s);
   const bool angular_is_good = read_velocity(
       keys.angular_velocity, ObstacleMotion::kMaxAngularSpeed_rad_per_s, motion.angular_rad_per_s);
-  const bool turns_back = keys.turn_back_after.number(motion.reverse_after_s, kTurnBack);
-  if (turns_back && linear_is_good && angular_is_good && !motion.moves())
-    keys.turn_back_after.refuse(
+  const bool reverses = keys.reverse_after.number(motion.reverse_after_s, kReversal_s);
+  if (reverses && linear_is_good && angular_is_good && !motion.moves())
+    keys.reverse_after.refuse(
         "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s, or leave this "
         "out");
 }
@@ -145,7 +145,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   const MeshKeys keys = {table.optional("scale", "m"),          table.optional("position_m"),
                          table.optional("rotation_vector_rad"), table.optional("kind"),
                          table.optional("velocity_m_per_s"),    table.optional("angular_velocity_rad_per_s"),
-                         table.optional("turn_back_after_s")};
+                         table.optional("reverse_after_s")};
   if (mesh) {
     if (half_space)
       half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
@@ -154,7 +154,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
     if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
-  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.turn_back_after})
+  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.reverse_after})
     if (key) key.refuse("belongs to a mesh; a half_space stands still, so give what is to move as a mesh");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);

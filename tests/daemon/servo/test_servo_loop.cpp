@@ -626,5 +626,5 @@ TEST_CASE("what the servo thread says becomes lines that name the cure", "[servo
   CHECK(to_text({Event::Kind::fault_raised, {}, static_cast<std::uint32_t>(Fault::tick_late), 0.0305})
             .find("tick_late: a tick came some milliseconds late (30.5 ms); give wrenchd") == 0);
   CHECK(to_text({Event::Kind::arming_refused, {}, static_cast<std::uint32_t>(State::fault), 0.0}) ==
-        "not armed: acknowledge what happened first");
+        "not armed: acknowledge the fault or stop first");
 }
