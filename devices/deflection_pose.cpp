@@ -34,7 +34,7 @@ double excess(double length, double leash, double nothing) noexcept {
 double SteeringCurve::response(const Vector3d& t) const noexcept {
   if (!has_full_scale()) return 0.0;
   const double share = (t.norm() / full_scale_ - dead_zone_) / (1.0 - dead_zone_);
-  return std::pow(std::clamp(share, 0.0, 1.0), curve_);
+  return std::pow(std::clamp(share, 0.0, 1.0), exponent_);
 }
 
 Vector3d SteeringCurve::velocity(const Vector3d& t) const noexcept {
@@ -48,14 +48,14 @@ Vector3d SteeringCurve::deflection(const Vector3d& v) const noexcept {
   const double speed = v.norm();
   const double firmness = std::min(speed / (gain_ * full_scale_), 1.0);
   if (!(firmness > kNoSpeed)) return Vector3d::Zero();
-  const double share = dead_zone_ + (1.0 - dead_zone_) * std::pow(firmness, 1.0 / curve_);
+  const double share = dead_zone_ + (1.0 - dead_zone_) * std::pow(firmness, 1.0 / exponent_);
   return full_scale_ * share / speed * v;
 }
 
 /// The velocity that the cap asks for. In position mode: what brings the pose to its goal within this step.
 Twist DeflectionPose::commanded_twist(double dt_s) const noexcept {
   if (settings_.mode == Deflection::Mode::rate)
-    return {speed_share_ * linear_.velocity(translation_m_), speed_share_ * angular_.velocity(rotation_rad_)};
+    return {speed_factor_ * linear_.velocity(translation_m_), speed_factor_ * angular_.velocity(rotation_rad_)};
   const Vector3d goal = no_longer_than(settings_.linear_gain * translation_m_, settings_.reach_m);
   return {
       (goal - X_BH_.translation_m) / dt_s,

@@ -247,7 +247,7 @@ class BitMap {
       refuse("length = " + std::to_string(frame.length) + " must be " + std::to_string(least) + " to " +
              std::to_string(kMaxReportBytes) + " bytes");
     if (frame.min_length > frame.length || (frame.min_length != 0 && frame.checksum != Checksum::none))
-      refuse("least_length = " + std::to_string(frame.min_length) +
+      refuse("min_length = " + std::to_string(frame.min_length) +
              " must not be above length, and not be stated where there is a checksum");
     if (frame.min_length == 0 && frame.length < least) refuse("is empty");
     room_ = 8 * (frame.length - tail);

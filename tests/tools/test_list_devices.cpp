@@ -80,7 +80,7 @@ TEST_CASE("a SpaceNavigator has its profile, what it senses and drives, and why 
         "3-2, interface 0: 046d:c626 \"SpaceNavigator\" of 3Dconnexion, no serial number\n"
         "  /dev/hidraw2 can be opened\n"
         "  profile spacemouse_split: 3Dconnexion SpaceMouse family, translation and rotation in two reports: "
-        "moves a tool, feels nothing\n"
+        "steers a tool, no force\n"
         "  senses x y z rx ry rz; drives none: it moves a tool, and every wrench is dropped\n"
         "  its report descriptor agrees with the profile\n"
         "  the other profiles:\n"
