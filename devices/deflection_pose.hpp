@@ -84,7 +84,7 @@ class DeflectionPose {
 
  private:
   Twist commanded_twist(double dt_s) const noexcept;
-  void limit_lead(const Pose& before, double dt_s) noexcept;
+  void limit_proxy_distance(const Pose& before, double dt_s) noexcept;
   void clamp_to_workspace(const Pose& before, double dt_s) noexcept;
 
   Deflection settings_;

@@ -248,7 +248,7 @@ class BitMap {
              std::to_string(kMaxReportBytes) + " bytes");
     if (frame.min_length > frame.length || (frame.min_length != 0 && frame.checksum != Checksum::none))
       refuse("min_length = " + std::to_string(frame.min_length) +
-             " must not be above length, and not be stated where there is a checksum");
+             " must not exceed length, and must not be stated together with a checksum");
     if (frame.min_length == 0 && frame.length < least) refuse("is empty");
     room_ = 8 * (frame.length - tail);
     if (frame.has_id) claim("the report id", 0, 8);
@@ -358,12 +358,12 @@ void check_distinguishable(const PoseReportLayout& a, const PoseReportLayout& b)
   const bool ids = a.has_id && b.has_id;
   if (a.has_id != b.has_id)
     throw std::invalid_argument(
-        "reports with an id and without one cannot be told apart; a device has either");
+        "reports with an id and without one cannot be distinguished; a device has either kind");
   if (ids && a.id != b.id) return;
   const auto least = [](const ReportFrame& r) { return r.min_length == 0 ? r.length : r.min_length; };
   if (least(a) > b.length || least(b) > a.length) return;
   throw std::invalid_argument("two reports have the same " + std::string(ids ? "id" : "length") +
-                              " and cannot be told apart");
+                              " and cannot be distinguished");
 }
 
 /// Whether the reports make a pose together.
@@ -534,10 +534,10 @@ void check(const WrenchReportLayout& layout) {
   BitMap map("wrench_report", layout);
   if (!layout.template_bytes.empty() && layout.template_bytes.size() != layout.length)
     map.refuse("template has " + std::to_string(layout.template_bytes.size()) +
-               " bytes and must have as many as the report, " + std::to_string(layout.length));
+               " bytes and must have the length of the report, " + std::to_string(layout.length));
   if (!layout.efforts.present) map.need("force", layout.force);
   if (layout.efforts.present && (layout.force.present || layout.torque.present))
-    map.refuse("efforts stand instead of force and torque; leave one of the two out");
+    map.refuse("efforts replace force and torque; leave one of the two out");
   map.claim("enable", layout.enable);
   map.claim("sequence", layout.sequence, 1);
   map.claim("force", layout.force, 3);
@@ -557,7 +557,7 @@ void check_reports(const DeviceProfile& profile) {
   if (!profile.has_output) return;
   check(profile.wrench_report);
   if (profile.wrench_report.efforts.present && profile.kinematics.kind == Kinematics::Kind::none)
-    throw std::invalid_argument("wrench_report: efforts need kinematics to be computed by");
+    throw std::invalid_argument("wrench_report: efforts require [kinematics]");
   if (profile.max_torque_Nm > 0.0 && !profile.wrench_report.torque.present)
     throw std::invalid_argument(
         "wrench_report: torque is missing, though max_torque_Nm is stated; a device without torque states "

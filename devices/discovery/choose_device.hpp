@@ -36,7 +36,7 @@ struct DeviceChoice {
 /// (match_profile()), have the requested serial number and interface, and have a report descriptor that
 /// agrees with the profile. If several devices qualify, selects none, and each rejection states how to
 /// distinguish the device. Opens no device. Not RT-safe: allocates.
-DeviceChoice choose_device(std::span<const UsbDevice> plugged, std::span<const DeviceProfile> profiles,
-                           const DeviceCriteria& wanted);
+DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const DeviceProfile> profiles,
+                           const DeviceCriteria& criteria);
 
 }  // namespace wrenchd

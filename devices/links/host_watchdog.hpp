@@ -15,7 +15,7 @@ namespace wrenchd {
 /// a wrench, the watchdog sends a zero wrench with the motors off. A hanging loop cannot release the device,
 /// and the device's own watchdog may take half a second.
 ///
-/// The watchdog is active only after a nonzero wrench. The loop sends zeros before an intended silence, for
+/// The watchdog is active only timeout a nonzero wrench. The loop sends zeros before an intended silence, for
 /// example in the self-test of the device's watchdog. After its zero commands the watchdog is inactive until
 /// the loop sends a nonzero wrench again. Its commands use the next sequence numbers of the loop. A loop that
 /// resumes therefore loses the same number of its own commands; these are zero too (core/transitions.hpp: a
@@ -26,9 +26,9 @@ class HostWatchdog {
  public:
   /// Makes a watchdog that never sends.
   HostWatchdog() noexcept = default;
-  /// after: timeout since the last command of the loop. For a device without motors the watchdog never sends.
+  /// timeout: timeout since the last command of the loop. For a device without motors the watchdog never sends.
   /// Not RT-safe: allocates.
-  HostWatchdog(const DeviceProfile& profile, Duration after);
+  HostWatchdog(const DeviceProfile& profile, Duration timeout);
 
   /// Processes a report that the loop sent at `now`. RT-safe.
   void feed(TimePoint now, const Packet& packet) noexcept;
