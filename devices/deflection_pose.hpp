@@ -19,7 +19,10 @@ class SteeringCurve {
  public:
   /// full: full deflection; NaN if it is not stated.
   SteeringCurve(const Deflection& settings, double gain, double full) noexcept
-      : gain_(gain), full_scale_(full), dead_zone_(settings.dead_zone), exponent_(settings.response_exponent) {}
+      : gain_(gain),
+        full_scale_(full),
+        dead_zone_(settings.dead_zone),
+        exponent_(settings.response_exponent) {}
 
   /// Returns the response u(t); 0 if the full deflection is not stated. RT-safe.
   double response(const Vector3d& t) const noexcept;

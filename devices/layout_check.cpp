@@ -105,8 +105,7 @@ std::optional<std::string> difference(const DescribedReport& device, const Expec
       return report_name + "the device's report ends with byte " + std::to_string(device.length - 1);
     const std::vector<Cell> cells = cells_within(device, begin, end);
     if (cells.empty()) return report_name + "the device declares nothing there";
-    if (!agrees(cells, begin, end, field.is_signed))
-      return report_name + "the device has " + text(cells);
+    if (!agrees(cells, begin, end, field.is_signed)) return report_name + "the device has " + text(cells);
   }
   return {};
 }
@@ -129,7 +128,8 @@ std::vector<std::string> find_differences(const ReportDescriptor& device,
     const DescribedReport* report = device.find(expected_report.kind, expected_report.id);
     if (report == nullptr) {
       if (expected_report.may_be_absent) continue;
-      lines.push_back(report_name + ": the device has no such report; " + ids_of(device, expected_report.kind));
+      lines.push_back(report_name + ": the device has no such report; " +
+                      ids_of(device, expected_report.kind));
       continue;
     }
     const bool is_short = acceptably_short(*report, expected_report);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/finite.hpp"
+#include "devices/layout_validation.hpp"
 
 namespace wrenchd {
 namespace {
@@ -71,7 +72,7 @@ void check_profile(const DeviceProfile& profile) {
   check_number(profile, "max_angular_speed_rad_per_s", profile.max_angular_speed_rad_per_s);
   check_number(profile, "stale_fault_s", profile.stale_fault_s);
   try {
-    check_reports(profile);
+    validate_reports(profile);
   } catch (const std::invalid_argument& e) {
     refuse(profile, e.what());
   }

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "core/clock.hpp"
-#include "devices/report_codec.hpp"
+#include "devices/report_frame.hpp"
 
 namespace wrenchd {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "devices/report_codec.hpp"
+#include "devices/report_frame.hpp"
 
 namespace wrenchd {
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/finite.hpp"
+#include "devices/layout_validation.hpp"
 
 namespace wrenchd {
 namespace {
@@ -49,8 +50,8 @@ const PoseReportLayout& checked_layout(const DeviceProfile& profile) {
         "device profile " + profile.name +
         ": the simulated device sends whole poses and accepts wrenches, this one does not; "
         "choose a profile that inherits loopback");
-  check(profile.pose_report);
-  check(profile.wrench_report);
+  validate(profile.pose_report);
+  validate(profile.wrench_report);
   return profile.pose_report;
 }
 

@@ -66,7 +66,8 @@ SimulatedHandle::SimulatedHandle(const SimulationSettings& s, const Pose& X_BH, 
           step_s);
 }
 
-//   (m + h (D + b)) v' = m v + h (F + K offset + D v_G),  then Coulomb friction removes at most h c / (m + h (D + b))
+//   (m + h (D + b)) v' = m v + h (F + K offset + D v_G),  then Coulomb friction removes at most h c / (m + h
+//   (D + b))
 SimulatedHandle::AppliedForces SimulatedHandle::integrate(const MotionParameters& motion,
                                                           const Vector3d& demand, const Vector3d& offset,
                                                           const Vector3d& goal_velocity,
