@@ -321,20 +321,22 @@ void read_reach(TomlTable& table, Deflection& d) {
     most.refuse("the pose begins at 0, inside of the box; no number may be below 0");
 }
 
-/// Optional parameters of steering; "none" removes an inherited value.
+/// Optional response of a puck. "none" removes an inherited value.
 void read_steering(TomlTable& table, Deflection& d) {
-  const TomlValue full_m = table.optional("full_m"), full_rad = table.optional("full_rad");
-  const TomlValue dead_zone = table.optional("dead_zone"), curve = table.optional("curve");
-  const TomlValue slow = table.optional("slow");
-  const TomlValue leash_m = table.optional("leash_m"), leash_rad = table.optional("leash_rad");
-  const bool has_end = is_stated(full_m) && is_stated(full_rad);
-  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_end) {
+  const TomlValue full_m = table.optional("full_deflection_m");
+  const TomlValue full_rad = table.optional("full_deflection_rad");
+  const TomlValue dead_zone = table.optional("dead_zone"), exponent = table.optional("response_exponent");
+  const TomlValue slow_factor = table.optional("slow_factor");
+  const TomlValue distance = table.optional("max_proxy_distance_m");
+  const TomlValue angle = table.optional("max_proxy_angle_rad");
+  const bool has_full_scale = is_stated(full_m) && is_stated(full_rad);
+  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_full_scale) {
     if (!is_stated(value)) return;
     if (d.mode != Deflection::Mode::rate) {
       if (!value.is_inherited())
         value.refuse("belongs to mode \"rate\", in which the deflection is a velocity; leave it out");
-    } else if (needs_end && !has_end) {
-      value.refuse("is reckoned by the end of the cap's way; state full_m and full_rad");
+    } else if (needs_full_scale && !has_full_scale) {
+      value.refuse("needs the full deflection of the puck; state full_deflection_m and full_deflection_rad");
     } else {
       value.number(out, range);
     }
@@ -342,12 +344,13 @@ void read_steering(TomlTable& table, Deflection& d) {
   read(full_m, d.full_deflection_m, {1e-5, 1}, true);
   read(full_rad, d.full_deflection_rad, {1e-4, 3.2}, true);
   read(dead_zone, d.dead_zone, {0, 0.9}, true);
-  read(curve, d.response_exponent, {1, 5}, true);
-  read(slow, d.slow_factor, {0.01, 1}, false);
-  read(leash_m, d.max_proxy_distance_m, {1e-4, 0.5}, true);
-  read(leash_rad, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
-  if (is_stated(leash_m) == is_stated(leash_rad)) return;
-  (is_stated(leash_m) ? leash_m : leash_rad).refuse("is one of two: state leash_m and leash_rad, or neither");
+  read(exponent, d.response_exponent, {1, 5}, true);
+  read(slow_factor, d.slow_factor, {0.01, 1}, false);
+  read(distance, d.max_proxy_distance_m, {1e-4, 0.5}, true);
+  read(angle, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
+  if (is_stated(distance) == is_stated(angle)) return;
+  (is_stated(distance) ? distance : angle)
+      .refuse("is one of two: state max_proxy_distance_m and max_proxy_angle_rad, or neither");
 }
 
 void read_deflection(TomlTable& table, DeviceProfile& p) {
@@ -374,8 +377,8 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   position.vector(plan.X_BR.translation_m, {-2, 2});
   Vector3d turn = Vector3d::Zero();
   if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);
-  table.optional("most_offset_m").number(plan.max_offset_m, {0, 2});
-  table.optional("most_offset_rad").number(plan.max_offset_rad, {0, 4});
+  table.optional("max_offset_m").number(plan.max_offset_m, {0, 2});
+  table.optional("max_offset_rad").number(plan.max_offset_rad, {0, 4});
   table.optional("confirm_buttons").integer(plan.confirm_buttons, {0, 4294967295.0});
   table.optional("travel_m").number(plan.travel_m, {0.001, 0.5});
   table.optional("travel_rad").number(plan.travel_rad, {0.01, 1.5});
@@ -386,7 +389,7 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   if (least < plan.travel_m)
     most.refuse("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
                 ", along each axis; along one it is " + to_text(least));
-  const TomlValue turns = table.optional("max_turn_rad");
+  const TomlValue turns = table.optional("max_rotation_rad");
   turns.number(plan.max_rotation_rad, {0.01, 4});
   if (plan.max_rotation_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
 }

@@ -165,7 +165,7 @@ class FrameReader {
                                       {"xor8", Checksum::xor8},
                                       {"none", Checksum::none}});
     const std::size_t length = length_good ? layout.length : kMaxReportBytes;
-    const TomlValue least = table.optional("least_length");
+    const TomlValue least = table.optional("min_length");
     if (least.integer(layout.min_length, {shortest, static_cast<double>(length)}) &&
         layout.checksum != Checksum::none)
       least.refuse("a report with a checksum is never short; leave one of the two out");
@@ -314,13 +314,13 @@ void read_parts(TomlTable& table, FrameReader& frame, PoseReportLayout& r, const
 // an i16 with a step rounded down from 1/32767 reaches slightly less than 1
 constexpr double kUnitQuaternion = 0.999;
 
-std::size_t least_length(const ReportFrame& frame) {
+std::size_t min_length(const ReportFrame& frame) {
   return frame.min_length == 0 ? frame.length : frame.min_length;
 }
 
 bool told_apart(const ReportFrame& a, const ReportFrame& b) {
   if (a.has_id && b.has_id && a.id != b.id) return true;
-  return least_length(a) > b.length || least_length(b) > a.length;
+  return min_length(a) > b.length || min_length(b) > a.length;
 }
 
 }  // namespace

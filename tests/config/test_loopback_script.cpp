@@ -133,7 +133,7 @@ TEST_CASE("a script is for simulated devices that can do what it says", "[loopba
   const auto arm = run_program("wrenchd", {"--simulate", "polhem", "--virtual-time", "--seconds", "1",
                                            "--loopback-script", file.string()});
   CHECK(arm.exit_code == 1);
-  CHECK(says(arm, "s.toml: an emulated arm has no such fault; the loopback device has"));
+  CHECK(says(arm, "s.toml: an emulated arm does not support this fault; the loopback device does"));
 }
 
 }  // namespace
