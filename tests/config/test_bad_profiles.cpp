@@ -115,9 +115,9 @@ torque_constant_Nm_per_A = [0.0538, 0.0538, 0.0538]
 max_current_A = 2.0
 counts_per_turn = [2000, 2000, 2000]
 direction = [-1, -1, -1]
-joint_slots = [0, 1, 2]
+joint_report_index = [0, 1, 2]
 home_counts = [0, 0, -5000]
-count_button = { slot = 2, above = 5000, minus = 10000 }
+count_button = { report_index = 2, threshold_counts = 5000, offset_counts = 10000 }
 [pose_report]
 id = "none"
 length = 64
@@ -462,7 +462,7 @@ const std::vector<Bad> kTable = {
     {kArm, "[0.058, 0.174, 0.133]", "[0.058, 0.174]", "[0.058, 0.174]", "expected an array of 3 numbers"},
     {kArm, "[0.058, 0.174, 0.133]", "[58, 174, 133]", "58, 174", "from 0.0001 to 2 m, found 58"},
     {kArm, "direction = [-1, -1, -1]", "direction = [-1, 0, -1]", "[-1, 0, -1]", "each must be 1 or -1"},
-    {kArm, "joint_slots = [0, 1, 2]", "joint_slots = [0, 1, 1]", "[0, 1, 1]", "each integer of joints once"},
+    {kArm, "joint_report_index = [0, 1, 2]", "joint_report_index = [0, 1, 1]", "[0, 1, 1]", "each integer of joints once"},
     {kArm, "counts_per_turn = [2000, 2000, 2000]", "counts_per_turn = [2000, 2000, 2000, 1024]",
      "[2000, 2000, 2000, 1024]", "expected an array of 3 numbers, found an array of 4"},
     {kArm, "slot = 2", "slot = 3", "3", "from 0 to 2, found 3"},
