@@ -6,7 +6,7 @@
 
 namespace wrenchd {
 
-/// By how much obstacles that move raise T, Eq. (8), around a hand that stands still, or lower it. For an
+/// By how much obstacles that move raise T of Eq. (8) around a hand that stands still, or lower it. For an
 /// answer q at scene time to_s, and what its contacts' obstacles moved since from_s [s]:
 ///
 ///   dT = sum over the contacts of  multiplier n . (x - D^-1 x)       [kg m^2]

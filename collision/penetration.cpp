@@ -234,9 +234,9 @@ Penetration PenetrationDepth::to_penetration(const Pose& X_WP, const Projection&
 /// Every contact on its own, in every plane of its family; a convex obstacle counts as the half-space of the
 /// plane held, which for two edges is that of their common normal. Generically one vertex collides, and its
 /// projection frees the whole body: the best that does is the answer. Where none does (the family looks at
-/// one cross-section, and a vertex beside it stays inside), the wrenches of the contacts are added
-/// (paper, section 5; core/METHOD.md, section 7.3), and the pose reported is the best of their rotations
-/// lifted until the whole body is out. Translation alone always is a candidate.
+/// one cross-section, and a vertex beside it stays inside), the wrenches of the contacts are added, as
+/// section 5 of the paper says, and the pose reported is the best of their rotations lifted until the whole
+/// body is out. Translation alone always is a candidate.
 Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
   Penetration out = to_penetration(X_WP, translate(X_WP));
   if (out.projection.status == ProjectionStatus::free) return out;

@@ -25,9 +25,9 @@ struct Penetration {
   std::uint16_t contacts = 0;       ///< feature pairs that touch at q; 0 where p is admissible
   Vector6d eps = Vector6d::Zero();  ///< Eq. (15): exponential coordinates of p^-1 q
   /// What enters the wrench law. The same as eps for exact. For planar too, unless several contacts need each
-  /// its own projection: then the sum of their eps (paper, section 5 adds the wrenches). For
-  /// translational, METHOD (59), [d; sum (c_i - x) x d_i]: with the force gain k for both halves this is the
-  /// force k d at each contact and its torque about the centre of mass, which is that method's wrench.
+  /// its own projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For
+  /// translational, [d; sum (c_i - x) x d_i]: with the force gain k for both halves this is the force k d at
+  /// each contact and its torque about the centre of mass, which is that method's wrench.
   Vector6d spring_displacement = Vector6d::Zero();
 };
 

@@ -11,7 +11,7 @@
 
 namespace wrenchd {
 
-/// The admissible proxy (core/METHOD.md, section 14): a configuration q that follows the hand's p through a
+/// The admissible proxy (section 4 of the method): a configuration q that follows the hand's p through a
 /// scene of any shape, never enters an obstacle and never passes through one.
 ///
 /// Each step goes straight from an admissible pose towards the closest-point projection of p for the contacts

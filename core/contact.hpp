@@ -9,16 +9,15 @@
 
 namespace wrenchd {
 
-/// Which features of tool (A) and obstacle (B) meet, and with it how the normal moves (core/METHOD.md,
-/// section 3.1).
+/// Which features of tool (A) and obstacle (B) meet, and with it how the normal moves (section 2 of the
+/// method).
 enum class ContactKind : std::uint8_t {
   vertex_face,  ///< a face of the obstacle: the normal stands still in the world
   face_vertex,  ///< a face of the tool: the normal turns with the tool
   edge_edge,    ///< two edges: the normal is their common one
 };
 
-/// A feature pair with a signed gap, METHOD (17), (18). T is the tool's body frame at its centre of mass, q =
-/// (R, x) its pose:
+/// A feature pair with a signed gap. T is the tool's body frame at its centre of mass, q = (R, x) its pose:
 ///
 ///   gap(q) = n(q) . (R a + x - b)        > 0 apart, < 0 overlapping
 ///

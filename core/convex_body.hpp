@@ -11,7 +11,7 @@
 namespace wrenchd {
 
 /// A convex polyhedron in a frame of its own: vertices, and for each vertex its neighbours in order around it
-/// (the sequence N_v of the paper, section 3.3). Built once, then only read.
+/// (the sequence N_v of section 3.3). Built once, then only read.
 struct ConvexBody {
   /// The solid lies in n . x <= offset. Triangles in one plane are one face.
   struct Face {

@@ -7,10 +7,9 @@
 
 namespace wrenchd {
 
-/// The paper's numerical method (paper, section 3.1; core/METHOD.md, section 7.4): conjugate gradient in
-/// exponential coordinates from the last admissible configuration. The reference that the paper measures its
-/// analytical family by; slow, and where several contacts hold the optimum it stops short of it, because T
-/// has a kink there.
+/// The paper's numerical method (section 3.1): conjugate gradient in exponential coordinates from the last
+/// admissible configuration. The reference that the paper measures its analytical family by; slow, and where
+/// several contacts hold the optimum it stops short of it, because T has a kink there.
 ///
 /// The translation is not searched: for each rotation the nearest admissible one is known exactly. So the
 /// unknowns are the exponential coordinates eta of the rotation, E <- E exp(eta), and the cost is

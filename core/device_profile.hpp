@@ -125,7 +125,7 @@ struct FixedReport {
 /// Where the wrench a device receives is taken about, and in which axes.
 enum class WrenchPoint : std::uint8_t {
   handle,        ///< about the device's handle point, in the axes of its base: what a device's motors need
-  world_origin,  ///< the paper's spatial wrench W_S, METHOD (66), about the world origin in world axes
+  world_origin,  ///< the paper's spatial wrench W_S (section 2.4), about the world origin in world axes
 };
 
 /// How a device's bytes travel.

@@ -8,8 +8,8 @@
 namespace wrenchd {
 
 /// The wrench of the potential U(p) = (k/2) T(p, q*(p)), T the energy of Eq. (8) and q* the closest
-/// admissible configuration (core/METHOD.md, section 8.2). Conservative by construction: the work around a
-/// closed path of p is zero while q* is the closest point, whatever the shape of the wall.
+/// admissible configuration (section 5 of the method). Conservative by construction: the work around a closed
+/// path of p is zero while q* is the closest point, whatever the shape of the wall.
 ///
 /// M: of the body; k_per_s2: stiffness per mass [1/s^2], so that k m is the stiffness of a translation [N/m]
 /// and k H nearly that of a small rotation [N.m/rad]. X_WP, X_WQ: poses of the body frame T at p and q.

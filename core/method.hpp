@@ -10,7 +10,7 @@ enum class Method : std::uint8_t {
   exact,          ///< all contacts together, no discretisation (core/projection.hpp)
   planar,         ///< the paper's family of planes, contact by contact (core/planar_family.hpp)
   descent,        ///< the paper's numerical reference (core/descent.hpp)
-  translational,  ///< the traditional penalty method (paper, section 4)
+  translational,  ///< the traditional penalty method of section 4: translation only
 };
 
 }  // namespace wrenchd

@@ -12,7 +12,7 @@ namespace wrenchd {
 ///
 ///   V_lin = R_E^(-1/2) d        V_ang = 2 v        |v| = sin(theta/2)
 ///
-///   d(p, q) = T = m |x_q - x_p|^2 + 4 v' H v               METHOD (9), Eq. (8) without a factor 1/2
+///   d(p, q) = T = m |x_q - x_p|^2 + 4 v' H v                                        (Eq. 8, no factor 1/2)
 ///
 /// T is quadratic in (x_q - x_p, v). X_WP, X_WQ: poses of the body frame T at the centre of mass.
 /// Unit: that of m times m^2. RT safe.

@@ -12,8 +12,8 @@
 
 namespace wrenchd {
 
-/// The planar body of one cross-section (paper, section 3.2), in axes with the obstacle's normal as y, and
-/// the body as it stands at p (so phi = 0).
+/// The planar body of one cross-section (section 3.2), in axes with the obstacle's normal as y, and the body
+/// as it stands at p (so phi = 0).
 struct PlanarBody {
   double m = 1.0;             ///< mass [kg]
   double H = 1.0;             ///< moment of inertia about the section's normal, H_33 of Eq. (18) [kg m^2]
@@ -21,7 +21,7 @@ struct PlanarBody {
   double h = 0.0;             ///< height of the centre of mass above the obstacle [m]
 };
 
-/// With the angles at which both adjacent edges stay above the plane, METHOD (52), Eq. (21):
+/// With the angles at which both adjacent edges stay above the plane (Eq. 21):
 /// -pi <= theta_min <= pi,  theta_min <= theta_max <= theta_min + 2 pi.
 struct PlanarSection : PlanarBody {
   double theta_min = 0.0;  ///< [rad]
@@ -37,9 +37,8 @@ struct PlanarMinimum {
 /// The least-energy admissible configuration of one section: Eqs. (20)-(32). RT safe.
 PlanarMinimum minimise(const PlanarSection& section) noexcept;
 
-/// The paper's analytical approximation (paper, sections 3.2 and 3.3; core/METHOD.md, section 7.1): the
-/// family of planes that contain the contact's normal through its vertex, each solved in closed form, the
-/// best of them taken.
+/// The paper's analytical approximation (sections 3.2 and 3.3): the family of planes that contain the
+/// contact's normal through its vertex, each solved in closed form, the best of them taken.
 class PlanarFamily {
  public:
   /// planes: N_delta of Eq. (40). The body is kept by reference and must outlive this.

@@ -52,7 +52,8 @@ Vector3d rotation_vector(const Quaterniond& R) noexcept {
   return n < 0.5 * kSmallAngle_rad ? Vector3d(2.0 * v * (1.0 + n * n / 6.0)) : Vector3d(v * (theta / n));
 }
 
-//   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2        METHOD (2)
+//   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2        (Murray, Li, Sastry, ref. [18] of the
+//   paper)
 Pose exp(const Vector6d& xi) noexcept {
   const Vector3d v = xi.head<3>();
   const Vector3d w = xi.tail<3>();

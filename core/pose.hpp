@@ -37,8 +37,8 @@ inline bool same_bits(const Pose& a, const Pose& b) noexcept {
   return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
 }
 
-/// Exponential coordinates to configuration. xi = [v; w] (linear [m] first, angular [rad] second),
-/// METHOD (2).
+/// Exponential coordinates to configuration. xi = [v; w] (linear [m] first, angular [rad] second,
+/// section 2.2).
 Pose exp(const Vector6d& xi) noexcept;
 
 /// Exponential coordinates xi = [v; w] of a configuration, |w| <= pi. Inverse of exp().
@@ -56,13 +56,13 @@ inline Vector3d small_rotation_vector(const Quaterniond& R) noexcept {
   return (R.w() < 0.0 ? -2.0 : 2.0) * R.vec();
 }
 
-/// The 6x6 adjoint transformation, METHOD (4), acting on [v; w]:
+/// The 6x6 adjoint transformation of section 2.4, acting on [v; w]:
 ///
 ///   Ad_p = [ R  d^R ]
 ///          [ 0   R  ]
 Matrix6d adjoint(const Pose& p) noexcept;
 
-/// w^ with w^ x = w cross x (Eq. (3)).
+/// w^ with w^ x = w cross x (Eq. 3).
 Matrix3d hat(const Vector3d& w) noexcept;
 
 }  // namespace wrenchd

@@ -45,7 +45,7 @@ struct Projection {
 StaticVector<ActiveContact, ContactSet::kCapacity> evenly_loaded_contacts(
     const Projection& projection) noexcept;
 
-/// The exact method (core/METHOD.md, section 5): closest admissible configuration under the kinetic-energy
+/// The exact method (section 3.4 of the method): closest admissible configuration under the kinetic-energy
 /// metric, all contacts together.
 ///
 /// Unknowns: u = s/L and the unit quaternion E = (w, v) of R_p' R_q, with s = R_p'(x_q - x_p) and L a length

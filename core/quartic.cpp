@@ -186,7 +186,7 @@ Around around(double middle, double half, double product) noexcept {
   return out;
 }
 
-// Ferrari, METHOD (54). For every y
+// Ferrari (ref. [24] of the paper). For every y
 //
 //   x^4 + b x^3 + c x^2 + d x + e = (x^2 + b/2 x + y/2)^2
 //                                   - [(b^2/4 - c + y) x^2 + (b y/2 - d) x + (y^2/4 - e)]

@@ -15,8 +15,8 @@ struct RealRoots {
   const double* end() const noexcept { return x.data() + count; }
 };
 
-/// Real roots of  A x^4 + B x^3 + C x^2 + D x + E = 0  (Eq. (25)), in rising order, whatever the scales of
-/// the coefficients: each satisfies the equation to rounding, and none that stands apart from the others is
+/// Real roots of  A x^4 + B x^3 + C x^2 + D x + E = 0  (Eq. 25), in rising order, whatever the scales of the
+/// coefficients: each satisfies the equation to rounding, and none that stands apart from the others is
 /// missed. A multiple root comes once, or as often as rounding has split it. Any leading coefficients may
 /// vanish: what is left is solved as a cubic, quadratic or line. The zero polynomial has no roots here.
 /// Coefficients must be finite. RT safe.

@@ -71,7 +71,7 @@ class WrenchLaw {
   Vector6d rate_ = Vector6d::Zero();
 };
 
-/// W_S = Ad_(p^-1)' W_T: the wrench about the world origin, in world axes, METHOD (66). RT safe.
+/// W_S = Ad_(p^-1)' W_T: the wrench about the world origin, in world axes (section 2.4). RT safe.
 Wrench spatial_wrench(const Pose& X_WP, const Wrench& W_T) noexcept;
 
 /// The wrench about a point given in the world, in world axes. RT safe.

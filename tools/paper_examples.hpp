@@ -10,7 +10,7 @@
 
 namespace wrenchd {
 
-/// The examples of the paper, section 4. Its unit of length is any: the cube has sides of 50 of them, 500
+/// The examples of section 4 of the paper. Its unit of length is any: the cube has sides of 50 of them, 500
 /// in the larger version; the obstacle is the half-space y < 0.
 Scene paper_scene(double scale);
 

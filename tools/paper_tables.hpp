@@ -5,8 +5,7 @@
 
 namespace wrenchd {
 
-/// The examples of the paper (paper, section 4), run by wrenchd's methods, beside the numbers the paper
-/// prints.
+/// The examples of section 4 of the paper, run by wrenchd's methods, beside the numbers the paper prints.
 std::string paper_tables();
 
 }  // namespace wrenchd
