@@ -57,6 +57,8 @@ struct WrenchSettings {
 struct PoseSettings {
   Vector3d position_m = Vector3d::Zero();
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
+
+  Pose pose() const noexcept { return {rotation_from(rotation_vector_rad), position_m}; }
 };
 
 /// Placeholder for a profile name: select the profile of the connected device.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
@@ -35,6 +37,20 @@ Pose inverse(const Pose& X_AB) noexcept;
 /// True if all numbers of both poses are equal.
 inline bool same_bits(const Pose& a, const Pose& b) noexcept {
   return a.rotation.coeffs() == b.rotation.coeffs() && a.translation_m == b.translation_m;
+}
+
+/// A pose as records and files store it: translation x, y, z [m], then the unit quaternion x, y, z, w.
+using PoseNumbers = std::array<double, 7>;
+
+/// The stored numbers of a pose. RT-safe.
+inline PoseNumbers numbers_of(const Pose& X) noexcept {
+  const auto& [q, p] = X;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+/// The pose of stored numbers, bit for bit; it does not normalize the quaternion. RT-safe.
+inline Pose pose_from_numbers(const PoseNumbers& x) noexcept {
+  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
 }
 
 /// Configuration for the exponential coordinates xi = [v; w] (linear [m] first, angular [rad] second), METHOD

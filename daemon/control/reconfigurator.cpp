@@ -404,17 +404,14 @@ Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
 Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
   const ServoLoop::HandlePose seen = loop_.handle_pose();
-  const auto pose_of = [](const PoseSettings& placed) {
-    return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
-  };
   const DeviceSettings& device = config_.settings.device;
   // The view is of the scene that the configuration names: of one that a client has loaded nobody has said.
   const bool configured = config_.settings.scene == file_settings_.scene;
   return {scene_,
           rendering_id_,
           seen.at - from_seconds(seen.scene_time_s),
-          pose_of(device.base_in_world),
-          pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
+          device.base_in_world.pose(),
+          device.tool_in_handle.pose() * scene_->tool().X_MT(),
           config_.profile.wrench_point,
           configured ? config_.settings.view : ViewSettings{}};
 }
