@@ -19,8 +19,8 @@ constexpr double kSliver = 1e-3;
 constexpr std::size_t kFewVertices = 4096;
 
 /// Compressed rows: `all` holds the entries of all vertices, row i from begin[i] to begin[i + 1] - 1.
-void lay_out(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std::uint32_t>& begin,
-             std::vector<std::uint32_t>& all) {
+void compress_rows(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std::uint32_t>& begin,
+                   std::vector<std::uint32_t>& all) {
   begin.clear();
   all.clear();
   for (const auto& of_vertex : at) {
@@ -45,8 +45,8 @@ void ConvexBody::compute_derived_data() {
   for (const Vector3d& p : vertices_T_m) middle += p / static_cast<double>(vertices_T_m.size());
   std::vector<std::vector<std::uint32_t>> at(vertices_T_m.size());
 
-  const bool few = vertices_T_m.size() <= kFewVertices;
-  const auto face_like = [&](const Vector3d& n, std::uint32_t vertex) {
+  const bool is_small = vertices_T_m.size() <= kFewVertices;
+  const auto find_face = [&](const Vector3d& n, std::uint32_t vertex) {
     for (const std::uint32_t f : at[vertex])
       if ((faces[f].n - n).norm() < kSamePlane) return static_cast<std::int64_t>(f);
     return std::int64_t{-1};
@@ -59,12 +59,12 @@ void ConvexBody::compute_derived_data() {
                         n.norm() < kSliver * (vertices_T_m[j] - p).squaredNorm();
     n.normalize();
     if (n.dot(p - middle) < 0.0) n = -n;
-    std::int64_t face = face_like(n, i);
-    if (face < 0) face = face_like(n, j);
-    if (face < 0) face = face_like(n, k);
+    std::int64_t face = find_face(n, i);
+    if (face < 0) face = find_face(n, j);
+    if (face < 0) face = find_face(n, k);
     if (face < 0) {
       face = static_cast<std::int64_t>(faces.size());
-      faces.push_back({n, n.dot(vertices_T_m[sliver || few ? support(n, i) : i])});
+      faces.push_back({n, n.dot(vertices_T_m[sliver || is_small ? support(n, i) : i])});
     }
     const auto f = static_cast<std::uint32_t>(face);
     for (const std::uint32_t v : {i, j, k})
@@ -79,7 +79,7 @@ void ConvexBody::compute_derived_data() {
     }
   }
 
-  lay_out(at, faces_begin, faces_at);
+  compress_rows(at, faces_begin, faces_at);
 
   edges.clear();
   for (std::uint32_t v = 0; v < vertices_T_m.size(); ++v)
@@ -90,7 +90,7 @@ void ConvexBody::compute_derived_data() {
     at[edges[e].from].push_back(e);
     at[edges[e].to].push_back(e);
   }
-  lay_out(at, edges_begin, edges_at);
+  compress_rows(at, edges_begin, edges_at);
 }
 
 /// Adds the edge if it separates two faces. An edge inside a flat face has only one face and is skipped.
@@ -116,17 +116,17 @@ void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
   constexpr std::uint32_t kFew = 16, kMany = 256;
   Eigen::AlignedBox3d extent;
   for (std::uint32_t i = begin; i < end; ++i) extent.extend(vertices_T_m[order_[i]]);
-  const bool few = end - begin <= kFew;
+  const bool is_small = end - begin <= kFew;
   const std::size_t here = blocks_.size();
-  if (few || end - begin > kMany) {
-    Block block{extent.center(), 0.0, begin, few ? end : begin, static_cast<std::uint32_t>(here + 1)};
+  if (is_small || end - begin > kMany) {
+    Block block{extent.center(), 0.0, begin, is_small ? end : begin, static_cast<std::uint32_t>(here + 1)};
     for (std::uint32_t i = begin; i < end; ++i)
       block.radius_m = std::max(block.radius_m, (vertices_T_m[order_[i]] - block.centre_m).norm());
     // covers the rounding of the radius and of the dot products in visit_above()
     block.radius_m *= 1.0 + 1e-12;
     blocks_.push_back(block);
   }
-  if (!few) {
+  if (!is_small) {
     Eigen::Index axis = 0;
     extent.sizes().maxCoeff(&axis);
     const std::uint32_t middle = begin + (end - begin) / 2;

@@ -39,8 +39,8 @@ class Friction {
   Friction(const Inertia& M, const FrictionSettings& settings, double clearance_m);
 
   /// The frictional goal p' in W; X_WP itself if no contact carries load. X_WP: p. X_last: q of the previous
-  /// tick. may_hold: if false, sticks() remains false. Call once per tick. RT-safe.
-  Pose frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_hold = true) noexcept;
+  /// tick. may_stick: if false, sticks() remains false. Call once per tick. RT-safe.
+  Pose frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_stick = true) noexcept;
 
   /// Call before frictional_goal() if obstacles move. motion_of(k): displacement of obstacle k in W since the
   /// previous tick, X_WO(now) = motion * X_WO(before). Moves the stored contacts with their obstacles, and
@@ -76,11 +76,11 @@ class Friction {
 
   void collect_points(const Pose& X_last) noexcept;
   Pose stick_pose(const Pose& X_last) const noexcept;
-  Vector3d stick_error_m(const FrictionPoint& touch, const Pose& X_WT) const noexcept;
+  Vector3d stick_error_m(const FrictionPoint& point, const Pose& X_WT) const noexcept;
   double stick_fraction(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept;
   Vector3d rotational_gradient(const Quaterniond& E) const noexcept;
-  double normal_multiplier(std::size_t i, double held) const noexcept;
-  Pose goal_for_pose(const Pose& X_WQ, double held) const noexcept;
+  double normal_multiplier(std::size_t i, double fraction) const noexcept;
+  Pose goal_for_pose(const Pose& X_WQ, double fraction) const noexcept;
 
   Inertia M_;
   Matrix3d H_inverse_;
@@ -101,16 +101,16 @@ class Friction {
 template <class MotionOf>
 Pose Friction::carry_with_obstacle(const Pose& X_last, const MotionOf& motion_of) noexcept {
   if (!X_WQ_last_ || last_contacts_.empty() || !same_bits(*X_WQ_last_, X_last)) return X_last;
-  const auto pressing = [&](std::uint32_t obstacle) {
+  const auto load_on = [&](std::uint32_t obstacle) {
     double sum = 0.0;
-    for (const ActiveContact& touch : last_contacts_)
-      if (touch.contact.obstacle == obstacle) sum += touch.multiplier;
+    for (const ActiveContact& active : last_contacts_)
+      if (active.contact.obstacle == obstacle) sum += active.multiplier;
     return sum;
   };
   std::uint32_t carrier = last_contacts_[0].contact.obstacle;
   StaticVector<ActiveContact, ContactSet::kCapacity> now;
   for (const auto& [contact, multiplier] : last_contacts_) {
-    if (pressing(contact.obstacle) > pressing(carrier)) carrier = contact.obstacle;
+    if (load_on(contact.obstacle) > load_on(carrier)) carrier = contact.obstacle;
     now.add({moved(contact, motion_of(contact.obstacle)), multiplier});
   }
   last_contacts_ = now;

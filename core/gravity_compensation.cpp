@@ -11,12 +11,12 @@ namespace wrenchd {
 namespace {
 
 /// A hand-held handle weighs less than 1 kg. A larger mass than this is a mistake of units.
-constexpr double kMostMass_kg = 20.0;
-constexpr double kFarthestCentre_m = 1.0;
+constexpr double kMaxMass_kg = 20.0;
+constexpr double kMaxCentreDistance_m = 1.0;
 constexpr double kUnitNorm = 1e-6;  ///< tolerance on the squared norm of a quaternion with few printed digits
 
 void check_mass(const char* which, double mass_kg) {
-  if (is_finite(mass_kg) && mass_kg >= 0.0 && mass_kg <= kMostMass_kg) return;
+  if (is_finite(mass_kg) && mass_kg >= 0.0 && mass_kg <= kMaxMass_kg) return;
   throw std::invalid_argument(std::string("gravity compensation: the mass of the ") + which +
                               " must be from 0 to 20 kg");
 }
@@ -27,7 +27,7 @@ GravityCompensation::GravityCompensation(const MovingMasses& masses, const Quate
     : masses_(masses) {
   check_mass("handle", masses.handle_kg);
   check_mass("carried parts", masses.carried_kg);
-  if (!is_finite(masses.p_HHcm_m) || masses.p_HHcm_m.norm() > kFarthestCentre_m)
+  if (!is_finite(masses.p_HHcm_m) || masses.p_HHcm_m.norm() > kMaxCentreDistance_m)
     throw std::invalid_argument("gravity compensation: the handle's centre of mass must be within 1 m of H");
   if (!is_finite(R_WB) || std::abs(R_WB.squaredNorm() - 1.0) > kUnitNorm)
     throw std::invalid_argument("gravity compensation: the base's tilt must be a unit quaternion");

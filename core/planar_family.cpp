@@ -17,12 +17,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A rotation by theta, given by x = tan(theta/2) of Eq. (24); x is infinite for half a turn. Energies are
 /// compared without angles, and no term loses digits for small angles.
-struct Turn {
+struct HalfAngleTangent {
   double x;
   double sine;        ///< sin(theta)
   double half_sine2;  ///< sin^2(theta/2)
 
-  explicit Turn(double tan_half) noexcept : x(tan_half) {
+  explicit HalfAngleTangent(double tan_half) noexcept : x(tan_half) {
     const bool less_than_quarter = std::abs(x) <= 1.0;
     const double t = less_than_quarter ? x : 1.0 / x;
     const double u = 1.0 / (1.0 + t * t);
@@ -32,7 +32,7 @@ struct Turn {
 };
 
 /// Eq. (22) with phi = 0; beta - h = -vx sin(theta) - vy cos(theta) - h by Eq. (20).
-double energy(const PlanarBody& s, const Turn& turn) noexcept {
+double energy(const PlanarBody& s, const HalfAngleTangent& turn) noexcept {
   const double lift = 2.0 * s.vy * turn.half_sine2 - s.vx * turn.sine - (s.vy + s.h);
   return s.m * lift * lift + 4.0 * s.H * turn.half_sine2;
 }
@@ -49,8 +49,8 @@ struct Range {
   }
 };
 
-struct Least {
-  Turn turn;
+struct BestRotation {
+  HalfAngleTangent turn;
   double T;
 };
 
@@ -58,7 +58,7 @@ struct Least {
 /// Eqs. (26)-(30) at phi = 0, METHOD (51). vy + h and vy - h are factored out: for a shallow contact vy + h
 /// is small and must keep its digits. If A_1 is zero, one root is at x = infinity: half a turn, which is
 /// always tried.
-Least least(const PlanarBody& s, const Range& range) noexcept {
+BestRotation best_rotation(const PlanarBody& s, const Range& range) noexcept {
   const double sum = s.vy + s.h;
   const double difference = s.vy - s.h;
   const double A1 = s.m * s.vx * difference;
@@ -67,9 +67,9 @@ Least least(const PlanarBody& s, const Range& range) noexcept {
   const double D1 = 2.0 * (s.H - s.m * (s.vy * sum - s.vx * s.vx));
   const double E1 = s.m * s.vx * sum;
 
-  Least best{Turn(0.0), kInfinity};
+  BestRotation best{HalfAngleTangent(0.0), kInfinity};
   const auto try_turn = [&](double x) noexcept {
-    const Turn turn(x);
+    const HalfAngleTangent turn(x);
     const double T = energy(s, turn);
     if (T < best.T) best = {turn, T};
   };
@@ -81,7 +81,7 @@ Least least(const PlanarBody& s, const Range& range) noexcept {
   return best;
 }
 
-PlanarMinimum minimum_at(const PlanarBody& s, const Least& best) noexcept {
+PlanarMinimum minimum_at(const PlanarBody& s, const BestRotation& best) noexcept {
   const auto& [x, sine, half_sine2] = best.turn;
   const double beta = -s.vx * sine - s.vy * (1.0 - 2.0 * half_sine2);  // Eq. (20)
   return {2.0 * std::atan(x), beta, best.T};                           // Eq. (24)
@@ -113,7 +113,7 @@ Range range_of(Direction2 a, Direction2 b) noexcept {
 PlanarMinimum minimise(const PlanarSection& s) noexcept {
   using std::numbers::pi;
   const Range range{std::tan(0.5 * s.theta_min), std::tan(0.5 * s.theta_max), s.theta_max > pi};
-  const Least best = least(s, range);
+  const BestRotation best = best_rotation(s, range);
   PlanarMinimum minimum = minimum_at(s, best);
   if (range.through_half_turn && best.turn.x <= range.max) minimum.theta += 2.0 * pi;
   minimum.theta = std::clamp(minimum.theta, s.theta_min, s.theta_max);
@@ -132,8 +132,8 @@ PlanarFamily::AtContact::AtContact(const PlanarFamily& family, const Pose& X_WP,
                                    const Contact& contact) noexcept
     : family_(family), ring_(family.body_.ring_of(contact.tool_feature)), apex_T_(contact.p_TCa_m) {
   const Vector3d& n = contact.n_W;
-  const Vector3d along = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
-  Z_W_ = (along - along.dot(n) * n).normalized();
+  const Vector3d reference = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
+  Z_W_ = (reference - reference.dot(n) * n).normalized();
   X_W_ = n.cross(Z_W_);
   const Matrix3d R_PW = X_WP.rotation.conjugate().toRotationMatrix();
   X_T_ = R_PW * X_W_;
@@ -184,7 +184,7 @@ PlanarFamily::InPlane PlanarFamily::AtContact::solve(int k) const noexcept {
     d_previous = d;
   }
   const Range range = cuts < 2 ? Range{} : range_of(cut[0], cut[1]);
-  return {minimum_at(section, least(section, range)), sine * X_W_ + cosine * Z_W_};
+  return {minimum_at(section, best_rotation(section, range)), sine * X_W_ + cosine * Z_W_};
 }
 
 Pose PlanarFamily::pose(const Pose& X_WP, const Contact& contact, const InPlane& solution) noexcept {

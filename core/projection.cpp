@@ -28,13 +28,13 @@ constexpr double kSmallResidual = 2e-10;
 /// If a short step no longer halves the residual, the rest is rounding if it is below this value.
 constexpr double kRoundedResidual = 1e-8;
 /// Least curvature of the Lagrangian, relative to the metric, that a step assumes.
-constexpr double kLeastCurvature = 1e-3;
+constexpr double kMinCurvature = 1e-3;
 /// Gradient of a penetration of half a millionth of L: lower bound of the denominator of the residual.
-constexpr double kLeastGradient = 1e-6;
+constexpr double kMinGradient = 1e-6;
 /// Above this number of contacts, contacts without load are dropped.
-constexpr std::size_t kCrowded = 24;
+constexpr std::size_t kMaxIdleContacts = 24;
 /// Factor on the iteration limit for each start of a query without history.
-constexpr int kPatience = 5;
+constexpr int kStartBudgetFactor = 5;
 
 double positive_length(const Inertia& M) {
   const double squared = M.H_kg_m2.trace() / (2.0 * M.mass_kg);
@@ -45,18 +45,18 @@ double positive_length(const Inertia& M) {
 
 StaticVector<ActiveContact, ContactSet::kCapacity> evenly_loaded_contacts(
     const Projection& projection) noexcept {
-  StaticVector<ActiveContact, ContactSet::kCapacity> shared;
+  StaticVector<ActiveContact, ContactSet::kCapacity> balanced;
   for (const ActiveContact& a : projection.active) {
-    double touching = 0.0;
-    double carried = 0.0;
+    double count = 0.0;
+    double load = 0.0;
     for (const ActiveContact& b : projection.active) {
       if (b.contact.obstacle != a.contact.obstacle) continue;
-      touching += 1.0;
-      carried += b.multiplier;
+      count += 1.0;
+      load += b.multiplier;
     }
-    shared.add({a.contact, carried / touching});
+    balanced.add({a.contact, load / count});
   }
-  return shared;
+  return balanced;
 }
 
 ExactProjection::ExactProjection(const Inertia& M) : ExactProjection(M, Budget{}) {}
@@ -82,7 +82,7 @@ Projection ExactProjection::project(const Pose& X_WP, const ContactSource& scene
 }
 
 Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
-                                 const StepLimit& leash) noexcept {
+                                 const StepLimit& limit) noexcept {
   /// All contacts are known: the scene has none.
   class Nothing final : public ContactSource {
    public:
@@ -99,7 +99,7 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   step_start_.R = step_start_.E.toRotationMatrix();
   step_start_.u = X_WP.rotation.conjugate() * (X_start.translation_m - X_WP.translation_m) / L_;
   step_start_.T = scaled_energy(step_start_);
-  step_limit_ = leash;
+  step_limit_ = limit;
   state_ = Iterate{};
   if (free_at_p && !exceeds_step_limit(state_)) {
     step_limit_ = StepLimit{};
@@ -109,8 +109,8 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   if (contacts_.empty()) {  // no contacts: straight towards p
     const double turn_rad = step_start_.E.angularDistance(Quaterniond::Identity());
     const double share =
-        std::min(leash.translation_m / std::max(step_start_.u.norm() * L_, leash.translation_m),
-                 leash.rotation_rad / std::max(turn_rad, leash.rotation_rad));
+        std::min(limit.translation_m / std::max(step_start_.u.norm() * L_, limit.translation_m),
+                 limit.rotation_rad / std::max(turn_rad, limit.rotation_rad));
     state_.E = step_start_.E.slerp(share, Quaterniond::Identity());
     state_.R = state_.E.toRotationMatrix();
     state_.u = (1.0 - share) * step_start_.u;
@@ -121,8 +121,8 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   }
   // A tool between two obstacles may have to rotate. In all other cases the rotation of X_start is
   // admissible.
-  const bool pushed = leash.rotation_rad == std::numeric_limits<double>::infinity();
-  if (!translate(state_) && !(pushed && find_feasible_rotation(state_))) {
+  const bool may_rotate = limit.rotation_rad == std::numeric_limits<double>::infinity();
+  if (!translate(state_) && !(may_rotate && find_feasible_rotation(state_))) {
     step_limit_ = StepLimit{};
     return make_projection(LocalResult::infeasible);
   }
@@ -130,8 +130,8 @@ Projection ExactProjection::step(const Pose& X_WP, const Pose& X_start, std::spa
   if (exceeds_step_limit(state_)) {
     // At a fixed rotation the gaps are affine and T is convex: the straight path to the nearest translation
     // is admissible, and T falls along it.
-    const Vector3d way = state_.u - step_start_.u;
-    state_.u = step_start_.u + way * (leash.translation_m / (L_ * way.norm()));
+    const Vector3d path = state_.u - step_start_.u;
+    state_.u = step_start_.u + path * (limit.translation_m / (L_ * path.norm()));
     state_.T = scaled_energy(state_);
     linearise(state_);
     residual_ = residual(gradient(state_));
@@ -155,7 +155,7 @@ Projection ExactProjection::translate(const Pose& X_WP, const ContactSource& sce
 }
 
 Projection ExactProjection::project_globally(const Pose& X_WP, const ContactSource& scene) noexcept {
-  iteration_limit_ = static_cast<std::uint16_t>(kPatience * budget_.iterations);
+  iteration_limit_ = static_cast<std::uint16_t>(kStartBudgetFactor * budget_.iterations);
   begin_query(X_WP, scene);
   Projection best = multistart();
   iteration_limit_ = budget_.iterations;
@@ -337,7 +337,7 @@ bool ExactProjection::restore_admissibility(Iterate& state) noexcept {
   translation_problem_.clear();
   for (std::uint16_t round = 0; round < budget_.constraint_rounds; ++round) {
     if (!extend_translation(state)) return false;
-    if (contacts_.size() > kCrowded) drop_idle_contacts(state);
+    if (contacts_.size() > kMaxIdleContacts) drop_idle_contacts(state);
     const std::size_t known = contacts_.size();
     if (scene_->add_violated(to_pose(state), tolerance_m_, contacts_) == 0)
       return !contacts_.full();  // a full set may lack further violated contacts
@@ -434,7 +434,7 @@ void ExactProjection::factorise_convexified(const HessianBlocks& curvature,
   const Matrix6d scaled = metric_root_.triangularView<Eigen::Lower>().solve(
       metric_root_.triangularView<Eigen::Lower>().solve(W).transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled);
-  const Vector6d turned_over = eigen.eigenvalues().cwiseAbs().cwiseMax(kLeastCurvature);
+  const Vector6d turned_over = eigen.eigenvalues().cwiseAbs().cwiseMax(kMinCurvature);
   const Matrix6d factor = metric_root_ * eigen.eigenvectors();
   if (split(factor * turned_over.asDiagonal() * factor.transpose())) return;
   split(metric_root_ * metric_root_.transpose());
@@ -483,10 +483,10 @@ bool ExactProjection::project_translation_or_rotate(Iterate& state) noexcept {
   return project_translation(state) || (find_feasible_rotation(state) && project_translation(state));
 }
 
-/// Newton's method from a state and first multipliers; leaves the gaps of the last state. asked: the scene
-/// was queried for this state and is queried for each next one. Following a proxy starts without: until the
-/// known contacts give a result or one of them loses its load, they count as all contacts.
-ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool asked) noexcept {
+/// Newton's method from a state and first multipliers; leaves the gaps of the last state. scene_asked: the
+/// scene was queried for this state and is queried for each next one. Following a proxy starts without: until
+/// the known contacts give a result or one of them loses its load, they count as all contacts.
+ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool scene_asked) noexcept {
   // KKT residual before the last short step
   double before_short_step = std::numeric_limits<double>::infinity();
   for (;;) {
@@ -497,34 +497,36 @@ ExactProjection::LocalResult ExactProjection::minimise(Iterate& state, bool aske
     const bool converged = residual_ <= kSmallResidual || rounding;
     if (converged || iterations_ == iteration_limit_ || at_step_limit_) {
       const LocalResult local = converged ? LocalResult::converged : LocalResult::budget_spent;
-      if (asked || (all_gaps_open() && add_touching_contacts(state))) return local;
+      if (scene_asked || (all_gaps_open() && add_touching_contacts(state))) return local;
       if (!restore_admissibility(state) && !project_translation_or_rotate(state))
         return LocalResult::infeasible;
-      asked = true;
+      scene_asked = true;
       continue;
     }
     ++iterations_;
     factorise_model(state);
     Vector6d dy;
     const bool stepped = newton_step(g, dy);
-    const double promised = stepped ? -g.dot(dy) : 0.0;  // first-order decrease of T
-    const bool ask = asked || has_idle_contact();        // a contact without load may have to be replaced
-    const LineSearchResult moved =
-        stepped ? line_search(state, dy, promised, ask) : LineSearchResult::no_decrease;
-    if (moved == LineSearchResult::decreased) asked = ask;
-    const bool short_step = moved == LineSearchResult::decreased && dy.norm() < kShortStep;
+    const double predicted_decrease = stepped ? -g.dot(dy) : 0.0;  // first-order decrease of T
+    const bool ask_scene =
+        scene_asked || has_idle_contact();  // a contact without load may have to be replaced
+    const LineSearchResult searched =
+        stepped ? line_search(state, dy, predicted_decrease, ask_scene) : LineSearchResult::no_decrease;
+    if (searched == LineSearchResult::decreased) scene_asked = ask_scene;
+    const bool short_step = searched == LineSearchResult::decreased && dy.norm() < kShortStep;
     before_short_step = short_step ? residual_ : std::numeric_limits<double>::infinity();
-    if (moved != LineSearchResult::no_decrease) continue;  // decreased, or found contacts: next model
+    if (searched != LineSearchResult::no_decrease) continue;  // decreased, or found contacts: next model
     if (at_step_limit_) continue;
-    if (!asked) {
+    if (!scene_asked) {
       if (!project_translation_or_rotate(state)) return LocalResult::infeasible;
-      asked = true;
+      scene_asked = true;
       continue;
     }
     linearise(state);  // contacts may have been dropped
     residual_ = residual(gradient(state));
     // Rounding hides a decrease of T below its last digits.
-    return stepped && promised <= 1e-13 * state.T ? LocalResult::converged : LocalResult::budget_spent;
+    return stepped && predicted_decrease <= 1e-13 * state.T ? LocalResult::converged
+                                                            : LocalResult::budget_spent;
   }
 }
 
@@ -534,7 +536,7 @@ double ExactProjection::residual(const Vector6d& g) const noexcept {
   Vector6d rest = g;
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (multiplier_[i] > 0.0 && gap_[i] <= kTouching) rest -= multiplier_[i] * J_[i];
-  return std::sqrt(rest.squaredNorm() / std::max(g.squaredNorm(), kLeastGradient * kLeastGradient));
+  return std::sqrt(rest.squaredNorm() / std::max(g.squaredNorm(), kMinGradient * kMinGradient));
 }
 
 /// True if all gaps of the state linearised last are open. A state without a scene query may overlap a
@@ -552,20 +554,21 @@ bool ExactProjection::has_idle_contact() const noexcept {
 /// Line search along dy, METHOD (41): halves the step until T decreases by kArmijo times the predicted
 /// decrease. A failed trial that found new contacts ends the search; the next step includes them.
 ExactProjection::LineSearchResult ExactProjection::line_search(Iterate& state, const Vector6d& dy,
-                                                               double promised, bool ask) noexcept {
-  constexpr double kFairShare = 1e-4;  // Armijo constant, usual value
-  constexpr int kHalvings = 20;        // below a millionth of a step the model is not accurate
+                                                               double predicted_decrease,
+                                                               bool ask_scene) noexcept {
+  constexpr double kArmijo = 1e-4;  // Armijo constant, usual value
+  constexpr int kMaxHalvings = 20;  // below a millionth of a step the model is not accurate
   const Vector3d eta = dy.tail<3>();
   // Apparent increase of T by rounding of T and by the tolerance gap_slack_ of the translation.
   const double rounding = dy.norm() < kShortStep ? 1e-14 * state.T + 4.0 * gap_slack_ * state.u.norm() : 0.0;
   double fraction =
       1.0 / std::max(1.0, eta.norm() / std::min(1.0, step_limit_.rotation_rad));  // at most one radian
-  for (int halving = 0; halving < kHalvings; ++halving, fraction *= 0.5) {
+  for (int halving = 0; halving < kMaxHalvings; ++halving, fraction *= 0.5) {
     Iterate trial = state;
     rotate(trial, fraction * eta);
     const std::size_t known = contacts_.size();
-    if ((ask ? restore_admissibility(trial) : translate(trial)) &&
-        trial.T <= state.T + rounding - kFairShare * fraction * promised) {
+    if ((ask_scene ? restore_admissibility(trial) : translate(trial)) &&
+        trial.T <= state.T + rounding - kArmijo * fraction * predicted_decrease) {
       if (exceeds_step_limit(trial)) {
         at_step_limit_ = true;
         continue;

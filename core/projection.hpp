@@ -90,7 +90,7 @@ class ExactProjection {
   /// status iteration_limit. X_start must be admissible for the known contacts, unless the limit is infinite.
   /// Then the nearest admissible pose is the start; its rotation may differ. RT-safe.
   Projection step(const Pose& X_WP, const Pose& X_start, std::span<const ActiveContact> known,
-                  const StepLimit& leash) noexcept;
+                  const StepLimit& limit) noexcept;
 
   /// The closest admissible configuration to p, without history. Tries further starts until the dual
   /// certificate proves the result optimal or no start is left. Usually the first start is proven, and the
@@ -135,7 +135,7 @@ class ExactProjection {
   bool find_feasible_rotation(Iterate& state) noexcept;
   bool project_translation(Iterate& state) noexcept;
   bool project_translation_or_rotate(Iterate& state) noexcept;
-  LocalResult minimise(Iterate& state, bool asked) noexcept;
+  LocalResult minimise(Iterate& state, bool scene_asked) noexcept;
   bool exceeds_step_limit(const Iterate& state) const noexcept;
   bool all_gaps_open() const noexcept;
   bool has_idle_contact() const noexcept;
@@ -147,7 +147,8 @@ class ExactProjection {
   void factorise_convexified(const HessianBlocks& W, CholeskyFactor& root) const noexcept;
   void factorise_model(const Iterate& state) noexcept;
   bool newton_step(const Vector6d& g, Vector6d& dy) noexcept;
-  LineSearchResult line_search(Iterate& state, const Vector6d& dy, double promised, bool ask) noexcept;
+  LineSearchResult line_search(Iterate& state, const Vector6d& dy, double predicted_decrease,
+                               bool ask_scene) noexcept;
   void drop_idle_contacts(const Iterate& state) noexcept;
   bool add_touching_contacts(const Iterate& state) noexcept;
   void fill_projection(Projection& out) noexcept;

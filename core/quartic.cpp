@@ -13,16 +13,16 @@ namespace wrenchd {
 namespace {
 
 /// A root beyond 2^250 counts as infinite: its fourth power would overflow.
-constexpr int kFarthest_log2 = 250;
+constexpr int kMaxRoot_log2 = 250;
 /// A sum below this fraction of the sum of its absolute terms counts as zero: rounding of four
 /// multiplications and additions, and of the coefficients.
 constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
 /// Range of coefficient ratios for the closed form. Their powers stay far from overflow and underflow.
-constexpr double kWidest = 0x1p100;
+constexpr double kMaxRatio = 0x1p100;
 /// rho in count_is_certain(): about a hundred times the rounding error of the coefficients and the factors.
-constexpr double kExact = 1e-13;
+constexpr double kMaxResidual = 1e-13;
 /// s in count_is_certain(), up to the factor of four: 4 sqrt(rho / 0.02) = 0.9e-5.
-constexpr double kApart = 1e-5;
+constexpr double kMinSeparation = 1e-5;
 
 struct Polynomial {
   std::array<double, 5> a{};  ///< descending powers
@@ -75,13 +75,13 @@ Polynomial normalised(std::array<double, 5> a) noexcept {
 /// All roots of the polynomial and its derivatives are between minus and plus this bound (Fujiwara: 2 max
 /// |a_k / a_0|^(1/k)).
 double bound(const Polynomial& p) noexcept {
-  int log2 = -kFarthest_log2;
+  int log2 = -kMaxRoot_log2;
   for (std::size_t k = 1; k <= p.degree; ++k) {
     if (p.a[k] == 0.0) continue;
     const int ratio = std::ilogb(p.a[k]) + 1 - std::ilogb(p.a[0]);
     log2 = std::max(log2, static_cast<int>(std::ceil(ratio / static_cast<double>(k))) + 2);
   }
-  return std::scalbn(1.0, std::min(log2, kFarthest_log2));
+  return std::scalbn(1.0, std::min(log2, kMaxRoot_log2));
 }
 
 /// The number that halves the set of doubles between a and b.
@@ -99,7 +99,7 @@ double middle(double a, double b) noexcept {
 /// is at most half of the previous one; otherwise bisection of the set of doubles, at most 64 steps for any
 /// scale.
 double root_between(const Polynomial& p, double below, double above, bool rising) noexcept {
-  constexpr int kPatience = 40;  // quadratic convergence takes fewer than ten
+  constexpr int kMaxNewtonSteps = 40;  // quadratic convergence takes fewer than ten
   double x = 0.5 * (below + above);
   double last_step = above - below;
   for (int count = 0; below < x && x < above; ++count) {
@@ -111,7 +111,7 @@ double root_between(const Polynomial& p, double below, double above, bool rising
     // rounding limits the accuracy
     if (std::abs(value) <= 0.25 * noise) return std::clamp(next, below, above);
     const bool inside = below < next && next < above;
-    const bool converging = inside && std::abs(step) <= 0.5 * std::abs(last_step) && count < kPatience;
+    const bool converging = inside && std::abs(step) <= 0.5 * std::abs(last_step) && count < kMaxNewtonSteps;
     last_step = step;
     x = converging ? next : middle(below, above);
   }
@@ -120,12 +120,12 @@ double root_between(const Polynomial& p, double below, double above, bool rising
 
 /// The roots of p, given the roots of its derivative in ascending order: one between two neighbours if the
 /// signs of p differ there, and each neighbour that is a root itself.
-RealRoots roots_between(const Polynomial& p, const RealRoots& turning, double far) noexcept {
+RealRoots roots_between(const Polynomial& p, const RealRoots& extrema, double bound_x) noexcept {
   RealRoots roots;
-  double below = -far;
+  double below = -bound_x;
   int sign_below = p.sign(below);
-  for (std::size_t i = 0; i <= turning.count; ++i) {
-    const double above = i < turning.count ? turning.x[i] : far;
+  for (std::size_t i = 0; i <= extrema.count; ++i) {
+    const double above = i < extrema.count ? extrema.x[i] : bound_x;
     const int sign_above = p.sign(above);
     if (sign_below * sign_above < 0) roots.x[roots.count++] = root_between(p, below, above, sign_below < 0);
     if (sign_above == 0) roots.x[roots.count++] = above;
@@ -266,7 +266,7 @@ Quadratic corrected(const Quadratic& f, const Quadratic& g, const Monic& r) noex
 ///
 /// Per factor, with w the root of |discriminant|: n = max(|b|, w) <= |z_1| + |z_2| <= sqrt(2) n and s_12 >= w
 /// / (sqrt(2) n). The product of the other four s_ij is the resultant divided by that of (|z_i| + |z_j|).
-/// kApart includes the factors sqrt(2), at most four in s.
+/// kMinSeparation includes the factors sqrt(2), at most four in s.
 bool count_is_certain(const Factors& by, const Monic& r) noexcept {
   const auto& [f, g] = by;
   const double w_f = std::sqrt(std::abs(f.discriminant()));
@@ -276,11 +276,12 @@ bool count_is_certain(const Factors& by, const Monic& r) noexcept {
   const double c_f = std::abs(f.c);
   const double c_g = std::abs(g.c);
   const double crossed = n_f * c_g + n_g * c_f;
-  if (!(std::abs(r.b) <= kExact * (n_f + n_g) && std::abs(r.c) <= kExact * (c_f + c_g + n_f * n_g) &&
-        std::abs(r.d) <= kExact * crossed && std::abs(r.e) <= kExact * (c_f * c_g)))
+  if (!(std::abs(r.b) <= kMaxResidual * (n_f + n_g) &&
+        std::abs(r.c) <= kMaxResidual * (c_f + c_g + n_f * n_g) && std::abs(r.d) <= kMaxResidual * crossed &&
+        std::abs(r.e) <= kMaxResidual * (c_f * c_g)))
     return false;
   const double largest = (c_f - c_g) * (c_f - c_g) + (n_f + n_g) * crossed;
-  return w_f * w_g * std::abs(resultant(f, g)) >= kApart * (n_f * n_g * largest);
+  return w_f * w_g * std::abs(resultant(f, g)) >= kMinSeparation * (n_f * n_g * largest);
 }
 
 /// Improves an approximate root of the quartic by Newton's method. NaN if the result is no root up to
@@ -308,7 +309,7 @@ std::optional<Factors> factors_of(const Monic& a) noexcept {
   constexpr int kCorrections = 2;  // rarely needed; a third does not help
   if (a.d == 0.0 && a.e == 0.0) {
     const Factors by{{0.0, 0.0}, {a.b, a.c}};
-    const bool certain = std::abs(by.g.discriminant()) >= kApart * (a.b * a.b + std::abs(a.c));
+    const bool certain = std::abs(by.g.discriminant()) >= kMinSeparation * (a.b * a.b + std::abs(a.c));
     return certain ? std::optional(by) : std::nullopt;
   }
   Factors by = a.e == 0.0 ? cardano(a) : ferrari(a);
@@ -356,7 +357,7 @@ std::optional<RealRoots> closed_form(double A, double B, double C, double D, dou
   }
   const double last = E != 0.0 ? E : D != 0.0 ? D : C != 0.0 ? C : B;
   const Monic a{B / A, C / A, D / A, E / A};
-  const auto within = [](double x) noexcept { return std::abs(x) <= kWidest; };
+  const auto within = [](double x) noexcept { return std::abs(x) <= kMaxRatio; };
   if (!(within(a.b) && within(a.c) && within(a.d) && within(a.e) && within(A / last))) return std::nullopt;
   const auto by = factors_of(a);
   if (!by || !add_roots(a, by->f, roots) || !add_roots(a, by->g, roots)) return std::nullopt;
@@ -373,9 +374,9 @@ RealRoots real_roots_by_bracketing(double A, double B, double C, double D, doubl
   std::array<Polynomial, 5> by_degree;
   by_degree[p.degree] = p;
   for (std::size_t k = p.degree; k > 1; --k) by_degree[k - 1] = by_degree[k].derivative();
-  const double far = bound(p);
+  const double bound_x = bound(p);
   RealRoots roots;
-  for (std::size_t k = 1; k <= p.degree; ++k) roots = roots_between(by_degree[k], roots, far);
+  for (std::size_t k = 1; k <= p.degree; ++k) roots = roots_between(by_degree[k], roots, bound_x);
   return roots;
 }
 

@@ -13,14 +13,14 @@ namespace {
 
 /// Allowed heat above 1 while the ceiling decreases. The rest of kMaxHeat covers the tick in which the heat
 /// reaches 1.
-constexpr double kRiseWhileFolding = 0.04;
+constexpr double kHeatRiseWhileFolding = 0.04;
 
 bool is_positive(double x) noexcept {
   return is_finite(x) && x > 0.0;
 }
 
 /// Fraction of the distance to its steady state that the heat covers in dt.
-double step_share(double dt_s, double time_s) noexcept {
+double settling_fraction(double dt_s, double time_s) noexcept {
   return -std::expm1(-dt_s / time_s);
 }
 
@@ -37,7 +37,7 @@ MotorGroupHeat::MotorGroupHeat(double maximum, double continuous, double thermal
   //
   //   rise = (t / T) (mean of (F / continuous)^2 - 1) = (t / T) ((r^2 + r + 1) / 3 - 1)
   const double r = maximum_ / continuous_;
-  fold_time_s_ = kRiseWhileFolding * time_s_ / ((r * r + r + 1.0) / 3.0 - 1.0);
+  fold_time_s_ = kHeatRiseWhileFolding * time_s_ / ((r * r + r + 1.0) / 3.0 - 1.0);
   ceiling_ = max_next_ceiling();
 }
 
@@ -45,7 +45,7 @@ MotorGroupHeat::MotorGroupHeat(double maximum, double continuous, double thermal
 ///
 ///   h' = h + a ((F / continuous)^2 - h) <= kMaxHeat
 double MotorGroupHeat::max_next_ceiling() const noexcept {
-  const double a = step_share(kMaxStep_s, time_s_);
+  const double a = settling_fraction(kMaxStep_s, time_s_);
   const double square = heat_ + (kMaxHeat - heat_) / a;
   return std::min(maximum_, continuous_ * std::sqrt(std::max(square, 1.0)));
 }
@@ -66,7 +66,7 @@ void MotorGroupHeat::set_maximum(double maximum) noexcept {
 void MotorGroupHeat::advance(double pushed, double dt_s) noexcept {
   if (!rated_ || !is_positive(dt_s)) return;
   const double share = (is_finite(pushed) ? std::min(pushed, maximum_) : maximum_) / continuous_;
-  heat_ += step_share(dt_s, time_s_) * (share * share - heat_);
+  heat_ += settling_fraction(dt_s, time_s_) * (share * share - heat_);
   if (heat_ >= 1.0) folded_ = true;
   if (heat_ <= kRecoveryHeat) folded_ = false;
   const double step = (maximum_ - continuous_) * (dt_s / fold_time_s_);

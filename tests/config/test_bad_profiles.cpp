@@ -465,7 +465,7 @@ const std::vector<Bad> kTable = {
     {kArm, "joint_report_index = [0, 1, 2]", "joint_report_index = [0, 1, 1]", "[0, 1, 1]", "each integer of joints once"},
     {kArm, "counts_per_turn = [2000, 2000, 2000]", "counts_per_turn = [2000, 2000, 2000, 1024]",
      "[2000, 2000, 2000, 1024]", "expected an array of 3 numbers, found an array of 4"},
-    {kArm, "slot = 2", "slot = 3", "3", "from 0 to 2, found 3"},
+    {kArm, "report_index = 2", "report_index = 3", "3", "from 0 to 2, found 3"},
     {kArm, "step_A = 0.001", "step_mA = 1", "step_mA", "give it in A as 'step_A'"},
     {kArm, "step_A = 0.001", "step_A = 0.00001", "0.00001", "less than the 2 A it has to carry"},
     {kArm, "efforts = {", "force = { byte = 8, type = \"i16\", step_N = 0.01 }\nefforts = {",

@@ -167,7 +167,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"[rendering.friction]\ndynamic = -0.1", "2:11", "expected a number from 0 to 5, found -0.1"},
       {"[rendering.friction]\nstatic = 0.2\ndynamic = 0.3", "3:11",
        "key 'rendering.friction.dynamic': expected no more than 'static', 0.2, found 0.3"},
-      {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'dynamic', 'static'"},
+      {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'static', 'dynamic'"},
       {"[rendering]\nfriction = 0.2", "2:12", "key 'rendering.friction': expected a table, found 0.2"},
       {"[rendering]\nmethod = 'planar'\n[rendering.friction]\nstatic = 0.2", "3:1",
        "key 'rendering.friction': only method = \"exact\" supports friction; choose it, or leave friction out"},
