@@ -11,6 +11,7 @@
 #include "devices/device.hpp"
 #include "devices/kinematics.hpp"
 #include "devices/links/report_link.hpp"
+#include "devices/pose_observer.hpp"
 #include "devices/report_codec.hpp"
 
 namespace wrenchd {
@@ -41,7 +42,8 @@ class ProfileDevice final : public Device {
   /// Silence of a lock-step device after which ProfileDevice sends a command again.
   static constexpr Duration kLockStepTimeout = std::chrono::milliseconds(10);
 
-  /// The link must outlive the device.
+  /// The link must outlive the device. If the link also implements PoseObserver, as a simulated link does,
+  /// the device sends it each steered pose.
   ProfileDevice(DeviceProfile profile, ReportLink& link);
 
   /// Throws std::runtime_error if the profile is invalid or the link cannot be opened. Not RT-safe: may take
@@ -103,6 +105,7 @@ class ProfileDevice final : public Device {
 
   DeviceProfile profile_;
   ReportLink& link_;
+  PoseObserver* pose_observer_;  ///< the link, if it observes the steered pose; otherwise null
   bool open_ = false;
   bool disconnected_ = false;
 

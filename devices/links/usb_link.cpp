@@ -540,8 +540,7 @@ void UsbLink::wait_readable(TimePoint deadline) noexcept {
   while (transfers_ && !transfers_->disconnected.load(std::memory_order_acquire) &&
          transfers_->ring.read_available() == 0) {
     if (wait_for_fd(transfers_->readable.fd(), POLLIN, deadline) == 0) return;
-    transfers_->readable
-        .wait();  // consumed before the ring is checked again, so that no wake-up is lost
+    transfers_->readable.wait();  // consumed before the ring is checked again, so that no wake-up is lost
   }
 }
 

@@ -60,7 +60,6 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
 
   State state() const noexcept { return state_; }
   bool homed() const noexcept { return homed_; }
-  unsigned lights() const noexcept { return lights_; }  ///< bits 1 to 3: green, blue, red LED
   const std::array<int, 3>& efforts() const noexcept { return efforts_; }
   const std::vector<std::uint8_t>& firmware() const noexcept { return firmware_; }
 
@@ -82,7 +81,7 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   bool reply_due_ = false;
   std::array<int, 3> true_counts_{}, power_on_counts_{}, efforts_{};
   bool homing_ = false, homed_ = false;
-  unsigned buttons_ = 0, lights_ = 0;
+  unsigned buttons_ = 0;
 };
 
 }  // namespace wrenchd
