@@ -107,8 +107,7 @@ constexpr std::array<int, 6> kUp = {0, 0, -350, 0, 0, 0};
 
 // --- the curve --------------------------------------------------------------------------------------------
 
-TEST_CASE("nothing moves in the dead zone, and the end of the way is the greatest speed",
-          "[deflection_pose]") {
+TEST_CASE("the velocity is zero in the dead zone and maximal at full deflection", "[deflection_pose]") {
   const Deflection settings = steered();
   const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
   const Vector3d along = Vector3d(1, -2, 2) / 3.0;
@@ -124,7 +123,7 @@ TEST_CASE("nothing moves in the dead zone, and the end of the way is the greates
   }
 }
 
-TEST_CASE("a velocity and its deflection belong together", "[deflection_pose]") {
+TEST_CASE("velocity() and deflection() are inverse to each other", "[deflection_pose]") {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1.0, 1.0), share(1e-3, 1.0);
   for (const double power : {1.0, 2.0, 3.5}) {
@@ -140,7 +139,8 @@ TEST_CASE("a velocity and its deflection belong together", "[deflection_pose]") 
   }
 }
 
-TEST_CASE("without an end of the way speed is in proportion to deflection", "[deflection_pose]") {
+TEST_CASE("without a stated full deflection the speed is proportional to the deflection",
+          "[deflection_pose]") {
   Deflection settings;
   settings.linear_gain = 71.0;
   const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
@@ -150,7 +150,7 @@ TEST_CASE("without an end of the way speed is in proportion to deflection", "[de
 
 // --- the pose ---------------------------------------------------------------------------------------------
 
-TEST_CASE("held at a wall the pose goes as far in as the push is firm, and comes back at once",
+TEST_CASE("at a wall the distance to the proxy grows with the deflection and returns to zero at once",
           "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
   press(pose, {1e-3, 0, 0}, 5000);
@@ -178,7 +178,8 @@ TEST_CASE("held at a wall the pose goes as far in as the push is firm, and comes
   CHECK(free.X_BH().translation_m.x() == Approx(0.2));  // its reach
 }
 
-TEST_CASE("a tool that is not allowed to turn is turned no farther than the leash", "[deflection_pose]") {
+TEST_CASE("at a wall that blocks rotation the angle to the proxy stays within its limit",
+          "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
   pose.set_proxy_pose(Pose{});
   pose.set_deflection(Vector3d::Zero(), {0, 0, 0.1});
@@ -189,7 +190,7 @@ TEST_CASE("a tool that is not allowed to turn is turned no farther than the leas
   CHECK(rotation_vector(pose.X_BH().rotation).norm() < 1e-5);
 }
 
-TEST_CASE("whatever the cap and the world do, the pose keeps the speeds and the box", "[deflection_pose]") {
+TEST_CASE("the pose respects speed limits and box for any deflection and proxy pose", "[deflection_pose]") {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   const auto vector = [&](double size) {
@@ -219,7 +220,7 @@ TEST_CASE("whatever the cap and the world do, the pose keeps the speeds and the 
   CHECK(farthest_m > 0.02);
 }
 
-TEST_CASE("at rest in the air, where the world holds it is where it is, to the last bit",
+TEST_CASE("at rest without contact the proxy distance limit does not change a bit of the pose",
           "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
   pose.set_deflection({0.7e-3, 0.3e-3, 0}, {0, 0.05, 0.02});
@@ -236,7 +237,7 @@ TEST_CASE("at rest in the air, where the world holds it is where it is, to the l
 
 // --- in the loop ------------------------------------------------------------------------------------------
 
-TEST_CASE("steered into a table the tool is pressed no deeper than the leash, and lifts off at once",
+TEST_CASE("a tool steered into a table stays within the distance limit and lifts off at once",
           "[deflection_pose][servo]") {
   Steered s;
   s.up_from_the_table();
@@ -269,7 +270,7 @@ TEST_CASE("steered into a table the tool is pressed no deeper than the leash, an
   CHECK(ticks < 50);  // 16 ms to the next report, 20 for the way out
 }
 
-TEST_CASE("a device without motors needs no arming, and its silence is no lasting fault",
+TEST_CASE("a device without motors needs no arming, and its silence is no permanent fault",
           "[deflection_pose][servo]") {
   Steered s;
   s.up_from_the_table();
@@ -293,7 +294,7 @@ TEST_CASE("a device without motors needs no arming, and its silence is no lastin
   CHECK(s.depth_m() < 1e-6);  // nobody pushes any more
 }
 
-TEST_CASE("the recentre button brings the tool back through whatever is in between",
+TEST_CASE("the recentre button returns the tool to its initial pose through obstacles",
           "[deflection_pose][servo]") {
   RunConfig plan = shipped_config();
   plan.settings.device.base_in_world.position_m = {0, 0, 0.05};  // half of the cube over the table
@@ -320,7 +321,7 @@ TEST_CASE("the recentre button brings the tool back through whatever is in betwe
   CHECK(s.fault == Fault::none);
 }
 
-TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay]") {
+TEST_CASE("a steered session replays with the same bits", "[deflection_pose][replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   Steered s;
@@ -349,7 +350,7 @@ TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay
   if (difference) FAIL("tick " << difference->tick << ' ' << difference->field);
 }
 
-TEST_CASE("to steer allocates nothing and takes no lock", "[deflection_pose][realtime]") {
+TEST_CASE("steering does not allocate or lock", "[deflection_pose][realtime]") {
   Steered s;
   s.up_from_the_table();
   std::uint64_t allocations = 0, locks = 0;
@@ -367,7 +368,7 @@ TEST_CASE("to steer allocates nothing and takes no lock", "[deflection_pose][rea
   CHECK(locks == 0);
 }
 
-TEST_CASE("the simulated hand sees where the tool has come to, and steers it along its path",
+TEST_CASE("the simulated hand observes the displayed tool and steers it along its path",
           "[deflection_pose][simulation]") {
   RunConfig plan = shipped_config();
   plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_split.toml",

@@ -43,7 +43,7 @@ constexpr double kResolution_rad = 0.02;
 
 }  // namespace
 
-TEST_CASE("encoders that count from anywhere are told where they are by the rest", "[device_homing]") {
+TEST_CASE("the reference pose gives the offsets of incremental encoders", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   CHECK(error(polhem)[0] > 0.01);
@@ -58,7 +58,7 @@ TEST_CASE("encoders that count from anywhere are told where they are by the rest
   CHECK(polhem.board.currents_mA() == std::array<int, 3>{});
 }
 
-TEST_CASE("a device that was homed before is homed anew, and not on top of that", "[device_homing]") {
+TEST_CASE("homing a homed device replaces its offsets", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   for (int time = 0; time < 2; ++time) {
@@ -68,7 +68,7 @@ TEST_CASE("a device that was homed before is homed anew, and not on top of that"
   }
 }
 
-TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[device_homing]") {
+TEST_CASE("a calibration checks the axes after it has applied the reference offsets", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::full);
@@ -76,7 +76,7 @@ TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[dev
   CHECK(error(polhem)[0] < kResolution_m);
 }
 
-TEST_CASE("an axis that goes another way ends a calibration", "[device_homing]") {
+TEST_CASE("a wrong axis direction fails a calibration", "[device_homing]") {
   PolhemInHand polhem;
   polhem.swapped_axis = 1;
   polhem.device.open();
@@ -86,7 +86,7 @@ TEST_CASE("an axis that goes another way ends a calibration", "[device_homing]")
   CHECK(state.problem == HomingProblem::wrong_axis);
 }
 
-TEST_CASE("without a confirmation there is no rest", "[device_homing]") {
+TEST_CASE("without a confirmation the reference pose is not measured", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
@@ -94,7 +94,7 @@ TEST_CASE("without a confirmation there is no rest", "[device_homing]") {
   CHECK(homing.offsets().empty());
 }
 
-TEST_CASE("the button of the profile confirms the rest", "[device_homing]") {
+TEST_CASE("the button of the profile confirms the reference pose", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   polhem.board.set_handle_button(true);
@@ -102,7 +102,7 @@ TEST_CASE("the button of the profile confirms the rest", "[device_homing]") {
   CHECK(home_pose(polhem, homing, false).step == HomingStep::done);
 }
 
-TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
+TEST_CASE("an unplugged device is reported during homing", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
@@ -114,7 +114,7 @@ TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
   CHECK(homing.device_lost());
 }
 
-TEST_CASE("a device that knows where it is has nothing to be shown at a start", "[device_homing]") {
+TEST_CASE("a device with absolute encoders needs no reference pose at the start", "[device_homing]") {
   PolhemInHand polhem;
   polhem.profile.homing.reference = ReferenceSchedule::never;
   polhem.device.open();

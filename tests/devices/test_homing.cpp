@@ -87,7 +87,7 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("a sound device is homed when a person does what is asked", "[homing]") {
+TEST_CASE("a correct device is homed when the operator follows the instructions", "[homing]") {
   Bench bench;
   CHECK(operator_instruction(bench.state()) == "Waiting for the device to report.");
   bench.obey_all();
@@ -104,7 +104,7 @@ TEST_CASE("a sound device is homed when a person does what is asked", "[homing]"
   CHECK(bench.heard == expected);
 }
 
-TEST_CASE("what the person is asked is the positive direction of the axes", "[homing]") {
+TEST_CASE("the instructions describe the positive directions of the axes", "[homing]") {
   const auto top_goes = [](const Vector3d& axis) {
     return Vector3d(Eigen::AngleAxisd(0.1, axis) * Vector3d::UnitZ());  // of the handle, x forward, y left
   };
@@ -113,7 +113,7 @@ TEST_CASE("what the person is asked is the positive direction of the axes", "[ho
   CHECK((Eigen::AngleAxisd(0.1, Vector3d::UnitZ()) * Vector3d::UnitX()).y() > 0);  // its front to the left
 }
 
-TEST_CASE("nothing is homed before every axis was seen, whatever the time", "[homing]") {
+TEST_CASE("homing is not done before every axis has moved", "[homing]") {
   for (std::size_t stuck = 0; stuck < 6; ++stuck) {
     Bench bench;
     bench.spoil = [stuck](DeviceSample& sample) {
@@ -132,7 +132,7 @@ TEST_CASE("nothing is homed before every axis was seen, whatever the time", "[ho
   CHECK(idle.state().axis == 0);
 }
 
-TEST_CASE("a person who errs is asked once more", "[homing]") {
+TEST_CASE("after an operator error homing asks once more", "[homing]") {
   Bench bench;
   bench.hold(0.5);
   REQUIRE(bench.state().step == HomingStep::moving);
@@ -150,7 +150,7 @@ TEST_CASE("a person who errs is asked once more", "[homing]") {
   CHECK(bench.homing.may_arm());
 }
 
-TEST_CASE("the way back to the middle is not taken for the next axis", "[homing]") {
+TEST_CASE("the return to the centre does not count as the next axis", "[homing]") {
   Bench bench;
   bench.hold(0.5);
   bench.move(0, 0.03);
@@ -165,7 +165,7 @@ TEST_CASE("the way back to the middle is not taken for the next axis", "[homing]
   CHECK(bench.homing.may_arm());
 }
 
-TEST_CASE("a sign that is wrong in the profile is found", "[homing]") {
+TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     Bench bench;
     bench.spoil = [axis](DeviceSample& s) {
@@ -185,7 +185,7 @@ TEST_CASE("a sign that is wrong in the profile is found", "[homing]") {
   CHECK(mirrored.state().axis == 4);
 }
 
-TEST_CASE("axes that are exchanged are found", "[homing]") {
+TEST_CASE("homing detects exchanged axes", "[homing]") {
   Bench bench;
   bench.spoil = [](DeviceSample& s) { std::swap(s.X_BH.translation_m.y(), s.X_BH.translation_m.z()); };
   bench.obey_all();
@@ -203,7 +203,8 @@ TEST_CASE("axes that are exchanged are found", "[homing]") {
   CHECK(turns.state().moved_axis == 5);
 }
 
-TEST_CASE("a velocity of the wrong sign is found, and one that is not reported is no fault", "[homing]") {
+TEST_CASE("homing detects a velocity with the wrong sign and accepts a device without velocities",
+          "[homing]") {
   for (Eigen::Index axis = 0; axis < 6; ++axis) {
     Bench bench;
     bench.spoil = [axis](DeviceSample& s) {
@@ -220,7 +221,7 @@ TEST_CASE("a velocity of the wrong sign is found, and one that is not reported i
   CHECK(silent.homing.may_arm());
 }
 
-TEST_CASE("in its rest a device is told where it is", "[homing]") {
+TEST_CASE("the reference pose gives the offset of the device", "[homing]") {
   const HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   RandomValues random(11);
   for (int i = 0; i < 20; ++i) {
@@ -243,7 +244,7 @@ TEST_CASE("in its rest a device is told where it is", "[homing]") {
   }
 }
 
-TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[homing]") {
+TEST_CASE("the reference pose must be confirmed, still and within the maximum offset", "[homing]") {
   HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   plan.confirm_buttons = 0x4;
   Bench bench(plan);
@@ -251,7 +252,8 @@ TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[ho
   bench.X_BH.translation_m.x() += 0.2;
   bench.hold(5.0);
   CHECK(bench.state().step == HomingStep::reference);  // lying still is not enough
-  CHECK(operator_instruction(bench.state()) == "Put the handle into its reference pose, release it, and confirm.");
+  CHECK(operator_instruction(bench.state()) ==
+        "Put the handle into its reference pose, release it, and confirm.");
 
   std::uint32_t buttons = 0x3;
   bench.spoil = [&](DeviceSample& s) { s.buttons = buttons; };
@@ -279,7 +281,7 @@ TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[ho
   CHECK(bench.homing.offset().position_m.x() == Approx(-0.002));
 }
 
-TEST_CASE("a stored offset spares the rest where the encoders remember, and only there", "[homing]") {
+TEST_CASE("a stored offset replaces the reference pose only for absolute encoders", "[homing]") {
   const PoseOffset stored{{0.01, 0, 0}, {0, 0, 0.1}};
   Bench once(with_reference(ReferenceSchedule::once), stored);
   once.tick();
@@ -301,7 +303,7 @@ TEST_CASE("a stored offset spares the rest where the encoders remember, and only
   CHECK(foreign.state().problem == HomingProblem::stored_offset_too_large);
 }
 
-TEST_CASE("an offset goes to the store and comes back", "[homing]") {
+TEST_CASE("an offset survives conversion to the calibration store and back", "[homing]") {
   const TemporaryDirectory dir;
   const CalibrationStore store(dir.path());
   const PoseOffset offset{{0.0125, -1e-7, 0.1}, {0.01, 0.02, -0.03}};
@@ -321,7 +323,7 @@ TEST_CASE("an offset goes to the store and comes back", "[homing]") {
   }
 }
 
-TEST_CASE("a pose that cannot be fails", "[homing]") {
+TEST_CASE("a pose outside the workspace fails homing", "[homing]") {
   HomingPlan plan;
   plan.workspace_min_m = {-0.1, -0.2, 0.0};
   plan.workspace_max_m = {0.1, 0.2, 0.3};
@@ -354,7 +356,7 @@ TEST_CASE("a pose that cannot be fails", "[homing]") {
   }
 }
 
-TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[homing]") {
+TEST_CASE("a fault pauses the step, and a lost device restarts homing", "[homing]") {
   Bench bench;
   Fault fault = Fault::none;
   bench.spoil = [&](DeviceSample& s) { s.fault = fault; };
@@ -454,14 +456,14 @@ TEST_CASE("the simulated device is homed through its reports, and a wrong profil
   CHECK(mirrored.homing.state().axis == 0);  // x went the wrong way; this hand does not try again
 }
 
-TEST_CASE("samples that are not fresh are no evidence", "[homing]") {
+TEST_CASE("homing ignores samples that are not fresh", "[homing]") {
   Bench bench;
   bench.spoil = [](DeviceSample& s) { s.fresh = false; };
   bench.hold(5.0);
   CHECK(bench.state().step == HomingStep::awaiting_sample);
 }
 
-TEST_CASE("only axes that a device senses are asked for", "[homing]") {
+TEST_CASE("homing asks only for sensed axes", "[homing]") {
   HomingPlan plan;
   plan.sensed = {true, true, true, false, false, false};
   Bench bench(plan);
@@ -475,7 +477,7 @@ TEST_CASE("only axes that a device senses are asked for", "[homing]") {
   CHECK(turn.heard.at(1) == "Turn the handle to the left, counterclockwise as seen from above.");
 }
 
-TEST_CASE("a plan that cannot work is refused", "[homing]") {
+TEST_CASE("an invalid homing plan is rejected", "[homing]") {
   const auto refused = [](const std::function<void(HomingPlan&)>& spoil) {
     HomingPlan plan;
     spoil(plan);
@@ -499,7 +501,7 @@ TEST_CASE("a plan that cannot work is refused", "[homing]") {
   CHECK(refused([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
 }
 
-TEST_CASE("the servo thread may home, whatever the device says", "[homing]") {
+TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
   RandomValues random(13);
   HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   plan.confirm_buttons = 1;

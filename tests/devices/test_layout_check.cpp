@@ -30,7 +30,7 @@ ExpectedReport combined(std::vector<ExpectedField> fields, std::size_t length = 
   return {ReportKind::input, 1, length, std::move(fields)};
 }
 
-TEST_CASE("the reference layout agrees with the descriptor its page gives", "[layout_check]") {
+TEST_CASE("the reference layout agrees with the descriptor in devices/README.md", "[layout_check]") {
   const auto expected = expected_reports(reference_profile());
   REQUIRE(expected.size() == 2);
   CHECK(expected[0].fields.size() == 11);
@@ -38,7 +38,7 @@ TEST_CASE("the reference layout agrees with the descriptor its page gives", "[la
   CHECK(find_differences(reference_device(), expected) == LineReader{});
 }
 
-TEST_CASE("a profile for another device is told apart, line by line", "[layout_check]") {
+TEST_CASE("a profile for another device differs, one line per difference", "[layout_check]") {
   const LineReader lines =
       find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
   REQUIRE(lines.size() == 13);  // no field agrees
@@ -56,7 +56,7 @@ TEST_CASE("a profile for another device is told apart, line by line", "[layout_c
   CHECK(lines.back() == "output report 0x02: the device has no such report; its output reports: 0x04");
 }
 
-TEST_CASE("fields of a device agree where they are, as wide as they are, with their sign", "[layout_check]") {
+TEST_CASE("a field agrees if position, width and sign match", "[layout_check]") {
   const ReportDescriptor device = parsed(space_mouse_wireless());
   const auto lines = [&](const ExpectedField& field) {
     return find_differences(device, {combined({field})});
@@ -73,7 +73,7 @@ TEST_CASE("fields of a device agree where they are, as wide as they are, with th
   CHECK(lines({"the report id", 0, 8, 1, false}).size() == 1);
 }
 
-TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them", "[layout_check]") {
+TEST_CASE("a button mask consists of single bits and trailing padding", "[layout_check]") {
   const ReportDescriptor device = parsed(space_navigator());
   const auto agrees = [&](std::size_t bit, unsigned bits) {
     return find_differences(device, {{ReportKind::input, 3, 3, {{"buttons", bit, bits, 1, false}}}}).empty();
@@ -94,7 +94,7 @@ TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them",
   CHECK(find_differences(mouse, {{ReportKind::input, {}, 2, {{"both", 0, 16, 1, true}}}}).size() == 1);
 }
 
-TEST_CASE("bytes of the maker's own agree with all that lies within them", "[layout_check]") {
+TEST_CASE("vendor-defined bytes agree with any field within them", "[layout_check]") {
   const ReportDescriptor device = parsed(teensy_rawhid());
   const auto agrees = [&](const ExpectedField& field) {
     return find_differences(device, {{ReportKind::input, {}, 64, {field}}}).empty();
@@ -106,7 +106,7 @@ TEST_CASE("bytes of the maker's own agree with all that lies within them", "[lay
   CHECK_FALSE(agrees({"one more", 0, 8, 65, false}));
 }
 
-TEST_CASE("words of the maker's own may be taken by bits, but not across their ends", "[layout_check]") {
+TEST_CASE("a field may use bits of one vendor-defined word, but not cross its boundary", "[layout_check]") {
   const ReportDescriptor device =
       parsed(from_hex("06 00 ff 09 01 a1 01 16 00 80 26 ff 7f 75 10 95 04 09 02 81 02 c0"));
   const auto agrees = [&](const ExpectedField& field) {
@@ -119,20 +119,20 @@ TEST_CASE("words of the maker's own may be taken by bits, but not across their e
   CHECK_FALSE(agrees({"two", 0, 32, 1, true}));
 }
 
-TEST_CASE("report ids that the other side does not have are told", "[layout_check]") {
+TEST_CASE("report ids without a counterpart are reported", "[layout_check]") {
   const ExpectedReport with{ReportKind::input, 1, 65, {}}, without{ReportKind::input, {}, 64, {}};
   CHECK(find_differences(parsed(teensy_rawhid()), {without}).empty());
   CHECK(find_differences(parsed(teensy_rawhid()), {with}) ==
         LineReader{"input report 0x01: the device has no such report; its input reports: without an id"});
-  CHECK(find_differences(parsed(space_navigator()), {without}) ==
-        LineReader{
-            "input report without an id: the device has no such report; its input reports: 0x01, 0x02, 0x03"});
+  CHECK(
+      find_differences(parsed(space_navigator()), {without}) ==
+      LineReader{
+          "input report without an id: the device has no such report; its input reports: 0x01, 0x02, 0x03"});
   CHECK(find_differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
         LineReader{"output report without an id: the device has no such report; it has no output report"});
 }
 
-TEST_CASE("a report may be as short as is allowed, and one that need not be there may be absent",
-          "[layout_check]") {
+TEST_CASE("a report may have its minimum length, and an optional report may be absent", "[layout_check]") {
   const ReportDescriptor device = parsed(space_navigator());  // report 3 has 3 bytes, with 2 buttons
   const ExpectedField buttons{"buttons", 8, 32, 1, false};
   ExpectedReport report{ReportKind::input, 3, 7, {buttons}};
@@ -180,7 +180,7 @@ TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layo
   CHECK_FALSE(differ("spacemouse_split.toml", space_mouse_wireless()).empty());
 }
 
-TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_check]") {
+TEST_CASE("wrenchctl check --against prints the required changes", "[layout_check]") {
   const std::string profile = WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml";
   const TemporaryDirectory dir;
   const auto check = [&](const std::string& file, const std::string& descriptor) {

@@ -177,7 +177,7 @@ TEST_CASE("a maximum is unsigned unless the minimum is negative", "[report_descr
   CHECK(range("14 27 ff ff ff ff") == Range(0, 4294967295LL));
 }
 
-TEST_CASE("a usage takes the page that holds where its field is declared", "[report_descriptor]") {
+TEST_CASE("a usage takes the page that is current where its field is declared", "[report_descriptor]") {
   const auto usage = [](const std::string& items) {
     return *parsed(framed(items + "81 02")).reports.at(0).fields.at(0).usage(0);
   };
@@ -186,7 +186,7 @@ TEST_CASE("a usage takes the page that holds where its field is declared", "[rep
   CHECK(usage("05 09 0b 30 00 01 00") == Usage{0x01, 0x30});
 }
 
-TEST_CASE("push keeps what holds, and pop brings it back", "[report_descriptor]") {
+TEST_CASE("push saves the global state, and pop restores it", "[report_descriptor]") {
   const auto d = parsed(framed("a4 75 10 95 03 81 02 b4 81 02"));
   const DescribedReport& in = report(d, ReportKind::input, {});
   CHECK(in.fields.at(0).count == 3);
@@ -195,17 +195,17 @@ TEST_CASE("push keeps what holds, and pop brings it back", "[report_descriptor]"
   CHECK(in.fields.at(1).bit == 48);
 }
 
-TEST_CASE("a field of no bits, and a field that is not there, declare nothing", "[report_descriptor]") {
+TEST_CASE("a field without bits and a count of zero declare nothing", "[report_descriptor]") {
   CHECK(parsed(framed("95 00 81 02 95 01 81 02")).reports.at(0).fields.size() == 1);
   CHECK(parsed(framed("75 00 81 02 75 08 81 02")).reports.at(0).fields.size() == 1);
 }
 
-TEST_CASE("items of reserved types and tags are passed over, as Linux does", "[report_descriptor]") {
+TEST_CASE("items of reserved types and tags are skipped, as in Linux", "[report_descriptor]") {
   CHECK(rejection_text(from_hex(framed("0c 81 02 f9 01"))).empty());
   CHECK(rejection_text(from_hex(framed("81 02 00 00"))).empty());
 }
 
-TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_descriptor]") {
+TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[report_descriptor]") {
   struct Bad {
     std::string hex;
     std::string message;
@@ -277,7 +277,7 @@ TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_d
   }
 }
 
-TEST_CASE("every descriptor cut short is refused", "[report_descriptor]") {
+TEST_CASE("every truncated descriptor is rejected", "[report_descriptor]") {
   for (const Bytes& whole : sample_descriptors()) {
     REQUIRE(rejection_text(whole).empty());
     for (std::size_t length = 0; length < whole.size(); ++length)
@@ -306,7 +306,7 @@ void check_sound(const ReportDescriptor& descriptor) {
   if (!sound) FAIL("what was accepted contradicts itself");  // a CHECK each would cost more than the parsing
 }
 
-TEST_CASE("a million mutated and random descriptors are accepted whole or refused", "[report_descriptor]") {
+TEST_CASE("a million mutated and random descriptors are fully accepted or rejected", "[report_descriptor]") {
   RandomValues random(20);
   constexpr int cases = 1'000'000;  // under sanitizers too: it is memory that such bytes are after
   int accepted = 0;

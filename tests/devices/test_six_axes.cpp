@@ -28,7 +28,7 @@ Bytes controller(const std::string& items) {
   return from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 01" + items + "c0");
 }
 
-TEST_CASE("split and combined layouts are told by the descriptor alone", "[six_axes]") {
+TEST_CASE("split and combined layouts are distinguished by the descriptor alone", "[six_axes]") {
   CHECK(six_axes(space_navigator()).layout == AxesLayout::split);
   CHECK(six_axes(space_mouse_wireless()).layout == AxesLayout::combined);
   CHECK(six_axes(ten_bit_axes()).layout == AxesLayout::combined);
@@ -37,7 +37,7 @@ TEST_CASE("split and combined layouts are told by the descriptor alone", "[six_a
   CHECK(six_axes(home_made_split()).layout == AxesLayout::split);
 }
 
-TEST_CASE("a SpaceNavigator's axes, buttons and LED are where they are known to be", "[six_axes]") {
+TEST_CASE("axes, buttons and LED of a SpaceNavigator are found at their known positions", "[six_axes]") {
   const SixAxisController device = six_axes(space_navigator());
   for (std::size_t i = 0; i < 6; ++i) {
     const DescribedNumber& axis = device.axes[i];
@@ -92,13 +92,14 @@ TEST_CASE("steps come from physical range, exponent and unit", "[six_axes]") {
   CHECK(std::isnan(steps("65 11 35 7f 45 01").first));  // a physical range upside down
 }
 
-TEST_CASE("what has no six axes is told apart, with the reason", "[six_axes]") {
+TEST_CASE("a device without six axes is rejected with the reason", "[six_axes]") {
   struct Other {
     Bytes bytes;
     std::string why_not;
   };
   for (const Other& other : {
-           Other{boot_keyboard(), "it is no multi-axis controller (01:08); its applications are 01:06 (keyboard)"},
+           Other{boot_keyboard(),
+                 "it is no multi-axis controller (01:08); its applications are 01:06 (keyboard)"},
            Other{effects_joystick(), "it wants to be 01:04 (joystick)"},  // though it has all six axes
            Other{teensy_rawhid(), "it wants to be ffab:200 (vendor defined)"},
            Other{controller("19 30 29 32 95 03 81 02"), "without Rx, Ry, Rz"},

@@ -47,7 +47,7 @@ std::string why_not(const DeviceIdentity& device, const std::string& profile) {
 
 }  // namespace
 
-TEST_CASE("each device of the table has its profile", "[match_profile]") {
+TEST_CASE("each device of the table matches its profile", "[match_profile]") {
   for (const int pid : {0xc626, 0xc628, 0xc627, 0xc625, 0xc629, 0xc62b})
     CHECK(matched(plugged(0x046d, pid)) == "spacemouse_split");
   CHECK(matched(plugged(0x256f, 0xc635)) == "spacemouse_split");
@@ -82,7 +82,7 @@ TEST_CASE("the report descriptor decides between split and combined, not the id"
         "input report 2 of the profile is not in the device's report descriptor");
 }
 
-TEST_CASE("a device without ids is told by the length of its report", "[match_profile]") {
+TEST_CASE("a device without report ids is matched by the length of its report", "[match_profile]") {
   DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
   polhem.input_reports = {{0, 64}};
   CHECK(matched(polhem) == "polhem");
@@ -90,7 +90,7 @@ TEST_CASE("a device without ids is told by the length of its report", "[match_pr
   CHECK(matched(polhem).empty());
 }
 
-TEST_CASE("every profile that does not match says why", "[match_profile]") {
+TEST_CASE("every profile that does not match has a reason", "[match_profile]") {
   const DeviceIdentity stranger = plugged(0x1d50, 0x6018);
   const MatchResult result = match_profile(stranger, kProfiles);
   CHECK_FALSE(result.profile);
@@ -107,14 +107,14 @@ TEST_CASE("every profile that does not match says why", "[match_profile]") {
   CHECK(why_not(unread, "polhem") == "the usage page is not known, the profile requires ffab");
 }
 
-TEST_CASE("a profile that shares its ids is used only where the configuration names it", "[match_profile]") {
+TEST_CASE("a profile with shared ids is used only if the configuration names it", "[match_profile]") {
   const DeviceIdentity board = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
   CHECK(why_not(board, "woodenhaptics") == "it is used only if the configuration names it");
   CHECK(matched(board, "woodenhaptics") == "woodenhaptics");
   CHECK(matched(board, "falcon").empty());
 }
 
-TEST_CASE("over libusb a profile is for one interface of a device", "[match_profile]") {
+TEST_CASE("a libusb profile matches one interface of a device", "[match_profile]") {
   DeviceIdentity falcon = plugged(0x0403, 0xcb48);
   CHECK(matched(falcon) == "falcon");  // as far as is known
   falcon.interface = 0;
@@ -126,7 +126,7 @@ TEST_CASE("over libusb a profile is for one interface of a device", "[match_prof
   CHECK(matched(polhem) == "polhem");
 }
 
-TEST_CASE("closed devices, and those that only share a vendor, are refused by name", "[match_profile]") {
+TEST_CASE("unusable devices are rejected by name", "[match_profile]") {
   CHECK_THAT(matched(plugged(0x2988, 0x0304)),
              Contains("3D Systems Touch (HID) (2988:0304)") && Contains("protocol is not public"));
   CHECK_THAT(matched(plugged(0x2988, 0x0302)), Contains("Touch (USB)"));
@@ -143,14 +143,14 @@ TEST_CASE("closed devices, and those that only share a vendor, are refused by na
   CHECK(find_unusable_device({0x256f, 0xc653}) == nullptr);
 }
 
-TEST_CASE("a refused device stays refused when a profile claims it", "[match_profile]") {
+TEST_CASE("an unusable device stays rejected if a profile lists its id", "[match_profile]") {
   std::vector<DeviceProfile> profiles = {kProfiles.front()};
   profiles[0].transport = Transport::hidraw;
   profiles[0].match.usb = {{0x2988, 0x0304}};
   CHECK_FALSE(match_profile(plugged(0x2988, 0x0304), profiles).profile);
 }
 
-TEST_CASE("two equal devices are told apart by serial number", "[match_profile]") {
+TEST_CASE("two equal devices are distinguished by serial number", "[match_profile]") {
   DeviceProfile left = kProfiles.front();
   left.name = "left";
   left.transport = Transport::hidraw;

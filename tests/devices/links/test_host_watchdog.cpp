@@ -50,7 +50,8 @@ struct Said {
   WrenchReport spoken() const { return decode(profile.wrench_report, packet.report()).report; }
 };
 
-TEST_CASE("a loop that pushes and falls silent is spoken for: zero wrench, motors off", "[last_word]") {
+TEST_CASE("if the loop hangs after a nonzero wrench, the watchdog sends zero with the motors off",
+          "[host_watchdog]") {
   Said said(shipped("loopback"), push(65534));
   CHECK(said.word.due() == kStart + kAfter);
   CHECK_FALSE(said.speaks(kStart + kAfter - 1ns));
@@ -70,7 +71,7 @@ TEST_CASE("a loop that pushes and falls silent is spoken for: zero wrench, motor
   CHECK_FALSE(said.speaks(now + 1h));
 }
 
-TEST_CASE("whoever goes on speaking is not interrupted", "[last_word]") {
+TEST_CASE("the watchdog does not interrupt a running loop", "[host_watchdog]") {
   Said said(shipped("loopback"), push(1));
   TimePoint now = kStart;
   for (std::uint64_t n = 2; n < 100; ++n) {
@@ -86,7 +87,7 @@ TEST_CASE("whoever goes on speaking is not interrupted", "[last_word]") {
   CHECK(said.spoken().sequence == 8);
 }
 
-TEST_CASE("a silence without a push is nobody's business", "[last_word]") {
+TEST_CASE("the watchdog ignores silence after a zero wrench", "[host_watchdog]") {
   // The self-test wants to see the watchdog trip: motors on, zero wrench, and then nothing.
   const DeviceProfile profile = shipped("loopback");
   WrenchReport rest = push(1);
@@ -102,7 +103,7 @@ TEST_CASE("a silence without a push is nobody's business", "[last_word]") {
   CHECK(HostWatchdog(mouse, kAfter).due() == TimePoint::max());
 }
 
-TEST_CASE("what is no wrench leaves the last one standing", "[last_word]") {
+TEST_CASE("a report that is no wrench does not change the watchdog's state", "[host_watchdog]") {
   Said said(shipped("loopback"), push(1));
   Packet other;
   other.length = 3;
@@ -112,7 +113,7 @@ TEST_CASE("what is no wrench leaves the last one standing", "[last_word]") {
   CHECK(said.speaks(kStart + kAfter));
 }
 
-TEST_CASE("motors that are told their efforts are told none", "[last_word]") {
+TEST_CASE("the watchdog sends zero efforts to a device with motor efforts", "[host_watchdog]") {
   const DeviceProfile polhem = shipped("polhem");
   REQUIRE(polhem.wrench_report.efforts.present);
   WrenchReport report;
@@ -124,7 +125,7 @@ TEST_CASE("motors that are told their efforts are told none", "[last_word]") {
   CHECK(Said(polhem, report).word.due() == TimePoint::max());
 }
 
-TEST_CASE("the last word neither allocates nor locks", "[last_word]") {
+TEST_CASE("the watchdog does not allocate or lock", "[host_watchdog]") {
   Said said(shipped("loopback"), push(1));
   const Packet packet = packet_of(said.profile, push(2));
   std::uint64_t allocations = 0, locks = 0;

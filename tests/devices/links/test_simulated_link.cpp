@@ -153,7 +153,7 @@ bool is_cap(const DeviceProfile& profile) {
 
 }  // namespace
 
-TEST_CASE("the motion of a hand comes out as the pose, for every shipped profile", "[simulation]") {
+TEST_CASE("the pose follows the motion of the hand, for every shipped profile", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, moving());
@@ -217,8 +217,7 @@ TEST_CASE("a wrench arrives as force on the simulated handle, for every shipped 
   }
 }
 
-TEST_CASE("a wall rendered through a simulated device holds the hand, for every shipped profile with motors",
-          "[simulation]") {
+TEST_CASE("a rendered wall stops the hand, for every shipped profile with motors", "[simulation]") {
   constexpr double kWall_N_per_m = 200.0, kWallAt_m = 0.02, kDeep_m = 0.006;
   for (const DeviceProfile& profile : all_shipped()) {
     if (driven_dofs(profile) == kNoDof) continue;
@@ -243,8 +242,7 @@ TEST_CASE("a wall rendered through a simulated device holds the hand, for every 
   }
 }
 
-TEST_CASE("a host that hangs: the watchdog of the profile frees the hand, where there is one",
-          "[simulation]") {
+TEST_CASE("if the host hangs, the device's watchdog releases the hand", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     if (driven_dofs(profile) == kNoDof) continue;
     INFO(profile.name);
@@ -270,8 +268,7 @@ TEST_CASE("a host that hangs: the watchdog of the profile frees the hand, where 
   }
 }
 
-TEST_CASE("faults of the wire show on every shipped profile as they do on the simulated device",
-          "[simulation]") {
+TEST_CASE("transport faults appear on every shipped profile as on the simulated device", "[simulation]") {
   const Kind kind = GENERATE(Kind::unplug, Kind::silence, Kind::freeze, Kind::corrupt, Kind::short_report,
                              Kind::refuse_commands);
   for (const DeviceProfile& profile : all_shipped()) {
@@ -332,7 +329,7 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
   }
 }
 
-TEST_CASE("a pose that is wrong on request shows where a device can tell one", "[simulation]") {
+TEST_CASE("an injected pose fault appears on devices that send a pose", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, still());
@@ -357,7 +354,7 @@ TEST_CASE("a pose that is wrong on request shows where a device can tell one", "
   }
 }
 
-TEST_CASE("a simulated link allocates nothing and takes no lock while it is open", "[simulation]") {
+TEST_CASE("an open simulated link does not allocate or lock", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, moving());
@@ -377,7 +374,7 @@ TEST_CASE("a simulated link allocates nothing and takes no lock while it is open
   }
 }
 
-TEST_CASE("a simulated run is the same however time is cut", "[simulation]") {
+TEST_CASE("a simulated run does not depend on how calls divide the time", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     const auto run = [&](Duration cut) {
@@ -396,7 +393,7 @@ TEST_CASE("a simulated run is the same however time is cut", "[simulation]") {
   }
 }
 
-TEST_CASE("a device that sends whole poses in frames of its own is simulated in them", "[simulation]") {
+TEST_CASE("a device with its own frames is simulated in these frames", "[simulation]") {
   DeviceProfile profile = shipped("reference_full_speed");
   profile.X_BD = {rotation_from({0.3, -0.5, 1.1}), {0.02, -0.01, 0.05}};
   profile.X_EH = {rotation_from({-0.2, 0.4, 0.1}), {0.03, 0.04, -0.02}};
@@ -414,7 +411,7 @@ TEST_CASE("a device that sends whole poses in frames of its own is simulated in 
   CHECK((felt.torque_Nm - F.torque_Nm).norm() < 1e-5);
 }
 
-TEST_CASE("a cap at rest is silent, and the tool stays where the hand has left it", "[simulation]") {
+TEST_CASE("a puck at rest sends nothing, and the tool keeps its pose", "[simulation]") {
   for (const char* name : {"spacemouse_split", "spacemouse_combined"}) {
     INFO(name);
     Session s(shipped(name), still());
@@ -429,7 +426,7 @@ TEST_CASE("a cap at rest is silent, and the tool stays where the hand has left i
   }
 }
 
-TEST_CASE("a cap whose deflection is the pose is held where the hand wants the tool", "[simulation]") {
+TEST_CASE("in position mode the hand holds the puck at the goal of the tool", "[simulation]") {
   DeviceProfile profile = shipped("spacemouse_combined");
   profile.deflection->mode = Deflection::Mode::position;
   profile.deflection->linear_gain = 71.0;
@@ -442,7 +439,7 @@ TEST_CASE("a cap whose deflection is the pose is held where the hand wants the t
   CHECK(apart_rad(s.sample.X_BH, target) < 11.4 * 2.5e-4);
 }
 
-TEST_CASE("out of reach an arm has an end stop, and comes back from it", "[simulation]") {
+TEST_CASE("an arm has an end stop at the boundary of its workspace and returns from it", "[simulation]") {
   for (const char* name : {"polhem", "woodenhaptics", "falcon"}) {
     INFO(name);
     Session s(shipped(name), exact({{0.0, {0.0, 0.0, 0.03}, {0, 0, 0}},
@@ -460,14 +457,14 @@ TEST_CASE("out of reach an arm has an end stop, and comes back from it", "[simul
   }
 }
 
-TEST_CASE("an arm whose first waypoint is out of reach starts as near to it as it comes", "[simulation]") {
+TEST_CASE("an arm with an unreachable first waypoint starts at the nearest reachable pose", "[simulation]") {
   VirtualClock clock;
   const auto link = make_simulated_link(shipped("polhem"), exact({{0.0, {0, 0, 5.0}, {0, 0, 0}}}), clock);
   CHECK(link->device().X_BH().translation_m.z() > 0.132);
   CHECK(link->device().X_BH().translation_m.z() < 0.4);
 }
 
-TEST_CASE("a profile that no emulator speaks like is not simulated, and the cure is told", "[simulation]") {
+TEST_CASE("a profile without an emulator is rejected with the remedy", "[simulation]") {
   VirtualClock clock;
   DeviceProfile arm = shipped("polhem");
   arm.name = "my_arm";

@@ -63,7 +63,7 @@ bool written_until(SocketLink& link, const Bytes& report, LinkStatus wanted) {
   return false;
 }
 
-TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_link]") {
+TEST_CASE("a socket transfers reports in both directions and keeps their boundaries", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   link.open();
@@ -94,7 +94,7 @@ TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_
   CHECK(pair.hear() == Bytes{9});
 }
 
-TEST_CASE("a device that does not read makes a write fail and not wait", "[socket_link]") {
+TEST_CASE("if the device does not read, a write fails without waiting", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   link.open();
@@ -104,7 +104,7 @@ TEST_CASE("a device that does not read makes a write fail and not wait", "[socke
   CHECK(written_until(link, report, LinkStatus::ok));  // there is room again
 }
 
-TEST_CASE("when the other end of a socket is gone, so is the device", "[socket_link]") {
+TEST_CASE("when the other end of a socket closes, the device is disconnected", "[socket_link]") {
   Pair pair;
   SocketLink link(pair.near);
   link.open();
@@ -117,7 +117,7 @@ TEST_CASE("when the other end of a socket is gone, so is the device", "[socket_l
   CHECK_THROWS_WITH(link.open(), Catch::Contains("nobody is at its other end"));
 }
 
-TEST_CASE("a closed socket link is silent, and speaks again when it is opened", "[socket_link]") {
+TEST_CASE("a closed socket link transfers nothing until it is opened again", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   std::array<std::uint8_t, 4> buffer{};
@@ -132,7 +132,7 @@ TEST_CASE("a closed socket link is silent, and speaks again when it is opened", 
   CHECK(pair.hear() == Bytes{1});
 }
 
-TEST_CASE("what is no socket of packets is refused with the cure", "[socket_link]") {
+TEST_CASE("a descriptor that is no packet socket is rejected with the remedy", "[socket_link]") {
   const Pair stream(SOCK_STREAM);
   SocketLink of_stream(stream.near);
   CHECK_THROWS_WITH(of_stream.open(),
@@ -154,7 +154,7 @@ TEST_CASE("waiting on a socket ends with a report, and with the deadline", "[soc
   link.wait_readable(std::chrono::steady_clock::now() + std::chrono::hours(1));  // or this test never ends
 }
 
-TEST_CASE("a socket is read and written without allocating or locking", "[socket_link]") {
+TEST_CASE("reading and writing a socket does not allocate or lock", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   link.open();

@@ -64,7 +64,7 @@ using Mouse = EmulatedSpaceMouse;
 
 // --- SpaceMouse -------------------------------------------------------------------------------------------
 
-TEST_CASE("a SpaceMouse that nobody touches is silent, and that is no fault", "[emulators]") {
+TEST_CASE("an untouched SpaceMouse sends nothing, which is no fault", "[emulators]") {
   for (const auto& [name, format] : {std::pair("spacemouse_split", Mouse::Format::split),
                                      {"spacemouse_combined", Mouse::Format::combined}}) {
     Bench<Mouse> bench(name, format);
@@ -80,7 +80,7 @@ TEST_CASE("a SpaceMouse that nobody touches is silent, and that is no fault", "[
   }
 }
 
-TEST_CASE("what the cap is pushed comes out as the way of the tool, in both formats", "[emulators]") {
+TEST_CASE("the deflection of the puck moves the tool, in both formats", "[emulators]") {
   // To the right, half as much toward the user, a quarter down: -y, -x / 2, -z / 4 in the base.
   const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
   for (const auto& [name, format] : {std::pair("spacemouse_split", Mouse::Format::split),
@@ -111,7 +111,7 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
   }
 }
 
-TEST_CASE("a cap's buttons bring the pose back to where it began, and make it slow", "[emulators]") {
+TEST_CASE("the buttons of the puck recentre the pose and reduce its speed", "[emulators]") {
   Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
   bench.open();
   bench.emulator.set_deflection({0, -350, 0, 0, 0, 100});
@@ -137,7 +137,7 @@ TEST_CASE("a cap's buttons bring the pose back to where it began, and make it sl
   CHECK(bench.sample.X_BH.translation_m.x() > 0.02);
 }
 
-TEST_CASE("a cap let go sends three packets of zeros and the pose stays", "[emulators]") {
+TEST_CASE("a released puck sends three packets of zeros and the pose stays", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
   bench.emulator.set_deflection({100, 0, 0, 50, 0, 0});
@@ -152,8 +152,7 @@ TEST_CASE("a cap let go sends three packets of zeros and the pose stays", "[emul
   CHECK(bench.sample.fault == Fault::none);
 }
 
-TEST_CASE("a SpaceMouse that falls silent while it is pushed stops the tool, and says so once",
-          "[emulators]") {
+TEST_CASE("a SpaceMouse that stops sending while deflected stops the tool, with a fault", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
   bench.emulator.set_deflection({100, 0, 0, 0, 0, 0});
@@ -170,7 +169,7 @@ TEST_CASE("a SpaceMouse that falls silent while it is pushed stops the tool, and
   CHECK(bench.sample.V_BH.linear_m_per_s.isZero());
 }
 
-TEST_CASE("buttons come through, the LED is switched off at the end", "[emulators]") {
+TEST_CASE("buttons arrive, and the LED is off at the end", "[emulators]") {
   Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
   bench.open();
   bench.emulator.set_buttons(2);
@@ -185,7 +184,7 @@ TEST_CASE("buttons come through, the LED is switched off at the end", "[emulator
   CHECK_FALSE(bench.emulator.led());
 }
 
-TEST_CASE("a wrench for a device without motors is dropped, and told", "[emulators]") {
+TEST_CASE("a wrench for a device without motors is dropped and reported", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
   bench.step({{1, 0, 0}, {0, 0, 0.1}}, true);
@@ -198,7 +197,7 @@ TEST_CASE("a wrench for a device without motors is dropped, and told", "[emulato
 
 // --- Polhem -----------------------------------------------------------------------------------------------
 
-TEST_CASE("encoders put in come out as the pose that the maker's formulas give", "[emulators]") {
+TEST_CASE("encoder counts give the pose of the manufacturer's formulas", "[emulators]") {
   std::mt19937 random(5);
   const auto between = [&](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(random);
@@ -230,7 +229,7 @@ TEST_CASE("encoders put in come out as the pose that the maker's formulas give",
   }
 }
 
-TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas", "[emulators]") {
+TEST_CASE("a force on a Polhem gives the currents of the manufacturer's formulas", "[emulators]") {
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   Bench<EmulatedPolhem> bench("polhem", 64u);
@@ -250,7 +249,7 @@ TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas",
   CHECK(dof_text(bench.device.read_newest(bench.clock.now()).dropped_dofs) == "ry");
 }
 
-TEST_CASE("a Polhem speaks only when spoken to, and wrenchd speaks first", "[emulators]") {
+TEST_CASE("a Polhem answers commands only, and wrenchd sends the first one", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
   bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   struct Nobody final : ReportSink {
@@ -317,7 +316,7 @@ TEST_CASE("the profile's calibration sets the counters to home", "[emulators]") 
 
 // --- Falcon -----------------------------------------------------------------------------------------------
 
-TEST_CASE("a Falcon is started: handshake, firmware with its echo, speed", "[emulators]") {
+TEST_CASE("a Falcon starts: handshake, firmware with echo, baud rate", "[emulators]") {
   std::vector<std::uint8_t> firmware(1000);
   std::mt19937 random(8);
   for (std::uint8_t& byte : firmware) byte = static_cast<std::uint8_t>(random() & 0xffu);
@@ -334,7 +333,7 @@ TEST_CASE("a Falcon is started: handshake, firmware with its echo, speed", "[emu
   CHECK(falcon.firmware() == firmware);
 }
 
-TEST_CASE("a Falcon that cannot be started is given up with a reason", "[emulators]") {
+TEST_CASE("a Falcon that does not start gives an error with the reason", "[emulators]") {
   using Catch::Contains;
   const std::vector<std::uint8_t> firmware(300, 7);
   EmulatedFalcon dead;
@@ -348,7 +347,7 @@ TEST_CASE("a Falcon that cannot be started is given up with a reason", "[emulato
   CHECK(deaf.state() != EmulatedFalcon::State::running);
 }
 
-TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it has to be", "[emulators]") {
+TEST_CASE("a Falcon can be opened in every state, and firmware is loaded only if needed", "[emulators]") {
   using Catch::Contains;
   const TemporaryDirectory dir;
   const std::string file = dir.write("firmware.bin", std::string(700, 'x')).string();
@@ -368,7 +367,7 @@ TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it 
   CHECK(falcon.efforts() == std::array<int, 3>{});
 }
 
-TEST_CASE("what the Falcon's profile says of its link", "[emulators]") {
+TEST_CASE("the Falcon's profile gives its link settings", "[emulators]") {
   const LinkSettings settings = link_settings(shipped("falcon"));
   CHECK(settings.in_endpoint == 0x81);
   CHECK(settings.out_endpoint == 0x02);
@@ -384,7 +383,7 @@ TEST_CASE("what the Falcon's profile says of its link", "[emulators]") {
   CHECK_FALSE(polhem.start_serial);
 }
 
-TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulators]") {
+TEST_CASE("before homing, the pose of a Falcon is not used and it is not driven", "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
   bench.emulator.set_true_counts({100, 100, 100});
@@ -407,8 +406,7 @@ TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulat
   CHECK(bench.emulator.efforts()[0] > 0);
 }
 
-TEST_CASE("a Falcon's handle comes out where it was put, and what it is not driven along is told",
-          "[emulators]") {
+TEST_CASE("the pose of a Falcon follows its handle, and undriven components are reported", "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
   bench.open();
@@ -465,9 +463,8 @@ TEST_CASE("short packets of a Falcon are dropped, and its buttons do not flicker
   CHECK(rejected == 4);
 }
 
-TEST_CASE(
-    "a Falcon, which has no watchdog, gets a quarter of its limits, and its motors never more than 4096",
-    "[emulators]") {
+TEST_CASE("a Falcon has no watchdog and gets a quarter of its limits, at most 4096 motor counts",
+          "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
   bench.open();
@@ -482,7 +479,7 @@ TEST_CASE(
   CHECK(std::abs(2 * bench.emulator.efforts()[0] - most[0]) <= 2);
 }
 
-TEST_CASE("a device that is unplugged is lost, and is heard again after it was opened anew", "[emulators]") {
+TEST_CASE("an unplugged device is lost until it is opened again", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
   bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   bench.emulator.inject({SimulatedFault::Kind::unplug, 10500us, 100ms});

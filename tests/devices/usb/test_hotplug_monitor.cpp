@@ -45,7 +45,7 @@ class Events {
 
 }  // namespace
 
-TEST_CASE("plugging and unplugging are told, for the node and for the device", "[usb]") {
+TEST_CASE("connection and disconnection are reported for the node and for the device", "[usb]") {
   const auto source = GENERATE(HotplugMonitor::Source::udev, HotplugMonitor::Source::kernel);
   MockMachine machine;
   Events events;
