@@ -9,7 +9,7 @@ namespace {
 
 using namespace test;
 
-/// Steps until it has ended, and half a minute at most.
+/// Steps until homing has ended, at most half a minute.
 HomingState home_pose(PolhemInHand& polhem, DeviceHoming& homing, bool confirming = true) {
   for (int ms = 0; ms < 30000; ++ms) {
     polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
@@ -23,7 +23,7 @@ HomingState home_pose(PolhemInHand& polhem, DeviceHoming& homing, bool confirmin
   return homing.state();
 }
 
-/// How far the device's pose is from the true one: [m] and [rad].
+/// Error of the device's pose: [m] and [rad].
 Eigen::Vector2d error(PolhemInHand& polhem) {
   DeviceSample sample;
   for (int ms = 0; ms < 50; ++ms) {
@@ -36,8 +36,8 @@ Eigen::Vector2d error(PolhemInHand& polhem) {
           sample.X_BH.rotation.angularDistance(polhem.X_BH.rotation)};
 }
 
-/// A count of the coarsest encoder is 2 pi / 1024 rad, one of the arm 0.02 mm or so; the rest and the pose
-/// each are off by half of it, in several joints.
+/// One count of the coarsest encoder is 2 pi / 1024 rad, of the arm about 0.02 mm. The reference and the pose
+/// each have an error of half a count, in several joints.
 constexpr double kResolution_m = 2e-4;
 constexpr double kResolution_rad = 0.02;
 
@@ -52,7 +52,8 @@ TEST_CASE("the reference pose gives the offsets of incremental encoders", "[devi
   CHECK(homing.offsets().size() == 6);
   polhem.target.translation_m += Vector3d(-0.05, 0.03, 0.02);
   for (int ms = 0; ms < 1000; ++ms) polhem.step();
-  polhem.device.recalibrate(apply_calibration(polhem.profile, homing.offsets()));  // the way was no motion
+  polhem.device.recalibrate(
+      apply_calibration(polhem.profile, homing.offsets()));  // the displacement was no motion
   CHECK(error(polhem)[0] < kResolution_m);
   CHECK(error(polhem)[1] < kResolution_rad);
   CHECK(polhem.board.currents_mA() == std::array<int, 3>{});

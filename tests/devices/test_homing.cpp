@@ -19,17 +19,17 @@ namespace {
 
 using namespace test;
 
-/// A device with a handle in a person's hand, 1000 samples a second, and what is wrong with it.
+/// A device in an operator's hand, 1000 samples per second, with optional errors.
 struct Bench {
   explicit Bench(const HomingPlan& plan = {}) : homing(plan) {}
   Bench(const HomingPlan& plan, const PoseOffset& stored) : homing(plan, stored) {}
 
   Homing homing;
-  Pose X_BH;  ///< where the handle truly is
+  Pose X_BH;  ///< true pose of the handle
   std::function<void(DeviceSample&)> spoil = [](DeviceSample&) {};
   TimePoint now{};
   double time_s = 0.0;
-  std::vector<std::string> heard;  ///< what the person was told, each once in a row
+  std::vector<std::string> heard;  ///< instructions received, without consecutive repetitions
 
   const HomingState& state() const { return homing.state(); }
 
@@ -53,7 +53,7 @@ struct Bench {
   void hold(double for_s) {
     for (int i = 0; i < static_cast<int>(1000 * for_s); ++i) tick();
   }
-  /// Along or about an axis, within 0.2 s, or until something else is asked.
+  /// Moves along or about an axis within 0.2 s, or until the instruction changes.
   void move(std::size_t axis, double way) {
     const auto k = static_cast<Eigen::Index>(axis % 3);
     Twist V;
@@ -64,13 +64,13 @@ struct Bench {
       tick(V);
     }
   }
-  /// As the person is told, a bit farther than needed.
+  /// Follows the instruction, slightly farther than needed.
   void obey() {
     if (state().step == HomingStep::moving) return move(state().axis, state().axis < 3 ? 0.03 : 0.35);
     hold(0.05);
     if (state().step == HomingStep::reference && state().progress == 1.0) homing.confirm();
   }
-  /// For as long as there is anything to do, and at most a minute of theirs.
+  /// Follows instructions until homing ends, at most one simulated minute.
   void obey_all() {
     while (time_s < 60.0 && state().step != HomingStep::done && state().step != HomingStep::failed) obey();
   }
@@ -106,10 +106,11 @@ TEST_CASE("a correct device is homed when the operator follows the instructions"
 
 TEST_CASE("the instructions describe the positive directions of the axes", "[homing]") {
   const auto top_goes = [](const Vector3d& axis) {
-    return Vector3d(Eigen::AngleAxisd(0.1, axis) * Vector3d::UnitZ());  // of the handle, x forward, y left
+    return Vector3d(Eigen::AngleAxisd(0.1, axis) *
+                    Vector3d::UnitZ());  // top of the handle, x forward, y left
   };
   CHECK(top_goes(Vector3d::UnitX()).y() < 0);                                      // to the right
-  CHECK(top_goes(Vector3d::UnitY()).x() > 0);                                      // away
+  CHECK(top_goes(Vector3d::UnitY()).x() > 0);                                      // away from the user
   CHECK((Eigen::AngleAxisd(0.1, Vector3d::UnitZ()) * Vector3d::UnitX()).y() > 0);  // its front to the left
 }
 
@@ -121,7 +122,7 @@ TEST_CASE("homing is not done before every axis has moved", "[homing]") {
       (stuck < 3 ? sample.X_BH.translation_m : turn)[static_cast<Eigen::Index>(stuck % 3)] = 0.0;
       sample.X_BH.rotation = rotation_from(turn);
     };
-    // As long as it takes for the stuck one to be asked for, and then some.
+    // Long enough for the request of the stuck axis, and some more.
     for (int i = 0; i < 200; ++i) bench.obey();
     INFO("axis " << stuck);
     CHECK_FALSE(bench.homing.may_arm());
@@ -155,7 +156,7 @@ TEST_CASE("the return to the centre does not count as the next axis", "[homing]"
   bench.hold(0.5);
   bench.move(0, 0.03);
   REQUIRE(bench.state().step == HomingStep::holding_still);
-  for (int i = 0; i < 300; ++i) {  // while the person brings the handle back
+  for (int i = 0; i < 300; ++i) {  // while the operator moves the handle back
     bench.X_BH.translation_m.x() -= 0.0001;
     bench.tick();
   }
@@ -178,7 +179,7 @@ TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
     CHECK(holds(operator_instruction(bench.state()), "Its sign is wrong: look at it in the profile"));
   }
-  Bench mirrored;  // a quaternion with its y of the other sign
+  Bench mirrored;  // a quaternion with inverted y
   mirrored.spoil = [](DeviceSample& s) { s.X_BH.rotation.y() *= -1.0; };
   mirrored.obey_all();
   CHECK(mirrored.state().problem == HomingProblem::wrong_direction);
@@ -196,7 +197,7 @@ TEST_CASE("homing detects exchanged axes", "[homing]") {
         "the encoders' plugs.");
   CHECK_FALSE(bench.homing.may_arm());
 
-  Bench turns;  // y and z of the quaternion
+  Bench turns;  // y and z of the quaternion exchanged
   turns.spoil = [](DeviceSample& s) { std::swap(s.X_BH.rotation.y(), s.X_BH.rotation.z()); };
   turns.obey_all();
   CHECK(turns.state().problem == HomingProblem::wrong_axis);
@@ -228,7 +229,7 @@ TEST_CASE("the reference pose gives the offset of the device", "[homing]") {
     Bench bench(plan);
     const PoseOffset off{random.vector<3>(0.02), random.vector<3>(0.1)};
     bench.X_BH = plan.X_BR;
-    bench.spoil = [&](DeviceSample& s) {  // it counts from elsewhere, and its last digit flickers
+    bench.spoil = [&](DeviceSample& s) {  // arbitrary zero, and noise in the last digit
       s.X_BH = {s.X_BH.rotation * rotation_from(off.rotation_rad), s.X_BH.translation_m + off.position_m};
       s.X_BH.translation_m += random.vector<3>(2e-5);
     };
@@ -251,14 +252,14 @@ TEST_CASE("the reference pose must be confirmed, still and within the maximum of
   bench.X_BH = plan.X_BR;
   bench.X_BH.translation_m.x() += 0.2;
   bench.hold(5.0);
-  CHECK(bench.state().step == HomingStep::reference);  // lying still is not enough
+  CHECK(bench.state().step == HomingStep::reference);  // stillness alone is not enough
   CHECK(operator_instruction(bench.state()) ==
         "Put the handle into its reference pose, release it, and confirm.");
 
   std::uint32_t buttons = 0x3;
   bench.spoil = [&](DeviceSample& s) { s.buttons = buttons; };
   bench.hold(0.1);
-  CHECK(bench.state().problem == HomingProblem::none);  // other buttons say nothing
+  CHECK(bench.state().problem == HomingProblem::none);  // other buttons have no effect
   buttons = 0x4;
   bench.hold(0.1);
   buttons = 0;
@@ -312,7 +313,7 @@ TEST_CASE("an offset survives conversion to the calibration store and back", "[h
   REQUIRE(read);
   CHECK(read->position_m == offset.position_m);
   CHECK(read->rotation_rad == offset.rotation_rad);
-  CHECK_FALSE(pose_offset({{"joint_1", 0.5}}));  // of a device that is calibrated otherwise
+  CHECK_FALSE(pose_offset({{"joint_1", 0.5}}));  // calibration of a device with joints
 
   RandomValues random(12);
   for (int i = 0; i < 100; ++i) {
@@ -348,7 +349,7 @@ TEST_CASE("a pose outside the workspace fails homing", "[homing]") {
     CHECK(bench.state().axis == bad.axis);
     bench.X_BH = {};
     bench.hold(1.0);
-    CHECK(bench.state().step == HomingStep::failed);  // until somebody has looked at it
+    CHECK(bench.state().step == HomingStep::failed);  // until the operator restarts it
     bench.homing.restart();
     bench.X_BH.translation_m.z() = 0.1;
     bench.obey_all();
@@ -386,7 +387,7 @@ TEST_CASE("a fault pauses the step, and a lost device restarts homing", "[homing
   fault = Fault::none;
   bench.obey_all();
   CHECK(bench.homing.may_arm());
-  fault = Fault::overspeed;  // what follows of that is the servo loop's matter
+  fault = Fault::overspeed;  // the servo loop handles the consequences
   bench.tick();
   CHECK(bench.homing.may_arm());
   fault = Fault::device_lost;
@@ -394,8 +395,7 @@ TEST_CASE("a fault pauses the step, and a lost device restarts homing", "[homing
   CHECK_FALSE(bench.homing.may_arm());
 }
 
-/// The simulated device, its reports and all, in a hand that does what homing asks for, one thing after the
-/// other.
+/// The simulated device with its reports, in a hand that performs all motions that homing requests, in order.
 struct SimulatedBench {
   explicit SimulatedBench(const DeviceProfile& profile)
       : simulation(reference_profile(), obedient_hand()),
@@ -411,12 +411,12 @@ struct SimulatedBench {
     Waypoint at;
     s.hand_path = {at};
     for (Eigen::Index axis = 0; axis < 6; ++axis) {
-      at.time_s += 1.0;  // long enough to be seen holding still
+      at.time_s += 1.0;  // long enough to count as still
       s.hand_path.push_back(at);
       at.time_s += 0.8;
       (axis < 3 ? at.position_m : at.rotation_vector_rad)[axis % 3] += axis < 3 ? 0.03 : 0.35;
       s.hand_path.push_back(at);
-      at.time_s += 0.8;  // and back, so that turns are about one axis at a time
+      at.time_s += 0.8;  // and back, so that only one axis rotates at a time
       (axis < 3 ? at.position_m : at.rotation_vector_rad)[axis % 3] = 0.0;
       s.hand_path.push_back(at);
     }
@@ -453,7 +453,7 @@ TEST_CASE("the simulated device is homed through its reports, and a wrong profil
   SimulatedBench mirrored(profile);
   mirrored.run();
   CHECK(mirrored.homing.state().step == HomingStep::failed);
-  CHECK(mirrored.homing.state().axis == 0);  // x went the wrong way; this hand does not try again
+  CHECK(mirrored.homing.state().axis == 0);  // x moved in the wrong direction; this hand does not repeat it
 }
 
 TEST_CASE("homing ignores samples that are not fresh", "[homing]") {
@@ -514,7 +514,7 @@ TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
     sample.X_BH = random.pose(0.1);
     if (random.chance(0.01)) sample.X_BH.translation_m.x() = std::numeric_limits<double>::quiet_NaN();
     sample.V_BH = random.velocity();
-    sample.device_time_s = random.normal();  // even a clock that jumps
+    sample.device_time_s = random.normal();  // the clock may jump too
     sample.fresh = random.chance(0.9);
     sample.buttons = static_cast<std::uint32_t>(random.bits() & 1U);
     if (random.chance(0.001)) sample.fault = static_cast<Fault>(random.integer(0, 8));
@@ -526,7 +526,7 @@ TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
     armed += homing.may_arm();
   }
   CHECK(forbidden == 0);
-  CHECK(armed == 0);  // noise is no hand
+  CHECK(armed == 0);  // noise is no motion of the hand
 }
 
 }  // namespace

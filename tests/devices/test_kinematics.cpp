@@ -24,7 +24,7 @@ double distance(const Pose& a, const Pose& b) {
   return std::max((a.translation_m - b.translation_m).norm(), a.rotation.angularDistance(b.rotation));
 }
 
-/// Joint angles all over the workspace, the arm bent the way it is built.
+/// Joint angles throughout the workspace, with the elbow of the real device.
 struct Angles {
   std::mt19937_64 random{7};
 
@@ -33,7 +33,7 @@ struct Angles {
   }
   JointAngles arm() {
     const double tB = between(-0.6, 0.8);
-    // With body c folded onto b the arm is straight, and both elbows are one: keep 0.3 rad away from both
+    // With body c folded onto b the arm is straight and both elbows coincide: keep 0.3 rad away from both
     // ends.
     return {between(-1.0, 1.0), tB, between(0.9, 2.2), between(-1.5, 1.5), between(0.3, 1.3),
             between(-2.0, 2.0)};
@@ -151,20 +151,20 @@ TEST_CASE("one factor scales all efforts, so the force keeps its direction", "[k
 }
 
 TEST_CASE("the kinematics gives the positions stated in the sources", "[kinematics]") {
-  // haptikfabrikenapi, polhem_v1: at its calibration counts body b stands upright and body c level.
+  // haptikfabrikenapi, polhem_v1: at its calibration counts body b is upright and body c is level.
   const Pose polhem = *home_pose(kPolhem);
   CHECK(polhem.translation_m.isApprox(Vector3d(0.133 - 0.140, 0.0, 0.058 + 0.174 - 0.100), 1e-12));
   CHECK(polhem.rotation.angularDistance(Quaterniond::Identity()) < 1e-7);
   CHECK(home_pose(kWood)->translation_m.isApprox(Vector3d(0.245 - 0.220, 0.0, 0.080 + 0.205 - 0.080), 1e-12));
 
-  // A quarter turn of body a: 2000 counts a turn, capstan 10 mm on 180 mm, so 18 motor turns a turn.
+  // A quarter turn of body a: 2000 counts per turn, capstan 10 mm on 180 mm, so 18 motor turns per turn.
   JointCounts counts = kPolhem.home_counts;
   counts[0] = -9000;
   const JointAngles t = joint_angles(kPolhem, counts);
   CHECK(t[0] == Approx(std::numbers::pi / 2));
   CHECK(forward_kinematics(kPolhem, t, {})->translation_m.isApprox(Vector3d(-0.140, 0.133, 0.132), 1e-12));
 
-  // libnifalcon: 35 degrees at count 0, and 360/1280 * 14.25/110 degrees a count.
+  // libnifalcon: 35 degrees at count 0, and 360/1280 * 14.25/110 degrees per count.
   CHECK(joint_angles(kFalcon, {0, 100, -100})[0] == Approx(35 * std::numbers::pi / 180));
   CHECK(joint_angles(kFalcon, {0, 100, -100})[1] ==
         Approx((35 + 100 * 360.0 / 1280 * 14.25 / 110) * std::numbers::pi / 180));

@@ -18,14 +18,14 @@ ReportDescriptor parsed(const Bytes& bytes) {
   return parse_report_descriptor(bytes);
 }
 
-/// The descriptor that devices/README.md gives to makers.
+/// The descriptor in devices/README.md.
 const std::string kReference =
     "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0";
 ReportDescriptor reference_device() {
   return parsed(from_hex(kReference));
 }
 
-/// Six axes as a profile of a SpaceMouse would have them, with what is to be wrong.
+/// Six axes as in a SpaceMouse profile, with the differences of the test.
 ExpectedReport combined(std::vector<ExpectedField> fields, std::size_t length = 13) {
   return {ReportKind::input, 1, length, std::move(fields)};
 }
@@ -87,7 +87,7 @@ TEST_CASE("a button mask consists of single bits and trailing padding", "[layout
   CHECK_FALSE(agrees(16, 8));
   CHECK_FALSE(agrees(8, 17));
 
-  // Two axes of a byte each are two values, not one of two bytes.
+  // Two axes of one byte each are two values, not one of two bytes.
   const ReportDescriptor mouse =
       parsed(from_hex("05 01 09 02 a1 01 15 81 25 7f 75 08 95 02 09 30 09 31 81 06 c0"));
   CHECK(find_differences(mouse, {{ReportKind::input, {}, 2, {{"axis", 0, 8, 2, true}}}}).empty());
@@ -141,7 +141,7 @@ TEST_CASE("a report may have its minimum length, and an optional report may be a
   CHECK(find_differences(device, {report}) == LineReader{});
   report.min_length = 4;
   CHECK(find_differences(device, {report}).size() == 2);
-  const ExpectedField axis{"axis", 8, 16, 6, false};  // what is there has to agree as ever
+  const ExpectedField axis{"axis", 8, 16, 6, false};  // an axis that is present must agree
   CHECK(find_differences(device, {{ReportKind::input, 1, 13, {axis}, 7, false}}).size() == 1);
 
   report.id = 0x17;
@@ -171,7 +171,7 @@ TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layo
   CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == LineReader{});
   CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == LineReader{});
   CHECK(differ("polhem.toml", teensy_rawhid()) == LineReader{});
-  // Buttons of two bytes where the profile takes up to six, no battery, and a battery where there is one.
+  // Two bytes of buttons although the profile permits six, no battery, and a battery on another model.
   CHECK(differ("spacemouse_split.toml", space_navigator()) == LineReader{});
   CHECK(differ("spacemouse_split.toml", home_made_split()) == LineReader{});
   CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == LineReader{});

@@ -12,7 +12,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-/// A wild way, with steps of many lengths.
+/// An irregular trajectory with different time steps.
 std::vector<TimedPose> wild_way() {
   RandomValues random(4);
   std::vector<TimedPose> poses;
@@ -35,7 +35,7 @@ TEST_CASE("a pose spline passes through its poses at their times", "[pose_spline
   const PoseSpline track(poses);
   for (const TimedPose& pose : poses) {
     const Pose X = track.at(from_seconds(pose.time_s)).X_BG;
-    CHECK((X.translation_m - pose.X.translation_m).norm() < 1e-7);  // a nanosecond of the fastest step
+    CHECK((X.translation_m - pose.X.translation_m).norm() < 1e-7);  // one nanosecond at the highest speed
     CHECK(X.rotation.angularDistance(pose.X.rotation) < 1e-6);
   }
   CHECK(same_bits(track.at(from_seconds(1e6)).X_BG, poses.back().X));

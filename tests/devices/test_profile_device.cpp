@@ -21,7 +21,7 @@ namespace {
 
 const DeviceProfile kProfile = reference_profile();
 
-/// A link whose far side is a list: what is queued is read, what is written is kept.
+/// Link with scripted reports: reads return queued reports, writes are recorded.
 class ScriptedLink final : public ReportLink {
  public:
   void open() override { ++opened; }
@@ -47,19 +47,19 @@ class ScriptedLink final : public ReportLink {
   int opened = 0, closed = 0;
 };
 
-/// A device on a scripted link that has opened it, and a far side that counts as a good firmware does.
+/// A device opened on a scripted link. The far end counts like a correct firmware.
 struct Bench {
   ScriptedLink link;
   ProfileDevice device{kProfile, link};
-  PoseReport report;  ///< what push() sends next; its counters are at the start of the last millisecond
+  PoseReport report;  ///< next report of push(); its counters are those at the start of the last millisecond
   TimePoint now{};
 
   Bench() {
     device.open();
-    device.read_newest(now);  // the first read only empties the link
+    device.read_newest(now);  // the first read only discards waiting reports
   }
 
-  /// One more millisecond and the report at its end.
+  /// Advances one millisecond and sends a report at its end.
   void push() {
     now += 1ms;
     ++report.sequence;
@@ -400,7 +400,7 @@ TEST_CASE("motion just within the speeds is no fault") {
 
 TEST_CASE("acknowledged is the last command that the device accepted") {
   Bench bench;
-  bench.report.acknowledged = 57;  // of a session before ours
+  bench.report.acknowledged = 57;  // of a previous session
   CHECK(bench.step().acknowledged == 0);
   for (std::uint64_t sent = 1; sent <= 1000; ++sent) {
     bench.device.write(bench.now, {}, true);

@@ -45,7 +45,7 @@ TEST_CASE("a HID device has its ids, strings, usage and input reports", "[inspec
   CHECK(in_reports(space_navigator()) == Reports{{1, 7}, {2, 7}, {3, 3}});
   CHECK(in_reports(space_mouse_wireless()) == Reports{{1, 13}, {3, 3}, {0x17, 3}});
   CHECK(in_reports(home_made_combined()) == Reports{{1, 13}, {3, 5}});
-  CHECK(in_reports(teensy_rawhid()) == Reports{{0, 64}});  // no ids
+  CHECK(in_reports(teensy_rawhid()) == Reports{{0, 64}});  // no report ids
 }
 
 TEST_CASE("a device that is not HID has no usage, without an error", "[inspected_device]") {

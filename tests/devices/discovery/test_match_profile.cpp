@@ -31,7 +31,7 @@ DeviceIdentity plugged(int vendor, int product, std::uint16_t page = 0x01, std::
   return device;
 }
 
-/// The name of the matching profile, or why there is none.
+/// Returns the name of the matching profile, or the reason if there is none.
 std::string matched(const DeviceIdentity& device, std::string_view named = {}) {
   const MatchResult result = match_profile(device, kProfiles, named);
   REQUIRE(result.rejections.size() == kProfiles.size());
@@ -63,7 +63,7 @@ TEST_CASE("each device of the table matches its profile", "[match_profile]") {
 
 TEST_CASE("the report descriptor decides between split and combined, not the id", "[match_profile]") {
   DeviceIdentity by_hand =
-      plugged(0x046d, 0xc62b);  // passes for a SpaceMouse Pro, speaks the combined format
+      plugged(0x046d, 0xc62b);  // has the id of a SpaceMouse Pro but uses the combined format
   by_hand.input_reports = {{1, 13}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_combined");
   CHECK(why_not(by_hand, "spacemouse_split") ==
@@ -116,12 +116,12 @@ TEST_CASE("a profile with shared ids is used only if the configuration names it"
 
 TEST_CASE("a libusb profile matches one interface of a device", "[match_profile]") {
   DeviceIdentity falcon = plugged(0x0403, 0xcb48);
-  CHECK(matched(falcon) == "falcon");  // as far as is known
+  CHECK(matched(falcon) == "falcon");  // as far as it is known
   falcon.interface = 0;
   CHECK(matched(falcon) == "falcon");
   falcon.interface = 1;
   CHECK_THAT(why_not(falcon, "falcon"), Contains("speaks over interface 0") && Contains("this is 1"));
-  DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are told apart by usage
+  DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are distinguished by usage
   polhem.interface = 3;
   CHECK(matched(polhem) == "polhem");
 }

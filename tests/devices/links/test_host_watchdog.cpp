@@ -37,7 +37,7 @@ WrenchReport push(std::uint64_t sequence) {
   return report;
 }
 
-/// A writer that has heard that, at kStart.
+/// A watchdog that received a report at kStart.
 struct Said {
   DeviceProfile profile;
   HostWatchdog word;
@@ -64,7 +64,7 @@ TEST_CASE("if the loop hangs after a nonzero wrench, the watchdog sends zero wit
     CHECK(report.F.torque_Nm.isZero(0.0));
     CHECK_FALSE(report.enable);
     CHECK(report.hold_time_s == Approx(0.008));
-    CHECK(report.sequence == ((65534 + n) & 0xffff));  // a device takes no number twice
+    CHECK(report.sequence == ((65534 + n) & 0xffff));  // a device accepts no sequence twice
     CHECK(decode(said.profile.wrench_report, said.packet.report()).outcome == Decoding::ok);
   }
   CHECK(said.word.due() == TimePoint::max());
@@ -80,7 +80,7 @@ TEST_CASE("the watchdog does not interrupt a running loop", "[host_watchdog]") {
     said.word.feed(now, packet_of(said.profile, push(n)));
   }
   CHECK(said.speaks(now + kAfter));
-  // One that comes back is heard again, and spoken for again.
+  // After the loop resumes, the watchdog is armed again.
   said.word.feed(now + 1s, packet_of(said.profile, push(7)));
   CHECK_FALSE(said.speaks(now + 1s));
   REQUIRE(said.speaks(now + 1s + kAfter));
@@ -88,7 +88,7 @@ TEST_CASE("the watchdog does not interrupt a running loop", "[host_watchdog]") {
 }
 
 TEST_CASE("the watchdog ignores silence after a zero wrench", "[host_watchdog]") {
-  // The self-test wants to see the watchdog trip: motors on, zero wrench, and then nothing.
+  // The self-test of the device's watchdog: motors on, zero wrench, then silence.
   const DeviceProfile profile = shipped("loopback");
   WrenchReport rest = push(1);
   rest.F = {};

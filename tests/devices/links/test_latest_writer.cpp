@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A device that takes reports only while its gate is open, and keeps a writer waiting otherwise.
+/// A device that accepts reports only while its gate is open; otherwise the write blocks.
 class Gate {
  public:
   LinkStatus write(std::span<const std::uint8_t> report) {
@@ -61,7 +61,7 @@ class Gate {
   bool open_ = true;
 };
 
-/// A writer at a gate. The gate outlives a writer that is left alone with it.
+/// A writer at a gate. The gate outlives a detached writer.
 struct Bench {
   std::shared_ptr<Gate> gate = std::make_shared<Gate>();
   LatestWriter writer;
@@ -110,7 +110,7 @@ TEST_CASE("on every close the last submitted report is the last one written", "[
     {
       LatestWriter writer([gate](auto report) { return gate->write(report); }, {.close_timeout = 1h});
       for (std::uint8_t n = 1; n <= 20; ++n) writer.submit(TimePoint{1h}, std::array{n});
-      writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{0});  // the zeros
+      writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{0});  // the zeros of a release
     }
     REQUIRE_FALSE(gate->taken().empty());
     REQUIRE(gate->taken().back() == 0);

@@ -25,7 +25,7 @@ namespace {
 
 const SearchPath kShipped({WRENCHD_SOURCE_DIR "/config"});
 
-/// Every shipped profile, so that none can be forgotten.
+/// All shipped profiles, read from the folder.
 std::vector<DeviceProfile> all_shipped() {
   std::vector<DeviceProfile> profiles;
   for (const auto& file : profile_files(kShipped)) profiles.push_back(load_profile(file, kShipped));
@@ -36,7 +36,7 @@ DeviceProfile shipped(const std::string& name) {
   return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml", kShipped);
 }
 
-/// No delays, no quanta but those of the protocols: what is left is a device's own resolution.
+/// No delays and no quanta except those of the protocol: the resolution of the device remains.
 SimulationSettings exact(std::vector<Waypoint> hand_path) {
   SimulationSettings s;
   s.hand_path = std::move(hand_path);
@@ -77,7 +77,7 @@ struct Session {
       Duration time, const std::function<void()>& each = [] {}) {
     for (const TimePoint end = clock.now() + time; clock.now() < end; each()) step();
   }
-  /// Until the device tells poses, and the hand rests.
+  /// Runs until the device sends poses and the hand rests.
   void settle() {
     open();
     run(2s);
@@ -93,13 +93,13 @@ struct Session {
   Fault written = Fault::none;
 };
 
-/// What half a count of each encoder can move the pose by.
+/// Change of the pose by half a count of each encoder.
 struct Resolution {
   double m = 1e-6;
   double rad = 1e-6;
 };
 
-/// What rounding to the steps of the report's own fields does.
+/// Change of the pose by rounding to the steps of the report fields.
 Resolution resolution_of_fields(const DeviceProfile& profile) {
   const PoseReportLayout& report = profile.pose_report;
   Resolution resolution;
@@ -127,7 +127,7 @@ Resolution resolution_at(const DeviceProfile& profile, const Pose& X_BH) {
   return sum;
 }
 
-/// The pose of the nearest counts.
+/// Pose of the nearest counts.
 Pose on_counts(const DeviceProfile& profile, const Pose& X_BH) {
   const Kinematics& k = profile.kinematics;
   if (k.kind == Kinematics::Kind::none) return X_BH;
@@ -177,10 +177,10 @@ TEST_CASE("the pose follows the motion of the hand, for every shipped profile", 
       least_x = std::min(least_x, told.translation_m.x());
       most_x = std::max(most_x, told.translation_m.x());
     });
-    // A Falcon that is not homed yet tells nothing.
+    // A Falcon sends no valid pose before it is homed.
     CHECK(compared >= 5.3 / seconds(s.period));
     CHECK(most_x - least_x > 0.025);
-    // And the hand has come to where it wanted to be: a free handle follows it, and so does a steered tool.
+    // The hand has reached its goal: a free handle and a steered tool follow it.
     const HandTarget target = s.link->device().hand_target();
     CHECK(apart_m(s.sample.X_BH, target.X_BG) < 3e-4);
     if (senses_turns(profile)) CHECK(apart_rad(s.sample.X_BH, target.X_BG) < 0.012);
@@ -208,7 +208,7 @@ TEST_CASE("a wrench arrives as force on the simulated handle, for every shipped 
       CHECK(s.sample.dropped_dofs == kAllDofs);
       continue;
     }
-    // Efforts are counts too: a milliampere, or a count of 4096.
+    // Efforts are counts too: 1 mA, or one of 4096.
     const double resolution_N = driven == kAllDofs ? 1e-3 : 0.02;
     CHECK((felt.force_N - F.force_N).norm() < resolution_N);
     CHECK((moved - F.force_N / settings.hand_stiffness_N_per_m).norm() <
@@ -284,7 +284,7 @@ TEST_CASE("transport faults appear on every shipped profile as on the simulated 
     Fault fault = Fault::none, written = Fault::none;
     s.run(500ms, [&] {
       rejected += s.sample.rejected;
-      fresh += s.sample.fresh && !is_cap(profile) ? 1 : 0;  // that of a cap goes on between reports
+      fresh += s.sample.fresh && !is_cap(profile) ? 1 : 0;  // the pose of a puck continues between reports
       if (fault == Fault::none) fault = s.sample.fault;
       if (written == Fault::none) written = s.written;
     });
@@ -297,12 +297,12 @@ TEST_CASE("transport faults appear on every shipped profile as on the simulated 
         break;
       case Kind::silence:
         CHECK(fault == Fault::sample_stale);
-        CHECK(fresh * seconds(s.period) <= 0.001);  // before it began
+        CHECK(fresh * seconds(s.period) <= 0.001);  // before the fault begins
         break;
-      case Kind::freeze:  // without a sequence nobody can tell
+      case Kind::freeze:  // not detectable without a sequence
         CHECK((rejected > 400) == report.sequence.present);
         break;
-      case Kind::corrupt:  // nor without a checksum
+      case Kind::corrupt:  // not detectable without a checksum
         CHECK((rejected > 400) == (report.checksum != Checksum::none));
         break;
       case Kind::short_report:
@@ -314,7 +314,7 @@ TEST_CASE("transport faults appear on every shipped profile as on the simulated 
       default:
         FAIL();
     }
-    s.run(3s);  // and it is over
+    s.run(3s);  // the fault is over
     if (kind != Kind::unplug) {
       CHECK(s.sample.fault == Fault::none);
       continue;
@@ -435,7 +435,7 @@ TEST_CASE("in position mode the hand holds the puck at the goal of the tool", "[
   s.open();
   s.run(3s);
   const Pose target = s.link->device().hand_target().X_BG;
-  CHECK(apart_m(s.sample.X_BH, target) < 71.0 * 4e-6);  // counts of it
+  CHECK(apart_m(s.sample.X_BH, target) < 71.0 * 4e-6);  // one count of the translation
   CHECK(apart_rad(s.sample.X_BH, target) < 11.4 * 2.5e-4);
 }
 

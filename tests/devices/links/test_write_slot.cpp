@@ -49,7 +49,7 @@ TEST_CASE("an endless write is reported after the deadline, independent of furth
     CHECK(slot.submit(kStart + n * 1ms, report(n)) == (n > 4 ? LinkStatus::not_ready : LinkStatus::ok));
   CHECK(slot.overdue(kStart + 11ms));
 
-  slot.complete(LinkStatus::ok);  // at last: what is written next is the newest
+  slot.complete(LinkStatus::ok);  // the stuck write ends; the newest report is next
   CHECK(slot.submit(kStart + 12ms, report(12)) == LinkStatus::ok);
   REQUIRE(slot.take(packet));
   CHECK(number_in(packet) == 12);

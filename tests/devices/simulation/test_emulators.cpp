@@ -27,7 +27,7 @@ DeviceProfile shipped(const std::string& name) {
   return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml");
 }
 
-/// A shipped profile's device on its emulator, opened and read once.
+/// The device of a shipped profile on its emulator, opened and read once.
 template <class Emulator>
 struct Bench {
   template <class... Args>
@@ -39,7 +39,7 @@ struct Bench {
     sample = device.read_newest(clock.now());
   }
   void pass(Duration time) { clock.sleep_until(clock.now() + time); }
-  /// Reads, then writes, once a millisecond.
+  /// Reads, then writes, once per millisecond.
   void step(const Wrench& F = {}, bool motors_on = false) {
     pass(1ms);
     sample = device.read_newest(clock.now());
@@ -96,12 +96,12 @@ TEST_CASE("the deflection of the puck moves the tool, in both formats", "[emulat
     bench.steps(1000);
     const Vector3d way = bench.sample.X_BH.translation_m - start;
     const double firmness = std::pow((pushed_m.norm() / 1.4e-3 - 0.08) / 0.92, 2.0);
-    const Vector3d expected = 71.0 * 1.4e-3 * firmness * pushed_m.normalized();  // one second
+    const Vector3d expected = 71.0 * 1.4e-3 * firmness * pushed_m.normalized();  // after one second
     INFO(name << ": " << way.transpose() << " is not " << expected.transpose());
     CHECK((way - expected).norm() < 1e-6);
     CHECK(bench.sample.X_BH.rotation.angularDistance(Quaterniond::Identity()) < 1e-9);
 
-    bench.emulator.set_deflection({0, 0, 0, 0, 0, -200});  // about z down: the other way about z up
+    bench.emulator.set_deflection({0, 0, 0, 0, 0, -200});  // about z down: the opposite rotation about z up
     bench.steps(40);
     const Quaterniond before = bench.sample.X_BH.rotation;
     bench.steps(500);
@@ -132,7 +132,8 @@ TEST_CASE("the buttons of the puck recentre the pose and reduce its speed", "[em
   bench.emulator.set_buttons(1);
   bench.steps(20);
   CHECK(same_bits(bench.sample.X_BH, {}));
-  bench.emulator.set_deflection({0, -350, 0, 0, 0, 0});  // pressed as it is, the pose goes on from there
+  bench.emulator.set_deflection(
+      {0, -350, 0, 0, 0, 0});  // with the button held, the pose continues from there
   bench.steps(500);
   CHECK(bench.sample.X_BH.translation_m.x() > 0.02);
 }
@@ -158,7 +159,7 @@ TEST_CASE("a SpaceMouse that stops sending while deflected stops the tool, with 
   bench.emulator.set_deflection({100, 0, 0, 0, 0, 0});
   bench.steps(100);
   REQUIRE_FALSE(bench.sample.V_BH.linear_m_per_s.isZero());
-  bench.emulator.stop_sending();  // its battery, or the radio
+  bench.emulator.stop_sending();  // battery or radio failure
   int faults = 0;
   for (int i = 0; i < 1000; ++i) {
     bench.step();
@@ -190,7 +191,7 @@ TEST_CASE("a wrench for a device without motors is dropped and reported", "[emul
   bench.step({{1, 0, 0}, {0, 0, 0.1}}, true);
   CHECK(bench.last_write == Fault::none);
   bench.step();
-  CHECK(dof_text(bench.sample.dropped_dofs) == "x rz");  // of the write before
+  CHECK(dof_text(bench.sample.dropped_dofs) == "x rz");  // of the previous write
   bench.step();
   CHECK(bench.sample.dropped_dofs == kNoDof);
 }
@@ -209,7 +210,7 @@ TEST_CASE("encoder counts give the pose of the manufacturer's formulas", "[emula
     bench.steps(5);
     std::array<int, 6> counts = {0, 0, -5000, 0, 0, 0};
     for (int i = 0; i < 2000; ++i) {
-      for (int j = 0; j < 3; ++j) {  // slow enough for a hand
+      for (int j = 0; j < 3; ++j) {  // within the speed limits
         auto& base = counts[static_cast<std::size_t>(j)];
         base = std::clamp(base + between(-20, 20), j == 2 ? -6500 : -1500, j == 2 ? -3500 : 1500);
         auto& wrist = counts[static_cast<std::size_t>(j + 3)];
@@ -260,7 +261,7 @@ TEST_CASE("a Polhem answers commands only, and wrenchd sends the first one", "[e
   CHECK(bench.emulator.reports_sent() == 1);
   bench.open();  // the first read sends zeros
   CHECK(bench.emulator.reports_sent() == 1);
-  for (int i = 0; i < 30; ++i) {  // only reading: one report for each time wrenchd had to speak again
+  for (int i = 0; i < 30; ++i) {  // reading only: one report per prompt of wrenchd
     bench.pass(1ms);
     bench.sample = bench.device.read_newest(bench.clock.now());
     REQUIRE(bench.sample.fault == Fault::none);
@@ -303,7 +304,7 @@ TEST_CASE("a Polhem's amplifiers are off half a second after the last report, an
 
 TEST_CASE("the profile's calibration sets the counters to home", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
-  bench.emulator.set_encoder_counts({12, 34, 56, 7, 8, 9});  // powered on at home, counters anywhere
+  bench.emulator.set_encoder_counts({12, 34, 56, 7, 8, 9});  // powered on at home, with arbitrary counters
   bench.emulator.press_calibration_button();
   bench.link.open();
   CHECK(bench.link.write(bench.clock.now(), bench.profile.calibration.bytes) == LinkStatus::ok);
@@ -361,7 +362,7 @@ TEST_CASE("a Falcon can be opened in every state, and firmware is loaded only if
   falcon.write(std::vector<std::uint8_t>{'<', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'B',
                                          'A', '>'});
   falcon.perform_homing();
-  falcon_open(falcon, "");  // it runs one, and knows where it is
+  falcon_open(falcon, "");  // a firmware runs and is homed
   CHECK(falcon.homed());
   CHECK(falcon.firmware().size() == 700);
   CHECK(falcon.efforts() == std::array<int, 3>{});
@@ -423,8 +424,7 @@ TEST_CASE("the pose of a Falcon follows its handle, and undriven components are 
     bench.steps(2);
     REQUIRE(bench.sample.fault == Fault::none);
     REQUIRE(bench.sample.buttons == (static_cast<unsigned>(i / 10) & 0xfu));
-    // Back to the device's axes, and through the equation that ties each leg's angle to the place of the
-    // handle.
+    // Back to the device's axes, and through the constraint between each leg's angle and the handle position.
     const Vector3d b = bench.sample.X_BH.translation_m;
     const Vector3d p(-b.y(), b.z(), 0.1346 - b.x());
     for (int leg = 0; leg < 3; ++leg) {

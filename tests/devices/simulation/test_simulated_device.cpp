@@ -19,7 +19,7 @@ namespace {
 
 using Kind = SimulatedFault::Kind;
 
-/// A hand that goes down, turns and comes back in two seconds.
+/// A hand that moves down, rotates and returns within two seconds.
 SimulationSettings moving_hand() {
   SimulationSettings s;
   s.hand_path = {{0.0, {0.0, 0.0, 0.05}, {0, 0, 0}},
@@ -44,12 +44,12 @@ SimulationSettings nobody() {
   return s;
 }
 
-/// The whole stack on virtual time.
+/// The whole stack in virtual time.
 struct Rig {
   explicit Rig(const SimulationSettings& settings, const DeviceProfile& profile = reference_profile())
       : simulation(profile, settings), link(simulation, clock, settings), device(profile, link) {
     device.open();
-    device.read_newest(clock.now());  // the first read only empties the link
+    device.read_newest(clock.now());  // the first read only discards waiting reports
   }
   DeviceSample read_after(Duration wait) {
     clock.sleep_until(clock.now() + wait);
@@ -63,7 +63,7 @@ struct Rig {
   ProfileDevice device;
 };
 
-/// Keeps every report with its time.
+/// Stores each report with its time.
 struct Listener final : ReportSink {
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override {
     times.push_back(sent);
@@ -500,7 +500,7 @@ TEST_CASE("a gap of more than a second is skipped, and the watchdog has tripped"
 TEST_CASE("each injected fault appears as such for its duration") {
   struct Case {
     Kind kind;
-    Fault fault;  ///< while it lasts
+    Fault fault;  ///< the fault raised while it is active
     std::uint32_t rejected;
   };
   for (const Case& c :
@@ -559,7 +559,7 @@ TEST_CASE("an unplugged device is lost at once, releases the hand, and must be o
     rig.device.release(rig.clock.now());
     if (unplugged > 1ms) CHECK_THROWS_WITH(rig.device.open(), Catch::Contains("unplugged"));
     CHECK(rig.read_after(10ms).fault == Fault::device_lost);
-    rig.link.advance_to(rig.clock.now());  // time passes for the device although nobody listens
+    rig.link.advance_to(rig.clock.now());  // the device continues although the link is closed
     CHECK(rig.simulation.motor_wrench().force_N == Vector3d::Zero());
     CHECK(rig.read_after(50ms).fault == Fault::device_lost);
     rig.device.open();

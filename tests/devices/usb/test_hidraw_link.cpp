@@ -40,7 +40,7 @@ Bytes numbered(std::size_t length, std::uint8_t first) {
   return bytes;
 }
 
-/// What the link reads next, waiting for it.
+/// Waits for the next report of the link and returns it.
 std::pair<LinkRead, Bytes> read_one(ReportLink& link, std::size_t room = 64) {
   Bytes buffer(room);
   link.wait_readable(now() + 1h);
@@ -209,7 +209,7 @@ TEST_CASE("hidraw: a device without a node is rejected with the alternative", "[
 TEST_CASE("hidraw: a profile device reads the pose, and the device receives the wrench", "[usb]") {
   Bench bench;
   DeviceProfile profile = reference_profile();
-  profile.stale_fault_s = 3600.0;  // however slow this machine is
+  profile.stale_fault_s = 3600.0;  // independent of the speed of the machine
   ProfileDevice device(profile, bench.link);
   device.open();
   device.read_newest(now());

@@ -21,7 +21,7 @@ class Events {
     events_.push_back(event);
     changed_.notify_all();
   }
-  /// Waits for it; a test that never hears of it ends by the time limit of all tests.
+  /// Waits for the event; without it the test ends by its time limit.
   HotplugEvent await(HotplugEvent::Kind kind, const std::string& subsystem) {
     std::unique_lock lock(mutex_);
     std::vector<HotplugEvent>::iterator found;
@@ -57,7 +57,7 @@ TEST_CASE("connection and disconnection are reported for the node and for the de
   const HotplugEvent usb = events.await(HotplugEvent::Kind::connected, "usb");
   CHECK(usb.node == "/dev/bus/usb/002/007");
   CHECK(usb.port_path == "2-1.4");
-  CHECK(events.count() == 2);  // not each interface
+  CHECK(events.count() == 2);  // not one per interface
   device.unplug();
   CHECK(events.await(HotplugEvent::Kind::disconnected, "hidraw").node == "/dev/hidraw5");
   CHECK(events.await(HotplugEvent::Kind::disconnected, "usb").port_path == "2-1.4");
