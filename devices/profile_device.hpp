@@ -110,8 +110,8 @@ class ProfileDevice final : public Device {
   bool disconnected_ = false;
 
   bool same_frames_ = true;  ///< true if D = B and E = H
-  std::uint64_t pose_layouts_ =
-      0;  ///< bit mask of the reports that carry a part of the pose; bit 0 is pose_report
+  /// Bit mask of the reports that carry a part of the pose; bit 0 is pose_report.
+  std::uint64_t pose_layouts_ = 0;
   const ReportField* device_time_field_ = nullptr;  ///< device_time field; null if the device has no clock
   const ReportField* acknowledged_field_ = nullptr;
 
@@ -120,11 +120,11 @@ class ProfileDevice final : public Device {
   std::uint64_t layouts_since_open_ = 0;  ///< bit mask of the layouts received since open()
   std::uint64_t layouts_this_read_ = 0;   ///< bit mask of the layouts received in this read
   bool report_received_ = false;          ///< true if a valid report arrived since open()
-  std::optional<TimePoint>
-      silent_since_;                ///< arrival time of the last valid report, or time of the first read
-  std::uint64_t sequence_ = 0;      ///< raw sequence of the last valid report
-  std::uint64_t device_time_ = 0;   ///< raw device time of the last valid report
-  std::uint64_t device_ticks_ = 0;  ///< device time of the last valid report, unwrapped
+  /// Arrival time of the last valid report, or time of the first read.
+  std::optional<TimePoint> silent_since_;
+  std::uint64_t sequence_ = 0;                 ///< raw sequence of the last valid report
+  std::uint64_t device_time_ = 0;              ///< raw device time of the last valid report
+  std::uint64_t device_ticks_ = 0;             ///< device time of the last valid report, unwrapped
   std::optional<std::uint64_t> acknowledged_;  ///< raw acknowledged sequence of the last valid report
   std::optional<Pose> previous_pose_;          ///< last valid pose, also if it jumped
   double previous_pose_time_s_ = 0.0;          ///< device time of previous_pose_

@@ -38,12 +38,10 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   void set_buttons(unsigned buttons) noexcept { buttons_ = buttons & 0x0fu; }
 
   // Faults; the argument is the number of affected packets, blocks or handshakes.
-  void truncate_packets(int packets) noexcept {
-    packets_to_truncate_ = packets;
-  }  ///< truncates packets to 14 bytes
-  void corrupt_firmware_echoes(int blocks) noexcept {
-    echoes_to_corrupt_ = blocks;
-  }  ///< inverts a bit in the echoes of firmware blocks
+  /// Truncates packets to 14 bytes.
+  void truncate_packets(int packets) noexcept { packets_to_truncate_ = packets; }
+  /// Inverts a bit in the echoes of firmware blocks.
+  void corrupt_firmware_echoes(int blocks) noexcept { echoes_to_corrupt_ = blocks; }
   void ignore_handshakes(int times) noexcept { handshakes_to_ignore_ = times; }
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;

@@ -29,7 +29,7 @@ struct Bench {
   std::function<void(DeviceSample&)> spoil = [](DeviceSample&) {};
   TimePoint now{};
   double time_s = 0.0;
-  std::vector<std::string> heard;  ///< instructions received, without consecutive repetitions
+  std::vector<std::string> instructions;  ///< instructions received, without consecutive repetitions
 
   const HomingState& state() const { return homing.state(); }
 
@@ -48,7 +48,7 @@ struct Bench {
     spoil(next);
     homing.advance(next, now);
     const std::string words = operator_instruction(state());
-    if (heard.empty() || heard.back() != words) heard.push_back(words);
+    if (instructions.empty() || instructions.back() != words) instructions.push_back(words);
   }
   void hold(double for_s) {
     for (int i = 0; i < static_cast<int>(1000 * for_s); ++i) tick();
@@ -65,14 +65,15 @@ struct Bench {
     }
   }
   /// Follows the instruction, slightly farther than needed.
-  void obey() {
+  void follow_instruction() {
     if (state().step == HomingStep::moving) return move(state().axis, state().axis < 3 ? 0.03 : 0.35);
     hold(0.05);
     if (state().step == HomingStep::reference && state().progress == 1.0) homing.confirm();
   }
   /// Follows instructions until homing ends, at most one simulated minute.
-  void obey_all() {
-    while (time_s < 60.0 && state().step != HomingStep::done && state().step != HomingStep::failed) obey();
+  void follow_all_instructions() {
+    while (time_s < 60.0 && state().step != HomingStep::done && state().step != HomingStep::failed)
+      follow_instruction();
   }
 };
 
@@ -90,7 +91,7 @@ bool holds(const std::string& text, const std::string& part) {
 TEST_CASE("a correct device is homed when the operator follows the instructions", "[homing]") {
   Bench bench;
   CHECK(operator_instruction(bench.state()) == "Waiting for the device to report.");
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
   const std::vector<std::string> expected = {
       "Hold the handle still.", "Push the handle straight away from you.",
@@ -101,7 +102,7 @@ TEST_CASE("a correct device is homed when the operator follows the instructions"
       "Hold the handle still.", "Turn the handle to the left, counterclockwise as seen from above.",
       "Hold the handle still.", "Homed: the device may be armed.",
   };
-  CHECK(bench.heard == expected);
+  CHECK(bench.instructions == expected);
 }
 
 TEST_CASE("the instructions describe the positive directions of the axes", "[homing]") {
@@ -123,7 +124,7 @@ TEST_CASE("homing is not done before every axis has moved", "[homing]") {
       sample.X_BH.rotation = rotation_from(turn);
     };
     // Long enough for the request of the stuck axis, and some more.
-    for (int i = 0; i < 200; ++i) bench.obey();
+    for (int i = 0; i < 200; ++i) bench.follow_instruction();
     INFO("axis " << stuck);
     CHECK_FALSE(bench.homing.may_arm());
   }
@@ -138,16 +139,17 @@ TEST_CASE("after an operator error homing asks once more", "[homing]") {
   bench.hold(0.5);
   REQUIRE(bench.state().step == HomingStep::moving);
   bench.move(0, -0.03);
-  CHECK(operator_instruction(bench.state()) == "That moved x the other way. Hold the handle still.");
+  CHECK(operator_instruction(bench.state()) ==
+        "That moved x in the opposite direction. Hold the handle still.");
   bench.hold(0.5);
   CHECK(operator_instruction(bench.state()) ==
-        "That moved x the other way. Push the handle straight away from you.");
+        "That moved x in the opposite direction. Push the handle straight away from you.");
   bench.move(0, 0.03);
   bench.hold(0.5);
   REQUIRE(bench.state().axis == 1);
   bench.move(2, 0.03);
   CHECK(operator_instruction(bench.state()) == "That moved z, not y. Hold the handle still.");
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
 }
 
@@ -162,7 +164,7 @@ TEST_CASE("the return to the centre does not count as the next axis", "[homing]"
   }
   CHECK(bench.state().step == HomingStep::holding_still);
   CHECK(bench.state().problem == HomingProblem::none);
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
 }
 
@@ -173,7 +175,7 @@ TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
       s.X_BH.translation_m[axis] *= -1.0;
       s.V_BH.linear_m_per_s[axis] *= -1.0;
     };
-    bench.obey_all();
+    bench.follow_all_instructions();
     CHECK(bench.state().step == HomingStep::failed);
     CHECK(bench.state().problem == HomingProblem::wrong_direction);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
@@ -181,7 +183,7 @@ TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
   }
   Bench mirrored;  // a quaternion with inverted y
   mirrored.spoil = [](DeviceSample& s) { s.X_BH.rotation.y() *= -1.0; };
-  mirrored.obey_all();
+  mirrored.follow_all_instructions();
   CHECK(mirrored.state().problem == HomingProblem::wrong_direction);
   CHECK(mirrored.state().axis == 4);
 }
@@ -189,7 +191,7 @@ TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
 TEST_CASE("homing detects exchanged axes", "[homing]") {
   Bench bench;
   bench.spoil = [](DeviceSample& s) { std::swap(s.X_BH.translation_m.y(), s.X_BH.translation_m.z()); };
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.state().step == HomingStep::failed);
   CHECK(bench.state().problem == HomingProblem::wrong_axis);
   CHECK(operator_instruction(bench.state()) ==
@@ -199,7 +201,7 @@ TEST_CASE("homing detects exchanged axes", "[homing]") {
 
   Bench turns;  // y and z of the quaternion exchanged
   turns.spoil = [](DeviceSample& s) { std::swap(s.X_BH.rotation.y(), s.X_BH.rotation.z()); };
-  turns.obey_all();
+  turns.follow_all_instructions();
   CHECK(turns.state().problem == HomingProblem::wrong_axis);
   CHECK(turns.state().moved_axis == 5);
 }
@@ -211,14 +213,14 @@ TEST_CASE("homing detects a velocity with the wrong sign and accepts a device wi
     bench.spoil = [axis](DeviceSample& s) {
       (axis < 3 ? s.V_BH.linear_m_per_s : s.V_BH.angular_rad_per_s)[axis % 3] *= -1.0;
     };
-    bench.obey_all();
+    bench.follow_all_instructions();
     CHECK(bench.state().step == HomingStep::failed);
     CHECK(bench.state().problem == HomingProblem::velocity_sign_mismatch);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
   }
   Bench silent;
   silent.spoil = [](DeviceSample& s) { s.V_BH = {}; };
-  silent.obey_all();
+  silent.follow_all_instructions();
   CHECK(silent.homing.may_arm());
 }
 
@@ -233,7 +235,7 @@ TEST_CASE("the reference pose gives the offset of the device", "[homing]") {
       s.X_BH = {s.X_BH.rotation * rotation_from(off.rotation_rad), s.X_BH.translation_m + off.position_m};
       s.X_BH.translation_m += random.vector<3>(2e-5);
     };
-    bench.obey_all();
+    bench.follow_all_instructions();
     REQUIRE(bench.homing.may_arm());
     CHECK((bench.homing.offset().position_m - off.position_m).norm() < 1e-5);
     CHECK((bench.homing.offset().rotation_rad - off.rotation_rad).norm() < 1e-9);
@@ -352,7 +354,7 @@ TEST_CASE("a pose outside the workspace fails homing", "[homing]") {
     CHECK(bench.state().step == HomingStep::failed);  // until the operator restarts it
     bench.homing.restart();
     bench.X_BH.translation_m.z() = 0.1;
-    bench.obey_all();
+    bench.follow_all_instructions();
     CHECK(bench.homing.may_arm());
   }
 }
@@ -385,7 +387,7 @@ TEST_CASE("a fault pauses the step, and a lost device restarts homing", "[homing
   bench.tick();
   CHECK(bench.state().step == HomingStep::awaiting_sample);
   fault = Fault::none;
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
   fault = Fault::overspeed;  // the servo loop handles the consequences
   bench.tick();
@@ -467,14 +469,14 @@ TEST_CASE("homing asks only for sensed axes", "[homing]") {
   HomingPlan plan;
   plan.sensed = {true, true, true, false, false, false};
   Bench bench(plan);
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
-  CHECK(bench.heard.size() == 8);
+  CHECK(bench.instructions.size() == 8);
   plan.sensed = {false, false, false, false, false, true};
   Bench turn(plan);
-  turn.obey_all();
+  turn.follow_all_instructions();
   CHECK(turn.homing.may_arm());
-  CHECK(turn.heard.at(1) == "Turn the handle to the left, counterclockwise as seen from above.");
+  CHECK(turn.instructions.at(1) == "Turn the handle to the left, counterclockwise as seen from above.");
 }
 
 TEST_CASE("an invalid homing plan is rejected", "[homing]") {

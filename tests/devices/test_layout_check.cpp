@@ -12,7 +12,7 @@ namespace wrenchd {
 namespace {
 
 using namespace test;
-using LineReader = std::vector<std::string>;
+using Lines = std::vector<std::string>;
 
 ReportDescriptor parsed(const Bytes& bytes) {
   return parse_report_descriptor(bytes);
@@ -35,12 +35,11 @@ TEST_CASE("the reference layout agrees with the descriptor in devices/README.md"
   REQUIRE(expected.size() == 2);
   CHECK(expected[0].fields.size() == 11);
   CHECK(expected[1].fields.size() == 6);
-  CHECK(find_differences(reference_device(), expected) == LineReader{});
+  CHECK(find_differences(reference_device(), expected) == Lines{});
 }
 
 TEST_CASE("a profile for another device differs, one line per difference", "[layout_check]") {
-  const LineReader lines =
-      find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
+  const Lines lines = find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
   REQUIRE(lines.size() == 13);  // no field agrees
   CHECK(lines[0] == "input report 0x01: the profile has 64 bytes, the device 13");
   CHECK(lines[1] ==
@@ -123,13 +122,13 @@ TEST_CASE("report ids without a counterpart are reported", "[layout_check]") {
   const ExpectedReport with{ReportKind::input, 1, 65, {}}, without{ReportKind::input, {}, 64, {}};
   CHECK(find_differences(parsed(teensy_rawhid()), {without}).empty());
   CHECK(find_differences(parsed(teensy_rawhid()), {with}) ==
-        LineReader{"input report 0x01: the device has no such report; its input reports: without an id"});
+        Lines{"input report 0x01: the device has no such report; its input reports: without an id"});
   CHECK(
       find_differences(parsed(space_navigator()), {without}) ==
-      LineReader{
+      Lines{
           "input report without an id: the device has no such report; its input reports: 0x01, 0x02, 0x03"});
   CHECK(find_differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
-        LineReader{"output report without an id: the device has no such report; it has no output report"});
+        Lines{"output report without an id: the device has no such report; it has no output report"});
 }
 
 TEST_CASE("a report may have its minimum length, and an optional report may be absent", "[layout_check]") {
@@ -138,7 +137,7 @@ TEST_CASE("a report may have its minimum length, and an optional report may be a
   ExpectedReport report{ReportKind::input, 3, 7, {buttons}};
   CHECK(find_differences(device, {report}).size() == 2);  // its length, and the field beyond its end
   report.min_length = 3;
-  CHECK(find_differences(device, {report}) == LineReader{});
+  CHECK(find_differences(device, {report}) == Lines{});
   report.min_length = 4;
   CHECK(find_differences(device, {report}).size() == 2);
   const ExpectedField axis{"axis", 8, 16, 6, false};  // an axis that is present must agree
@@ -147,7 +146,7 @@ TEST_CASE("a report may have its minimum length, and an optional report may be a
   report.id = 0x17;
   CHECK(find_differences(device, {report}).size() == 1);
   report.may_be_absent = true;
-  CHECK(find_differences(device, {report}) == LineReader{});
+  CHECK(find_differences(device, {report}) == Lines{});
 }
 
 TEST_CASE("a profile without report ids expects a device without them", "[layout_check]") {
@@ -159,7 +158,7 @@ TEST_CASE("a profile without report ids expects a device without them", "[layout
   CHECK(expected[0].length == 64);
   const ReportDescriptor device =
       parsed(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 40 09 01 81 02 95 20 09 02 91 02 c0"));
-  CHECK(find_differences(device, expected) == LineReader{});
+  CHECK(find_differences(device, expected) == Lines{});
 }
 
 TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layout_check]") {
@@ -168,14 +167,14 @@ TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layo
         parsed(descriptor),
         expected_reports(load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name))));
   };
-  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == LineReader{});
-  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == LineReader{});
-  CHECK(differ("polhem.toml", teensy_rawhid()) == LineReader{});
+  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == Lines{});
+  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == Lines{});
+  CHECK(differ("polhem.toml", teensy_rawhid()) == Lines{});
   // Two bytes of buttons although the profile permits six, no battery, and a battery on another model.
-  CHECK(differ("spacemouse_split.toml", space_navigator()) == LineReader{});
-  CHECK(differ("spacemouse_split.toml", home_made_split()) == LineReader{});
-  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == LineReader{});
-  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == LineReader{});
+  CHECK(differ("spacemouse_split.toml", space_navigator()) == Lines{});
+  CHECK(differ("spacemouse_split.toml", home_made_split()) == Lines{});
+  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == Lines{});
+  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == Lines{});
   CHECK_FALSE(differ("spacemouse_combined.toml", space_navigator()).empty());
   CHECK_FALSE(differ("spacemouse_split.toml", space_mouse_wireless()).empty());
 }

@@ -15,7 +15,7 @@ ReportDescriptor parsed(const std::string& hex) {
 }
 
 /// Returns the error of a descriptor; empty if it is valid.
-std::string rejection_text(const Bytes& bytes) {
+std::string parse_error(const Bytes& bytes) {
   try {
     parse_report_descriptor(bytes);
   } catch (const DescriptorError& error) {
@@ -201,8 +201,8 @@ TEST_CASE("a field without bits and a count of zero declare nothing", "[report_d
 }
 
 TEST_CASE("items of reserved types and tags are skipped, as in Linux", "[report_descriptor]") {
-  CHECK(rejection_text(from_hex(framed("0c 81 02 f9 01"))).empty());
-  CHECK(rejection_text(from_hex(framed("81 02 00 00"))).empty());
+  CHECK(parse_error(from_hex(framed("0c 81 02 f9 01"))).empty());
+  CHECK(parse_error(from_hex(framed("81 02 00 00"))).empty());
 }
 
 TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[report_descriptor]") {
@@ -271,7 +271,7 @@ TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[re
            {framed("81 02") + "a9 01", "byte 21: a delimiter is still open"},
        }) {
     INFO(bad.hex);
-    const std::string message = rejection_text(from_hex(bad.hex));
+    const std::string message = parse_error(from_hex(bad.hex));
     INFO(message);
     CHECK(message.find(bad.message) != std::string::npos);
   }
@@ -279,10 +279,9 @@ TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[re
 
 TEST_CASE("every truncated descriptor is rejected", "[report_descriptor]") {
   for (const Bytes& whole : sample_descriptors()) {
-    REQUIRE(rejection_text(whole).empty());
+    REQUIRE(parse_error(whole).empty());
     for (std::size_t length = 0; length < whole.size(); ++length)
-      CHECK_FALSE(
-          rejection_text({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}).empty());
+      CHECK_FALSE(parse_error({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}).empty());
   }
 }
 

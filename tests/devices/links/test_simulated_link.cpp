@@ -147,7 +147,7 @@ double apart_rad(const Pose& a, const Pose& b) {
 bool senses_turns(const DeviceProfile& profile) {
   return (sensed_dofs(profile) & kAngularDofs) != 0;
 }
-bool is_cap(const DeviceProfile& profile) {
+bool is_puck(const DeviceProfile& profile) {
   return pose_source(profile) == PoseSource::deflection;
 }
 
@@ -284,7 +284,7 @@ TEST_CASE("transport faults appear on every shipped profile as on the simulated 
     Fault fault = Fault::none, written = Fault::none;
     s.run(500ms, [&] {
       rejected += s.sample.rejected;
-      fresh += s.sample.fresh && !is_cap(profile) ? 1 : 0;  // the pose of a puck continues between reports
+      fresh += s.sample.fresh && !is_puck(profile) ? 1 : 0;  // the pose of a puck continues between reports
       if (fault == Fault::none) fault = s.sample.fault;
       if (written == Fault::none) written = s.written;
     });
@@ -337,7 +337,7 @@ TEST_CASE("an injected pose fault appears on devices that send a pose", "[simula
     const bool tells_pose = pose_source(profile) == PoseSource::pose;
     if (!tells_pose)
       CHECK_THROWS_WITH(device.inject({Kind::bad_quaternion, 0s, 1s}), Contains("that could be bad"));
-    if (is_cap(profile)) {
+    if (is_puck(profile)) {
       CHECK_THROWS_WITH(device.inject({Kind::jump, 0s, 1s}), Contains("that could be bad"));
       continue;
     }
@@ -482,13 +482,13 @@ TEST_CASE("a profile without an emulator is rejected with the remedy", "[simulat
   }
   CHECK_THROWS_WITH(make_simulated_link(arm, still(), clock),
                     Contains("my_arm") && Contains("Polhem") && Contains("inherits polhem"));
-  DeviceProfile cap = shipped("spacemouse_split");
-  cap.pose_report.translation.big_endian = true;
-  CHECK_THROWS_WITH(make_simulated_link(cap, still(), clock),
+  DeviceProfile puck = shipped("spacemouse_split");
+  puck.pose_report.translation.big_endian = true;
+  CHECK_THROWS_WITH(make_simulated_link(puck, still(), clock),
                     Contains("spacemouse_split") && Contains("not those of a SpaceMouse"));
-  cap = shipped("spacemouse_split");
-  cap.more_reports.clear();
-  CHECK_THROWS_WITH(make_simulated_link(cap, still(), clock), Contains("do not carry both"));
+  puck = shipped("spacemouse_split");
+  puck.more_reports.clear();
+  CHECK_THROWS_WITH(make_simulated_link(puck, still(), clock), Contains("do not carry both"));
   CHECK_THROWS_WITH(make_simulated_link(shipped("falcon"), exact({}), clock),
                     Contains("at least one waypoint"));
 }
