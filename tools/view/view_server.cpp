@@ -346,11 +346,11 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
     const bool upgrade = websocket::is_upgrade(request_);
     if (!server_.is_ours(request_[http::field::host]) || !from_us || (upgrade && origin == request_.end()))
       return refuse(http::status::forbidden,
-                    "This page is served to browsers that were sent to it by wrenchctl view.\n");
+                    "Only browsers that open the address from wrenchctl view may load this page.\n");
     const auto name = wanted();
     if (!name)
       return refuse(http::status::forbidden,
-                    "The address is not complete: open the one that wrenchctl view printed, all of it.\n");
+                    "The address is incomplete; open the whole address that wrenchctl view printed.\n");
     if (upgrade && *name == "live") {
       stream_.expires_never();
       became_page_ = true;
@@ -358,9 +358,9 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
       return;
     }
     if (request_.method() != http::verb::get && request_.method() != http::verb::head)
-      return refuse(http::status::method_not_allowed, "Only GET is answered here.\n");
+      return refuse(http::status::method_not_allowed, "Only the method GET is supported.\n");
     const PageFiles::File* file = server_.files.find(*name);
-    if (file == nullptr) return refuse(http::status::not_found, "There is no such file.\n");
+    if (file == nullptr) return refuse(http::status::not_found, "The file does not exist.\n");
     respond(http::status::ok, file->type, file->bytes);
   }
 
@@ -403,8 +403,8 @@ ViewServer::Server::Server(std::uint16_t wanted_port, PageFiles page_files) : fi
     acceptor.bind(here);
     acceptor.listen();
   } catch (const boost::system::system_error& error) {
-    throw std::runtime_error("127.0.0.1:" + std::to_string(wanted_port) + " cannot be listened on: " +
-                             error.code().message() + "; name another port, or none, with --port");
+    throw std::runtime_error("127.0.0.1:" + std::to_string(wanted_port) + ": cannot listen: " +
+                             error.code().message() + "; name another port with --port, or omit it");
   }
   port = acceptor.local_endpoint().port();
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) signals.add(signal);

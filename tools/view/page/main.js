@@ -135,7 +135,7 @@ function showLink() {
   $("about").title = status.scene.file;
   set("most", `${status.limits.max_force_N} N, ${status.limits.max_torque_Nm} N·m${percent}`);
   set("armed-by", status.armed_by ?? "nobody");
-  set("device", status.device.present ? "present" : "not there");
+  set("device", status.device.present ? "present" : "absent");
 }
 
 function showButtons() {
