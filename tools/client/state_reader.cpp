@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uint64_t kVersion = 1;
+constexpr std::uint64_t kVersion = 2;
 /// Interval at which a waiting reader checks whether the daemon is still connected.
 constexpr auto kConnectionCheckInterval = std::chrono::milliseconds(50);
 
@@ -117,8 +117,8 @@ struct TickState::Layout {
   std::size_t bytes, header_bytes, written_offset, slots, slot_bytes, record_offset, record_bytes;
   double rate_Hz;
   Fields fields;
-  std::size_t touches_offset, touch_bytes, most_touches;
-  Fields touch_fields;
+  std::size_t contacts_offset, contact_bytes, max_contacts;
+  Fields contact_fields;
 
   explicit Layout(const json& from) {
     if (from.at("version").get<std::uint64_t>() != kVersion)
@@ -139,14 +139,14 @@ struct TickState::Layout {
                       slots <= (bytes - header_bytes) / slot_bytes && rate_Hz > 0.0;
     if (!fits) fail_protocol("the sizes in its layout contradict each other");
     fields = read_fields(from.at("fields"), record_bytes);
-    const json& touches = from.at("touches");
-    touches_offset = touches.at("offset");
-    touch_bytes = touches.at("bytes");
-    most_touches = touches.at("most");
-    if (touch_bytes == 0 || touches_offset > record_bytes ||
-        most_touches > (record_bytes - touches_offset) / touch_bytes)
+    const json& contacts = from.at("contacts");
+    contacts_offset = contacts.at("offset");
+    contact_bytes = contacts.at("bytes");
+    max_contacts = contacts.at("max_count");
+    if (contact_bytes == 0 || contacts_offset > record_bytes ||
+        max_contacts > (record_bytes - contacts_offset) / contact_bytes)
       fail_protocol("the contacts lie outside of the record");
-    touch_fields = read_fields(touches.at("fields"), touch_bytes);
+    contact_fields = read_fields(contacts.at("fields"), contact_bytes);
   }
 };
 
@@ -171,7 +171,7 @@ class TickState::Names {
 
  private:
   void keep(const json& from) {
-    known_[from.at("rendering")] = from.at("obstacles").get<std::vector<std::string>>();
+    known_[from.at("rendering_id")] = from.at("obstacles").get<std::vector<std::string>>();
     while (known_.size() > kMostKept) known_.erase(known_.begin());
   }
 
@@ -202,35 +202,35 @@ std::string TickState::text(std::string_view field) const {
 
 std::vector<ProxyContact> TickState::contacts() const {
   const auto count =
-      std::min<std::size_t>(static_cast<std::size_t>(integer("touch_count")), layout_->most_touches);
+      std::min<std::size_t>(static_cast<std::size_t>(integer("contact_count")), layout_->max_contacts);
   std::vector<ProxyContact> out(count);
-  const auto rendering = static_cast<std::uint32_t>(integer("rendering"));
+  const auto rendering_id = static_cast<std::uint32_t>(integer("rendering_id"));
   for (std::size_t k = 0; k < count; ++k) {
-    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->touches_offset +
-                            k * layout_->touch_bytes;
+    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->contacts_offset +
+                            k * layout_->contact_bytes;
     const auto get = [&](std::string_view name, std::size_t i = 0) {
-      return parse_number(field_of(layout_->touch_fields, name), from, i);
+      return parse_number(field_of(layout_->contact_fields, name), from, i);
     };
     const auto feature = [&](const std::string& body) {
-      std::string name = text_of(field_of(layout_->touch_fields, body + "_feature_kind"), from);
+      std::string name = text_of(field_of(layout_->contact_fields, body + "_feature_kind"), from);
       if (name == "plane" || name == "none") return name;
       const auto number = [&](const std::string& which) {
-        return std::to_string(bits_of(field_of(layout_->touch_fields, body + which), from, 0));
+        return std::to_string(bits_of(field_of(layout_->contact_fields, body + which), from, 0));
       };
       name += " " + number("_first");
       return name.find("edge") == std::string::npos ? name : name + "-" + number("_second");
     };
-    ProxyContact& touch = out[k];
+    ProxyContact& contact = out[k];
     for (std::size_t i = 0; i < 3; ++i) {
-      touch.point_W_m[i] = get("point_W_m", i);
-      touch.normal_W[i] = get("normal_W", i);
+      contact.point_W_m[i] = get("point_W_m", i);
+      contact.normal_W[i] = get("normal_W", i);
     }
-    touch.share = get("share");
-    touch.multiplier_kg_m = get("multiplier_kg_m");
-    touch.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
-    touch.obstacle = names_->of(rendering, touch.obstacle_number);
-    touch.tool_feature = feature("tool");
-    touch.obstacle_feature = feature("obstacle");
+    contact.load_fraction = get("load_fraction");
+    contact.multiplier_kg_m = get("multiplier_kg_m");
+    contact.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
+    contact.obstacle = names_->of(rendering_id, contact.obstacle_number);
+    contact.tool_feature = feature("tool");
+    contact.obstacle_feature = feature("obstacle");
   }
   return out;
 }

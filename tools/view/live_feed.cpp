@@ -104,7 +104,7 @@ void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_t
     bool any = false;
     while (reader.next(state, 0ms)) {
       any = true;
-      const ViewTick tick = view_tick(state);
+      const ViewTick tick = view_tick(tick_record(state));
       const ChannelValues values = tick.channels();
       const std::scoped_lock lock(mutex_);
       history_.add(tick.time_ns, values);
@@ -112,7 +112,8 @@ void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_t
       wake_latency_.add(tick.time_ns, tick.wake_latency_ns);
     }
     if (any) {
-      Sample now{view_tick(state), view_status(state), reader.missed()};
+      const TickRecord record = tick_record(state);
+      Sample now{view_tick(record), view_status(record, state.contacts()), reader.missed()};
       rendering_id_.store(now.tick.rendering_id);
       const std::scoped_lock lock(mutex_);
       newest_sample_ = std::move(now);

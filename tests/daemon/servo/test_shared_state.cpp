@@ -57,7 +57,7 @@ Touches touches_of(std::uint64_t number) {
   for (std::uint64_t i = 0; i < number % (kMaxTouches + 1); ++i) {
     Touch touch;
     touch.point_W_m.fill(static_cast<double>(number));
-    touch.share = static_cast<double>(i);
+    touch.load_fraction = static_cast<double>(i);
     touches.add(touch);
   }
   return touches;
@@ -81,7 +81,7 @@ bool whole(const TickState& state) {
   const std::vector<ProxyContact> told = state.contacts();
   if (told.size() != number % (kMaxTouches + 1)) return false;
   for (std::size_t i = 0; i < told.size(); ++i)
-    if (told[i].point_W_m[2] != static_cast<double>(number) || told[i].share != static_cast<double>(i))
+    if (told[i].point_W_m[2] != static_cast<double>(number) || told[i].load_fraction != static_cast<double>(i))
       return false;
   return true;
 }
@@ -203,7 +203,7 @@ TEST_CASE("writing neither allocates nor locks, and touches no page for the firs
 #endif
 }
 
-TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][servo]") {
+TEST_CASE("every tick of the loop is published with its contacts", "[shared_state][servo]") {
   VirtualRuntime s;
   StateReader reader =
       reader_of(s.runtime.enable_shared_state(), s.runtime.reconfigurator().obstacle_names());
@@ -219,23 +219,23 @@ TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][
   CHECK(tick.state() == "active");
   CHECK(tick.text("projection_status") == "converged");
   CHECK(tick.text("faults").empty());
-  const std::vector<ProxyContact> touches = tick.contacts();
-  REQUIRE(touches.size() == 4);
-  double share = 0.0;
-  for (const ProxyContact& touch : touches) {
+  const std::vector<ProxyContact> contacts = tick.contacts();
+  REQUIRE(contacts.size() == 4);
+  double load = 0.0;
+  for (const ProxyContact& touch : contacts) {
     CHECK(touch.obstacle == "table");
     CHECK(touch.obstacle_feature == "plane");
     CHECK(touch.tool_feature.starts_with("hull vertex "));
     CHECK(touch.normal_W == std::array<double, 3>{0.0, 0.0, 1.0});
     CHECK(std::abs(touch.point_W_m[2]) < 1e-8);
     CHECK(std::abs(std::abs(touch.point_W_m[0] - tick.proxy_pose()[0]) - 0.025) < 1e-6);
-    share += touch.share;
+    load += touch.load_fraction;
   }
-  CHECK(share == Approx(1.0));
+  CHECK(load == Approx(1.0));
   s.runtime.loop().release(s.clock.now());
   REQUIRE(reader.next(tick));
   CHECK(tick.integer("released") == 1);
-  CHECK(tick.text("commands") == "let go");
+  CHECK(tick.text("commands") == "release");
 }
 
 TEST_CASE("the layout describes every field, within a line of the protocol", "[shared_state]") {
@@ -243,7 +243,7 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
   CHECK(state.slots() >= 16'000);
   const nlohmann::json layout = state_layout(state, kTable);
   CHECK(layout.dump().size() < 32 * 1024);
-  for (const nlohmann::json& list : {layout["fields"], layout["touches"]["fields"]})
+  for (const nlohmann::json& list : {layout["fields"], layout["contacts"]["fields"]})
     for (const nlohmann::json& field : list) {
       INFO(field);
       CHECK_FALSE(field["unit"].get<std::string>().empty());
@@ -254,7 +254,7 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
           for (const std::string name : field[names]) CHECK((!name.empty() && name != "unknown"));
     }
   CHECK(layout["obstacles"] == nlohmann::json({"table"}));
-  CHECK(layout["rendering"] == 3);
+  CHECK(layout["rendering_id"] == 3);
 }
 
 TEST_CASE(
@@ -262,7 +262,7 @@ TEST_CASE(
     "[shared_state]") {
   SharedState state(4.0);
   int asked = 0;
-  std::string answer = R"({"rendering": 4, "obstacles": ["bolt"]})";
+  std::string answer = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
   StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
                      [&] {
                        ++asked;
@@ -283,13 +283,13 @@ TEST_CASE(
   CHECK(asked == 0);
   CHECK(touched_in(4) == "bolt");
   CHECK(touched_in(4) == "bolt");
-  CHECK(touched_in(3) == "table");  // looked at late
+  CHECK(touched_in(3) == "table");  // a tick that is read late
   CHECK(asked == 1);
-  CHECK(touched_in(5) == "obstacle 0");  // that is not known yet
-  answer = R"({"rendering": 7, "obstacles": ["nut"]})";
-  CHECK(touched_in(6) == "obstacle 0");  // that is known no more
+  CHECK(touched_in(5) == "obstacle 0");  // not known yet
+  answer = R"({"rendering_id": 7, "obstacles": ["nut"]})";
+  CHECK(touched_in(6) == "obstacle 0");  // not known any more
   CHECK(touched_in(7) == "nut");
-  for (const char* bad : {"", "no JSON", "{}", R"({"rendering": 8, "obstacles": 1})"}) {
+  for (const char* bad : {"", "no JSON", "{}", R"({"rendering_id": 8, "obstacles": 1})"}) {
     answer = bad;
     CHECK(touched_in(8) == "obstacle 0");
   }
@@ -308,7 +308,7 @@ TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") 
     INFO(where << " = " << value);
     CHECK_THROWS_AS(open(layout), ClientError);
   };
-  refused("/version", 2);
+  refused("/version", SharedState::kVersion + 1);
   refused("/bytes", state.bytes() + 1);
   refused("/slots", state.slots() + 1);
   refused("/slots", 0);
@@ -319,8 +319,8 @@ TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") 
   refused("/fields/3/offset", sizeof(StateRecord));
   refused("/fields/3/count", 1'000'000);
   refused("/fields/3/type", "f16");
-  refused("/touches/most", 1000);
-  refused("/touches/fields/0/offset", 87);
+  refused("/contacts/max_count", 1000);
+  refused("/contacts/fields/0/offset", 87);
   refused("/fields", nullptr);
   const int unsealed = memfd_create("unsealed", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   REQUIRE(ftruncate(unsealed, static_cast<off_t>(state.bytes())) == 0);

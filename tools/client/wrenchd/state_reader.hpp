@@ -19,7 +19,7 @@ namespace wrenchd {
 struct ProxyContact {
   std::array<double, 3> point_W_m{};  ///< contact point in the world
   std::array<double, 3> normal_W{};   ///< unit normal from the obstacle to the tool, in the world
-  double share = 0.0;                 ///< share of the total contact load, 0 to 1
+  double load_fraction = 0.0;         ///< multiplier divided by the sum of all multipliers, 0 to 1
   /// Lagrange multiplier; the sum of multiplier times normal over all contacts is 2 m (x_q - x_p).
   double multiplier_kg_m = 0.0;
   std::uint32_t obstacle_number = 0;
