@@ -8,7 +8,7 @@
 
 #include <catch2/catch.hpp>
 
-// The rooms of the source tree, as the README draws them: arrows point one way.
+// The rooms of the source tree and the dependencies that the README permits. Dependencies point one way.
 
 namespace {
 
@@ -44,7 +44,7 @@ std::vector<Include> includes_of(const std::string& room) {
 
 }  // namespace
 
-TEST_CASE("a room includes only the rooms it may know", "[rooms]") {
+TEST_CASE("a room includes only the rooms that it may depend on", "[rooms]") {
   for (const auto& [room, allowed] : kMayInclude) {
     const auto includes = includes_of(room);
     REQUIRE(includes.size() > 5);
@@ -57,7 +57,7 @@ TEST_CASE("a room includes only the rooms it may know", "[rooms]") {
   }
 }
 
-TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
+TEST_CASE("core depends only on Eigen and the standard library", "[rooms]") {
   for (const Include& include : includes_of("core")) {
     INFO(include.file << " includes " << include.name);
     const bool ours = include.name.starts_with("core/");
@@ -68,7 +68,7 @@ TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
   }
 }
 
-TEST_CASE("headers do not carry CGAL, hidapi, toml++ or HDF5 along", "[rooms]") {
+TEST_CASE("headers do not include CGAL, hidapi, toml++ or HDF5", "[rooms]") {
   for (const auto& [room, allowed] : kMayInclude)
     for (const Include& include : includes_of(room)) {
       if (include.file.extension() != ".hpp") continue;

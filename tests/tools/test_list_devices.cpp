@@ -21,7 +21,7 @@ struct Ids {
   std::uint16_t vendor, product, page, usage;
 };
 
-/// A HID device in its socket; the nodes have the number of the port.
+/// A connected HID device; the node numbers are the port number.
 UsbDevice hid(int port, Ids ids, const Bytes& descriptor, const std::string& name) {
   UsbDevice device;
   device.port_path = "3-" + std::to_string(port);
@@ -70,12 +70,13 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("where nothing is plugged in the list says so", "[list_devices]") {
+TEST_CASE("the list states that no device is connected", "[list_devices]") {
   CHECK(list({}) == "No device is connected: no USB device except hubs, and no HID device.\n");
   CHECK(list({}, true) == list({}));
 }
 
-TEST_CASE("a SpaceNavigator has its profile, what it senses and drives, and why no other", "[list_devices]") {
+TEST_CASE("a SpaceNavigator is listed with profile, degrees of freedom and rejected profiles",
+          "[list_devices]") {
   CHECK(list({space_navigator_in(2)}) ==
         "3-2, interface 0: 046d:c626 \"SpaceNavigator\" of 3Dconnexion, no serial number\n"
         "  /dev/hidraw2 can be opened\n"
@@ -91,7 +92,7 @@ TEST_CASE("a SpaceNavigator has its profile, what it senses and drives, and why 
         "    woodenhaptics: it is used only where the configuration names it\n");
 }
 
-TEST_CASE("a borrowed id does not hide how the device speaks", "[list_devices]") {
+TEST_CASE("the report descriptor identifies a device with a copied id", "[list_devices]") {
   const std::string text =
       list({hid(1, {0x046d, 0xc62b, 1, 8}, home_made_combined(), "home-made SpaceMouse")});
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
@@ -100,7 +101,7 @@ TEST_CASE("a borrowed id does not hide how the device speaks", "[list_devices]")
       holds(text, "\n    spacemouse_split: in-report 1 of the device has 13 bytes, that of the profile 7\n"));
 }
 
-TEST_CASE("two equal devices are told apart by serial number, where they have one", "[list_devices]") {
+TEST_CASE("serial numbers distinguish two equal devices", "[list_devices]") {
   const std::string text = list({reference_in(1, "B2"), reference_in(2, "A1")});
   CHECK(holds(text, "3-1, interface 0: 1209:0001 \"handle\", serial number B2\n"));
   CHECK(holds(text, "3-2, interface 0: 1209:0001 \"handle\", serial number A1\n"));
@@ -139,7 +140,7 @@ TEST_CASE("a profile that states the serial number goes to that device", "[list_
   CHECK(holds(both, "\n    reference_full_speed, mine: this profile also matches\n"));
 }
 
-TEST_CASE("devices of fewer degrees of freedom say what they lack", "[list_devices]") {
+TEST_CASE("devices with fewer degrees of freedom list the missing ones", "[list_devices]") {
   const std::string polhem = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
   CHECK(holds(polhem, "\n  profile polhem: "));
   CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; of a wrench rx ry rz is dropped\n"));
@@ -158,7 +159,7 @@ TEST_CASE("devices of fewer degrees of freedom say what they lack", "[list_devic
               "\n  the device is not HID, so there is no report descriptor to compare with the profile\n"));
 }
 
-TEST_CASE("closed devices are named and refused, and nobody is sent to open them", "[list_devices]") {
+TEST_CASE("closed devices are named and rejected, without advice to open them", "[list_devices]") {
   UsbDevice touch = hid(3, {0x2988, 0x0304, 0xff00, 1}, teensy_rawhid(), "Touch");
   UsbDevice second = touch;
   second.interface = 1;
@@ -170,7 +171,7 @@ TEST_CASE("closed devices are named and refused, and nobody is sent to open them
         "  wrenchd does not open this device, independent of profiles\n");
 }
 
-TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
+TEST_CASE("an unrelated device has one line, and --all shows the rejection reasons", "[list_devices]") {
   UsbDevice keys = hid(6, {0x04d9, 0x1702, 1, 2}, boot_keyboard(), "USB Keyboard");  // its second interface
   keys.interface = 1;
   UsbDevice disk = hid(7, {0x0781, 0x5581, 0, 0}, {}, "Ultra");
@@ -190,7 +191,7 @@ TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
   CHECK(holds(list({space_navigator_in(1), keyboard_in(2)}), "\n\nOther devices (--all"));
 }
 
-TEST_CASE("a device that may not be opened comes with the udev rule", "[list_devices]") {
+TEST_CASE("a device without access is listed with the udev rule", "[list_devices]") {
   const std::string text = list({space_navigator_in(2)}, false, open_to_root);
   CHECK(holds(text,
               "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add to "
@@ -207,8 +208,8 @@ TEST_CASE("a device that may not be opened comes with the udev rule", "[list_dev
   CHECK(holds(list({high_speed}, false, open_to_root), R"(SUBSYSTEM=="usb", ATTR{idVendor}=="1209")"));
 }
 
-TEST_CASE("a profile that the device contradicts is told, line by line", "[list_devices]") {
-  // Its ids and its in-report are right; what it takes is a byte too short.
+TEST_CASE("differences between profile and report descriptor are listed line by line", "[list_devices]") {
+  // Ids and input report agree; the output report is one byte too short.
   const Bytes shorter = from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1e 91 02 c0");
   const std::string text = list({hid(1, {0x1209, 0x0001, 0xff00, 1}, shorter, "handle")});
@@ -223,13 +224,13 @@ TEST_CASE("a profile that the device contradicts is told, line by line", "[list_
               "\n  the report descriptor is invalid, so it cannot be compared with the profile: byte 30: "));
 }
 
-TEST_CASE("a controller that no profile knows is told how to get one", "[list_devices]") {
+TEST_CASE("a controller without a profile is listed with the command that proposes one", "[list_devices]") {
   const std::string text = list({hid(8, {0x1d50, 0x6018, 1, 8}, ten_bit_axes(), "home-made")});
   CHECK(holds(text, "\n  no profile matches:\n    example, falcon, "));
   CHECK(holds(text, "\n  wrenchctl profile --from /dev/hidraw8 proposes one\n"));
 }
 
-TEST_CASE("of a device with several interfaces those that matter are told", "[list_devices]") {
+TEST_CASE("only the relevant interfaces of a device are listed", "[list_devices]") {
   UsbDevice keys = hid(2, {0x046d, 0xc626, 1, 6}, boot_keyboard(), "SpaceNavigator");
   UsbDevice axes = space_navigator_in(2);
   axes.interface = 1;
@@ -262,7 +263,7 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
   CHECK(holds(list({keys, keys}), "keyboard); no profile matches\n  /dev/hidraw9 (not on USB): 04d9:1702 "));
 }
 
-TEST_CASE("profiles that are refused are told below the list", "[list_devices]") {
+TEST_CASE("invalid profiles are listed below the devices", "[list_devices]") {
   KnownProfiles known = kShipped;
   known.refused = {"profiles/mine.toml:3:1: key 'x' is not known"};
   const std::string text = device_list(std::vector{space_navigator_in(1)}, known, false, open_to_all);
@@ -273,7 +274,7 @@ TEST_CASE("profiles that are refused are told below the list", "[list_devices]")
   CHECK(holds(device_list({}, {}, false, open_to_all), "There are no profiles.\n"));
 }
 
-TEST_CASE("no device moves the cursor of a terminal", "[list_devices]") {
+TEST_CASE("control characters from devices are not printed", "[list_devices]") {
   UsbDevice device = space_navigator_in(1);
   device.product_name = "\x1b[2J\nprofile";
   device.manufacturer = "\x9b\x31m";
@@ -316,7 +317,7 @@ std::string mock_hid(int port, const std::string& vendor, const std::string& pro
          "\nE: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw" + n + "\nE: MAJOR=243\nE: MINOR=" + n + "\n\n";
 }
 
-/// What `wrenchctl devices` prints on a machine where nothing else is plugged in.
+/// Returns the output of `wrenchctl devices` on a machine without other devices.
 std::string printed(const std::string& devices, const std::string& options = {}) {
   const TemporaryDirectory dir;
   const auto file = dir.write("devices", devices);
@@ -344,7 +345,7 @@ TEST_CASE("wrenchctl devices lists what udev knows", "[list_devices]") {
   CHECK(holds(printed(devices, "--all"), "3-3, interface 0: 04d9:1702 \"USB Keyboard\", no serial number\n"));
 }
 
-TEST_CASE("wrenchctl devices where nothing is plugged in", "[list_devices]") {
+TEST_CASE("wrenchctl devices without a connected device", "[list_devices]") {
   const std::string one_that_is_nothing =
       "P: /devices/virtual/mem/null\nN: null\nE: SUBSYSTEM=mem\nE: DEVNAME=/dev/null\n";
   CHECK(printed(one_that_is_nothing).find("No device is connected: ") == 0);

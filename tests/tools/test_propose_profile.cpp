@@ -29,7 +29,7 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// What loading it as a profile is refused with.
+/// Returns the message with which the profile is rejected.
 std::string rejection_text(const std::string& text) {
   const TemporaryDirectory dir;
   const auto file = dir.write("proposed.toml", text);
@@ -42,7 +42,7 @@ std::string rejection_text(const std::string& text) {
   return {};
 }
 
-/// As a person would who has read the lines marked FILL IN, and can only know what no descriptor tells.
+/// Completes the lines marked FILL IN with values that no descriptor contains.
 std::string completed(std::string text) {
   const std::array<std::array<std::string, 2>, 8> known = {{{"report_rate_Hz", "62.5"},
                                                             {"stale_fault_s", "0.2"},
@@ -67,7 +67,7 @@ DeviceProfile loaded(const std::string& text) {
   return load_profile(dir.write("proposed.toml", text));
 }
 
-/// Six bytes that go from 0 to 255, and rest in the middle.
+/// Six bytes with the range 0 to 255 and the rest count in the middle.
 Bytes unsigned_axes() {
   return from_hex(
       "05 01 09 08 a1 01 85 07 15 00 26 ff 00 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 c0");
@@ -77,7 +77,7 @@ std::string text_of(const Bytes& bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
+TEST_CASE("a proposal contains the content of the descriptor", "[propose_profile]") {
   const std::string text = proposal(space_navigator());
   CHECK(holds(text, "# Made from a test\n# Device: usb 046d:c626, \"SpaceNavigator\"\n"));
   CHECK(holds(text,
@@ -95,7 +95,7 @@ TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
   CHECK(holds(text, "# LED: byte 1 of output report 0x04;"));
 }
 
-TEST_CASE("limits are never guessed, and no proposal loads as it is", "[propose_profile]") {
+TEST_CASE("limits are never guessed, and no proposal loads before its completion", "[propose_profile]") {
   for (const Bytes& bytes : {space_navigator(), space_mouse_wireless(), home_made_combined(), ten_bit_axes(),
                              teensy_rawhid(), effects_joystick()}) {
     const std::string text = proposal(bytes);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A large scene on a machine that draws slowly: few triangles while something moves, all of them when it is at rest.
+// A large scene on a machine that draws slowly: few triangles while something moves, all triangles when it is static.
 import assert from "node:assert/strict";
 import { file, finished, open, test, until, view } from "./browser.mjs";
 
