@@ -177,7 +177,9 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
 /// Until nothing is on its way into the loop any more, so that an obstacle cannot have set out before it is
 /// followed. A loop that does not tick has no hand in it, and need not be waited for.
 void Reconfigurator::wait_until_idle() {
-  const auto quiet = [this] { return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading(); };
+  const auto quiet = [this] {
+    return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading();
+  };
   if (quiet()) return;
   const auto busy = [] {
     throw BusyError("another change is on its way to the hand; ask again in a moment");

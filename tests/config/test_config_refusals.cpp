@@ -150,7 +150,8 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'static', 'dynamic'"},
       {"[rendering]\nfriction = 0.2", "2:12", "key 'rendering.friction': expected a table, found 0.2"},
       {"[rendering]\nmethod = 'planar'\n[rendering.friction]\nstatic = 0.2", "3:1",
-       "key 'rendering.friction': only method = \"exact\" supports friction; choose it, or leave friction out"},
+       "key 'rendering.friction': only method = \"exact\" supports friction; choose it, or leave friction "
+       "out"},
       {"[wrench]\nlaw = \"spring\"", "2:7", "expected \"pid\" or \"energy\""},
       {"[wrench]\nenergy_stiffness_per_s2 = -1", "2:27", "expected a number from 0 to 1e+09 1/s2"},
       {"[rendering]\nmethod = \"exakt\"", "2:10",

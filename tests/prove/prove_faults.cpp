@@ -36,7 +36,8 @@ Outcome run(std::uint64_t seed) {
   }
   const auto ticks_of = [&](int n) {
     for (int i = 0; i < n && rig.violation().empty(); ++i) {
-      if (random.integer(0, 400) == 0) rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
+      if (random.integer(0, 400) == 0)
+        rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
       if (random.integer(0, 40) == 0) rig.loop.requests().heartbeat();
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));

@@ -232,7 +232,8 @@ int main(int argc, char** argv) {
       if (is_latched(station.loop().telemetry().state())) station.loop().requests().acknowledge();
     }
     const Duration took = clock.now() - began;
-    while (station.loop().telemetry().crossfading()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (station.loop().telemetry().crossfading())
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     changing.store(false);
     std::this_thread::sleep_for(took);
   }

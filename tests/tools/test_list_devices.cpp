@@ -97,8 +97,7 @@ TEST_CASE("the report descriptor identifies a device with a copied id", "[list_d
       list({hid(1, {0x046d, 0xc62b, 1, 8}, home_made_combined(), "home-made SpaceMouse")});
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
   CHECK(holds(text, "\n  the report descriptor agrees with the profile\n"));
-  CHECK(
-      holds(text, "\n    spacemouse_split: input report 1 of the device has 13 bytes, in the profile 7\n"));
+  CHECK(holds(text, "\n    spacemouse_split: input report 1 of the device has 13 bytes, in the profile 7\n"));
 }
 
 TEST_CASE("serial numbers distinguish two equal devices", "[list_devices]") {
