@@ -10,6 +10,7 @@
 #include "config/load_hand_script.hpp"
 #include "config/load_profile.hpp"
 #include "core/finite.hpp"
+#include "devices/layout_validation.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/simulation/reference_profile.hpp"

@@ -179,7 +179,7 @@ TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
     CHECK(bench.state().step == HomingStep::failed);
     CHECK(bench.state().problem == HomingProblem::wrong_direction);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
-    CHECK(holds(operator_instruction(bench.state()), "Its sign is wrong: look at it in the profile"));
+    CHECK(holds(operator_instruction(bench.state()), "The sign is wrong: check it in the profile"));
   }
   Bench mirrored;  // a quaternion with inverted y
   mirrored.spoil = [](DeviceSample& s) { s.X_BH.rotation.y() *= -1.0; };
@@ -195,8 +195,8 @@ TEST_CASE("homing detects exchanged axes", "[homing]") {
   CHECK(bench.state().step == HomingStep::failed);
   CHECK(bench.state().problem == HomingProblem::wrong_axis);
   CHECK(operator_instruction(bench.state()) ==
-        "Homing failed. That moved z, not y. Axes are exchanged: look at their order in the profile, and at "
-        "the encoders' plugs.");
+        "Homing failed. That moved z, not y. Axes are exchanged: check their order in the profile, and the "
+        "plugs of the encoders.");
   CHECK_FALSE(bench.homing.may_arm());
 
   Bench turns;  // y and z of the quaternion exchanged
@@ -267,7 +267,7 @@ TEST_CASE("the reference pose must be confirmed, still and within the maximum of
   buttons = 0;
   CHECK(bench.state().step == HomingStep::reference);
   CHECK(bench.state().problem == HomingProblem::not_at_reference);
-  CHECK(holds(operator_instruction(bench.state()), "too far from its rest"));
+  CHECK(holds(operator_instruction(bench.state()), "too far from the reference pose"));
 
   for (int i = 0; i < 1000; ++i) {
     bench.X_BH.translation_m.x() -= 0.0002;

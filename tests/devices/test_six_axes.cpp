@@ -100,16 +100,17 @@ TEST_CASE("a device without six axes is rejected with the reason", "[six_axes]")
   for (const Other& other : {
            Other{boot_keyboard(),
                  "it is no multi-axis controller (01:08); its applications are 01:06 (keyboard)"},
-           Other{effects_joystick(), "it wants to be 01:04 (joystick)"},  // although it has all six axes
-           Other{teensy_rawhid(), "it wants to be ffab:200 (vendor defined)"},
+           Other{effects_joystick(),
+                 "its applications are 01:04 (joystick)"},  // although it has all six axes
+           Other{teensy_rawhid(), "its applications are ffab:200 (vendor defined)"},
            Other{controller("19 30 29 32 95 03 81 02"), "without Rx, Ry, Rz"},
            Other{controller("19 30 29 35 95 06 81 02 09 30 95 01 81 02"), "it has X twice"},
            Other{controller("19 30 29 35 95 06 b1 02"),
                  "without X, Y, Z, Rx, Ry, Rz"},  // feature report only
            Other{controller("19 30 29 35 95 06 81 03"), "without X, Y, Z, Rx, Ry, Rz"},  // padding only
-           Other{controller("75 40 19 30 29 35 95 06 81 02"), "its X has 64 bits; 32 are the most"},
+           Other{controller("75 40 19 30 29 35 95 06 81 02"), "its X has 64 bits; the maximum is 32"},
            Other{controller("85 01 19 30 29 31 95 02 81 02 85 02 19 32 29 35 95 04 81 02"),
-                 "its axes are spread over its reports otherwise"},
+                 "its axes are not grouped"},
        }) {
     const SixAxisResult found = found_in(other.bytes);
     INFO(found.rejection);

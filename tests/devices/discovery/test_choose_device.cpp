@@ -75,12 +75,12 @@ TEST_CASE("two equal devices are distinguished by serial number alone", "[choose
   const std::vector<UsbDevice> two = {reference("A"), reference("B")};
   const DeviceChoice either = choose(two, {.profile = "reference_full_speed"});
   CHECK_FALSE(either.selection);
-  CHECK_THAT(either.rejections[0], Contains("serial number A") && Contains("not alone"));
+  CHECK_THAT(either.rejections[0], Contains("serial number A") && Contains("other devices match too"));
   CHECK_THAT(either.rejections[1], Contains("serial number B"));
   const DeviceChoice second = choose(two, {.profile = "reference_full_speed", .serial = "B"});
   REQUIRE(second.selection);
   CHECK(second.selection->device == 1);
-  CHECK_THAT(second.rejections[0], Contains("wants serial number B"));
+  CHECK_THAT(second.rejections[0], Contains("requires serial number B"));
   CHECK_FALSE(choose(two, {.profile = "reference_full_speed", .serial = "C"}).selection);
 }
 
@@ -93,7 +93,7 @@ TEST_CASE("after unplugging only the same device is selected", "[choose_device]"
   const DeviceChoice other = choose({reference("B")}, wanted);
   CHECK_FALSE(other.selection);
   CHECK_THAT(other.rejections[0],
-             Contains("not the device that was unplugged") && Contains("start wrenchd anew"));
+             Contains("not the device that was unplugged") && Contains("restart wrenchd"));
 }
 
 TEST_CASE("a device whose reports differ from its profile is not selected", "[choose_device]") {
@@ -102,10 +102,10 @@ TEST_CASE("a device whose reports differ from its profile is not selected", "[ch
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 0f 91 02 c0");
   const DeviceChoice choice = choose({other_reports}, {.profile = "reference_full_speed"});
   CHECK_FALSE(choice.selection);
-  CHECK_THAT(choice.rejections[0], Contains("disagrees") && Contains("output report"));
+  CHECK_THAT(choice.rejections[0], Contains("differs") && Contains("output report"));
   other_reports.report_descriptor = {0x75};
   CHECK_THAT(choose({other_reports}, {.profile = "reference_full_speed"}).rejections[0],
-             Contains("is refused"));
+             Contains("is invalid"));
 }
 
 TEST_CASE("a profile with endpoints matches only its interface", "[choose_device]") {

@@ -120,7 +120,7 @@ TEST_CASE("a libusb profile matches one interface of a device", "[match_profile]
   falcon.interface = 0;
   CHECK(matched(falcon) == "falcon");
   falcon.interface = 1;
-  CHECK_THAT(why_not(falcon, "falcon"), Contains("speaks over interface 0") && Contains("this is 1"));
+  CHECK_THAT(why_not(falcon, "falcon"), Contains("uses interface 0") && Contains("this is 1"));
   DeviceIdentity polhem =
       identity(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are distinguished by usage
   polhem.interface = 3;

@@ -114,7 +114,7 @@ TEST_CASE("when the other end of a socket closes, the device is disconnected", "
   CHECK(link.read(kNow, buffer).status == LinkStatus::ok);  // a report sent before the end
   CHECK(link.read(kNow, buffer).status == LinkStatus::disconnected);
   CHECK(written_until(link, Bytes{1}, LinkStatus::disconnected));
-  CHECK_THROWS_WITH(link.open(), Catch::Contains("nobody is at its other end"));
+  CHECK_THROWS_WITH(link.open(), Catch::Contains("the other end is closed"));
 }
 
 TEST_CASE("a closed socket link transfers nothing until it is opened again", "[socket_link]") {

@@ -340,10 +340,10 @@ TEST_CASE("a Falcon that does not start gives an error with the reason", "[emula
   EmulatedFalcon dead;
   dead.ignore_handshakes(1'000'000);
   CHECK_THROWS_WITH(falcon_start(dead, firmware, 2),
-                    Contains("its boot loader does not answer") && Contains("2 tries"));
+                    Contains("its boot loader does not answer") && Contains("2 attempts"));
   EmulatedFalcon deaf;
   deaf.corrupt_firmware_echoes(1'000'000);
-  CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("came back wrong"));
+  CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("were echoed wrongly"));
   CHECK_THROWS_WITH(falcon_start(deaf, {}), Contains("the firmware is empty"));
   CHECK(deaf.state() != EmulatedFalcon::State::running);
 }
