@@ -8,7 +8,7 @@
 
 #include <catch2/catch.hpp>
 
-// The rooms of the source tree and the dependencies that the README permits. Dependencies point one way.
+// The rooms of the source tree, as the README draws them: dependencies point one way.
 
 namespace {
 
@@ -44,7 +44,7 @@ std::vector<Include> includes_of(const std::string& room) {
 
 }  // namespace
 
-TEST_CASE("a room includes only the rooms that it may depend on", "[rooms]") {
+TEST_CASE("a room includes only the rooms it may know", "[rooms]") {
   for (const auto& [room, allowed] : kMayInclude) {
     const auto includes = includes_of(room);
     REQUIRE(includes.size() > 5);
@@ -57,7 +57,7 @@ TEST_CASE("a room includes only the rooms that it may depend on", "[rooms]") {
   }
 }
 
-TEST_CASE("core depends only on Eigen and the standard library", "[rooms]") {
+TEST_CASE("core knows Eigen and the standard library only", "[rooms]") {
   for (const Include& include : includes_of("core")) {
     INFO(include.file << " includes " << include.name);
     const bool ours = include.name.starts_with("core/");
@@ -68,7 +68,7 @@ TEST_CASE("core depends only on Eigen and the standard library", "[rooms]") {
   }
 }
 
-TEST_CASE("headers do not include CGAL, hidapi, toml++ or HDF5", "[rooms]") {
+TEST_CASE("headers do not carry CGAL, hidapi, toml++ or HDF5 along", "[rooms]") {
   for (const auto& [room, allowed] : kMayInclude)
     for (const Include& include : includes_of(room)) {
       if (include.file.extension() != ".hpp") continue;
@@ -76,4 +76,22 @@ TEST_CASE("headers do not include CGAL, hidapi, toml++ or HDF5", "[rooms]") {
       for (const char* heavy : {"CGAL/", "hidapi", "libusb", "toml++", "hdf5", "spdlog"})
         CHECK(include.name.find(heavy) == std::string::npos);
     }
+}
+
+TEST_CASE("what runs on the servo thread includes nothing that allocates, locks or writes by itself",
+          "[rooms]") {
+  const std::vector<std::string> forbidden = {
+      "nlohmann/",          "spdlog/", "fmt/",    "filesystem", "hdf5",    "H5",
+      "iostream",           "fstream", "sstream", "ostream",    "istream", "mutex",
+      "condition_variable", "future",  "CGAL/",   "toml++/"};
+  std::size_t files = 0;
+  for (const Include& include : includes_of("daemon")) {
+    if (include.file.parent_path().filename() != "servo") continue;
+    ++files;
+    INFO(include.file << " includes " << include.name);
+    for (const std::string& name : forbidden) CHECK_FALSE(include.name.starts_with(name));
+    // The rest of the daemon may know the servo loop, and never the other way round.
+    if (include.name.starts_with("daemon/")) CHECK(include.name.starts_with("daemon/servo/"));
+  }
+  REQUIRE(files > 100);
 }

@@ -236,87 +236,86 @@ Finding groups(const MachineState& p) {
   return {Health::warning,
           "groups: " + p.user + " is not in " + kOperators + ", and may only observe and stop",
           "usermod -aG " + std::string(kOperators) + " " + p.user + ", and log in again"};
-  }
+}
 
-  /// Returns the effective lines: no comments and no blank lines.
-  std::set<std::string>
-  effective_lines(const std::string& rules) {
-    std::set<std::string> lines;
-    for (const std::string& line : lines_of(rules))
-      if (!line.empty() && line[0] != '#') lines.insert(line);
-    return lines;
-  }
+/// Returns the effective lines: no comments and no blank lines.
+std::set<std::string> effective_lines(const std::string& rules) {
+  std::set<std::string> lines;
+  for (const std::string& line : lines_of(rules))
+    if (!line.empty() && line[0] != '#') lines.insert(line);
+  return lines;
+}
 
-  Finding rules(const MachineState& p) {
-    const auto file =
-        first_of(p.root, {"etc/udev/rules.d", "run/udev/rules.d", "lib/udev/rules.d", "usr/lib/udev/rules.d"},
-                 "70-wrenchd.rules");
-    const std::string remedy =
-        "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules, then udevadm trigger";
-    if (!file)
-      return {p.nodes.empty() && !unit_file(p.root) ? Health::warning : Health::failure,
-              "udev rules: none, so only root can open a device", remedy};
-    const std::string name = "/" + file->lexically_relative(p.root).string(), installed = content(*file);
-    const std::set<std::string> there = effective_lines(installed);
-    std::size_t missing = 0;
-    const std::set<std::string> wanted = effective_lines(udev_rules(p.profiles));
-    for (const std::string& line : wanted) missing += there.count(line) == 0 ? 1 : 0;
-    if (missing > 0)
-      return {Health::failure,
-              "udev rules: " + name + " lacks " + std::to_string(missing) + " of the " +
-                  std::to_string(wanted.size()) + " rules for the profiles of wrenchd " + kVersion,
-              remedy};
-    return ok("udev rules: " + name + " covers all profiles");
-  }
+Finding rules(const MachineState& p) {
+  const auto file =
+      first_of(p.root, {"etc/udev/rules.d", "run/udev/rules.d", "lib/udev/rules.d", "usr/lib/udev/rules.d"},
+               "70-wrenchd.rules");
+  const std::string remedy =
+      "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules, then udevadm trigger";
+  if (!file)
+    return {p.nodes.empty() && !unit_file(p.root) ? Health::warning : Health::failure,
+            "udev rules: none, so only root can open a device", remedy};
+  const std::string name = "/" + file->lexically_relative(p.root).string(), installed = content(*file);
+  const std::set<std::string> there = effective_lines(installed);
+  std::size_t missing = 0;
+  const std::set<std::string> wanted = effective_lines(udev_rules(p.profiles));
+  for (const std::string& line : wanted) missing += there.count(line) == 0 ? 1 : 0;
+  if (missing > 0)
+    return {Health::failure,
+            "udev rules: " + name + " lacks " + std::to_string(missing) + " of the " +
+                std::to_string(wanted.size()) + " rules for the profiles of wrenchd " + kVersion,
+            remedy};
+  return ok("udev rules: " + name + " covers all profiles");
+}
 
-  std::vector<Finding> devices(const MachineState& p) {
-    if (p.nodes.empty()) return {ok("devices: no device with a profile is connected")};
-    std::vector<Finding> findings;
-    for (const DeviceNode& node : p.nodes) {
-      std::array<char, 8> mode{};
-      std::snprintf(mode.data(), mode.size(), "%04o", node.mode);
-      const std::string who = "device " + node.profile + ": " + node.node + " is of group " + node.group +
-                              ", mode " + mode.data();
-      if (node.group != kGroup || (node.mode & 0060U) != 0060U)
-        findings.push_back({Health::failure, who + ": the service cannot open it",
-                            "correct the udev rules, then udevadm trigger, or reconnect the device"});
-      else if ((node.mode & 0006U) != 0)
-        findings.push_back({Health::failure, who + ": any user can apply force beyond all limits",
-                            "find the rule that grants access: grep -l 0666 /etc/udev/rules.d/*"});
-      else
-        findings.push_back(ok(who));
-      if (node.port_path.empty()) continue;
-      const std::string control = content(p.root / "sys/bus/usb/devices" / node.port_path / "power/control");
-      if (control == "auto")
-        findings.push_back(
-            {Health::failure, "device " + node.profile + " in " + node.port_path + ": autosuspend is on",
-             "udevadm trigger, or: echo on > /sys/bus/usb/devices/" + node.port_path + "/power/control"});
-      else if (!control.empty())
-        findings.push_back(ok("device " + node.profile + " in " + node.port_path + ": autosuspend is off"));
-    }
-    return findings;
+std::vector<Finding> devices(const MachineState& p) {
+  if (p.nodes.empty()) return {ok("devices: no device with a profile is connected")};
+  std::vector<Finding> findings;
+  for (const DeviceNode& node : p.nodes) {
+    std::array<char, 8> mode{};
+    std::snprintf(mode.data(), mode.size(), "%04o", node.mode);
+    const std::string who =
+        "device " + node.profile + ": " + node.node + " is of group " + node.group + ", mode " + mode.data();
+    if (node.group != kGroup || (node.mode & 0060U) != 0060U)
+      findings.push_back({Health::failure, who + ": the service cannot open it",
+                          "correct the udev rules, then udevadm trigger, or reconnect the device"});
+    else if ((node.mode & 0006U) != 0)
+      findings.push_back({Health::failure, who + ": any user can apply force beyond all limits",
+                          "find the rule that grants access: grep -l 0666 /etc/udev/rules.d/*"});
+    else
+      findings.push_back(ok(who));
+    if (node.port_path.empty()) continue;
+    const std::string control = content(p.root / "sys/bus/usb/devices" / node.port_path / "power/control");
+    if (control == "auto")
+      findings.push_back(
+          {Health::failure, "device " + node.profile + " in " + node.port_path + ": autosuspend is on",
+           "udevadm trigger, or: echo on > /sys/bus/usb/devices/" + node.port_path + "/power/control"});
+    else if (!control.empty())
+      findings.push_back(ok("device " + node.profile + " in " + node.port_path + ": autosuspend is off"));
   }
+  return findings;
+}
 
-  // --- wake latency
-  // -----------------------------------------------------------------------------------------
+// --- wake latency
+// -----------------------------------------------------------------------------------------
 
-  std::string us_text(Duration d) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.0f us", static_cast<double>(d.count()) / 1e3);
-    return text.data();
-  }
+std::string us_text(Duration d) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.0f us", static_cast<double>(d.count()) / 1e3);
+  return text.data();
+}
 
-  Finding wake_latency_finding(const WakeLatency& measured) {
-    const std::string summary = "wake latency: p50 " + us_text(measured.p50) + ", p99.9 " +
-                                us_text(measured.p999) + ", at most " + us_text(measured.max) + ", " +
-                                (measured.fifo ? "with" : "without") + " SCHED_FIFO";
-    if (measured.p999 <= kGoodWakeLatency) return ok(summary);
-    if (!measured.fifo)
-      return {Health::warning, summary,
-              "run as root, or raise the limits above, to measure the service's latency"};
-    return {measured.p999 <= kBadWakeLatency ? Health::warning : Health::failure, summary,
-            "apply the remedies above; stop other heavy programs; avoid virtual machines"};
-  }
+Finding wake_latency_finding(const WakeLatency& measured) {
+  const std::string summary = "wake latency: p50 " + us_text(measured.p50) + ", p99.9 " +
+                              us_text(measured.p999) + ", at most " + us_text(measured.max) + ", " +
+                              (measured.fifo ? "with" : "without") + " SCHED_FIFO";
+  if (measured.p999 <= kGoodWakeLatency) return ok(summary);
+  if (!measured.fifo)
+    return {Health::warning, summary,
+            "run as root, or raise the limits above, to measure the service's latency"};
+  return {measured.p999 <= kBadWakeLatency ? Health::warning : Health::failure, summary,
+          "apply the remedies above; stop other heavy programs; avoid virtual machines"};
+}
 
 }  // namespace
 

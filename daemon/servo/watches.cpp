@@ -4,46 +4,37 @@
 #include "core/finite.hpp"
 
 namespace wrenchd {
-namespace {
 
-/// Without required real-time priority a short stall is expected, so it counts as a late tick only.
-Duration stalled_after(const ServoSettings& servo) noexcept {
-  return servo.realtime == Realtime::required ? from_seconds(servo.late_limit_s) : Duration::max();
-}
-
-}  // namespace
-
-Watches::Watches(const Settings& settings, const DeviceProfile& profile, double max_force_N,
-                 double max_torque_Nm)
-    : pace(from_seconds(1.0 / settings.servo.rate_Hz), stalled_after(settings.servo)),
-      link(profile.report_rate_Hz),
+Watches::Watches(const DeviceProfile& profile, double max_force_N, double max_torque_Nm)
+    : link(profile.report_rate_Hz),
       pose(profile),
       motor_stall(max_force_N, max_torque_Nm),
       deadman_button(button_bit(profile.deadman_button)),
       stop_button(button_bit(profile.stop_button)),
       has_motors(profile.has_output) {}
 
-FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
-  FaultSet faults = link.check(sample, now) | pose.check(sample) | motors.check(sample, driven, now);
-  faults |= classify_sample_fault(sample.fault, state, now);
+FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, const TickTime& t) noexcept {
+  FaultSet faults = link.check(sample, t.now) | pose.check(sample) | motors.check(sample, driven, t.now);
+  faults |= classify_sample_fault(sample.fault, state, t.recently_late);
   if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) faults |= bit(Fault::pose_not_finite);
   if (was_homed_ && !sample.homed) faults |= bit(Fault::not_homed);
-  if (sample.arrived != TimePoint{}) was_homed_ = sample.homed;  // not known before the first report
-  return faults | check_buttons(sample, state) | client.check(now);
+  const bool report_received = sample.arrived != TimePoint{};  // before that `homed` says nothing
+  if (report_received) was_homed_ = sample.homed;
+  return faults | check_buttons(sample, state) | client.check(t.now);
 }
 
-/// Maps a fault of the device driver to the fault that counts in this state.
-FaultSet Watches::classify_sample_fault(Fault fault, State state, TimePoint now) const noexcept {
+/// Which fault of the loop follows from the fault that the device found in its reports.
+FaultSet Watches::classify_sample_fault(Fault fault, State state, bool recently_late) const noexcept {
   switch (fault) {
     case Fault::none:
-    case Fault::pose_not_a_rotation:  // PoseWatch raises this fault after three such poses in a row
+    case Fault::pose_not_a_rotation:  // PoseWatch::check() raises it after three samples in a row
       return 0;
-    case Fault::overspeed:  // a fast handle is harmless while no force acts
+    case Fault::overspeed:  // a fast handle is harmless while no force is on it
       return is_driving(state) ? bit(fault) : 0;
-    // After a late tick the driver's queue may have overflowed, so the sample is old but the device was not
-    // silent. A device without motors is harmless when silent: the pose stays constant.
+    // If the loop itself was late, the report queue overflowed and the device was not silent. A device
+    // without motors cannot push: its pose stays where it was, and continues with the next report.
     case Fault::sample_stale:
-      return bit(pace.recently_late(now) || !has_motors ? Fault::sample_late : fault);
+      return bit(recently_late || !has_motors ? Fault::sample_late : fault);
     default:
       return bit(fault);
   }
@@ -52,8 +43,8 @@ FaultSet Watches::classify_sample_fault(Fault fault, State state, TimePoint now)
 FaultSet Watches::check_buttons(const DeviceSample& sample, State state) const noexcept {
   FaultSet faults = 0;
   if ((sample.buttons & stop_button) != 0) faults |= bit(Fault::stop_button);
-  const bool deadman_required = is_driving(state) || state == State::waiting;
-  if (deadman_required && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
+  const bool armed = is_driving(state) || state == State::waiting;
+  if (armed && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
     faults |= bit(Fault::deadman_released);
   return faults;
 }
@@ -62,7 +53,6 @@ void Watches::reset() noexcept {
   link.reset();
   pose.reset();
   motors = MotorWatch();
-  writes.reset();
   was_homed_ = false;
 }
 

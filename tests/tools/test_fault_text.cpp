@@ -16,7 +16,7 @@ TEST_CASE("the fault text contains every fault with reaction and remedy", "[faul
   CHECK_THAT(fault_text("overspeed"), Contains("state fault; in the same tick, no force in that tick"));
   CHECK_THAT(fault_text("sample_late"),
              Contains("state degraded; after 3 ms, within one tick, no force 10 ms later"));
-  CHECK_THAT(fault_text("client_gone"),
+  CHECK_THAT(fault_text("heartbeat_lost"),
              Contains("state releasing; after 100 ms, within one tick, no force 100 ms later"));
   CHECK_THAT(fault_text("overheated"), Contains("the loop reports it, and the force remains"));
 }

@@ -89,7 +89,7 @@ void check_exhibit(const std::string& name) {
     if (static_cast<ProxyInitialization>(run.ticks[i].proxy_initialization) != ProxyInitialization::complete)
       continue;
     INFO("tick " << i);
-    CHECK(admissible.at(pose_of(run.ticks[i].X_WQ), run.scene_time_s[i]));
+    CHECK(admissible.at(pose_from_numbers(run.ticks[i].X_WQ), run.scene_time_s[i]));
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
   }
 

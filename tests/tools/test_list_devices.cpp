@@ -81,15 +81,15 @@ TEST_CASE("a SpaceNavigator is listed with profile, degrees of freedom and rejec
         "3-2, interface 0: 046d:c626 \"SpaceNavigator\" of 3Dconnexion, no serial number\n"
         "  /dev/hidraw2 can be opened\n"
         "  profile spacemouse_split: 3Dconnexion SpaceMouse family, translation and rotation in two reports: "
-        "moves a tool, feels nothing\n"
+        "steers a tool, no force\n"
         "  senses x y z rx ry rz; drives none: it moves a tool, and every wrench is dropped\n"
         "  the report descriptor agrees with the profile\n"
         "  the other profiles:\n"
         "    example, falcon, polhem, polhem_lpc1768, reference_full_speed, reference_high_speed: its ids do "
         "not include 046d:c626\n"
         "    loopback: it is for the simulated device\n"
-        "    spacemouse_combined: in-report 1 of the device has 7 bytes, that of the profile 13\n"
-        "    woodenhaptics: it is used only where the configuration names it\n");
+        "    spacemouse_combined: input report 1 of the device has 7 bytes, in the profile 13\n"
+        "    woodenhaptics: it is used only if the configuration names it\n");
 }
 
 TEST_CASE("the report descriptor identifies a device with a copied id", "[list_devices]") {
@@ -97,8 +97,7 @@ TEST_CASE("the report descriptor identifies a device with a copied id", "[list_d
       list({hid(1, {0x046d, 0xc62b, 1, 8}, home_made_combined(), "home-made SpaceMouse")});
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
   CHECK(holds(text, "\n  the report descriptor agrees with the profile\n"));
-  CHECK(
-      holds(text, "\n    spacemouse_split: in-report 1 of the device has 13 bytes, that of the profile 7\n"));
+  CHECK(holds(text, "\n    spacemouse_split: input report 1 of the device has 13 bytes, in the profile 7\n"));
 }
 
 TEST_CASE("serial numbers distinguish two equal devices", "[list_devices]") {
@@ -238,14 +237,14 @@ TEST_CASE("only the relevant interfaces of a device are listed", "[list_devices]
   CHECK(text.find("3-2, interface 1: ") == 0);
   CHECK_FALSE(holds(text, "interface 0"));
   CHECK(holds(list({keys, axes}, true),
-              "spacemouse_combined, spacemouse_split: the usage is 0006, the profile is for 0008"));
+              "spacemouse_combined, spacemouse_split: the usage is 0006, the profile requires 0008"));
 
   // The Teensy's other interface has the ids of the profile too, and comes first.
   UsbDevice console = hid(3, {0x16c0, 0x0486, 0xffc9, 4}, teensy_rawhid(), "RawHID");
   UsbDevice raw = hid(3, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID");
   raw.interface = 1;
   CHECK(list({console, raw}).find("3-3, interface 1: ") == 0);
-  CHECK(holds(list({console}), "    polhem: the usage page is ffc9, the profile is for ffab\n"));
+  CHECK(holds(list({console}), "    polhem: the usage page is ffc9, the profile requires ffab\n"));
 }
 
 TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") {

@@ -30,14 +30,14 @@ const Reconfigurator::ObstacleNames kTable{3, {"table"}};
 StateReader reader_of(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles = kTable) {
   std::string layout;
   int descriptor = -1;
-  open_state(state, obstacles, [&](const nlohmann::json& result, int handed_over) {
+  open_state(state, obstacles, [&](const nlohmann::json& result, int sent_descriptor) {
     layout = result.at("layout").dump();
-    descriptor = fcntl(handed_over, F_DUPFD_CLOEXEC, 0);
+    descriptor = fcntl(sent_descriptor, F_DUPFD_CLOEXEC, 0);
   });
   return StateReader(layout, descriptor);
 }
 
-/// A record whose every number follows from one: whoever has parts of two sees it.
+/// Returns a record in which every field depends on `number`, so that a mixture of two records is detected.
 TickRecord record_of(std::uint64_t number) {
   TickRecord r;
   auto* const bytes = reinterpret_cast<std::byte*>(&r);
@@ -52,22 +52,22 @@ TickRecord record_of(std::uint64_t number) {
   return r;
 }
 
-Touches touches_of(std::uint64_t number) {
-  Touches touches;
+Touches contacts_of(std::uint64_t number) {
+  Touches contacts;
   for (std::uint64_t i = 0; i < number % (kMaxTouches + 1); ++i) {
     Touch touch;
     touch.point_W_m.fill(static_cast<double>(number));
     touch.load_fraction = static_cast<double>(i);
-    touches.add(touch);
+    contacts.add(touch);
   }
-  return touches;
+  return contacts;
 }
 
-/// Is this record_of() and touches_of() its own number, in every bit of every field?
-bool whole(const TickState& state) {
+/// Returns true if every field equals that of record_of() and contacts_of() for the number of the tick.
+bool complete(const TickState& state) {
   const std::uint64_t number = state.tick();
-  const TickRecord wanted = record_of(number);
-  const auto* const bytes = reinterpret_cast<const std::byte*>(&wanted);
+  const TickRecord reference = record_of(number);
+  const auto* const bytes = reinterpret_cast<const std::byte*>(&reference);
   for (const RecordField& field : tick_fields())
     for (std::size_t i = 0; i < field.count; ++i) {
       if (field.type == FieldType::f64) {
@@ -78,39 +78,38 @@ bool whole(const TickState& state) {
       std::memcpy(&expected, bytes + field.offset + i * size_of(field.type), size_of(field.type));
       if (state.integer(field.name, i) != expected) return false;
     }
-  const std::vector<ProxyContact> told = state.contacts();
-  if (told.size() != number % (kMaxTouches + 1)) return false;
-  for (std::size_t i = 0; i < told.size(); ++i)
-    if (told[i].point_W_m[2] != static_cast<double>(number) || told[i].load_fraction != static_cast<double>(i))
+  const std::vector<ProxyContact> contacts = state.contacts();
+  if (contacts.size() != number % (kMaxTouches + 1)) return false;
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (contacts[i].point_W_m[2] != static_cast<double>(number) ||
+        contacts[i].load_fraction != static_cast<double>(i))
       return false;
   return true;
 }
 
 }  // namespace
 
-TEST_CASE("what is written is read, every field, in order, each once", "[shared_state]") {
+TEST_CASE("a reader gets every field of every record, in order, once", "[shared_state]") {
   SharedState state(100.0);
   REQUIRE(state.slots() == 256);
   state.write(record_of(999), {});
   StateReader reader = reader_of(state);
   TickState tick;
-  CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));  // what was there before is not the next
+  CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));  // next() starts after the records that exist
   REQUIRE(reader.latest(tick));
   CHECK(tick.tick() == 999);
   for (std::uint64_t i = 1000; i < 3000; ++i) {
-    state.write(record_of(i), touches_of(i));
+    state.write(record_of(i), contacts_of(i));
     REQUIRE(reader.next(tick));
     REQUIRE(tick.tick() == i);
-    REQUIRE(whole(tick));
+    REQUIRE(complete(tick));
     CHECK(reader.unread() == 0);
   }
   CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));
   CHECK(reader.missed() == 0);
 }
 
-TEST_CASE(
-    "a reader that slept for two seconds of ticks has missed none; one that slept longer is told how many",
-    "[shared_state]") {
+TEST_CASE("a reader that pauses for 2 s misses nothing; a longer pause is counted", "[shared_state]") {
   SharedState state(4000.0);
   REQUIRE(state.slots() >= 8000);
   StateReader reader = reader_of(state);
@@ -132,11 +131,10 @@ TEST_CASE(
   CHECK(taken + reader.missed() == written);
 }
 
-TEST_CASE("readers beside a writer at full speed never see a torn record, however often they are overrun",
-          "[shared_state]") {
-  SharedState state(4.0);  // 8 records: overrun all the time
+TEST_CASE("readers beside a writer at full speed never get a torn record", "[shared_state]") {
+  SharedState state(4.0);  // 8 records, overwritten all the time
   std::atomic<bool> stop{false};
-  std::array<std::uint64_t, 2> seen{}, torn{}, back{}, missed{};
+  std::array<std::uint64_t, 2> read{}, torn{}, backward{}, missed{};
   std::vector<std::thread> readers;
   for (std::size_t r = 0; r < 2; ++r)
     readers.emplace_back([&, r] {
@@ -145,27 +143,27 @@ TEST_CASE("readers beside a writer at full speed never see a torn record, howeve
       std::uint64_t last = 0;
       while (!stop.load()) {
         if (r == 0 ? !reader.next(tick, std::chrono::milliseconds(1)) : !reader.latest(tick)) continue;
-        ++seen[r];
-        if (!whole(tick)) ++torn[r];
-        if (tick.tick() < last) ++back[r];
+        ++read[r];
+        if (!complete(tick)) ++torn[r];
+        if (tick.tick() < last) ++backward[r];
         last = tick.tick();
       }
       missed[r] = reader.missed();
     });
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
   for (std::uint64_t i = 0; std::chrono::steady_clock::now() < end; ++i)
-    state.write(record_of(i), touches_of(i));
+    state.write(record_of(i), contacts_of(i));
   stop.store(true);
   for (std::thread& reader : readers) reader.join();
   for (std::size_t r = 0; r < 2; ++r) {
-    CHECK(seen[r] > 100);
+    CHECK(read[r] > 100);
     CHECK(torn[r] == 0);
-    CHECK(back[r] == 0);
+    CHECK(backward[r] == 0);
   }
   CHECK(missed[0] > 100);
 }
 
-TEST_CASE("who has the descriptor can read the memory, and nothing else", "[shared_state]") {
+TEST_CASE("the descriptor allows reading only", "[shared_state]") {
   SharedState state(100.0);
   const int fd = state.descriptor();
   const auto size = static_cast<off_t>(state.bytes());
@@ -183,16 +181,15 @@ TEST_CASE("who has the descriptor can read the memory, and nothing else", "[shar
   CHECK(state.written() == 1);
 }
 
-TEST_CASE("writing neither allocates nor locks, and touches no page for the first time",
-          "[shared_state][realtime]") {
+TEST_CASE("writing neither allocates nor locks, and causes no page fault", "[shared_state][realtime]") {
   SharedState state(1000.0);
   const TickRecord record = record_of(5);
-  const Touches touches = touches_of(16);
-  state.write(record, touches);
+  const Touches contacts = contacts_of(16);
+  state.write(record, contacts);
   rusage before{}, after{};
   getrusage(RUSAGE_THREAD, &before);
   const RealtimeGuard guard;
-  for (std::uint64_t i = 0; i < 2 * state.slots(); ++i) state.write(record, touches);
+  for (std::uint64_t i = 0; i < 2 * state.slots(); ++i) state.write(record, contacts);
   const std::uint64_t allocations = guard.allocations();
   const std::uint64_t locks = guard.locks();
   getrusage(RUSAGE_THREAD, &after);
@@ -207,7 +204,7 @@ TEST_CASE("every tick of the loop is published with its contacts", "[shared_stat
   VirtualRuntime s;
   StateReader reader =
       reader_of(s.runtime.enable_shared_state(), s.runtime.reconfigurator().obstacle_names());
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   TickState tick;
   for (int i = 0; i < 2400; ++i) {
     REQUIRE(s.tick() == Fault::none);
@@ -257,9 +254,8 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
   CHECK(layout["rendering_id"] == 3);
 }
 
-TEST_CASE(
-    "contacts have the names of their own rendering's obstacles, and the daemon is asked once a rendering",
-    "[shared_state]") {
+TEST_CASE("contacts have the obstacle names of their rendering, requested from the daemon once per rendering",
+          "[shared_state]") {
   SharedState state(4.0);
   int asked = 0;
   std::string answer = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
@@ -272,9 +268,9 @@ TEST_CASE(
   const auto touched_in = [&](std::uint32_t rendering) {
     TickRecord record;
     record.rendering_id = rendering;
-    Touches touches;
-    touches.add(Touch{});
-    state.write(record, touches);
+    Touches contacts;
+    contacts.add(Touch{});
+    state.write(record, contacts);
     TickState tick;
     REQUIRE(reader.latest(tick));
     return tick.contacts().at(0).obstacle;
@@ -295,7 +291,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") {
+TEST_CASE("a layout that does not fit its memory is rejected", "[shared_state]") {
   SharedState state(4.0);
   const nlohmann::json good = state_layout(state, kTable);
   const auto open = [&](const nlohmann::json& layout) {
