@@ -190,7 +190,7 @@ TEST_CASE("wrenchctl gallery lists the scenes, and shows one", "[gallery][wrench
 TEST_CASE("tools/run rejects an unknown gallery name with the list of names", "[gallery]") {
   const ProgramResult result = run_program("../../../tools/run", {"teapot"});
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.err, Catch::Contains("there is no 'teapot' in the gallery; there are bolt_and_nut"));
+  CHECK_THAT(result.err, Catch::Contains("the gallery has no scene 'teapot'; the scenes are bolt_and_nut"));
 }
 
 }  // namespace
