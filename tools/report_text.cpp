@@ -10,6 +10,7 @@
 
 #include "devices/kinematics.hpp"
 #include "devices/profile_device.hpp"
+#include "devices/report_bits.hpp"
 #include "devices/report_codec.hpp"
 
 namespace wrenchd {

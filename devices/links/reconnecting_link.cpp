@@ -20,7 +20,7 @@ void ReconnectingLink::open() {
   if (!choice.selection)
     throw DeviceNotFound("no device of profile " + profile_.name +
                              (criteria_.serial.empty() ? "" : " with serial number " + criteria_.serial) +
-                             " is plugged in",
+                             " is connected",
                          describe_rejected(plugged, choice));
   const UsbDevice& device = plugged[choice.selection->device];
   std::unique_ptr<ReportLink> link;

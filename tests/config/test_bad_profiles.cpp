@@ -49,7 +49,7 @@ values = [{ name = "volts", byte = 34, type = "u16", step = 0.01 }]
 name = "buttons"
 id = 3
 length = 5
-least_length = 3
+min_length = 3
 buttons = { byte = 1, type = "u32" }
 [wrench_report]
 id = 2
@@ -115,13 +115,13 @@ torque_constant_Nm_per_A = [0.0538, 0.0538, 0.0538]
 max_current_A = 2.0
 counts_per_turn = [2000, 2000, 2000]
 direction = [-1, -1, -1]
-joint_slots = [0, 1, 2]
+joint_report_index = [0, 1, 2]
 home_counts = [0, 0, -5000]
-count_button = { slot = 2, above = 5000, minus = 10000 }
+count_button = { report_index = 2, threshold_counts = 5000, offset_counts = 10000 }
 [pose_report]
 id = "none"
 length = 64
-least_length = 14
+min_length = 14
 joints = { byte = 0, type = "i16" }
 [wrench_report]
 id = "none"
@@ -231,7 +231,7 @@ const std::string kTranslation = R"(translation = { byte = 1, type = "i16", step
 
 /// What kMouse has at the end of [deflection], and one key more.
 std::string steering(const std::string& key) {
-  return "angular_gain = 11.0\nfull_m = 0.001\nfull_rad = 0.09\n" + key;
+  return "angular_gain = 11.0\nfull_deflection_m = 0.001\nfull_deflection_rad = 0.09\n" + key;
 }
 
 const std::vector<Bad> kTable = {
@@ -369,8 +369,8 @@ const std::vector<Bad> kTable = {
     {kWhole, "checksum_at = 18", "checksum_at = 17", "{ byte = 16, type = \"u16\"",
      "overlaps 'wrench_report.checksum_at'"},
     {kWhole, "checksum_from = 1", "checksum_from = 18", "18", "from 0 to 17, found 18"},
-    {kWhole, "checksum = \"sum8\"", "checksum = \"sum8\"\nleast_length = 30", "30", "never short"},
-    {kWhole, "least_length = 3", "least_length = 9", "9", "from 2 to 5, found 9"},
+    {kWhole, "checksum = \"sum8\"", "checksum = \"sum8\"\nmin_length = 30", "30", "never short"},
+    {kWhole, "min_length = 3", "min_length = 9", "9", "from 2 to 5, found 9"},
     {kWhole, "[[20, 0x3e]]", "[20, 0x3e]", "20, 0x3e]", "expected an array of 2 numbers"},
     {kWhole, "[[20, 0x3e]]", "[[20, 0x13e]]", "0x13e", "from 0 to 255, found 318"},
     {kWhole, "[[20, 0x3e]]", "[[4, 0x3e]]", "{ byte = 4, bits = 16", "overlaps 'wrench_report.constants[0]'"},
@@ -436,18 +436,18 @@ const std::vector<Bad> kTable = {
     {kMouse, "angular_gain = 11.0", "angular_gain = 0", "0", "from 0.001 to 1000000, found 0"},
     // how a cap steers
     {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\ndead_zone = 0.1", "0.1",
-     "state full_m and full_rad"},
-    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nfull_m = 0.001", "0.001",
-     "state full_m and full_rad"},
+     "state full_deflection_m and full_deflection_rad"},
+    {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nfull_deflection_m = 0.001", "0.001",
+     "state full_deflection_m and full_deflection_rad"},
     {kMouse, "angular_gain = 11.0", steering("dead_zone = 1.0"), "1.0\n[pose", "from 0 to 0.9, found 1"},
-    {kMouse, "angular_gain = 11.0", steering("curve = 0.5"), "0.5\n[pose", "from 1 to 5, found 0.5"},
-    {kMouse, "angular_gain = 11.0", steering("slow = 0"), "0\n[pose", "from 0.01 to 1, found 0"},
-    {kMouse, "angular_gain = 11.0", steering("leash_m = 0.01"), "0.01\n", "state leash_m and leash_rad"},
-    {kMouse, "angular_gain = 11.0", steering("leash_m = 10\nleash_rad = 0.2"), "10\n",
+    {kMouse, "angular_gain = 11.0", steering("response_exponent = 0.5"), "0.5\n[pose", "from 1 to 5, found 0.5"},
+    {kMouse, "angular_gain = 11.0", steering("slow_factor = 0"), "0\n[pose", "from 0.01 to 1, found 0"},
+    {kMouse, "angular_gain = 11.0", steering("max_proxy_distance_m = 0.01"), "0.01\n", "state max_proxy_distance_m and max_proxy_angle_rad"},
+    {kMouse, "angular_gain = 11.0", steering("max_proxy_distance_m = 10\nmax_proxy_angle_rad = 0.2"), "10\n",
      "from 0.0001 to 0.5 m, found 10"},
-    {kMouse, "angular_gain = 11.0", steering("leash_mm = 10\nleash_rad = 0.2"), "leash_mm",
-     "give it in m as 'leash_m'"},
-    {kMouse, "mode = \"rate\"", "mode = \"position\"\ncurve = 2.0", "2.0", "belongs to mode \"rate\""},
+    {kMouse, "angular_gain = 11.0", steering("max_proxy_distance_mm = 10\nmax_proxy_angle_rad = 0.2"), "max_proxy_distance_mm",
+     "give it in m as 'max_proxy_distance_m'"},
+    {kMouse, "mode = \"rate\"", "mode = \"position\"\nresponse_exponent = 2.0", "2.0", "belongs to mode \"rate\""},
     {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nbox_min_m = [-1, -1, -1]", "[-1, -1, -1]",
      "state box_min_m and box_max_m"},
     {kMouse, "angular_gain = 11.0", "angular_gain = 11.0\nbox_min_m = [-1, 0.1, -1]\nbox_max_m = [1, 1, 1]",
@@ -462,10 +462,10 @@ const std::vector<Bad> kTable = {
     {kArm, "[0.058, 0.174, 0.133]", "[0.058, 0.174]", "[0.058, 0.174]", "expected an array of 3 numbers"},
     {kArm, "[0.058, 0.174, 0.133]", "[58, 174, 133]", "58, 174", "from 0.0001 to 2 m, found 58"},
     {kArm, "direction = [-1, -1, -1]", "direction = [-1, 0, -1]", "[-1, 0, -1]", "each must be 1 or -1"},
-    {kArm, "joint_slots = [0, 1, 2]", "joint_slots = [0, 1, 1]", "[0, 1, 1]", "each integer of joints once"},
+    {kArm, "joint_report_index = [0, 1, 2]", "joint_report_index = [0, 1, 1]", "[0, 1, 1]", "each integer of joints once"},
     {kArm, "counts_per_turn = [2000, 2000, 2000]", "counts_per_turn = [2000, 2000, 2000, 1024]",
      "[2000, 2000, 2000, 1024]", "expected an array of 3 numbers, found an array of 4"},
-    {kArm, "slot = 2", "slot = 3", "3", "from 0 to 2, found 3"},
+    {kArm, "report_index = 2", "report_index = 3", "3", "from 0 to 2, found 3"},
     {kArm, "step_A = 0.001", "step_mA = 1", "step_mA", "give it in A as 'step_A'"},
     {kArm, "step_A = 0.001", "step_A = 0.00001", "0.00001", "less than the 2 A it has to carry"},
     {kArm, "efforts = {", "force = { byte = 8, type = \"i16\", step_N = 0.01 }\nefforts = {",
@@ -481,7 +481,7 @@ const std::vector<Bad> kTable = {
     {kWhole, "[closed_loop]",
      "[homing]\nworkspace_min_m = [-1, -1, 0.5]\nworkspace_max_m = [1, 1, 0.5]\n[closed_loop]", "[1, 1, 0.5]",
      "the workspace must be larger than travel_m"},
-    {kWhole, "[closed_loop]", "[homing]\nmax_turn_rad = 0.1\n[closed_loop]", "0.1\n[closed",
+    {kWhole, "[closed_loop]", "[homing]\nmax_rotation_rad = 0.1\n[closed_loop]", "0.1\n[closed",
      "must be no less than travel_rad"},
     {kWhole, "[closed_loop]", "[homing]\nrest_m = [0, 0, 0]\n[closed_loop]", "rest_m",
      "known keys here: 'reference'"},

@@ -167,10 +167,10 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"[rendering.friction]\ndynamic = -0.1", "2:11", "expected a number from 0 to 5, found -0.1"},
       {"[rendering.friction]\nstatic = 0.2\ndynamic = 0.3", "3:11",
        "key 'rendering.friction.dynamic': expected no more than 'static', 0.2, found 0.3"},
-      {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'dynamic', 'static'"},
+      {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'static', 'dynamic'"},
       {"[rendering]\nfriction = 0.2", "2:12", "key 'rendering.friction': expected a table, found 0.2"},
       {"[rendering]\nmethod = 'planar'\n[rendering.friction]\nstatic = 0.2", "3:1",
-       "key 'rendering.friction': only method = \"exact\" knows friction; choose it, or leave friction out"},
+       "key 'rendering.friction': only method = \"exact\" supports friction; choose it, or leave friction out"},
       {"[wrench]\nlaw = \"spring\"", "2:7", "expected \"pid\" or \"energy\""},
       {"[wrench]\nenergy_stiffness_per_s2 = -1", "2:27", "expected a number from 0 to 1e+09 1/s2"},
       {"[rendering]\nmethod = \"exakt\"", "2:10",
@@ -295,19 +295,19 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {mesh + "angular_velocity_rad_per_s = [0, 0]", "5:30", "3 numbers"},
       {mesh + "angular_velocity_deg_per_s = [0, 0, 90]", "5:1",
        "give it in rad/s as 'angular_velocity_rad_per_s'"},
-      {mesh + "turn_back_after_s = 2.0", "5:21",
+      {mesh + "reverse_after_s = 2.0", "5:19",
        "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s"},
-      {mesh + "velocity_m_per_s = [0, 0, 0]\nturn_back_after_s = 2.0", "6:21", "the obstacle does not move"},
-      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_s = -1", "6:21",
+      {mesh + "velocity_m_per_s = [0, 0, 0]\nreverse_after_s = 2.0", "6:19", "the obstacle does not move"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_s = -1", "6:19",
        "expected a number from 0 to 86400 s, found -1"},
-      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_s = inf", "6:21", "s, found inf"},
-      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_ms = 500", "6:1",
-       "give it in s as 'turn_back_after_s'"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_s = inf", "6:19", "s, found inf"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_ms = 500", "6:1",
+       "give it in s as 'reverse_after_s'"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nvelocity_m_per_s = [0, 0, 1]", "5:20",
        "belongs to a mesh; a half_space stands still, so give what is to move as a mesh"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nangular_velocity_rad_per_s = [0, 0, 1]", "5:30",
        "a half_space stands still"},
-      {plane + "{ normal = [0, 0, 1], offset = 0 }\nturn_back_after_s = 1", "5:21",
+      {plane + "{ normal = [0, 0, 1], offset = 0 }\nreverse_after_s = 1", "5:19",
        "a half_space stands still"},
       {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
        "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'half_space', 'scale'"},
@@ -325,7 +325,7 @@ TEST_CASE("a velocity that is refused does not have its turning back refused as 
   dir.write("cube.off", "");
   const auto file = dir.write("s.toml", kTool +
                                             "[[obstacle]]\nmesh = 'cube.off'\nvelocity_m_per_s = [9, 0, 0]\n"
-                                            "turn_back_after_s = 1");
+                                            "reverse_after_s = 1");
   const std::string message = rejection_text(as_scene, file);
   CHECK(message.find("velocity_m_per_s[0]") != std::string::npos);
   CHECK(message.find('\n') == std::string::npos);

@@ -251,7 +251,7 @@ TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[ho
   bench.X_BH.translation_m.x() += 0.2;
   bench.hold(5.0);
   CHECK(bench.state().step == HomingStep::reference);  // lying still is not enough
-  CHECK(operator_instruction(bench.state()) == "Put the handle into its rest, let go of it, and confirm.");
+  CHECK(operator_instruction(bench.state()) == "Put the handle into its reference pose, release it, and confirm.");
 
   std::uint32_t buttons = 0x3;
   bench.spoil = [&](DeviceSample& s) { s.buttons = buttons; };

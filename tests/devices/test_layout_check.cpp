@@ -42,18 +42,18 @@ TEST_CASE("a profile for another device is told apart, line by line", "[layout_c
   const LineReader lines =
       find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
   REQUIRE(lines.size() == 13);  // no field agrees
-  CHECK(lines[0] == "input report 0x01: the profile says 64 bytes, the device 13");
+  CHECK(lines[0] == "input report 0x01: the profile has 64 bytes, the device 13");
   CHECK(lines[1] ==
-        "input report 0x01, checksum: the profile says 16 bits, unsigned, from byte 62; the device's report "
+        "input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the device's report "
         "ends with byte 12");
   CHECK(lines[2] ==
-        "input report 0x01, motors_on: the profile says 1 bit, unsigned, at byte 1; there the device has "
+        "input report 0x01, motors_on: the profile has 1 bit, unsigned, at byte 1; the device has "
         "01:30 (X), 16 bits, signed, from byte 1");
   CHECK(lines[6] ==
-        "input report 0x01, position[0]: the profile says 32 bits, signed, from byte 8; there the device has "
+        "input report 0x01, position[0]: the profile has 32 bits, signed, from byte 8; the device has "
         "01:33 (Rx), 16 bits, signed, from byte 7; 01:34 (Ry), 16 bits, signed, from byte 9; 01:35 (Rz), "
         "16 bits, signed, from byte 11");
-  CHECK(lines.back() == "output report 0x02: the device has none such; its output reports: 0x04");
+  CHECK(lines.back() == "output report 0x02: the device has no such report; its output reports: 0x04");
 }
 
 TEST_CASE("fields of a device agree where they are, as wide as they are, with their sign", "[layout_check]") {
@@ -123,12 +123,12 @@ TEST_CASE("report ids that the other side does not have are told", "[layout_chec
   const ExpectedReport with{ReportKind::input, 1, 65, {}}, without{ReportKind::input, {}, 64, {}};
   CHECK(find_differences(parsed(teensy_rawhid()), {without}).empty());
   CHECK(find_differences(parsed(teensy_rawhid()), {with}) ==
-        LineReader{"input report 0x01: the device has none such; its input reports: without an id"});
+        LineReader{"input report 0x01: the device has no such report; its input reports: without an id"});
   CHECK(find_differences(parsed(space_navigator()), {without}) ==
         LineReader{
-            "input report without an id: the device has none such; its input reports: 0x01, 0x02, 0x03"});
+            "input report without an id: the device has no such report; its input reports: 0x01, 0x02, 0x03"});
   CHECK(find_differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
-        LineReader{"output report without an id: the device has none such; it has no output report"});
+        LineReader{"output report without an id: the device has no such report; it has no output report"});
 }
 
 TEST_CASE("a report may be as short as is allowed, and one that need not be there may be absent",
@@ -200,8 +200,8 @@ TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_che
   CHECK(bad.exit_code == 1);
   CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with what " + source +
                        " says of its reports; change the profile, or name the device it is for:\n"
-                       "  input report 0x01: the profile says 64 bytes, the device 63\n"
-                       "  input report 0x01, checksum: the profile says 16 bits, unsigned, from byte 62; the "
+                       "  input report 0x01: the profile has 64 bytes, the device 63\n"
+                       "  input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the "
                        "device's report ends with byte 62\n");
 
   const ProgramResult scene = check(WRENCHD_SOURCE_DIR "/config/scenes/cube_on_table.toml", kReference);
@@ -210,7 +210,7 @@ TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_che
   const ProgramResult broken = check(profile, "05 01 c0");
   CHECK(broken.exit_code == 1);
   CHECK(broken.err ==
-        "wrenchctl: " + source + ": report descriptor, byte 2: ends a collection, and none is open\n");
+        "wrenchctl: " + source + ": report descriptor, byte 2: ends a collection, but none is open\n");
 }
 
 }  // namespace

@@ -98,7 +98,7 @@ TEST_CASE("what has no six axes is told apart, with the reason", "[six_axes]") {
     std::string why_not;
   };
   for (const Other& other : {
-           Other{boot_keyboard(), "it is no multi-axis controller (01:08); it wants to be 01:06 (keyboard)"},
+           Other{boot_keyboard(), "it is no multi-axis controller (01:08); its applications are 01:06 (keyboard)"},
            Other{effects_joystick(), "it wants to be 01:04 (joystick)"},  // though it has all six axes
            Other{teensy_rawhid(), "it wants to be ffab:200 (vendor defined)"},
            Other{controller("19 30 29 32 95 03 81 02"), "without Rx, Ry, Rz"},

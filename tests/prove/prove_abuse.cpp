@@ -410,10 +410,10 @@ int main(int argc, char** argv) {
     // Anybody's stop, in the middle of it.
     abusers.begin();
     std::this_thread::sleep_for(200ms);
-    const auto stop_asked = std::chrono::steady_clock::now();
+    const auto stop_requested = std::chrono::steady_clock::now();
     watcher.call("stop");
     const double stop_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_asked).count();
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_requested).count();
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");

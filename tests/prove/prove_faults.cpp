@@ -36,8 +36,8 @@ Outcome run(std::uint64_t seed) {
   }
   const auto ticks_of = [&](int n) {
     for (int i = 0; i < n && rig.violation().empty(); ++i) {
-      if (random.integer(0, 400) == 0) rig.loop.request(static_cast<CommandSet>(1 << random.integer(0, 7)));
-      if (random.integer(0, 40) == 0) rig.loop.heartbeat();
+      if (random.integer(0, 400) == 0) rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
+      if (random.integer(0, 40) == 0) rig.loop.requests().heartbeat();
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));
       if (rig.raised(Fault::device_lost)) {  // it is opened again, as the daemon does
@@ -62,8 +62,8 @@ Outcome run(std::uint64_t seed) {
   ticks_of(500);
   // All planned faults are over after six seconds at most; the device may have to be opened again.
   for (int i = 0; i < 9000 && rig.violation().empty() && rig.state() != State::disarmed; ++i) {
-    if (i % 500 == 0) rig.loop.request(kAcknowledge);
-    rig.loop.request(kDisarm);
+    if (i % 500 == 0) rig.loop.requests().request(kAcknowledge);
+    rig.loop.requests().request(kDisarm);
     rig.tick();
     if (!rig.raised(Fault::device_lost)) continue;
     try {

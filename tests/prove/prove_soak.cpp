@@ -118,7 +118,7 @@ int main(int argc, char** argv) {
   Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
                          plan.settings.limits.force_slew_N_per_s, plan.settings.limits.torque_slew_Nm_per_s,
                          1.0 / plan.settings.servo.rate_Hz, 0.004});
-  loop.arm();
+  loop.requests().arm();
   const auto ticks = static_cast<std::uint64_t>(minutes * 60.0 * plan.settings.servo.rate_Hz);
   long violations = 0, faults = 0, pages_after_a_minute = 0;
   std::uint64_t last_sequence = 0;
@@ -131,7 +131,7 @@ int main(int argc, char** argv) {
       const RealtimeGuard guard;
       clock.sleep_until(clock.now() + period);
       loop.tick(clock.now(), clock.now());
-      loop.latest_record().read(last);
+      loop.telemetry().latest_record().read(last);
       allocations += guard.allocations();
       locks += guard.locks();
     }

@@ -213,7 +213,7 @@ int main(int argc, char** argv) {
   int applied = 0, refused = 0, done = 0;
   // A hand that presses, before anything is changed.
   for (const TimePoint end = clock.now() + std::chrono::seconds(20); pushed == 0 && clock.now() < end;) {
-    if (station.loop().state() == State::disarmed) station.loop().arm();
+    if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   constexpr int kInARow = 250;
@@ -228,11 +228,11 @@ int main(int argc, char** argv) {
         const std::lock_guard lock(sums_mutex);
         if (number > 0) sums[number] = sum;
       }
-      if (station.loop().state() == State::disarmed) station.loop().arm();
-      if (is_latched(station.loop().state())) station.loop().acknowledge();
+      if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
+      if (is_latched(station.loop().telemetry().state())) station.loop().requests().acknowledge();
     }
     const Duration took = clock.now() - began;
-    while (station.loop().crossfading()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (station.loop().telemetry().crossfading()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     changing.store(false);
     std::this_thread::sleep_for(took);
   }

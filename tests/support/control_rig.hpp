@@ -177,16 +177,16 @@ class ControlRig {
   RigClient connect(TestUser who) const { return {path(), who}; }
   ServoLoop& loop() { return runtime_.runtime.loop(); }
   EventFeed& feed() { return feed_; }
-  State state() { return loop().state(); }
+  State state() { return loop().telemetry().state(); }
 
   /// A fault that the machine made, by letting the loop wait, is acknowledged; a stop is not.
   bool wait_for_state(State state, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     const auto end = std::chrono::steady_clock::now() + limit;
-    while (loop().state() != state && std::chrono::steady_clock::now() < end) {
-      if (loop().state() == State::fault) loop().acknowledge();
+    while (loop().telemetry().state() != state && std::chrono::steady_clock::now() < end) {
+      if (loop().telemetry().state() == State::fault) loop().requests().acknowledge();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    return loop().state() == state;
+    return loop().telemetry().state() == state;
   }
 
  private:

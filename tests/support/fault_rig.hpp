@@ -124,12 +124,12 @@ class FaultRig {
 
   RigClock clock;
   RunConfig config;
-  Scene scene;
+  std::shared_ptr<const Scene> scene;
   SimulatedDevice simulated;
   LoopbackLink link;
   ProfileDevice device;
   FaultyDevice faulty_device;
-  OverriddenProxyInitializer proxy_initializer;
+  std::shared_ptr<OverriddenProxyInitializer> proxy_initializer;
   ServoLoop loop;
 
  private:

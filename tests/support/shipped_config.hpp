@@ -44,7 +44,7 @@ struct VirtualRuntime : SimulatedRuntime<VirtualClock> {
   Fault tick_after(Duration pause) {
     clock.sleep_until(clock.now() + pause);
     const Fault fault = runtime.loop().tick(clock.now(), clock.now());
-    runtime.loop().latest_record().read(last);
+    runtime.loop().telemetry().latest_record().read(last);
     return fault;
   }
   /// Ticks until a fault, or for so long. Returns the fault.

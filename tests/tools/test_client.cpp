@@ -101,7 +101,7 @@ TEST_CASE("a client that dies fades out: its lease ends with its connection", "[
       return client.state() == "active";
     }));
   }
-  CHECK(soon([&] { return !is_driving(daemon.loop().state()); }));
+  CHECK(soon([&] { return !is_driving(daemon.loop().telemetry().state()); }));
   CHECK_FALSE(daemon.leased());
 }
 

@@ -136,7 +136,7 @@ TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wa
     arm.signal(SIGSTOP);
     CHECK(daemon.program.wait_for_output("gives no sign of life", std::chrono::seconds(5)));
   }
-  CHECK(daemon.program.wait_for_output("client_gone: ", std::chrono::seconds(5)));
+  CHECK(daemon.program.wait_for_output("heartbeat_lost: ", std::chrono::seconds(5)));
   CHECK(daemon.comes_to("disarmed"));
 }
 
@@ -146,10 +146,10 @@ TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
   const ProgramResult stop = daemon.ctl({"stop"});
   CHECK(stop.exit_code == 0);
   has(stop.out, "asked: stop; state stopped");
-  has(daemon.ctl({"status"}).out, "cause      stop_asked: ");
+  has(daemon.ctl({"status"}).out, "cause      stop_requested: ");
   const ProgramResult arm = daemon.ctl({"arm"});
   CHECK(arm.exit_code == 1);
-  has(arm.err, "It cannot be armed in state 'stopped': acknowledge what happened first.");
+  has(arm.err, "It cannot be armed in state 'stopped': acknowledge the fault or stop first.");
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 0);
   CHECK(daemon.comes_to("disarmed"));
 }

@@ -16,7 +16,7 @@ TEST_CASE("the list of faults has all of them, with what follows and what to do"
   CHECK_THAT(fault_text("overspeed"), Contains("state fault; in the same tick, no force in that tick"));
   CHECK_THAT(fault_text("sample_late"),
              Contains("state degraded; after 3 ms, within one tick, no force 10 ms later"));
-  CHECK_THAT(fault_text("client_gone"),
+  CHECK_THAT(fault_text("heartbeat_lost"),
              Contains("state releasing; after 100 ms, within one tick, no force 100 ms later"));
   CHECK_THAT(fault_text("overheated"), Contains("it is told, and the force stays"));
 }

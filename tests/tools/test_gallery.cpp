@@ -27,10 +27,6 @@ constexpr double kSeconds = 2.0;
 constexpr double kSeconds = 0.0;  // all of it
 #endif
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 /// That the tool has nothing in common with any obstacle, looked at in exact arithmetic.
 class Admissible {
  public:
@@ -90,7 +86,7 @@ void check_exhibit(const std::string& name) {
     if (static_cast<ProxyInitialization>(run.ticks[i].proxy_initialization) != ProxyInitialization::complete)
       continue;
     INFO("tick " << i);
-    CHECK(admissible.at(pose_of(run.ticks[i].X_WQ), run.scene_time_s[i]));
+    CHECK(admissible.at(pose_from_numbers(run.ticks[i].X_WQ), run.scene_time_s[i]));
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
   }
 

@@ -80,15 +80,15 @@ TEST_CASE("a SpaceNavigator has its profile, what it senses and drives, and why 
         "3-2, interface 0: 046d:c626 \"SpaceNavigator\" of 3Dconnexion, no serial number\n"
         "  /dev/hidraw2 can be opened\n"
         "  profile spacemouse_split: 3Dconnexion SpaceMouse family, translation and rotation in two reports: "
-        "moves a tool, feels nothing\n"
+        "steers a tool, no force\n"
         "  senses x y z rx ry rz; drives none: it moves a tool, and every wrench is dropped\n"
         "  its report descriptor agrees with the profile\n"
         "  the other profiles:\n"
         "    example, falcon, polhem, polhem_lpc1768, reference_full_speed, reference_high_speed: its ids do "
         "not include 046d:c626\n"
         "    loopback: it is for the simulated device\n"
-        "    spacemouse_combined: in-report 1 of the device has 7 bytes, that of the profile 13\n"
-        "    woodenhaptics: it is used only where the configuration names it\n");
+        "    spacemouse_combined: input report 1 of the device has 7 bytes, in the profile 13\n"
+        "    woodenhaptics: it is used only if the configuration names it\n");
 }
 
 TEST_CASE("a borrowed id does not hide how the device speaks", "[list_devices]") {
@@ -97,7 +97,7 @@ TEST_CASE("a borrowed id does not hide how the device speaks", "[list_devices]")
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
   CHECK(holds(text, "\n  its report descriptor agrees with the profile\n"));
   CHECK(
-      holds(text, "\n    spacemouse_split: in-report 1 of the device has 13 bytes, that of the profile 7\n"));
+      holds(text, "\n    spacemouse_split: input report 1 of the device has 13 bytes, in the profile 7\n"));
 }
 
 TEST_CASE("two equal devices are told apart by serial number, where they have one", "[list_devices]") {
@@ -144,7 +144,7 @@ TEST_CASE("devices of fewer degrees of freedom say what they lack", "[list_devic
   CHECK(holds(polhem, "\n  profile polhem: "));
   CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; of a wrench rx ry rz is dropped\n"));
   CHECK(holds(polhem, "\n  its report descriptor agrees with the profile\n"));
-  CHECK(holds(polhem, "\n    woodenhaptics: it is used only where the configuration names it\n"));
+  CHECK(holds(polhem, "\n    woodenhaptics: it is used only if the configuration names it\n"));
 
   UsbDevice falcon = hid(5, {0x0403, 0xcb48, 0, 0}, {}, "FALCON HAPTIC");
   falcon.hidraw_node.clear();
@@ -206,20 +206,20 @@ TEST_CASE("a device that may not be opened comes with the udev rule", "[list_dev
 }
 
 TEST_CASE("a profile that the device contradicts is told, line by line", "[list_devices]") {
-  // Its ids and its in-report are right; what it takes is a byte too short.
+  // Its ids and its input report are right; what it takes is a byte too short.
   const Bytes shorter = from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1e 91 02 c0");
   const std::string text = list({hid(1, {0x1209, 0x0001, 0xff00, 1}, shorter, "handle")});
   CHECK(
       holds(text,
             "\n  its report descriptor disagrees with the profile; change the profile, or it is for another "
-            "device:\n    output report 0x02: the profile says 32 bytes, the device 31\n    output report "
+            "device:\n    output report 0x02: the profile has 32 bytes, the device 31\n    output report "
             "0x02, "));
   Bytes cut = reference_descriptor();
   cut.pop_back();
   CHECK(
       holds(list({hid(1, {0x1209, 0x0001, 0xff00, 1}, cut, "handle")}),
-            "\n  its report descriptor is refused, so the profile could not be held against it: byte 30: "));
+            "\n  its report descriptor is invalid, so the profile could not be held against it: byte 30: "));
 }
 
 TEST_CASE("a controller that no profile knows is told how to get one", "[list_devices]") {
@@ -236,14 +236,14 @@ TEST_CASE("of a device with several interfaces those that matter are told", "[li
   CHECK(text.find("3-2, interface 1: ") == 0);
   CHECK_FALSE(holds(text, "interface 0"));
   CHECK(holds(list({keys, axes}, true),
-              "spacemouse_combined, spacemouse_split: the usage is 0006, the profile is for 0008"));
+              "spacemouse_combined, spacemouse_split: the usage is 0006, the profile requires 0008"));
 
   // The Teensy's other interface has the ids of the profile too, and comes first.
   UsbDevice console = hid(3, {0x16c0, 0x0486, 0xffc9, 4}, teensy_rawhid(), "RawHID");
   UsbDevice raw = hid(3, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID");
   raw.interface = 1;
   CHECK(list({console, raw}).find("3-3, interface 1: ") == 0);
-  CHECK(holds(list({console}), "    polhem: the usage page is ffc9, the profile is for ffab\n"));
+  CHECK(holds(list({console}), "    polhem: the usage page is ffc9, the profile requires ffab\n"));
 }
 
 TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") {

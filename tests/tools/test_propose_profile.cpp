@@ -322,10 +322,10 @@ TEST_CASE("whatever six axes a device has, a proposal with nothing left open loa
 TEST_CASE("what is no device for wrenchd gets no proposal", "[propose_profile]") {
   CHECK_THROWS_WITH(
       proposal(boot_keyboard()),
-      "a test: nothing to propose: it is no multi-axis controller (01:08); it wants to be 01:06 "
+      "a test: nothing to propose: it is no multi-axis controller (01:08); its applications are 01:06 "
       "(keyboard), and has no report of its maker's own; name another device");
   CHECK_THROWS_WITH(proposal(from_hex("05 01 c0")),
-                    "a test: report descriptor, byte 2: ends a collection, and none is open");
+                    "a test: report descriptor, byte 2: ends a collection, but none is open");
 }
 
 TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") {

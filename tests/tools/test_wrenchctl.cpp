@@ -848,7 +848,7 @@ fs::path scene_with_lift(const TemporaryDirectory& dir) {
               .exit_code == 0);
   return dir.write("scene.toml",
                    "[tool]\nmesh = \"cube.off\"\n[[obstacle]]\nname = \"lift\"\nmesh = \"cube.off\"\n"
-                   "position_m = [0, 0, -0.055]\nvelocity_m_per_s = [0, 0, 0.01]\nturn_back_after_s = 1\n");
+                   "position_m = [0, 0, -0.055]\nvelocity_m_per_s = [0, 0, 0.01]\nreverse_after_s = 1\n");
 }
 
 TEST_CASE("wrenchctl solve without --proxy leaves obstacles where they start, and says so", "[moving]") {

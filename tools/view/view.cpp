@@ -33,10 +33,6 @@ void serve(ViewServer& server, const ViewOptions& options) {
   server.run();
 }
 
-Pose pose_of(const PoseSettings& placed) {
-  return {rotation_from(placed.rotation_vector_rad), placed.position_m};
-}
-
 /// The scene of a recording, as it is inside.
 std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunConfig& plan) {
   MeshLoader meshes(cache_directory(),
@@ -52,8 +48,8 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunC
   const TickRecord& first = recording.ticks.front();
   description["scene_time_begins_ns"] =
       first.now_ns - std::llround(1e9 * static_cast<double>(first.tick) / plan.settings.servo.rate_Hz);
-  description["X_WB"] = pose_json(pose_of(device.base_in_world));
-  description["X_HT"] = pose_json(pose_of(device.tool_in_handle) * scene->tool().X_MT());
+  description["X_WB"] = pose_json(device.base_in_world.pose());
+  description["X_HT"] = pose_json(device.tool_in_handle.pose() * scene->tool().X_MT());
   description["wrench_about"] = plan.profile.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
   description["view"] = view_json(plan.settings.view);
   return std::make_shared<const ViewScene>(description, shapes.bytes());

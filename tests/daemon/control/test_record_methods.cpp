@@ -137,13 +137,13 @@ TEST_CASE("an emergency stop leaves a flight recording, which status and the eve
           "[recording][flight][program]") {
   const Daemon daemon;
   CHECK(daemon.ctl({"stop"}).exit_code == 0);
-  REQUIRE(daemon.wrenchd.wait_for_output("what led to stop_asked is in "));
+  REQUIRE(daemon.wrenchd.wait_for_output("what led to stop_requested is in "));
   const std::string err = daemon.wrenchd.err();
   CHECK(err.find("; what led to it: " + (daemon.recordings / "flight-").string()) != std::string::npos);
   const ProgramResult status = daemon.ctl({"status", "--json"});
   const auto last = nlohmann::json::parse(status.out)["recording"]["last_flight"].get<std::string>();
   CHECK(last.starts_with((daemon.recordings / "flight-").string()));
-  CHECK(last.ends_with("-stop_asked.h5"));
+  CHECK(last.ends_with("-stop_requested.h5"));
   CHECK(daemon.ctl({"status"}).out.find("last fault " + last) != std::string::npos);
   const Recording recording = read_recording(last);
   CHECK(recording.ticks.front().tick == 0);  // it had not run for a minute

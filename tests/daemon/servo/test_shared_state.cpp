@@ -207,7 +207,7 @@ TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][
   VirtualRuntime s;
   StateReader reader =
       reader_of(s.runtime.enable_shared_state(), s.runtime.reconfigurator().obstacle_names());
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   TickState tick;
   for (int i = 0; i < 2400; ++i) {
     REQUIRE(s.tick() == Fault::none);

@@ -67,7 +67,7 @@ TEST_CASE("the report descriptor decides between split and combined, not the id"
   by_hand.input_reports = {{1, 13}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_combined");
   CHECK(why_not(by_hand, "spacemouse_split") ==
-        "in-report 1 of the device has 13 bytes, that of the profile 7");
+        "input report 1 of the device has 13 bytes, in the profile 7");
   by_hand.input_reports = {{1, 7}, {2, 7}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_split");
 
@@ -79,7 +79,7 @@ TEST_CASE("the report descriptor decides between split and combined, not the id"
   old.input_reports = {{1, 7}, {3, 7}};
   CHECK(matched(old).empty());
   CHECK(why_not(old, "spacemouse_split") ==
-        "in-report 2 of the profile is not in the device's report descriptor");
+        "input report 2 of the profile is not in the device's report descriptor");
 }
 
 TEST_CASE("a device without ids is told by the length of its report", "[match_profile]") {
@@ -99,17 +99,17 @@ TEST_CASE("every profile that does not match says why", "[match_profile]") {
   CHECK(why_not(stranger, "falcon") == "its ids do not include 1d50:6018");
   CHECK(why_not(stranger, "loopback") == "it is for the simulated device");
   CHECK(why_not(plugged(0x16c0, 0x0486, 0xff00, 1), "polhem") ==
-        "the usage page is ff00, the profile is for ffab");
+        "the usage page is ff00, the profile requires ffab");
   CHECK(why_not(plugged(0x16c0, 0x0486, 0xffab, 1), "polhem") ==
-        "the usage is 0001, the profile is for 0200");
+        "the usage is 0001, the profile requires 0200");
   DeviceIdentity unread;
   unread.id = {0x16c0, 0x0486};
-  CHECK(why_not(unread, "polhem") == "the usage page is not known, the profile is for ffab");
+  CHECK(why_not(unread, "polhem") == "the usage page is not known, the profile requires ffab");
 }
 
 TEST_CASE("a profile that shares its ids is used only where the configuration names it", "[match_profile]") {
   const DeviceIdentity board = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
-  CHECK(why_not(board, "woodenhaptics") == "it is used only where the configuration names it");
+  CHECK(why_not(board, "woodenhaptics") == "it is used only if the configuration names it");
   CHECK(matched(board, "woodenhaptics") == "woodenhaptics");
   CHECK(matched(board, "falcon").empty());
 }

@@ -340,7 +340,7 @@ TEST_CASE("a Falcon that cannot be started is given up with a reason", "[emulato
   EmulatedFalcon dead;
   dead.ignore_handshakes(1'000'000);
   CHECK_THROWS_WITH(falcon_start(dead, firmware, 2),
-                    Contains("its loader does not answer") && Contains("2 tries"));
+                    Contains("its boot loader does not answer") && Contains("2 tries"));
   EmulatedFalcon deaf;
   deaf.corrupt_firmware_echoes(1'000'000);
   CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("came back wrong"));

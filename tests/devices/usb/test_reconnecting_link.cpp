@@ -48,7 +48,7 @@ std::string refusal(ReconnectingLink& link) {
 TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
   MockMachine machine;
   ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
-  CHECK(refusal(link) == "no device of profile reference is plugged in");
+  CHECK(refusal(link) == "no device of profile reference is connected");
   std::array<std::uint8_t, 64> buffer{};
   CHECK(link.read(now(), buffer).status == LinkStatus::disconnected);
   CHECK(link.write(now(), buffer) == LinkStatus::disconnected);

@@ -37,7 +37,7 @@ struct Rig {
                   }};
 
   Rig() {
-    soon([this] { return daemon.loop().state() == State::disarmed; });
+    soon([this] { return daemon.loop().telemetry().state() == State::disarmed; });
   }
   bool was_told(std::uint64_t page, const std::string& what, bool done) {
     return soon([&] {
@@ -51,7 +51,7 @@ struct Rig {
   void live(std::uint64_t page, std::chrono::milliseconds time) {
     for (const auto end = std::chrono::steady_clock::now() + time; std::chrono::steady_clock::now() < end;) {
       lease.heartbeat(page);
-      lease.set_loop_state(name(daemon.loop().state()));
+      lease.set_loop_state(name(daemon.loop().telemetry().state()));
       std::this_thread::sleep_for(16ms);
     }
   }
