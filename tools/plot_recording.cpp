@@ -33,17 +33,13 @@ double time_s(const Recording& recording, const TickRecord& tick) {
   return 1e-9 * static_cast<double>(tick.now_ns - recording.ticks.front().now_ns);
 }
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 double norm(const std::array<double, 6>& F, std::size_t from) {
   return std::hypot(F[from], F[from + 1], F[from + 2]);
 }
 
 /// Returns the distance [mm] and the angle [deg] between p and q; NaN if q is not valid.
 std::array<double, 2> penetration(const TickRecord& tick) {
-  const Pose p = pose_of(tick.X_WP), q = pose_of(tick.X_WQ);
+  const Pose p = pose_from_numbers(tick.X_WP), q = pose_from_numbers(tick.X_WQ);
   return {1e3 * (q.translation_m - p.translation_m).norm(),
           180.0 / std::numbers::pi * rotation_vector(p.rotation.conjugate() * q.rotation).norm()};
 }

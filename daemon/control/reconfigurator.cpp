@@ -11,8 +11,8 @@
 #include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/setting_table.hpp"
 #include "core/finite.hpp"
-#include "daemon/control/setting_keys.hpp"
 
 namespace wrenchd {
 namespace {
@@ -71,16 +71,6 @@ std::vector<std::string> names_of(const Scene& scene) {
   std::vector<std::string> names;
   for (std::uint32_t i = 0; i < scene.obstacle_count(); ++i) names.push_back(obstacle_name(scene, i));
   return names;
-}
-
-double value_of(const Settings& settings, const char* name) {
-  const LimitSettings& limits = settings.limits;
-  const std::string_view key(name);
-  if (key == "limits.max_force_N") return limits.max_force_N;
-  if (key == "limits.max_torque_Nm") return limits.max_torque_Nm;
-  if (key == "limits.force_slew_N_per_s") return limits.force_slew_N_per_s;
-  if (key == "limits.torque_slew_Nm_per_s") return limits.torque_slew_Nm_per_s;
-  return limits.soft_start_s;
 }
 
 }  // namespace
@@ -187,7 +177,9 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
 /// Until nothing is on its way into the loop any more, so that an obstacle cannot have set out before it is
 /// followed. A loop that does not tick has no hand in it, and need not be waited for.
 void Reconfigurator::wait_until_idle() {
-  const auto quiet = [this] { return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading(); };
+  const auto quiet = [this] {
+    return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading();
+  };
   if (quiet()) return;
   const auto busy = [] {
     throw BusyError("another change is on its way to the hand; ask again in a moment");
@@ -331,30 +323,31 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   Settings configured = file_settings_;  // and as far as it comes from files
   bool needs_rendering = false, limits_changed = false;
   const bool armed = loop_.telemetry().state() == State::waiting || is_driving(loop_.telemetry().state());
-  for (const SettingKey& key : setting_keys()) {
-    if (key.same(plan.settings, file_settings_)) continue;
-    if (key.effect == SettingKey::Effect::restart) {
-      result.not_applied.push_back(std::string(key.name) + ": takes a restart");
+  for (const Setting& setting : setting_table()) {
+    if (setting.effect == Setting::Effect::scene || setting.effect == Setting::Effect::none) continue;
+    if (setting.equal(plan.settings, file_settings_)) continue;
+    if (setting.effect == Setting::Effect::restart) {
+      result.not_applied.push_back(setting.name() + ": takes a restart");
       continue;
     }
     Settings wanted = settings;
-    key.copy(plan.settings, wanted);
-    if (key.effect == SettingKey::Effect::limits) {
+    setting.copy(plan.settings, wanted);
+    if (setting.effect == Setting::Effect::limits) {
       Settings allowed = wanted;
       if (armed) allowed.limits = tighter(settings.limits, wanted.limits, config_.profile);
-      if (!key.same(allowed, wanted)) {
-        result.not_applied.push_back(std::string(key.name) + ": is looser than " +
-                                     to_text(value_of(settings, key.name)) +
+      if (!setting.equal(allowed, wanted)) {
+        result.not_applied.push_back(setting.name() + ": is looser than " +
+                                     to_text(setting.number(settings)) +
                                      ", which holds as long as the loop is armed; disarm, and reload again");
         continue;
       }
       limits_changed = true;
-    } else if (key.effect == SettingKey::Effect::new_rendering) {
+    } else if (setting.effect == Setting::Effect::new_rendering) {
       needs_rendering = true;
     }
     settings = wanted;
-    key.copy(plan.settings, configured);
-    result.applied.emplace_back(key.name);
+    setting.copy(plan.settings, configured);
+    result.applied.emplace_back(setting.name());
   }
   if (plan.settings.device.profile == file_settings_.device.profile &&
       contents(plan.settings.device.profile_file) != profile_text_)
@@ -413,17 +406,14 @@ Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
 Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
   const HandlePose seen = loop_.telemetry().handle_pose();
-  const auto pose_of = [](const PoseSettings& placed) {
-    return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
-  };
   const DeviceSettings& device = config_.settings.device;
   // The view is of the scene that the configuration names: of one that a client has loaded nobody has said.
   const bool configured = config_.settings.scene == file_settings_.scene;
   return {scene_,
           rendering_id_,
           seen.at - from_seconds(seen.scene_time_s),
-          pose_of(device.base_in_world),
-          pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
+          device.base_in_world.pose(),
+          device.tool_in_handle.pose() * scene_->tool().X_MT(),
           config_.profile.wrench_point,
           configured ? config_.settings.view : ViewSettings{}};
 }

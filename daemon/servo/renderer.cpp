@@ -13,10 +13,6 @@ namespace {
 constexpr double kContactFadeOut_s = 0.050;
 constexpr double kContactFadeIn_s = 0.100;
 
-Pose pose_of(const PoseSettings& settings) noexcept {
-  return {rotation_from(settings.rotation_vector_rad), settings.position_m};
-}
-
 }  // namespace
 
 Renderer::Renderer(const Settings& settings, const DeviceProfile& profile,
@@ -26,8 +22,8 @@ Renderer::Renderer(const Settings& settings, const DeviceProfile& profile,
       driven_(driven_dofs(profile)),
       recentre_button_(button_bit(profile.recentre_button)),
       crossfade_(std::move(rendering), exchange),
-      workspace_(pose_of(settings.device.base_in_world)),
-      gravity_(profile.masses, pose_of(settings.device.base_in_world).rotation),
+      workspace_(settings.device.base_in_world.pose()),
+      gravity_(profile.masses, settings.device.base_in_world.pose().rotation),
       stability_(settings, profile, active().stability()) {
   invalidate_proxy({});
 }

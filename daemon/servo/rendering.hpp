@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "collision/touch.hpp"
 #include "collision/penetration.hpp"
 #include "collision/scene.hpp"
+#include "collision/touch.hpp"
 #include "config/settings.hpp"
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"

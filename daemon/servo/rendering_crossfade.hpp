@@ -16,38 +16,37 @@ namespace wrenchd {
 /// If the search finds no feasible pose, the wrench fades to zero. The fade takes at least kMinFade_s and is
 /// no faster than the force rise after arming. daemon/servo/README.md, section "Renderings".
 ///
-/// All methods except exchange() belong to the servo thread.
+/// Belongs to the servo thread. All members except constructor and destructor are RT-safe.
 class RenderingCrossfade {
  public:
   static constexpr double kMinFade_s = 0.100;
 
-  /// Makes `first` the active rendering. RT-safe.
-  explicit RenderingCrossfade(std::unique_ptr<Rendering> first) : active_(std::move(first)) {}
+  /// first: active from the start. exchange: where another thread offers renderings; it must outlive this
+  /// object. Not RT-safe: for set-up.
+  RenderingCrossfade(std::unique_ptr<Rendering> first, RenderingExchange& exchange)
+      : exchange_(exchange), active_(std::move(first)) {}
   /// Destroys both renderings. Not RT-safe: frees memory.
   ~RenderingCrossfade() = default;
 
-  /// Returns the exchange through which another thread offers renderings and destroys retired ones. RT-safe.
-  RenderingExchange& exchange() noexcept { return exchange_; }
-
-  /// Returns the active rendering. During a cross-fade this is the outgoing one. RT-safe.
+  /// Returns the active rendering. During a cross-fade this is the outgoing one.
   Rendering& active() noexcept { return *active_; }
-  const Rendering& active() const noexcept { return *active_; }  ///< RT-safe.
-  /// Returns the incoming rendering; null if no change is under way. RT-safe.
+  const Rendering& active() const noexcept { return *active_; }
+  /// Returns the incoming rendering; null if no change is under way.
   Rendering* next() noexcept { return next_.get(); }
-  const Rendering* next() const noexcept { return next_.get(); }  ///< RT-safe.
+  const Rendering* next() const noexcept { return next_.get(); }
 
   enum class Change : std::uint8_t {
     none,
     next_arrived,  ///< next() is new. The caller must set its stiffness scale.
     switched       ///< The former next() is now active().
   };
-  /// Takes an offered rendering and completes a finished cross-fade. force: true if force may act on the
-  /// hand; otherwise the change is immediate. Call once per tick, before project(). RT-safe.
+  /// Takes an offered rendering and completes a finished cross-fade. driving: true if force may act on the
+  /// hand; otherwise the change is immediate. Call once per tick, before project().
   Change update(bool driving) noexcept;
 
-  /// Calls Rendering::project() for both renderings. Returns false if either proxy is trapped. RT-safe.
+  /// Calls Rendering::project() for both renderings. Returns false if either proxy is trapped.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
-  /// Calls Rendering::compute_wrench() for both renderings. RT-safe.
+  /// Calls Rendering::compute_wrench() for both renderings.
   void compute_wrench(double dt_s) noexcept;
 
   /// Bounds the rate of the cross-fade: a change of max_force_N or max_torque_Nm takes rise_time_s.
@@ -56,30 +55,30 @@ class RenderingCrossfade {
     double max_torque_Nm;
     double rise_time_s;
   };
-  /// Advances the weight by dt_s and returns (1 - w) F_active + w F_next. RT-safe.
+  /// Advances the weight by dt_s and returns (1 - w) F_active + w F_next.
   Wrench blend(const Wrench& F_active, const Wrench& F_next, const FadeLimits& limits, double dt_s) noexcept;
-  /// Returns w, the weight of next() in the blend, 0 to 1. RT-safe.
+  /// Returns w, the weight of next() in the blend, 0 to 1.
   double next_weight() const noexcept { return next_weight_; }
-  /// Returns the weighted sum of the energies stored in the springs [J]. RT-safe.
+  /// Returns the weighted sum of the energies stored in the springs [J].
   double stored_energy_J() const noexcept;
-  /// Returns the change of stored energy that the weight change of the last blend() caused [J]. RT-safe.
+  /// Returns the change of stored energy that the weight change of the last blend() caused [J].
   double crossfade_work_J() const noexcept { return crossfade_work_J_; }
-  /// Returns the weighted sum of the work of moving obstacles in this tick [J]. RT-safe.
+  /// Returns the weighted sum of the work of moving obstacles in this tick [J].
   double obstacle_work_J() const noexcept;
-  /// Returns true if a rendering with a weight above zero is in contact. RT-safe.
+  /// Returns true if a rendering with a weight above zero is in contact.
   bool in_contact() const noexcept;
 
-  /// Resets the wrench laws of both renderings, for use after a gap of unknown length. RT-safe.
+  /// Resets the wrench laws of both renderings, for use after a gap of unknown length.
   void reset_law() noexcept;
   /// Ends a cross-fade at once, then invalidates the proxy of the active rendering. Returns true if the
-  /// active rendering changed. RT-safe.
+  /// active rendering changed.
   bool invalidate_proxy() noexcept;
 
  private:
   void switch_to_next() noexcept;
   bool fading() const noexcept;
 
-  RenderingExchange exchange_;
+  RenderingExchange& exchange_;
   std::unique_ptr<Rendering> active_;
   std::unique_ptr<Rendering> next_;
   double next_weight_ = 0.0;

@@ -79,11 +79,11 @@ double mean(const MethodTiming& result) {
 struct Tables {
   Table times{"meshes: time of one pose [us]",
               {"p50", "p99", "p99.9", "max", "p99 / p50", "max / p50", "spread %", "verdict"}};
-  Table ratios{"meshes: peer's p50 / ours",
+  Table ratios{"meshes: peer's p50 / wrenchd's",
                {"to all pairs", "to the whole tick", "p99 to the whole tick", "verdict"}};
   Table answers{
-      "meshes: what is found",
-      {"poses", "contacts a pose", "wrong at", "of", "overlapping at q", "unconverged", "worst KKT"}};
+      "meshes: results",
+      {"poses", "contacts per pose", "wrong at", "of", "overlapping at q", "unconverged", "worst KKT"}};
 };
 
 std::string us(double ns) {
@@ -170,7 +170,7 @@ std::vector<Table> bench_meshes(const Effort& effort, const CounterScale& scale,
 }
 
 Table bench_growth(const Effort& effort, const CounterScale& scale) {
-  Table table("growth: a tool of 10k triangles on a boulder of so many [us]",
+  Table table("growth: a tool of 10k triangles on a boulder with N triangles [us]",
               {"triangles", "p50", "p99", "max"});
   for (const std::size_t triangles : {2000, 6000, 20000, 60000, 200000, 600000, 2000000}) {
     if (effort.quick && triangles > 6000) break;

@@ -97,14 +97,15 @@ Tally handle(const ManipulationCase& handling, long poses, std::uint64_t seed, c
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
-      "prove_proxy: does the proxy ever overlap anything? Every pose is looked at in exact arithmetic.");
+  CLI::App app("prove_proxy: checks in exact arithmetic that the proxy overlaps no obstacle.");
   long poses = 1000;
   std::uint64_t seed = 1;
   std::string only;
-  app.add_option("--poses", poses, "in each scene")->check(CLI::Range(1L, 100000000L))->capture_default_str();
-  app.add_option("--seed", seed, "of the hand")->capture_default_str();
-  app.add_option("--only", only, "scenes with this in their name");
+  app.add_option("--poses", poses, "number of poses per scene")
+      ->check(CLI::Range(1L, 100000000L))
+      ->capture_default_str();
+  app.add_option("--seed", seed, "seed of the hand's motion")->capture_default_str();
+  app.add_option("--only", only, "runs only scenes whose name contains this text");
   bool moving = false;
   app.add_flag("--moving", moving, "the obstacles move too, at random");
   CLI11_PARSE(app, argc, argv);

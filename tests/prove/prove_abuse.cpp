@@ -59,7 +59,7 @@ OwnedFd connected(const fs::path& path) {
 }
 
 /// Sends as many bytes as possible without a long wait. Returns false if the peer is gone.
-bool push(int fd, const std::string& bytes) {
+bool send_bytes(int fd, const std::string& bytes) {
   for (std::size_t sent = 0; sent < bytes.size();) {
     const ssize_t more = ::send(fd, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (more > 0) {
@@ -87,20 +87,20 @@ void floods_requests(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   std::string many;
   for (int i = 0; i < 50; ++i) many += request("describe");
-  while (wanted && fd && push(fd.get(), many)) drain(fd.get());
+  while (wanted && fd && send_bytes(fd.get(), many)) drain(fd.get());
 }
 
 void never_reads(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   const std::string line = request("subscribe") + request("status") + request("describe");
-  while (wanted && fd && push(fd.get(), line)) {
+  while (wanted && fd && send_bytes(fd.get(), line)) {
   }
 }
 
 void floods_rubbish(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   const std::string rubbish = std::string(40000, '[') + "\n{\"jsonrpc\":\"2.0\",\n\xff\xfe\n";
-  while (wanted && fd && push(fd.get(), rubbish)) drain(fd.get());
+  while (wanted && fd && send_bytes(fd.get(), rubbish)) drain(fd.get());
 }
 
 void endless_line(const fs::path& path, const std::atomic<bool>& wanted) {
@@ -108,7 +108,7 @@ void endless_line(const fs::path& path, const std::atomic<bool>& wanted) {
   while (wanted) {
     const OwnedFd fd = connected(path);
     if (!fd) return;
-    for (int i = 0; i < 1600 && wanted && push(fd.get(), piece); ++i) {
+    for (int i = 0; i < 1600 && wanted && send_bytes(fd.get(), piece); ++i) {
     }
   }
 }
@@ -125,7 +125,7 @@ void connects(const fs::path& path, const std::atomic<bool>& wanted) {
 void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   const std::string line = request("devices") + request("arm") + request("beat") + request("lease.give");
-  while (wanted && fd && push(fd.get(), line)) drain(fd.get());
+  while (wanted && fd && send_bytes(fd.get(), line)) drain(fd.get());
 }
 
 constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
@@ -290,7 +290,7 @@ class Holder {
   double worst_ms() const { return 1e-6 * static_cast<double>(worst_.count()); }
   long lost() const { return lost_; }
   /// Returns the number of leases lost although every heartbeat, including its answer, was in time.
-  long wronged() const { return wronged_; }
+  long lost_in_time() const { return wronged_; }
 
  private:
   static constexpr auto kTooLong = 80ms;  ///< the lease allows 100 ms, and the daemon shares the machine
@@ -335,23 +335,23 @@ std::int64_t now_ns() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("prove_abuse: does abuse of the control socket reach the servo loop?");
+  CLI::App app("prove_abuse: measures how abuse of the control socket affects the servo loop.");
   long slices = 10;
   double slice_s = 1.0;
   std::uint64_t seed = 1;
   int threads = 12;
   std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "wrenchd").string();
-  app.add_option("--slices", slices, "rounds of a quiet, a busy and an abused slice")
+  app.add_option("--slices", slices, "number of rounds with an idle, a busy and an abused slice each")
       ->check(CLI::Range(1L, 1000000L))
       ->capture_default_str();
-  app.add_option("--slice-s", slice_s, "how long each is")
+  app.add_option("--slice-s", slice_s, "duration of a slice [s]")
       ->check(CLI::Range(0.1, 60.0))
       ->capture_default_str();
-  app.add_option("--threads", threads, "that abuse at the same time")
+  app.add_option("--threads", threads, "number of abusing threads")
       ->check(CLI::Range(1, 200))
       ->capture_default_str();
-  app.add_option("--seed", seed, "of the order in a round")->capture_default_str();
-  app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
+  app.add_option("--seed", seed, "seed of the order within a round")->capture_default_str();
+  app.add_option("--wrenchd", program, "path of the daemon")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
     const test::TemporaryDirectory files;
@@ -409,14 +409,14 @@ int main(int argc, char** argv) {
     // An emergency stop by an unprivileged user during the abuse.
     abusers.begin();
     std::this_thread::sleep_for(200ms);
-    const auto stop_asked = std::chrono::steady_clock::now();
+    const auto stop_requested = std::chrono::steady_clock::now();
     watcher.call("stop");
     const double stop_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_asked).count();
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_requested).count();
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");
-    if (holder.wronged() > 0) violation("a holder that beat in time lost the lease");
+    if (holder.lost_in_time() > 0) violation("a holder that beat in time lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
 
     std::array<Times, kKinds> times;

@@ -31,12 +31,13 @@ Outcome run(std::uint64_t seed) {
   const State state =
       states[static_cast<std::size_t>(random.integer(0, static_cast<int>(states.size()) - 1))];
   if (!rig.bring_to(state)) {
-    outcome.broken = "does not come to its state";
+    outcome.broken = "does not reach its state";
     return outcome;
   }
   const auto ticks_of = [&](int n) {
     for (int i = 0; i < n && rig.violation().empty(); ++i) {
-      if (random.integer(0, 400) == 0) rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
+      if (random.integer(0, 400) == 0)
+        rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
       if (random.integer(0, 40) == 0) rig.loop.requests().heartbeat();
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));
@@ -73,7 +74,7 @@ Outcome run(std::uint64_t seed) {
   }
   outcome.broken = rig.violation();
   if (outcome.broken.empty() && rig.state() != State::disarmed)
-    outcome.broken = std::string("does not come back: ") + name(rig.state());
+    outcome.broken = std::string("does not recover: ") + name(rig.state());
   outcome.ticks = rig.last().tick + 1;
   return outcome;
 }
@@ -81,7 +82,7 @@ Outcome run(std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Random schedules of faults, each tick held against the invariants.");
+  CLI::App app("Random schedules of faults; checks every tick against the invariants.");
   long schedules = 1000;
   std::uint64_t seed = 1;
   app.add_option("--schedules", schedules)->check(CLI::PositiveNumber);

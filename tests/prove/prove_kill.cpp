@@ -418,19 +418,20 @@ std::string beside_this_program(const char* name) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "prove_kill: is the hand free in time when the daemon is killed, crashes, is stopped or stuck? The "
-      "device "
-      "lives on in\n"
-      "this process.");
+      "prove_kill: checks that the force ends in time when the daemon is killed, crashes, is stopped or "
+      "hangs.\n"
+      "This process emulates the device.");
   long kills = 10;
   std::uint64_t seed = 1;
   std::string profile = "loopback";
   std::string program = beside_this_program("wrenchd");
-  app.add_option("--kills", kills, "how many")->check(CLI::Range(1L, 100000000L))->capture_default_str();
-  app.add_option("--seed", seed, "of the instants and the signals")->capture_default_str();
-  app.add_option("--profile", profile, "of the emulated device: one that sends whole poses")
+  app.add_option("--kills", kills, "number of kills")
+      ->check(CLI::Range(1L, 100000000L))
       ->capture_default_str();
-  app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
+  app.add_option("--seed", seed, "seed of the instants and signals")->capture_default_str();
+  app.add_option("--profile", profile, "profile of the emulated device, whose reports contain complete poses")
+      ->capture_default_str();
+  app.add_option("--wrenchd", program, "path of the daemon")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   const rlimit no_core{0, 0};  // the daemon crashes on purpose
   setrlimit(RLIMIT_CORE, &no_core);

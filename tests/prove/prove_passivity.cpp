@@ -426,33 +426,34 @@ std::uint64_t seed_of(std::uint64_t seed, long n) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("prove_passivity: does contact ever give energy to the hand? A ledger on the plant.");
+  CLI::App app(
+      "prove_passivity: checks on the continuous plant that contact supplies no energy to the hand.");
   Options options;
   bool tell = false;
   app.add_option("--trajectories", options.trajectories)
       ->check(CLI::Range(1L, 100000000L))
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "of the first; each of the others has the next")
+  app.add_option("--seed", options.seed,
+                 "seed of the first trajectory; each further trajectory has the next seed")
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "of each, in the hand's time")
+  app.add_option("--seconds", options.seconds, "duration of a trajectory [s]")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
   app.add_option("--times-bound", options.times_bound,
-                 "stiffness, in the bound's; 0: half of it to all of it")
+                 "stiffness as a multiple of the bound; 0: random from 0.5 to 1")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_flag("--guard", options.guarded, "with the passivity guard");
-  app.add_flag("--pid", options.pid, "the law of Eq. (16), not the energy law");
+  app.add_flag("--guard", options.guarded, "enables the passivity guard");
+  app.add_flag("--pid", options.pid, "law of Eq. (16) instead of the energy law");
   app.add_option("--friction", options.friction,
-                 "of the device, viscous: N.s/m and N.m.s/rad; without it that of the simulated device as it "
-                 "is shipped")
+                 "viscous friction of the device [N.s/m, N.m.s/rad]; default: the shipped simulated device")
       ->expected(2)
       ->check(CLI::Range(0.01, 100.0) | CLI::Range(0.0001, 1.0));
   app.add_option("--angular-share", options.angular_share,
-                 "with --pid: angular stiffness, in the one that the tool's inertia gives")
+                 "with --pid: angular stiffness relative to the one of the tool's inertia")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_flag("--tell", tell, "each violation with its circumstances");
+  app.add_flag("--tell", tell, "prints the parameters of each violation");
   CLI11_PARSE(app, argc, argv);
 
   const Scene floor = scene_of(false), posted = scene_of(true);

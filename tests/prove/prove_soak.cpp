@@ -102,11 +102,11 @@ class HeldHandle final : public ReportLink {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Hours of the shipped scene in virtual time.");
+  CLI::App app("Runs the shipped scene for hours in virtual time.");
   double minutes = 5.0;
-  app.add_option("--minutes", minutes, "of virtual time")->check(CLI::PositiveNumber);
+  app.add_option("--minutes", minutes, "duration in virtual time [min]")->check(CLI::PositiveNumber);
   std::uint64_t seed = 1;
-  app.add_option("--seed", seed, "unused: every run is the same");
+  app.add_option("--seed", seed, "unused: all runs are equal");
   CLI11_PARSE(app, argc, argv);
   const RunConfig plan = shipped_config();
   VirtualClock clock;

@@ -131,7 +131,7 @@ class Asker {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Changes what is rendered, many times and half of them wrong, while the real loop runs.");
+  CLI::App app("Changes the rendering many times, half of the changes invalid, while the real loop runs.");
   int changes = 10000;
   std::uint64_t seed = 1;
   app.add_option("--changes", changes)->capture_default_str()->check(CLI::Range(10, 10000000));
@@ -141,7 +141,7 @@ int main(int argc, char** argv) {
   const test::TemporaryDirectory directory;
   const RunConfig plan = plan_of();
   for (const RealtimeGrant& grant : lock_memory(plan.settings.servo.realtime))
-    std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.request.c_str());
+    std::printf("%s: %s\n", grant.granted ? "granted" : "denied", grant.request.c_str());
   WallClock clock;
   SimulatedDevice simulated(plan.profile, plan.settings.simulation);
   LoopbackLink link(simulated, clock, plan.settings.simulation);
@@ -172,7 +172,7 @@ int main(int argc, char** argv) {
   std::atomic<bool> stop{false};
   std::thread servo([&] {
     for (const RealtimeGrant& grant : prepare_servo_thread(plan.settings.servo))
-      std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.request.c_str());
+      std::printf("%s: %s\n", grant.granted ? "granted" : "denied", grant.request.c_str());
     station.loop().run(clock, stop);
   });
   std::thread watcher([&] {
@@ -232,7 +232,8 @@ int main(int argc, char** argv) {
       if (is_latched(station.loop().telemetry().state())) station.loop().requests().acknowledge();
     }
     const Duration took = clock.now() - began;
-    while (station.loop().telemetry().crossfading()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (station.loop().telemetry().crossfading())
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     changing.store(false);
     std::this_thread::sleep_for(took);
   }

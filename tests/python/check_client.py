@@ -31,8 +31,8 @@ def insist_on_arming(client):
     if state == "disarmed":
         try:
             client.arm()
-        except wrenchd.Refused as refused:  # so busy that a beat came too late
-            assert refused.code == wrenchd.Refused.NOT_NOW, refused
+        except wrenchd.Rejected as refused:  # so busy that a beat came too late
+            assert refused.code == wrenchd.Rejected.INVALID_STATE, refused
             client.call("lease.take")
 
 
@@ -72,13 +72,13 @@ class Commands(unittest.TestCase):
         self.assertTrue(soon(lambda: rests(self.client)))
 
     def test_lease_arm_and_stop(self):
-        with self.assertRaises(wrenchd.Refused) as refused:
+        with self.assertRaises(wrenchd.Rejected) as refused:
             self.client.arm()
-        self.assertEqual(refused.exception.code, wrenchd.Refused.NOT_NOW)
+        self.assertEqual(refused.exception.code, wrenchd.Rejected.INVALID_STATE)
         with self.client.lease():
-            with wrenchd.Client() as other, self.assertRaises(wrenchd.Refused) as refused:
+            with wrenchd.Client() as other, self.assertRaises(wrenchd.Rejected) as refused:
                 other.lease()
-            self.assertEqual(refused.exception.code, wrenchd.Refused.TAKEN)
+            self.assertEqual(refused.exception.code, wrenchd.Rejected.LEASE_HELD)
 
             def active():
                 insist_on_arming(self.client)
@@ -101,15 +101,15 @@ class Commands(unittest.TestCase):
 
         def free():
             try:
-                self.client.lease().give()
+                self.client.lease().release()
                 return True
-            except wrenchd.Refused:
+            except wrenchd.Rejected:
                 return False
 
         self.assertTrue(soon(free))
 
     def test_refusals_have_a_sentence(self):
-        with self.assertRaisesRegex(wrenchd.Refused, "dance"):
+        with self.assertRaisesRegex(wrenchd.Rejected, "dance"):
             self.client.call("dance")
         self.assertIn("state", self.client.status())
 
@@ -154,11 +154,11 @@ class ReadsState(unittest.TestCase):
         first = self.state.next().tick
         written = self.state._written
         slots = self.state._layout.slots
-        self.assertTrue(soon(lambda: self.state.behind > slots + 10))
+        self.assertTrue(soon(lambda: self.state.unread > slots + 10))
         second = self.state.next().tick
         self.assertEqual(second - first, self.state.missed + 1)
         self.assertGreater(self.state.missed, slots // 2)
-        self.assertLess(self.state.behind, slots)
+        self.assertLess(self.state.unread, slots)
         self.assertGreater(written(), slots)
 
     def test_a_record_that_is_written_over_while_it_is_copied_is_not_taken(self):
@@ -210,7 +210,7 @@ class ReadsState(unittest.TestCase):
 
 class Names(unittest.TestCase):
     def test_each_rendering_has_its_own_and_the_daemon_is_asked_once(self):
-        answers = [{"rendering_id": 4, "obstacles": ["bolt"]}, wrenchd.Gone("gone"), {"rendering_id": 7, "obstacles": []}]
+        answers = [{"rendering_id": 4, "obstacles": ["bolt"]}, wrenchd.Disconnected("gone"), {"rendering_id": 7, "obstacles": []}]
         asked = []
 
         def ask():
@@ -239,15 +239,15 @@ class Unhappy(unittest.TestCase):
         client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"result":{"state":"disarmed"}}\n').path)
         self.assertEqual(client.status(), {"state": "disarmed"})
         for _ in range(3):
-            with self.assertRaises(wrenchd.Gone):
+            with self.assertRaises(wrenchd.Disconnected):
                 client.status()
-        with self.assertRaises(wrenchd.Gone):
+        with self.assertRaises(wrenchd.Disconnected):
             client.event()
-        self.assertFalse(client.is_there())
+        self.assertFalse(client.is_connected())
 
     def test_half_a_line_is_no_answer(self):
         client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"res').path, 1.0)
-        with self.assertRaises((wrenchd.Gone, wrenchd.Timeout)):
+        with self.assertRaises((wrenchd.Disconnected, wrenchd.Timeout)):
             client.status()
 
     def test_a_daemon_that_hangs(self):
@@ -274,7 +274,7 @@ class Unhappy(unittest.TestCase):
         with self.assertRaisesRegex(wrenchd.ProtocolError, "not sealed"):
             wrenchd.State(layout, unsealed)
         with self.assertRaises(wrenchd.ProtocolError):
-            wrenchd.State({**layout, "version": 2}, os.memfd_create("x"))
+            wrenchd.State({**layout, "version": 99}, os.memfd_create("x"))
 
     def test_no_descriptor_is_left(self):
         def count():

@@ -28,7 +28,7 @@ void serve(ViewServer& server, const ViewOptions& options) {
     char* const words[] = {program.data(), url.data(), nullptr};
     pid_t pid = -1;
     if (posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) != 0)
-      std::fputs("wrenchctl: there is no xdg-open; open the address yourself\n", stderr);
+      std::fputs("wrenchctl: xdg-open is missing; open the address by hand\n", stderr);
   }
   server.run();
 }
@@ -51,8 +51,8 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunC
   const TickRecord& first = recording.ticks.front();
   description["scene_time_begins_ns"] =
       first.now_ns - std::llround(1e9 * static_cast<double>(first.tick) / plan.settings.servo.rate_Hz);
-  description["X_WB"] = pose_json(pose_of(device.base_in_world));
-  description["X_HT"] = pose_json(pose_of(device.tool_in_handle) * scene->tool().X_MT());
+  description["X_WB"] = pose_json(device.base_in_world.pose());
+  description["X_HT"] = pose_json(device.tool_in_handle.pose() * scene->tool().X_MT());
   description["wrench_about"] = plan.profile.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
   description["view"] = view_json(plan.settings.view);
   return std::make_shared<const ViewScene>(description, shapes.bytes());

@@ -40,10 +40,10 @@ TEST_CASE("events of the loop get numbers without a gap, their names, levels, ti
   CHECK(states == std::vector<std::string>{"disarmed", "waiting", "ramping", "active", "stopped"});
   const auto faults = operator_instruction(feed, 1, {"fault"});
   REQUIRE(faults.size() == 1);
-  CHECK(faults[0]["fault"]["name"] == "stop_asked");
+  CHECK(faults[0]["fault"]["name"] == "stop_requested");
   CHECK(faults[0]["fault"]["cure"].get<std::string>() != "");
   CHECK(faults[0]["level"] == "error");
-  CHECK(operator_instruction(feed, 1, {"state"}).back()["cause"]["name"] == "stop_asked");
+  CHECK(operator_instruction(feed, 1, {"state"}).back()["cause"]["name"] == "stop_requested");
   CHECK(operator_instruction(feed, 1, {"device"})[0]["present"] == true);
   const FeedSnapshot now = feed.snapshot();
   CHECK(now.sequence == events.size());

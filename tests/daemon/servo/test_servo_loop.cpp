@@ -24,13 +24,6 @@ namespace {
 /// When the shipped hand is deep in the table, in seconds after power-on.
 constexpr double kPressing_s = 2.4;
 
-Pose pose_of(const std::array<double, 7>& x) {
-  Pose X;
-  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
-  X.translation_m = {x[0], x[1], x[2]};
-  return X;
-}
-
 /// A handle that lies where it is, and says so at every tick.
 class StillDevice final : public Device {
  public:
@@ -97,7 +90,7 @@ TEST_CASE("armed, the simulated hand presses the cube into the table and the tab
   CHECK(s.last.F_out[2] == Approx(600.0 * depth_m).epsilon(0.02));
   CHECK(std::hypot(s.last.F_out[0], s.last.F_out[1]) < 1e-3);
   CHECK(s.simulated.handle().hand_wrench().force_N.z() == Approx(-s.last.F_out[2]).epsilon(0.05));
-  CHECK(pose_of(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
+  CHECK(pose_from_numbers(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
 }
 
 TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the base's axes", "[servo]") {
@@ -113,11 +106,11 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   for (int i = 0; i < 8000; ++i) {
     REQUIRE(s.tick() == Fault::none);
     if (s.state() != State::active || s.last.limit_causes != kNotLimited || s.last.contacts == 0) continue;
-    const Pose X_WP = pose_of(s.last.X_WP);
-    const Vector6d eps = log(inverse(X_WP) * pose_of(s.last.X_WQ));
+    const Pose X_WP = pose_from_numbers(s.last.X_WP);
+    const Vector6d eps = log(inverse(X_WP) * pose_from_numbers(s.last.X_WQ));
     const Vector6d W_T = K * eps;
     const Pose X_WB{Quaterniond(Eigen::AngleAxisd(1.2, Vector3d::UnitZ())), Vector3d::Zero()};
-    const Pose X_WH = X_WB * pose_of(s.last.X_BH);
+    const Pose X_WH = X_WB * pose_from_numbers(s.last.X_BH);
     const Vector3d f_W = X_WP.rotation * W_T.head<3>();
     const Vector3d t_W = X_WP.rotation * W_T.tail<3>() + (X_WP.translation_m - X_WH.translation_m).cross(f_W);
     const Vector3d f_B = X_WB.rotation.conjugate() * f_W;
@@ -171,7 +164,7 @@ TEST_CASE("armed, the motors hold the weight of the handle, however the base sta
   REQUIRE(s.run(3.0) == Fault::none);
   REQUIRE(s.state() == State::active);
   CHECK(s.last.contacts == 0);
-  const Wrench weight = gravity.wrench(pose_of(s.last.X_BH));
+  const Wrench weight = gravity.wrench(pose_from_numbers(s.last.X_BH));
   CHECK(weight.force_N.norm() == Approx(0.3 * kGravity_m_per_s2));
   CHECK((weight.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-12);
   CHECK((weight.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-12);
@@ -188,7 +181,7 @@ TEST_CASE("a profile may ask for the paper's spatial wrench about the world orig
   REQUIRE(s.last.contacts > 0);
   const Wrench W_T{{s.last.F_T[0], s.last.F_T[1], s.last.F_T[2]},
                    {s.last.F_T[3], s.last.F_T[4], s.last.F_T[5]}};
-  const Wrench W_S = spatial_wrench(pose_of(s.last.X_WP), W_T);
+  const Wrench W_S = spatial_wrench(pose_from_numbers(s.last.X_WP), W_T);
   CHECK((W_S.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-9);
   CHECK((W_S.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-9);
 }
@@ -314,7 +307,7 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
       ++seeking;
       continue;
     }
-    if (s.last.tick % 10 == 0) CHECK(placement.admissible(pose_of(s.last.X_WQ)));
+    if (s.last.tick % 10 == 0) CHECK(placement.admissible(pose_from_numbers(s.last.X_WQ)));
     waited = waited || s.state() == State::waiting;
     ramped = ramped || s.state() == State::ramping;
     CHECK(s.force_N() <= last_N + slew_N + 1e-9);
@@ -339,7 +332,7 @@ TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, an
   REQUIRE(s.run(0.5) == Fault::none);
   CHECK(proxy_initialization(s) == ProxyInitialization::complete);
   CHECK(s.last.contacts > 0);
-  CHECK(FeasiblePoseSearch(s.runtime.scene()).admissible(pose_of(s.last.X_WQ)));
+  CHECK(FeasiblePoseSearch(s.runtime.scene()).admissible(pose_from_numbers(s.last.X_WQ)));
   CHECK(s.last.energy > 0.0);
   CHECK(s.state() == State::waiting);
   CHECK(s.force_N() == 0.0);
@@ -535,7 +528,7 @@ TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the 
   for (int i = 0; i < 6000; ++i) {
     REQUIRE(s.tick() == Fault::none);
     if (proxy_initialization(s) != ProxyInitialization::complete) continue;
-    const Pose X_WQ = pose_of(s.last.X_WQ);
+    const Pose X_WQ = pose_from_numbers(s.last.X_WQ);
     const double down = X_WQ.translation_m.z() - 0.025;  // of a cube that lies on the table
     if (s.last.contacts > 0) most_lift_m = std::max(most_lift_m, down);
     most_tilt = std::max(most_tilt, std::abs(X_WQ.rotation.y()));

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's state at the rate of its servo loop, from memory that the daemon writes and this maps read-only.
+"""The daemon's state at the rate of its servo loop, from shared memory that this package maps read-only.
 
-The memory is a ring of records, each behind a guard: 2 i + 1 while record i is being written, 2 i + 2 when it is
-whole. Two equal guards before and after a copy, and the copy is whole. That holds where a processor keeps its
-loads in order, as x86 does; on others there are thousands of instructions of the interpreter in between, and a lock
-taken, which orders them in practice.
+The memory is a ring of records, each with a guard: 2 i + 1 while the daemon writes record i, 2 i + 2 when it is complete.
+If the guard is the same before and after a copy, then the copy is consistent. This requires ordered loads, which x86
+guarantees. On other processors the interpreter executes thousands of instructions and a lock in between, which orders
+the loads in practice.
 """
 
 import fcntl
@@ -15,12 +15,12 @@ import sys
 import threading
 import time
 
-from .errors import Gone, ProtocolError, WrenchdError
+from .errors import Disconnected, ProtocolError, WrenchdError
 
 _VERSION = 2
 _F_GET_SEALS = 1034
 _F_SEAL_SHRINK = 2
-_LOOK_AROUND_S = 0.05  # how often a reader that waits asks whether the daemon is there still
+_CONNECTION_CHECK_S = 0.05  # how often a reader that waits asks whether the daemon is there still
 _TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i64": "q", "f64": "d"}
 
 
@@ -32,7 +32,7 @@ class _Field:
         self.count = described["count"]
         self.offset = described["offset"]
         if described["type"] not in _TYPES:
-            raise ProtocolError(f"field '{self.name}' of the state is of an unknown type; use the package of the "
+            raise ProtocolError(f"field '{self.name}' of the state has an unknown type; use the package of the "
                                 "daemon's version")
         self.code = _TYPES[described["type"]]
         self.values = described.get("values")
@@ -58,10 +58,10 @@ class _Layout:
     def __init__(self, described):
         try:
             if described["version"] != _VERSION:
-                raise ProtocolError(f"the state's layout is of version {described['version']}, and {_VERSION} is what "
-                                    "can be read; use the package of the daemon's version")
+                raise ProtocolError(f"the state's layout has version {described['version']}, but this package "
+                                    f"requires version {_VERSION}; use the package of the daemon's version")
             if described["byte_order"] != sys.byteorder or sys.byteorder != "little":
-                raise ProtocolError("only little-endian machines are known")
+                raise ProtocolError("only little-endian machines are supported")
             self.bytes = described["bytes"]
             self.header_bytes = described["header_bytes"]
             self.written_word = described["written_offset"] // 8
@@ -81,7 +81,7 @@ class _Layout:
                 raise ProtocolError("the contacts lie outside of the record")
             self.contact_fields = {f["name"]: _Field(f, self.contact_bytes) for f in contacts["fields"]}
         except (KeyError, TypeError) as error:
-            raise ProtocolError(f"the state's layout cannot be understood ({error!r}); use the package of the daemon's "
+            raise ProtocolError(f"the state's layout has an unknown format ({error!r}); use the package of the daemon's "
                                 "version") from error
 
     def dtype(self):
@@ -98,9 +98,9 @@ class _Layout:
 
 
 class _Names:
-    """Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more."""
+    """Caches the names of obstacles by rendering, because a tick may belong to an earlier rendering."""
 
-    _MOST_KEPT = 8
+    _CAPACITY = 8
 
     def __init__(self, described, ask):
         self._ask = ask
@@ -112,7 +112,7 @@ class _Names:
             try:
                 self._keep(self._ask())
             except WrenchdError:
-                pass  # gone, or busy: a number tells which one, too
+                pass  # the daemon is gone or busy; the obstacle number identifies the obstacle instead
         names = self._known.get(rendering, ())
         return names[number] if number < len(names) else f"obstacle {number}"
 
@@ -120,16 +120,16 @@ class _Names:
         try:
             self._known[described["rendering_id"]] = described["obstacles"]
         except (KeyError, TypeError) as error:
-            raise ProtocolError(f"the names of obstacles cannot be understood ({error!r}); use the package of the "
+            raise ProtocolError(f"the names of obstacles have an unknown format ({error!r}); use the package of the "
                                 "daemon's version") from error
-        while len(self._known) > self._MOST_KEPT:
+        while len(self._known) > self._CAPACITY:
             del self._known[min(self._known)]
 
 
 class Contact:
-    """A contact that holds the proxy: point_W_m, normal_W, share, multiplier_kg_m; and by name obstacle,
-    tool_feature, obstacle_feature. Where the scene was changed the daemon is asked once for the names of its
-    obstacles."""
+    """A contact that constrains the proxy. Attributes: point_W_m, normal_W, load_fraction, multiplier_kg_m, and the names
+    obstacle, tool_feature, obstacle_feature. After a change of the scene the first access requests the obstacle names
+    from the daemon."""
 
     def __init__(self, layout, names, record, base):
         for name in ("point_W_m", "normal_W", "load_fraction", "multiplier_kg_m"):
@@ -158,9 +158,9 @@ class Contact:
 
 
 class Tick:
-    """One tick of the servo loop. Every field of State.describe() is an attribute: a number or a tuple of numbers;
-    for states, faults and the like their name; for bits a list of names. touches: the contacts, those that carry
-    most first. tick["state"] is the bare number."""
+    """One tick of the servo loop. Every field of State.describe() is an attribute: a number or a tuple of numbers; the name
+    of a state, a fault or another enumerated value; a list of names for bits. contact_list: the contacts in descending
+    order of their load. tick["state"] is the number itself."""
 
     __slots__ = ("_layout", "_names", "_record")
 
@@ -193,24 +193,24 @@ class Tick:
 
 
 class State:
-    """Reads the ticks. The daemon knows nothing of readers: one that is slow misses ticks, and is told how many.
-    Client.open_state() makes one; an object serves one thread."""
+    """Reads the ticks. The daemon does not wait for readers: a slow reader misses ticks, and `missed` counts them.
+    Client.open_state() creates the object. Each thread needs its own object."""
 
-    def __init__(self, layout, descriptor, is_there=lambda: True, ask_names=lambda: {}):
+    def __init__(self, layout, descriptor, is_connected=lambda: True, request_names=lambda: {}):
         try:
             self._layout = _Layout(layout)
-            self._names = _Names(layout, ask_names)
+            self._names = _Names(layout, request_names)
             seals = fcntl.fcntl(descriptor, _F_GET_SEALS)
             if not seals & _F_SEAL_SHRINK or os.fstat(descriptor).st_size < self._layout.bytes:
                 raise ProtocolError("the state's memory is not sealed, or too small")
             self._memory = mmap.mmap(descriptor, self._layout.bytes, mmap.MAP_SHARED, mmap.PROT_READ)
         finally:
             os.close(descriptor)
-        self._words = memoryview(self._memory).cast("Q")  # a word is read at once, not byte by byte
+        self._words = memoryview(self._memory).cast("Q")  # reads a word with one load, not byte by byte
         self._in_order = threading.Lock()
-        self._is_there = is_there
+        self._is_connected = is_connected
         self._next = self._written()
-        self.missed = 0  # ticks that were overwritten before they were taken
+        self.missed = 0  # ticks that the daemon overwrote before next() read them
 
     def close(self):
         self._words.release()
@@ -224,20 +224,20 @@ class State:
 
     @property
     def rate_Hz(self):
-        """Of the servo loop, as configured."""
+        """Configured rate of the servo loop."""
         return self._layout.rate_Hz
 
     @property
-    def behind(self):
-        """Ticks that were written and not taken yet."""
+    def unread(self):
+        """Number of ticks that next() has not read yet."""
         return self._written() - self._next
 
     def describe(self):
-        """What a tick has: {name: (unit, meaning)}."""
+        """Returns the fields of a tick: {name: (unit, meaning)}."""
         return {field.name: (field.unit, field.doc) for field in self._layout.fields.values()}
 
     def latest(self):
-        """The newest tick, whatever was taken before. None where there was none at all."""
+        """Returns the newest tick, independent of next(). None if there is no tick yet."""
         while True:
             written = self._written()
             if written == 0:
@@ -247,13 +247,13 @@ class State:
                 return Tick(self._layout, self._names, record)
 
     def next(self, timeout_s=1.0):
-        """Waits for the tick after the last one taken. None where none came in time. One that was overrun goes on
-        with newer ones, and `missed` grows. Raises Gone where the daemon is gone."""
+        """Waits for the next tick. Returns None if none came in time. If the daemon has overwritten ticks, continues
+        with newer ones, and `missed` grows. Raises Disconnected if the daemon is gone."""
         record = self._next_record(timeout_s)
         return None if record is None else Tick(self._layout, self._names, record)
 
     def ticks(self, count=None):
-        """The next ticks one after the other: so many, or until the daemon is gone, which raises Gone."""
+        """Yields the next `count` ticks; without `count`, until the daemon is gone, which raises Disconnected."""
         taken = 0
         while count is None or taken < count:
             tick = self.next()
@@ -262,7 +262,7 @@ class State:
                 yield tick
 
     def array(self, count):
-        """The next `count` ticks as a numpy structured array, a column a field: array["F_out"] is count x 6."""
+        """Returns the next `count` ticks as a numpy structured array with one column per field: array["F_out"] is count x 6."""
         import numpy
 
         out = numpy.empty(count, self._layout.dtype())
@@ -290,22 +290,22 @@ class State:
 
     def _next_record(self, timeout_s):
         end = time.monotonic() + timeout_s
-        look_around = time.monotonic() + _LOOK_AROUND_S
+        next_check = time.monotonic() + _CONNECTION_CHECK_S
         while True:
             while self._written() > self._next:
                 record = self._copy(self._next)
                 if record is not None:
                     self._next += 1
                     return record
-                # Overrun: goes on in the middle of what is there, so as not to be overrun again at once.
-                left_out = self._written() - self._next - self._layout.slots // 2
-                self.missed += max(left_out, 0)
-                self._next += max(left_out, 0)
+                # Overrun: continues in the middle of the available ticks, so that the next overrun is not immediate.
+                skipped = self._written() - self._next - self._layout.slots // 2
+                self.missed += max(skipped, 0)
+                self._next += max(skipped, 0)
             now = time.monotonic()
             if now >= end:
                 return None
-            if now >= look_around:
-                look_around = now + _LOOK_AROUND_S
-                if not self._is_there() and self._written() == self._next:
-                    raise Gone("the daemon is gone; connect again when it is back")
+            if now >= next_check:
+                next_check = now + _CONNECTION_CHECK_S
+                if not self._is_connected() and self._written() == self._next:
+                    raise Disconnected("the daemon is gone; connect again when wrenchd is running")
             time.sleep(0.25 / self._layout.rate_Hz)
