@@ -15,8 +15,8 @@ namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(10);
 
-/// Whether a fault latches, or lets go of the hand.
-bool is_grave(Fault fault) {
+/// Returns true if a fault latches or releases the hand.
+bool is_severe(Fault fault) {
   const Trigger trigger = fault_row(fault).trigger;
   return trigger == Trigger::hard_fault || trigger == Trigger::self_test_failed || trigger == Trigger::stop ||
          trigger == Trigger::device_disconnected;
@@ -25,7 +25,7 @@ bool is_grave(Fault fault) {
 EventLevel level_of(const Event& event) {
   switch (event.kind) {
     case Event::Kind::fault_raised:
-      return is_grave(static_cast<Fault>(event.detail)) ? EventLevel::error : EventLevel::warning;
+      return is_severe(static_cast<Fault>(event.detail)) ? EventLevel::error : EventLevel::warning;
     case Event::Kind::state_changed:
     case Event::Kind::proxy_search_started:
     case Event::Kind::proxy_found:
@@ -50,7 +50,7 @@ spdlog::level::level_enum log_level(EventLevel level) {
   return spdlog::level::err;
 }
 
-/// What the value of a fault's event says.
+/// Returns the measured value of a fault event, as text.
 std::string measured(Fault fault, double value) {
   switch (fault) {
     case Fault::tick_late:
@@ -64,13 +64,13 @@ std::string measured(Fault fault, double value) {
   }
 }
 
-/// The cause that came with a state.
+/// Returns the cause of a state event.
 Fault cause_of(const Event& event) {
   return static_cast<Fault>(static_cast<int>(event.value));
 }
 
-/// The name that programs know it by.
-std::string generated_mesh_name(Event::Kind kind) {
+/// Returns the name of the event on the wire.
+std::string event_name(Event::Kind kind) {
   switch (kind) {
     case Event::Kind::state_changed:
       return "state";
@@ -80,12 +80,12 @@ std::string generated_mesh_name(Event::Kind kind) {
     case Event::Kind::stability_bound_unknown:
       return "stiffness";
     case Event::Kind::arming_refused:
-      return "refused";
+      return "arming_refused";
     case Event::Kind::projection_infeasible:
     case Event::Kind::proxy_search_started:
     case Event::Kind::proxy_found:
     case Event::Kind::proxy_search_failed:
-      return "placing";
+      return "proxy_initialization";
     case Event::Kind::released:
       return "released";
     case Event::Kind::crossfade_started:
@@ -102,37 +102,38 @@ Json fields_of(const Event& event) {
     case Event::Kind::fault_raised:
       return {{"fault", fault_json(static_cast<Fault>(event.detail))}, {"value", event.value}};
     case Event::Kind::stiffness_scaled:
-      return {{"share", event.value}};
+      return {{"scale", event.value}};
     case Event::Kind::stability_bound_unknown:
-      return {{"share", nullptr}};
+      return {{"scale", nullptr}};
     case Event::Kind::arming_refused:
       return {{"state", name(static_cast<State>(event.detail))}};
     case Event::Kind::projection_infeasible:
-      return {{"outcome", "no_admissible_pose"}};
+      return {{"outcome", "projection_infeasible"}};
     case Event::Kind::proxy_search_started:
-      return {{"outcome", "seeking"}};
+      return {{"outcome", "searching"}};
     case Event::Kind::proxy_found:
-      return {{"outcome", "placed"}, {"distance_m", event.value}};
+      return {{"outcome", "found"}, {"distance_m", event.value}};
     case Event::Kind::proxy_search_failed:
-      return {{"outcome", "nowhere"}};
+      return {{"outcome", "failed"}};
     case Event::Kind::crossfade_started:
     case Event::Kind::rendering_changed:
-      return {{"rendering", event.detail}, {"felt", event.kind == Event::Kind::rendering_changed}};
+      return {{"rendering_id", event.detail},
+              {"crossfade_complete", event.kind == Event::Kind::rendering_changed}};
     case Event::Kind::released:
       break;
   }
   return Json::object();
 }
 
-/// What the event changes in what is known.
+/// Updates the snapshot with an event.
 void apply(FeedSnapshot& now, const Event& event) {
   if (event.kind == Event::Kind::state_changed) {
     now.state = static_cast<State>(event.detail);
     now.cause = cause_of(event);
-    if (now.state == State::self_test) now.stiffness_scale = 1.0;  // it is measured anew
+    if (now.state == State::self_test) now.stiffness_scale = 1.0;  // the self-test measures it again
   }
   if (event.kind == Event::Kind::stiffness_scaled) now.stiffness_scale = event.value;
-  if (generated_mesh_name(event.kind) == "placing" && event.kind != Event::Kind::projection_infeasible)
+  if (event_name(event.kind) == "proxy_initialization" && event.kind != Event::Kind::projection_infeasible)
     now.proxy_initialization = fields_of(event)["outcome"].get<std::string>();
 }
 
@@ -153,29 +154,33 @@ const char* name(EventLevel level) noexcept {
 Json fault_json(Fault fault) {
   if (fault == Fault::none) return nullptr;
   const FaultRow& row = fault_row(fault);
-  return {{"name", row.name}, {"sentence", row.message}, {"cure", row.cure}};
+  return {{"name", row.name}, {"message", row.message}, {"cure", row.cure}};
 }
 
 std::span<const EventRow> feed_events() {
   static const std::array<EventRow, 10> rows = {{
-      {"state", "The loop came to another state. state: its name; cause: the fault that led to it, or null."},
+      {"state", "The loop entered another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
-       "Something is wrong. fault: name, sentence, cure; value: how much of it, where that says "
-       "something; recording: the file of the flight recorder, where one is kept of it."},
-      {"device", "present: whether there is a device now; again: it has been there before."},
+       "The loop detected a fault. fault: name, message, cure; value: measured value, if the fault has one; "
+       "recording: file of the flight recorder, if it records this fault."},
+      {"device",
+       "The device connected or disconnected. present: true if connected; reconnected: true if the "
+       "device was connected before."},
       {"stiffness",
-       "share: of the stiffness asked for that the device bears, at the rate and delay "
-       "measured; null: its profile states no damping, so nobody knows."},
-      {"refused", "It was asked to arm, and was not. state: in which it was."},
-      {"placing",
-       "outcome: seeking, placed (distance_m: how far from the hand), nowhere, "
-       "no_admissible_pose. Where the tool stands is looked for after each arming."},
-      {"released", "The hand was released: zero wrench, motors off."},
+       "scale: stable fraction of the configured stiffness at the measured rate and delay; null: the profile "
+       "states no damping, so the stability bound is unknown."},
+      {"arming_refused", "The loop refused to arm. state: state of the loop."},
+      {"proxy_initialization",
+       "The search for a feasible pose of the proxy, which follows each arming. outcome: searching, found "
+       "(distance_m: distance from the handle pose), failed, projection_infeasible."},
+      {"released", "The loop released the hand: zero wrench, motors off."},
       {"scene",
-       "What is rendered changes. rendering: the number of the new one, as in the record of a tick; felt: "
-       "false where it begins to take the place of the one before, true where it has."},
-      {"reload", "The configuration was read again. applied, not_applied: keys; refused: why, or null."},
-      {"log", "What else the log has."},
+       "The rendering changes. rendering_id: number of the new rendering, as in the tick records; "
+       "crossfade_complete: false at the start of the crossfade, true at its end."},
+      {"reload",
+       "The daemon read the configuration again. applied, not_applied: keys; error: why all changes were "
+       "rejected, or null."},
+      {"log", "Any other log entry."},
   }};
   return rows;
 }
@@ -191,31 +196,33 @@ std::string to_text(const Event& event) {
     }
     case Event::Kind::stiffness_scaled:
       return fmt::format(
-          "the device bears {:.0f} % of the stiffness that is asked for, at the rate and delay measured: it "
-          "is "
-          "scaled; lower it in [wrench], or state more damping in the profile if it has more",
+          "the stiffness is scaled to {:.0f} %: more is unstable at the measured rate and delay; lower the "
+          "stiffness in [wrench], or state more damping in the profile if the device has more",
           100.0 * event.value);
     case Event::Kind::stability_bound_unknown:
-      return "the profile states no damping: nobody knows how stiff a wall the device bears; measure it, and "
+      return "the profile states no damping, so the stability bound is unknown; measure the damping, and "
              "state "
              "damping_N_s_per_m and damping_Nm_s_per_rad";
     case Event::Kind::arming_refused:
       return fmt::format("not armed: {}", transition(Trigger::arm, static_cast<State>(event.detail)).reason);
     case Event::Kind::projection_infeasible:
-      return "no admissible pose near the hand: the obstacles leave no room; the proxy stays where it was";
+      return "no feasible pose near the handle: the obstacles leave no room; the proxy keeps its pose";
     case Event::Kind::proxy_search_started:
-      return "placing: the admissible pose nearest to the hand is looked for; zero wrench until it is found";
+      return "proxy initialization: searching the feasible pose nearest to the handle; zero contact force "
+             "until "
+             "then";
     case Event::Kind::proxy_found:
-      return fmt::format("placed {:.1f} mm from the hand", 1e3 * event.value);
+      return fmt::format("proxy initialized {:.1f} mm from the handle", 1e3 * event.value);
     case Event::Kind::proxy_search_failed:
-      return "no admissible pose was found: the tool does not fit in where the hand is; zero wrench, and it "
-             "is looked for again";
+      return "proxy initialization failed: there is no feasible pose near the handle; zero contact force, "
+             "and "
+             "the search starts again";
     case Event::Kind::released:
       return "the hand is released: zero wrench, motors off";
     case Event::Kind::crossfade_started:
-      return fmt::format("rendering {} begins to take the place of the one before", event.detail);
+      return fmt::format("crossfade to rendering {} begins", event.detail);
     case Event::Kind::rendering_changed:
-      return fmt::format("rendering {} is felt from now on", event.detail);
+      return fmt::format("crossfade to rendering {} is complete", event.detail);
   }
   return "unknown event";
 }
@@ -239,7 +246,7 @@ void EventFeed::emit(const std::string& name, EventLevel level, const std::strin
   append(std::chrono::steady_clock::now(), name, level, text, fields);
 }
 
-/// With the mutex held, so that what an event changes is known with its number and not before.
+/// Precondition: mutex_ is locked, so that snapshot and sequence number change together.
 void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
                        const Json& fields) {
   Json params = {{"sequence", ++snapshot_.sequence},
@@ -256,41 +263,41 @@ void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, 
   [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof one);  // full is awake
 }
 
-void EventFeed::set_fault_recorder(RecordFault kept_in) {
+void EventFeed::set_fault_recorder(RecordFault recorded_in) {
   const std::scoped_lock draining(drain_mutex_);
-  record_fault_ = std::move(kept_in);
+  record_fault_ = std::move(recorded_in);
 }
 
 void EventFeed::publish(const Event& event) {
   const auto fault = static_cast<Fault>(event.detail);
-  std::string kept_in;
-  if (event.kind == Event::Kind::fault_raised && is_grave(fault) && record_fault_)
-    kept_in = record_fault_(fault, event.at);
+  std::string recorded_in;
+  if (event.kind == Event::Kind::fault_raised && is_severe(fault) && record_fault_)
+    recorded_in = record_fault_(fault, event.at);
   const std::scoped_lock lock(mutex_);
   const JournalFields fields(journal_fields(event));
   const State from = snapshot_.state;
   apply(snapshot_, event);
-  Json fields_told = fields_of(event);
+  Json all_fields = fields_of(event);
   std::string text = to_text(event);
-  if (!kept_in.empty()) {
-    fields_told["recording"] = kept_in;
-    text += "; what led to it: " + kept_in;
+  if (!recorded_in.empty()) {
+    all_fields["recording"] = recorded_in;
+    text += "; recorded in " + recorded_in;
   }
-  append(event.at, generated_mesh_name(event.kind), level_of(event), text, fields_told);
+  append(event.at, event_name(event.kind), level_of(event), text, all_fields);
   if (event.kind == Event::Kind::state_changed) append_device_event(event, from);
 }
 
-/// That a device came or went is told by the states it leads to, whatever link it is on.
+/// Derives the device events from the states, which are the same for every link.
 void EventFeed::append_device_event(const Event& event, State from) {
   const auto to = static_cast<State>(event.detail);
   if (from == State::disconnected && to != State::shutdown) {
     append(event.at, "device", EventLevel::info,
-           device_was_present_ ? "the device is back" : "the device is there",
-           {{"present", true}, {"again", device_was_present_}});
+           device_was_present_ ? "the device is connected again" : "the device is connected",
+           {{"present", true}, {"reconnected", device_was_present_}});
     device_was_present_ = true;
   } else if (to == State::disconnected) {
-    append(event.at, "device", EventLevel::warning, "the device is gone",
-           {{"present", false}, {"again", device_was_present_}});
+    append(event.at, "device", EventLevel::warning, "the device is disconnected",
+           {{"present", false}, {"reconnected", device_was_present_}});
   }
 }
 

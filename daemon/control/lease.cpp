@@ -14,18 +14,18 @@ Json holder_json(const std::optional<Lease::Holder>& holder) {
 }  // namespace
 
 void Lease::acquire(const Holder& client, TimePoint now) {
-  const bool again = held_by(client.client);
+  const bool already_held = held_by(client.client);
   holder_ = client;
   heartbeat(now);
-  if (again) return;
+  if (already_held) return;
   armed_ = false;
-  feed_.emit("lease", EventLevel::info, "lease: " + client.identity + " has it", holder_json(holder_));
+  feed_.emit("lease", EventLevel::info, "lease: " + client.identity + " holds it", holder_json(holder_));
 }
 
 void Lease::preempt(const Holder& client, TimePoint now) {
   if (holder_ && !held_by(client.client)) {
     if (armed_) loop_.disarm();
-    end(EventLevel::warning, "lease: " + client.identity + " takes it from " + holder_->identity);
+    end(EventLevel::warning, "lease: " + client.identity + " preempts " + holder_->identity);
   }
   acquire(client, now);
 }

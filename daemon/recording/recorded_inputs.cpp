@@ -179,12 +179,12 @@ DeviceProfile profile_of(const RecordingHeader& header, const fs::path& director
 
 }  // namespace
 
-RecordingHeader read_recorded_texts(const RunConfig& plan) {
+RecordingHeader read_recorded_texts(const RunConfig& config) {
   RecordingHeader header;
   header.version = kVersion;
-  header.settings_file = plan.settings.file;
-  header.scene_file = plan.scene.file;
-  header.profile_file = plan.settings.device.profile_file;
+  header.settings_file = config.settings.file;
+  header.scene_file = config.scene.file;
+  header.profile_file = config.settings.device.profile_file;
   header.settings = contents(header.settings_file).value_or("");
   header.scene = contents(header.scene_file).value_or("");
   header.profile = contents(header.profile_file).value_or("");
@@ -192,9 +192,9 @@ RecordingHeader read_recorded_texts(const RunConfig& plan) {
   for (const fs::path& parent : parents_of(header.profile_file))
     header.files.push_back(
         {"profile_" + std::to_string(++number), parent, {}, true, contents(parent).value_or("")});
-  const fs::path& script = plan.settings.simulation.hand_script;
+  const fs::path& script = config.settings.simulation.hand_script;
   header.files.push_back({"hand_script", script, {}, true, contents(script).value_or("")});
-  header.realtime = word(plan.settings.servo.realtime);
+  header.realtime = word(config.settings.servo.realtime);
   utsname system{};
   if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
   return header;
@@ -233,9 +233,9 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   const RecordedFile* const script = find(header, "hand_script");
   const fs::path hand = directory / "hand.toml";
   write(hand, script == nullptr ? "" : script->bytes);
-  RunConfig plan;
-  plan.profile = profile_of(header, directory);
-  plan.scene = scene_of(header, directory);
+  RunConfig config;
+  config.profile = profile_of(header, directory);
+  config.scene = scene_of(header, directory);
   TomlNode tree = read_toml_text(header.settings, header.settings_file);
   write(directory / "scene.toml", header.scene);
   set(&tree, "scene", (directory / "scene.toml").string());
@@ -245,9 +245,9 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   set(simulation, "hand_script", hand.string());
   set(simulation, "playback", "");
   set(table_in(tree, "servo"), "realtime", header.realtime.empty() ? "required" : header.realtime);
-  plan.settings = load_settings(tree, header.settings_file, SearchPath({directory}));
-  plan.simulated = plan.profile.transport == Transport::loopback;
-  return plan;
+  config.settings = load_settings(tree, header.settings_file, SearchPath({directory}));
+  config.simulated = config.profile.transport == Transport::loopback;
+  return config;
 }
 
 }  // namespace wrenchd

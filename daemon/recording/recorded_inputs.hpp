@@ -19,7 +19,7 @@ inline constexpr std::size_t kMaxEmbeddedMesh_bytes = std::size_t{32} << 20;
 
 /// Versions, and the texts of settings, scene, profile with its parents, and hand script. What cannot be read
 /// any more is empty. Not RT safe.
-RecordingHeader read_recorded_texts(const RunConfig& plan);
+RecordingHeader read_recorded_texts(const RunConfig& config);
 
 /// The mesh files of the scene, as they are now. Meshes that are made stand in the scene's text.
 void add_meshes(const SceneSettings& scene, RecordingHeader& header);
@@ -28,7 +28,7 @@ void add_meshes(const SceneSettings& scene, RecordingHeader& header);
 void set_start_time(const Clock& clock, RecordingHeader& header);
 
 /// What a recording ran with, made of what is in it. Writes its files into the directory, which has to be
-/// there for as long as the plan is used. Throws RecordingError where it lacks something: a mesh that is too
+/// there for as long as the config is used. Throws RecordingError where it lacks something: a mesh that is too
 /// large to be inside is taken from where it was, if it is still the same.
 RunConfig unpack_run_config(const RecordingHeader& header, const std::filesystem::path& directory);
 

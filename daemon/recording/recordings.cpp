@@ -37,14 +37,14 @@ std::time_t utc_now() {
 
 }  // namespace
 
-Recordings::Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pace pace)
-    : runtime_(station),
+Recordings::Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pace pace)
+    : runtime_(runtime),
       feed_(feed),
       clock_(clock),
-      settings_(station.config().settings.recording),
+      settings_(runtime.config().settings.recording),
       directory_(recordings_directory(settings_)),
       flight_s_(pace == Pace::threads ? settings_.flight_s : 0.0),
-      state_(station.enable_shared_state()),
+      state_(runtime.enable_shared_state()),
       history_(room_for(flight_s_, state_.rate_Hz())) {
   status_.directory = directory_;
   status_.flight_s = flight_s_;

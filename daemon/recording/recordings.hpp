@@ -39,7 +39,7 @@ class Recordings {
   };
 
   /// Before the loop runs. Station and feed must outlive this. Throws std::system_error.
-  Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
+  Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
   /// What is there is written, and files are closed.
   ~Recordings();
   Recordings(const Recordings&) = delete;

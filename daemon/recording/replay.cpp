@@ -160,7 +160,7 @@ const char* compared_fields() {
   return names.c_str();
 }
 
-std::optional<Difference> replay(const Recording& recording, const RunConfig& plan) {
+std::optional<Difference> replay(const Recording& recording, const RunConfig& config) {
   if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
     throw RecordingError("the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
                          ": what the loop had in mind by then (the stiffness it had measured, how warm the "
@@ -168,11 +168,11 @@ std::optional<Difference> replay(const Recording& recording, const RunConfig& pl
                          "wrong before, where obstacles that move stood) is not in it, and arming does not "
                          "begin it anew; what is "
                          "replayed is a recording from the start on, as by wrenchd --record");
-  const Scene scene(plan.scene);
+  const Scene scene(config.scene);
   RecordedClock clock;
   RecordedDevice device;
   RecordedPlacer placer;
-  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  ServoLoop loop(config.settings, config.profile, device, scene, placer, clock);
   std::uint64_t last = 0;  // a release from outside has the number of the tick before
   for (const TickRecord& then : recording.ticks) {
     if (then.tick != last && then.tick != last + 1)

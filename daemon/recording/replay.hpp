@@ -18,11 +18,11 @@ struct Difference {
   double replayed = 0.0;
 };
 
-/// Feeds the recorded samples through a servo loop of the same plan, offline and at once, and compares what
+/// Feeds the recorded samples through a servo loop of the same config, offline and at once, and compares what
 /// came out then with what comes out now, bit for bit. Nothing: all ticks agree. Times are not compared.
 /// Scene time is that of the ticks, so obstacles move as they did. Throws RecordingError where the recording
 /// does not begin at the loop's first tick, or where ticks are missing in it.
-std::optional<Difference> replay(const Recording& recording, const RunConfig& plan);
+std::optional<Difference> replay(const Recording& recording, const RunConfig& config);
 
 /// The columns that are compared, for people.
 const char* compared_fields();
