@@ -72,13 +72,13 @@ std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& config) {
                                             link_settings(config));
 }
 
-Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode place_in,
+Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
                  const MeshLoader& meshes)
-    : Runtime(std::move(config), link, clock, place_in, meshes, meshes) {}
+    : Runtime(std::move(config), link, clock, search_mode, meshes, meshes) {}
 
 /// `used` reads the scene and keeps the warnings. `fresh` has read nothing: the reconfigurator copies it for
 /// each reload.
-Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode place_in,
+Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
                  const MeshLoader& fresh, MeshLoader used)
     : config_(std::move(config)),
       clock_(clock),
@@ -88,9 +88,9 @@ Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMo
       device_(config_.profile, link),
       loop_(config_.settings, config_.profile, device_,
             std::make_unique<Rendering>(0, config_.settings, config_.profile, scene_,
-                                        make_proxy_initializer(scene_, place_in)),
+                                        make_proxy_initializer(scene_, search_mode)),
             clock),
-      reconfigurator_(config_, scene_, loop_, place_in, fresh) {
+      reconfigurator_(config_, scene_, loop_, search_mode, fresh) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());
 }
 

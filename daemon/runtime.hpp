@@ -50,7 +50,7 @@ class Runtime {
   /// Link and clock must outlive this object. meshes: loader of the scene's meshes. Throws MeshError,
   /// std::runtime_error. May take seconds: reads meshes.
   Runtime(RunConfig config, ReportLink& link, Clock& clock,
-          ProxySearchMode place_in = ProxySearchMode::background, const MeshLoader& meshes = {});
+          ProxySearchMode search_mode = ProxySearchMode::background, const MeshLoader& meshes = {});
   ~Runtime();
   Runtime(const Runtime&) = delete;
   Runtime& operator=(const Runtime&) = delete;
@@ -88,8 +88,8 @@ class Runtime {
   ServoLoop loop_;
   Reconfigurator reconfigurator_;
 
-  Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode place_in, const MeshLoader& fresh,
-          MeshLoader used);
+  Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
+          const MeshLoader& fresh, MeshLoader used);
 };
 
 }  // namespace wrenchd

@@ -308,10 +308,10 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
     throw RpcError(RpcCode::invalid_state, "Your last request of this kind still runs; wait for its reply.");
   Caller worker_caller = caller;
   worker_caller.subscription = nullptr;
-  const bool posted = worker_->post([this, &row, request, away] {
-    Finished finished{away.client, {}, {}};
+  const bool posted = worker_->post([this, &row, request, worker_caller] {
+    Finished finished{worker_caller.client, {}, {}};
     try {
-      const MethodResult answer = MethodTable::run(row, request.params, away);
+      const MethodResult answer = MethodTable::run(row, request.params, worker_caller);
       if (answer.fd >= 0) finished.fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
       if (request.wants_reply) finished.line = reply_line(request.id, answer.result);
     } catch (const RpcError& error) {

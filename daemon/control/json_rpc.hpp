@@ -29,9 +29,9 @@ enum class RpcCode : int {
   invalid_params = -32602,
   internal_error = -32603,
   permission_denied = -32001,  ///< the role is too low
-  invalid_state = -32002,      ///< the state does not allow it
-  lease_held = -32003,         ///< somebody else holds the lease
-  rejected = -32004,           ///< what it names, a file or a place in a scene, is not as it has to be
+  invalid_state = -32002,      ///< the present state does not allow the request
+  lease_held = -32003,         ///< another client holds the lease
+  rejected = -32004,           ///< a file or value that the request names is invalid
 };
 
 /// Error of a request. what() is a sentence that says what to do.

@@ -15,8 +15,8 @@ namespace wrenchd {
 
 /// Path of the control socket.
 struct SocketPath {
-  std::filesystem::path path;     ///< empty: nowhere, nobody wants one
-  bool explicitly_named = false;  ///< somebody named it; else it is the usual place, and may be another's
+  std::filesystem::path path;     ///< empty: no socket
+  bool explicitly_named = false;  ///< false: the default path, which another daemon may use
 };
 
 /// Returns the first path given by: command line, $WRENCHD_SOCKET, configuration, default path. Throws

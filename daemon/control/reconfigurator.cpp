@@ -138,7 +138,7 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
   rendering_id_ = rendering->id();
   checksum_ = rendering->checksum();
   {
-    const std::lock_guard told(names_mutex_);
+    const std::lock_guard names_lock(names_mutex_);
     names_ = {rendering_id_, names_of(*scene_)};
   }
   loop_.exchange().offer(std::move(rendering));
@@ -409,13 +409,13 @@ Reconfigurator::CurrentRendering Reconfigurator::current_rendering() const {
 }
 
 Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
-  const std::lock_guard told(names_mutex_);
+  const std::lock_guard names_lock(names_mutex_);
   return names_;
 }
 
 Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
-  const ServoLoop::HandlePose seen = loop_.handle_pose();
+  const ServoLoop::HandlePose pose = loop_.handle_pose();
   const auto pose_of = [](const PoseSettings& placed) {
     return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
   };
@@ -424,7 +424,7 @@ Reconfigurator::SceneView Reconfigurator::scene_view() {
   const bool configured = config_.settings.scene == file_settings_.scene;
   return {scene_,
           rendering_id_,
-          seen.at - from_seconds(seen.scene_time_s),
+          pose.at - from_seconds(pose.scene_time_s),
           pose_of(device.base_in_world),
           pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
           config_.profile.wrench_point,

@@ -16,7 +16,7 @@ namespace wrenchd {
 /// obstacles use is stored once.
 ///
 ///   vertices    three floats each [m], in the frame of the mesh (O for an obstacle, T for the tool)
-///   triangles   three vertex numbers of 32 bits each, counter-clockwise seen from outside
+///   triangles   three vertex numbers of 32 bits each, counter-clockwise from outside
 ///
 /// Not RT-safe: a million triangles take some tens of milliseconds.
 class SceneGeometry {
