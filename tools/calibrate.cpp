@@ -33,7 +33,7 @@ std::vector<DeviceProfile> profiles_named(const std::string& name) {
   return {profile};
 }
 
-/// The profile of the plugged-in device that is meant, and its serial number.
+/// Profile and serial number of the connected device to calibrate.
 struct Target {
   DeviceProfile profile;
   std::string serial;
@@ -60,7 +60,7 @@ Target find_target(const CalibrateOptions& options) {
   return {profiles[choice.selection->profile], device.serial};
 }
 
-/// Whether a line was typed since it was asked last.
+/// Returns true if the operator has typed a line since the last call.
 bool line_typed() {
   pollfd input = {STDIN_FILENO, POLLIN, 0};
   if (poll(&input, 1, 0) <= 0 || (input.revents & POLLIN) == 0) return false;

@@ -26,10 +26,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A third of what the lease allows, so that two may be late.
+/// Heartbeat interval: a third of the heartbeat timeout, so that two heartbeats may be late.
 constexpr auto kBeatEvery = 30ms;
 constexpr auto kFadesWithin = 2s;
-/// What takes longest, a mesh of a million triangles, takes less.
+/// Response timeout, above the duration of the slowest request (a mesh of a million triangles).
 constexpr auto kAnswerWithin = 60s;
 
 std::atomic<bool> interrupted{false};
@@ -62,7 +62,7 @@ void show(const Json& event, const ControlOptions& options) {
   print(options.json ? event.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n' : event_text(event));
 }
 
-/// The states in which there is force, or will be.
+/// Returns true in states with force, and in states that lead to force.
 bool is_armed(const std::string& state) {
   return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
 }
@@ -71,14 +71,14 @@ Json call(Client& client, const std::string& method, const Json& params = Json::
   return Json::parse(client.call(method, params.dump()));
 }
 
-/// The next event; nothing: none came so soon.
+/// Returns the next event; empty if none came in time.
 std::optional<Json> next_event(Client& client, std::chrono::milliseconds limit) {
   ClientEvent event;
   if (!client.poll_event(event, limit)) return {};
   return Json::parse(event.json);
 }
 
-/// Until the hand is free: the daemon tells. The connection may end before.
+/// Waits until the daemon reports that the force is zero. The connection may end before.
 void see_it_fade(Client& client, const ControlOptions& options, std::string state) {
   const auto end = std::chrono::steady_clock::now() + kFadesWithin;
   while ((is_armed(state) || state == "releasing") && std::chrono::steady_clock::now() < end) {
@@ -182,7 +182,7 @@ void run_request(const std::string& method, const ControlOptions& options) {
   const Json result = call(client, method);
   if (options.json) return print(pretty(result));
   if (!result.contains("asked")) return print(result.empty() ? "done\n" : pretty(result));
-  std::this_thread::sleep_for(150ms);  // a fade, and a little for the event
+  std::this_thread::sleep_for(150ms);  // duration of the fade and a margin for the event
   print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
 }
 
@@ -197,7 +197,7 @@ void list_recordings(const ControlOptions& options) {
     print("no recordings in " + result["directory"].get<std::string>() + "\n");
 }
 
-/// The daemon's files are its own: it hands over a descriptor, from which a copy is made.
+/// The daemon owns its files, so it sends a file descriptor from which this program copies.
 void get_recording(const ControlOptions& options) {
   if (options.file.empty())
     throw std::runtime_error("record get: which one? `wrenchctl record list` names them");
@@ -227,7 +227,7 @@ void run_record(const ControlOptions& options) {
   if (options.method == "list") return list_recordings(options);
   if (options.method == "get") return get_recording(options);
   Json params = Json::object();
-  if (!options.file.empty()) {  // a path is meant from here, and the daemon is elsewhere
+  if (!options.file.empty()) {  // the user's path is relative to this process, not to the daemon
     const bool is_name = options.file.find('/') == std::string::npos;
     params["file"] =
         is_name ? options.file : std::filesystem::absolute(options.file).lexically_normal().string();

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A descriptor in hexadecimal with a comment on every byte stays far below this.
+/// Maximum size of a text file: well above a hexadecimal descriptor with a comment on every byte.
 constexpr std::size_t kMostText = 1 << 20;
 
 [[noreturn]] void refuse(const fs::path& file, const std::string& why) {
@@ -32,14 +32,14 @@ constexpr std::size_t kMostText = 1 << 20;
 
 constexpr std::string_view kBlanks = " \t\r\n,";
 
-/// Every descriptor has a byte below the blank: its first item gives a usage page, or a usage, or begins a
-/// collection. Text has none but for tabs and ends of lines.
+/// A binary descriptor always contains a byte below 0x20, because its first item is a usage page, a usage or
+/// the start of a collection. A text contains only tabs and line ends below 0x20.
 bool is_text(std::string_view content) {
   return std::all_of(content.begin(), content.end(),
                      [](char c) { return kBlanks.find(c) != kBlanks.npos || (c > ' ' && c <= '~'); });
 }
 
-/// Closes what it holds.
+/// Closes its file descriptor on destruction.
 class OpenFile {
  public:
   explicit OpenFile(const fs::path& file) : fd_(open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
@@ -84,7 +84,7 @@ DescriptorSource ask_kernel(const fs::path& file) {
   return source;
 }
 
-/// Files of /sys do not know their size, so this one reads until the end.
+/// Reads until the end, because files in /sys have no known size.
 std::string content_of(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) refuse(file, "cannot be opened; check that this user may read it");
@@ -97,7 +97,7 @@ std::string content_of(const fs::path& file) {
   return content;
 }
 
-/// "05", "0x05" or "05010908".
+/// Parses "05", "0x05" or "05010908".
 void add_bytes_of_word(std::string_view word, const std::string& place, std::vector<std::uint8_t>& bytes) {
   std::string_view digits = word;
   if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);

@@ -33,10 +33,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a servo thread of 1 kHz bears: a tenth of its period is not noticed; a whole one is a lost tick.
+/// Acceptable p99.9 wake latency for a 1 kHz servo thread: a tenth of its period has no noticeable effect; a
+/// whole period loses a tick.
 constexpr Duration kGoodWakeUp = std::chrono::microseconds(100);
 constexpr Duration kBadWakeUp = std::chrono::milliseconds(1);
-constexpr std::uint64_t kServoPriority = 45;  ///< of wrenchd.toml
+constexpr std::uint64_t kServoPriority = 45;  ///< as in wrenchd.toml
 constexpr std::uint64_t kLeastMemory_bytes = std::uint64_t{512} << 20U;
 constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
 
@@ -47,7 +48,7 @@ Finding ok(std::string what) {
   return {Health::ok, std::move(what), {}};
 }
 
-/// A file's text without the line's end; empty where it cannot be read.
+/// Returns the text of a file without its line end; empty if the file cannot be read.
 std::string content(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
@@ -62,7 +63,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// The first of these that is there.
+/// Returns the first of these directories that contains the file.
 std::optional<fs::path> first_of(const fs::path& root, std::initializer_list<const char*> directories,
                                  const std::string& name) {
   for (const char* directory : directories) {
@@ -87,7 +88,7 @@ Finding kernel(const MachineState& p) {
           "apt install linux-image-rt-amd64, and boot it"};
 }
 
-/// What else stands on the kernel's command line is for those who want the last microseconds.
+/// Further kernel options improve the latency by microseconds only, so this check ignores them.
 Finding boot_options(const MachineState& p) {
   std::istringstream line(content(p.root / "proc/cmdline"));
   bool isolated = false, threaded = content(p.root / "sys/kernel/realtime") == "1";
@@ -170,7 +171,7 @@ std::vector<Finding> user_limits(const MachineState& p) {
   return found;
 }
 
-/// The value of a setting in a unit file and its drop-ins; the last counts.
+/// Returns the value of a setting in a unit file and its drop-ins; the last one wins.
 std::string setting(const MachineState& p, const fs::path& unit, const std::string& key) {
   std::vector<fs::path> files = {unit};
   std::vector<fs::path> more;
@@ -236,7 +237,7 @@ Finding groups(const MachineState& p) {
           "usermod -aG " + std::string(kOperators) + " " + p.user + ", and log in anew"};
 }
 
-/// Those of its lines that act.
+/// Returns the effective lines: no comments and no blank lines.
 std::set<std::string> acting(const std::string& rules) {
   std::set<std::string> lines;
   for (const std::string& line : lines_of(rules))
@@ -293,7 +294,7 @@ std::vector<Finding> devices(const MachineState& p) {
   return found;
 }
 
-// --- wake-ups ---------------------------------------------------------------------------------------------
+// --- wake latency -----------------------------------------------------------------------------------------
 
 std::string us_text(Duration d) {
   std::array<char, 32> text{};

@@ -15,13 +15,13 @@ double milliseconds(Duration d) {
   return 1e3 * seconds(d);
 }
 
-/// When the reaction to a fault begins, counted from the moment at which the fault can be seen.
+/// Returns when the reaction begins, measured from the moment at which the fault is detectable.
 std::string begins(const FaultRow& row) {
   if (row.persistence == Duration{0}) return "in the same tick";
   return fmt::format("after {:.0f} ms, within one tick", milliseconds(row.persistence));
 }
 
-/// Until when the hand is free of force, counted from there.
+/// Returns when the force has ended, measured from the same moment.
 std::string ends(Reaction reaction) {
   switch (reaction) {
     case Reaction::none:
@@ -34,7 +34,7 @@ std::string ends(Reaction reaction) {
   }
 }
 
-/// Where a trigger leads from a loop at full force.
+/// Returns the effect of a fault on an active loop.
 std::string follows(const FaultRow& row) {
   const Transition& from_active = transition(row.trigger, State::active);
   if (!from_active.changes_state) return "it is told, and the force stays";

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kColumns = 100;
 
-/// Words, with single blanks between them.
+/// Replaces all white space by single blanks.
 std::string on_one_line(const std::string& text) {
   std::istringstream words(text);
   std::string line;

@@ -16,18 +16,18 @@ namespace {
 
 constexpr Usage kMultiAxis = {0x01, 0x08};
 
-/// One interface, and what came of holding the profiles against it.
+/// One USB interface, and the result of matching it with the profiles.
 struct Entry {
-  UsbDevice shown;  ///< its strings made plain
+  UsbDevice shown;  ///< the device with printable strings
   InspectedDevice facts;
   MatchResult match;
-  bool ours = false;  ///< it has to do with us, whether or not it can be used
+  bool ours = false;  ///< the interface belongs to a supported or related device
 };
 
-/// A device, by its interfaces.
+/// The interfaces of one device.
 using Interfaces = std::span<const Entry>;
 
-// --- what there is ----------------------------------------------------------------------------------------
+// --- collecting the devices -------------------------------------------------------------------------------
 
 constexpr std::size_t kLongestName = 60, kLongestReason = 400;
 
@@ -63,7 +63,7 @@ bool same_socket(const UsbDevice& a, const UsbDevice& b) {
   return !a.port_path.empty() && a.port_path == b.port_path && a.vendor == b.vendor && a.product == b.product;
 }
 
-/// The interfaces of one device follow each other in the list.
+/// Groups the interfaces. The interfaces of one device are adjacent in the list.
 std::vector<Interfaces> by_device(const std::vector<Entry>& entries) {
   std::vector<Interfaces> devices;
   for (std::size_t i = 0; i < entries.size();) {
@@ -75,8 +75,8 @@ std::vector<Interfaces> by_device(const std::vector<Entry>& entries) {
   return devices;
 }
 
-/// The interfaces that tell what there is to tell of a device: those with a profile, else the first that has
-/// to do with us, for the others are of the same id and would say the same.
+/// Returns the interfaces that the list describes: those with a profile, otherwise the first related one. The
+/// others have the same id and would repeat its text.
 std::vector<const Entry*> telling(Interfaces device, bool all) {
   std::vector<const Entry*> found;
   for (const Entry& entry : device)
@@ -92,7 +92,7 @@ std::vector<const Entry*> telling(Interfaces device, bool all) {
   return found;
 }
 
-// --- a device in words ------------------------------------------------------------------------------------
+// --- describing a device ----------------------------------------------------------------------------------
 
 std::string indented(const std::string& text) {
   std::string lines = "  ";
@@ -131,7 +131,7 @@ std::string in_one_line(Interfaces device) {
   return text + (kinds.empty() ? ", not HID" : "") + "; no profile is for it\n";
 }
 
-/// Whether we may open what the transport opens.
+/// Returns whether wrenchd may open the node that the transport uses.
 std::string access(const UsbDevice& device, Transport transport, const OpenCheck& why_not_open) {
   const bool hidraw = transport == Transport::hidraw;
   const std::string& node = hidraw ? device.hidraw_node : device.usb_node;
@@ -145,7 +145,7 @@ std::string access(const UsbDevice& device, Transport transport, const OpenCheck
   return indented(why.empty() ? node + " can be opened" : why);
 }
 
-/// Of an unmatched device, the node that would be opened first.
+/// Returns whether wrenchd may open the preferred node of a device without a profile.
 std::string access(const UsbDevice& device, const OpenCheck& why_not_open) {
   return access(device, device.hidraw_node.empty() ? Transport::libusb : Transport::hidraw, why_not_open);
 }
@@ -162,7 +162,7 @@ std::string degrees_of_freedom(const DeviceProfile& profile) {
   return indented(text);
 }
 
-/// The profile held against what the device says of its reports.
+/// Returns the result of comparing the profile with the device's report descriptor.
 std::string agreement(const InspectedDevice& facts, const DeviceProfile& profile) {
   if (!facts.descriptor_error.empty())
     return indented("its report descriptor is refused, so the profile could not be held against it: " +
@@ -177,7 +177,7 @@ std::string agreement(const InspectedDevice& facts, const DeviceProfile& profile
   return indented(text);
 }
 
-/// Profiles with the same reason share a line.
+/// Returns the reasons for rejection. Profiles with the same reason share a line.
 std::string why_not(const Entry& entry, const std::vector<DeviceProfile>& profiles) {
   std::vector<std::pair<std::string, std::string>> names_by_reason;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
@@ -227,9 +227,9 @@ std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& prof
   return text;
 }
 
-// --- below the list ---------------------------------------------------------------------------------------
+// --- notes below the list ---------------------------------------------------------------------------------
 
-/// Devices that have the same profile, and what tells them apart.
+/// Returns the devices that share a profile, and how to distinguish them.
 std::string equal_devices(const std::vector<Entry>& entries, const std::vector<DeviceProfile>& profiles) {
   std::string text;
   for (std::size_t i = 0; i < profiles.size(); ++i) {

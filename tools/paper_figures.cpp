@@ -19,7 +19,7 @@ namespace {
 
 using Steps = std::vector<PaperStep>;
 
-/// The outline of the cube in the plane of motion, and its centre of mass.
+/// Writes the outline of the cube in the plane of motion, and its centre of mass.
 std::string trajectory_csv(const Steps& steps) {
   constexpr double kHalf = 25.0;
   std::ostringstream csv;
@@ -35,7 +35,7 @@ std::string trajectory_csv(const Steps& steps) {
   return csv.str();
 }
 
-/// Of a step at which contact starts, or the first without it.
+/// Returns the value at a step where contact begins, or at the first step without contact.
 double starts_or_ends(const Steps& steps, std::size_t i) {
   const bool before = i > 0 && steps[i - 1].in_contact;
   return before != steps[i].in_contact ? 1.0 : 0.0;

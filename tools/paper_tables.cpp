@@ -15,8 +15,8 @@ namespace {
 
 constexpr const char* kHeading = "{:<22} {:>10}  {:>16}  {:>16}  {:>16}\n";
 
-/// A quantity the paper prints to four decimals, and what each method makes of it. A star marks what lies
-/// further from the paper than half of its last digit.
+/// Formats a number that the paper prints with four decimals, and the result of each method. A star marks
+/// results that differ by more than half of the last printed digit.
 std::string row(std::string_view name, double printed, const std::vector<double>& computed) {
   constexpr double kHalfDigit = 0.5e-4 * (1.0 + 1e-9);
   std::string text = fmt::format("{:<22} {:>10.4f}", name, printed);
@@ -33,7 +33,7 @@ std::vector<Penetration> projections(double scale) {
   return answers;
 }
 
-/// One row: a number of each answer.
+/// Formats one row with one number per answer.
 template <class Number>
 std::string row_of(std::string_view name, double printed, const std::vector<Penetration>& answers,
                    const Number& number) {
@@ -42,7 +42,7 @@ std::string row_of(std::string_view name, double printed, const std::vector<Pene
   return row(name, printed, computed);
 }
 
-/// Rows of the planar motion: of exponential coordinates [v; w], those that are not zero.
+/// Formats the nonzero exponential coordinates [v; w] of the planar motion.
 template <class Coordinates>
 std::string rows_of(std::string_view name, std::initializer_list<double> printed,
                     const std::vector<Penetration>& answers, const Coordinates& coordinates) {
@@ -68,7 +68,7 @@ std::string rows_of_matrix(std::string_view name, double cosine, double sine, do
                 [](const Penetration& answer) { return answer.projection.X_WQ.translation_m.y(); });
 }
 
-/// eps of p and q as the paper prints their matrices.
+/// Returns eps of p and q from the matrices as printed in the paper.
 Vector6d eps_of_printed_matrices() {
   const Pose p{rotation_from({0.0, 0.0, std::atan2(-0.1987, 0.9801)}), {0.0, 25.0, 0.0}};
   const Pose q{rotation_from({0.0, 0.0, std::atan2(-0.0866, 0.9962)}), {0.0, 27.0712, 0.0}};

@@ -15,7 +15,8 @@
 namespace wrenchd {
 namespace {
 
-// What a profile may say; config/load_report_layout.cpp and load_profile.cpp refuse what is beyond.
+// Maximum length of a report in a profile. config/load_report_layout.cpp and config/load_profile.cpp reject
+// longer ones.
 constexpr std::size_t kMostReportBytes = 64;
 constexpr std::size_t kMostButtons = 32;
 constexpr double kLeastStep = 1e-12, kLargestStep = 1e3;
@@ -36,14 +37,14 @@ std::string place_text(std::size_t bit) {
   return "byte " + std::to_string(bit / 8) + (bit % 8 == 0 ? "" : " bit " + std::to_string(bit % 8));
 }
 
-/// A name that somebody else chose, fit for a comment: TOML wants one line of good UTF-8.
+/// Makes a device's name fit for a TOML comment: one line of valid UTF-8.
 std::string to_printable(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
   return printable(text, 200);
 }
 
-// What the descriptor says, as comments
+// Comments that repeat the descriptor
 
 std::string field_text(const DescribedField& field) {
   const std::string where = "#     " + place_text(field.bit) + ": ";
@@ -88,8 +89,8 @@ bool of_maker(const DescribedReport& report) {
   });
 }
 
-/// What drives motors, as far as bytes can tell: the longest output report that does more than light lamps,
-/// one of the maker's own before any other.
+/// Returns the output report that most likely drives motors: the longest one that does more than set LEDs,
+/// preferably vendor-defined.
 const DescribedReport* driving_report(const ReportDescriptor& descriptor) {
   const DescribedReport* found = nullptr;
   const auto drives = [](const DescribedField& field) {
@@ -106,7 +107,7 @@ const DescribedReport* driving_report(const ReportDescriptor& descriptor) {
   return found;
 }
 
-// What every profile has
+// Keys of every profile
 
 std::string match_table(const DescriptorSource& source, const ReportDescriptor& descriptor) {
   std::array<char, 80> line{};
@@ -117,7 +118,7 @@ std::string match_table(const DescriptorSource& source, const ReportDescriptor& 
                   unsigned{source.id->product});
     text = line.data();
   }
-  // The kernel's lists know a device by the first thing it wants to be.
+  // The kernel names a device after its first collection.
   const Usage usage = descriptor.collections.empty() ? Usage{} : descriptor.collections.front().usage;
   if (usage == Usage{}) return text;
   std::snprintf(line.data(), line.size(), "usage_page = 0x%02x\nusage = 0x%02x\n", unsigned{usage.page},
@@ -125,7 +126,7 @@ std::string match_table(const DescriptorSource& source, const ReportDescriptor& 
   return text + line.data();
 }
 
-/// All that stands above the reports.
+/// Returns the keys above the reports.
 std::string general_keys(const DescriptorSource& source, const ReportDescriptor& descriptor,
                          const std::string& description, const char* stream) {
   const bool driven = driving_report(descriptor) != nullptr;
@@ -151,7 +152,7 @@ std::string general_keys(const DescriptorSource& source, const ReportDescriptor&
   return text + "# FILL IN: max_linear_speed_m_per_s =\n# FILL IN: max_angular_speed_rad_per_s =\n";
 }
 
-/// Id and length. `guess`: what was guessed of the report.
+/// Returns id and length of a report. `guess`: text that marks which part is a guess.
 std::string frame_keys(const DescribedReport& report, const std::string& guess = {}) {
   const std::string length = std::to_string(report.length);
   std::string text = "id = " + id_text(report.id) + guess + "\n";
@@ -181,34 +182,34 @@ std::string wrench_table(const ReportDescriptor& descriptor) {
 
 // Multi-axis controllers
 
-/// The six axes are two fields of a profile.
+/// Half of the six axes: a profile describes them as two fields.
 struct Half {
-  const char* key;       ///< of the field
-  const char* step_key;  ///< [m] or [rad] of one count
+  const char* key;       ///< name of the field
+  const char* step_key;  ///< key of the size of one count [m] or [rad]
   const char* offset_key;
   const char* gain_key;
-  const char* what;  ///< the step is
+  const char* what;  ///< description of the step for the comment
   const char* full_text;
-  double full;   ///< taken as the end of the cap's way where the device gives no unit
-  double speed;  ///< that the end of the cap's way shall mean
+  double full;   ///< assumed full deflection if the device gives no unit
+  double speed;  ///< commanded speed at full deflection
   const char* speed_text;
-  std::size_t first;  ///< of its three axes
+  std::size_t first;  ///< index of the first of its three axes
 };
 
-// A guess each, and marked as one. Where a device gives no unit only the product of step and gain moves
-// anything, so the ends may be any; the speeds are slow enough to follow with the eye.
+// Default values, which the proposal marks as guesses. If a device gives no unit, only the product of step
+// and gain has an effect, so the full deflections are arbitrary. The speeds are slow enough to follow by eye.
 constexpr Half kTranslation = {"translation", "step_m", "offset_m", "linear_gain", "length",
                                "10 mm",       0.01,     0.1,        "0.1 m/s",     0};
 constexpr Half kRotation = {"rotation", "step_rad", "offset_rad", "angular_gain", "angle",
                             "0.1 rad",  0.1,        1.0,          "1 rad/s",      3};
 
-/// The count at which the cap rests: 0, or the middle where there is no 0 between its ends.
+/// Returns the count of the undeflected cap: 0, or the middle if 0 is outside its range.
 double rest_count(const DescribedNumber& axis) {
   if (axis.logical_min < 0 && axis.logical_max > 0) return 0.0;
   return std::ceil(0.5 * (static_cast<double>(axis.logical_min) + static_cast<double>(axis.logical_max)));
 }
 
-/// Counts from rest to the farther end, of the widest of the three.
+/// Returns the counts from rest to the farther end, for the axis with the widest range.
 double counts_to_end(const SixAxisController& device, const Half& half) {
   double most = 0.0;
   for (std::size_t i = half.first; i < half.first + 3; ++i) {
@@ -220,7 +221,8 @@ double counts_to_end(const SixAxisController& device, const Half& half) {
   return most;
 }
 
-/// Three equal numbers that follow each other: what a field is. The step is one for all three.
+/// Returns true if the three axes are equal and adjacent, as a field of a profile requires. They share one
+/// step.
 bool is_row(const SixAxisController& device, const Half& half) {
   const DescribedNumber& a = device.axes[half.first];
   for (std::size_t i = 1; i < 3; ++i) {
@@ -233,7 +235,8 @@ bool is_row(const SixAxisController& device, const Half& half) {
   return counts_to_end(device, half) > 0.0;
 }
 
-/// [m] or [rad] of a count: the device's own, or a guess where it gives none that a profile may have.
+/// Size of a count [m] or [rad]: the device's own, or a guess if the device gives none that a profile
+/// accepts.
 struct Step {
   double si = 0.0;
   bool guessed = false;
@@ -264,7 +267,7 @@ std::string axes_places(const SixAxisController& device, std::size_t first) {
   return text;
 }
 
-/// Where a field lies and how wide it is: `byte = 1, type = "i16"`, or `byte = 0, bit = 3, bits = 10`.
+/// Returns position and width of a field: `byte = 1, type = "i16"`, or `byte = 0, bit = 3, bits = 10`.
 std::string place_keys(std::size_t bit, unsigned bits, bool is_signed, bool signed_by_itself) {
   std::string text = "byte = " + std::to_string(bit / 8);
   const bool plain_width = bits == 8 || bits == 16 || bits == 32;
@@ -297,7 +300,7 @@ std::string axes_field(const SixAxisController& device, const Half& half) {
   return text + " }\n";
 }
 
-/// As much a metre, or a radian, as makes the end of the cap's way the speed that is wanted there.
+/// Returns the gain per metre or radian for which full deflection gives the intended speed.
 std::string gain(const SixAxisController& device, const Half& half) {
   const double value =
       is_row(device, half) ? half.speed / (step_of(device, half).si * counts_to_end(device, half)) : 0.0;
@@ -308,12 +311,12 @@ std::string gain(const SixAxisController& device, const Half& half) {
   return key + "# GUESSED: " + half.speed_text + " at the end of the cap's way\n";
 }
 
-/// [m] or [rad] at the end of the cap's way; 0 where that cannot be told.
+/// Returns the full deflection [m] or [rad]; 0 if it is unknown.
 double end_of_way(const SixAxisController& device, const Half& half) {
   return is_row(device, half) ? step_of(device, half).si * counts_to_end(device, half) : 0.0;
 }
 
-/// How it steers: as the SpaceMouse's shipped profiles have it.
+/// Returns the steering keys, with the values of the shipped SpaceMouse profiles.
 std::string steering(const SixAxisController& device) {
   const double full_m = end_of_way(device, kTranslation), full_rad = end_of_way(device, kRotation);
   if (!(full_m >= 1e-5 && full_m <= 1.0 && full_rad >= 1e-4 && full_rad <= 3.2)) return {};
@@ -331,7 +334,7 @@ std::string deflection_table(const SixAxisController& device) {
          gain(device, kTranslation) + gain(device, kRotation) + steering(device);
 }
 
-/// Nothing but buttons from its first to its last, and padding: what a mask can hold.
+/// Returns true if the field contains only buttons and padding, as a mask requires.
 bool is_mask(const DescribedReport& report, const DescribedBits& bits) {
   return std::all_of(report.fields.begin(), report.fields.end(), [&](const DescribedField& field) {
     const bool apart = field.end_bit() <= bits.bit || field.bit >= bits.bit + bits.count;
@@ -350,7 +353,7 @@ std::string buttons_field(const SixAxisController& device, const DescribedReport
          "\nbuttons = { " + place_keys(bits.bit, count, false, false) + " }\n";
 }
 
-/// What a report of the device carries of axes and buttons.
+/// Returns the axes and buttons of an input report.
 std::string report_fields(const SixAxisController& device, const DescribedReport& report) {
   std::string text;
   for (const Half& half : {kTranslation, kRotation})
@@ -393,9 +396,9 @@ std::string multi_axis(const DescriptorSource& source, const SixAxisController& 
   return text;
 }
 
-// Devices with reports of their maker's own
+// Devices with vendor-defined reports
 
-/// The longest of its kind: what carries poses or wrenches is seldom the shortest.
+/// Returns the longest report of a kind, which most likely carries poses or wrenches.
 const DescribedReport* longest(const ReportDescriptor& descriptor, ReportKind kind) {
   const DescribedReport* found = nullptr;
   for (const DescribedReport& report : descriptor.reports)

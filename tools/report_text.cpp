@@ -19,11 +19,11 @@ using Bytes = std::span<const std::uint8_t>;
 
 std::string number(double x) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.9g", x == 0.0 ? 0.0 : x);  // no -0
+  std::snprintf(text.data(), text.size(), "%.9g", x == 0.0 ? 0.0 : x);  // avoids -0
   return text.data();
 }
 
-/// Lines of a name, values and a unit.
+/// Lines with a name, values and a unit.
 class LineReader {
  public:
   void add(const std::string& name, const std::string& text) {
@@ -36,7 +36,7 @@ class LineReader {
     double largest = 0.0;
     for (const double value : values) largest = std::max(largest, std::abs(value));
     std::string line;
-    for (const double value : values)  // what rounding of a rotation leaves is nothing
+    for (const double value : values)  // suppresses the rounding error of a rotation
       line += (line.empty() ? "" : " ") + number(std::abs(value) < 1e-14 * largest ? 0.0 : value);
     add(name, line + (unit.empty() ? "" : " " + unit) + more);
   }
@@ -106,7 +106,7 @@ void add_pose(LineReader& lines, const std::string& where, const Pose& X) {
   lines.add("orientation " + where, q, "(x y z w)");
 }
 
-/// What wrenchd makes of a report, in the axes of the base.
+/// Adds wrenchd's interpretation of a report, in the base frame.
 void add_meaning(LineReader& lines, const DeviceProfile& profile, const PoseReportLayout& layout,
                  PoseReport report) {
   const Quaterniond& R_BD = profile.X_BD.rotation;
@@ -180,7 +180,8 @@ std::string wrench_text(const DeviceProfile& profile, Bytes bytes) {
   return lines.take();
 }
 
-/// The report itself: without an FTDI chip's status bytes, or the 00 by which host libraries say "no id".
+/// Returns the report itself: without the status bytes of an FTDI chip, and without the byte 00 that host
+/// libraries write for "no report id".
 Bytes without_wrapping(const DeviceProfile& profile, Bytes bytes) {
   const PoseReportLayout& r = profile.pose_report;
   const std::size_t prefix = profile.endpoints.prefix_bytes;
@@ -191,7 +192,7 @@ Bytes without_wrapping(const DeviceProfile& profile, Bytes bytes) {
   return bytes;
 }
 
-/// A link that gives what it was given to the device, and keeps what the device writes.
+/// A link that supplies one given report and stores the report that the device writes.
 class BytesLink final : public ReportLink {
  public:
   void open() override {}
@@ -215,7 +216,7 @@ class BytesLink final : public ReportLink {
   std::size_t written_length = 0;
 };
 
-/// A report of a device that stands at its home position.
+/// Returns a report of a device at its home pose.
 std::vector<std::uint8_t> home_report(const DeviceProfile& profile) {
   PoseReport report;
   report.joints = profile.kinematics.home_counts;

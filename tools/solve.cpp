@@ -42,7 +42,7 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
   PenetrationDepth::Options options = settings.depth;
   if (settings.proxy) options.clearance_m = Proxy::kClearance_m;
   PenetrationDepth depth(scene, options);
-  std::optional<Pose> X_last;  // of the proxy
+  std::optional<Pose> X_last;  // previous pose of the proxy
   WrenchGains gains;
   gains.stiffness = WrenchGains::scalar(settings.k_P);
   WrenchLaw law(gains_for(settings.depth.method, gains));

@@ -53,11 +53,11 @@ namespace {
 
 using namespace wrenchd;
 
-constexpr int kExitRefused = 1;     ///< a file was refused, or cannot be written
-constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is no solid
-constexpr int kExitDiffers = 4;     ///< wrenchctl replay: a tick came out differently
-constexpr int kExitUnfit = 5;       ///< wrenchctl doctor: something is wrong
-constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: a pose had no admissible pose near it
+constexpr int kExitRefused = 1;     ///< a file was rejected, or cannot be written
+constexpr int kExitDefects = 2;     ///< wrenchctl mesh: the mesh is not a solid
+constexpr int kExitDiffers = 4;     ///< wrenchctl replay: a tick differs
+constexpr int kExitUnfit = 5;       ///< wrenchctl doctor: a check failed
+constexpr int kExitInfeasible = 3;  ///< wrenchctl solve: no admissible pose was found near a pose
 
 const std::map<std::string, Method> kMethods = {{"exact", Method::exact},
                                                 {"planar", Method::planar},
@@ -74,7 +74,7 @@ struct SolveOptions {
   SolveSettings settings;
 };
 
-/// "0.5,0.3": the static and the dynamic coefficient; one alone stands for both.
+/// Parses "0.5,0.3": static and dynamic friction coefficient; a single number sets both.
 std::optional<FrictionSettings> friction_of(const std::string& text) {
   FrictionSettings friction;
   const char* const end = text.data() + text.size();
@@ -115,7 +115,7 @@ std::vector<Pose> read_poses_from(const std::string& name) {
   return read_poses(file, name);
 }
 
-/// On standard error: what is being done, and what was changed.
+/// Prints progress and changes to standard error.
 void say(const std::string& what) {
   std::fprintf(stderr, "wrenchctl: %s\n", what.c_str());
 }
@@ -307,7 +307,7 @@ std::vector<std::uint8_t> bytes_of(const char* option, const std::string& text) 
                            "; write bytes in hexadecimal, as in \"01 00 ff\"");
 }
 
-/// "fx,fy,fz,tx,ty,tz"
+/// Parses "fx,fy,fz,tx,ty,tz".
 Wrench wrench_of(const std::string& text) {
   std::array<double, 6> numbers{};
   if (const auto commas = static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')); commas != 5)
@@ -625,7 +625,7 @@ void add_recordings(CLI::App& app, RecordingOptions& options, int& exit_code) {
   add_plot(app, options);
 }
 
-/// What a daemon that runs is asked for.
+/// Adds the commands for a running daemon.
 void add_control(CLI::App& app, ControlOptions& options, int& exit_code) {
   const auto add = [&](const char* name, const char* what, auto&& run) {
     CLI::App* command = app.add_subcommand(name, what);
@@ -682,7 +682,7 @@ int main(int argc, char** argv) {
       "2 mesh: not a solid; 3 solve: a pose had no admissible pose near it; 4 replay: a tick differs;\n"
       "5 doctor: something is wrong; "
       "over 100: the command line was not understood.");
-  app.require_subcommand(0, 1);  // an unknown one is then told by its name
+  app.require_subcommand(0, 1);  // optional, so that an unknown command appears by name in the error
   int exit_code = 0;
 
   SolveOptions solve_options;

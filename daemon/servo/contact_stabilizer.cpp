@@ -4,11 +4,11 @@
 namespace wrenchd {
 namespace {
 
-/// Of the device's reports: how long a command may take where nothing says when it arrived.
+/// Assumed round trip of a command in report periods, for a device that acknowledges no commands.
 constexpr double kAssumedPeriods = 2.0;
-/// An oscillation costs half of the stiffness; the third is none of the stiffness's.
-constexpr double kCalmer = 0.5;
-constexpr int kOscillations = 3;
+/// Factor on the wrench for each oscillation. The third oscillation after arming is a fault.
+constexpr double kOscillationScale = 0.5;
+constexpr int kMaxOscillations = 3;
 
 double report_rate_Hz(const Settings& settings, const DeviceProfile& profile) {
   return profile.report_rate_Hz > 0.0 ? profile.report_rate_Hz : settings.servo.rate_Hz;
@@ -25,10 +25,10 @@ ContactStabilizer::ContactStabilizer(const Settings& settings, const DeviceProfi
       wrench_about_handle_(profile.wrench_point == WrenchPoint::handle),
       device_acknowledges_(profile.pose_report.acknowledged.present) {}
 
-void ContactStabilizer::update_measurement(const DeviceSample& sample, std::uint64_t commanded,
+void ContactStabilizer::update_measurement(const DeviceSample& sample, std::uint64_t last_command_sent,
                                            TimePoint now) noexcept {
   measurement_.tick({now, sample.arrived, sample.device_time_s, sample.sequence, sample.fresh,
-                     device_acknowledges_, sample.acknowledged, commanded});
+                     device_acknowledges_, sample.acknowledged, last_command_sent});
 }
 
 const StiffnessScale& ContactStabilizer::derive_stiffness() noexcept {
@@ -44,7 +44,7 @@ StiffnessScale ContactStabilizer::max_stable_scale(const StabilityAnalysis& stab
                             : StiffnessScale{};
 }
 
-/// The guard knows the device and the delay, and no walls: it stays.
+/// The guard depends on device and delay only, so it stays.
 void ContactStabilizer::set_stability(const StabilityAnalysis& stability) noexcept {
   stability_ = stability;
   stiffness_scale_ = max_stable_scale(stability_);
@@ -57,29 +57,29 @@ bool ContactStabilizer::set_workspace_scale(double scale) noexcept {
   return true;
 }
 
-Wrench ContactStabilizer::stabilize(const Wrench& asked, const DeviceSample& sample,
-                                    const ContactInput& moment) noexcept {
+Wrench ContactStabilizer::stabilize(const Wrench& requested, const DeviceSample& sample,
+                                    const ContactInput& input) noexcept {
   faults_ = 0;
-  const bool risen = last_state_ == State::ramping && moment.state == State::active;
-  last_state_ = moment.state;
+  const bool ramp_ended = last_state_ == State::ramping && input.state == State::active;
+  last_state_ = input.state;
   if (!is_driving(last_state_) || last_state_ == State::ramping || !wrench_about_handle_) {
     reset_guard(last_state_);
-    return asked;
+    return requested;
   }
-  if (risen) guard_.credit(moment.stored_energy_J);
+  if (ramp_ended) guard_.credit(input.stored_energy_J);
   double dt_s = 0.0;
-  if (moment.sample_usable) {
+  if (input.sample_usable) {
     if (guard_active_) dt_s = sample.device_time_s - guard_sample_time_s_;
     guard_active_ = true;
     guard_sample_time_s_ = sample.device_time_s;
-    detect_oscillation(oscillation_gain_ * asked, sample, dt_s, moment.in_contact);
+    detect_oscillation(oscillation_gain_ * requested, sample, dt_s, input.in_contact);
   }
-  const Wrench left = guard_.limit(oscillation_gain_ * asked, sample.X_BH, dt_s, moment.in_contact);
+  const Wrench limited = guard_.limit(oscillation_gain_ * requested, sample.X_BH, dt_s, input.in_contact);
   if (guard_.energy_runaway()) faults_ |= bit(Fault::energy_generated);
-  return left;
+  return limited;
 }
 
-/// No force, or one that rises: nothing to guard. Whoever arms anew starts with all of the stiffness.
+/// State::waiting follows arming, and therefore restores the full wrench.
 void ContactStabilizer::reset_guard(State state) noexcept {
   guard_.reset();
   guard_active_ = false;
@@ -89,13 +89,13 @@ void ContactStabilizer::reset_guard(State state) noexcept {
   oscillation_gain_ = 1.0;
 }
 
-void ContactStabilizer::detect_oscillation(const Wrench& asked, const DeviceSample& sample, double dt_s,
+void ContactStabilizer::detect_oscillation(const Wrench& requested, const DeviceSample& sample, double dt_s,
                                            bool in_contact) noexcept {
-  oscillation_.update(asked, sample.V_BH, dt_s, in_contact);
+  oscillation_.update(requested, sample.V_BH, dt_s, in_contact);
   if (!oscillation_.oscillates()) return;
-  oscillation_gain_ *= kCalmer;
+  oscillation_gain_ *= kOscillationScale;
   oscillation_.reset();
-  faults_ |= bit(++oscillation_count_ < kOscillations ? Fault::oscillating : Fault::oscillation_persists);
+  faults_ |= bit(++oscillation_count_ < kMaxOscillations ? Fault::oscillating : Fault::oscillation_persists);
 }
 
 }  // namespace wrenchd

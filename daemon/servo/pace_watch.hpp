@@ -9,32 +9,34 @@
 
 namespace wrenchd {
 
-/// Looks at the times of the ticks: late, stopped, back, and a machine that slept in between. RT safe.
+/// Detects late ticks, a stalled loop, a clock that runs backwards, and a machine that was suspended.
 class PaceWatch {
  public:
-  /// stopped_after: how late a tick has to be to be a loop that stood still, and not a late one any more.
-  PaceWatch(Duration period, Duration stopped_after) noexcept
-      : period_(period), stopped_after_(stopped_after) {}
+  /// stalled_after: lateness from which a tick counts as a stall of the loop. RT-safe.
+  PaceWatch(Duration period, Duration stalled_after) noexcept
+      : period_(period), stalled_after_(stalled_after) {}
 
-  /// slept: how long the machine has slept since it was switched on.
-  FaultSet check(TimePoint now, Duration slept) noexcept;
+  /// Returns the faults of this tick. suspended: time that the machine has been suspended since boot. Call
+  /// once per tick, first of all detectors. RT-safe.
+  FaultSet check(TimePoint now, Duration suspended) noexcept;
 
-  /// Since the last tick [s]: never less than nothing, and after a gap no more than two periods, so that
-  /// nothing that grows with time leaps.
+  /// Returns the time since the last tick [s], clamped to 0 ... 2 periods. The clamp keeps integrators and
+  /// ramps from jumping after a gap. RT-safe.
   double dt_s() const noexcept { return dt_s_; }
-  /// How late this tick is; nothing where it is not.
+  /// Returns how late this tick is; 0 if it is not late. RT-safe.
   Duration lateness() const noexcept { return lateness_; }
-  /// Did a tick come late so short a time ago that old reports are nobody's fault but ours?
+  /// Returns true if a tick was late within the last kStaleSample. Old samples are then no fault of the
+  /// device. RT-safe.
   bool recently_late(TimePoint now) const noexcept {
     return last_late_tick_ && now - *last_late_tick_ <= kStaleSample;
   }
 
  private:
   Duration period_;
-  Duration stopped_after_;
+  Duration stalled_after_;
   std::optional<TimePoint> last_tick_;
-  std::optional<TimePoint> last_late_tick_;  ///< the last late one
-  Duration suspended_{};
+  std::optional<TimePoint> last_late_tick_;
+  Duration suspended_{};  ///< Value of `suspended` in the previous tick.
   double dt_s_ = 0.0;
   Duration lateness_{};
 };

@@ -9,63 +9,70 @@
 
 namespace wrenchd {
 
-/// What the hand feels: one rendering, and for a moment two, while another takes its place.
+/// Holds the active rendering and, during a change, the next one, and cross-fades the wrench between the two.
 ///
-/// The other one looks for its place beside, near the proxy of the first, which is felt as before. When it
-/// has one both follow the hand, and the wrench goes over from the first to the second along a straight line:
-/// within kMinFade_s, and no faster than a force rises after arming. Where the tool fits nowhere in the
-/// other scene the force goes to zero so.
+/// The proxy of the next rendering is initialised near the active proxy while the active rendering continues.
+/// When the next proxy is complete, the weight of the next wrench rises linearly from 0 to 1 (METHOD (71)).
+/// If the search finds no feasible pose, the wrench fades to zero. The fade takes at least kMinFade_s and is
+/// no faster than the force rise after arming. daemon/servo/README.md, section "Renderings".
 ///
-/// All but exchange() belongs to the servo thread. What is noexcept is RT safe.
+/// All methods except exchange() belong to the servo thread.
 class RenderingCrossfade {
  public:
   static constexpr double kMinFade_s = 0.100;
 
+  /// Makes `first` the active rendering. RT-safe.
   explicit RenderingCrossfade(std::unique_ptr<Rendering> first) : active_(std::move(first)) {}
+  /// Destroys both renderings. Not RT-safe: frees memory.
   ~RenderingCrossfade() = default;
 
-  /// Where others hand over renderings, and destroy those that are done with.
+  /// Returns the exchange through which another thread offers renderings and destroys retired ones. RT-safe.
   RenderingExchange& exchange() noexcept { return exchange_; }
 
-  /// The one that is felt; while one takes its place, the one that goes.
+  /// Returns the active rendering. During a cross-fade this is the outgoing one. RT-safe.
   Rendering& active() noexcept { return *active_; }
-  const Rendering& active() const noexcept { return *active_; }
-  /// The one that comes; null where none does.
+  const Rendering& active() const noexcept { return *active_; }  ///< RT-safe.
+  /// Returns the incoming rendering; null if no change is under way. RT-safe.
   Rendering* next() noexcept { return next_.get(); }
-  const Rendering* next() const noexcept { return next_.get(); }
+  const Rendering* next() const noexcept { return next_.get(); }  ///< RT-safe.
 
   enum class Change : std::uint8_t {
     none,
-    next_arrived,  ///< next() is new, and has to be scaled
-    switched       ///< felt() is what was next()
+    next_arrived,  ///< next() is new. The caller must set its stiffness scale.
+    switched       ///< The former next() is now active().
   };
-  /// Between two ticks. force: whether there is any on the hand; where there is none nothing has to fade.
+  /// Takes an offered rendering and completes a finished cross-fade. force: true if force may act on the
+  /// hand; otherwise the change is immediate. Call once per tick, before project(). RT-safe.
   Change update(bool force) noexcept;
 
-  /// As of Rendering, for both.
+  /// Calls Rendering::project() for both renderings. Returns false if either proxy is trapped. RT-safe.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
+  /// Calls Rendering::compute_wrench() for both renderings. RT-safe.
   void compute_wrench(double dt_s) noexcept;
 
-  /// How fast a wrench may go over into another.
+  /// Bounds the rate of the cross-fade: a change of max_force_N or max_torque_Nm takes rise_time_s.
   struct FadeLimits {
-    double max_force_N, max_torque_Nm;  ///< that may come or go ...
-    double rise_time_s;                 ///< ... in so long
+    double max_force_N;
+    double max_torque_Nm;
+    double rise_time_s;
   };
-  /// What is felt of the wrenches of felt() and of next(), and one step further.
-  Wrench blend(const Wrench& F_felt, const Wrench& F_next, const FadeLimits& pace, double dt_s) noexcept;
-  /// The share of next() in it.
+  /// Advances the weight by dt_s and returns (1 - w) F_active + w F_next. RT-safe.
+  Wrench blend(const Wrench& F_active, const Wrench& F_next, const FadeLimits& limits, double dt_s) noexcept;
+  /// Returns w, the weight of next() in the blend, 0 to 1. RT-safe.
   double next_weight() const noexcept { return next_weight_; }
-  /// What the springs hold, each by its share [J]; and what the last mixed() put into them by the change
-  /// alone.
+  /// Returns the weighted sum of the energies stored in the springs [J]. RT-safe.
   double stored_energy_J() const noexcept;
+  /// Returns the change of stored energy that the weight change of the last blend() caused [J]. RT-safe.
   double crossfade_work_J() const noexcept { return crossfade_work_J_; }
-  /// What obstacles that move put into them in this tick, or took [J].
+  /// Returns the weighted sum of the work of moving obstacles in this tick [J]. RT-safe.
   double obstacle_work_J() const noexcept;
+  /// Returns true if a rendering with a weight above zero is in contact. RT-safe.
   bool in_contact() const noexcept;
 
-  /// No time has passed for the laws since nobody knows when.
+  /// Resets the wrench laws of both renderings, for use after a gap of unknown length. RT-safe.
   void reset_law() noexcept;
-  /// What comes takes over at once, and looks for a place anew. True where something came.
+  /// Ends a cross-fade at once, then invalidates the proxy of the active rendering. Returns true if the
+  /// active rendering changed. RT-safe.
   bool invalidate_proxy() noexcept;
 
  private:
@@ -76,7 +83,7 @@ class RenderingCrossfade {
   std::unique_ptr<Rendering> active_;
   std::unique_ptr<Rendering> next_;
   double next_weight_ = 0.0;
-  double weight_rate_per_s_ = 0.0;  ///< 0: the fade has not begun
+  double weight_rate_per_s_ = 0.0;  ///< Rate of next_weight_; 0 until the cross-fade begins.
   double crossfade_work_J_ = 0.0;
 };
 

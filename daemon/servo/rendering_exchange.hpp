@@ -10,11 +10,12 @@
 
 namespace wrenchd {
 
-/// Hands renderings to the servo thread, and takes back those that it is done with: what is built and
-/// destroyed elsewhere it only ever borrows. Between one thread that offers and one that takes.
+/// Passes renderings from one building thread to the servo thread, and retired renderings back. The building
+/// thread allocates and frees; the servo thread only borrows.
 class RenderingExchange {
  public:
   RenderingExchange() = default;
+  /// Destroys the offered rendering and all retired ones. Not RT-safe: frees memory.
   ~RenderingExchange() {
     delete offered_.load(std::memory_order_acquire);
     destroy_retired();
@@ -22,36 +23,39 @@ class RenderingExchange {
   RenderingExchange(const RenderingExchange&) = delete;
   RenderingExchange& operator=(const RenderingExchange&) = delete;
 
-  // --- the thread that builds ---
+  // --- building thread ---
 
-  /// Offers this one, in the place of one that was not taken yet. True where there was one.
+  /// Offers `rendering` to the servo thread. Destroys a previous offer that was not taken, and returns true
+  /// in that case. Not RT-safe: frees memory.
   bool offer(std::unique_ptr<Rendering> rendering) noexcept {
     destroy_retired();
-    const std::unique_ptr<Rendering> forgone(
+    const std::unique_ptr<Rendering> replaced(
         offered_.exchange(rendering.release(), std::memory_order_acq_rel));
-    return forgone != nullptr;
+    return replaced != nullptr;
   }
-  /// Was what was offered last taken?
+  /// Returns true if the servo thread took the last offer. RT-safe.
   bool taken() const noexcept { return offered_.load(std::memory_order_acquire) == nullptr; }
-  /// Destroys what was given back.
+  /// Destroys all retired renderings. Not RT-safe: frees memory.
   void destroy_retired() noexcept {
     retired_.consume_all([](Rendering* rendering) { delete rendering; });
   }
 
-  // --- the servo thread: RT safe ---
+  // --- servo thread ---
 
-  /// What is offered, if anything is. It has to be given back.
+  /// Returns the offered rendering, or null if there is no offer. The caller must later pass it to retire().
+  /// RT-safe.
   Rendering* take() noexcept {
     if (offered_.load(std::memory_order_relaxed) == nullptr) return nullptr;
     return offered_.exchange(nullptr, std::memory_order_acq_rel);
   }
-  /// There is always room: one is given back for one that was taken, and each offer() has cleaned up before.
+  /// Returns a rendering to the building thread for destruction. The queue never overflows: each retired
+  /// rendering was offered once, and every offer() empties the queue first. RT-safe.
   void retire(Rendering* rendering) noexcept { retired_.push(rendering); }
 
  private:
   std::atomic<Rendering*> offered_{nullptr};
   static_assert(std::atomic<Rendering*>::is_always_lock_free);
-  /// Since the last clean-up one may have been offered and taken, and another been on its way in.
+  /// At most two renderings are retired between two calls of offer().
   boost::lockfree::spsc_queue<Rendering*, boost::lockfree::capacity<8>> retired_;
 };
 

@@ -6,8 +6,8 @@
 namespace wrenchd {
 namespace {
 
-/// Without real-time priority a loop that stands still for a moment is nothing to look at: it is late.
-Duration stopped_after(const ServoSettings& servo) noexcept {
+/// Without required real-time priority a short stall is expected, so it counts as a late tick only.
+Duration stalled_after(const ServoSettings& servo) noexcept {
   return servo.realtime == Realtime::required ? from_seconds(servo.late_limit_s) : Duration::max();
 }
 
@@ -15,7 +15,7 @@ Duration stopped_after(const ServoSettings& servo) noexcept {
 
 Watches::Watches(const Settings& settings, const DeviceProfile& profile, double max_force_N,
                  double max_torque_Nm)
-    : pace(from_seconds(1.0 / settings.servo.rate_Hz), stopped_after(settings.servo)),
+    : pace(from_seconds(1.0 / settings.servo.rate_Hz), stalled_after(settings.servo)),
       link(profile.report_rate_Hz),
       pose(profile),
       motor_stall(max_force_N, max_torque_Nm),
@@ -24,25 +24,24 @@ Watches::Watches(const Settings& settings, const DeviceProfile& profile, double 
       has_motors(profile.has_output) {}
 
 FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
-  FaultSet found = link.check(sample, now) | pose.check(sample) | motors.check(sample, driven, now);
-  found |= classify_sample_fault(sample.fault, state, now);
-  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) found |= bit(Fault::pose_not_finite);
-  if (was_homed_ && !sample.homed) found |= bit(Fault::not_homed);
-  if (sample.arrived != TimePoint{})
-    was_homed_ = sample.homed;  // before the first report it is anybody's guess
-  return found | check_buttons(sample, state) | client.check(now);
+  FaultSet faults = link.check(sample, now) | pose.check(sample) | motors.check(sample, driven, now);
+  faults |= classify_sample_fault(sample.fault, state, now);
+  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) faults |= bit(Fault::pose_not_finite);
+  if (was_homed_ && !sample.homed) faults |= bit(Fault::not_homed);
+  if (sample.arrived != TimePoint{}) was_homed_ = sample.homed;  // not known before the first report
+  return faults | check_buttons(sample, state) | client.check(now);
 }
 
-/// What the device found in its reports, as far as it counts here.
+/// Maps a fault of the device driver to the fault that counts in this state.
 FaultSet Watches::classify_sample_fault(Fault fault, State state, TimePoint now) const noexcept {
   switch (fault) {
     case Fault::none:
-    case Fault::pose_not_a_rotation:  // three one after the other are one fault, which pose.look() finds
+    case Fault::pose_not_a_rotation:  // PoseWatch raises this fault after three such poses in a row
       return 0;
-    case Fault::overspeed:  // a hand that is fast while it feels nothing does no harm
+    case Fault::overspeed:  // a fast handle is harmless while no force acts
       return is_driving(state) ? bit(fault) : 0;
-    // A queue that ran over while we were late is no silence of the device's; and one that pushes nobody is
-    // no danger: the pose stands still by now, and goes on when it is heard again.
+    // After a late tick the driver's queue may have overflowed, so the sample is old but the device was not
+    // silent. A device without motors is harmless when silent: the pose stays constant.
     case Fault::sample_stale:
       return bit(pace.recently_late(now) || !has_motors ? Fault::sample_late : fault);
     default:
@@ -51,12 +50,12 @@ FaultSet Watches::classify_sample_fault(Fault fault, State state, TimePoint now)
 }
 
 FaultSet Watches::check_buttons(const DeviceSample& sample, State state) const noexcept {
-  FaultSet found = 0;
-  if ((sample.buttons & stop_button) != 0) found |= bit(Fault::stop_button);
-  const bool wanted = is_driving(state) || state == State::waiting;
-  if (wanted && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
-    found |= bit(Fault::deadman_released);
-  return found;
+  FaultSet faults = 0;
+  if ((sample.buttons & stop_button) != 0) faults |= bit(Fault::stop_button);
+  const bool deadman_required = is_driving(state) || state == State::waiting;
+  if (deadman_required && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
+    faults |= bit(Fault::deadman_released);
+  return faults;
 }
 
 void Watches::reset() noexcept {

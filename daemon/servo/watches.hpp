@@ -4,6 +4,7 @@
 #include "config/settings.hpp"
 #include "core/device_profile.hpp"
 #include "core/fault.hpp"
+#include "core/state.hpp"
 #include "daemon/servo/client_watch.hpp"
 #include "daemon/servo/link_watch.hpp"
 #include "daemon/servo/motor_stall_watch.hpp"
@@ -15,9 +16,10 @@
 
 namespace wrenchd {
 
-/// Everything that looks for faults in a tick, each by its own rule. They find; what follows is the state
-/// machine's. RT safe.
+/// All fault detectors of a tick. A detector returns the faults it finds; the state machine decides how the
+/// loop reacts. daemon/servo/README.md, section "Fault detectors".
 struct Watches {
+  /// max_force_N, max_torque_Nm: limits of the wrench; 0 if the device has no such motors. RT-safe.
   Watches(const Settings& settings, const DeviceProfile& profile, double max_force_N, double max_torque_Nm);
 
   PaceWatch pace;
@@ -27,20 +29,21 @@ struct Watches {
   WriteWatch writes;
   MotorStallWatch motor_stall;
   ClientWatch client;
-  std::uint32_t deadman_button;  ///< bit; 0: there is none
-  std::uint32_t stop_button;
-  bool has_motors;
+  std::uint32_t deadman_button;  ///< Bit of the dead man's button; 0 if the profile names none.
+  std::uint32_t stop_button;     ///< Bit of the stop button; 0 if the profile names none.
+  bool has_motors;               ///< True if the device can output a wrench.
 
-  /// What the sample says, as of now. driven: the last command switched the motors on.
+  /// Returns the faults of the link, pose, motor, button and client detectors for this sample. driven: true
+  /// if the last command enabled the motors. RT-safe.
   FaultSet check(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept;
-  /// Another device may come.
+  /// Resets the link, pose, motor and write detectors for a newly opened device. RT-safe.
   void reset() noexcept;
 
  private:
   FaultSet classify_sample_fault(Fault fault, State state, TimePoint now) const noexcept;
   FaultSet check_buttons(const DeviceSample& sample, State state) const noexcept;
 
-  bool was_homed_ = false;  ///< it has been
+  bool was_homed_ = false;  ///< True if the last report said that the encoders have their reference.
 };
 
 }  // namespace wrenchd

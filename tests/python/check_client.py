@@ -86,13 +86,13 @@ class Commands(unittest.TestCase):
 
             self.assertTrue(soon(active))
             with self.client.open_state() as state:
-                self.assertTrue(soon(lambda: len(state.latest().touches) == 4))
+                self.assertTrue(soon(lambda: len(state.latest().contact_list) == 4))
                 tick = state.latest()
             self.client.stop()
             self.assertTrue(soon(lambda: self.client.status()["state"] in ("stopped", "fault")))
         self.assertTrue(soon(lambda: rests(self.client)))
-        if tick.touches:
-            self.assertAlmostEqual(sum(touch.share for touch in tick.touches), 1.0)
+        if tick.contact_list:
+            self.assertAlmostEqual(sum(contact.load_fraction for contact in tick.contact_list), 1.0)
 
     def test_a_lease_ends_with_its_connection(self):
         dying = wrenchd.Client()
@@ -182,19 +182,19 @@ class ReadsState(unittest.TestCase):
         self.assertEqual(len(late), 1)
         self.assertIsNone(taken)
 
-    def test_touches_name_what_touches(self):
+    def test_contacts_name_features_and_obstacle(self):
         def touched():
-            return bool(self.state.latest().touches)
+            return bool(self.state.latest().contact_list)
 
         self.assertTrue(soon(touched))
         for tick in self.state.ticks(5000):
-            if tick.touches:
+            if tick.contact_list:
                 break
-        touch = tick.touches[0]
-        self.assertEqual(touch.obstacle, "table")
-        self.assertRegex(str(touch), r"^hull vertex \d+ on table plane$")
-        self.assertEqual(touch.normal_W, (0.0, 0.0, 1.0))
-        self.assertLess(abs(touch.point_W_m[2]), 1e-6)
+        contact = tick.contact_list[0]
+        self.assertEqual(contact.obstacle, "table")
+        self.assertRegex(str(contact), r"^hull vertex \d+ on table plane$")
+        self.assertEqual(contact.normal_W, (0.0, 0.0, 1.0))
+        self.assertLess(abs(contact.point_W_m[2]), 1e-6)
 
     def test_arrays_are_the_same_ticks(self):
         try:
@@ -204,13 +204,13 @@ class ReadsState(unittest.TestCase):
         array = self.state.array(200)
         self.assertTrue((numpy.diff(array["tick"].astype(numpy.int64)) == 1).all())
         self.assertEqual(array["F_out"].shape, (200, 6))
-        self.assertEqual(array["touches"]["point_W_m"].shape, (200, 16, 3))
+        self.assertEqual(array["contact_list"]["point_W_m"].shape, (200, 16, 3))
         numpy.testing.assert_allclose(numpy.linalg.norm(array["X_WP"][:, 3:], axis=1), 1.0)
 
 
 class Names(unittest.TestCase):
     def test_each_rendering_has_its_own_and_the_daemon_is_asked_once(self):
-        answers = [{"rendering": 4, "obstacles": ["bolt"]}, wrenchd.Gone("gone"), {"rendering": 7, "obstacles": []}]
+        answers = [{"rendering_id": 4, "obstacles": ["bolt"]}, wrenchd.Gone("gone"), {"rendering_id": 7, "obstacles": []}]
         asked = []
 
         def ask():
@@ -219,7 +219,7 @@ class Names(unittest.TestCase):
                 raise asked[-1]
             return asked[-1]
 
-        names = wrenchd.state._Names({"rendering": 3, "obstacles": ["table", "nut"]}, ask)
+        names = wrenchd.state._Names({"rendering_id": 3, "obstacles": ["table", "nut"]}, ask)
         self.assertEqual(names.of(3, 1), "nut")
         self.assertEqual(asked, [])
         self.assertEqual([names.of(4, 0), names.of(4, 1), names.of(3, 0)], ["bolt", "obstacle 1", "table"])
@@ -227,7 +227,7 @@ class Names(unittest.TestCase):
         self.assertEqual([names.of(5, 0), names.of(7, 0), names.of(6, 0)], ["obstacle 0"] * 3)
         self.assertEqual(answers, [])
         with self.assertRaises(wrenchd.ProtocolError):
-            wrenchd.state._Names({"rendering": 3}, ask)
+            wrenchd.state._Names({"rendering_id": 3}, ask)
 
 
 class Unhappy(unittest.TestCase):

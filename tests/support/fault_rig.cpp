@@ -10,7 +10,7 @@ namespace {
 using Kind = SimulatedFault::Kind;
 
 constexpr double kArmAt_s = 0.08;
-constexpr double kPressed_s = 0.5;  ///< by then the hand is where the phase wants it
+constexpr double kPressed_s = 0.5;  ///< time at which the hand has reached the phase's target
 constexpr int kDeadman = 0;
 constexpr int kStopButton = 1;
 

@@ -23,7 +23,7 @@ double norm3(const std::array<double, 6>& x, std::size_t from) {
   return std::hypot(x[from], x[from + 1], x[from + 2]);
 }
 
-/// Of its x axis, seen from above.
+/// Returns the angle of the pose's x axis about the world's z axis.
 double heading_rad(const Pose& X) {
   const Vector3d x = X.rotation * Vector3d::UnitX();
   return std::atan2(x.y(), x.x());
@@ -125,7 +125,7 @@ std::vector<ExpectedFigure> expected_figures(const std::string& name) {
   std::ifstream in(file);
   std::vector<ExpectedFigure> all;
   std::string line;
-  std::getline(in, line);  // time_s,quantity,least,most
+  std::getline(in, line);  // the header: time_s,quantity,min,max
   while (std::getline(in, line)) {
     std::istringstream cells(line);
     std::string time, quantity, least, most;

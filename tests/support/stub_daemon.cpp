@@ -38,7 +38,7 @@ int listen_at(const std::string& path) {
   return fd;
 }
 
-/// The descriptor goes with the first byte.
+/// Sends the descriptor with the first byte.
 void send_line(int peer, const std::string& line, int descriptor = -1) {
   iovec part = {const_cast<char*>(line.data()), line.size()};
   msghdr message{};

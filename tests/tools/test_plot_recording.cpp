@@ -60,7 +60,7 @@ TEST_CASE("a recording becomes figures, and the tables that they show", "[plot]"
   }
   CHECK(contents(files.path() / "new/figures/force.svg").find("force on the hand [N]") != std::string::npos);
   const std::string run = contents(files.path() / "new/figures/run.csv");
-  CHECK(run.find(",9.75,") != std::string::npos);  // no peak is lost where ticks are left out
+  CHECK(run.find(",9.75,") != std::string::npos);  // the export keeps every peak
   CHECK(std::count(run.begin(), run.end(), '\n') < 6002);
 }
 
@@ -95,6 +95,6 @@ TEST_CASE("what cannot be drawn is refused with a cure", "[plot]") {
   const TemporaryDirectory files;
   CHECK_THROWS_WITH(plot_recording({}, files.path() / "none"), Contains("has no ticks"));
   const auto file = files.write("file", "");
-  CHECK_THROWS_WITH(plot_recording(pressed(), file), Contains("is no directory") && Contains(".svg"));
+  CHECK_THROWS_WITH(plot_recording(pressed(), file), Contains("is not a directory") && Contains(".svg"));
   CHECK_THROWS_WITH(plot_recording(pressed(), file / "x.png"), Contains("cannot be written"));
 }

@@ -15,12 +15,12 @@ namespace {
 
 using nlohmann::json;
 
-/// So many beats in the time that the daemon waits for one.
+/// Number of heartbeats within the daemon's heartbeat timeout.
 constexpr double kBeatsInTime = 4.0;
 
 }  // namespace
 
-/// The thread that says that the program lives. It ends by itself where the connection does.
+/// The thread that sends heartbeats. The thread ends when the connection ends.
 class Client::HeartbeatThread {
  public:
   HeartbeatThread(std::shared_ptr<ClientConnection> connection, std::chrono::duration<double> every)
@@ -32,7 +32,7 @@ class Client::HeartbeatThread {
             try {
               connection->notify("beat");
             } catch (const ClientError&) {
-              return;  // whoever calls next hears of it
+              return;  // the next call reports the error
             }
             ended.wait_for(lock, stop, every, [] { return false; });
           }
@@ -104,7 +104,7 @@ void Client::release_lease() {
   heartbeat_thread_.reset();
   try {
     call("lease.give");
-  } catch (const ClientError& error) {  // lost meanwhile: there is nothing to give back
+  } catch (const ClientError& error) {  // the lease ended before, so there is nothing to release
     if (error.code() != ClientError::kInvalidState && error.code() != ClientError::kLeaseHeld) throw;
   }
 }

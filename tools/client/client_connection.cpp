@@ -22,7 +22,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kLongestLine = 16U << 20;
-/// Events that nobody polls for are kept so far; then the oldest go.
+/// Maximum number of stored events. If there are more, the oldest is dropped.
 constexpr std::size_t kMostEvents = 10'000;
 
 [[noreturn]] void gone(const std::string& why) {
@@ -39,7 +39,7 @@ std::vector<std::string> places(const std::string& named) {
   return all;
 }
 
-/// 0, or why not.
+/// Returns 0, or the errno of the failure.
 int try_to_connect(int descriptor, const std::string& place) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -48,7 +48,7 @@ int try_to_connect(int descriptor, const std::string& place) {
   return connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 ? 0 : errno;
 }
 
-/// Who may connect there, from the file.
+/// Returns the users that may connect, from the permissions of the socket file.
 std::string who_may(const std::string& place) {
   struct stat status {};
   if (stat(place.c_str(), &status) != 0 || (status.st_mode & 0060U) == 0)
@@ -60,7 +60,7 @@ std::string who_may(const std::string& place) {
          " $USER, and log in anew";
 }
 
-/// found: where the daemon is.
+/// Connects to the named socket or to the default ones. found: receives the path of the daemon's socket.
 int connected(const std::string& named, std::string& found) {
   const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0)
@@ -118,7 +118,7 @@ json ClientConnection::call(const std::string& method, const json& params, int* 
       throw ClientError(error->value("code", int{ClientError::kProtocol}),
                         error->value("message", method + " was refused"));
     }
-    if (message.value("id", json()) != id) continue;  // of a call that was given up
+    if (message.value("id", json()) != id) continue;  // response to a call that timed out
     if (descriptor != nullptr) *descriptor = std::exchange(descriptor_, -1);
     return message.value("result", json::object());
   }
@@ -147,7 +147,7 @@ void ClientConnection::queue_event(json message) {
   events_.push_back(std::move(message["params"]));
 }
 
-/// What has come is told even where the connection ended after it.
+/// Received data stays readable after the connection has ended.
 bool ClientConnection::is_connected() const noexcept {
   pollfd here = {socket_, POLLRDHUP, 0};
   return poll(&here, 1, 0) >= 0 && (here.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
@@ -164,7 +164,7 @@ bool ClientConnection::wait_for(short events, Clock::time_point end) const {
   }
 }
 
-/// False where no whole line came in time.
+/// Returns false if no complete line came in time.
 bool ClientConnection::read_line(std::string& line, Clock::time_point end) {
   for (;;) {
     const std::size_t at = received_.find('\n', scanned_);

@@ -20,8 +20,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uint64_t kVersion = 1;
-/// How often a reader that waits asks whether the daemon is there still.
+constexpr std::uint64_t kVersion = 2;
+/// Interval at which a waiting reader checks whether the daemon is still connected.
 constexpr auto kLookAround = std::chrono::milliseconds(50);
 
 [[noreturn]] void not_understood(const std::string& what) {
@@ -31,7 +31,7 @@ constexpr auto kLookAround = std::chrono::milliseconds(50);
 
 struct Field {
   std::string name, unit, doc;
-  char type = 'f';  ///< f, i or u
+  char type = 'f';  ///< 'f', 'i' or 'u'
   std::size_t width = 8;
   std::size_t count = 1;
   std::size_t offset = 0;
@@ -85,7 +85,7 @@ std::uint64_t bits_of(const Field& field, const std::byte* record, std::size_t i
     throw ClientError(ClientError::kProtocol, "field '" + field.name + "' has " +
                                                   std::to_string(field.count) + " numbers, and number " +
                                                   std::to_string(i) + " was asked for");
-  std::uint64_t bits = 0;  // of a little-endian machine, as the reader has made sure
+  std::uint64_t bits = 0;  // value on a little-endian machine, which the constructor requires
   std::memcpy(&bits, record + field.offset + i * field.width, field.width);
   return bits;
 }
@@ -117,8 +117,8 @@ struct TickState::Layout {
   std::size_t bytes, header_bytes, written_offset, slots, slot_bytes, record_offset, record_bytes;
   double rate_Hz;
   Fields fields;
-  std::size_t touches_offset, touch_bytes, most_touches;
-  Fields touch_fields;
+  std::size_t contacts_offset, contact_bytes, max_contacts;
+  Fields contact_fields;
 
   explicit Layout(const json& from) {
     if (from.at("version").get<std::uint64_t>() != kVersion)
@@ -139,18 +139,18 @@ struct TickState::Layout {
                       slots <= (bytes - header_bytes) / slot_bytes && rate_Hz > 0.0;
     if (!fits) not_understood("the sizes in its layout contradict each other");
     fields = read_fields(from.at("fields"), record_bytes);
-    const json& touches = from.at("touches");
-    touches_offset = touches.at("offset");
-    touch_bytes = touches.at("bytes");
-    most_touches = touches.at("most");
-    if (touch_bytes == 0 || touches_offset > record_bytes ||
-        most_touches > (record_bytes - touches_offset) / touch_bytes)
+    const json& contacts = from.at("contacts");
+    contacts_offset = contacts.at("offset");
+    contact_bytes = contacts.at("bytes");
+    max_contacts = contacts.at("max_count");
+    if (contact_bytes == 0 || contacts_offset > record_bytes ||
+        max_contacts > (record_bytes - contacts_offset) / contact_bytes)
       not_understood("the contacts lie outside of the record");
-    touch_fields = read_fields(touches.at("fields"), touch_bytes);
+    contact_fields = read_fields(contacts.at("fields"), contact_bytes);
   }
 };
 
-/// Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more.
+/// Caches the names of obstacles by rendering, because a tick may belong to an earlier rendering.
 class TickState::Names {
  public:
   Names(const json& layout, std::function<std::string()> ask) : ask_(std::move(ask)) { keep(layout); }
@@ -160,7 +160,8 @@ class TickState::Names {
     if (rendering > known_.rbegin()->first && ask_) {
       try {
         keep(json::parse(ask_()));
-      } catch (const std::exception&) {  // the daemon is gone, or busy: a number tells which one, too
+      } catch (const std::exception&) {  // the daemon is gone or busy; the obstacle number identifies the
+                                         // obstacle instead
       }
     }
     const auto found = known_.find(rendering);
@@ -170,7 +171,7 @@ class TickState::Names {
 
  private:
   void keep(const json& from) {
-    known_[from.at("rendering")] = from.at("obstacles").get<std::vector<std::string>>();
+    known_[from.at("rendering_id")] = from.at("obstacles").get<std::vector<std::string>>();
     while (known_.size() > kMostKept) known_.erase(known_.begin());
   }
 
@@ -201,35 +202,35 @@ std::string TickState::text(std::string_view field) const {
 
 std::vector<ProxyContact> TickState::contacts() const {
   const auto count =
-      std::min<std::size_t>(static_cast<std::size_t>(integer("touch_count")), layout_->most_touches);
+      std::min<std::size_t>(static_cast<std::size_t>(integer("contact_count")), layout_->max_contacts);
   std::vector<ProxyContact> out(count);
-  const auto rendering = static_cast<std::uint32_t>(integer("rendering"));
+  const auto rendering_id = static_cast<std::uint32_t>(integer("rendering_id"));
   for (std::size_t k = 0; k < count; ++k) {
-    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->touches_offset +
-                            k * layout_->touch_bytes;
+    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->contacts_offset +
+                            k * layout_->contact_bytes;
     const auto get = [&](std::string_view name, std::size_t i = 0) {
-      return parse_number(field_of(layout_->touch_fields, name), from, i);
+      return parse_number(field_of(layout_->contact_fields, name), from, i);
     };
     const auto feature = [&](const std::string& body) {
-      std::string name = text_of(field_of(layout_->touch_fields, body + "_feature_kind"), from);
+      std::string name = text_of(field_of(layout_->contact_fields, body + "_feature_kind"), from);
       if (name == "plane" || name == "none") return name;
       const auto number = [&](const std::string& which) {
-        return std::to_string(bits_of(field_of(layout_->touch_fields, body + which), from, 0));
+        return std::to_string(bits_of(field_of(layout_->contact_fields, body + which), from, 0));
       };
       name += " " + number("_first");
       return name.find("edge") == std::string::npos ? name : name + "-" + number("_second");
     };
-    ProxyContact& touch = out[k];
+    ProxyContact& contact = out[k];
     for (std::size_t i = 0; i < 3; ++i) {
-      touch.point_W_m[i] = get("point_W_m", i);
-      touch.normal_W[i] = get("normal_W", i);
+      contact.point_W_m[i] = get("point_W_m", i);
+      contact.normal_W[i] = get("normal_W", i);
     }
-    touch.share = get("share");
-    touch.multiplier_kg_m = get("multiplier_kg_m");
-    touch.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
-    touch.obstacle = names_->of(rendering, touch.obstacle_number);
-    touch.tool_feature = feature("tool");
-    touch.obstacle_feature = feature("obstacle");
+    contact.load_fraction = get("load_fraction");
+    contact.multiplier_kg_m = get("multiplier_kg_m");
+    contact.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
+    contact.obstacle = names_->of(rendering_id, contact.obstacle_number);
+    contact.tool_feature = feature("tool");
+    contact.obstacle_feature = feature("obstacle");
   }
   return out;
 }
@@ -248,7 +249,7 @@ StateReader::StateReader(const std::string& layout, int descriptor, std::functio
   } catch (const json::exception& error) {
     not_understood(error.what());
   }
-  // Memory that could shrink would end this process where it is read.
+  // The memory must be sealed: if it shrank, a read would end this process.
   const int seals = fcntl(descriptor, F_GET_SEALS);
   struct stat file {};
   if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || fstat(descriptor, &file) != 0 ||
@@ -298,7 +299,8 @@ void StateReader::unmap() noexcept {
 
 namespace {
 
-/// A word that another process writes. Loads of lock-free atomics write nothing, so read-only memory will do.
+/// Loads a word that another process writes. A load of a lock-free atomic does not write, so read-only memory
+/// suffices.
 std::uint64_t load(const std::byte* at, std::memory_order order) {
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
   return reinterpret_cast<const std::atomic<std::uint64_t>*>(at)->load(order);
@@ -310,8 +312,8 @@ std::uint64_t StateReader::unread() const noexcept {
   return load(memory_ + layout_->written_offset, std::memory_order_acquire) - next_;
 }
 
-/// A word of a newer record is seen together with its guard, for words are stored with release order; so two
-/// equal guards have only the words of one record between them.
+/// The daemon stores words with release order, so a word of a newer record becomes visible together with the
+/// record's guard. Therefore two equal guards enclose words of one record only.
 StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const {
   const std::byte* slot = memory_ + layout_->header_bytes + i % layout_->slots * layout_->slot_bytes;
   const std::uint64_t whole = 2 * i + 2;
@@ -324,7 +326,7 @@ StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const
   return load(slot, std::memory_order_relaxed) == whole ? CopyResult::complete : CopyResult::overrun;
 }
 
-/// Goes on in the middle of what is there, so as not to be overrun again at once.
+/// Continues in the middle of the available ticks, so that the next overrun is not immediate.
 void StateReader::skip_overwritten() {
   const std::uint64_t ahead = unread();
   if (ahead <= layout_->slots / 2) return;

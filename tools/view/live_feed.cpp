@@ -14,14 +14,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kAgain = 300ms;      ///< between two attempts to connect
-constexpr auto kWatched = 6ms;      ///< between two looks: a frame has ticks that are no older
-constexpr auto kUnwatched = 100ms;  ///< the memory keeps two seconds
+constexpr auto kAgain = 300ms;  ///< interval between two attempts to connect
+/// Reading interval with an open page; bounds the age of the ticks in a frame.
+constexpr auto kWatched = 6ms;
+constexpr auto kUnwatched = 100ms;  ///< reading interval without a page; the shared memory retains 2 s
 constexpr auto kStatusEvery =
-    1s;  ///< what no event tells: who has the lease is told, how long ticks take is not
+    1s;  ///< interval for status values without events, such as tick durations; lease changes have events
 constexpr std::size_t kMostEvents = 200;
 
-/// Memory of another process, for as long as it is looked at.
+/// Maps memory of another process for the lifetime of this object.
 class Mapped {
  public:
   explicit Mapped(int descriptor) {
@@ -102,7 +103,7 @@ void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_t
     bool any = false;
     while (reader.next(state, 0ms)) {
       any = true;
-      const ViewTick tick = view_tick(state);
+      const ViewTick tick = view_tick(tick_record(state));
       const ChannelValues values = tick.channels();
       const std::scoped_lock lock(mutex_);
       history_.add(tick.time_ns, values);
@@ -110,7 +111,8 @@ void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_t
       wake_latency_.add(tick.time_ns, tick.wake_latency_ns);
     }
     if (any) {
-      Sample now{view_tick(state), view_status(state), reader.missed()};
+      const TickRecord record = tick_record(state);
+      Sample now{view_tick(record), view_status(record, state.contacts()), reader.missed()};
       rendering_id_.store(now.tick.rendering_id);
       const std::scoped_lock lock(mutex_);
       newest_sample_ = std::move(now);
@@ -139,8 +141,8 @@ void LiveFeed::request_status(Client& client) {
   ++link_.revision;
 }
 
-/// The scene is fetched with each connection, whenever the ticks are of another rendering, and after a
-/// reload, which may have changed from where it is looked at.
+/// Fetches the scene after each connection, after each change of the rendering, and after a reload, which may
+/// change the viewpoint.
 void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
   std::uint64_t of_connection = 0;
   std::uint32_t of_rendering = 0, of_reload = 0;
@@ -153,7 +155,7 @@ void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
     try {
       if (connection != of_connection) {
         const std::scoped_lock lock(mutex_);
-        scene_ = nullptr;  // another daemon may count its meshes as the last did
+        scene_ = nullptr;  // another daemon may use the same mesh numbers for other meshes
       }
       Client client(socket_, 60s);
       fetch_scene(client);

@@ -32,7 +32,8 @@ std::string sha256_base64(std::string_view text) {
   return {reinterpret_cast<const char*>(out.data()), static_cast<std::size_t>(length)};
 }
 
-/// The import map has to stand in the page itself, where it would be refused unless it is named.
+/// The browser requires the import map in the page itself, and accepts it only if the policy contains its
+/// hash.
 std::string policy_of(const std::string& page) {
   std::string scripts = "'self'";
   constexpr std::string_view kBegin = "<script type=\"importmap\">", kEnd = "</script>";

@@ -9,10 +9,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kBeatEvery = 25ms;    ///< the daemon waits for 100
-constexpr auto kAnswerWithin = 2s;   ///< or the lease is lost anyway
-constexpr int kFadeLooks = 20;       ///< of the time between two beats: a fade takes 100 ms
-constexpr auto kUntilArmed = 500ms;  ///< until the ticks tell of it
+constexpr auto kBeatEvery = 25ms;    ///< heartbeat interval; the daemon's timeout is 100 ms
+constexpr auto kAnswerWithin = 2s;   ///< response timeout; after it the lease is lost anyway
+constexpr int kFadeLooks = 20;       ///< in heartbeat intervals; a fade takes 100 ms
+constexpr auto kUntilArmed = 500ms;  ///< time until the ticks show the new state
 
 const char* name(PageLease::Request wish) {
   switch (wish) {
@@ -90,7 +90,7 @@ Client& PageLease::client() {
 
 void PageLease::arm(std::uint64_t page) {
   const std::uint64_t other = holder_.load();
-  if (other == page) return;  // it was pressed twice
+  if (other == page) return;  // the user pressed the button twice
   if (other != 0)
     throw ClientError(ClientError::kLeaseHeld, "Another page of this view has armed; disarm there first.");
   client().call("lease.take");
@@ -106,20 +106,20 @@ void PageLease::arm(std::uint64_t page) {
   }
 }
 
-/// The force fades, and others may arm. why: told to the page that held it; empty: it knows.
+/// Disarms and releases the lease. why: message to the page that held it; empty: no message.
 void PageLease::release(const std::string& why) {
   const std::uint64_t page = holder_.exchange(0);
   if (page == 0) return;
   try {
     client().call("disarm");
-    // The lease is kept until the force has faded: to the daemon, one that ends before is a client that died.
+    // Keeps the lease until the force is zero. The daemon treats a lease that ends before as a lost client.
     for (int i = 0; i < kFadeLooks && !is_over(client().state()); ++i) {
       client().heartbeat();
       std::this_thread::sleep_for(kBeatEvery);
     }
     client().call("lease.give");
   } catch (const ClientError&) {
-    client_.reset();  // a connection that ends takes the lease with it
+    client_.reset();  // the end of the connection also ends the lease
   }
   if (!why.empty()) on_reply_({page, "lease", false, why});
 }
@@ -146,7 +146,7 @@ void PageLease::execute(const PendingRequest& asked) {
   } catch (const ClientError& error) {
     told.accepted = false;
     told.error = error.what();
-    if (error.code() > 0) {  // the connection, not the daemon's answer
+    if (error.code() > 0) {  // an error of the connection, not a response of the daemon
       client_.reset();
       holder_.store(0);
     }

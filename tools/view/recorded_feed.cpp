@@ -55,8 +55,8 @@ std::size_t RecordedFeed::index_at(double t_s) const {
 Json RecordedFeed::frame(double t_s) const {
   const std::size_t row = index_at(t_s);
   const TickRecord& record = recording_.ticks[row];
-  return frame_json(view_tick(record), view_status(record, recording_.contacts_of(row)), scene_.get(),
-                    begin_ns());
+  return frame_json(view_tick(record), view_status(record, proxy_contacts(recording_.contacts_of(row))),
+                    scene_.get(), begin_ns());
 }
 
 std::pair<std::uint64_t, std::uint64_t> RecordedFeed::bucket_range(double t_s) const {

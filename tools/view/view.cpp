@@ -37,7 +37,7 @@ Pose pose_of(const PoseSettings& placed) {
   return {rotation_from(placed.rotation_vector_rad), placed.position_m};
 }
 
-/// The scene of a recording, as it is inside.
+/// Loads the scene that the recording contains.
 std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunConfig& plan) {
   MeshLoader meshes(cache_directory(),
                     [](const std::string& what) { std::fprintf(stderr, "wrenchctl: %s\n", what.c_str()); });
@@ -47,8 +47,7 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunC
   const DeviceSettings& device = plan.settings.device;
   description["shapes"] = 1;
   description["rendering"] = 0;
-  // Scene time began with tick 0, which a recording that was started later does not have: ticks are even
-  // enough.
+  // Scene time starts at tick 0. If the recording starts later, extrapolates with the nominal period.
   const TickRecord& first = recording.ticks.front();
   description["scene_time_begins_ns"] =
       first.now_ns - std::llround(1e9 * static_cast<double>(first.tick) / plan.settings.servo.rate_Hz);

@@ -75,7 +75,8 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     const auto add_all = [&](Detail detail, std::size_t most) {
       std::uint32_t number = 0;
       for (const Json& mesh : meshes) {
-        // Each mesh gets its share, and none is made too coarse to be known again.
+        // Distributes the triangles in proportion to the meshes' sizes, with a minimum that keeps a mesh
+        // recognizable.
         constexpr double kLeast = 2'000.0;
         const auto triangles = static_cast<double>(source_triangles_[number]);
         const double share = static_cast<double>(most) * triangles / static_cast<double>(std::max(all, most));

@@ -41,8 +41,9 @@ constexpr auto kFrameEvery = 16ms;
 constexpr auto kTimesEvery = 250ms;
 constexpr auto kRequestWithin = 20s;
 constexpr std::size_t kMostConnections = 32;
-constexpr std::size_t kMostWaiting = 256;  ///< messages to a page that does not read: then it is hung up on
-constexpr std::size_t kLongestMessage = 4096;  ///< from a page
+/// Maximum number of unsent messages per page; above it the server closes the connection.
+constexpr std::size_t kMostWaiting = 256;
+constexpr std::size_t kLongestMessage = 4096;  ///< maximum size of a message from a page [bytes]
 
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
@@ -56,7 +57,7 @@ std::string random_token() {
   return token;
 }
 
-/// Takes as long wherever they differ.
+/// Compares in constant time, so that the duration reveals nothing about the token.
 bool same(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   unsigned different = 0;
@@ -80,7 +81,7 @@ Json times_json(const RollingHistogram::Summary& took, const RollingHistogram::S
   return {{"type", "times"}, {"took", sum_json(took)}, {"late", sum_json(late)}};
 }
 
-/// What every page has to know of faults: their sentences and cures.
+/// Returns message and remedy of all faults, which every page requires.
 Json faults_json() {
   Json out = Json::object();
   for (const FaultRow& row : fault_rows())
@@ -105,7 +106,7 @@ struct ViewServer::Server {
   std::map<std::uint64_t, std::weak_ptr<Page>> pages;
   std::uint64_t last_page = 0;
   std::size_t connections = 0;
-  std::unique_ptr<PageLease> lease;  ///< last: its threads post to io
+  std::unique_ptr<PageLease> lease;  ///< declared last: its threads post to io
 
   Server(std::uint16_t wanted_port, PageFiles page_files);
   ~Server() { lease.reset(); }
@@ -123,7 +124,7 @@ struct ViewServer::Server {
   }
 };
 
-/// A page that is open: its WebSocket.
+/// The WebSocket of an open page.
 class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
  public:
   Page(tcp::socket&& socket, Server& server)
@@ -154,7 +155,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   }
   void send(const Json& json) { send(text_of(json)); }
 
-  /// What is new, unless it has yet to read what came before.
+  /// Sends new data, unless the page has not read the previous data yet.
   void push(const std::shared_ptr<const std::string>& frame, std::chrono::steady_clock::time_point now) {
     if (!waiting_.empty()) return;
     LiveFeed& feed = *server_.live;
@@ -231,7 +232,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     scene_ = scene;
   }
 
-  /// A moment of a recording.
+  /// Sends the state of a recording at this time.
   void at(double t_s) {
     const RecordedFeed& feed = *server_.recorded;
     const auto [from, to] = feed.bucket_range(t_s);
@@ -245,13 +246,13 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
       times_at_ = now + kTimesEvery;
       times_timer_.cancel();
       tell_times(t_s);
-    } else {  // later: the moment at which somebody stops looking about is told of too
+    } else {  // posted, so that the page also receives the event that ends its input
       times_timer_.expires_at(times_at_);
       times_timer_.async_wait([self = shared_from_this(), t_s](beast::error_code error) {
         if (!error) self->tell_times(t_s);
       });
     }
-    send(feed.frame(t_s));  // last: the page asks again when it has come
+    send(feed.frame(t_s));  // sent last: the page requests the next frame when this one arrives
   }
 
   void tell_times(double t_s) {
@@ -309,7 +310,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
 
 namespace {
 
-/// A connection of which nobody knows yet what it wants.
+/// A connection before its HTTP request is complete.
 template <class Server>
 class Visit : public std::enable_shared_from_this<Visit<Server>> {
  public:
@@ -330,7 +331,7 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
   }
 
  private:
-  /// What was asked for below the token; nothing: the token is another.
+  /// Returns the requested path below the token; empty if the token is wrong.
   std::optional<std::string> wanted() const {
     const auto target = request_.target();
     const std::size_t end = server_.token.size() + 1;
@@ -424,7 +425,7 @@ void ViewServer::Server::accept() {
   });
 }
 
-/// The same frame for all pages that can take one.
+/// Sends the same frame to all pages that are ready to receive one.
 void ViewServer::Server::push_frames() {
   frame_timer.expires_after(kFrameEvery);
   frame_timer.async_wait([this](beast::error_code error) {

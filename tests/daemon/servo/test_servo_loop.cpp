@@ -58,7 +58,9 @@ class Listener final : public ProxyInitializer {
  public:
   std::vector<ProxyInitializationRequest> questions;
 
-  void request(const ProxyInitializationRequest& question) noexcept override { questions.push_back(question); }
+  void request(const ProxyInitializationRequest& question) noexcept override {
+    questions.push_back(question);
+  }
   bool take_result(ProxyInitializationResult& answer) noexcept override {
     answer = {questions.back().id, false, Pose{}, questions.back().scene_time_s};
     return true;

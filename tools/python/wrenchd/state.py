@@ -17,7 +17,7 @@ import time
 
 from .errors import Gone, ProtocolError, WrenchdError
 
-_VERSION = 1
+_VERSION = 2
 _F_GET_SEALS = 1034
 _F_SEAL_SHRINK = 2
 _LOOK_AROUND_S = 0.05  # how often a reader that waits asks whether the daemon is there still
@@ -73,13 +73,13 @@ class _Layout:
             if self.slots < 1 or self.header_bytes + self.slots * self.slot_bytes > self.bytes:
                 raise ProtocolError("the sizes in the state's layout contradict each other")
             self.fields = {f["name"]: _Field(f, self.record_bytes) for f in described["fields"]}
-            touches = described["touches"]
-            self.touches_offset = touches["offset"]
-            self.touch_bytes = touches["bytes"]
-            self.most_touches = touches["most"]
-            if self.touches_offset + self.most_touches * self.touch_bytes > self.record_bytes:
+            contacts = described["contacts"]
+            self.contacts_offset = contacts["offset"]
+            self.contact_bytes = contacts["bytes"]
+            self.max_contacts = contacts["max_count"]
+            if self.contacts_offset + self.max_contacts * self.contact_bytes > self.record_bytes:
                 raise ProtocolError("the contacts lie outside of the record")
-            self.touch_fields = {f["name"]: _Field(f, self.touch_bytes) for f in touches["fields"]}
+            self.contact_fields = {f["name"]: _Field(f, self.contact_bytes) for f in contacts["fields"]}
         except (KeyError, TypeError) as error:
             raise ProtocolError(f"the state's layout cannot be understood ({error!r}); use the package of the daemon's "
                                 "version") from error
@@ -93,8 +93,8 @@ class _Layout:
             return numpy.dtype({"names": [n for n, _, _ in named], "formats": [t for _, t, _ in named],
                                 "offsets": [o for _, _, o in named], "itemsize": size})
 
-        touch = of(self.touch_fields, self.touch_bytes)
-        return of(self.fields, self.record_bytes, [("touches", (touch, (self.most_touches,)), self.touches_offset)])
+        contact = of(self.contact_fields, self.contact_bytes)
+        return of(self.fields, self.record_bytes, [("contact_list", (contact, (self.max_contacts,)), self.contacts_offset)])
 
 
 class _Names:
@@ -118,7 +118,7 @@ class _Names:
 
     def _keep(self, described):
         try:
-            self._known[described["rendering"]] = described["obstacles"]
+            self._known[described["rendering_id"]] = described["obstacles"]
         except (KeyError, TypeError) as error:
             raise ProtocolError(f"the names of obstacles cannot be understood ({error!r}); use the package of the "
                                 "daemon's version") from error
@@ -126,24 +126,24 @@ class _Names:
             del self._known[min(self._known)]
 
 
-class Touch:
+class Contact:
     """A contact that holds the proxy: point_W_m, normal_W, share, multiplier_kg_m; and by name obstacle,
     tool_feature, obstacle_feature. Where the scene was changed the daemon is asked once for the names of its
     obstacles."""
 
     def __init__(self, layout, names, record, base):
-        for name in ("point_W_m", "normal_W", "share", "multiplier_kg_m"):
-            setattr(self, name, layout.touch_fields[name].value(record, base))
-        self.kind = layout.touch_fields["contact_kind"].value(record, base)
-        self.obstacle_number = layout.touch_fields["obstacle"].value(record, base)
-        self.obstacle = names.of(layout.fields["rendering"].value(record), self.obstacle_number)
+        for name in ("point_W_m", "normal_W", "load_fraction", "multiplier_kg_m"):
+            setattr(self, name, layout.contact_fields[name].value(record, base))
+        self.kind = layout.contact_fields["contact_kind"].value(record, base)
+        self.obstacle_number = layout.contact_fields["obstacle"].value(record, base)
+        self.obstacle = names.of(layout.fields["rendering_id"].value(record), self.obstacle_number)
         self.tool_feature = self._feature(layout, record, base, "tool")
         self.obstacle_feature = self._feature(layout, record, base, "obstacle")
 
     @staticmethod
     def _feature(layout, record, base, body):
         def of(name):
-            return layout.touch_fields[body + name].value(record, base)
+            return layout.contact_fields[body + name].value(record, base)
 
         kind = of("_feature_kind")
         if kind in ("plane", "none"):
@@ -154,7 +154,7 @@ class Touch:
         return f"{self.tool_feature} on {self.obstacle} {self.obstacle_feature}"
 
     def __repr__(self):
-        return f"<{self}, {100 * self.share:.0f} %>"
+        return f"<{self}, {100 * self.load_fraction:.0f} %>"
 
 
 class Tick:
@@ -183,10 +183,10 @@ class Tick:
         return [*super().__dir__(), *self._layout.fields]
 
     @property
-    def touches(self):
+    def contact_list(self):
         layout = self._layout
-        count = min(self.touch_count, layout.most_touches)
-        return [Touch(layout, self._names, self._record, layout.touches_offset + i * layout.touch_bytes) for i in range(count)]
+        count = min(self.contact_count, layout.max_contacts)
+        return [Contact(layout, self._names, self._record, layout.contacts_offset + i * layout.contact_bytes) for i in range(count)]
 
     def __repr__(self):
         return f"<tick {self.tick}: {self.state}>"

@@ -55,32 +55,32 @@ function showFrame(now) {
   set("angle", now.angle_rad === null ? "–" : fixed((180 / Math.PI) * now.angle_rad, 2));
   set("energy", now.energy === null ? "–" : fixed(1e6 * now.energy, 3));
   set("authority", fixed(100 * now.authority, 0));
-  set("contacts", String(now.contacts));
+  set("contacts", String(now.contact_count));
   set("time", mode === "recording" ? `${now.t.toFixed(3)} s` : running(now.tick));
   set("tick", String(now.tick) + (now.missed ? `, ${now.missed} not seen` : ""));
-  set("placing", readable(now.placing));
+  set("proxy-initialization", readable(now.proxy_initialization));
   set("limits", now.limits === "" ? "nothing" : now.limits);
-  showTouches(now.touches);
-  $("untold").hidden = now.touches.length > 0 || now.contacts === 0;
+  showContacts(now.contacts);
+  $("untold").hidden = now.contacts.length > 0 || now.contact_count === 0;
   if (mode === "recording" || connected) showState(now.state);
   showCause(now);
   if (mode === "recording") showPlayer(now);
 }
 
-function showTouches(touches) {
-  const body = $("touches").tBodies[0];
-  while (body.rows.length > touches.length) body.deleteRow(-1);
-  while (body.rows.length < touches.length) {
+function showContacts(contacts) {
+  const body = $("contacts-held").tBodies[0];
+  while (body.rows.length > contacts.length) body.deleteRow(-1);
+  while (body.rows.length < contacts.length) {
     const row = body.insertRow();
     for (let i = 0; i < 4; ++i) row.insertCell();
     const meter = document.createElement("meter");
     meter.max = 1;
     row.cells[0].append(meter, document.createElement("span"));
   }
-  touches.forEach(({ share, obstacle, tool, on }, i) => {
+  contacts.forEach(({ load_fraction, obstacle, tool, on }, i) => {
     const [cell, ...others] = body.rows[i].cells;
-    cell.firstChild.value = share ?? 0;
-    cell.lastChild.textContent = ` ${fixed(100 * (share ?? 0), 0)} %`;
+    cell.firstChild.value = load_fraction ?? 0;
+    cell.lastChild.textContent = ` ${fixed(100 * (load_fraction ?? 0), 0)} %`;
     [obstacle, tool, on].forEach((text, k) => {
       if (others[k].textContent !== text) others[k].textContent = text;
     });

@@ -238,13 +238,13 @@ export class World {
       if (frame.q !== null) place(this.tool, frame.q);
     }
     for (const [number, pose] of frame.moved) if (this.obstacles[number]) place(this.obstacles[number], pose);
-    this.touch(frame.touches);
+    this.showContacts(frame.contacts);
     this.push(frame.wrench);
     if (!this.fitted && this.tool) this.fit(frame.p);
   }
 
-  touch(touches) {
-    while (this.contacts.length < touches.length) {
+  showContacts(contacts) {
+    while (this.contacts.length < contacts.length) {
       const point = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), this.materials.contact);
       const normal = new Arrow(this.materials.contact);
       point.renderOrder = normal.renderOrder = 3;
@@ -252,12 +252,12 @@ export class World {
       this.contacts.push({ point, normal });
     }
     this.contacts.forEach(({ point, normal }, i) => {
-      point.visible = normal.visible = i < touches.length;
-      if (i >= touches.length) return;
-      const { p, n, share } = touches[i];
+      point.visible = normal.visible = i < contacts.length;
+      if (i >= contacts.length) return;
+      const { p, n, load_fraction } = contacts[i];
       point.position.set(...p);
-      point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(share ?? 0)));
-      normal.point(point.position, new THREE.Vector3(...n).multiplyScalar(this.size * (0.15 + 1.1 * (share ?? 0))), 0.014 * this.size);
+      point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(load_fraction ?? 0)));
+      normal.point(point.position, new THREE.Vector3(...n).multiplyScalar(this.size * (0.15 + 1.1 * (load_fraction ?? 0))), 0.014 * this.size);
     });
   }
 
