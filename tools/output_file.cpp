@@ -49,8 +49,7 @@ void write_output(const std::string& name, const std::function<void(std::ostream
   const auto status = std::filesystem::status(name, ignored);
   const bool replaceable = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
   if (!(replaceable ? replace_file(name, write) : write_into(name, write)))
-    throw std::runtime_error(
-        name + ": cannot be written; name a file in a directory that exists and may be written to");
+    throw std::runtime_error(name + ": cannot be written; name a file in an existing, writable directory");
 }
 
 }  // namespace wrenchd

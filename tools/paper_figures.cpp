@@ -70,7 +70,8 @@ void write_paper_figures(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (!std::filesystem::is_directory(directory))
-    throw std::runtime_error(directory.string() + ": is no directory and cannot be made one; name another");
+    throw std::runtime_error(directory.string() +
+                             ": is not a directory and cannot be created; name another directory");
   const auto write = [&](const char* name, const std::string& text) {
     write_output((directory / name).string(), text);
   };
@@ -84,7 +85,7 @@ void write_paper_figures(const std::filesystem::path& directory) {
   write("fig15.csv", over_time_csv("tau_z", ours, traditional,
                                    [](const PaperStep& step) { return step.F_W.torque_Nm.z(); }));
   write("figures.gp", kPaperScript);
-  run_gnuplot(directory, "figures.gp", "; the tables it would draw are in " + directory.string());
+  run_gnuplot(directory, "figures.gp", "; the data of the figures is in " + directory.string());
 }
 
 }  // namespace wrenchd

@@ -10,6 +10,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
@@ -17,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::TemporaryDirectory;
+using test::with;
 
 const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
 
@@ -40,48 +42,26 @@ void as_hand_script(const fs::path& file) {
   load_hand_script(file, simulation);
 }
 
-/// What the file is refused with; empty when it loads.
+/// Returns the message with which the loader rejects the file; empty if the file loads.
 std::string rejection_text(Load load, const fs::path& file) {
-  try {
-    load(file);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return {};
+  return test::rejection_message<ConfigError>([&] { load(file); });
 }
 
-/// A file, where it must be refused, and what the message must say.
+/// The text of an invalid file, the location of its error, and a part of the message.
 struct Bad {
   std::string text;
   std::string place;  ///< line:column
   std::string cure;
 };
 
-/// One line of the message starts with the place and holds the cure.
-bool operator_instruction(const std::string& message, const std::string& start, const std::string& cure) {
-  for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1)) {
-    if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
-  }
-  return false;
-}
-
-void check_refused(Load load, const std::vector<Bad>& table) {
+void check_rejected(Load load, const std::vector<Bad>& table) {
   const TemporaryDirectory dir;
   dir.write("cube.off", "");
   for (const Bad& bad : table) {
     const fs::path file = dir.write("bad.toml", bad.text);
-    const std::string message = rejection_text(load, file);
-    INFO(bad.text << "\nexpected " << bad.place << " ... " << bad.cure << "\ngot " << message);
-    CHECK(operator_instruction(message, file.string() + ":" + bad.place + ": ", bad.cure));
+    test::check_rejection(rejection_text(load, file), file.string() + ":" + bad.place + ": ", bad.cure,
+                          bad.text);
   }
-}
-
-/// `text` with its only `from` replaced. A `from` that is not there would make a test say nothing.
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  REQUIRE(text.find(from, at + 1) == std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 const std::string kProfile = R"(name = "p"
@@ -232,7 +212,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
            " = 1",
        "2:1", "has more than 120 dots in one line"},
   };
-  check_refused(as_settings, table);
+  check_rejected(as_settings, table);
 }
 
 TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
@@ -317,7 +297,7 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {kTool + "[obstacle]\nname = 'x'", "3:1", "expected tables, each headed [[obstacle]], found a table"},
       {kTool + "[[obstacles]]\nname = 'x'", "3:3", "did you mean 'obstacle'?"},
   };
-  check_refused(as_scene, table);
+  check_rejected(as_scene, table);
 }
 
 TEST_CASE("a velocity that is refused does not have its turning back refused as well", "[config]") {
@@ -377,7 +357,7 @@ TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") 
       {changed("enable = { byte = 1, bit = 0 }", "enable = { byte = 1, bit = 8 }"), "23:28",
        "from 0 to 7, found 8"},
   };
-  check_refused(as_profile, table);
+  check_rejected(as_profile, table);
 }
 
 TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config]") {
@@ -397,7 +377,7 @@ TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config
       {start + "rotation_vector_deg = [0, 0, 90]", "4:1", "give it in rad as 'rotation_vector_rad'"},
       {point("0", "[0, 0, 40]"), "3:21", "from -10 to 10 m, found 40"},
   };
-  check_refused(as_hand_script, table);
+  check_rejected(as_hand_script, table);
 }
 
 TEST_CASE("everything wrong with a file is told at once, in its order", "[config]") {
@@ -426,14 +406,14 @@ TEST_CASE("what is not a readable file of sensible size is refused", "[config]")
   const fs::path absent = dir.path() / "absent.toml";
   CHECK(rejection_text(as_scene, absent) ==
         absent.string() + ": no such file; looked for " + absent.string());
-  CHECK(operator_instruction(rejection_text(as_scene, dir.path()), dir.path().string() + ": ",
-                             "is a directory; name a file in it"));
+  CHECK(test::rejects_at(rejection_text(as_scene, dir.path()), dir.path().string() + ": ",
+                         "is a directory; name a file in it"));
   const fs::path pipe = dir.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(operator_instruction(rejection_text(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
+  CHECK(test::rejects_at(rejection_text(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
   CHECK(rejection_text(as_scene, "/dev/zero").find("is not a regular file") != std::string::npos);
   const fs::path big = dir.write("big.toml", std::string((1 << 20) + 1, '#'));
-  CHECK(operator_instruction(rejection_text(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
+  CHECK(test::rejects_at(rejection_text(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
   CHECK(rejection_text(as_scene, std::string(5000, 'a')).find("cannot be read") != std::string::npos);
 }
 
@@ -453,8 +433,8 @@ TEST_CASE("deep nesting through many lines of dotted keys does not overflow the 
   text += "1";
   for (int i = 0; i < 120; ++i) text += "}\n]";
   const TemporaryDirectory dir;
-  CHECK(operator_instruction(rejection_text(as_scene, dir.write("deep.toml", text)),
-                             "deep.toml:", "is nested more than 16 deep"));
+  CHECK(test::rejects_at(rejection_text(as_scene, dir.write("deep.toml", text)),
+                         "deep.toml:", "is nested more than 16 deep"));
 }
 
 TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {

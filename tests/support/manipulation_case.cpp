@@ -7,7 +7,7 @@
 namespace wrenchd::test {
 
 const std::vector<ManipulationCase>& manipulation_cases() {
-  using enum Motion;
+  using enum HandMotion;
   static const std::vector<ManipulationCase> all = {
       {"cube through a plate", {"cube", 12}, {"plate", 12}, stab, {0, 0, 0.05}},
       {"fine cube through a fine plate", {"cube", 1200}, {"plate", 5000}, stab, {0, 0, 0.05}},

@@ -87,7 +87,7 @@ TEST_CASE("wrenchctl calibrate refuses what it cannot calibrate") {
   } const table[] = {
       {{"calibrate", "gone"}, "gone.toml: no such file"},
       {{"calibrate", "loopback"}, "profile loopback: it is for the simulated device"},
-      {{"calibrate", "polhem"}, "no such device is plugged in; wrenchctl devices lists what is"},
+      {{"calibrate", "polhem"}, "no such device is connected; wrenchctl devices lists the connected devices"},
       {{"calibrate", ""}, "must not be empty; name a profile, or leave it out"},
       {{"calibrate", "polhem", "--serial", ""}, "--serial: must not be empty; give the serial number"},
   };

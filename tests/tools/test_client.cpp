@@ -232,5 +232,5 @@ TEST_CASE("the example prints what the hand feels", "[client]") {
   CHECK(ran.out.starts_with("wrenchd is disarmed\ntick "));
   CHECK(std::count(ran.out.begin(), ran.out.end(), '\n') == 4);
   CHECK(alone.exit_code == 1);
-  CHECK(alone.err.find("no wrenchd answers (") == 0);
+  CHECK(alone.err.find("no wrenchd responds (") == 0);
 }

@@ -63,8 +63,8 @@ TEST_CASE("wrenchctl tells the status of a daemon, for a person and for a progra
   const ProgramResult text = daemon.ctl({"status"});
   CHECK(text.exit_code == 0);
   for (const char* part :
-       {"state      disarmed\n", "device     loopback (simulated), present\n", "armed by   nobody\n",
-        "lease      nobody has it\n", "limits     10 N, 0.5 N.m\n", "at 1000 Hz", "(p50 / p99.9 / max)"})
+       {"state      disarmed\n", "device     loopback (simulated), present\n", "armed by   -\n",
+        "lease      free\n", "limits     10 N, 0.5 N.m\n", "at 1000 Hz", "(p50 / p99.9 / max)"})
     has(text.out, part);
   const ProgramResult json = daemon.ctl({"status", "--json"});
   CHECK(json.exit_code == 0);
@@ -159,14 +159,14 @@ TEST_CASE("wrenchctl describe shows what can be asked, by whom", "[control_comma
   const ProgramResult all = daemon.ctl({"describe"});
   CHECK(all.exit_code == 0);
   for (const char* part : {"lease.take  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
-                           "from_other: true or false, may be left out; "})
+                           "from_other: true or false, optional; "})
     has(all.out, part);
   const ProgramResult one = daemon.ctl({"describe", "arm"});
   CHECK(one.out.find("arm  (operator)\n") == 0);
   CHECK(one.out.find("stop") == std::string::npos);
   const ProgramResult none = daemon.ctl({"describe", "dance"});
   CHECK(none.exit_code == 1);
-  has(none.err, "there is no method 'dance'; wrenchctl describe, without a name, lists them");
+  has(none.err, "there is no method 'dance'; wrenchctl describe without a name lists the methods");
 }
 
 TEST_CASE("wrenchctl says where it looked for a daemon, and what to do", "[control_commands]") {
@@ -175,10 +175,10 @@ TEST_CASE("wrenchctl says where it looked for a daemon, and what to do", "[contr
   const ProgramResult gone = run_program("wrenchctl", {"status", "--socket", socket});
   CHECK(gone.exit_code == 1);
   CHECK(gone.out == "");
-  has(gone.err, "wrenchctl: no wrenchd answers (" + socket + ": No such file or directory); start it");
+  has(gone.err, "wrenchctl: no wrenchd responds (" + socket + ": No such file or directory); start it");
   const ProgramResult usual = run_program("wrenchctl", {"arm"});  // tests have $WRENCHD_SOCKET set to none
   CHECK(usual.exit_code == 1);
-  has(usual.err, "no wrenchd answers (none: ");
+  has(usual.err, "no wrenchd responds (none: ");
 }
 
 TEST_CASE("beside a daemon that has the socket no second one starts, and what it finds is told",

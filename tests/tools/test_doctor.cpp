@@ -194,7 +194,7 @@ TEST_CASE("findings read as lines with their cures", "[doctor]") {
                                          {Health::warning, "b: so so", "do c"},
                                          {Health::failure, "d: bad", "do e"}};
   CHECK(text(findings) ==
-        "ok      a: fine\nbetter  b: so so\n        -> do c\nWRONG   d: bad\n        -> do e\n");
+        "ok      a: fine\nwarning b: so so\n        -> do c\nERROR   d: bad\n        -> do e\n");
   CHECK(has_failure(findings));
 }
 
@@ -204,8 +204,8 @@ TEST_CASE("wrenchctl doctor looks at this machine, and its exit code says whethe
   INFO(result.out << result.err);
   CHECK(result.err == "");
   CHECK(has(result.out, "kernel: "));
-  CHECK(has(result.out, "wake-ups: p50 "));
-  CHECK(result.exit_code == (has(result.out, "WRONG   ") ? 5 : 0));
+  CHECK(has(result.out, "wake latency: p50 "));
+  CHECK(result.exit_code == (has(result.out, "ERROR   ") ? 5 : 0));
 }
 
 }  // namespace

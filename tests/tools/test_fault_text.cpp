@@ -18,7 +18,7 @@ TEST_CASE("the list of faults has all of them, with what follows and what to do"
              Contains("state degraded; after 3 ms, within one tick, no force 10 ms later"));
   CHECK_THAT(fault_text("client_gone"),
              Contains("state releasing; after 100 ms, within one tick, no force 100 ms later"));
-  CHECK_THAT(fault_text("overheated"), Contains("it is told, and the force stays"));
+  CHECK_THAT(fault_text("overheated"), Contains("the loop reports it, and the force remains"));
 }
 
 TEST_CASE("a fault that there is not is told with those that there are", "[fault_text]") {

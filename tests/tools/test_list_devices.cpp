@@ -71,7 +71,7 @@ bool holds(const std::string& text, const std::string& part) {
 }
 
 TEST_CASE("where nothing is plugged in the list says so", "[list_devices]") {
-  CHECK(list({}) == "Nothing is plugged in: no USB device but hubs, and no HID device.\n");
+  CHECK(list({}) == "No device is connected: no USB device except hubs, and no HID device.\n");
   CHECK(list({}, true) == list({}));
 }
 
@@ -82,7 +82,7 @@ TEST_CASE("a SpaceNavigator has its profile, what it senses and drives, and why 
         "  profile spacemouse_split: 3Dconnexion SpaceMouse family, translation and rotation in two reports: "
         "moves a tool, feels nothing\n"
         "  senses x y z rx ry rz; drives none: it moves a tool, and every wrench is dropped\n"
-        "  its report descriptor agrees with the profile\n"
+        "  the report descriptor agrees with the profile\n"
         "  the other profiles:\n"
         "    example, falcon, polhem, polhem_lpc1768, reference_full_speed, reference_high_speed: its ids do "
         "not include 046d:c626\n"
@@ -95,7 +95,7 @@ TEST_CASE("a borrowed id does not hide how the device speaks", "[list_devices]")
   const std::string text =
       list({hid(1, {0x046d, 0xc62b, 1, 8}, home_made_combined(), "home-made SpaceMouse")});
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
-  CHECK(holds(text, "\n  its report descriptor agrees with the profile\n"));
+  CHECK(holds(text, "\n  the report descriptor agrees with the profile\n"));
   CHECK(
       holds(text, "\n    spacemouse_split: in-report 1 of the device has 13 bytes, that of the profile 7\n"));
 }
@@ -109,7 +109,7 @@ TEST_CASE("two equal devices are told apart by serial number, where they have on
               "\n\n2 devices have the profile reference_full_speed: for one of them alone write a profile "
               "with inherits = \"reference_full_speed\" and its serial in [match]: \"A1\" \"B2\"\n"));
 
-  const std::string cure = ", and no serial numbers that tell them apart: leave in the one you mean\n";
+  const std::string cure = ", and no serial numbers to distinguish them: connect only the intended device\n";
   CHECK(holds(list({reference_in(1, "A1"), reference_in(2, "A1")}), cure));
   CHECK(holds(list({reference_in(1, ""), reference_in(2, "A1")}), cure));
   CHECK_FALSE(holds(list({reference_in(1, "A1"), space_navigator_in(2)}), "devices have the profile"));
@@ -129,31 +129,33 @@ TEST_CASE("a profile that states the serial number goes to that device", "[list_
   const std::size_t second = text.find("3-2, ");
   CHECK(holds(text.substr(0, second), "\n  profile mine: "));
   CHECK(holds(text.substr(0, second),
-              "\n    reference_full_speed: it fits as well, and the other is nearer\n"));
+              "\n    reference_full_speed: this profile also matches, but less specifically\n"));
   CHECK(holds(text.substr(second), "\n  profile reference_full_speed: "));
   CHECK(holds(text.substr(second), "\n    mine: it is for serial number A1, not B2\n"));
 
   known.profiles.back().match.serial.clear();
   const std::string both = device_list(std::vector{reference_in(1, "A1")}, known, false, open_to_all);
   CHECK(holds(both, "\n  several profiles match 1209:0001, the last of them mine; name one"));
-  CHECK(holds(both, "\n    reference_full_speed, mine: it fits, and is not alone\n"));
+  CHECK(holds(both, "\n    reference_full_speed, mine: this profile also matches\n"));
 }
 
 TEST_CASE("devices of fewer degrees of freedom say what they lack", "[list_devices]") {
   const std::string polhem = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
   CHECK(holds(polhem, "\n  profile polhem: "));
   CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; of a wrench rx ry rz is dropped\n"));
-  CHECK(holds(polhem, "\n  its report descriptor agrees with the profile\n"));
+  CHECK(holds(polhem, "\n  the report descriptor agrees with the profile\n"));
   CHECK(holds(polhem, "\n    woodenhaptics: it is used only where the configuration names it\n"));
 
   UsbDevice falcon = hid(5, {0x0403, 0xcb48, 0, 0}, {}, "FALCON HAPTIC");
   falcon.hidraw_node.clear();
   const std::string text = list({falcon});
   CHECK(holds(text, "\n  /dev/bus/usb/003/005 can be opened\n  profile falcon: "));
+  CHECK(holds(
+      text,
+      "\n  senses x y z; drives x y z; the pose stays constant along rx ry rz; wrenchd drops rx ry rz of "
+      "every wrench\n"));
   CHECK(holds(text,
-              "\n  senses x y z; drives x y z; along rx ry rz the handle stays where it is; of a wrench "
-              "rx ry rz is dropped\n"));
-  CHECK(holds(text, "\n  it is not HID: there is no report descriptor to hold the profile against\n"));
+              "\n  the device is not HID, so there is no report descriptor to compare with the profile\n"));
 }
 
 TEST_CASE("closed devices are named and refused, and nobody is sent to open them", "[list_devices]") {
@@ -165,7 +167,7 @@ TEST_CASE("closed devices are named and refused, and nobody is sent to open them
         "  3D Systems Touch (HID) (2988:0304): its protocol is not public; use it with its maker's driver, "
         "or ask "
         "the maker to publish the reports\n"
-        "  wrenchd does not open it, whatever a profile says\n");
+        "  wrenchd does not open this device, independent of profiles\n");
 }
 
 TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
@@ -175,10 +177,10 @@ TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
   disk.hidraw_node.clear();
   const std::vector<UsbDevice> devices = {keyboard_in(6), keys, disk};
   CHECK(list(devices) ==
-        "Nothing is plugged in that wrenchd knows.\n"
-        "Other devices (--all says of each why no profile is for it):\n"
-        "  3-6: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard), 01:02 (mouse); no profile is for it\n"
-        "  3-7: 0781:5581 \"Ultra\", not HID; no profile is for it\n");
+        "No known device is connected.\n"
+        "Other devices (--all shows the rejection reasons):\n"
+        "  3-6: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard), 01:02 (mouse); no profile matches\n"
+        "  3-7: 0781:5581 \"Ultra\", not HID; no profile matches\n");
   const std::string all = list(devices, true);
   CHECK(holds(all, "3-6, interface 0: "));
   CHECK(holds(all, "3-6, interface 1: "));
@@ -210,21 +212,20 @@ TEST_CASE("a profile that the device contradicts is told, line by line", "[list_
   const Bytes shorter = from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1e 91 02 c0");
   const std::string text = list({hid(1, {0x1209, 0x0001, 0xff00, 1}, shorter, "handle")});
-  CHECK(
-      holds(text,
-            "\n  its report descriptor disagrees with the profile; change the profile, or it is for another "
-            "device:\n    output report 0x02: the profile says 32 bytes, the device 31\n    output report "
-            "0x02, "));
+  CHECK(holds(text,
+              "\n  its report descriptor disagrees with the profile; change the profile, unless it belongs "
+              "to another "
+              "device:\n    output report 0x02: the profile says 32 bytes, the device 31\n    output report "
+              "0x02, "));
   Bytes cut = reference_descriptor();
   cut.pop_back();
-  CHECK(
-      holds(list({hid(1, {0x1209, 0x0001, 0xff00, 1}, cut, "handle")}),
-            "\n  its report descriptor is refused, so the profile could not be held against it: byte 30: "));
+  CHECK(holds(list({hid(1, {0x1209, 0x0001, 0xff00, 1}, cut, "handle")}),
+              "\n  the report descriptor is invalid, so it cannot be compared with the profile: byte 30: "));
 }
 
 TEST_CASE("a controller that no profile knows is told how to get one", "[list_devices]") {
   const std::string text = list({hid(8, {0x1d50, 0x6018, 1, 8}, ten_bit_axes(), "home-made")});
-  CHECK(holds(text, "\n  no profile is for it:\n    example, falcon, "));
+  CHECK(holds(text, "\n  no profile matches:\n    example, falcon, "));
   CHECK(holds(text, "\n  wrenchctl profile --from /dev/hidraw8 proposes one\n"));
 }
 
@@ -258,8 +259,7 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
   CHECK(holds(list({device, other}), "2 devices have the profile spacemouse_combined"));
   UsbDevice keys = keyboard_in(9);
   keys.port_path.clear();
-  CHECK(
-      holds(list({keys, keys}), "keyboard); no profile is for it\n  /dev/hidraw9 (not on USB): 04d9:1702 "));
+  CHECK(holds(list({keys, keys}), "keyboard); no profile matches\n  /dev/hidraw9 (not on USB): 04d9:1702 "));
 }
 
 TEST_CASE("profiles that are refused are told below the list", "[list_devices]") {
@@ -270,7 +270,7 @@ TEST_CASE("profiles that are refused are told below the list", "[list_devices]")
   CHECK(
       text.ends_with("\n\nProfiles that were refused, and not asked:\n"
                      "  profiles/mine.toml:3:1: key 'x' is not known\n"));
-  CHECK(holds(device_list({}, {}, false, open_to_all), "There is no profile to hold a device against.\n"));
+  CHECK(holds(device_list({}, {}, false, open_to_all), "There are no profiles.\n"));
 }
 
 TEST_CASE("no device moves the cursor of a terminal", "[list_devices]") {
@@ -338,16 +338,16 @@ TEST_CASE("wrenchctl devices lists what udev knows", "[list_devices]") {
   REQUIRE(second != std::string::npos);
   CHECK(text.find("3-1, interface 0: 046d:c626 \"SpaceNavigator\", no serial number\n") == 0);
   CHECK(holds(text.substr(0, second), "\n  /dev/hidraw1 can be opened\n  profile spacemouse_split: "));
-  CHECK(holds(text.substr(0, second), "\n  its report descriptor agrees with the profile\n"));
+  CHECK(holds(text.substr(0, second), "\n  the report descriptor agrees with the profile\n"));
   CHECK(holds(text.substr(second), "\n  profile reference_full_speed: "));
-  CHECK(holds(text, "\n  3-3: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard); no profile is for it\n"));
+  CHECK(holds(text, "\n  3-3: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard); no profile matches\n"));
   CHECK(holds(printed(devices, "--all"), "3-3, interface 0: 04d9:1702 \"USB Keyboard\", no serial number\n"));
 }
 
 TEST_CASE("wrenchctl devices where nothing is plugged in", "[list_devices]") {
   const std::string one_that_is_nothing =
       "P: /devices/virtual/mem/null\nN: null\nE: SUBSYSTEM=mem\nE: DEVNAME=/dev/null\n";
-  CHECK(printed(one_that_is_nothing).find("Nothing is plugged in: ") == 0);
+  CHECK(printed(one_that_is_nothing).find("No device is connected: ") == 0);
 }
 #endif
 

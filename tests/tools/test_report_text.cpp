@@ -109,20 +109,20 @@ TEST_CASE("what is cut and what is dropped is told", "[report_text]") {
   const EncodedWrench e = encode_wrench(shipped("polhem"), {{9, 0, 0}, {0, 0.1, 0}});
   REQUIRE(e.remarks.size() == 3);
   CHECK_THAT(e.remarks[0], Contains("home position"));
-  CHECK(e.remarks[1] == "the force is cut from 9 to 5 N, the limit of the profile");
-  CHECK(e.remarks[2] == "dropped, for there are no motors: ry");
+  CHECK(e.remarks[1] == "the force is limited from 9 to 5 N, the limit in the profile");
+  CHECK(e.remarks[2] == "dropped, because there are no motors: ry");
   CHECK_THROWS_WITH(encode_wrench(shipped("spacemouse_split"), {}), Contains("has no motors"));
 }
 
 TEST_CASE("bytes that are no report are refused with the reason for each report", "[report_text]") {
   CHECK_THAT(refused("spacemouse_split", "01 00 00"),
-             Contains("these 3 bytes are no report of spacemouse_split") &&
+             Contains("these 3 bytes match no report of spacemouse_split") &&
                  Contains("report 0x01 (translation) has 7 bytes, these are 3") &&
-                 Contains("report 0x03 (buttons) begins with another id: these begin with 01"));
+                 Contains("report 0x03 (buttons) begins with another id: found 01"));
   CHECK_THAT(refused("falcon", "3c 41 41 41 41 41 41 41 41 41 41 41 41 41 3e"),
              Contains("has 16 bytes, these are 15"));
   CHECK_THAT(refused("falcon", "3c 41 41 41 41 41 41 41 41 41 41 41 41 41 3e 00"),
-             Contains("has 3e at byte 15, these have 00"));
+             Contains("has 3e at byte 15, found 00"));
   CHECK_THAT(refused("loopback", hex_text(std::vector<std::uint8_t>(64, 1))), Contains("another checksum"));
   CHECK_THAT(refused("falcon", ""), Contains("no bytes"));
 }

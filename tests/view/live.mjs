@@ -53,14 +53,14 @@ test(async () => {
     await until("it is disarmed while the page hangs", async () => !ARMED.includes(await state()), 3900);
     await hung;
     await sleep(500);
-    return /nobody has seen this page/.test(await text(page, "toast"));
+    return /this page was hidden or unresponsive/.test(await text(page, "toast"));
   });
 
   // Stop, by the button, whoever armed.
   await armed();
   await page.locator("#stop").click();
   await until("it is stopped", async () => (await state()) === "stopped");
-  await until("the banner says what to do", async () => /cknowledge/.test(await text(page, "banner-cure")));
+  await until("the banner says what to do", async () => /cknowledge/.test(await text(page, "banner-remedy")));
   await page.locator("#acknowledge").click();
   await until("it is disarmed again", async () => (await state()) === "disarmed");
 
@@ -81,7 +81,7 @@ test(async () => {
   wrenchd.child.kill("SIGTERM");
   await wrenchd.ended;
   await until("the page says that it is gone", async () => (await text(again, "state")) === "connection lost");
-  assert.match(await text(again, "banner-what"), /No connection to wrenchd/);
+  assert.match(await text(again, "banner-title"), /No connection to wrenchd/);
   assert.equal(await armAsItIsTold, true);
   await daemon();
   await until("it is back", async () => (await text(again, "state")) === "disarmed");
@@ -89,6 +89,6 @@ test(async () => {
 
   // So is the end of the view.
   server.child.kill("SIGTERM");
-  await until("the page says that nobody serves it", async () => /wrenchctl view/.test(await text(again, "banner-what")));
+  await until("the page says that nobody serves it", async () => /wrenchctl view/.test(await text(again, "banner-title")));
   await sleep(100);
 });

@@ -71,7 +71,7 @@ test(async () => {
   // At the end: the curves and the histogram have the extremes of single ticks.
   const most = await page.evaluate(() => Math.max(...window.view.history().values[3]));
   near(most, columns.most_force_N, 1e-9, "the greatest force of the curve");
-  const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.took.max_us));
+  const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.tick_duration.max_us));
   near(longest, columns.longest_us, 1e-6, "the longest tick");
   assert.ok((await page.evaluate(() => window.view.world().triangles)) > 20);
 

@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 /// Number of heartbeats within the daemon's heartbeat timeout.
-constexpr double kBeatsInTime = 4.0;
+constexpr double kHeartbeatsPerTimeout = 4.0;
 
 }  // namespace
 
@@ -58,7 +58,7 @@ json parameters(const std::string& method, const std::string& params) {
   json parsed = json::parse(params, nullptr, false);
   if (!parsed.is_object())
     throw ClientError(ClientError::kProtocol,
-                      "the parameters of '" + method + "' are no JSON object: " + params);
+                      "the parameters of '" + method + "' are not a JSON object: " + params);
   return parsed;
 }
 
@@ -97,7 +97,7 @@ bool Client::poll_event(ClientEvent& out, std::chrono::milliseconds timeout) {
 void Client::acquire_lease() {
   const json lease = connection_->call("lease.take", json::object());
   const std::chrono::duration<double> within(lease.value("beat_within_s", 0.1));
-  heartbeat_thread_ = std::make_unique<HeartbeatThread>(connection_, within / kBeatsInTime);
+  heartbeat_thread_ = std::make_unique<HeartbeatThread>(connection_, within / kHeartbeatsPerTimeout);
 }
 
 void Client::release_lease() {
@@ -117,7 +117,7 @@ StateReader Client::open_state() {
   int descriptor = -1;
   const json answer = connection_->call("state.open", json::object(), &descriptor);
   if (descriptor < 0 || !answer.contains("layout"))
-    throw ClientError(ClientError::kProtocol, "wrenchd handed no shared memory over; see its log");
+    throw ClientError(ClientError::kProtocol, "wrenchd sent no shared memory; see its log");
   return StateReader(
       answer["layout"].dump(), descriptor, [connection = connection_] { return connection->is_connected(); },
       [connection = connection_] { return connection->call("state.names", json::object(), nullptr).dump(); });

@@ -22,9 +22,9 @@ using nlohmann::json;
 
 constexpr std::uint64_t kVersion = 2;
 /// Interval at which a waiting reader checks whether the daemon is still connected.
-constexpr auto kLookAround = std::chrono::milliseconds(50);
+constexpr auto kConnectionCheckInterval = std::chrono::milliseconds(50);
 
-[[noreturn]] void not_understood(const std::string& what) {
+[[noreturn]] void fail_protocol(const std::string& what) {
   throw ClientError(ClientError::kProtocol, "the daemon's state cannot be read: " + what +
                                                 "; use the client library of the daemon's version");
 }
@@ -51,19 +51,19 @@ Field read_field(const json& from, std::size_t room) {
   static const std::map<std::string, std::size_t> kWidths = {{"u8", 1},  {"u16", 2}, {"u32", 4},
                                                              {"u64", 8}, {"i64", 8}, {"f64", 8}};
   const auto width = kWidths.find(type);
-  if (width == kWidths.end()) not_understood("field '" + field.name + "' is of type '" + type + "'");
+  if (width == kWidths.end()) fail_protocol("field '" + field.name + "' is of type '" + type + "'");
   field.type = type.front();
   field.width = width->second;
   if (field.count == 0 || field.count > room || field.offset > room ||
       field.offset + field.count * field.width > room)
-    not_understood("field '" + field.name + "' lies outside of its record");
+    fail_protocol("field '" + field.name + "' lies outside of its record");
   if (from.contains("values")) field.values = from.at("values").get<std::vector<std::string>>();
   if (from.contains("bits")) field.bits = from.at("bits").get<std::vector<std::string>>();
   return field;
 }
 
 Fields read_fields(const json& list, std::size_t room) {
-  if (!list.is_array() || list.empty()) not_understood("its layout has no fields");
+  if (!list.is_array() || list.empty()) fail_protocol("its layout has no fields");
   Fields fields;
   for (const json& one : list) {
     Field field = read_field(one, room);
@@ -83,8 +83,8 @@ const Field& field_of(const Fields& fields, std::string_view name) {
 std::uint64_t bits_of(const Field& field, const std::byte* record, std::size_t i) {
   if (i >= field.count)
     throw ClientError(ClientError::kProtocol, "field '" + field.name + "' has " +
-                                                  std::to_string(field.count) + " numbers, and number " +
-                                                  std::to_string(i) + " was asked for");
+                                                  std::to_string(field.count) + " numbers, and index " +
+                                                  std::to_string(i) + " was requested");
   std::uint64_t bits = 0;  // value on a little-endian machine, which the constructor requires
   std::memcpy(&bits, record + field.offset + i * field.width, field.width);
   return bits;
@@ -122,9 +122,9 @@ struct TickState::Layout {
 
   explicit Layout(const json& from) {
     if (from.at("version").get<std::uint64_t>() != kVersion)
-      not_understood("its layout is of version " + from.at("version").dump());
+      fail_protocol("its layout has version " + from.at("version").dump());
     if (from.at("byte_order") != "little" || std::endian::native != std::endian::little)
-      not_understood("only little-endian machines are known");
+      fail_protocol("only little-endian machines are supported");
     bytes = from.at("bytes");
     header_bytes = from.at("header_bytes");
     written_offset = from.at("written_offset");
@@ -137,7 +137,7 @@ struct TickState::Layout {
                       record_offset == 8 && record_bytes < slot_bytes && header_bytes >= 64 &&
                       header_bytes < bytes && written_offset % 8 == 0 && written_offset < header_bytes &&
                       slots <= (bytes - header_bytes) / slot_bytes && rate_Hz > 0.0;
-    if (!fits) not_understood("the sizes in its layout contradict each other");
+    if (!fits) fail_protocol("the sizes in its layout contradict each other");
     fields = read_fields(from.at("fields"), record_bytes);
     const json& contacts = from.at("contacts");
     contacts_offset = contacts.at("offset");
@@ -145,7 +145,7 @@ struct TickState::Layout {
     max_contacts = contacts.at("max_count");
     if (contact_bytes == 0 || contacts_offset > record_bytes ||
         max_contacts > (record_bytes - contacts_offset) / contact_bytes)
-      not_understood("the contacts lie outside of the record");
+      fail_protocol("the contacts lie outside of the record");
     contact_fields = read_fields(contacts.at("fields"), contact_bytes);
   }
 };
@@ -247,21 +247,21 @@ StateReader::StateReader(const std::string& layout, int descriptor, std::functio
     layout_ = std::make_shared<const TickState::Layout>(described);
     names_ = std::make_shared<TickState::Names>(described, std::move(ask_names));
   } catch (const json::exception& error) {
-    not_understood(error.what());
+    fail_protocol(error.what());
   }
   // The memory must be sealed: if it shrank, a read would end this process.
   const int seals = fcntl(descriptor, F_GET_SEALS);
   struct stat file {};
   if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || fstat(descriptor, &file) != 0 ||
       static_cast<std::uint64_t>(file.st_size) < layout_->bytes)
-    not_understood("its memory is not sealed, or too small");
+    fail_protocol("its memory is not sealed, or too small");
   void* const mapped = mmap(nullptr, layout_->bytes, PROT_READ, MAP_SHARED, descriptor, 0);
-  if (mapped == MAP_FAILED) not_understood(std::string("mmap: ") + std::strerror(errno));
+  if (mapped == MAP_FAILED) fail_protocol(std::string("mmap: ") + std::strerror(errno));
   memory_ = static_cast<const std::byte*>(mapped);
   bytes_ = layout_->bytes;
   if (std::memcmp(memory_, "WRENCHST", 8) != 0) {
     unmap();
-    not_understood("its memory does not begin with WRENCHST");
+    fail_protocol("its memory does not begin with WRENCHST");
   }
   next_ = unread();
 }
@@ -339,7 +339,7 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + timeout;
   const auto pause = std::chrono::duration<double>(0.25 / layout_->rate_Hz);
-  auto look_around = Clock::now() + kLookAround;
+  auto next_check = Clock::now() + kConnectionCheckInterval;
   for (;;) {
     while (unread() > 0) {
       if (copy(next_, out) == CopyResult::complete) {
@@ -350,10 +350,11 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
     }
     const auto now = Clock::now();
     if (now >= end) return false;
-    if (now >= look_around) {
-      look_around = now + kLookAround;
+    if (now >= next_check) {
+      next_check = now + kConnectionCheckInterval;
       if (is_connected_ && !is_connected_() && unread() == 0)
-        throw ClientError(ClientError::kDisconnected, "the daemon is gone; connect again when it is back");
+        throw ClientError(ClientError::kDisconnected,
+                          "the daemon is gone; connect again when wrenchd is running");
     }
     std::this_thread::sleep_for(pause);
   }

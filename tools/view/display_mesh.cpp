@@ -195,7 +195,7 @@ DisplayMesh display_mesh(std::span<const float> vertices, std::span<const Triang
   for (const Triangle& t : triangles)
     for (const std::uint32_t v : t)
       if (v >= surface.vertices.size())
-        throw std::invalid_argument("a triangle names vertex " + std::to_string(v) + " of " +
+        throw std::invalid_argument("a triangle refers to vertex " + std::to_string(v) + " of " +
                                     std::to_string(surface.vertices.size()));
   surface.triangles.assign(triangles.begin(), triangles.end());
   DisplayMesh out;

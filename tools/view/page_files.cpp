@@ -60,8 +60,9 @@ PageFiles::PageFiles(const fs::path& directory) {
   }
   const auto page = files_.find("index.html");
   if (page == files_.end())
-    throw std::runtime_error(directory.string() +
-                             ": holds no index.html, the page of the view; build or install wrenchd again");
+    throw std::runtime_error(
+        directory.string() +
+        ": contains no index.html, the page of the view; build or install wrenchd again");
   policy_ = policy_of(page->second.bytes);
 }
 
@@ -76,7 +77,7 @@ fs::path PageFiles::directory() {
   const fs::path installed = "/usr/share/wrenchd/view";
   for (const fs::path& place : {beside, installed})
     if (fs::exists(place / "index.html")) return place;
-  throw std::runtime_error("the page of the view is not there; looked for " + beside.string() + ", " +
+  throw std::runtime_error("the page of the view is missing; searched " + beside.string() + ", " +
                            installed.string() + "; build it (target view_page), or install wrenchd");
 }
 

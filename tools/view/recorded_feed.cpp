@@ -21,7 +21,7 @@ RecordedFeed::RecordedFeed(std::string name, Recording recording, std::shared_pt
       recording_(std::move(recording)),
       scene_(std::move(scene)),
       scene_error_(std::move(why_no_scene)) {
-  if (recording_.ticks.empty()) throw RecordingError(name_ + ": has no ticks; there is nothing to be seen");
+  if (recording_.ticks.empty()) throw RecordingError(name_ + ": has no ticks, so there is nothing to show");
   for (const TickRecord& record : recording_.ticks) history_.add(record.now_ns, view_tick(record).channels());
 }
 

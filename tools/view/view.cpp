@@ -28,7 +28,7 @@ void serve(ViewServer& server, const ViewOptions& options) {
     char* const words[] = {program.data(), url.data(), nullptr};
     pid_t pid = -1;
     if (posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) != 0)
-      std::fputs("wrenchctl: there is no xdg-open; open the address yourself\n", stderr);
+      std::fputs("wrenchctl: xdg-open is missing; open the address by hand\n", stderr);
   }
   server.run();
 }

@@ -35,7 +35,7 @@ std::optional<ScheduledMotion> later_of(const Json& json) {
 template <class T>
 std::vector<T> part(std::span<const std::byte> bytes, std::size_t offset, std::size_t count) {
   if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T))
-    throw std::runtime_error("the shapes of the scene lie outside of their memory");
+    throw std::runtime_error("the geometry of the scene exceeds its memory");
   std::vector<T> out(count);
   if (count > 0) std::memcpy(out.data(), bytes.data() + offset, count * sizeof(T));
   return out;
@@ -119,9 +119,9 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
                {"obstacles", obstacles}, {"view", description.value("view", Json())}}
               .dump(-1, ' ', false, Json::error_handler_t::replace);
 } catch (const nlohmann::json::exception& error) {
-  throw std::runtime_error(std::string("the scene is not told as this program knows it: ") + error.what());
+  throw std::runtime_error(std::string("the scene has an unknown format: ") + error.what());
 } catch (const std::invalid_argument& error) {
-  throw std::runtime_error(std::string("the shapes of the scene: ") + error.what());
+  throw std::runtime_error(std::string("the geometry of the scene: ") + error.what());
 }
 
 Json ViewScene::moving_obstacle_poses(std::int64_t time_ns) const {

@@ -183,7 +183,7 @@ TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing"
   wrenchctl.signal(SIGINT);
   const ProgramResult result = wrenchctl.wait();
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.err, Contains("stopped; nothing was stored"));
+  CHECK_THAT(result.err, Contains("cancelled; no calibration was stored"));
   CHECK_FALSE(std::filesystem::exists(files.path() / "calibration"));
   CHECK_FALSE(handle.was_pushed());
 }

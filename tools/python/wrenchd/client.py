@@ -38,7 +38,7 @@ def _connected(places):
             connection.close()
             hint = " (are you in the group that may connect?)" if isinstance(error, PermissionError) else ""
             tried.append(f"{place}: {error.strerror or error}{hint}")
-    raise NoDaemon(f"no wrenchd answers ({'; '.join(tried)}); start it, or name its socket in WRENCHD_SOCKET")
+    raise NoDaemon(f"no wrenchd responds ({'; '.join(tried)}); start it, or name its socket in WRENCHD_SOCKET")
 
 
 class Client:
@@ -118,7 +118,7 @@ class Client:
         """The state of every tick, through shared memory."""
         answer, descriptor = self._call("state.open", {}, True)
         if descriptor is None or "layout" not in answer:
-            raise ProtocolError("wrenchd handed no shared memory over; see its log")
+            raise ProtocolError("wrenchd sent no shared memory; see its log")
         return State(answer["layout"], descriptor, self.is_there, lambda: self.call("state.names"))
 
     def open_recording(self, name):
@@ -230,12 +230,12 @@ class Client:
         except BlockingIOError:
             return
         except OSError as error:
-            raise Gone(f"wrenchd ended the connection ({error}); connect again when it is back") from error
+            raise Gone(f"wrenchd ended the connection ({error}); connect again when wrenchd is running") from error
         if descriptors:
             self._drop_descriptor()
             self._descriptor = descriptors[0]
         if not data:
-            raise Gone("wrenchd ended the connection; connect again when it is back")
+            raise Gone("wrenchd ended the connection; connect again when wrenchd is running")
         self._received += data
 
     def _drop_descriptor(self):
@@ -254,7 +254,7 @@ class Client:
                     if not self._wait(select.POLLOUT, end):
                         raise Gone("wrenchd takes no more requests; connect again") from None
                 except OSError as error:
-                    raise Gone(f"wrenchd ended the connection ({error}); connect again when it is back") from error
+                    raise Gone(f"wrenchd ended the connection ({error}); connect again when wrenchd is running") from error
 
 
 class Lease:

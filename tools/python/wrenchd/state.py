@@ -61,7 +61,7 @@ class _Layout:
                 raise ProtocolError(f"the state's layout is of version {described['version']}, and {_VERSION} is what "
                                     "can be read; use the package of the daemon's version")
             if described["byte_order"] != sys.byteorder or sys.byteorder != "little":
-                raise ProtocolError("only little-endian machines are known")
+                raise ProtocolError("only little-endian machines are supported")
             self.bytes = described["bytes"]
             self.header_bytes = described["header_bytes"]
             self.written_word = described["written_offset"] // 8
@@ -307,5 +307,5 @@ class State:
             if now >= look_around:
                 look_around = now + _LOOK_AROUND_S
                 if not self._is_there() and self._written() == self._next:
-                    raise Gone("the daemon is gone; connect again when it is back")
+                    raise Gone("the daemon is gone; connect again when wrenchd is running")
             time.sleep(0.25 / self._layout.rate_Hz)
