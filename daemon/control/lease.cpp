@@ -50,23 +50,23 @@ void Lease::arm(TimePoint now) {
 void Lease::client_lost(std::uint64_t client) {
   if (!held_by(client)) return;
   if (armed_) loop_.client_lost();
-  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " hung up");
+  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " disconnected");
 }
 
 void Lease::check(TimePoint now) {
   if (!holder_ || now - last_heartbeat_ <= kHeartbeatTimeout) return;
   if (armed_) loop_.client_lost();
-  end(EventLevel::warning, "lease: " + holder_->identity + " gives no sign of life any more");
+  end(EventLevel::warning, "lease: " + holder_->identity + " sends no heartbeat any more");
 }
 
 TimePoint Lease::next_check_at() const noexcept {
   return holder_ ? last_heartbeat_ + kHeartbeatTimeout + std::chrono::milliseconds(1) : TimePoint::max();
 }
 
-void Lease::end(EventLevel level, const std::string& what) {
+void Lease::end(EventLevel level, const std::string& text) {
   holder_.reset();
   armed_ = false;
-  feed_.emit("lease", level, what, holder_json(holder_));
+  feed_.emit("lease", level, text, holder_json(holder_));
 }
 
 }  // namespace wrenchd

@@ -621,9 +621,9 @@ TEST_CASE("what the servo thread says becomes lines that name the cure", "[servo
   CHECK(to_text({Event::Kind::state_changed, {}, static_cast<std::uint32_t>(State::active), 0.0}) ==
         "state: active");
   CHECK(to_text({Event::Kind::proxy_found, {}, 0, 0.0125}) == "placed 12.5 mm from the hand");
-  CHECK(to_text({Event::Kind::proxy_search_started, {}, 0, 0.0}).find("zero wrench until") !=
+  CHECK(to_text({Event::Kind::proxy_search_started, {}, 0, 0.0}).find("zero contact force until") !=
         std::string::npos);
-  CHECK(to_text({Event::Kind::proxy_search_failed, {}, 0, 0.0}).find("the tool does not fit") !=
+  CHECK(to_text({Event::Kind::proxy_search_failed, {}, 0, 0.0}).find("there is no feasible pose") !=
         std::string::npos);
   CHECK(to_text({Event::Kind::fault_raised, {}, static_cast<std::uint32_t>(Fault::tick_late), 0.0305})
             .find("tick_late: a tick came some milliseconds late (30.5 ms); give wrenchd") == 0);

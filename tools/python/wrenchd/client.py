@@ -103,12 +103,12 @@ class Client:
     def acknowledge(self):
         return self.call("acknowledge")
 
-    def start_over(self):
-        return self.call("start_over")
+    def reinitialize_proxy(self):
+        return self.call("reinitialize_proxy")
 
-    def beat(self):
+    def heartbeat(self):
         """Says that the program lives. Lease does so by itself."""
-        self._send({"jsonrpc": "2.0", "method": "beat", "params": {}})
+        self._send({"jsonrpc": "2.0", "method": "lease.heartbeat", "params": {}})
 
     def lease(self):
         """The right to arm, which one client has at a time: `with client.lease(): client.arm(); ...`."""
@@ -119,7 +119,7 @@ class Client:
         answer, descriptor = self._call("state.open", {}, True)
         if descriptor is None or "layout" not in answer:
             raise ProtocolError("wrenchd sent no shared memory; see its log")
-        return State(answer["layout"], descriptor, self.is_there, lambda: self.call("state.names"))
+        return State(answer["layout"], descriptor, self.is_there, lambda: self.call("state.obstacles"))
 
     def open_recording(self, name):
         """A recording of the daemon's (call("record.list")), as a file to read: h5py.File(client.open_recording(...))."""
@@ -260,12 +260,12 @@ class Client:
 class Lease:
     """The right to arm. While it is held a thread says that the program lives; where the program ends or loses
     its connection, the daemon fades the force out. A program that may hang while it lives should do that itself:
-    client.call("lease.take"), and client.beat() in time."""
+    client.call("lease.acquire"), and client.heartbeat() in time."""
 
     def __init__(self, client):
         self._client = client
         self._ended = threading.Event()
-        within_s = client.call("lease.take").get("beat_within_s", 0.1)
+        within_s = client.call("lease.acquire").get("heartbeat_timeout_s", 0.1)
         self._thread = threading.Thread(target=self._beat, args=(within_s / _BEATS_IN_TIME,), daemon=True)
         self._thread.start()
 
@@ -277,7 +277,7 @@ class Lease:
         self._ended.set()
         self._thread.join()
         try:
-            self._client.call("lease.give")
+            self._client.call("lease.release")
         except Refused as refused:
             if refused.code not in (Refused.NOT_NOW, Refused.TAKEN):
                 raise
@@ -295,7 +295,7 @@ class Lease:
     def _beat(self, every_s):
         while True:
             try:
-                self._client.beat()
+                self._client.heartbeat()
             except Gone:
                 return  # whoever calls next hears of it
             if self._ended.wait(every_s):
