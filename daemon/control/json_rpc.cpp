@@ -148,8 +148,4 @@ std::string notification_line(const std::string& method, const Json& params) {
   return line_of({{"jsonrpc", "2.0"}, {"method", method}, {"params", params}});
 }
 
-std::string request_line(const Json& id, const std::string& method, const Json& params) {
-  return line_of({{"jsonrpc", "2.0"}, {"id", id}, {"method", method}, {"params", params}});
-}
-
 }  // namespace wrenchd

@@ -71,7 +71,4 @@ std::string reply_line(const Json& id, const Json& result);
 std::string error_line(const Json& id, const RpcError& error);
 std::string notification_line(const std::string& method, const Json& params);
 
-/// Returns the line of a request that has an id, for clients.
-std::string request_line(const Json& id, const std::string& method, const Json& params);
-
 }  // namespace wrenchd

@@ -40,7 +40,6 @@ class ListeningSocket {
 
   int fd() const noexcept { return socket_.get(); }
   const std::filesystem::path& path() const noexcept { return path_; }
-  bool from_systemd() const noexcept { return from_systemd_; }
 
  private:
   bool adopt_from_systemd();

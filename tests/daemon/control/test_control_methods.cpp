@@ -121,8 +121,8 @@ TEST_CASE("anybody may stop and look, operators may arm, and nobody below", "[co
   const Table t;
   for (const char* open : {"describe", "status", "subscribe", "unsubscribe", "stop", "devices"})
     CHECK(t.methods.methods().at(open).min_role == Role::observer);
-  for (const char* closed :
-       {"lease.acquire", "lease.release", "lease.heartbeat", "arm", "disarm", "acknowledge", "reinitialize_proxy"})
+  for (const char* closed : {"lease.acquire", "lease.release", "lease.heartbeat", "arm", "disarm",
+                             "acknowledge", "reinitialize_proxy"})
     CHECK(t.methods.methods().at(closed).min_role == Role::operator_);
 }
 
@@ -153,7 +153,8 @@ TEST_CASE("describe tells all of the table", "[control_methods]") {
     events.insert(event["name"].get<std::string>());
     CHECK(event["doc"].get<std::string>().size() > 10);
   }
-  for (const char* name : {"state", "fault", "device", "lease", "stiffness", "proxy_initialization", "events_lost"})
+  for (const char* name :
+       {"state", "fault", "device", "lease", "stiffness", "proxy_initialization", "events_lost"})
     CHECK(events.count(name) == 1);
   CHECK(told["errors"].size() == 9);
   for (const Json& error : told["errors"]) CHECK(error["code"].get<int>() < 0);

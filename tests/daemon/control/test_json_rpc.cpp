@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/json_rpc.hpp"
+#include "tests/support/request_line.hpp"
 
 namespace wrenchd {
 namespace {
@@ -73,8 +74,10 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
       {"\"stop\"", RpcCode::invalid_request, "A request is an object"},
       {"null", RpcCode::invalid_request, "A request is an object"},
       {"{}", RpcCode::invalid_request, "does not name JSON-RPC 2.0"},
-      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::invalid_request, "does not name JSON-RPC 2.0", true},
-      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::invalid_request, "does not name JSON-RPC 2.0", true},
+      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::invalid_request, "does not name JSON-RPC 2.0",
+       true},
+      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::invalid_request, "does not name JSON-RPC 2.0",
+       true},
       {R"({"jsonrpc":"2.0","id":5})", RpcCode::invalid_request, "names no method", true},
       {R"({"jsonrpc":"2.0","id":5,"method":5})", RpcCode::invalid_request, "names no method", true},
       {head + ",\"parms\":{}}", RpcCode::invalid_request, "no member 'parms'; did you mean 'params'?", true},
@@ -116,7 +119,7 @@ TEST_CASE("replies are one line of JSON-RPC each, whatever stands in them", "[js
   CHECK(Json::parse(broken)["params"]["text"] == "\xef\xbf\xbd\n");
   CHECK(std::count(broken.begin(), broken.end(), '\n') == 1);
   const RpcRequest back = request_of([] {
-    std::string line = request_line(1, "lease.heartbeat", Json::object());
+    std::string line = test::request_line(1, "lease.heartbeat", Json::object());
     line.pop_back();
     return line;
   }());

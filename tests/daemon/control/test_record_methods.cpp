@@ -113,7 +113,8 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
   CHECK(run_python(script.string() + " " WRENCHD_SOURCE_DIR "/tools/python " + daemon.socket, rows) == 0);
   CHECK(rows == std::to_string(read_recording(file).ticks.size()) + "\n");
   CHECK(daemon.ctl({"record", "get", "yours"}).err.find("there are: mine.h5") != std::string::npos);
-  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no valid name of a recording") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no valid name of a recording") !=
+        std::string::npos);
   CHECK(daemon.ctl({"record", "get"}).err.find("record list") != std::string::npos);
   CHECK(daemon.ctl({"record", "list", "-o", "x"}).err.find("accepts no -o") != std::string::npos);
   CHECK(daemon.ctl({"record", "start", "next"}).exit_code == 0);
@@ -129,7 +130,8 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
   CHECK(std::filesystem::exists(elsewhere));
   CHECK(daemon.ctl({"record", "start", "no/such/directory/x.h5"}).err.find("cannot be created") !=
         std::string::npos);
-  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is no valid name of a recording") != std::string::npos);
+  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is no valid name of a recording") !=
+        std::string::npos);
   CHECK(daemon.ctl({"record", "stop", "x"}).err.find("accepts no file") != std::string::npos);
 }
 

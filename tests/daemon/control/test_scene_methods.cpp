@@ -117,7 +117,8 @@ TEST_CASE("what a scene cannot be is refused with its place, and nothing changes
   null["scale"] = nullptr;
   CHECK(a.refused("scene.add", {{"obstacle", null}}).code() == RpcCode::invalid_params);
   has(a.refused("scene.remove", {{"name", "tabel"}}), "'tabel'");
-  has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"duration_s", 1.0}}), "half_space");
+  has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"duration_s", 1.0}}),
+      "half_space");
   CHECK(a.refused("scene.move", {{"name", "table"}, {"duration_s", 1.0}}).code() == RpcCode::invalid_params);
   has(a.refused("rendering.set", {{"wrench", {{"law", "hooke"}}}}), "law");
   has(a.refused("rendering.set", {{"wrench", {{"stiffnes", 1.0}}}}), "stiffness");
@@ -141,7 +142,7 @@ TEST_CASE("a workspace is changed all at once or not at all", "[scene_methods]")
 TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
   const Asked a;
   const Json plane = {{"id", 7},           {"kind", "plane"},
-                      {"lifetime_s", 1.0},  {"normal", {0, 0, 1}},
+                      {"lifetime_s", 1.0}, {"normal", {0, 0, 1}},
                       {"offset_m", 0.005}, {"stiffness_N_per_m", 200.0}};
   CHECK(a.ask("model.set", plane) == Json::object());
   CHECK(a.ask("model.remove", {{"id", 7}}) == Json::object());

@@ -99,9 +99,10 @@ TEST_CASE("a recording of another format is refused, with its version", "[record
     H5Dclose(table);
     H5Fclose(opened);
   }
-  CHECK_THROWS_WITH(read_recording(file),
-                    Catch::Contains(file.string() + ": was written by wrenchd 0.0.9 in recording format " + named) &&
-                        Catch::Contains("replay or export it with the version that wrote it"));
+  CHECK_THROWS_WITH(
+      read_recording(file),
+      Catch::Contains(file.string() + ": was written by wrenchd 0.0.9 in recording format " + named) &&
+          Catch::Contains("replay or export it with the version that wrote it"));
 }
 
 TEST_CASE("the contacts of each tick are in a recording, whatever pieces it was written in", "[recording]") {
@@ -206,8 +207,7 @@ TEST_CASE("a recording that is cut short anywhere, or lacks a column, is refused
   REQUIRE(at != std::string::npos);
   bytes[at] = 'q';
   const auto renamed = directory.write("renamed.h5", bytes);
-  CHECK_THROWS_WITH(read_recording(renamed),
-                    Catch::Contains("column 'kkt_residual' of table 'ticks' is"));
+  CHECK_THROWS_WITH(read_recording(renamed), Catch::Contains("column 'kkt_residual' of table 'ticks' is"));
 }
 
 TEST_CASE("a recording with wrong bytes is read or refused, and no more", "[recording]") {
