@@ -19,6 +19,7 @@
 #include "daemon/control/control_interface.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/wall_clock.hpp"
+#include "tests/support/request_line.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 

@@ -49,7 +49,7 @@ TEST_CASE("events of the loop get numbers without a gap, their names, levels, ti
   CHECK(now.sequence == events.size());
   CHECK(now.state == State::stopped);
   CHECK(now.cause == Fault::stop_requested);
-  CHECK(now.proxy_initialization == "placed");
+  CHECK(now.proxy_initialization == "found");
 }
 
 TEST_CASE("a snapshot and the events after it are the whole story, while the loop runs", "[event_feed]") {
