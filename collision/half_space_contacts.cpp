@@ -10,11 +10,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The few smallest of a stream of gaps, smallest first.
+/// The N smallest gaps of a sequence, smallest first.
 template <std::size_t N>
 class Deepest {
  public:
-  /// Below this gap a vertex would be kept.
+  /// Gaps below this value are kept.
   double threshold() const noexcept { return count_ < N ? kInfinity : gap_[N - 1]; }
   void insert(double gap, std::uint32_t vertex) noexcept {
     std::size_t at = std::min(count_, N - 1);

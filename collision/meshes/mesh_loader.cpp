@@ -21,7 +21,7 @@ std::string_view bytes_of(const std::vector<T>& list) {
   return {reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T)};
 }
 
-/// Of thousands of bodies of one file the first has said it.
+/// Adds a text once, although thousands of bodies may share a file.
 void add_once(std::vector<std::string>& list, const std::string& text) {
   if (std::find(list.begin(), list.end(), text) == list.end()) list.push_back(text);
 }
@@ -72,7 +72,7 @@ void MeshLoader::report_progress(const std::filesystem::path& file, std::size_t 
     progress_(file.filename().string() + ": " + with_thousands_separators(triangles) + " triangles, " + what);
 }
 
-/// From the cache, or made and put there. key: all that it is made from.
+/// Returns the cached result for `made_from`, or computes and caches it.
 template <class T, class Make>
 T MeshLoader::cached(const std::vector<std::string_view>& made_from, bool large, const Make& make) {
   if (cache_.disabled() || !large) return make();
@@ -103,7 +103,7 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& 
   for (const std::string& change : loaded->repairs) add_once(changes_, begin + change);
   if (kind == BodyKind::surface)
     add_once(changes_, begin +
-                           "taken as a surface: it has two sides and no inside, so that nothing pushes out a "
+                           "used as a surface: it has two sides and no inside, so that nothing pushes out a "
                            "tool that starts "
                            "beyond it");
   return loaded;
@@ -133,7 +133,7 @@ LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
   return loaded;
 }
 
-/// What was made is looked at like a file: a body of somebody's measures may come out thinner than it can be.
+/// A generated mesh is checked as a file is, because some dimensions may yield walls that are too thin.
 LoadedMesh MeshLoader::make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind) {
   const TriangleMesh mesh = make_mesh(made);
   const bool large = mesh.triangles.size() >= kLargeMeshTriangles;
@@ -163,7 +163,7 @@ std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind
   const std::vector<std::string_view> made_from = {"treed", generated_mesh_name(kind),
                                                    bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
   return std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
-    report_progress(file, triangles, "finding its edges and building its tree");
+    report_progress(file, triangles, "finding its edges and building its BVH");
     return MeshBvh(mesh, kind);
   }));
 }

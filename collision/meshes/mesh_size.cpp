@@ -13,9 +13,9 @@
 namespace wrenchd {
 namespace {
 
-/// A thousand clearances of the proxy.
+/// A thousand times the clearance of the proxy.
 constexpr double kLeast_m = 1e-6;
-/// Here a coordinate is rounded by a thousandth of the clearance.
+/// At this coordinate rounding is a thousandth of the clearance.
 constexpr double kFarthest_m = 1e4;
 
 double largest_side(const TriangleMesh& mesh) {
@@ -32,7 +32,7 @@ std::string size_text(double side_m, double scale) {
   return text.str();
 }
 
-/// The scale that would make the size a likely one: a unit beside the one that was taken.
+/// Suggests a scale that makes the size plausible: a factor of 1000 up or down.
 std::string cure(double side_m, double scale, PlausibleSize likely) {
   std::ostringstream text;
   text.imbue(std::locale::classic());

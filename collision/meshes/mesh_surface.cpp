@@ -11,20 +11,20 @@
 namespace wrenchd {
 namespace {
 
-/// Triangles whose corners lie this near to one plane lie in it: in units of the mesh's size, and never more
-/// than a tenth of the clearance that a proxy keeps [m].
+/// Triangles are coplanar if their corners lie within this distance of one plane: a fraction of the mesh's
+/// size, and at most a tenth of the proxy's clearance [m].
 constexpr double kFlat = 1e-10;
 constexpr double kFlat_m = 1e-10;
-/// Neighbours that fall away from a vertex by less than this [rad] do not point it.
+/// A vertex is convex only if its neighbours fall away by at least this angle [rad].
 constexpr double kBlunt = 1e-7;
 
 constexpr int next(int i) noexcept {
   return i == 2 ? 0 : i + 1;
 }
 
-/// Is there a direction n with n . e < 0 for all of these? The one that all fall away from the most, by the
-/// least-distance problem  min |z|  s.t.  -e . z >= 1,  met a few rows at a time, for a vertex may have any
-/// number of neighbours.
+/// Returns true if a direction n exists with n . e < 0 for all directions e. Searches the direction of
+/// steepest descent with the least-distance problem  min |z|  s.t.  -e . z >= 1.  Rows are added a few at a
+/// time, because a vertex may have any number of neighbours.
 bool all_fall_away(const std::vector<Vector3d>& directions, const Vector3d& first_guess) {
   const auto worst_of = [&](const Vector3d& n) {
     return *std::max_element(directions.begin(), directions.end(),
@@ -57,11 +57,11 @@ MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)),
   find_convex_vertices();
 }
 
-/// Pairs the sides of the triangles: a side that runs from a to b meets one that runs from b to a. Where
-/// there is not exactly one of each, nothing is paired.
+/// Pairs a side from a to b with a side from b to a. Sides stay unpaired unless there is exactly one of each
+/// direction.
 void MeshSurface::find_neighbours() {
   struct Side {
-    std::uint64_t key;  ///< both vertices, the smaller first
+    std::uint64_t key;  ///< both vertices, the smaller number first
     std::uint32_t triangle;
     std::uint8_t side;
     bool forward;
@@ -89,8 +89,7 @@ void MeshSurface::find_neighbours() {
   }
 }
 
-/// Grows flat regions from the largest triangle left: each takes the plane of the triangle that it began
-/// with.
+/// Grows flat regions from the largest remaining triangle. All triangles of a region take its plane.
 void MeshSurface::find_planes() {
   const std::size_t count = mesh_.triangles.size();
   std::vector<Vector3d> area_normals(count);
@@ -133,7 +132,7 @@ void MeshSurface::find_planes() {
   }
 }
 
-/// Does the face across this side fall away? Its far corner then lies below the plane.
+/// Returns true if the face across this side falls away: its far corner lies below the plane.
 bool MeshSurface::is_convex_edge(std::uint32_t triangle, int side) const noexcept {
   const std::uint32_t other = neighbours_[triangle][static_cast<std::size_t>(side)];
   if (other == kNone) return true;
@@ -153,21 +152,21 @@ void MeshSurface::find_convex_edges() {
     for (int i = 0; i < 3; ++i) {
       const auto side = static_cast<std::size_t>(i);
       const std::uint32_t other = neighbours_[t][side];
-      if (other < t || !is_convex_edge(t, i)) continue;  // the lower number speaks for the edge
+      if (other < t || !is_convex_edge(t, i)) continue;  // the triangle with the smaller number owns the edge
       features_[t].edges[side] = static_cast<std::uint32_t>(convex_edges_.size());
       const Corners& corners = mesh_.triangles[t];
       convex_edges_.push_back({{corners[side], corners[static_cast<std::size_t>(next(i))]}, {t, other}});
     }
 }
 
-/// At a pointed vertex at least three sharp edges meet: the corners of the cone that its neighbours span.
+/// At a convex vertex at least three convex edges meet: the edges of the cone that its neighbours span.
 void MeshSurface::find_convex_vertices() {
   const std::size_t count = mesh_.vertices_m.size();
   std::vector<std::uint32_t> sharp_edges(count, 0);
   for (const Edge& edge : convex_edges_)
     for (const std::uint32_t v : edge.vertices) ++sharp_edges[v];
 
-  // The triangles around each vertex, one list after the other.
+  // Lists the triangles at each vertex, one list after the other.
   std::vector<std::uint32_t> begin(count + 1, 0), at(3 * mesh_.triangles.size());
   for (const Corners& corners : mesh_.triangles)
     for (const std::uint32_t v : corners) ++begin[v + 1];

@@ -352,8 +352,8 @@ TEST_CASE("where an obstacle moves only method exact will do, and the refusal sa
       why = error.what();
     }
     CHECK(why ==
-          "the obstacle 'plunger' moves, which only method exact can deal with; choose it, or let all "
-          "obstacles stand still");
+          "the obstacle 'plunger' moves, and only method exact supports moving obstacles; choose it, or keep all "
+          "obstacles at rest");
   }
   PenetrationDepth depth(scene, {});
   const Pose X_WP = {Quaterniond::Identity(), {0, 0, 0.2}};

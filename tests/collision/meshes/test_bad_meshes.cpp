@@ -270,9 +270,9 @@ const std::vector<Defect>& defects() {
        }},
       {"turned", in_any_format(with_faces_turned),
        [](std::size_t severity, Format) {
-         return Expected{repaired, "turned " + many(kCounts[severity], "face") + " round"};
+         return Expected{repaired, "flipped " + many(kCounts[severity], "face")};
        }},
-      {"cut_through", in_any_format(with_spikes_through), always({refused, "cut through each other", true})},
+      {"cut_through", in_any_format(with_spikes_through), always({refused, "intersect each other", true})},
       {"garbage", with_garbage,
        [](std::size_t severity, Format format) {
          constexpr std::array<const char*, 4> words = {"ends before face 320 of ",

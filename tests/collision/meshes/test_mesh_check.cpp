@@ -96,7 +96,7 @@ TEST_CASE("a quad that is not flat is cut into triangles") {
 TEST_CASE("a face of five corners that crosses itself cannot be cut, and is told") {
   const PolygonSoup star{{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {3, 1, 0}, {1, 1, 3}},
                          {{0, 2, 1, 3, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}}};
-  check_defect_with(star, {"face 0", "cannot be cut into triangles"});
+  check_defect_with(star, {"face 0", "cannot be triangulated"});
 }
 
 TEST_CASE("vertices that no face uses do not count") {
@@ -198,13 +198,13 @@ TEST_CASE("a face that looks the wrong way is found") {
 
 TEST_CASE("a solid that is inside out is found") {
   check_defects(inside_out(kBox),
-                {"all faces look inwards (the volume is negative); flip the faces in the modeller"});
+                {"all faces point inwards (the volume is negative); flip the faces in the modeller"});
   check_defect_with(concatenated(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})),
-                    {"make outer shells look outwards and cavities inwards"});
+                    {"make outer shells face outwards and cavities inwards"});
   check_defect_with(concatenated(kBox, inside_out(box({10, 0, 0}, {11, 1, 1}))),
-                    {"make outer shells look outwards"});
+                    {"make outer shells face outwards"});
   check_defect_with(concatenated(inside_out(kBox), inside_out(box({10, 0, 0}, {11, 1, 1}))),
-                    {"all faces look inwards"});
+                    {"all faces point inwards"});
 }
 
 TEST_CASE("an edge with more than two faces is found") {
@@ -239,31 +239,31 @@ TEST_CASE("parts that meet in one vertex are found") {
   CHECK_FALSE(check_solid(concatenated(kBox, box({2, 3, 5}, {4, 4, 6}))).solid());
 }
 
-TEST_CASE("faces that cut through each other are found") {
+TEST_CASE("faces that intersect each other are found") {
   const PolygonSoup soup = concatenated(kBox, box({1, 1, 1}, {3, 2, 2}));
-  check_defect_with(soup, {" near (", "cut through each other", " in all); unite the parts in the modeller"});
+  check_defect_with(soup, {" near (", "intersect each other", " in all); unite the parts in the modeller"});
   CHECK(check_solid(soup).self_intersecting);
   // A spike through the lid alone; numbers are the file's, not those of the triangles it is cut into.
   const PolygonSoup spike{{{1, 1, 6}, {1.5, 1, 6}, {1, 1.5, 6}, {1.1, 1.1, 4}},
                           {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}}};
   REQUIRE(check_solid(spike).solid());
-  check_defect_with(concatenated(kBox, spike), {"faces 5 and ", "cut through each other"});
-  check_defect_with(concatenated(kBox, kBox), {"cut through each other"});
+  check_defect_with(concatenated(kBox, spike), {"faces 5 and ", "intersect each other"});
+  check_defect_with(concatenated(kBox, kBox), {"intersect each other"});
   check_defect_with(concatenated(kBox, box({2, 0, 0}, {4, 3, 5})),
-                    {"cut through each other"});  // face on face
+                    {"intersect each other"});  // face on face
 }
 
 TEST_CASE("a mesh in which everything cuts through everything is refused in good time") {
   PolygonSoup soup;
   for (int i = 0; i < 300; ++i)
     soup = concatenated(soup, box(Vector3d::Constant(1e-4 * i), Vector3d::Constant(1 + 1e-4 * i)));
-  check_defect_with(soup, {"cut through each other (1000 or more in all)"});
+  check_defect_with(soup, {"intersect each other (1000 or more in all)"});
 }
 
-TEST_CASE("a face that cannot be cut into triangles is found") {
+TEST_CASE("a face that cannot be triangulated is found") {
   PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
   for (Vector3d& p : soup.vertices) p *= 1e110;  // beyond what the plane of a face can be computed with
-  check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be cut into triangles (6 in all); make it flat"});
+  check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be triangulated (6 in all); make it planar"});
 }
 
 TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must have numbers and areas") {

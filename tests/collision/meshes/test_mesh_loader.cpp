@@ -37,7 +37,7 @@ TEST_CASE("what a loader changed is told once, with the file", "[mesh_loader]") 
   CHECK(loader.load(dir.path() / "." / "box.ply", BodyKind::solid) == loaded);
   CHECK(loader.changes() ==
         std::vector<std::string>{file.string() + ": removed 1 duplicate face: face 6 near (0, 0.3, 0)",
-                                 file.string() + ": turned 6 faces round, first face 0 near (0, 0.3, 0)"});
+                                 file.string() + ": flipped 6 faces, first face 0 near (0, 0.3, 0)"});
   CHECK(loader.warnings().empty());
   loader.check_size(*loaded, 1000.0, kPlausibleToolSize);
   loader.check_size(*loaded, 1000.0, kPlausibleToolSize);
@@ -55,11 +55,11 @@ TEST_CASE("an open mesh is refused with the key that makes it a surface, and is 
   MeshLoader loader;
   const std::string told = refusal_of(loader, file, BodyKind::solid);
   CHECK(told.find(file.string() + ": is not a closed, consistently oriented solid:\n  the edge from (") == 0);
-  CHECK(told.find("\n  (after a repair: turned 1 face round: face 0 near ") != std::string::npos);
+  CHECK(told.find("\n  (after a repair: flipped 1 face: face 0 near ") != std::string::npos);
   CHECK(told.find("kind = \"surface\"") != std::string::npos);
   CHECK(loader.load(file, BodyKind::surface)->mesh.triangles.size() == 10);
   REQUIRE(loader.changes().size() == 2);
-  CHECK(loader.changes()[1].find("taken as a surface: it has two sides and no inside") != std::string::npos);
+  CHECK(loader.changes()[1].find("used as a surface: it has two sides and no inside") != std::string::npos);
 
   const fs::path none = dir.write("none.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 3 4\n");
   const std::string hopeless = refusal_of(loader, none, BodyKind::solid);
@@ -125,7 +125,7 @@ TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "
   CHECK(told[0] == "bumpy.off: reading 3 MB");
   CHECK(told[1] == "bumpy.off: " + size + " triangles, checking");
   CHECK(told[2] == "bumpy.off: " + size + " triangles, finding its convex hull");
-  CHECK(told[3] == "bumpy.off: " + size + " triangles, finding its edges and building its tree");
+  CHECK(told[3] == "bumpy.off: " + size + " triangles, finding its edges and building its BVH");
   REQUIRE(files_of(cache).size() == 3);
 
   const auto [warm, warm_hull, warm_tree] = load();
@@ -183,7 +183,7 @@ TEST_CASE("a cache that cannot be written is a remark", "[mesh_loader]") {
   loader.hull(*loader.load(file, BodyKind::solid));
   REQUIRE(loader.warnings().size() == 1);
   CHECK(loader.warnings()[0].find("cannot be made") != std::string::npos);
-  CHECK(loader.warnings()[0].find("; what is made of large meshes is not kept") != std::string::npos);
+  CHECK(loader.warnings()[0].find("; results for large meshes are not cached") != std::string::npos);
 }
 
 TEST_CASE("nothing is told of a small mesh, and nothing kept", "[mesh_loader]") {

@@ -51,7 +51,7 @@ TEST_CASE("points that no face uses are left out", "[mesh_repair]") {
   soup.vertices.emplace_back(0, 1000, 0);
   for (auto& face : soup.faces)
     for (std::size_t& v : face) v += v > 0 ? 1 : 0;
-  check_repaired(soup, {"left out 2 points that no face uses, first vertex 1 at (1000, 0, 0)"});
+  check_repaired(soup, {"removed 2 points that no face uses, first vertex 1 at (1000, 0, 0)"});
   repair(soup);
   CHECK(soup.vertices == kBox.vertices);
   CHECK(soup.vertex_in_file(1) == 2);
@@ -72,7 +72,7 @@ TEST_CASE("points at the same place are merged", "[mesh_repair]") {
 TEST_CASE("repeated corners and faces of two corners go", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.faces[2] = {0, 1, 1, 5, 4, 0};
-  check_repaired(soup, {"left out repeated corners of 1 face: face 2 near (0, 0, 0)"});
+  check_repaired(soup, {"removed repeated corners of 1 face: face 2 near (0, 0, 0)"});
   soup = kBox;
   soup.faces.insert(soup.faces.begin() + 1, {0, 1});
   soup.faces.push_back({3, 3, 3});
@@ -169,7 +169,7 @@ TEST_CASE("cracks of single precision are closed, wider ones are not", "[mesh_re
 TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   std::reverse(soup.faces[3].begin(), soup.faces[3].end());
-  check_repaired(soup, {"turned 1 face round: face 3 near (2, 3, 0)"});
+  check_repaired(soup, {"flipped 1 face: face 3 near (2, 3, 0)"});
   const PolygonSoup gear = soup_of(make_mesh({"gear", 2000}));
   const double volume = check_solid(gear).volume;
   RandomValues random(1);
@@ -186,13 +186,13 @@ TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[
 TEST_CASE("a solid that is inside out is turned, with its cavities", "[mesh_repair]") {
   const PolygonSoup cavity = inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}));
   const PolygonSoup beside = box({10, 0, 0}, {11, 1, 1});
-  check_repaired(inside_out(kBox), {"turned 6 faces round, first face 0 near (0, 3, 0)"});
+  check_repaired(inside_out(kBox), {"flipped 6 faces, first face 0 near (0, 3, 0)"});
   check_repaired(inside_out(concatenated(kBox, cavity)),
-                 {"turned 12 faces round, first face 0 near (0, 3, 0)"}, kVolume - 1);
+                 {"flipped 12 faces, first face 0 near (0, 3, 0)"}, kVolume - 1);
   check_repaired(concatenated(inside_out(kBox), beside),
-                 {"turned 6 faces round, first face 0 near (0, 3, 0)"}, kVolume + 1);
+                 {"flipped 6 faces, first face 0 near (0, 3, 0)"}, kVolume + 1);
   check_repaired(concatenated(concatenated(kBox, cavity), inside_out(beside)),
-                 {"turned 6 faces round, first face 12 near (10, 1, 0)"}, kVolume);
+                 {"flipped 6 faces, first face 12 near (10, 1, 0)"}, kVolume);
 }
 
 TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {

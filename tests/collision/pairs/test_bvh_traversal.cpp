@@ -50,7 +50,7 @@ const std::vector<std::pair<GeneratedMesh, GeneratedMesh>>& mesh_pairs() {
 
 TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of processor", "[tree_walk]") {
   RandomValues random(21);
-  BvhTraversal fastest, portable(simd::walk_portable);
+  BvhTraversal fastest, portable(simd::traverse_portable);
   std::size_t all = 0;
   for (const auto& [tool, obstacle] : mesh_pairs()) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
@@ -71,7 +71,7 @@ TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of
 // reach of its end.
 TEST_CASE("a swept walk lists whatever meets on the way and within reach of the end", "[tree_walk]") {
   RandomValues random(22);
-  BvhTraversal still, swept, portable(simd::walk_portable);
+  BvhTraversal still, swept, portable(simd::traverse_portable);
   std::size_t all = 0;
   for (const auto& [tool, obstacle] : mesh_pairs()) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));

@@ -28,7 +28,7 @@ TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of p
       {{"peg", 1000}, {"hole", 2000}},      {{"sphere", 80}, {"boulder", 20000}},
   };
   RandomValues random(31);
-  IntersectingPairs fastest, portable(simd::walk_portable);
+  IntersectingPairs fastest, portable(simd::traverse_portable);
   std::size_t all = 0, asked = 0;
   for (const auto& [tool, obstacle] : cases) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
@@ -53,7 +53,7 @@ TEST_CASE("at the verge of touching the pairs are those of exact arithmetic", "[
   const MeshBvh a(make_mesh({"bumpy", 2000})), b(make_mesh({"boulder", 3000}));
   const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
   RandomValues random(32);
-  IntersectingPairs pairs, portable(simd::walk_portable);
+  IntersectingPairs pairs, portable(simd::traverse_portable);
   for (int n = 0; n < 20; ++n) {
     const Quaterniond R = random.rotation();
     const Vector3d out = random.unit<3>();
@@ -90,7 +90,7 @@ TEST_CASE("faces that lie on each other meet in every pair of triangles that tou
 TEST_CASE("more pairs than there is room for are not taken for all", "[meeting_pairs]") {
   const MeshBvh bumpy(make_mesh({"bumpy", 60000}));
   for (const simd::TraversalKernel kernel :
-       {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::walk_portable}}) {
+       {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::traverse_portable}}) {
     IntersectingPairs pairs(kernel);
     CHECK_FALSE(pairs.find(bumpy, bumpy, Pose{}));  // each meets itself and its neighbours
     CHECK(pairs.pairs().size() <= BvhTraversal::kCapacity);

@@ -51,7 +51,7 @@ TEST_CASE("a sieve leaves out no pair that meets on the way, on every kind of pr
   const Bodies bodies;
   RandomValues random(51);
   PairCuller fastest(8, 1, bodies.tool.radius_m()),
-      portable(8, 1, bodies.tool.radius_m(), simd::sift_portable);
+      portable(8, 1, bodies.tool.radius_m(), simd::cull_portable);
   int met = 0, left_out = 0;
   const int runs = case_count(20000);
   for (int n = 0; n < runs; ++n) {
@@ -111,7 +111,7 @@ TEST_CASE("a sieve leaves out what is kept apart by more than rounding and the m
 TEST_CASE("what is left is told by its number, over all parts and in order", "[pair_sieve]") {
   const Bodies bodies;
   RandomValues random(52);
-  for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::sift_portable}}) {
+  for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::cull_portable}}) {
     PairCuller sieve(2000, 3, bodies.tool.radius_m(), kernel), alone(1, 1, bodies.tool.radius_m(), kernel);
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
     const Pose X = {random.rotation(), {0.05, 0.03, 0.0}};
@@ -143,7 +143,7 @@ TEST_CASE("what is left is told by its number, over all parts and in order", "[p
 // about that place.
 TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool goes", "[pair_sieve]") {
   const Bodies bodies;
-  for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::sift_portable}}) {
+  for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::cull_portable}}) {
     RandomValues random(53);
     PairCuller sieve(4000, 1, bodies.tool.radius_m(), kernel);
     std::vector<std::uint32_t> left(4000);

@@ -12,8 +12,8 @@ namespace {
 using namespace test;
 
 std::vector<SeparatingAxes> kernels() {
-  std::vector<SeparatingAxes> all = {SeparatingAxes(simd::apart_portable)};
-  if (simd::has_avx2()) all.emplace_back(simd::apart_avx2);
+  std::vector<SeparatingAxes> all = {SeparatingAxes(simd::separated_portable)};
+  if (simd::has_avx2()) all.emplace_back(simd::separated_avx2);
   return all;
 }
 
