@@ -91,6 +91,8 @@ PolygonSoup read_obj(MeshSource source) {
     else if (words[0] == "f")
       read_face(lines.number(), words, soup, pending);
   }
+  if (!soup.faces.empty() && soup.vertices.empty() && pending.empty())
+    source.reject(0, "has no vertices; export the mesh again");
   check_pending(source, pending, soup.vertices.size());
   return soup;
 }

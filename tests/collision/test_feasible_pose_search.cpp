@@ -12,7 +12,7 @@ namespace {
 
 using namespace test;
 
-TEST_CASE("a pose is admissible where nothing overlaps and nothing is inside", "[placement]") {
+TEST_CASE("a pose is admissible if nothing overlaps and no body contains another", "[feasible_pose_search]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back(
       {"boulder", MeshBvh(make_mesh({"boulder", 2000})), Pose{Quaterniond::Identity(), {1, 0, 0}}});
@@ -26,14 +26,14 @@ TEST_CASE("a pose is admissible where nothing overlaps and nothing is inside", "
   CHECK(placement.admissible({Quaterniond::Identity(), {0, 0, -0.47}}));
 }
 
-TEST_CASE("a tool around an obstacle is not admissible either", "[placement]") {
+TEST_CASE("a tool around an obstacle is not admissible either", "[feasible_pose_search]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back({"bolt", MeshBvh(make_mesh({"bolt", 500})), Pose{}});
   const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
   CHECK_FALSE(FeasiblePoseSearch(scene).admissible(Pose{}));
 }
 
-TEST_CASE("from inside an obstacle a way out is found, near by and admissible", "[placement]") {
+TEST_CASE("from inside an obstacle the search finds a near admissible pose", "[feasible_pose_search]") {
   RandomValues random(9);
   for (const std::size_t i : {0, 2, 7, 11, 12}) {
     const ManipulationCase& handling = manipulation_cases()[i];
@@ -60,7 +60,7 @@ TEST_CASE("from inside an obstacle a way out is found, near by and admissible", 
   }
 }
 
-TEST_CASE("a peg in its hole is held there, not thrown out", "[placement]") {
+TEST_CASE("a peg in its hole stays there", "[feasible_pose_search]") {
   const Scene scene = scene_of(manipulation_cases()[15]);
   FeasiblePoseSearch placement(scene);
   const Pose X_WP = {rotation_from({0.002, 0.001, 0.3}), {0.0003, 0.0001, 0.002}};

@@ -31,7 +31,7 @@ Pose at(double x, double y, double z, const Vector3d& turn = Vector3d::Zero()) {
   return {rotation_from(turn), {x, y, z}};
 }
 
-TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_contacts]") {
+TEST_CASE("a sweep of a cube meets a vertex, a face or an edge first", "[mesh_contacts]") {
   const Scene scene = two(make_mesh({"cube", 12}), make_mesh({"table", 12}));
   const Vector3d on_corner(0.6, 0.5, 0.0), on_edge(0.785398163, 0.0, 0.0);
   SECTION("a corner on a face") {
@@ -73,7 +73,7 @@ TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_c
 }
 
 // No ghost: a cube that slides over a table meets nothing, however finely the table is cut.
-TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
+TEST_CASE("a sweep along a flat face meets nothing", "[mesh_contacts]") {
   for (const std::size_t triangles : {12, 1000, 20000}) {
     const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));
     const double z = 0.035 + kClearance_m;
@@ -85,7 +85,7 @@ TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
   }
 }
 
-TEST_CASE("what touches at the end is told, by the names of its features", "[mesh_contacts]") {
+TEST_CASE("the touching contacts at the end of a sweep name their features", "[mesh_contacts]") {
   const Scene scene = two(make_mesh({"cube", 300}), make_mesh({"table", 300}));
   MeshContacts contacts(scene);
   VisitBudget budget = {1000000};
@@ -101,7 +101,7 @@ TEST_CASE("what touches at the end is told, by the names of its features", "[mes
   }
 }
 
-TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
+TEST_CASE("a sheet has two sides and stops the tool on both", "[mesh_contacts]") {
   TriangleMesh sheet;
   sheet.vertices_m = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
@@ -116,7 +116,7 @@ TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
 }
 
 // From where a hand leaves the tool, touching or not, steps in any direction.
-TEST_CASE("a step that ends in an obstacle is never seen as free", "[mesh_contacts]") {
+TEST_CASE("a path that ends in an obstacle is never free", "[mesh_contacts]") {
   RandomValues random(12);
   for (const std::size_t i : {1, 5, 6, 8, 11, 13}) {
     const ManipulationCase& handling = manipulation_cases()[i];
@@ -147,7 +147,7 @@ TEST_CASE("a step that ends in an obstacle is never seen as free", "[mesh_contac
 
 // Turned by 0.05 rad, an edge that was held dips by 13 um and slides off the corner it lay on; no other
 // feature is met first. A shaken hand found it once in a million poses.
-TEST_CASE("a way that turns far is not free where its end overlaps", "[mesh_contacts]") {
+TEST_CASE("a path with a large rotation is not free if its end overlaps", "[mesh_contacts]") {
   const Scene scene = scene_of(manipulation_cases()[9]);
   const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   const Pose from = {{-0.68298246087346626, -0.19239706033389406, 0.68845117377531961, 0.15017759700263147},
@@ -161,7 +161,7 @@ TEST_CASE("a way that turns far is not free where its end overlaps", "[mesh_cont
   CHECK((found.overlaps || !found.contacts.empty()));
 }
 
-TEST_CASE("ends within reach of one another need no second walk", "[mesh_contacts]") {
+TEST_CASE("sweeps within the reach of one list need no second traversal", "[mesh_contacts]") {
   const Scene scene = scene_of(manipulation_cases()[7]);
   MeshContacts contacts(scene);
   VisitBudget budget = {1000000};

@@ -78,7 +78,7 @@ ObstacleMotion turning(const Vector3d& w_rad_per_s) {
   return motion;
 }
 
-TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exactly outside", "[moving]") {
+TEST_CASE("a plate that flies through a hand at rest carries the proxy along, exactly outside", "[moving]") {
   const double speed_m_per_s = GENERATE(0.05, 0.5, 5.0);
   const GeneratedMesh tool =
       GENERATE(GeneratedMesh{"cube", 12}, GeneratedMesh{"bumpy", 2000}, GeneratedMesh{"plate", 100});
@@ -107,7 +107,7 @@ TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exac
   CHECK(latest_s <= 0.02);
 }
 
-TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactly outside", "[moving]") {
+TEST_CASE("a rotating gear and a tumbling block displace a tool that stays exactly outside", "[moving]") {
   const bool gear = GENERATE(true, false);
   const Scene scene =
       gear ? scene_with({"bumpy", 500}, {{{"gear", 1000}, {}, turning({0, 0, 20.0})}})
@@ -138,7 +138,7 @@ TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactl
 }
 
 // The energy knows only p^-1 q: what rides on an obstacle feels nothing of it.
-TEST_CASE("a hand that rides with a lift feels what it feels on the ground", "[moving]") {
+TEST_CASE("a hand on a moving lift gets the same contact as on the ground", "[moving]") {
   const GeneratedMesh tool = {"cube", 300};
   const Vector3d v_m_per_s(0.02, 0.01, 0.1);
   const Scene ground = scene_with(tool, {{{"table", 1200}, {}, {}}});
@@ -166,7 +166,7 @@ TEST_CASE("a hand that rides with a lift feels what it feels on the ground", "[m
   if (case_count(600) == 600) CHECK(most > 1e-8);
 }
 
-TEST_CASE("what is caught in a vice says so, and was outside until then", "[moving]") {
+TEST_CASE("a tool trapped in a vice is reported, and was outside until then", "[moving]") {
   const Scene scene =
       scene_with({"cube", 12},
                  {{{"table", 12}, {Quaterniond::Identity(), {0, 0, -0.07}}, to_and_fro({0, 0, 0.2}, 0.0)},
@@ -191,7 +191,7 @@ TEST_CASE("what is caught in a vice says so, and was outside until then", "[movi
   CHECK(watched.follow(beside, (i + 1) * kTick_s).status == ProjectionStatus::free);
 }
 
-TEST_CASE("a place that was found for an earlier time is caught up with", "[moving]") {
+TEST_CASE("a proxy pose found for an earlier scene time catches up with the obstacles", "[moving]") {
   const Scene scene =
       scene_with({"cube", 12},
                  {{{"table", 12}, {Quaterniond::Identity(), {0, 0, -0.05}}, to_and_fro({0, 0, 0.1}, 0.0)}});
@@ -211,7 +211,7 @@ TEST_CASE("a place that was found for an earlier time is caught up with", "[movi
   CHECK(X_WQ.translation_m.z() == Approx(table_m + 0.035).margin(1e-6));
 }
 
-TEST_CASE("with friction a tool rides on what moves, without friction it does not", "[moving][friction]") {
+TEST_CASE("a moving obstacle carries the tool with friction, and not without", "[moving][friction]") {
   const ObstacleMotion motion = GENERATE(to_and_fro({0.015, 0.0, 0.02}, 0.0), turning({0.0, 0.0, 0.6}));
   const Scene scene = scene_with({"cube", 12}, {{{"table", 12}, {}, motion}});
   const double mu = GENERATE(0.0, 0.8);
@@ -242,7 +242,7 @@ TEST_CASE("with friction a tool rides on what moves, without friction it does no
     CHECK(behind_m > 0.5 * way_m);
 }
 
-TEST_CASE("obstacles that move neither allocate nor lock", "[moving][realtime]") {
+TEST_CASE("following moving obstacles neither allocates nor locks", "[moving][realtime]") {
   const Scene scene = scene_with({"bumpy", 2000}, {{{"gear", 1000}, {}, turning({0, 0, 5.0})}});
   Proxy proxy(scene);
   Pose X_WP = {Quaterniond::Identity(), {0.10, 0, 0}};

@@ -47,7 +47,7 @@ Sums hold_still(const Scene& scene, const Pose& X_WP, double for_s) {
   return sums;
 }
 
-TEST_CASE("a block that rises into a hand at rest puts into T what T rises by, and takes it back",
+TEST_CASE("the work of a rising block equals the rise of T, and its descent returns it",
           "[obstacle_work]") {
   ObstacleMotion motion;
   motion.linear_m_per_s = {0.0, 0.0, 0.04};
@@ -63,7 +63,7 @@ TEST_CASE("a block that rises into a hand at rest puts into T what T rises by, a
   CHECK(std::abs(and_back.sum) < 0.01 * there.most_T);
 }
 
-TEST_CASE("a block that turns does work by its lever", "[obstacle_work]") {
+TEST_CASE("a rotating block does work in proportion to its lever", "[obstacle_work]") {
   ObstacleMotion motion;
   motion.angular_rad_per_s = {0.0, 2.0, 0.0};
   motion.reverse_after_s = 0.15;
@@ -73,7 +73,7 @@ TEST_CASE("a block that turns does work by its lever", "[obstacle_work]") {
   CHECK(sums.worst < 0.01 * sums.most_T);
 }
 
-TEST_CASE("what stands still does no work, however hard it is pressed", "[obstacle_work]") {
+TEST_CASE("an obstacle at rest does no work, however large the contact force", "[obstacle_work]") {
   const Scene scene = over_a_block({}, {Quaterniond::Identity(), {0.0, 0.0, -0.051}});
   PenetrationDepth depth(scene, {});
   const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, -0.01}};

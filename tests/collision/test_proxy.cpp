@@ -47,7 +47,7 @@ Scene two(TriangleMesh tool, TriangleMesh obstacle) {
   return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
 }
 
-TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]") {
+TEST_CASE("a proxy overlaps nothing for any motion of the hand, by exact arithmetic", "[proxy]") {
   const auto i = GENERATE(range<std::size_t>(0, 20));
   const ManipulationCase& handling = manipulation_cases()[i];
   INFO(handling.name);
@@ -67,7 +67,7 @@ TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]"
   if (case_count(600) == 600) CHECK(contacts > 10);  // a tenth of the ticks may not come so far
 }
 
-TEST_CASE("a plate of a millimetre holds a stab of five metres a second", "[proxy]") {
+TEST_CASE("a plate of 1 mm stops a stab at 5 m/s", "[proxy]") {
   for (const std::size_t i : {0, 1, 2, 3, 5}) {
     const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
@@ -182,7 +182,7 @@ TEST_CASE("an open surface stops a tool on the side where it is", "[proxy]") {
       }
 }
 
-TEST_CASE("the border of a surface and where it cuts through itself hold, too", "[proxy]") {
+TEST_CASE("the border and the self-intersections of a surface hold the tool", "[proxy]") {
   TriangleMesh cross = sheet(2);  // and another, upright, through its middle
   const auto first = static_cast<std::uint32_t>(cross.vertices_m.size());
   for (const Vector3d& p : sheet(2).vertices_m) cross.vertices_m.emplace_back(p.x(), 0.003, p.y());
@@ -231,7 +231,7 @@ std::vector<Vector6d> wrenches(std::size_t triangles, int ticks) {
   return out;
 }
 
-TEST_CASE("a cube on a table feels the same however both are cut, and does not chatter", "[proxy]") {
+TEST_CASE("a cube on a table has the same contact at every triangulation, without chatter", "[proxy]") {
   const int ticks = 1500;
   const std::vector<Vector6d> coarse = wrenches(12, ticks);
   double largest = 0.0, jolt = 0.0;
@@ -271,7 +271,7 @@ TEST_CASE("a proxy slides along a wall made of flush blocks without catching on 
   }
 }
 
-TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as those do", "[proxy]") {
+TEST_CASE("thousands of obstacles cost as much as the near ones, and yield the same result", "[proxy]") {
   const auto cube = std::make_shared<const MeshBvh>(make_mesh({"cube", 12}));
   std::vector<MeshObstacle> few, many;
   for (int i = 0; i < 60; ++i)
@@ -298,7 +298,7 @@ TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as thos
   CHECK(contacts > 300);
 }
 
-TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
+TEST_CASE("half-spaces and meshes hold a proxy together", "[proxy]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back({"wall", MeshBvh(make_mesh({"cube", 12})), Pose{Quaterniond::Identity(), {0.1, 0, 0}}});
   const Scene scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1), {{"floor", Vector3d::UnitZ(), -0.03}}, {},
@@ -316,7 +316,7 @@ TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
   CHECK(wall);
 }
 
-TEST_CASE("a proxy that is given no time stays where it is admissible, and says so", "[proxy]") {
+TEST_CASE("a proxy without budget stays at an admissible pose and reports it", "[proxy]") {
   const ManipulationCase& handling = manipulation_cases()[7];
   const Scene scene = scene_of(handling);
   const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
@@ -342,7 +342,7 @@ TEST_CASE("a proxy that is given no time stays where it is admissible, and says 
 
 // In visits, not in time. Among fine bodies that the hand has just begun to move, or turns back, a list of
 // pairs is missing: ticks that make it at once take tens of times what the others take.
-TEST_CASE("no tick takes far more work than most, and what is late is caught up with", "[proxy]") {
+TEST_CASE("no tick needs far more work than most, and the proxy catches up after deferral", "[proxy]") {
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, HandMotion::slide, {}});
   const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
@@ -417,7 +417,7 @@ std::vector<Projection> slid_along(double away_m, std::vector<std::uint32_t>& vi
 }
 
 // In visits: contacts come and go along the way, and a tick that meets one looks several times.
-TEST_CASE("along a path ticks take much the same work", "[proxy]") {
+TEST_CASE("ticks along a path need similar work", "[proxy]") {
   std::vector<std::uint32_t> visits;
   slid_along(0.1, visits);
   std::sort(visits.begin(), visits.end());
@@ -427,7 +427,7 @@ TEST_CASE("along a path ticks take much the same work", "[proxy]") {
 }
 
 // Far inside, a little of the hand's way is much of the tool's: where that is cannot be told beforehand.
-TEST_CASE("a tool that is not where it was expected is late now and then, not all the time", "[proxy]") {
+TEST_CASE("wrong predictions defer some ticks, not all", "[proxy]") {
   std::vector<std::uint32_t> visits;
   const std::vector<Projection> all = slid_along(0.096, visits);
   const auto late = std::count_if(

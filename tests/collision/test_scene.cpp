@@ -20,7 +20,7 @@ SceneSettings box_above_floor(const TemporaryDirectory& dir) {
   return settings;
 }
 
-TEST_CASE("a scene is built from its settings, and refuses a bad mesh") {
+TEST_CASE("a scene is built from its settings, and rejects an invalid mesh") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   const Scene scene(settings);
@@ -31,7 +31,7 @@ TEST_CASE("a scene is built from its settings, and refuses a bad mesh") {
   CHECK_THROWS_AS(Scene(settings), MeshError);
 }
 
-TEST_CASE("a mesh obstacle stands where it was put, at its scale") {
+TEST_CASE("a mesh obstacle has its pose and scale") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   settings.half_spaces.clear();
@@ -76,7 +76,7 @@ TEST_CASE("convex bodies are held as such, all others as meshes only", "[scene]"
   CHECK(forms() == std::pair<std::size_t, std::size_t>(0, 1));
 }
 
-TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodies to the proxy", "[scene]") {
+TEST_CASE("a moving obstacle follows its motion, and disables the convex bodies", "[scene]") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   MeshObstacleSettings post;
@@ -111,7 +111,7 @@ TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodie
   CHECK(by_hand.convex().empty());
 }
 
-TEST_CASE("a scene with its meshes elsewhere shares them, and what moves later moves", "[scene][moving]") {
+TEST_CASE("a scene with new poses shares its meshes, and scheduled motions apply", "[scene][moving]") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   MeshObstacleSettings post;

@@ -44,7 +44,7 @@ TEST_CASE("the deepest contacts come first, at most four of an obstacle, and non
   CHECK(contacts.size() == 8);
 }
 
-TEST_CASE("a contact tells its vertex, its face and its obstacle") {
+TEST_CASE("a contact names its vertex, its face and its obstacle") {
   const HalfSpaceSettings wall = half_space({3, 0, 4}, 0.5);
   const Scene scene(cube(), {kFloor, wall});
   const Pose X_WT{kTilt, {0.1, 0.2, 0.3}};
@@ -140,7 +140,7 @@ TEST_CASE("rounds of add_violated find every violated vertex, in order of depth"
   }
 }
 
-TEST_CASE("what touches is added at once, however much it is, and none twice") {
+TEST_CASE("all touching contacts are added at once, none twice") {
   std::vector<Vector3d> corners;
   for (int i = 0; i < 20; ++i)
     for (const double z : {0.0, 1.0})
@@ -181,7 +181,7 @@ TEST_CASE("the best plane of a survey is the separating axis of least depth") {
   }
 }
 
-TEST_CASE("what the planes held admit does not overlap, whichever they are") {
+TEST_CASE("a pose that the held planes admit never overlaps, for any planes") {
   RandomValues random(12);
   int admitted = 0;
   for (int i = 0; i < 200; ++i) {
@@ -201,7 +201,7 @@ TEST_CASE("what the planes held admit does not overlap, whichever they are") {
   CHECK(admitted > 100);
 }
 
-TEST_CASE("a gap of every kind has the slope that its contact tells") {
+TEST_CASE("a gap of every kind has the gradient of its contact") {
   RandomValues random(13);
   int seen[3] = {};
   for (int i = 0; i < 200; ++i) {
@@ -233,7 +233,7 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
   for (const int count : seen) CHECK(count > 50);
 }
 
-TEST_CASE("an obstacle out of reach is not asked") {
+TEST_CASE("an obstacle out of reach is not queried") {
   RandomValues random(14);
   const OverlappingScene met = overlap_body(random, 0.1);
   SceneContacts contacts(met.scene);
@@ -245,7 +245,7 @@ TEST_CASE("an obstacle out of reach is not asked") {
   CHECK(contacts.add_violated(far, 0.0, violated) == 0);
 }
 
-TEST_CASE("a far obstacle takes no part in what a near one does") {
+TEST_CASE("a far obstacle does not affect a near one") {
   RandomValues random(15);
   for (int i = 0; i < 20; ++i) {
     const OverlappingScene met = overlap_body(random, 0.1);

@@ -67,7 +67,7 @@ void check_rings(const ConvexBody& body) {
   CHECK(edges / 2 == 3 * p.size() - 6);  // Euler, all faces triangles
 }
 
-TEST_CASE("a tool is scaled to metres, and its mass is the whole solid's") {
+TEST_CASE("a tool is scaled to metres, and its mass is that of the whole solid") {
   const TemporaryDirectory dir;
   const auto file = dir.write("box.off", as_off(box({0, 0, 0}, {20, 30, 50})));
   const ToolBody tool = load_tool({file, 0.001, 0.3});
@@ -171,7 +171,7 @@ TEST_CASE("the ring of a hull's vertex runs once around it") {
   }
 }
 
-TEST_CASE("a tool that cannot be used is refused with its file and the cure") {
+TEST_CASE("an unusable tool is rejected with its file and the remedy") {
   const TemporaryDirectory dir;
   const auto good = dir.write("box.off", as_off(box({0, 0, 0}, {2, 3, 5})));
   for (const char* text : {"1e-200", "1e-110", "1e+110", "1e+200", "0", "-1"}) {

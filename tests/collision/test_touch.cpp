@@ -134,7 +134,7 @@ TEST_CASE("the contacts of convex bodies name features of their hulls that are w
   CHECK(kinds[2] > 5);
 }
 
-TEST_CASE("of more contacts than are told, those that carry most are", "[touch]") {
+TEST_CASE("of too many contacts those with the largest multipliers are reported", "[touch]") {
   const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitZ(), 0.0)});
   Projection q;
   for (std::uint32_t i = 0; i < 40; ++i) {

@@ -332,7 +332,7 @@ void check_file(const fs::path& file, const fs::path& tool, const Expected& expe
   }
 }
 
-TEST_CASE("240 bad meshes are accepted, repaired with a report, or refused with a reason", "[bad_meshes]") {
+TEST_CASE("240 bad meshes are accepted, repaired with a report, or rejected with a reason", "[bad_meshes]") {
   const TemporaryDirectory dir;
   const fs::path tool = dir.write("tool.off", as_off(box({0, 0, 0}, {1, 1, 1})));
   int files = 0;

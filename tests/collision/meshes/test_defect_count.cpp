@@ -6,7 +6,7 @@
 namespace wrenchd {
 namespace {
 
-TEST_CASE("a tally tells the first, and how many", "[tally]") {
+TEST_CASE("a defect count reports the first defect and the number", "[defect_count]") {
   std::vector<std::string> told;
   DefectCount tally;
   tally.report(told, "cure");

@@ -11,7 +11,7 @@ namespace {
 
 using namespace test;
 
-TEST_CASE("every side of every face is listed, those of an edge together", "[soup_sides]") {
+TEST_CASE("every half-edge is listed, grouped by edge", "[half_edges]") {
   PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
   soup.faces.push_back({0, 1, 5});
   soup.faces.push_back({7, 7});

@@ -83,7 +83,7 @@ TEST_CASE("a solid may have concave faces, corners on an edge, several shells an
              30 - 8 + 0.008);
 }
 
-TEST_CASE("a quad that is not flat is cut into triangles") {
+TEST_CASE("a quad that is not planar is triangulated") {
   PolygonSoup soup = kBox;
   soup.vertices[7] += Vector3d(0.1, 0.2, 0.3);
   TriangleMesh mesh;
@@ -93,7 +93,7 @@ TEST_CASE("a quad that is not flat is cut into triangles") {
   CHECK(report.volume > 30);
 }
 
-TEST_CASE("a face of five corners that crosses itself cannot be cut, and is told") {
+TEST_CASE("a face of five corners that crosses itself is reported") {
   const PolygonSoup star{{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {3, 1, 0}, {1, 1, 3}},
                          {{0, 2, 1, 3, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}}};
   check_defect_with(star, {"face 0", "cannot be triangulated"});
@@ -111,7 +111,7 @@ TEST_CASE("vertices that no face uses do not count") {
   CHECK(mesh.vertices_m.size() == 8);
 }
 
-TEST_CASE("scale and place of a solid do not matter") {
+TEST_CASE("scale and position of a solid do not matter") {
   for (const double scale : {1e-6, 1e-3, 1.0, 1e3, 1e6}) {
     for (const double offset : {0.0, 1e3}) {
       PolygonSoup soup = kBox;
@@ -124,7 +124,7 @@ TEST_CASE("scale and place of a solid do not matter") {
   }
 }
 
-TEST_CASE("numbers that are none are found") {
+TEST_CASE("coordinates that are not finite are found") {
   PolygonSoup soup = kBox;
   soup.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
   check_defects(soup, {"vertex 3 is not a number: (2, nan, 0); export the mesh again"});
@@ -132,7 +132,7 @@ TEST_CASE("numbers that are none are found") {
   check_defects(soup, {"vertex 3 is not a number: (2, nan, 0) (2 in all); export the mesh again"});
 }
 
-TEST_CASE("faces that are none are found") {
+TEST_CASE("faces that are no polygons are found") {
   PolygonSoup soup = kBox;
   soup.faces[1][2] = 8;
   check_defects(
@@ -187,7 +187,7 @@ TEST_CASE("a hole is found") {
   check_defect_with({kBox.vertices, {kBox.faces[0]}}, {"belongs to face 0 only", "(4 in all)"});
 }
 
-TEST_CASE("a face that looks the wrong way is found") {
+TEST_CASE("a face with the wrong orientation is found") {
   PolygonSoup soup = kBox;
   std::reverse(soup.faces[0].begin(), soup.faces[0].end());
   check_defect_with(soup, {"faces 0 and ", "oriented against each other along the edge from (0, ",
@@ -253,7 +253,7 @@ TEST_CASE("faces that intersect each other are found") {
                     {"intersect each other"});  // face on face
 }
 
-TEST_CASE("a mesh in which everything cuts through everything is refused in good time") {
+TEST_CASE("a mesh in which everything intersects is rejected quickly") {
   PolygonSoup soup;
   for (int i = 0; i < 300; ++i)
     soup = concatenated(soup, box(Vector3d::Constant(1e-4 * i), Vector3d::Constant(1 + 1e-4 * i)));
@@ -266,7 +266,7 @@ TEST_CASE("a face that cannot be triangulated is found") {
   check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be triangulated (6 in all); make it planar"});
 }
 
-TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must have numbers and areas") {
+TEST_CASE("a surface may be open, one-sided and self-intersecting, but needs finite coordinates and areas") {
   const auto triangles_of = [](const PolygonSoup& soup) {
     TriangleMesh mesh;
     const MeshReport report = check_surface(soup, &mesh);
@@ -304,7 +304,7 @@ TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must hav
   refused_with({kBox.vertices, {}}, "no face that has an area");
 }
 
-TEST_CASE("a surface of which the repair leaves nothing is refused") {
+TEST_CASE("a surface of which the repair leaves nothing is rejected") {
   PolygonSoup far = triangulated(kBox);
   far.vertices[5].x() = 1e126;  // beside it all other points are one
   TriangleMesh mesh;
@@ -314,7 +314,7 @@ TEST_CASE("a surface of which the repair leaves nothing is refused") {
   CHECK(report.defects[0].find("a vertex that is much too far away") != std::string::npos);
 }
 
-TEST_CASE("what has no inside is refused") {
+TEST_CASE("a mesh without an inside is rejected") {
   CHECK_FALSE(check_solid({}).solid());
   CHECK_FALSE(check_solid({kBox.vertices, {}}).solid());
   const PolygonSoup leaf{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}}};
@@ -324,7 +324,7 @@ TEST_CASE("what has no inside is refused") {
   CHECK_FALSE(check_solid(flat).solid());
 }
 
-TEST_CASE("numbers at the end of their range crash nothing") {
+TEST_CASE("coordinates at the end of their range cause no crash") {
   for (const double scale : {1e-320, 1e-200, 1e-110, 1e110, 1e200, 1e307}) {
     PolygonSoup soup = kBox;
     for (Vector3d& p : soup.vertices) p *= scale;

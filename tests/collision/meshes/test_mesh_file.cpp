@@ -80,7 +80,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST_CASE("what exporters write beside the mesh does no harm") {
+TEST_CASE("additional data of exporters is ignored") {
   const TemporaryDirectory dir;
   const PolygonSoup triangles = triangulated(kBox);
   const std::string off = as_off(kBox);
@@ -118,7 +118,7 @@ TEST_CASE("what exporters write beside the mesh does no harm") {
   check_is_the_box(dir.write("named.ply", replaced(as_binary_ply(kBox), "vertex_indices", "vertex_index")));
 }
 
-TEST_CASE("what exporters write in their own way is read") {
+TEST_CASE("variants of exporters are read") {
   const TemporaryDirectory dir;
   const PolygonSoup triangles = triangulated(kBox);
   const std::string mark = "\xef\xbb\xbf";
@@ -190,7 +190,7 @@ void check_refused(const std::vector<Bad>& table) {
   }
 }
 
-TEST_CASE("what is no mesh file is refused with its name and a cure") {
+TEST_CASE("a file that is no mesh is rejected with its name and a remedy") {
   const TemporaryDirectory dir;
   CHECK(rejection_text(dir.path() / "missing.off") ==
         (dir.path() / "missing.off").string() + ": no such file; check the path in the scene");
@@ -209,7 +209,7 @@ TEST_CASE("what is no mesh file is refused with its name and a cure") {
   });
 }
 
-TEST_CASE("a wrong extension is told") {
+TEST_CASE("a wrong extension is rejected") {
   const PolygonSoup triangles = triangulated(kBox);
   check_refused({
       {"stl.off", as_ascii_stl(triangles), ":1", "expected OFF"},
@@ -223,7 +223,7 @@ TEST_CASE("a wrong extension is told") {
   });
 }
 
-TEST_CASE("bad OFF files are refused at their line") {
+TEST_CASE("invalid OFF files are rejected with the line") {
   const std::string off = as_off(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(off, from, to); };
   check_refused({
@@ -267,7 +267,7 @@ TEST_CASE("bad OFF files are refused at their line") {
   });
 }
 
-TEST_CASE("bad OBJ files are refused at their line") {
+TEST_CASE("invalid OBJ files are rejected with the line") {
   const std::string obj = as_obj(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(obj, from, to); };
   check_refused({
@@ -288,7 +288,7 @@ TEST_CASE("bad OBJ files are refused at their line") {
   });
 }
 
-TEST_CASE("bad STL files are refused") {
+TEST_CASE("invalid STL files are rejected") {
   const PolygonSoup triangles = triangulated(kBox);
   const std::string ascii = as_ascii_stl(triangles), binary = as_binary_stl(triangles);
   std::string counted = binary, nan = binary;
@@ -316,7 +316,7 @@ TEST_CASE("bad STL files are refused") {
   });
 }
 
-TEST_CASE("bad PLY files are refused") {
+TEST_CASE("invalid PLY files are rejected") {
   const std::string ply = as_ascii_ply(kBox), binary = as_binary_ply(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(ply, from, to); };
   const std::string start = "ply\nformat ascii 1.0\n";
@@ -369,7 +369,7 @@ TEST_CASE("bad PLY files are refused") {
   });
 }
 
-TEST_CASE("noise in any format is refused, and crashes nothing") {
+TEST_CASE("noise in any format is rejected without a crash") {
   const TemporaryDirectory dir;
   std::mt19937 random(7);
   for (const char* name : {"noise.off", "noise.obj", "noise.stl", "noise.ply"}) {
@@ -382,7 +382,7 @@ TEST_CASE("noise in any format is refused, and crashes nothing") {
   }
 }
 
-TEST_CASE("a good file with bytes changed is read or refused, and crashes nothing") {
+TEST_CASE("a valid file with modified bytes is read or rejected without a crash") {
   const TemporaryDirectory dir;
   const PolygonSoup triangles = triangulated(kBox);
   const std::pair<const char*, std::string> good[] = {{"a.off", as_off(kBox)},

@@ -26,7 +26,7 @@ std::string refusal_of(MeshLoader& loader, const fs::path& file, BodyKind kind) 
   return {};
 }
 
-TEST_CASE("what a loader changed is told once, with the file", "[mesh_loader]") {
+TEST_CASE("a loader reports each change once, with the file", "[mesh_loader]") {
   const TemporaryDirectory dir;
   PolygonSoup soup = inside_out(kBox);
   soup.faces.push_back(soup.faces[0]);
@@ -45,7 +45,7 @@ TEST_CASE("what a loader changed is told once, with the file", "[mesh_loader]") 
   CHECK(loader.warnings()[0].find(file.string() + ": its largest side is 500 m") == 0);
 }
 
-TEST_CASE("an open mesh is refused with the key that makes it a surface, and is one with it",
+TEST_CASE("an open mesh is rejected with the key that makes it a surface, and is accepted with that key",
           "[mesh_loader]") {
   const TemporaryDirectory dir;
   PolygonSoup open = kBox;
@@ -104,7 +104,7 @@ std::vector<std::string> files_of(const fs::path& directory) {
   return files;
 }
 
-TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "[mesh_loader]") {
+TEST_CASE("a large mesh is reported and cached, and the cached result is equal", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path cache = dir.path() / "cache";
   const TriangleMesh made = make_mesh({"bumpy", 60000});
@@ -153,7 +153,7 @@ TEST_CASE("a large mesh is told of and kept on disk, and comes back the same", "
   }
 }
 
-TEST_CASE("a mesh that is made is checked and kept like one of a file", "[mesh_loader]") {
+TEST_CASE("a generated mesh is checked and cached like a file", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path cache = dir.path() / "cache";
   const GeneratedMesh bumpy = {"bumpy", 60000};
@@ -176,7 +176,7 @@ TEST_CASE("a mesh that is made is checked and kept like one of a file", "[mesh_l
   CHECK(told.empty());
 }
 
-TEST_CASE("a cache that cannot be written is a remark", "[mesh_loader]") {
+TEST_CASE("a cache that cannot be written causes a warning", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path file = dir.write("bumpy.off", off_of(make_mesh({"bumpy", 60000})));
   MeshLoader loader(dir.write("no_directory", "") / "cache", {});
@@ -186,7 +186,7 @@ TEST_CASE("a cache that cannot be written is a remark", "[mesh_loader]") {
   CHECK(loader.warnings()[0].find("; results for large meshes are not cached") != std::string::npos);
 }
 
-TEST_CASE("nothing is told of a small mesh, and nothing kept", "[mesh_loader]") {
+TEST_CASE("a small mesh is neither reported nor cached", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path file = dir.write("box.off", as_off(kBox)), cache = dir.path() / "cache";
   MeshLoader loader(cache, [](const std::string& what) { FAIL(what); });
@@ -202,12 +202,12 @@ std::size_t size_of_members(T thing) {
   return sum;
 }
 
-TEST_CASE("no member of what is kept is forgotten", "[mesh_loader]") {
+TEST_CASE("the cache stores every data member", "[mesh_loader]") {
   CHECK(size_of_members(MeshSurface()) == sizeof(MeshSurface));
   CHECK(size_of_members(TriangleBvh()) == sizeof(TriangleBvh));
 }
 
-TEST_CASE("numbers are grouped for people", "[mesh_loader]") {
+TEST_CASE("numbers have thousands separators", "[mesh_loader]") {
   CHECK(with_thousands_separators(0) == "0");
   CHECK(with_thousands_separators(999) == "999");
   CHECK(with_thousands_separators(1000) == "1,000");

@@ -45,7 +45,7 @@ TEST_CASE("a good mesh is left as it is", "[mesh_repair]") {
   }
 }
 
-TEST_CASE("points that no face uses are left out", "[mesh_repair]") {
+TEST_CASE("unused points are removed", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.vertices.insert(soup.vertices.begin() + 1, Vector3d(1000, 0, 0));
   soup.vertices.emplace_back(0, 1000, 0);
@@ -69,7 +69,7 @@ TEST_CASE("points at the same place are merged", "[mesh_repair]") {
   check_repaired(soup, {"merged 16 duplicate points, first vertex 8 at (0, 0, 0)"});
 }
 
-TEST_CASE("repeated corners and faces of two corners go", "[mesh_repair]") {
+TEST_CASE("repeated corners and faces of two corners are removed", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.faces[2] = {0, 1, 1, 5, 4, 0};
   check_repaired(soup, {"removed repeated corners of 1 face: face 2 near (0, 0, 0)"});
@@ -84,7 +84,7 @@ TEST_CASE("repeated corners and faces of two corners go", "[mesh_repair]") {
   CHECK(soup.face_in_file(1) == 2);
 }
 
-TEST_CASE("a face without area goes, and leaves no hole", "[mesh_repair]") {
+TEST_CASE("a face without area is removed and leaves no hole", "[mesh_repair]") {
   // A corner on an edge that only one side knows: a cap fills the gap.
   PolygonSoup soup = triangulated(kBox);
   const auto edge = std::find(soup.faces.begin(), soup.faces.end(), std::vector<std::size_t>{0, 1, 5});
@@ -125,7 +125,7 @@ TEST_CASE("a needle is closed", "[mesh_repair]") {
   CHECK(soup.vertices.size() == 8);
 }
 
-TEST_CASE("faces given twice are kept once, either way up", "[mesh_repair]") {
+TEST_CASE("of duplicate faces one is kept, whatever their orientation", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.faces.push_back({7, 3, 2, 6});
   check_repaired(soup, {"removed 1 duplicate face: face 6 near (2, 3, 5)"});
@@ -166,7 +166,7 @@ TEST_CASE("cracks of single precision are closed, wider ones are not", "[mesh_re
   }
 }
 
-TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[mesh_repair]") {
+TEST_CASE("faces with the wrong orientation are flipped", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   std::reverse(soup.faces[3].begin(), soup.faces[3].end());
   check_repaired(soup, {"flipped 1 face: face 3 near (2, 3, 0)"});
@@ -183,7 +183,7 @@ TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[
   }
 }
 
-TEST_CASE("a solid that is inside out is turned, with its cavities", "[mesh_repair]") {
+TEST_CASE("a solid that is inside out is flipped, with its cavities", "[mesh_repair]") {
   const PolygonSoup cavity = inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}));
   const PolygonSoup beside = box({10, 0, 0}, {11, 1, 1});
   check_repaired(inside_out(kBox), {"flipped 6 faces, first face 0 near (0, 3, 0)"});
@@ -195,7 +195,7 @@ TEST_CASE("a solid that is inside out is turned, with its cavities", "[mesh_repa
                  {"flipped 6 faces, first face 12 near (10, 1, 0)"}, kVolume);
 }
 
-TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {
+TEST_CASE("a defect that needs a guess is left unchanged", "[mesh_repair]") {
   const auto left = [](PolygonSoup soup) {
     CHECK(repair(soup).empty());
     return !check_solid(soup).solid();

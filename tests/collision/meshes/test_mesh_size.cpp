@@ -18,7 +18,7 @@ std::string asked(double scale, PlausibleSize likely) {
   return implausible_size(cube(), scale, likely).value_or("");
 }
 
-TEST_CASE("a size that is not likely is asked about, with the scale that would cure it", "[mesh_size]") {
+TEST_CASE("an implausible size causes a question with the scale that corrects it", "[mesh_size]") {
   CHECK(asked(1.0, kPlausibleToolSize) == "");
   CHECK(asked(0.02, kPlausibleToolSize) == "");
   CHECK(asked(40.0, kPlausibleToolSize) == "");
@@ -32,7 +32,7 @@ TEST_CASE("a size that is not likely is asked about, with the scale that would c
   CHECK(asked(10000.0, kPlausibleObstacleSize).find("its largest side is 500 m") == 0);
 }
 
-TEST_CASE("a size that contacts cannot be found at is refused", "[mesh_size]") {
+TEST_CASE("a size outside the range of contact queries is rejected", "[mesh_size]") {
   const auto refused = [](const TriangleMesh& mesh, double scale) -> std::string {
     try {
       require_size_for_contacts(mesh, scale, "cube.off");

@@ -42,7 +42,7 @@ double length_of_edges(const MeshSurface& surface) {
   return sum;
 }
 
-TEST_CASE("a cube has eight points and twelve edges, however finely it is cut", "[mesh_surface]") {
+TEST_CASE("a cube has eight convex vertices and twelve convex edges at every triangulation", "[mesh_surface]") {
   for (const std::size_t triangles : {12, 300, 5000}) {
     const MeshSurface cube(make_mesh({"cube", triangles}), Kind::solid);
     CHECK(cube.convex_vertex_count() == 8);
@@ -53,7 +53,7 @@ TEST_CASE("a cube has eight points and twelve edges, however finely it is cut", 
   }
 }
 
-TEST_CASE("the bottom of a groove holds neither edge nor point", "[mesh_surface]") {
+TEST_CASE("the bottom of a groove has neither a convex edge nor a convex vertex", "[mesh_surface]") {
   const MeshSurface iron(angle_iron(), Kind::solid);
   CHECK(iron.convex_vertex_count() == 10);  // the two ends of the inner edge are none
   CHECK(length_of_edges(iron) == Approx(2 * 8.0 + 5 * 1.0));
@@ -68,7 +68,7 @@ TEST_CASE("the bottom of a groove holds neither edge nor point", "[mesh_surface]
   CHECK(length_of_edges(skin) == Approx(2 * 8.0 + 6 * 1.0));
 }
 
-TEST_CASE("every pointed vertex and every sharp edge belongs to one triangle, and lies in it",
+TEST_CASE("every convex vertex and every convex edge has one owner triangle, and lies in it",
           "[mesh_surface]") {
   for (const char* kind : {"bumpy", "gear", "bolt", "hole"}) {
     const MeshSurface surface(make_mesh({kind, 3000}), Kind::solid);
@@ -96,7 +96,7 @@ TEST_CASE("every pointed vertex and every sharp edge belongs to one triangle, an
 
 // Found the slow way: a vertex is pointed where one of many directions leaves all its neighbours behind, and
 // the solid with them.
-TEST_CASE("no vertex that could meet a plane first is left out", "[mesh_surface]") {
+TEST_CASE("every vertex that can meet a plane first is convex", "[mesh_surface]") {
   RandomValues random(3);
   for (const char* kind : {"bumpy", "gear", "peg"}) {
     const MeshSurface surface(make_mesh({kind, 1000}), Kind::solid);

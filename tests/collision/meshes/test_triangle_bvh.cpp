@@ -49,7 +49,7 @@ void descend(const TriangleBvh& tree, const MeshSurface& surface, std::uint32_t 
   }
 }
 
-TEST_CASE("a tree holds every triangle once, inside all boxes above it", "[triangle_tree]") {
+TEST_CASE("a BVH contains every triangle once, inside all boxes above it", "[triangle_bvh]") {
   for (const char* kind : {"cube", "plate", "bumpy", "hole", "bolt", "gear"})
     for (const std::size_t triangles : {12, 500, 6000}) {
       INFO(kind << ' ' << triangles);
@@ -64,7 +64,7 @@ TEST_CASE("a tree holds every triangle once, inside all boxes above it", "[trian
     }
 }
 
-TEST_CASE("a tree of no triangles is no tree", "[triangle_tree]") {
+TEST_CASE("a BVH without triangles is empty", "[triangle_bvh]") {
   const TriangleBvh tree(MeshSurface(TriangleMesh{}, Kind::surface));
   CHECK(tree.nodes().empty());
 }

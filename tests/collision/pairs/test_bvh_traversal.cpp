@@ -48,7 +48,7 @@ const std::vector<std::pair<GeneratedMesh, GeneratedMesh>>& mesh_pairs() {
   return pairs;
 }
 
-TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of processor", "[tree_walk]") {
+TEST_CASE("a traversal finds every pair that exact arithmetic finds, on every processor", "[bvh_traversal]") {
   RandomValues random(21);
   BvhTraversal fastest, portable(simd::traverse_portable);
   std::size_t all = 0;
@@ -69,7 +69,7 @@ TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of
 
 // What a sweep must list is found by trying: the pairs that meet at many poses on the way, and at many within
 // reach of its end.
-TEST_CASE("a swept walk lists whatever meets on the way and within reach of the end", "[tree_walk]") {
+TEST_CASE("a swept traversal lists every pair that meets on the path or within reach of its end", "[bvh_traversal]") {
   RandomValues random(22);
   BvhTraversal still, swept, portable(simd::traverse_portable);
   std::size_t all = 0;
@@ -112,7 +112,7 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
   CHECK(all > 5000);
 }
 
-TEST_CASE("pairs without features that can meet first are left out when they are not wanted", "[tree_walk]") {
+TEST_CASE("a traversal omits pairs without features that can meet first, if requested", "[bvh_traversal]") {
   const MeshBvh a(make_mesh({"cube", 5000})), b(make_mesh({"table", 5000}));
   const Pose X_BA = {Quaterniond::Identity(), {0, 0, 0.035}};
   Sweep sweep = {X_BA, X_BA, 1e-5};
@@ -137,7 +137,7 @@ TEST_CASE("pairs without features that can meet first are left out when they are
   CHECK(corners.size() == 4);  // of the cube's lower face
 }
 
-TEST_CASE("a walk stops where its budget ends, and says so", "[tree_walk]") {
+TEST_CASE("a traversal stops at the end of its budget and reports it", "[bvh_traversal]") {
   const MeshBvh a(make_mesh({"peg", 1000})), b(make_mesh({"hole", 2000}));
   const Sweep sweep = {Pose{Quaterniond::Identity(), {3e-4, 0, 0}},
                        Pose{Quaterniond::Identity(), {3e-4, 0, 0}}};

@@ -41,7 +41,7 @@ Pose near_way(RandomValues& random, const CandidatePairs::Path& way, double away
           on_way.translation_m + of_shift * away_m * random.unit<3>()};
 }
 
-TEST_CASE("a list made in parts is the list made at once", "[near_pairs]") {
+TEST_CASE("a list built in parts equals a list built at once", "[candidate_pairs]") {
   const Scene scene = scene_of(manipulation_cases()[7]);
   const CandidatePairs::Path way = {
       {Quaterniond::Identity(), {0.10, 0, 0}}, {rotation_from({0.0, 0.01, 0.0}), {0.099, 0.001, 0}}, 1e-4};
@@ -63,7 +63,7 @@ TEST_CASE("a list made in parts is the list made at once", "[near_pairs]") {
 
 // A list that covers a pose holds all that a list made for that pose alone holds; but for what only its
 // margins let in, for which the triangles themselves are asked.
-TEST_CASE("a list holds what meets anywhere near its way", "[near_pairs]") {
+TEST_CASE("a list contains the pairs that meet anywhere near its path", "[candidate_pairs]") {
   RandomValues random(31);
   std::size_t looked_at = 0;
   for (const std::size_t i : {2, 7, 11, 14}) {
@@ -102,7 +102,7 @@ TEST_CASE("a list holds what meets anywhere near its way", "[near_pairs]") {
   CHECK(looked_at > 100);
 }
 
-TEST_CASE("what is farther from the way than the reach is not covered", "[near_pairs]") {
+TEST_CASE("poses beyond the reach of the path are not covered", "[candidate_pairs]") {
   RandomValues random(32);
   const Scene scene = scene_of(manipulation_cases()[8]);
   const double r_m = scene.tool_radius_m();
@@ -127,7 +127,7 @@ TEST_CASE("what is farther from the way than the reach is not covered", "[near_p
   }
 }
 
-TEST_CASE("of thousands of obstacles only those near by are listed", "[near_pairs]") {
+TEST_CASE("of thousands of obstacles only nearby ones are listed", "[candidate_pairs]") {
   std::vector<MeshObstacle> obstacles;
   const MeshBvh cube(make_mesh({"cube", 12}));
   for (int x = 0; x < 10; ++x)
@@ -143,8 +143,8 @@ TEST_CASE("of thousands of obstacles only those near by are listed", "[near_pair
 }
 
 // A tool that stands still and a ball that flies by, 2 mm above it at the nearest.
-TEST_CASE("a list for what moves holds for its time, and for where the obstacle sees the tool",
-          "[near_pairs]") {
+TEST_CASE("a list with a moving obstacle covers its times and its relative path",
+          "[candidate_pairs]") {
   const ObstacleMotion flies = {{0.5, 0, 0}, {0, 0, 20.0}, 0.0};
   std::vector<MeshObstacle> obstacles;
   const auto ball = std::make_shared<const MeshBvh>(make_mesh({"sphere", 320}));

@@ -20,8 +20,8 @@ std::set<std::pair<std::uint32_t, std::uint32_t>> make_state_set(const Intersect
   return out;
 }
 
-TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of processor",
-          "[meeting_pairs]") {
+TEST_CASE("the intersecting pairs are those of exact arithmetic, on every processor",
+          "[intersecting_pairs]") {
   const std::vector<std::pair<GeneratedMesh, GeneratedMesh>> cases = {
       {{"bumpy", 2000}, {"boulder", 3000}}, {{"cube", 12}, {"plate", 500}},
       {{"bolt", 2000}, {"nut", 2000}},      {{"gear", 3000}, {"gear", 1000}},
@@ -49,7 +49,7 @@ TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of p
 }
 
 // There one pair decides, and single precision cannot tell.
-TEST_CASE("at the verge of touching the pairs are those of exact arithmetic", "[meeting_pairs]") {
+TEST_CASE("nearly touching meshes yield the pairs of exact arithmetic", "[intersecting_pairs]") {
   const MeshBvh a(make_mesh({"bumpy", 2000})), b(make_mesh({"boulder", 3000}));
   const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
   RandomValues random(32);
@@ -73,7 +73,7 @@ TEST_CASE("at the verge of touching the pairs are those of exact arithmetic", "[
   }
 }
 
-TEST_CASE("faces that lie on each other meet in every pair of triangles that touch", "[meeting_pairs]") {
+TEST_CASE("coplanar touching faces intersect in every touching pair of triangles", "[intersecting_pairs]") {
   const MeshBvh cube(make_mesh({"cube", 12})), large(make_mesh({"cube", 1200}));
   const ExactIntersection exact(cube.surface.mesh(), large.surface.mesh());
   const double edge_m = 2.0 * cube.surface.mesh().vertices_m[0].cwiseAbs().maxCoeff();
@@ -87,7 +87,7 @@ TEST_CASE("faces that lie on each other meet in every pair of triangles that tou
   }
 }
 
-TEST_CASE("more pairs than there is room for are not taken for all", "[meeting_pairs]") {
+TEST_CASE("a search with more pairs than room reports that it is incomplete", "[intersecting_pairs]") {
   const MeshBvh bumpy(make_mesh({"bumpy", 60000}));
   for (const simd::TraversalKernel kernel :
        {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::traverse_portable}}) {
@@ -98,7 +98,7 @@ TEST_CASE("more pairs than there is room for are not taken for all", "[meeting_p
   }
 }
 
-TEST_CASE("a mesh of no triangles meets nothing", "[meeting_pairs]") {
+TEST_CASE("a mesh without triangles intersects nothing", "[intersecting_pairs]") {
   const MeshBvh cube(make_mesh({"cube", 12})), nothing(TriangleMesh{});
   IntersectingPairs pairs;
   CHECK(pairs.find(cube, nothing, Pose{}));

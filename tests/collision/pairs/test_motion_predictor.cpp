@@ -20,7 +20,7 @@ Pose hand(double t) {
   return {rotation_from(t * Vector3d(0.0, 1e-3, 4e-4)), {0.10, 1e-4 * t + 1e-7 * t * t, -5e-5 * t}};
 }
 
-TEST_CASE("nothing is expected to move that never did", "[expected_motion]") {
+TEST_CASE("a predictor without motion predicts no motion", "[motion_predictor]") {
   MotionPredictor motion;
   CHECK_FALSE(motion.has_observation());
   motion.observe(hand(3), hand(0));
@@ -29,7 +29,7 @@ TEST_CASE("nothing is expected to move that never did", "[expected_motion]") {
   CHECK(motion.chord_deviation_m(20, kRadius_m) == 0.0);
 }
 
-TEST_CASE("a tool that goes with the hand is expected where it will be", "[expected_motion]") {
+TEST_CASE("the prediction of a tool that moves with the hand is correct", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 100; ++i) motion.observe(hand(i), hand(i));
   const double way_m = apart_m(hand(100), hand(120));
@@ -39,14 +39,14 @@ TEST_CASE("a tool that goes with the hand is expected where it will be", "[expec
   CHECK(motion.chord_deviation_m(20, 0.0) == Approx(1e-5).epsilon(0.01));
 }
 
-TEST_CASE("a tool that is held drifts from the hand", "[expected_motion]") {
+TEST_CASE("a held tool drifts from the hand in the prediction", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 200; ++i) motion.observe(hand(0), hand(i));
   // It stays, but for what the hand gains in speed.
   CHECK(apart_m(motion.predict(10), hand(0)) < 0.1 * apart_m(hand(200), hand(210)));
 }
 
-TEST_CASE("a tool that jitters is expected to go with the hand", "[expected_motion]") {
+TEST_CASE("a jittering tool is predicted to move with the hand", "[motion_predictor]") {
   RandomValues random(61);
   MotionPredictor motion;
   double farthest_m = 0.0;
@@ -59,7 +59,7 @@ TEST_CASE("a tool that jitters is expected to go with the hand", "[expected_moti
   CHECK(farthest_m < 1e-4);
 }
 
-TEST_CASE("what was forgotten is not expected to go on", "[expected_motion]") {
+TEST_CASE("after a reset the predictor predicts no motion", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 50; ++i) motion.observe(hand(i), hand(i));
   motion.reset();
@@ -68,7 +68,7 @@ TEST_CASE("what was forgotten is not expected to go on", "[expected_motion]") {
   CHECK(apart_m(motion.predict(20), hand(0)) < 1e-15);
 }
 
-TEST_CASE("a tool that is late is expected where it would have come to", "[expected_motion]") {
+TEST_CASE("a deferred tick predicts the tool where it would have moved", "[motion_predictor]") {
   MotionPredictor motion;
   motion.observe_deferred(hand(0));
   CHECK_FALSE(motion.has_observation());

@@ -47,7 +47,7 @@ bool meet(const Bodies& bodies, std::uint32_t a, std::uint32_t b, const Frame& f
   return triangles_intersect(moved, still);
 }
 
-TEST_CASE("a sieve leaves out no pair that meets on the way, on every kind of processor", "[pair_sieve]") {
+TEST_CASE("the culler keeps every pair that meets on the path, on every processor", "[pair_culler]") {
   const Bodies bodies;
   RandomValues random(51);
   PairCuller fastest(8, 1, bodies.tool.radius_m()),
@@ -83,7 +83,7 @@ TEST_CASE("a sieve leaves out no pair that meets on the way, on every kind of pr
   CHECK(left_out > runs / 4);
 }
 
-TEST_CASE("a sieve leaves out what is kept apart by more than rounding and the margin", "[pair_sieve]") {
+TEST_CASE("the culler removes pairs that are apart by more than rounding and the margin", "[pair_culler]") {
   const MeshSurface tool(make_mesh({"cube", 12}), BodyKind::solid);
   const MeshSurface obstacle(make_mesh({"cube", 12}), BodyKind::solid);
   const double size_m = 2.0 * obstacle.vertices_m()[0].cwiseAbs().maxCoeff();
@@ -108,7 +108,7 @@ TEST_CASE("a sieve leaves out what is kept apart by more than rounding and the m
   }
 }
 
-TEST_CASE("what is left is told by its number, over all parts and in order", "[pair_sieve]") {
+TEST_CASE("the remaining pairs are numbered over all groups, in order", "[pair_culler]") {
   const Bodies bodies;
   RandomValues random(52);
   for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::cull_portable}}) {
@@ -141,7 +141,7 @@ TEST_CASE("what is left is told by its number, over all parts and in order", "[p
 
 // The tool wanders about a place where the two meet, now by a hair and now by far, and the pairs are those
 // about that place.
-TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool goes", "[pair_sieve]") {
+TEST_CASE("stored separations never hide a pair that meets, on any path", "[pair_culler]") {
   const Bodies bodies;
   for (const simd::CullKernel kernel : {simd::CullKernel{nullptr}, simd::CullKernel{simd::cull_portable}}) {
     RandomValues random(53);
@@ -187,7 +187,7 @@ TEST_CASE("what a sieve remembers hides no pair that meets, wherever the tool go
   }
 }
 
-TEST_CASE("a sieve asks again of all pairs where the tool comes from afar", "[pair_sieve]") {
+TEST_CASE("the culler tests all pairs again after a large displacement", "[pair_culler]") {
   const Bodies bodies;
   RandomValues random(54);
   PairCuller sieve(800, 1, bodies.tool.radius_m());
@@ -206,7 +206,7 @@ TEST_CASE("a sieve asks again of all pairs where the tool comes from afar", "[pa
 }
 
 // A peg is in its hole where it was made, as a part of the sieve that was not asked yet.
-TEST_CASE("a sieve asks of all pairs that were added anew", "[pair_sieve]") {
+TEST_CASE("the culler tests all pairs that were added", "[pair_culler]") {
   const MeshSurface tool(make_mesh({"cube", 12}), BodyKind::solid);
   const MeshSurface obstacle(make_mesh({"cube", 12}), BodyKind::solid);
   const Frame here(Pose{Quaterniond::Identity(), {1e-3, 0, 0}});

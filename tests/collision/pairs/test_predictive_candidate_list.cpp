@@ -34,7 +34,7 @@ bool tick(PredictiveCandidateList& pairs, const Pose& from, const Pose& to) {
   return listed;
 }
 
-TEST_CASE("what moves evenly needs no list at once", "[pairs_ahead]") {
+TEST_CASE("uniform motion needs no immediate list", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t at_first = pairs.immediate_lists();
@@ -52,7 +52,7 @@ TEST_CASE("what moves evenly needs no list at once", "[pairs_ahead]") {
 
 // In visits, not in time. Where the list ahead were left to the end, or the one at once were a long one, a
 // tick would have ten times the work of the others.
-TEST_CASE("the work for lists ahead is spread over the ticks", "[pairs_ahead]") {
+TEST_CASE("the work for prefetched lists is spread over the ticks", "[predictive_candidate_list]") {
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
   const auto inside = [](int i) {  // where many pairs are near
@@ -72,7 +72,7 @@ TEST_CASE("the work for lists ahead is spread over the ticks", "[pairs_ahead]") 
   CHECK(most < 3 * all / 100);
 }
 
-TEST_CASE("with work to spare lists are younger, and what is spent is no more than that", "[pairs_ahead]") {
+TEST_CASE("spare work makes lists younger, and the prefetch uses no more than that", "[predictive_candidate_list]") {
   const auto lists = [](std::uint32_t to_spare) {
     PredictiveCandidateList pairs(bumpy_bodies());
     int changes = 0;
@@ -90,7 +90,7 @@ TEST_CASE("with work to spare lists are younger, and what is spent is no more th
   CHECK(lists(1000) > 1.5 * lists(0));
 }
 
-TEST_CASE("at rest nothing is listed, whatever there is to spare", "[pairs_ahead]") {
+TEST_CASE("a tool at rest builds no list, however much work is spare", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   for (int i = 0; i < 100; ++i) {
@@ -101,7 +101,7 @@ TEST_CASE("at rest nothing is listed, whatever there is to spare", "[pairs_ahead
   }
 }
 
-TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pairs_ahead]") {
+TEST_CASE("a late prefetched list is completed, and no immediate list is built", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   int i = 1;
   for (; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
@@ -120,7 +120,7 @@ TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pa
 }
 
 // A look may go farther than the tool comes in the end: what was left for it is not gone back to.
-TEST_CASE("a list that has served does not come back", "[pairs_ahead]") {
+TEST_CASE("a used list is not used again", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   int changes = 0;
@@ -137,7 +137,7 @@ TEST_CASE("a list that has served does not come back", "[pairs_ahead]") {
 }
 
 // For some ticks no work is left for the list ahead, until the one that serves holds no longer.
-TEST_CASE("what can be made at once goes before a list ahead that cannot be ended in time", "[pairs_ahead]") {
+TEST_CASE("an immediate list takes precedence over a prefetched list that cannot be completed in time", "[predictive_candidate_list]") {
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
   const auto round = [](int i) {
@@ -177,7 +177,7 @@ TEST_CASE("what can be made at once goes before a list ahead that cannot be ende
   CHECK_FALSE(made_at_once(100));  // the list ahead is gone on with
 }
 
-TEST_CASE("after a list made at once the next leads on from where it ends", "[pairs_ahead]") {
+TEST_CASE("after an immediate list the next list starts where it ends", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t before = pairs.immediate_lists();
@@ -195,7 +195,7 @@ TEST_CASE("after a list made at once the next leads on from where it ends", "[pa
   CHECK(pairs.immediate_lists() == before + 1);
 }
 
-TEST_CASE("what turns round is listed at once", "[pairs_ahead]") {
+TEST_CASE("a reversal of the motion causes an immediate list", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t before = pairs.immediate_lists();
@@ -207,8 +207,8 @@ TEST_CASE("what turns round is listed at once", "[pairs_ahead]") {
   CHECK(pairs.current().covers(aside));
 }
 
-TEST_CASE("a way that is too long for the budget is not listed, and what was listed remains",
-          "[pairs_ahead]") {
+TEST_CASE("a path that exceeds the budget gets no list, and the current list remains",
+          "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   REQUIRE(tick(pairs, restrict_to_dofs(0), restrict_to_dofs(1)));
   const CandidatePairs* before = &pairs.current();
@@ -220,7 +220,7 @@ TEST_CASE("a way that is too long for the budget is not listed, and what was lis
   CHECK(few.remaining <= 20);
 }
 
-TEST_CASE("a tool that was put elsewhere is not expected to fly on", "[pairs_ahead]") {
+TEST_CASE("after a reset no motion is predicted", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 40; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   pairs.reset();
@@ -236,7 +236,7 @@ TEST_CASE("a tool that was put elsewhere is not expected to fly on", "[pairs_ahe
 }
 
 // What can wait takes no more of a tick than there is for it; the list that serves goes on to serve.
-TEST_CASE("a list that may wait is made over several ticks, and serves then", "[pairs_ahead]") {
+TEST_CASE("a deferrable list is built over several ticks and then used", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t before = pairs.immediate_lists();
@@ -260,7 +260,7 @@ TEST_CASE("a list that may wait is made over several ticks, and serves then", "[
   CHECK(pairs.covered_fraction(restrict_to_dofs(59), aside) == 1.0);
 }
 
-TEST_CASE("a list that waits is given up where the way leads elsewhere", "[pairs_ahead]") {
+TEST_CASE("a pending list is discarded if the path leads elsewhere", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const auto aside = [&](double s) {

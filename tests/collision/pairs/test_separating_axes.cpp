@@ -32,7 +32,7 @@ Triangle between(const Triangle& a, const Triangle& b, double t) {
   return {(1 - t) * a[0] + t * b[0], (1 - t) * a[1] + t * b[1], (1 - t) * a[2] + t * b[2]};
 }
 
-TEST_CASE("axes keep apart no pair that meets on the way, of any size and anywhere", "[separating_axes]") {
+TEST_CASE("separating axes never separate a pair that meets on the path, at any size and position", "[separating_axes]") {
   RandomValues random(17);
   int met = 0, apart = 0, parted = 0;
   const int runs = case_count(20000);
@@ -60,7 +60,7 @@ TEST_CASE("axes keep apart no pair that meets on the way, of any size and anywhe
   CHECK(apart > parted / 2);
 }
 
-TEST_CASE("axes keep apart by the margin, to a nanometre between small triangles", "[separating_axes]") {
+TEST_CASE("separating axes respect the margin, down to 1 nm between small triangles", "[separating_axes]") {
   RandomValues random(18);
   const double size_m = 1e-4;
   for (int n = 0; n < 300; ++n) {
@@ -83,7 +83,7 @@ TEST_CASE("axes keep apart by the margin, to a nanometre between small triangles
   }
 }
 
-TEST_CASE("triangles without area are never apart by mistake", "[separating_axes]") {
+TEST_CASE("triangles without area are never separated wrongly", "[separating_axes]") {
   const Vector3d p(0.1, 0.2, 0.3), q = p + Vector3d(1e-3, 0, 0);
   const Triangle point = {p, p, p}, line = {p, q, p};
   const Triangle b = {p - Vector3d(1e-3, 1e-3, 0), p + Vector3d(2e-3, -1e-3, 0), p + Vector3d(0, 2e-3, 0)};

@@ -14,7 +14,7 @@ TriangleMesh mesh_of(const Triangle& t) {
   return {{t[0], t[1], t[2]}, {{0, 1, 2}}};
 }
 
-TEST_CASE("two triangles meet where exact arithmetic says so", "[triangle_pair]") {
+TEST_CASE("two triangles intersect if and only if exact arithmetic finds it", "[triangle_intersection]") {
   RandomValues random(11);
   int meeting = 0;
   for (int n = 0; n < 20000; ++n) {
@@ -36,7 +36,7 @@ TEST_CASE("two triangles meet where exact arithmetic says so", "[triangle_pair]"
   CHECK(meeting < 18000);
 }
 
-TEST_CASE("triangles in one plane meet where they overlap", "[triangle_pair]") {
+TEST_CASE("coplanar triangles intersect if they overlap", "[triangle_intersection]") {
   const Triangle p = {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)};
   const auto shifted = [&](double x, double y) {
     Triangle q = p;
