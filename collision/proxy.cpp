@@ -137,8 +137,8 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
   double T_last = energy(M_, X_WP, X_WQ_);
   while (sweeps_ < work_limit_.sweeps && fraction >= kMinFraction) {
     const Projection q = step(X_WP, fraction * longest_m);
-    if (q.status ==
-        ProjectionStatus::infeasible) {  // the known contacts contradict each other; others may not
+    // The known contacts may contradict each other where others would not.
+    if (q.status == ProjectionStatus::infeasible) {
       if (known_contacts_.empty()) break;
       known_contacts_.clear();
       fraction = kCautiousFraction;
@@ -158,8 +158,8 @@ Projection Proxy::solve(const Pose& X_WP, double time_s) noexcept {
       first_step_fraction_ = std::max(fraction, kMinFirstFraction);
       continue;
     }
-    if (result ==
-        PathResult::list_pending) {  // moves as far as the current list covers the path; the rest waits
+    // The proxy moves as far as the current list covers the path. The rest waits for the next tick.
+    if (result == PathResult::list_pending) {
       if (std::exchange(deferred_, true)) break;
       const double distance_m =
           std::max((q.X_WQ.translation_m - X_WQ_.translation_m).norm(),

@@ -15,10 +15,10 @@
 namespace wrenchd {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kFullTurn_rad = 2.0 * std::numbers::pi;
 
-std::uint32_t at_least(double wanted, std::uint32_t least) {
-  return std::max(least, static_cast<std::uint32_t>(std::lround(wanted)));
+std::uint32_t at_least(double request, std::uint32_t least) {
+  return std::max(least, static_cast<std::uint32_t>(std::lround(request)));
 }
 
 /// Assigns one index to equal points.
@@ -80,22 +80,24 @@ TriangleMesh geodesic(std::uint32_t f) {
 }
 
 /// Returns a sphere with smooth bumps: sums of sines with seeded directions and phases.
-TriangleMesh bumpy(const GeneratedMesh& wanted, double radius_m, double height) {
+TriangleMesh bumpy(const GeneratedMesh& request, double radius_m, double height) {
   struct Wave {
     Vector3d k;
     double amplitude, phase;
   };
-  std::mt19937 generator(wanted.seed);
+  std::mt19937 generator(request.seed);
   // The distributions of the standard library differ between implementations, its generators do not.
   const auto uniform = [&] { return (static_cast<double>(generator()) + 0.5) / 4294967296.0; };
-  const auto normal = [&] { return std::sqrt(-2.0 * std::log(uniform())) * std::cos(kTurn * uniform()); };
+  const auto normal = [&] {
+    return std::sqrt(-2.0 * std::log(uniform())) * std::cos(kFullTurn_rad * uniform());
+  };
   std::vector<Wave> waves;
   for (int i = 0; i < 24; ++i) {
     const double x = normal(), y = normal(), z = normal();
     waves.push_back(
-        {(3.0 + i) * Vector3d(x, y, z).normalized(), height / (1.0 + 0.25 * i), kTurn * uniform()});
+        {(3.0 + i) * Vector3d(x, y, z).normalized(), height / (1.0 + 0.25 * i), kFullTurn_rad * uniform()});
   }
-  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(wanted.triangles) / 20.0), 1));
+  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(request.triangles) / 20.0), 1));
   for (Vector3d& p : mesh.vertices_m) {
     double scale = 1.0;
     for (const auto& [k, amplitude, phase] : waves) scale += amplitude * std::sin(k.dot(p) + phase);
@@ -105,9 +107,9 @@ TriangleMesh bumpy(const GeneratedMesh& wanted, double radius_m, double height) 
 }
 
 /// Returns a box whose sides are divided into nearly square cells of two triangles each.
-TriangleMesh box(const GeneratedMesh& wanted, const Vector3d& size_m) {
+TriangleMesh box(const GeneratedMesh& request, const Vector3d& size_m) {
   const double area = 2.0 * (size_m.x() * size_m.y() + size_m.y() * size_m.z() + size_m.z() * size_m.x());
-  const double cell_m = std::sqrt(2.0 * area / static_cast<double>(wanted.triangles));
+  const double cell_m = std::sqrt(2.0 * area / static_cast<double>(request.triangles));
   std::array<std::uint32_t, 3> cells{};
   for (int d = 0; d < 3; ++d) cells[static_cast<std::size_t>(d)] = at_least(size_m[d] / cell_m, 1);
   TriangleMesh mesh;
@@ -187,19 +189,19 @@ TriangleMesh lathe(const std::vector<double>& angles, const std::vector<Ring>& o
 
 std::vector<double> even_angles(std::uint32_t around) {
   std::vector<double> angles;
-  for (std::uint32_t i = 0; i < around; ++i) angles.push_back(kTurn * i / around);
+  for (std::uint32_t i = 0; i < around; ++i) angles.push_back(kFullTurn_rad * i / around);
   return angles;
 }
 
 /// A body of revolution or of constant profile along z, closed at both ends.
-struct Turned {
+struct Revolved {
   double length_m;
   std::function<double(double angle, double z_m)> radius_m;
   std::function<double(double angle, double z_m)> bore_m;  ///< empty: no bore
   std::uint32_t around, along;
 };
 
-TriangleMesh turned(const Turned& body) {
+TriangleMesh revolve(const Revolved& body) {
   const auto rings = [&](const auto& radius_m) {
     std::vector<Ring> out;
     for (std::uint32_t k = 0; radius_m && k <= body.along; ++k) {
@@ -213,32 +215,32 @@ TriangleMesh turned(const Turned& body) {
 
 /// Chooses the cell counts around and along the axis so that the cells are nearly square and the triangle
 /// count is as requested.
-Turned cut(const GeneratedMesh& wanted, double length_m, double radius_m, int sheets) {
-  const double cells = static_cast<double>(wanted.triangles) / (2.0 * sheets);
-  const double around = std::sqrt(cells * kTurn * radius_m / length_m);
+Revolved cell_grid(const GeneratedMesh& request, double length_m, double radius_m, int sheets) {
+  const double cells = static_cast<double>(request.triangles) / (2.0 * sheets);
+  const double around = std::sqrt(cells * kFullTurn_rad * radius_m / length_m);
   return {length_m, {}, {}, at_least(around, 8), at_least(cells / around, 1)};
 }
 
-TriangleMesh peg(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.060, 0.0098, 1);
+TriangleMesh peg(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.060, 0.0098, 1);
   body.radius_m = [](double angle, double z) {
     return 0.0098 + 0.00002 * std::sin(5.0 * angle) * std::sin(25.0 * z / 0.060);
   };
-  return turned(body);
+  return revolve(body);
 }
 
-TriangleMesh hole(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.080, 0.0130, 2);
+TriangleMesh hole(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.080, 0.0130, 2);
   body.radius_m = [](double, double) { return 0.020; };
   body.bore_m = [](double angle, double z) {
     return 0.0100 + 0.00002 * std::sin(5.0 * angle) * std::sin(25.0 * z / 0.080);
   };
-  return turned(body);
+  return revolve(body);
 }
 
 /// A triangle wave of period 1: 0 to 1 to 0.
-double triangle_wave(double turns) {
-  const double x = turns - std::floor(turns);
+double triangle_wave(double phase) {
+  const double x = phase - std::floor(phase);
   return x < 0.5 ? 2.0 * x : 2.0 - 2.0 * x;
 }
 
@@ -246,35 +248,35 @@ constexpr double kPitch_m = 0.0015;
 constexpr double kThread_m = 0.0008;
 
 double thread(double angle, double z) {
-  return kThread_m * triangle_wave(z / kPitch_m - angle / kTurn);
+  return kThread_m * triangle_wave(z / kPitch_m - angle / kFullTurn_rad);
 }
 
-TriangleMesh bolt(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.030, 0.005, 1);
+TriangleMesh bolt(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.030, 0.005, 1);
   body.radius_m = [](double angle, double z) { return 0.0041 + thread(angle, z); };
-  return turned(body);
+  return revolve(body);
 }
 
-TriangleMesh nut(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.008, 0.0067, 2);
+TriangleMesh nut(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.008, 0.0067, 2);
   body.around = (body.around + 5) / 6 * 6;  // a multiple of six corners
   body.radius_m = [](double angle, double) {
-    const double sixth = kTurn / 6.0;
+    const double sixth = kFullTurn_rad / 6.0;
     const double off = angle - sixth * std::floor(angle / sixth) - 0.5 * sixth;
     return 0.0085 / std::cos(off);
   };
   body.bore_m = [](double angle, double z) { return 0.0042 + thread(angle, z); };
-  return turned(body);
+  return revolve(body);
 }
 
-TriangleMesh gear(const GeneratedMesh& wanted) {
+TriangleMesh gear(const GeneratedMesh& request) {
   constexpr double kTeeth = 20.0;
-  Turned body = cut(wanted, 0.010, 0.021, 2);
+  Revolved body = cell_grid(request, 0.010, 0.021, 2);
   body.radius_m = [](double angle, double) {
-    return 0.019 + 0.004 * std::clamp(2.4 * triangle_wave(kTeeth * angle / kTurn) - 0.7, 0.0, 1.0);
+    return 0.019 + 0.004 * std::clamp(2.4 * triangle_wave(kTeeth * angle / kFullTurn_rad) - 0.7, 0.0, 1.0);
   };
   body.bore_m = [](double, double) { return 0.006; };
-  return turned(body);
+  return revolve(body);
 }
 
 /// Returns a circle at one height.
@@ -283,20 +285,20 @@ Ring circle(double z_m, double radius_m) {
 }
 
 /// Returns the number of vertices per ring that yields about the requested number of triangles.
-std::uint32_t around_for(const GeneratedMesh& wanted, std::size_t rings) {
-  return at_least(static_cast<double>(wanted.triangles) / (2.0 * static_cast<double>(rings)), 8);
+std::uint32_t around_for(const GeneratedMesh& request, std::size_t rings) {
+  return at_least(static_cast<double>(request.triangles) / (2.0 * static_cast<double>(rings)), 8);
 }
 
-TriangleMesh dowel(const GeneratedMesh& wanted) {
+TriangleMesh dowel(const GeneratedMesh& request) {
   const std::vector<Ring> rings = {circle(-0.030, 0.0079), circle(-0.028, 0.0099), circle(0.028, 0.0099),
                                    circle(0.030, 0.0079)};
-  return lathe(even_angles(around_for(wanted, rings.size())), rings, {});
+  return lathe(even_angles(around_for(request, rings.size())), rings, {});
 }
 
-TriangleMesh socket(const GeneratedMesh& wanted) {
+TriangleMesh socket(const GeneratedMesh& request) {
   const std::vector<Ring> outside = {circle(-0.025, 0.020), circle(0.025, 0.020)};
   const std::vector<Ring> bore = {circle(-0.025, 0.010), circle(0.022, 0.010), circle(0.025, 0.013)};
-  return lathe(even_angles(around_for(wanted, outside.size() + bore.size())), outside, bore);
+  return lathe(even_angles(around_for(request, outside.size() + bore.size())), outside, bore);
 }
 
 /// The outline of a keyhole (a circle with a slot towards +x) or of a key's bit, as radius over angle.
@@ -320,7 +322,7 @@ std::vector<double> angles_of(const Keyhole& shape, std::uint32_t around) {
   std::vector<double> angles;
   for (const double corner : shape.corners()) {
     angles.push_back(corner);
-    angles.push_back(kTurn - corner);
+    angles.push_back(kFullTurn_rad - corner);
   }
   for (const double angle : even_angles(around))
     if (std::none_of(angles.begin(), angles.begin() + 4,
@@ -332,7 +334,7 @@ std::vector<double> angles_of(const Keyhole& shape, std::uint32_t around) {
 
 /// Returns a key: a shaft with a bit near its lower end and a flat bow. The origin is the middle of the
 /// shaft.
-TriangleMesh key(const GeneratedMesh& wanted) {
+TriangleMesh key(const GeneratedMesh& request) {
   const Keyhole bit = {0.0030, 0.0012, 0.0080};
   const auto bow = [](double angle) {
     return 1.0 / std::hypot(std::cos(angle) / 0.010, std::sin(angle) / 0.0025);
@@ -340,16 +342,16 @@ TriangleMesh key(const GeneratedMesh& wanted) {
   const std::vector<Ring> rings = {circle(-0.025, 0.0022), circle(-0.024, 0.0030), circle(-0.0235, 0.0030),
                                    {-0.0230, bit},         {-0.0150, bit},         circle(-0.0145, 0.0030),
                                    circle(0.010, 0.0030),  {0.014, bow},           {0.025, bow}};
-  return lathe(angles_of(bit, around_for(wanted, rings.size())), rings, {});
+  return lathe(angles_of(bit, around_for(request, rings.size())), rings, {});
 }
 
 /// Returns a lock: a round plate with a keyhole, z from 0 to 6 mm, above a chamber that is open below.
-TriangleMesh lock(const GeneratedMesh& wanted) {
+TriangleMesh lock(const GeneratedMesh& request) {
   const Keyhole hole = {0.0033, 0.0015, 0.0084}, mouth = {0.0043, 0.0025, 0.0094};
   const std::vector<Ring> outside = {circle(-0.012, 0.020), circle(0.006, 0.020)};
   const std::vector<Ring> bore = {
       circle(-0.012, 0.0100), circle(0.0, 0.0100), {0.0, hole}, {0.005, hole}, {0.006, mouth}};
-  return lathe(angles_of(hole, around_for(wanted, outside.size() + bore.size())), outside, bore);
+  return lathe(angles_of(hole, around_for(request, outside.size() + bore.size())), outside, bore);
 }
 
 /// A thread whose vertex lines follow the helix, so that few triangles form a sharp thread. Line j runs
@@ -407,9 +409,9 @@ class Thread {
  private:
   Vector3d point(std::uint32_t i, std::uint32_t j) const {
     constexpr std::array<double, kLines> kHeight = {0.0, 0.2, 0.5, 0.7};  // in units of the pitch
-    const double turn = static_cast<double>(i) / around_, angle = kTurn * turn;
+    const double revolution = static_cast<double>(i) / around_, angle = kFullTurn_rad * revolution;
     const std::uint32_t below = j / kLines;  // number of turns below
-    const double z = kPitch_m * (below + kHeight[j % kLines] + turn - 0.5 * turns_);
+    const double z = kPitch_m * (below + kHeight[j % kLines] + revolution - 0.5 * turns_);
     const std::uint32_t line = j <= kLines || j >= (turns_ - 1) * kLines ? cut_off_to_ : j % kLines;
     const double r = wider_m_ + (line < kLines / 2 ? kRoot_m : kCrest_m);
     return {r * std::cos(angle), r * std::sin(angle), z};
@@ -454,19 +456,19 @@ void add_tip(TriangleMesh& mesh, const std::vector<std::uint32_t>& ring, double 
 
 /// Returns the radius of a hexagon at an angle. half_width_m: radius of its inscribed circle [m].
 double hexagon(double angle, double half_width_m) {
-  const double sixth = kTurn / 6.0;
+  const double sixth = kFullTurn_rad / 6.0;
   return half_width_m / std::cos(angle - sixth * std::floor(angle / sixth) - 0.5 * sixth);
 }
 
 /// Returns the number of vertices around a thread that yields about the requested number of triangles, a
 /// multiple of six.
-std::uint32_t around_thread(const GeneratedMesh& wanted, double lines) {
-  return (at_least(static_cast<double>(wanted.triangles) / (2.0 * lines), 12) + 5) / 6 * 6;
+std::uint32_t around_thread(const GeneratedMesh& request, double lines) {
+  return (at_least(static_cast<double>(request.triangles) / (2.0 * lines), 12) + 5) / 6 * 6;
 }
 
-TriangleMesh screw(const GeneratedMesh& wanted) {
+TriangleMesh screw(const GeneratedMesh& request) {
   constexpr std::uint32_t kTurns = 10;
-  const std::uint32_t around = around_thread(wanted, Thread::kLines * kTurns + 5);
+  const std::uint32_t around = around_thread(request, Thread::kLines * kTurns + 5);
   const std::vector<double> angles = even_angles(around);
   const auto head = [](double angle) { return hexagon(angle, 0.0080); };
   const double end_m = 0.5 * kTurns * Thread::kPitch_m;
@@ -480,10 +482,10 @@ TriangleMesh screw(const GeneratedMesh& wanted) {
   return mesh;
 }
 
-TriangleMesh screw_nut(const GeneratedMesh& wanted) {
+TriangleMesh screw_nut(const GeneratedMesh& request) {
   constexpr std::uint32_t kTurns = 4;
   constexpr double kWider_m = 0.0001;
-  const std::uint32_t around = around_thread(wanted, Thread::kLines * kTurns + 5);
+  const std::uint32_t around = around_thread(request, Thread::kLines * kTurns + 5);
   const std::vector<double> angles = even_angles(around);
   const auto side = [](double angle) { return hexagon(angle, 0.0085); };
   const double end_m = 0.5 * kTurns * Thread::kPitch_m + 0.001;
@@ -543,9 +545,9 @@ double hare_reach_m(const Vector3d& u) {
 
 /// Every ray from the origin crosses the surface once, so the surface cannot intersect itself. Before, the
 /// directions are moved towards long edges, on the flanks of the ears, as if springs acted along the edges.
-TriangleMesh hare(const GeneratedMesh& wanted) {
+TriangleMesh hare(const GeneratedMesh& request) {
   constexpr int kRounds = 60;
-  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(wanted.triangles) / 20.0), 1));
+  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(request.triangles) / 20.0), 1));
   std::vector<Vector3d>& directions = mesh.vertices_m;
   const std::size_t count = directions.size();
   std::vector<Vector3d> points(count), pulled(count);
@@ -614,10 +616,10 @@ const std::vector<Maker>& makers() {
 
 }  // namespace
 
-TriangleMesh make_mesh(const GeneratedMesh& wanted) {
+TriangleMesh make_mesh(const GeneratedMesh& request) {
   for (const Maker& maker : makers())
-    if (maker.kind == wanted.kind) return maker.make(wanted);
-  throw std::invalid_argument("no mesh of kind '" + wanted.kind + "' can be made");
+    if (maker.kind == request.kind) return maker.make(request);
+  throw std::invalid_argument("no mesh of kind '" + request.kind + "' can be made");
 }
 
 void write_off(std::ostream& out, const TriangleMesh& mesh) {

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kMagic = "wrenchd mesh cache 1\n";
 constexpr std::string_view kSuffix = ".mesh";
 constexpr std::size_t kHash = 32;  // SHA-256; collisions cannot be constructed
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{2} << 30;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{2} << 30;
 constexpr std::size_t kHeader = kMagic.size() + 3 * kHash;
 
 std::string sha256(const std::vector<std::string_view>& parts) {
@@ -111,7 +111,7 @@ std::optional<std::string> MeshCache::read(const std::string& key) const {
   const bool ours =
       S_ISREG(status.st_mode) && status.st_uid == ::geteuid() && (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
   if (!ours || status.st_size < static_cast<off_t>(kHeader) ||
-      static_cast<std::uintmax_t>(status.st_size) > kMostBytes)
+      static_cast<std::uintmax_t>(status.st_size) > kMaxBytes)
     return {};
   std::string head(kHeader, '\0');
   if (!file.read(head.data(), head.size())) return {};
@@ -146,27 +146,27 @@ bool MeshCache::write(const std::string& key, std::string_view bytes) {
 }
 
 void MeshCache::evict_oldest() const {
-  struct Kept {
+  struct Entry {
     fs::file_time_type time;
     std::uintmax_t size;
     fs::path file;
   };
-  std::vector<Kept> all;
+  std::vector<Entry> all;
   std::uintmax_t bytes = 0;
   std::error_code error;
   for (fs::directory_iterator at(directory_, error), end; !error && at != end; at.increment(error)) {
     if (at->path().extension() != kSuffix) continue;
     std::error_code gone;
-    const Kept kept{at->last_write_time(gone), at->file_size(gone), at->path()};
+    const Entry entry{at->last_write_time(gone), at->file_size(gone), at->path()};
     if (gone) continue;
-    bytes += kept.size;
-    all.push_back(kept);
+    bytes += entry.size;
+    all.push_back(entry);
   }
-  std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.time < b.time; });
-  for (const Kept& kept : all) {
-    if (bytes <= kMostBytes) return;
-    bytes -= kept.size;
-    fs::remove(kept.file, error);
+  std::sort(all.begin(), all.end(), [](const Entry& a, const Entry& b) { return a.time < b.time; });
+  for (const Entry& entry : all) {
+    if (bytes <= kMaxBytes) return;
+    bytes -= entry.size;
+    fs::remove(entry.file, error);
   }
 }
 

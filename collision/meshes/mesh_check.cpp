@@ -43,7 +43,7 @@ std::string index_text(std::size_t v) {
 }
 
 /// In a mesh that intersects itself everywhere the number of pairs grows with the square of the faces.
-constexpr std::size_t kMostIntersections = 1000;
+constexpr std::size_t kMaxIntersections = 1000;
 
 std::string face_name(const PolygonSoup& soup, std::size_t f) {
   return "face " + std::to_string(soup.face_in_file(f));
@@ -109,7 +109,7 @@ void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
 
 /// Checks that every edge occurs once in each direction: the mesh is closed and consistently oriented.
 void check_edges(const PolygonSoup& soup, MeshReport& report) {
-  DefectCount open, crowded, same_way;
+  DefectCount open, crowded, same_direction;
   for_each_edge(half_edges_of(soup), [&](std::span<const HalfEdge> half_edges) {
     const auto where = [&] {
       const Edge& e = half_edges[0].edge;
@@ -122,45 +122,45 @@ void check_edges(const PolygonSoup& soup, MeshReport& report) {
     else if (half_edges.size() > 2)
       crowded.add([&] { return where() + " belongs to " + std::to_string(half_edges.size()) + " faces"; });
     else if (half_edges[0].forward == half_edges[1].forward)
-      same_way.add([&] {
+      same_direction.add([&] {
         return "faces " + face(0) + " and " + face(1) + " are oriented against each other along " + where();
       });
   });
   open.report(report.defects, "close the hole in the modeller");
   crowded.report(report.defects, "a solid has two faces at every edge: split or remove the extra ones");
-  same_way.report(report.defects, "make all faces counter-clockwise seen from outside");
+  same_direction.report(report.defects, "make all faces counter-clockwise seen from outside");
   report.closed = !open.any() && !crowded.any();
-  report.consistent = !same_way.any();
+  report.consistent = !same_direction.any();
 }
 
 /// Every edge has two faces here, so the faces at a vertex form rings. A face that leaves the vertex towards
 /// n is followed by the face that arrives from n. A vertex with more than one ring joins parts of the surface
 /// in a point.
 void check_vertices(const PolygonSoup& soup, MeshReport& report) {
-  struct Turn {
+  struct FaceCorner {
     std::size_t vertex, from, to;  ///< a face arrives at `vertex` from `from` and leaves towards `to`
   };
-  std::vector<Turn> turns;
+  std::vector<FaceCorner> corners;
   for (const auto& face : soup.faces)
     for (std::size_t i = 0; i < face.size(); ++i)
-      turns.push_back(
+      corners.push_back(
           {face[i], face[i > 0 ? i - 1 : face.size() - 1], face[i + 1 < face.size() ? i + 1 : 0]});
-  const auto before = [](const Turn& a, const Turn& b) {
+  const auto before = [](const FaceCorner& a, const FaceCorner& b) {
     return a.vertex != b.vertex ? a.vertex < b.vertex : a.from < b.from;
   };
-  std::sort(turns.begin(), turns.end(), before);
+  std::sort(corners.begin(), corners.end(), before);
   DefectCount pinched;
-  for (auto begin = turns.begin(); begin != turns.end();) {
+  for (auto begin = corners.begin(); begin != corners.end();) {
     const auto end =
-        std::find_if(begin, turns.end(), [&](const Turn& t) { return t.vertex != begin->vertex; });
+        std::find_if(begin, corners.end(), [&](const FaceCorner& c) { return c.vertex != begin->vertex; });
     std::ptrdiff_t ring = 0;
     auto at = begin;
     do {
-      at = std::lower_bound(begin, end, Turn{begin->vertex, at->to, 0}, before);
+      at = std::lower_bound(begin, end, FaceCorner{begin->vertex, at->to, 0}, before);
     } while (++ring < end - begin && at != begin);
     if (ring < end - begin)
       pinched.add([&] {
-        return "parts of the surface meet only in vertex " +
+        return "parts of the surface are joined only in vertex " +
                std::to_string(soup.vertex_in_file(begin->vertex)) + " at " +
                format_point(soup.vertices[begin->vertex]);
       });
@@ -220,7 +220,7 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
                              MeshReport& report) {
   std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
   PMP::self_intersections(mesh, std::back_inserter(pairs),
-                          CGAL::parameters::maximum_number(kMostIntersections));
+                          CGAL::parameters::maximum_number(kMaxIntersections));
   report.self_intersecting = !pairs.empty();
   if (pairs.empty()) return;
   const auto corner = mesh.point(mesh.target(mesh.halfedge(pairs[0].first)));
@@ -229,7 +229,7 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
       (a == b ? "two halves of face " + std::to_string(a)
               : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
       " near " + format_point({corner.x(), corner.y(), corner.z()}) + " intersect each other" +
-      (pairs.size() < kMostIntersections ? total_suffix(pairs.size()) : " (1000 or more in all)") +
+      (pairs.size() < kMaxIntersections ? total_suffix(pairs.size()) : " (1000 or more in all)") +
       "; unite the parts in the modeller");
 }
 

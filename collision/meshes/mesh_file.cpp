@@ -67,10 +67,6 @@ MeshSource read_mesh_source(const std::filesystem::path& file) {
   return read_bytes(file);
 }
 
-PolygonSoup read_mesh_file(const std::filesystem::path& file) {
-  return parse_mesh(read_mesh_source(file));
-}
-
 PolygonSoup parse_mesh(MeshSource source) {
   const std::filesystem::path file = source.file;
   const std::string extension = lower_extension(file);

@@ -15,7 +15,4 @@ MeshSource read_mesh_source(const std::filesystem::path& file);
 /// vertices of STL, which has no shared vertices. Throws MeshError. Not RT-safe: allocates, may take seconds.
 PolygonSoup parse_mesh(MeshSource source);
 
-/// Reads and parses a mesh file. Throws MeshError. Not RT-safe: reads a file, may take seconds.
-PolygonSoup read_mesh_file(const std::filesystem::path& file);
-
 }  // namespace wrenchd

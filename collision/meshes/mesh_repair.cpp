@@ -350,7 +350,7 @@ void Repair::drop_duplicate_faces() {
   for_each_edge(half_edges(), [&](std::span<const HalfEdge> half_edges) {
     if (half_edges.size() < 2 || (half_edges.size() == 2 && half_edges[0].forward != half_edges[1].forward))
       return;
-    for (const HalfEdge& side : half_edges) suspect[side.face] = true;
+    for (const HalfEdge& half_edge : half_edges) suspect[half_edge.face] = true;
   });
   bool drops = false;
   std::map<Face, std::size_t> known;

@@ -13,10 +13,10 @@ namespace {
 
 /// Triangles are coplanar if their corners lie within this distance of one plane: a fraction of the mesh's
 /// size, and at most a tenth of the proxy's clearance [m].
-constexpr double kFlat = 1e-10;
-constexpr double kFlat_m = 1e-10;
+constexpr double kCoplanar = 1e-10;
+constexpr double kMaxCoplanar_m = 1e-10;
 /// A vertex is convex only if its neighbours fall away by at least this angle [rad].
-constexpr double kBlunt = 1e-7;
+constexpr double kMinFallAngle_rad = 1e-7;
 
 constexpr int next(int i) noexcept {
   return i == 2 ? 0 : i + 1;
@@ -30,17 +30,17 @@ bool all_fall_away(const std::vector<Vector3d>& directions, const Vector3d& firs
     return *std::max_element(directions.begin(), directions.end(),
                              [&](const Vector3d& a, const Vector3d& b) { return n.dot(a) < n.dot(b); });
   };
-  if (first_guess.dot(worst_of(first_guess)) < -kBlunt) return true;
+  if (first_guess.dot(worst_of(first_guess)) < -kMinFallAngle_rad) return true;
   constexpr std::size_t kRows = 32;
   LeastDistance<3, kRows> problem;
   Vector3d n = first_guess;
   for (std::size_t row = 0; row < kRows; ++row) {
     const Vector3d worst = worst_of(n);
-    if (row > 0 && n.dot(worst) < -kBlunt) return true;
+    if (row > 0 && n.dot(worst) < -kMinFallAngle_rad) return true;
     problem.add_unit(-worst, 1.0);
     if (problem.solve(Vector3d::Zero(), 1e-12) != decltype(problem)::Status::optimal) return false;
     const double length = problem.z().norm();
-    if (length * kBlunt > 1.0) return false;
+    if (length * kMinFallAngle_rad > 1.0) return false;
     n = problem.z() / length;
   }
   return false;
@@ -60,30 +60,30 @@ MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)),
 /// Pairs a side from a to b with a side from b to a. Sides stay unpaired unless there is exactly one of each
 /// direction.
 void MeshSurface::find_neighbours() {
-  struct Side {
+  struct TriangleHalfEdge {
     std::uint64_t key;  ///< both vertices, the smaller number first
     std::uint32_t triangle;
     std::uint8_t side;
     bool forward;
   };
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh_.triangles.size());
+  std::vector<TriangleHalfEdge> half_edges;
+  half_edges.reserve(3 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
       const std::uint64_t a = mesh_.triangles[t][static_cast<std::size_t>(i)];
       const std::uint64_t b = mesh_.triangles[t][static_cast<std::size_t>(next(i))];
-      sides.push_back({std::min(a, b) << 32 | std::max(a, b), t, static_cast<std::uint8_t>(i), a < b});
+      half_edges.push_back({std::min(a, b) << 32 | std::max(a, b), t, static_cast<std::uint8_t>(i), a < b});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+  std::sort(half_edges.begin(), half_edges.end(), [](const TriangleHalfEdge& a, const TriangleHalfEdge& b) {
     return std::pair(a.key, a.triangle) < std::pair(b.key, b.triangle);
   });
   neighbours_.assign(mesh_.triangles.size(), {kNone, kNone, kNone});
-  for (std::size_t i = 0; i < sides.size();) {
+  for (std::size_t i = 0; i < half_edges.size();) {
     std::size_t end = i + 1;
-    while (end < sides.size() && sides[end].key == sides[i].key) ++end;
-    if (end - i == 2 && sides[i].forward != sides[i + 1].forward) {
-      neighbours_[sides[i].triangle][sides[i].side] = sides[i + 1].triangle;
-      neighbours_[sides[i + 1].triangle][sides[i + 1].side] = sides[i].triangle;
+    while (end < half_edges.size() && half_edges[end].key == half_edges[i].key) ++end;
+    if (end - i == 2 && half_edges[i].forward != half_edges[i + 1].forward) {
+      neighbours_[half_edges[i].triangle][half_edges[i].side] = half_edges[i + 1].triangle;
+      neighbours_[half_edges[i + 1].triangle][half_edges[i + 1].side] = half_edges[i].triangle;
     }
     i = end;
   }
@@ -104,7 +104,7 @@ void MeshSurface::find_planes() {
   std::stable_sort(largest_first.begin(), largest_first.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return area[a] > area[b]; });
 
-  const double flat_m = std::min(kFlat * radius_m_, kFlat_m);
+  const double flat_m = std::min(kCoplanar * radius_m_, kMaxCoplanar_m);
   planes_.resize(count);
   planar_region_.assign(count, kNone);
   std::vector<std::uint32_t> front;
@@ -195,12 +195,11 @@ void MeshSurface::find_convex_vertices() {
     for (const std::uint32_t n : neighbours)
       directions.push_back((mesh_.vertices_m[n] - mesh_.vertices_m[v]).normalized());
     if (kind_ == Kind::solid && !all_fall_away(directions, mean_normal.normalized())) continue;
-    const std::uint32_t speaker = at[begin[v]];
+    const std::uint32_t owner = at[begin[v]];
     for (std::size_t i = 0; i < 3; ++i)
-      if (mesh_.triangles[speaker][i] == v) features_[speaker].vertices[i] = v;
+      if (mesh_.triangles[owner][i] == v) features_[owner].vertices[i] = v;
     ring_.insert(ring_.end(), neighbours.begin(), neighbours.end());
     ring_begin_[v + 1] = static_cast<std::uint32_t>(ring_.size());
-    ++convex_vertex_count_;
   }
 }
 

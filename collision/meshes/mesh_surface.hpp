@@ -70,15 +70,13 @@ class MeshSurface {
 
   /// Largest distance of a vertex from the origin of the mesh's frame [m].
   double radius_m() const noexcept { return radius_m_; }
-  std::size_t convex_vertex_count() const noexcept { return convex_vertex_count_; }
 
   /// Calls use(member) for each data member, for the mesh cache (mesh_cache.hpp).
   template <class Use>
   void visit_members(const Use& use) {
     use(mesh_.vertices_m), use(mesh_.triangles), use(kind_), use(neighbours_), use(planes_),
         use(planar_region_);
-    use(features_), use(convex_edges_), use(ring_begin_), use(ring_), use(radius_m_),
-        use(convex_vertex_count_);
+    use(features_), use(convex_edges_), use(ring_begin_), use(ring_), use(radius_m_);
   }
 
  private:
@@ -101,7 +99,6 @@ class MeshSurface {
   std::vector<std::uint32_t> ring_begin_;
   std::vector<std::uint32_t> ring_;
   double radius_m_ = 0.0;
-  std::size_t convex_vertex_count_ = 0;
 };
 
 }  // namespace wrenchd

@@ -22,7 +22,7 @@ simd::Transform displacement(const Pose& from, const Pose& to) noexcept {
 /// pose half way.
 simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, double extent_m) noexcept {
   const double radius_a_m = std::sqrt(3.0) * least_radius_a_m;
-  const auto& [start, end, reach_m, all_pairs, settle] = sweep;
+  const auto& [start, end, reach_m, all_pairs, classify] = sweep;
   simd::RelativeMotion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
@@ -47,7 +47,7 @@ simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, doub
   motion.centre_travel = static_cast<float>((end.translation_m - start.translation_m).norm());
   motion.moving =
       start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
-  motion.classify = settle && all_pairs && !motion.moving && reach_m == 0.0;
+  motion.classify = classify && all_pairs && !motion.moving && reach_m == 0.0;
   return motion;
 }
 

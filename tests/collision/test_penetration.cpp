@@ -43,8 +43,9 @@ TEST_CASE("every method's pose is admissible, and exact is never above the other
     CHECK(planar.projection.energy <= translational.projection.energy * (1.0 + 1e-9));
     most_excess = std::max(most_excess, planar.projection.energy / T - 1.0);
   }
-  CHECK(most_excess >
-        0.01);  // the paper's family is not optimal for a general inertia: its axis stays in the plane
+  CHECK(
+      most_excess >
+      0.01);  // the paper's family is not optimal for a general inertia, because its axis stays in the plane
 }
 
 TEST_CASE("planar solves example 4.1 exactly: the rotation lies in one of its planes", "[penetration]") {
@@ -328,7 +329,8 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
                    {convex_obstacle("table", convex_hull(split(9, {2.0, 3.0, 1.0})))});
   for (int i = 0; i < case_count(60); ++i) {
     const Pose X_WP{random.rotation(), 0.9 * random.unit<3>()};
-    if (separation_m(coarse, X_WP) < -0.4) continue;  // so deep that answers of equal merit lie far apart
+    if (separation_m(coarse, X_WP) < -0.4)
+      continue;  // at large depth several answers of equal energy are far apart
     const Penetration a = depth_by(Method::exact, coarse).query(X_WP);
     const Penetration b = depth_by(Method::exact, fine).query(X_WP);
     INFO("case " << i << ", T " << a.projection.energy << " and " << b.projection.energy);
@@ -336,8 +338,7 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
   }
 }
 
-TEST_CASE("with moving obstacles all methods but exact are rejected with a remedy",
-          "[penetration][moving]") {
+TEST_CASE("with moving obstacles all methods but exact are rejected with a remedy", "[penetration][moving]") {
   const ToolBody cube = tool_body(make_mesh({"cube", 12}), 1.0, 0.1);
   const auto mesh = std::make_shared<const MeshBvh>(make_mesh({"cube", 12}));
   std::vector<MeshObstacle> meshes;
@@ -352,7 +353,8 @@ TEST_CASE("with moving obstacles all methods but exact are rejected with a remed
       why = error.what();
     }
     CHECK(why ==
-          "the obstacle 'plunger' moves, and only method exact supports moving obstacles; choose it, or keep all "
+          "the obstacle 'plunger' moves, and only method exact supports moving obstacles; choose it, or keep "
+          "all "
           "obstacles at rest");
   }
   PenetrationDepth depth(scene, {});

@@ -20,7 +20,7 @@ ToolBody cube() {
 
 const HalfSpaceSettings kFloor = half_space(Vector3d::UnitZ(), 0.0);
 
-/// Tilted, so that the eight corners stand at eight heights.
+/// Tilted, so that the eight corners have eight different heights.
 const Quaterniond kTilt(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 0).normalized()));
 
 std::vector<double> heights(const Scene& scene, const Pose& X_WT) {
@@ -203,7 +203,7 @@ TEST_CASE("a pose that the held planes admit never overlaps, for any planes") {
 
 TEST_CASE("a gap of every kind has the gradient of its contact") {
   RandomValues random(13);
-  int seen[3] = {};
+  int found[3] = {};
   for (int i = 0; i < 200; ++i) {
     const OverlappingScene met = overlap_body(random, 0.1);
     SceneContacts contacts(met.scene);
@@ -213,8 +213,8 @@ TEST_CASE("a gap of every kind has the gradient of its contact") {
       ContactSet violated;
       if (contacts.add_violated(met.X_WP, 0.0, violated) == 0) continue;
       const Contact& contact = violated[0];
-      ++seen[static_cast<int>(contact.kind)];
-      // J = [n ; (c - x) x n] for a pair that touches: move the tool until it does.
+      ++found[static_cast<int>(contact.kind)];
+      // J = [n ; (c - x) x n] for a touching pair: moves the tool until the pair touches.
       Pose X_WT = met.X_WP;
       X_WT.translation_m -= gap_m(contact, X_WT) * normal_W(contact, X_WT);
       const Vector3d n = normal_W(contact, X_WT);
@@ -230,7 +230,7 @@ TEST_CASE("a gap of every kind has the gradient of its contact") {
       CHECK(difference == Approx(2.0 * J.dot(step)).margin(1e-12));
     }
   }
-  for (const int count : seen) CHECK(count > 50);
+  for (const int count : found) CHECK(count > 50);
 }
 
 TEST_CASE("an obstacle out of reach is not queried") {

@@ -12,8 +12,8 @@
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or refused
-// with its name, the place and the cure.
+// Twelve defects, five severities, four formats. Every file is accepted, repaired with a report, or rejected
+// with its name, the place and the remedy.
 
 namespace wrenchd {
 namespace {
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using namespace test;
 
 constexpr std::array<std::size_t, 5> kCounts = {1, 2, 5, 20, 80};  ///< of 320 faces, by severity
-constexpr double kVolume_m3 = 1.1e-4;                              ///< of the ball, about
+constexpr double kVolume_m3 = 1.1e-4;                              ///< about the volume of the ball
 
 PolygonSoup ball() {
   const TriangleMesh mesh = make_mesh({"sphere", 320});
@@ -31,7 +31,7 @@ PolygonSoup ball() {
   return soup;
 }
 
-/// Faces spread evenly, `count` of them.
+/// `count` faces, spread evenly.
 std::size_t spread(std::size_t i, std::size_t count, const PolygonSoup& soup) {
   return i * soup.faces.size() / count;
 }
@@ -39,7 +39,7 @@ std::size_t spread(std::size_t i, std::size_t count, const PolygonSoup& soup) {
 enum class Format { off, obj, stl, ply };
 constexpr std::array<Format, 4> kFormats = {Format::off, Format::obj, Format::stl, Format::ply};
 
-/// STL and PLY come as text and as binary, by severity; PLY in both orders of bytes.
+/// STL and PLY occur as text and as binary, depending on the severity; PLY in both byte orders.
 bool binary(Format format, std::size_t severity) {
   return (format == Format::stl || format == Format::ply) && severity % 2 == 0;
 }
@@ -65,8 +65,8 @@ std::string written(const PolygonSoup& soup, Format format, std::size_t severity
 
 struct Expected {
   enum class Outcome { accepted, repaired, refused } outcome;
-  std::string words;        ///< that are told
-  bool as_surface = false;  ///< it can be used as one
+  std::string words;        ///< words of the report
+  bool as_surface = false;  ///< the mesh can be used as a surface
 };
 constexpr auto accepted = Expected::Outcome::accepted;
 constexpr auto repaired = Expected::Outcome::repaired;
@@ -124,8 +124,7 @@ PolygonSoup with_faces_twice(std::size_t count) {
   return soup;
 }
 
-/// A face is cut in two through the middle of a side, and a face without area closes the gap to the one
-/// beyond.
+/// Splits a face through the middle of a side. A face without area closes the gap to the neighbour.
 PolygonSoup with_caps(std::size_t count) {
   PolygonSoup soup = ball();
   for (std::size_t i = 0; i < count; ++i) {
@@ -163,7 +162,7 @@ std::string with_numbers_that_are_none(std::size_t severity, Format format) {
   return written(soup, format, severity);
 }
 
-/// STL has no indices: facets of four corners, or more facets than there are, are the like of it.
+/// STL has no indices. Facets of four corners, or a wrong facet count, are the corresponding defect.
 std::string with_indices_out_of_range(std::size_t severity, Format format) {
   PolygonSoup soup = ball();
   const std::size_t count = kCounts[severity];
@@ -222,7 +221,7 @@ std::string cut_short(std::size_t severity, Format format) {
   return bytes;
 }
 
-/// A defect of the mesh itself, whatever it is written as.
+/// A defect of the mesh itself, independent of the format.
 auto in_any_format(PolygonSoup (*make)(std::size_t count)) {
   return [make](std::size_t severity, Format format) {
     return written(make(kCounts[severity]), format, severity);
@@ -237,7 +236,7 @@ const std::vector<Defect>& defects() {
   static const std::vector<Defect> all = {
       {"truncated", cut_short,
        [](std::size_t severity, Format format) {
-         // An OBJ is one wherever it ends: it has a hole, or no faces.
+         // A truncated OBJ is a valid OBJ with a hole, or without faces.
          if (format != Format::obj) return Expected{refused, "export the mesh again"};
          if (severity < 2) return Expected{refused, "the surface is open", true};
          return Expected{refused, severity == 2 ? "has no faces" : "expected 3 numbers"};
@@ -255,8 +254,8 @@ const std::vector<Defect>& defects() {
       {"fin", in_any_format(with_fins), always({refused, "belongs to 3 faces", true})},
       {"duplicate_points", in_any_format(with_corners_of_their_own),
        [](std::size_t severity, Format format) {
-         if (format == Format::stl) return Expected{accepted, ""};  // it has no others
-         // Where all faces around a point have points of their own, nobody uses it any longer.
+         if (format == Format::stl) return Expected{accepted, ""};  // STL has no shared vertices
+         // If all faces at a point have points of their own, the point is unused.
          if (severity > 2) return Expected{repaired, " duplicate points, first vertex 16"};
          return Expected{repaired, "merged " + std::to_string(3 * kCounts[severity]) + " duplicate points"};
        }},
@@ -291,7 +290,7 @@ const std::vector<Defect>& defects() {
   return all;
 }
 
-/// The file as an obstacle, beside a good tool.
+/// Uses the file as an obstacle, with a valid tool.
 SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind kind) {
   SceneSettings settings;
   settings.tool.mesh = tool;
@@ -306,25 +305,25 @@ SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind ki
 
 void check_file(const fs::path& file, const fs::path& tool, const Expected& expected) {
   MeshLoader loader;
-  std::string told;
+  std::string reported;
   try {
     const Scene scene(scene_with(tool, file, BodyKind::solid), loader);
-    for (const std::string& change : loader.changes()) told += change + "\n";
-    for (const std::string& remark : loader.warnings()) told += remark + "\n";
-    INFO(told);
-    CHECK(expected.outcome == (told.empty() ? accepted : repaired));
+    for (const std::string& change : loader.changes()) reported += change + "\n";
+    for (const std::string& remark : loader.warnings()) reported += remark + "\n";
+    INFO(reported);
+    CHECK(expected.outcome == (reported.empty() ? accepted : repaired));
     const TriangleMesh& mesh = scene.meshes()[0].mesh->surface.mesh();
-    const double size = told.find("millimetres") == std::string::npos ? 1.0 : 1e12;
+    const double size = reported.find("millimetres") == std::string::npos ? 1.0 : 1e12;
     CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(kVolume_m3 * size).epsilon(0.02));
   } catch (const MeshError& error) {
-    told = error.what();
-    INFO(told);
+    reported = error.what();
+    INFO(reported);
     CHECK(expected.outcome == refused);
   }
-  INFO(told);
-  CHECK((told.empty() || told.find(file.string() + ":") == 0));
-  CHECK(told.find(expected.words) != std::string::npos);
-  CHECK((told.find("kind = \"surface\"") != std::string::npos) == expected.as_surface);
+  INFO(reported);
+  CHECK((reported.empty() || reported.find(file.string() + ":") == 0));
+  CHECK(reported.find(expected.words) != std::string::npos);
+  CHECK((reported.find("kind = \"surface\"") != std::string::npos) == expected.as_surface);
   if (expected.as_surface) {
     const Scene scene(scene_with(tool, file, BodyKind::surface), loader);
     CHECK(scene.meshes()[0].mesh->surface.kind() == BodyKind::surface);

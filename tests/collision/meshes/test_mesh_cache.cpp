@@ -67,7 +67,7 @@ TEST_CASE("a cache file with any modified, missing or additional byte counts as 
   CHECK_FALSE(bench.cache.read(bench.key));
   bench.put(good);
   CHECK(bench.cache.read(bench.key));
-  // And it is written over.
+  // The file can be overwritten.
   bench.put("no");
   REQUIRE(bench.cache.write(bench.key, "some bytes"));
   CHECK(bench.contents() == good);

@@ -24,14 +24,14 @@ std::string defects(const PolygonSoup& soup) {
   return text;
 }
 
-/// Exactly these defects, one a line.
+/// Requires exactly these defects, one per line.
 void check_defects(const PolygonSoup& soup, const std::vector<std::string>& expected) {
   std::string text;
   for (const std::string& defect : expected) text += defect + "\n";
   CHECK(defects(soup) == text);
 }
 
-/// One defect that holds all of these words.
+/// Requires one defect that contains all of these words.
 void check_defect_with(const PolygonSoup& soup, const std::vector<std::string>& words) {
   const std::string text = defects(soup);
   INFO(text);
@@ -61,7 +61,7 @@ TEST_CASE("a closed box is a solid") {
 }
 
 TEST_CASE("a solid may have concave faces, corners on an edge, several shells and cavities") {
-  // An L of three unit squares, two high.
+  // An L of three unit squares, of height two.
   PolygonSoup ell{{}, {{5, 4, 3, 2, 1, 0}, {6, 7, 8, 9, 10, 11}}};
   for (const double z : {0.0, 2.0})
     for (const auto& [x, y] : {std::pair{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}})
@@ -69,7 +69,7 @@ TEST_CASE("a solid may have concave faces, corners on an edge, several shells an
   for (std::size_t i = 0; i < 6; ++i) ell.faces.push_back({i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6});
   check_good(ell, 6);
 
-  // A vertex half-way along the edge from 0 to 1, in both faces there.
+  // A vertex half-way along the edge from 0 to 1, in both faces at the edge.
   PolygonSoup corner = kBox;
   corner.vertices.emplace_back(1, 0, 0);
   corner.faces[2] = {0, 8, 1, 5, 4};
@@ -153,7 +153,7 @@ TEST_CASE("faces that are no polygons are found") {
   soup.faces[0] = {0, 4, 6, 4};
   check_defects(soup, {"face 0 uses a vertex twice; remove degenerate faces in the modeller"});
 
-  // All of them are told at once.
+  // All defects are reported at once.
   soup.vertices[0].z() = std::numeric_limits<double>::infinity();
   soup.faces[5][0] = 100;
   CHECK(defects(soup).find("vertex 0 ") != std::string::npos);
@@ -233,9 +233,9 @@ TEST_CASE("parts that meet in one vertex are found") {
   PolygonSoup soup = concatenated(kBox, box({2, 3, 5}, {4, 4, 6}));
   for (auto& face : soup.faces)
     for (std::size_t& v : face) v = v == 8 ? 7 : v;
-  check_defects(soup,
-                {"parts of the surface meet only in vertex 7 at (2, 3, 5); separate them in the modeller"});
-  // The same where the file has the vertex twice: the surfaces touch.
+  check_defects(
+      soup, {"parts of the surface are joined only in vertex 7 at (2, 3, 5); separate them in the modeller"});
+  // The same with two vertices in the file: the surfaces touch.
   CHECK_FALSE(check_solid(concatenated(kBox, box({2, 3, 5}, {4, 4, 6}))).solid());
 }
 
@@ -243,14 +243,14 @@ TEST_CASE("faces that intersect each other are found") {
   const PolygonSoup soup = concatenated(kBox, box({1, 1, 1}, {3, 2, 2}));
   check_defect_with(soup, {" near (", "intersect each other", " in all); unite the parts in the modeller"});
   CHECK(check_solid(soup).self_intersecting);
-  // A spike through the lid alone; numbers are the file's, not those of the triangles it is cut into.
+  // A spike through the lid only. The numbers are those of the file, not those of the triangles.
   const PolygonSoup spike{{{1, 1, 6}, {1.5, 1, 6}, {1, 1.5, 6}, {1.1, 1.1, 4}},
                           {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}}};
   REQUIRE(check_solid(spike).solid());
   check_defect_with(concatenated(kBox, spike), {"faces 5 and ", "intersect each other"});
   check_defect_with(concatenated(kBox, kBox), {"intersect each other"});
   check_defect_with(concatenated(kBox, box({2, 0, 0}, {4, 3, 5})),
-                    {"intersect each other"});  // face on face
+                    {"intersect each other"});  // coincident faces
 }
 
 TEST_CASE("a mesh in which everything intersects is rejected quickly") {
@@ -262,7 +262,7 @@ TEST_CASE("a mesh in which everything intersects is rejected quickly") {
 
 TEST_CASE("a face that cannot be triangulated is found") {
   PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
-  for (Vector3d& p : soup.vertices) p *= 1e110;  // beyond what the plane of a face can be computed with
+  for (Vector3d& p : soup.vertices) p *= 1e110;  // the plane of a face cannot be computed beyond this
   check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be triangulated (6 in all); make it planar"});
 }
 
@@ -306,7 +306,7 @@ TEST_CASE("a surface may be open, one-sided and self-intersecting, but needs fin
 
 TEST_CASE("a surface of which the repair leaves nothing is rejected") {
   PolygonSoup far = triangulated(kBox);
-  far.vertices[5].x() = 1e126;  // beside it all other points are one
+  far.vertices[5].x() = 1e126;  // relative to this point all others coincide
   TriangleMesh mesh;
   const MeshReport report = repair_and_check_surface(far, &mesh);
   CHECK(mesh.triangles.empty());

@@ -20,27 +20,32 @@ using namespace test;
 
 const PolygonSoup kBox = box({-1, 2, -3}, {4, 2.5, 1});
 
-/// What the file is refused with; empty when it is read. Nothing else may reach the standard streams.
+PolygonSoup read_file(const fs::path& file) {
+  return parse_mesh(read_mesh_source(file));
+}
+
+/// Returns the message with which the file is rejected; empty if it is read. Nothing else may appear on the
+/// standard streams.
 std::string rejection_text(const fs::path& file) {
-  std::ostringstream said;
-  std::streambuf* const out = std::cout.rdbuf(said.rdbuf());
-  std::streambuf* const err = std::cerr.rdbuf(said.rdbuf());
+  std::ostringstream printed;
+  std::streambuf* const out = std::cout.rdbuf(printed.rdbuf());
+  std::streambuf* const err = std::cerr.rdbuf(printed.rdbuf());
   std::string message;
   try {
-    read_mesh_file(file);
+    read_file(file);
   } catch (const MeshError& error) {
     message = error.what();
   }
   std::cout.rdbuf(out);
   std::cerr.rdbuf(err);
-  CHECK(said.str() == "");
+  CHECK(printed.str() == "");
   return message;
 }
 
 void check_is_the_box(const fs::path& file) {
   INFO(file);
   TriangleMesh mesh;
-  const MeshReport report = check_solid(read_mesh_file(file), &mesh);
+  const MeshReport report = check_solid(read_file(file), &mesh);
   REQUIRE(report.solid());
   CHECK(report.vertices == 8);
   CHECK(mesh.triangles.size() == 12);
@@ -164,12 +169,12 @@ TEST_CASE("variants of exporters are read") {
 
 TEST_CASE("STL vertices are merged where they are equal") {
   const TemporaryDirectory dir;
-  const PolygonSoup soup = read_mesh_file(dir.write("a.stl", as_binary_stl(triangulated(kBox))));
+  const PolygonSoup soup = read_file(dir.write("a.stl", as_binary_stl(triangulated(kBox))));
   CHECK(soup.vertices.size() == 8);
   CHECK(soup.faces.size() == 12);
 }
 
-/// A file, where it must be refused, and what the message must say.
+/// A file, the place of its defect, and a part of the message.
 struct Bad {
   std::string name;
   std::string bytes;
@@ -401,7 +406,7 @@ TEST_CASE("a valid file with modified bytes is read or rejected without a crash"
       const fs::path file = dir.write(name, bytes);
       try {
         TriangleMesh mesh;
-        const MeshReport report = check_solid(read_mesh_file(file), &mesh);
+        const MeshReport report = check_solid(read_file(file), &mesh);
         CHECK((report.solid() || !report.defects.empty()));
       } catch (const MeshError& error) {
         CHECK(std::string(error.what()).find(file.string()) == 0);

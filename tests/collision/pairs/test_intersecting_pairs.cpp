@@ -16,7 +16,7 @@ using namespace test;
 std::set<std::pair<std::uint32_t, std::uint32_t>> make_state_set(const IntersectingPairs& pairs) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> out;
   for (const TrianglePair& pair : pairs.pairs()) out.insert({pair.a, pair.b});
-  REQUIRE(out.size() == pairs.pairs().size());  // none twice
+  REQUIRE(out.size() == pairs.pairs().size());  // no pair occurs twice
   return out;
 }
 
@@ -29,7 +29,7 @@ TEST_CASE("the intersecting pairs are those of exact arithmetic, on every proces
   };
   RandomValues random(31);
   IntersectingPairs fastest, portable(simd::traverse_portable);
-  std::size_t all = 0, asked = 0;
+  std::size_t all = 0, exact_tests = 0;
   for (const auto& [tool, obstacle] : cases) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
     const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
@@ -41,14 +41,14 @@ TEST_CASE("the intersecting pairs are those of exact arithmetic, on every proces
       CHECK(make_state_set(fastest) == make_state_set(portable));
       CHECK(fastest.pairs().size() == exact.intersecting_pairs(X_BA));
       all += fastest.pairs().size();
-      asked += fastest.double_precision_tests();
+      exact_tests += fastest.double_precision_tests();
     }
   }
   CHECK(all > 2000);
-  CHECK(asked * 5 < all);  // single precision decides most
+  CHECK(exact_tests * 5 < all);  // single precision decides most pairs
 }
 
-// There one pair decides, and single precision cannot tell.
+// One pair decides, and single precision cannot classify it.
 TEST_CASE("nearly touching meshes yield the pairs of exact arithmetic", "[intersecting_pairs]") {
   const MeshBvh a(make_mesh({"bumpy", 2000})), b(make_mesh({"boulder", 3000}));
   const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
@@ -92,7 +92,7 @@ TEST_CASE("a search with more pairs than room reports that it is incomplete", "[
   for (const simd::TraversalKernel kernel :
        {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::traverse_portable}}) {
     IntersectingPairs pairs(kernel);
-    CHECK_FALSE(pairs.find(bumpy, bumpy, Pose{}));  // each meets itself and its neighbours
+    CHECK_FALSE(pairs.find(bumpy, bumpy, Pose{}));  // every triangle intersects itself and its neighbours
     CHECK(pairs.pairs().size() <= BvhTraversal::kCapacity);
     CHECK(pairs.pairs().size() > BvhTraversal::kCapacity / 2);
   }

@@ -15,7 +15,7 @@ double apart_m(const Pose& a, const Pose& b) {
   return (a.translation_m - b.translation_m).norm() + kRadius_m * a.rotation.angularDistance(b.rotation);
 }
 
-/// A hand that slides, turns and speeds up.
+/// A hand that translates, rotates and accelerates.
 Pose hand(double t) {
   return {rotation_from(t * Vector3d(0.0, 1e-3, 4e-4)), {0.10, 1e-4 * t + 1e-7 * t * t, -5e-5 * t}};
 }
@@ -35,14 +35,14 @@ TEST_CASE("the prediction of a tool that moves with the hand is correct", "[moti
   const double way_m = apart_m(hand(100), hand(120));
   CHECK(apart_m(motion.predict(0), hand(100)) < 1e-15);
   CHECK(apart_m(motion.predict(20), hand(120)) < 0.02 * way_m);
-  // A parabola of 2e-7 m per tick and tick leaves its chord by an eighth of that times 20^2.
+  // A parabola of 2e-7 m per tick^2 deviates from its chord by an eighth of that times 20^2.
   CHECK(motion.chord_deviation_m(20, 0.0) == Approx(1e-5).epsilon(0.01));
 }
 
 TEST_CASE("a held tool drifts from the hand in the prediction", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 200; ++i) motion.observe(hand(0), hand(i));
-  // It stays, but for what the hand gains in speed.
+  // The tool stays, except for the hand's gain in speed.
   CHECK(apart_m(motion.predict(10), hand(0)) < 0.1 * apart_m(hand(200), hand(210)));
 }
 
@@ -55,7 +55,7 @@ TEST_CASE("a jittering tool is predicted to move with the hand", "[motion_predic
     motion.observe(jitters, hand(i));
     if (i > 100) farthest_m = std::max(farthest_m, apart_m(motion.predict(20), hand(i + 20)));
   }
-  // By its own steps alone it would be expected up to 20 steps of 1e-5 m away.
+  // From its own steps alone it would be predicted up to 20 steps of 1e-5 m away.
   CHECK(farthest_m < 1e-4);
 }
 
