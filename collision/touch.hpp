@@ -44,7 +44,7 @@ struct Touch {
   std::array<double, 3> point_W_m{};   ///< contact point in W [m]
   std::array<double, 3> normal_W{};    ///< unit normal from the obstacle to the tool, in W
   double multiplier_kg_m = 0.0;        ///< d T / d gap: METHOD (35)
-  double share = 0.0;                  ///< multiplier as a fraction of the sum over all contacts, 0 to 1
+  double load_fraction = 0.0;          ///< multiplier as a fraction of the sum over all contacts, 0 to 1
   std::uint32_t obstacle = 0;          ///< obstacle number in the scene
   std::uint32_t tool_first = 0;        ///< Feature::first of the tool's feature
   std::uint32_t tool_second = 0;       ///< Feature::second of the tool's feature

@@ -28,8 +28,9 @@ constexpr int kFormat = 1;
 constexpr std::size_t kMostBytes = 1 << 16;
 constexpr std::size_t kMostOffsets = 32;
 constexpr std::size_t kLongestAxis = 32;
-constexpr std::size_t kLongestName = 240;  ///< of a file, with room for what a temporary one adds
-constexpr double kMostOffset = 1e4;        ///< [m] or [rad]: nothing on a table is farther off
+/// bytes of a file name, with room for the suffix of a temporary file
+constexpr std::size_t kLongestName = 240;
+constexpr double kMostOffset = 1e4;  ///< [m] or [rad]; no valid offset is larger
 
 constexpr const char* kCure = "; remove it and calibrate the device again";
 
@@ -37,7 +38,7 @@ bool is_letter_or_digit(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
-// Names. Any bytes go in, and what comes out is good as a file name and between quotation marks in TOML.
+// Names. Any bytes are accepted; the result is valid as a file name and as a TOML string.
 
 std::string encoded(std::string_view bytes) {
   std::string text;
@@ -70,8 +71,8 @@ std::string checksum_line(std::string_view text) {
   return line.data();
 }
 
-/// The first line names the format, so that a file from another time or another program is told apart from a
-/// damaged one.
+/// The first line states the format; it distinguishes a file of another version or program from a damaged
+/// one.
 void require_title(const std::string& text, const fs::path& file) {
   const std::string expected = std::string(kTitle) + std::to_string(kFormat) + "\n";
   if (text.starts_with(expected)) return;
@@ -105,7 +106,7 @@ void read_calibration(TomlTable& table, Calibration& calibration) {
     element.table(read_offset, calibration.offsets.emplace_back());
 }
 
-/// What is wrong with it; empty where nothing is.
+/// Description of the first defect of a calibration; empty if it is valid.
 std::string fault_of(const Calibration& calibration) {
   if (calibration.offsets.size() > kMostOffsets)
     return "more than " + std::to_string(kMostOffsets) + " axes have an offset";
@@ -121,7 +122,7 @@ std::string fault_of(const Calibration& calibration) {
 
 // Files
 
-/// Closes what it holds; -1 holds nothing.
+/// Owns a file descriptor and closes it; -1: none.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -139,7 +140,7 @@ class Descriptor {
   int fd_;
 };
 
-/// The file's bytes; nothing where there is none.
+/// The bytes of a file; empty if it does not exist.
 std::optional<std::string> content_of(const fs::path& file) {
   const Descriptor in(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (in.get() < 0 && errno == ENOENT) return {};
@@ -178,7 +179,7 @@ bool write_all(int fd, std::string_view text) {
   return true;
 }
 
-/// A file beside its place until it is put there; gone if it never is.
+/// A temporary file beside its target. Destroys the file if it was not renamed to the target.
 class FileBeside {
  public:
   explicit FileBeside(const fs::path& file)
@@ -193,8 +194,8 @@ class FileBeside {
   FileBeside(const FileBeside&) = delete;
   FileBeside& operator=(const FileBeside&) = delete;
 
-  /// The data must be on the disk before the name is: a name that points to nothing would be the worst of
-  /// both.
+  /// Flushes the data to disk before the rename. Otherwise a crash could leave the new name with incomplete
+  /// data.
   void fill(std::string_view text) {
     if (!write_all(out_.get(), text)) cannot_write(file_, "writing");
     if (::fchmod(out_.get(), 0644) != 0) cannot_write(file_, "giving it its mode");

@@ -19,7 +19,7 @@ TomlEntry* find(TomlNode::Table& table, const std::string& key) {
   return found == table.end() ? nullptr : &*found;
 }
 
-/// Writes the file into every place of a tree.
+/// Writes the file into every location of a tree.
 void sign(TomlNode& node, const std::shared_ptr<const fs::path>& file) {
   node.location.file = file;
   if (auto* array = std::get_if<TomlNode::Array>(&node.value))

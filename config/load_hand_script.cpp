@@ -8,10 +8,10 @@
 namespace wrenchd {
 namespace {
 
-/// First and last waypoint of a repeating path are the same to this [m, rad], or the hand would jump.
+/// Tolerance [m, rad] between the first and last waypoint of a repeating path; a larger difference is a jump.
 constexpr double kSamePoint = 1e-9;
 
-/// Nobody moves a hand between two points in less.
+/// Minimum time between two waypoints.
 constexpr double kMinStep_s = 0.001;
 
 struct HandScript {

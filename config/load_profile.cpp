@@ -18,13 +18,13 @@
 namespace wrenchd {
 namespace {
 
-/// What the rest of a profile must know before it is read.
+/// Properties that decide which keys of a profile are mandatory.
 struct Shape {
   bool output = true;
   bool torque = true;
 };
 
-/// A key that a profile may take back from the one it inherits.
+/// True if the key is present and not "none". "none" removes an inherited value.
 bool is_stated(const TomlValue& value) {
   return value && !value.is_text("none");
 }
@@ -38,8 +38,8 @@ void read_workspace(TomlTable& table, DeviceProfile& p) {
     centre.refuse("means nothing without workspace_radius_m; state both");
 }
 
-/// A rating above the maximum is a mistake where somebody wrote both. An inherited one under a maximum that
-/// was lowered says only that the motors bear the maximum for ever.
+/// Rejects a rating above the maximum. An inherited rating above a lowered maximum is clamped to it: the
+/// motors sustain that maximum indefinitely.
 void read_rating(const TomlValue& value, double& rating, Range range, double maximum) {
   if (!value.number(rating, range) || !(rating > maximum)) return;
   if (value.is_inherited())
@@ -49,7 +49,7 @@ void read_rating(const TomlValue& value, double& rating, Range range, double max
                  "; lower it, or leave all three out");
 }
 
-/// What motors bear for ever, and how long they take to warm up: together, or not at all.
+/// Reads the continuous ratings and the thermal time constant: all of them, or none.
 void read_motor_heat(TomlTable& table, DeviceProfile& p, const Shape& shape) {
   const TomlValue force = table.optional("continuous_force_N");
   const TomlValue torque = table.optional("continuous_torque_Nm");
@@ -72,7 +72,7 @@ void read_motor_heat(TomlTable& table, DeviceProfile& p, const Shape& shape) {
   time.number(p.thermal_time_s, {0.1, 10000});
 }
 
-/// Optional, and only of a device that has motors.
+/// Optional limits of a device with motors.
 void read_more_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
   const TomlValue power = table.optional("max_power_W");
   if (shape.output) {
@@ -89,7 +89,7 @@ void read_more_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
     refuse(table.optional(key));
 }
 
-/// Mandatory, every one: nobody but the maker knows what a device and the hand on it can bear.
+/// Mandatory limits. Only the manufacturer knows what the device may apply to a hand.
 void read_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
   const TomlValue force = shape.output ? table.mandatory("max_force_N") : table.optional("max_force_N");
   const TomlValue torque = shape.torque ? table.mandatory("max_torque_Nm") : table.optional("max_torque_Nm");
@@ -114,7 +114,7 @@ std::size_t buttons_in(const PoseReportLayout& layout) {
   return layout.buttons.present ? layout.buttons.bits : layout.button_bits.size();
 }
 
-/// Does any report carry the button of this number?
+/// True if any report has the button of this number.
 bool has_button(const DeviceProfile& p, int button) {
   const Kinematics::CountButton& hidden = p.kinematics.count_button;
   if (hidden.present && static_cast<int>(hidden.button) == button) return true;
@@ -123,7 +123,7 @@ bool has_button(const DeviceProfile& p, int button) {
   return button >= 0 && static_cast<std::size_t>(button) < most;
 }
 
-/// "0 to 7", "0"; empty: none.
+/// Ranges of button numbers, for example "0 to 7" or "0"; empty: no button.
 std::string buttons_text(const DeviceProfile& p) {
   std::string text;
   for (int first = 0; first < 32; ++first) {
@@ -149,7 +149,7 @@ void read_button(const TomlValue& value, int& button, const DeviceProfile& p) {
                              : "no report carries a button of this number; they carry " + known);
 }
 
-/// What buttons mean. The reports must have been read before.
+/// Reads the functions of the buttons. Precondition: the reports were read before.
 void read_buttons(TomlTable& table, DeviceProfile& p) {
   struct Meaning {
     const char* name;
@@ -198,7 +198,7 @@ void read_closed_loop(TomlTable& table, DeviceProfile& p) {
 
 // --- which device -----------------------------------------------------------------------------------------
 
-/// "046d:c626": two numbers of four hexadecimal digits.
+/// Parses "046d:c626": two numbers of four hexadecimal digits.
 std::optional<UsbId> usb_id(const std::string& text) {
   if (text.size() != 9 || text[4] != ':') return {};
   const auto number = [&](std::size_t at, std::uint16_t& out) {
@@ -258,7 +258,7 @@ void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
 
 // --- frames -----------------------------------------------------------------------------------------------
 
-/// "x", "-y" and so on: a row of a rotation between axes that lie along each other.
+/// Reads "x", "-y" and so on: a row of a rotation between parallel axes.
 bool read_axis(const TomlValue& value, Vector3d& axis) {
   Vector3d chosen = Vector3d::Zero();
   struct Named {
@@ -304,7 +304,7 @@ void read_frames(TomlTable& table, DeviceProfile& p) {
 
 // --- the rest ---------------------------------------------------------------------------------------------
 
-/// Where a steered pose stays. The box stands instead of the reach, unless both are stated.
+/// Limits of a pose in mode rate. A stated box replaces the default of reach_m.
 void read_reach(TomlTable& table, Deflection& d) {
   const TomlValue reach = table.optional("reach_m");
   const TomlValue least = table.optional("box_min_m"), most = table.optional("box_max_m");
@@ -321,20 +321,22 @@ void read_reach(TomlTable& table, Deflection& d) {
     most.refuse("the pose begins at 0, inside of the box; no number may be below 0");
 }
 
-/// How a cap steers, all of it optional; and where "none" takes back what is inherited.
+/// Optional response of a puck. "none" removes an inherited value.
 void read_steering(TomlTable& table, Deflection& d) {
-  const TomlValue full_m = table.optional("full_m"), full_rad = table.optional("full_rad");
-  const TomlValue dead_zone = table.optional("dead_zone"), curve = table.optional("curve");
-  const TomlValue slow = table.optional("slow");
-  const TomlValue leash_m = table.optional("leash_m"), leash_rad = table.optional("leash_rad");
-  const bool has_end = is_stated(full_m) && is_stated(full_rad);
-  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_end) {
+  const TomlValue full_m = table.optional("full_deflection_m");
+  const TomlValue full_rad = table.optional("full_deflection_rad");
+  const TomlValue dead_zone = table.optional("dead_zone"), exponent = table.optional("response_exponent");
+  const TomlValue slow_factor = table.optional("slow_factor");
+  const TomlValue distance = table.optional("max_proxy_distance_m");
+  const TomlValue angle = table.optional("max_proxy_angle_rad");
+  const bool has_full_scale = is_stated(full_m) && is_stated(full_rad);
+  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_full_scale) {
     if (!is_stated(value)) return;
     if (d.mode != Deflection::Mode::rate) {
       if (!value.is_inherited())
         value.refuse("belongs to mode \"rate\", in which the deflection is a velocity; leave it out");
-    } else if (needs_end && !has_end) {
-      value.refuse("is reckoned by the end of the cap's way; state full_m and full_rad");
+    } else if (needs_full_scale && !has_full_scale) {
+      value.refuse("needs the full deflection of the puck; state full_deflection_m and full_deflection_rad");
     } else {
       value.number(out, range);
     }
@@ -342,12 +344,13 @@ void read_steering(TomlTable& table, Deflection& d) {
   read(full_m, d.full_deflection_m, {1e-5, 1}, true);
   read(full_rad, d.full_deflection_rad, {1e-4, 3.2}, true);
   read(dead_zone, d.dead_zone, {0, 0.9}, true);
-  read(curve, d.response_exponent, {1, 5}, true);
-  read(slow, d.slow_factor, {0.01, 1}, false);
-  read(leash_m, d.max_proxy_distance_m, {1e-4, 0.5}, true);
-  read(leash_rad, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
-  if (is_stated(leash_m) == is_stated(leash_rad)) return;
-  (is_stated(leash_m) ? leash_m : leash_rad).refuse("is one of two: state leash_m and leash_rad, or neither");
+  read(exponent, d.response_exponent, {1, 5}, true);
+  read(slow_factor, d.slow_factor, {0.01, 1}, false);
+  read(distance, d.max_proxy_distance_m, {1e-4, 0.5}, true);
+  read(angle, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
+  if (is_stated(distance) == is_stated(angle)) return;
+  (is_stated(distance) ? distance : angle)
+      .refuse("is one of two: state max_proxy_distance_m and max_proxy_angle_rad, or neither");
 }
 
 void read_deflection(TomlTable& table, DeviceProfile& p) {
@@ -374,8 +377,8 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   position.vector(plan.X_BR.translation_m, {-2, 2});
   Vector3d turn = Vector3d::Zero();
   if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);
-  table.optional("most_offset_m").number(plan.max_offset_m, {0, 2});
-  table.optional("most_offset_rad").number(plan.max_offset_rad, {0, 4});
+  table.optional("max_offset_m").number(plan.max_offset_m, {0, 2});
+  table.optional("max_offset_rad").number(plan.max_offset_rad, {0, 4});
   table.optional("confirm_buttons").integer(plan.confirm_buttons, {0, 4294967295.0});
   table.optional("travel_m").number(plan.travel_m, {0.001, 0.5});
   table.optional("travel_rad").number(plan.travel_rad, {0.01, 1.5});
@@ -386,7 +389,7 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   if (least < plan.travel_m)
     most.refuse("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
                 ", along each axis; along one it is " + to_text(least));
-  const TomlValue turns = table.optional("max_turn_rad");
+  const TomlValue turns = table.optional("max_rotation_rad");
   turns.number(plan.max_rotation_rad, {0.01, 4});
   if (plan.max_rotation_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
 }

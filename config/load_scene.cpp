@@ -19,9 +19,9 @@ constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kTurn = {-10.0, 10.0};
-constexpr Range kTurnBack = {0.0, 86400.0};
+constexpr Range kReversal_s = {0.0, 86400.0};
 
-/// Shorter than this a normal is a slip of the keyboard rather than a direction.
+/// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
 
 void read_kind(const TomlValue& value, GeneratedMesh& made) {
@@ -52,7 +52,7 @@ void read_made(TomlTable& table, GeneratedMesh& made) {
     size.refuse("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
 }
 
-/// A file, or what is to be made instead of one.
+/// Reads a mesh file name, or a table that describes a generated mesh.
 void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
                std::optional<GeneratedMesh>& made) {
   if (value.is_table()) {
@@ -70,7 +70,7 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
       "= \"gear\" }");
 }
 
-/// The mass may stand in [tool] or at the top of the file.
+/// The mass may be in [tool] or at the top of the file.
 void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
   read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.generated);
   table.optional("scale", "m").number(scene.tool.scale, kScale);
@@ -80,8 +80,8 @@ void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass
   if (mass && top_mass) mass.refuse("is also given at the top of the file; keep one of the two");
 }
 
-/// Solid where normal . x < offset. A normal of another length is made unit, and the offset with it, so that
-/// the solid stays the same set of points.
+/// Reads normal . x < offset. Scales normal and offset to a unit normal, so the set of points does not
+/// change.
 void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   table.mandatory("offset", "m").number(half_space.offset_m, kAny);
   const TomlValue normal = table.mandatory("normal");
@@ -92,13 +92,13 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   half_space.offset_m /= length;
 }
 
-/// What goes with `mesh` and means nothing to a half-space.
+/// Keys that require `mesh`; a half-space rejects them.
 struct MeshKeys {
   TomlValue scale, position, rotation, kind;
-  TomlValue velocity, angular_velocity, turn_back_after;
+  TomlValue velocity, angular_velocity, reverse_after;
 };
 
-/// Of any direction, and no faster than that. True where it is good, or not given.
+/// Reads a velocity and rejects a length above `fastest`. Returns true if the key is valid or absent.
 bool read_velocity(const TomlValue& key, double fastest, Vector3d& velocity) {
   if (!key) return true;
   if (!key.vector(velocity, {-fastest, fastest})) return false;
@@ -114,9 +114,9 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
       read_velocity(keys.velocity, ObstacleMotion::kMaxSpeed_m_per_s, motion.linear_m_per_s);
   const bool angular_is_good = read_velocity(
       keys.angular_velocity, ObstacleMotion::kMaxAngularSpeed_rad_per_s, motion.angular_rad_per_s);
-  const bool turns_back = keys.turn_back_after.number(motion.reverse_after_s, kTurnBack);
-  if (turns_back && linear_is_good && angular_is_good && !motion.moves())
-    keys.turn_back_after.refuse(
+  const bool reverses = keys.reverse_after.number(motion.reverse_after_s, kReversal_s);
+  if (reverses && linear_is_good && angular_is_good && !motion.moves())
+    keys.reverse_after.refuse(
         "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s, or leave this "
         "out");
 }
@@ -136,7 +136,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
   scene.meshes.push_back(obstacle);
 }
 
-/// One shape each: half_space or mesh.
+/// Each obstacle has one shape: half_space or mesh.
 void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
   std::string name = place;
   table.optional("name").text(name);
@@ -145,7 +145,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   const MeshKeys keys = {table.optional("scale", "m"),          table.optional("position_m"),
                          table.optional("rotation_vector_rad"), table.optional("kind"),
                          table.optional("velocity_m_per_s"),    table.optional("angular_velocity_rad_per_s"),
-                         table.optional("turn_back_after_s")};
+                         table.optional("reverse_after_s")};
   if (mesh) {
     if (half_space)
       half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
@@ -154,7 +154,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
     if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
-  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.turn_back_after})
+  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.reverse_after})
     if (key) key.refuse("belongs to a mesh; a half_space stands still, so give what is to move as a mesh");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);
@@ -175,7 +175,7 @@ bool has_name(const SceneSettings& scene, const std::string& name) {
          std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it);
 }
 
-/// By its name it is moved and removed, so it has one of its own.
+/// Reads an added obstacle. It needs a unique name, because clients move and remove it by name.
 void read_added(TomlTable& table, SceneSettings& scene) {
   std::string name;
   const TomlValue key = table.optional("name");

@@ -200,11 +200,11 @@ class LiveView {
 
   void look_at(ServoLoop& loop) {
     TickRecord record;
-    if (!loop.latest_record().read(record)) return;
+    if (!loop.telemetry().latest_record().read(record)) return;
     add_sample(totals_, record);
     if (!shown_ || (!terminal_ && totals_.samples % 5 != 0)) return;
     std::fputs(terminal_ ? "\r\x1b[K" : "", stdout);
-    std::fputs(live_line(record, loop.timing(), totals_.shown).c_str(), stdout);
+    std::fputs(live_line(record, loop.telemetry().timing(), totals_.shown).c_str(), stdout);
     std::fputs(terminal_ ? "" : "\n", stdout);
     std::fflush(stdout);
   }
@@ -213,7 +213,7 @@ class LiveView {
     if (!shown_) return;
     totals_.seconds = seconds;
     std::fputs(terminal_ ? "\n" : "", stdout);
-    std::fputs(summary(totals_, loop.timing()).c_str(), stdout);
+    std::fputs(summary(totals_, loop.telemetry().timing()).c_str(), stdout);
     std::fflush(stdout);
   }
 
@@ -232,9 +232,9 @@ class Wishes {
 
   void pass_on(ServoLoop& loop, TimePoint now) {
     for (; next_ < commands_.size() && start_ + commands_[next_].at <= now; ++next_)
-      loop.request(commands_[next_].commands);
-    if (!arm_ || loop.state() != State::disarmed) return;
-    loop.arm();
+      loop.requests().request(commands_[next_].commands);
+    if (!arm_ || loop.telemetry().state() != State::disarmed) return;
+    loop.requests().arm();
     arm_ = false;
   }
   /// When there is something to pass on again, if it is before t.
@@ -251,13 +251,13 @@ class Wishes {
 
 /// What the run came to: the fault that the loop stands in at its end, if it does.
 Fault fault_of(const ServoLoop& loop, Fault ended) {
-  return ended == Fault::none && is_latched(loop.state()) ? loop.cause() : ended;
+  return ended == Fault::none && is_latched(loop.telemetry().state()) ? loop.telemetry().cause() : ended;
 }
 
 /// Where real time is required a hand shall not feel a loop that has lost it.
 void tell_realtime(const RealtimeWatch::Change& news, Runtime& station) {
   const bool disarms = news.lost && station.config().settings.servo.realtime == Realtime::required;
-  if (disarms) station.loop().disarm();
+  if (disarms) station.loop().requests().disarm();
   spdlog::log(news.lost ? spdlog::level::err : spdlog::level::info, "{}{}", news.message,
               disarms ? "; disarmed, as realtime = \"required\"" : "");
 }
@@ -291,7 +291,8 @@ Fault run_in_wall_time(Runtime& station, const std::string& device, TimePoint en
     log_grants(grants.get());
     the_service->running(
         [&loop = station.loop()] {
-          return LoopStatus{loop.state(), loop.cause(), loop.timing().tick.count()};
+          return LoopStatus{loop.telemetry().state(), loop.telemetry().cause(),
+                            loop.telemetry().timing().tick.count()};
         },
         device);
     RealtimeWatch realtime(servo_number.load());
@@ -511,7 +512,7 @@ Fault run_real(RunConfig plan, const Options& options) {
 
 /// From a signal handler.
 void ask(CommandSet commands) {
-  if (ServoLoop* loop = the_loop) loop->request(commands);
+  if (ServoLoop* loop = the_loop) loop->requests().request(commands);
 }
 
 void catch_signals() {

@@ -98,7 +98,7 @@ Runtime::~Runtime() {
 SharedState& Runtime::enable_shared_state() {
   if (shared_state_) return *shared_state_;
   shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(config_));
-  loop_.publish_to(*shared_state_);
+  loop_.telemetry().publish_to(*shared_state_);
   return *shared_state_;
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 using namespace test;
 
-/// The cells of a line, quotes taken off.
+/// Returns the cells of a line without quotes.
 std::vector<std::string> cells_of(const std::string& line) {
   std::istringstream in(line);
   std::vector<std::string> cells;
@@ -25,7 +25,7 @@ std::vector<std::string> cells_of(const std::string& line) {
   return cells;
 }
 
-TEST_CASE("how the cost grows is written cell by cell, and drawn", "[growth]") {
+TEST_CASE("the cost by mesh size is written cell by cell and plotted", "[growth]") {
   const TemporaryDirectory files;
   const auto csv = files.path() / "growth.csv";
   const ProgramResult bench = run_program("bench_contact", {"--quick", "--growth", "--csv", csv.string()});

@@ -107,12 +107,12 @@ MethodResult take_lease(const DaemonContext& parts, const Json& params, const Ca
 
 /// Whether a state allows a request, by the table of the state machine.
 void check_state(const ServoLoop& loop, Trigger trigger, const char* what) {
-  const State state = loop.state();
+  const State state = loop.telemetry().state();
   const Transition& row = transition(trigger, state);
   if (row.changes_state) return;
   throw RpcError(RpcCode::invalid_state,
                  "It cannot be " + std::string(what) + " in state '" + name(state) + "': " + row.reason + ".",
-                 {{"state", name(state)}, {"cause", fault_json(loop.cause())}});
+                 {{"state", name(state)}, {"cause", fault_json(loop.telemetry().cause())}});
 }
 
 MethodResult arm(const DaemonContext& parts, const Caller& caller) {
@@ -124,8 +124,8 @@ MethodResult arm(const DaemonContext& parts, const Caller& caller) {
 
 MethodResult stop(const DaemonContext& parts, const Caller& caller) {
   ServoLoop& loop = parts.runtime.loop();
-  const bool first = loop.state() != State::stopped;
-  loop.stop();
+  const bool first = loop.telemetry().state() != State::stopped;
+  loop.requests().stop();
   if (first)
     parts.feed.emit("log", EventLevel::warning, "stop: asked for by " + caller.identity,
                     {{"by", caller.identity}});
@@ -135,7 +135,7 @@ MethodResult stop(const DaemonContext& parts, const Caller& caller) {
 MethodResult acknowledge(const DaemonContext& parts, const Caller& caller) {
   ServoLoop& loop = parts.runtime.loop();
   check_state(loop, Trigger::acknowledge, "acknowledged");
-  loop.acknowledge();
+  loop.requests().acknowledge();
   parts.feed.emit("log", EventLevel::info, "acknowledged by " + caller.identity, {{"by", caller.identity}});
   return Json{{"asked", "acknowledge"}};
 }
@@ -161,7 +161,7 @@ MethodResult devices() {
 Json status_json(const DaemonContext& parts) {
   const RunConfig& plan = parts.runtime.config();
   const ServoLoop& loop = parts.runtime.loop();
-  const LoopTiming& timing = loop.timing();
+  const LoopTiming& timing = loop.telemetry().timing();
   parts.feed.drain();  // so that it is as of now
   const FeedSnapshot now = parts.feed.snapshot();
   Json status = state_json(parts, now);
@@ -181,7 +181,7 @@ Json status_json(const DaemonContext& parts) {
          {"wake_latency", times_json(timing.wake_latency)},
          {"overruns", timing.overruns.load()},
          {"skipped", timing.skipped_ticks.load()}}},
-       {"dropped_events", loop.dropped_events()}});
+       {"dropped_events", loop.telemetry().dropped_events()}});
   for (const auto& [name, row] : parts.status_sections) status[name] = row();
   return status;
 }
@@ -271,7 +271,7 @@ void add_daemon_methods(MethodTable& table, const DaemonContext& parts) {
                       {},
                       "The force fades within 100 ms, whoever armed. The lease stays where it is.",
                       [parts](const Json&, const Caller&) {
-                        parts.runtime.loop().disarm();
+                        parts.runtime.loop().requests().disarm();
                         return MethodResult(Json{{"asked", "disarm"}});
                       }});
   table.add(MethodRow{"acknowledge",
@@ -286,7 +286,7 @@ void add_daemon_methods(MethodTable& table, const DaemonContext& parts) {
                       "The place of the tool is looked for anew; there is no force until it is found, and a "
                       "soft start.",
                       [parts](const Json&, const Caller&) {
-                        parts.runtime.loop().reinitialize_proxy();
+                        parts.runtime.loop().requests().reinitialize_proxy();
                         return MethodResult(Json{{"asked", "start_over"}});
                       }});
 }

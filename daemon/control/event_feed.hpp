@@ -13,19 +13,13 @@
 
 #include "core/fault.hpp"
 #include "core/state.hpp"
+#include "daemon/control/event_description.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/servo/event.hpp"
 
 namespace wrenchd {
 
 class ServoLoop;
-
-/// One line of the log for an event of the servo thread.
-std::string to_text(const Event& event);
-
-enum class EventLevel : std::uint8_t { info, warning, error };
-/// "warning"
-const char* name(EventLevel level) noexcept;
 
 /// A kind of event, as `describe` tells it.
 struct EventRow {
@@ -93,7 +87,7 @@ class EventFeed {
   void publish(const Event& event);
   void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
               const Json& fields);
-  void append_device_event(const Event& event, State from);
+  void append_device_event(TimePoint at, State from, State to);
 
   ServoLoop& loop_;
   std::mutex drain_mutex_;  ///< the ring has one reader at a time
@@ -111,8 +105,5 @@ class EventFeed {
 
 /// The events that come from here. `describe` lists them.
 std::span<const EventRow> feed_events();
-
-/// A fault for programs: {name, sentence, cure}; null for none.
-Json fault_json(Fault fault);
 
 }  // namespace wrenchd

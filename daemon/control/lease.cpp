@@ -24,7 +24,7 @@ void Lease::acquire(const Holder& client, TimePoint now) {
 
 void Lease::preempt(const Holder& client, TimePoint now) {
   if (holder_ && !held_by(client.client)) {
-    if (armed_) loop_.disarm();
+    if (armed_) loop_.requests().disarm();
     end(EventLevel::warning, "lease: " + client.identity + " takes it from " + holder_->identity);
   }
   acquire(client, now);
@@ -32,30 +32,30 @@ void Lease::preempt(const Holder& client, TimePoint now) {
 
 void Lease::release(const std::string& why) {
   if (!holder_) return;
-  if (armed_) loop_.disarm();
+  if (armed_) loop_.requests().disarm();
   end(EventLevel::info, "lease: " + holder_->identity + " " + why);
 }
 
 void Lease::heartbeat(TimePoint now) {
   last_heartbeat_ = now;
-  loop_.heartbeat();
+  loop_.requests().heartbeat();
 }
 
 void Lease::arm(TimePoint now) {
   last_heartbeat_ = now;
   armed_ = true;
-  loop_.arm_with_lease();
+  loop_.requests().arm_with_lease();
 }
 
 void Lease::client_lost(std::uint64_t client) {
   if (!held_by(client)) return;
-  if (armed_) loop_.client_lost();
+  if (armed_) loop_.requests().client_lost();
   end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " hung up");
 }
 
 void Lease::check(TimePoint now) {
   if (!holder_ || now - last_heartbeat_ <= kHeartbeatTimeout) return;
-  if (armed_) loop_.client_lost();
+  if (armed_) loop_.requests().client_lost();
   end(EventLevel::warning, "lease: " + holder_->identity + " gives no sign of life any more");
 }
 

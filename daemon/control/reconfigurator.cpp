@@ -11,8 +11,8 @@
 #include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/setting_table.hpp"
 #include "core/finite.hpp"
-#include "daemon/control/setting_keys.hpp"
 
 namespace wrenchd {
 namespace {
@@ -73,16 +73,6 @@ std::vector<std::string> names_of(const Scene& scene) {
   return names;
 }
 
-double value_of(const Settings& settings, const char* name) {
-  const LimitSettings& limits = settings.limits;
-  const std::string_view key(name);
-  if (key == "limits.max_force_N") return limits.max_force_N;
-  if (key == "limits.max_torque_Nm") return limits.max_torque_Nm;
-  if (key == "limits.force_slew_N_per_s") return limits.force_slew_N_per_s;
-  if (key == "limits.torque_slew_Nm_per_s") return limits.torque_slew_Nm_per_s;
-  return limits.soft_start_s;
-}
-
 }  // namespace
 
 Reconfigurator::Reconfigurator(RunConfig plan, std::shared_ptr<const Scene> scene, ServoLoop& loop,
@@ -124,7 +114,7 @@ std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& setti
   auto placer = make_proxy_initializer(scene, proxy_search_mode_);
   auto rendering = std::make_unique<Rendering>(rendering_id_ + 1, settings, config_.profile, std::move(scene),
                                                std::move(placer));
-  const ServoLoop::HandlePose hand = loop_.handle_pose();
+  const HandlePose hand = loop_.telemetry().handle_pose();
   if (proxy_search_mode_ == ProxySearchMode::background) rendering->warm_up(hand.X_WH, hand.scene_time_s);
   return rendering;
 }
@@ -140,7 +130,7 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
     const std::lock_guard told(names_mutex_);
     names_ = {rendering_id_, names_of(*scene_)};
   }
-  loop_.exchange().offer(std::move(rendering));
+  loop_.requests().renderings().offer(std::move(rendering));
 }
 
 void Reconfigurator::replace_scene(const std::filesystem::path& file) {
@@ -187,17 +177,19 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
 /// Until nothing is on its way into the loop any more, so that an obstacle cannot have set out before it is
 /// followed. A loop that does not tick has no hand in it, and need not be waited for.
 void Reconfigurator::wait_until_idle() {
-  const auto quiet = [this] { return loop_.exchange().taken() && !loop_.crossfading(); };
+  const auto quiet = [this] {
+    return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading();
+  };
   if (quiet()) return;
   const auto busy = [] {
     throw BusyError("another change is on its way to the hand; ask again in a moment");
   };
   if (proxy_search_mode_ == ProxySearchMode::in_tick) busy();
   const auto end = std::chrono::steady_clock::now() + kPatience;
-  const std::uint64_t ticks = loop_.timing().tick.count();
+  const std::uint64_t ticks = loop_.telemetry().timing().tick.count();
   while (!quiet()) {
     if (std::chrono::steady_clock::now() > end) {
-      if (loop_.timing().tick.count() == ticks) return;
+      if (loop_.telemetry().timing().tick.count() == ticks) return;
       busy();
     }
     std::this_thread::sleep_for(kLook);
@@ -247,7 +239,7 @@ void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesyste
 
 void Reconfigurator::set_workspace(const WorkspaceRequest& wish) {
   workspace_ = wish;
-  loop_.set_workspace(wish);
+  loop_.requests().set_workspace(wish);
 }
 
 void Reconfigurator::set_scale(double scale) {
@@ -276,7 +268,7 @@ void Reconfigurator::recentre() {
 
 /// Those that have not expired.
 LocalModelSet Reconfigurator::other_models(std::uint32_t id) {
-  const TimePoint now = loop_.handle_pose().at;
+  const TimePoint now = loop_.telemetry().handle_pose().at;
   LocalModelSet others;
   for (const LocalModel& model : models_)
     if (model.id != id && model.expires > now) others.add(model);
@@ -308,19 +300,19 @@ void Reconfigurator::set_model(LocalModel model, double for_s) {
   model.normal_W /= length;
   model.offset_m /= length;
   model.X_WA.rotation.normalize();
-  model.expires = loop_.handle_pose().at + from_seconds(for_s);
+  model.expires = loop_.telemetry().handle_pose().at + from_seconds(for_s);
   LocalModelSet models = other_models(model.id);
   if (!models.add(model))
     throw std::invalid_argument("there are " + std::to_string(kMaxLocalModels) +
                                 " local models already; remove one, or let it expire");
   models_ = models;
-  loop_.set_local_models(models_);
+  loop_.requests().set_local_models(models_);
 }
 
 void Reconfigurator::remove_model(std::uint32_t id) {
   const std::lock_guard lock(mutex_);
   models_ = other_models(id);
-  loop_.set_local_models(models_);
+  loop_.requests().set_local_models(models_);
 }
 
 ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
@@ -330,31 +322,32 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   Settings settings = config_.settings;  // that will hold
   Settings configured = file_settings_;  // and as far as it comes from files
   bool needs_rendering = false, limits_changed = false;
-  const bool armed = loop_.state() == State::waiting || is_driving(loop_.state());
-  for (const SettingKey& key : setting_keys()) {
-    if (key.same(plan.settings, file_settings_)) continue;
-    if (key.effect == SettingKey::Effect::restart) {
-      result.not_applied.push_back(std::string(key.name) + ": takes a restart");
+  const bool armed = loop_.telemetry().state() == State::waiting || is_driving(loop_.telemetry().state());
+  for (const Setting& setting : setting_table()) {
+    if (setting.effect == Setting::Effect::scene || setting.effect == Setting::Effect::none) continue;
+    if (setting.equal(plan.settings, file_settings_)) continue;
+    if (setting.effect == Setting::Effect::restart) {
+      result.not_applied.push_back(setting.name() + ": takes a restart");
       continue;
     }
     Settings wanted = settings;
-    key.copy(plan.settings, wanted);
-    if (key.effect == SettingKey::Effect::limits) {
+    setting.copy(plan.settings, wanted);
+    if (setting.effect == Setting::Effect::limits) {
       Settings allowed = wanted;
       if (armed) allowed.limits = tighter(settings.limits, wanted.limits, config_.profile);
-      if (!key.same(allowed, wanted)) {
-        result.not_applied.push_back(std::string(key.name) + ": is looser than " +
-                                     to_text(value_of(settings, key.name)) +
+      if (!setting.equal(allowed, wanted)) {
+        result.not_applied.push_back(setting.name() + ": is looser than " +
+                                     to_text(setting.number(settings)) +
                                      ", which holds as long as the loop is armed; disarm, and reload again");
         continue;
       }
       limits_changed = true;
-    } else if (key.effect == SettingKey::Effect::new_rendering) {
+    } else if (setting.effect == Setting::Effect::new_rendering) {
       needs_rendering = true;
     }
     settings = wanted;
-    key.copy(plan.settings, configured);
-    result.applied.emplace_back(key.name);
+    setting.copy(plan.settings, configured);
+    result.applied.emplace_back(setting.name());
   }
   if (plan.settings.device.profile == file_settings_.device.profile &&
       contents(plan.settings.device.profile_file) != profile_text_)
@@ -377,7 +370,7 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   if (needs_rendering || new_scene) rendering = build_rendering(settings, scene_built);
 
   // All of it is good.
-  if (limits_changed) loop_.set_limits(settings.limits);
+  if (limits_changed) loop_.requests().set_limits(settings.limits);
   config_.settings = settings;
   file_settings_ = configured;
   scene_fingerprint_ = scene_files;
@@ -412,18 +405,15 @@ Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
 
 Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
-  const ServoLoop::HandlePose seen = loop_.handle_pose();
-  const auto pose_of = [](const PoseSettings& placed) {
-    return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
-  };
+  const HandlePose seen = loop_.telemetry().handle_pose();
   const DeviceSettings& device = config_.settings.device;
   // The view is of the scene that the configuration names: of one that a client has loaded nobody has said.
   const bool configured = config_.settings.scene == file_settings_.scene;
   return {scene_,
           rendering_id_,
           seen.at - from_seconds(seen.scene_time_s),
-          pose_of(device.base_in_world),
-          pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
+          device.base_in_world.pose(),
+          device.tool_in_handle.pose() * scene_->tool().X_MT(),
           config_.profile.wrench_point,
           configured ? config_.settings.view : ViewSettings{}};
 }

@@ -110,7 +110,7 @@ class Reconfigurator {
 
  private:
   std::string files_fingerprint(const SceneSettings& scene) const;
-  double scene_time_s() { return loop_.handle_pose().scene_time_s; }
+  double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
   std::shared_ptr<const Scene> build_scene(const SceneSettings& scene);
   std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);

@@ -8,13 +8,6 @@
 namespace wrenchd {
 namespace {
 
-Pose pose_of(const std::array<double, 7>& x) noexcept {
-  Pose X;
-  X.translation_m = {x[0], x[1], x[2]};
-  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
-  return X;
-}
-
 /// A device whose samples come out of a recording, one a tick.
 class RecordedDevice final : public Device {
  public:
@@ -57,7 +50,7 @@ class RecordedPlacer final : public ProxyInitializer {
   void request(const ProxyInitializationRequest& question) noexcept override { question_ = question; }
   bool take_result(ProxyInitializationResult& answer) noexcept override {
     const auto placing = static_cast<ProxyInitialization>(record_->proxy_initialization);
-    answer = {question_.id, placing == ProxyInitialization::found, pose_of(record_->X_WQ),
+    answer = {question_.id, placing == ProxyInitialization::found, pose_from_numbers(record_->X_WQ),
               question_.scene_time_s};
     return placing == ProxyInitialization::found || placing == ProxyInitialization::failed;
   }
@@ -70,7 +63,7 @@ class RecordedPlacer final : public ProxyInitializer {
 DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   const TickRecord& r = *record_;
   DeviceSample sample;
-  sample.X_BH = pose_of(r.X_BH);
+  sample.X_BH = pose_from_numbers(r.X_BH);
   sample.V_BH.linear_m_per_s = {r.V_BH[0], r.V_BH[1], r.V_BH[2]};
   sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
   sample.device_time_s = r.device_time_s;
@@ -168,11 +161,12 @@ std::optional<Difference> replay(const Recording& recording, const RunConfig& pl
                          "wrong before, where obstacles that move stood) is not in it, and arming does not "
                          "begin it anew; what is "
                          "replayed is a recording from the start on, as by wrenchd --record");
-  const Scene scene(plan.scene);
+  const auto scene = std::make_shared<const Scene>(plan.scene);
+  const auto placer = std::make_shared<RecordedPlacer>();
   RecordedClock clock;
   RecordedDevice device;
-  RecordedPlacer placer;
-  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  ServoLoop loop(plan.settings, plan.profile, device,
+                 std::make_unique<Rendering>(0, plan.settings, plan.profile, scene, placer), clock);
   std::uint64_t last = 0;  // a release from outside has the number of the tick before
   for (const TickRecord& then : recording.ticks) {
     if (then.tick != last && then.tick != last + 1)
@@ -188,17 +182,17 @@ std::optional<Difference> replay(const Recording& recording, const RunConfig& pl
           "changes to replay all of it");
     clock.play(then);
     device.play(then);
-    placer.play(then);
+    placer->play(then);
     const TimePoint now{Duration(then.now_ns)};
     // The record of a release from outside is the last tick's, with zero wrench and `released` set.
     if ((then.commands & kReleasedExternally) != 0) {
       loop.release(now);
     } else {
-      loop.request(then.commands);
+      loop.requests().request(then.commands);
       loop.tick(now, now);
     }
     TickRecord replayed;
-    loop.latest_record().read(replayed);
+    loop.telemetry().latest_record().read(replayed);
     if (auto difference = compare(then, replayed)) return difference;
   }
   return {};

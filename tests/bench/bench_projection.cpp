@@ -23,7 +23,7 @@ struct Options {
   std::filesystem::path csv;
 };
 
-/// What is compared with what: times mean nothing without it.
+/// Prints what the tables compare, so that their times can be interpreted.
 void explain(const Effort& effort, const CounterScale& scale) {
   std::cout << "Every pose is timed on its own, " << effort.poses
             << " of them a millisecond apart; its time is the "

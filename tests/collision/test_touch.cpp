@@ -54,7 +54,7 @@ Vector3d carried(const Touches& touches) {
 
 double shares(const Touches& touches) {
   double sum = 0.0;
-  for (const Touch& touch : touches) sum += touch.share;
+  for (const Touch& touch : touches) sum += touch.load_fraction;
   return sum;
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("the contacts of a proxy name features of both meshes that are where i
       const Touches reported = touches(depth.projection, scene, true);
       if (depth.projection.status != ProjectionStatus::converged || reported.empty()) continue;
       for (const Touch& touch : reported) {
-        if (touch.share == 0.0) continue;
+        if (touch.load_fraction == 0.0) continue;
         const MeshObstacle& obstacle = scene.meshes()[touch.obstacle];
         const Vector3d p_W = vector(touch.point_W_m);
         const Vector3d p_T = inverse(X_WQ) * p_W;
@@ -97,7 +97,8 @@ TEST_CASE("the contacts of a proxy name features of both meshes that are where i
       const Vector3d pulled = 2.0 * mass_kg * (X_WQ.translation_m - X_WP.translation_m);
       CHECK((carried(reported) - pulled).norm() < 1e-6 * pulled.norm() + 1e-12);
       CHECK(shares(reported) == Approx(1.0).epsilon(1e-12));
-      for (std::size_t i = 1; i < reported.size(); ++i) CHECK(reported[i].share <= reported[i - 1].share);
+      for (std::size_t i = 1; i < reported.size(); ++i)
+        CHECK(reported[i].load_fraction <= reported[i - 1].load_fraction);
     }
   }
   CHECK(slid < (kinds[0] + kinds[1] + kinds[2]) / 500);
@@ -117,7 +118,7 @@ TEST_CASE("the contacts of convex bodies name features of their hulls that are w
     const Touches reported = touches(q, c.scene, false);
     REQUIRE_FALSE(reported.empty());
     for (const Touch& touch : reported) {
-      if (touch.share == 0.0) continue;
+      if (touch.load_fraction == 0.0) continue;
       const Vector3d p_W = vector(touch.point_W_m);
       CHECK(off_hull_m(c.scene.tool().hull, FeatureKind{touch.tool_feature_kind}, touch.tool_first,
                        touch.tool_second, inverse(q.X_WQ) * p_W) < 1e-9);
@@ -147,7 +148,7 @@ TEST_CASE("of too many contacts those with the largest multipliers are reported"
   for (std::size_t i = 0; i < reported.size(); ++i) {
     CHECK(reported[i].multiplier_kg_m == static_cast<double>(39 - i));
     CHECK((reported[i].tool_first * 7) % 40 == 39 - i);
-    CHECK(reported[i].share == Approx(static_cast<double>(39 - i) / 780.0));
+    CHECK(reported[i].load_fraction == Approx(static_cast<double>(39 - i) / 780.0));
     CHECK(FeatureKind{reported[i].tool_feature_kind} == FeatureKind::hull_vertex);
     CHECK(FeatureKind{reported[i].obstacle_feature_kind} == FeatureKind::plane);
   }

@@ -54,7 +54,7 @@ TEST_CASE("every shipped profile loads, has the name of its file, and reports th
   CHECK(profiles.size() == 10);
   for (const DeviceProfile& p : profiles) {
     INFO(p.name);
-    CHECK_NOTHROW(check_reports(p));
+    CHECK_NOTHROW(validate_reports(p));
     CHECK_FALSE(p.description.empty());
     CHECK(p.max_linear_speed_m_per_s > 0);
     CHECK(p.max_angular_speed_rad_per_s > 0);
@@ -116,7 +116,7 @@ TEST_CASE("the example's other devices are good profiles as well", "[profiles]")
   for (const std::string& block : blocks) {
     INFO(block);
     const DeviceProfile profile = load_profile(dir.write("block.toml", block), kShipped);
-    CHECK_NOTHROW(check_reports(profile));
+    CHECK_NOTHROW(validate_reports(profile));
   }
 }
 

@@ -223,7 +223,7 @@ TEST_CASE("wrenchd records, and never overwrites a recording") {
   const ProgramResult second = run_virtual({"--arm", "--record", file.string()});
   CHECK(second.exit_code == 1);
   CHECK(second.err.find(file.string() +
-                        ": exists already, and a recording is never overwritten; choose another name") !=
+                        ": already exists, and wrenchd never overwrites a recording; choose another name") !=
         std::string::npos);
   CHECK(contents(file) == recording);
 

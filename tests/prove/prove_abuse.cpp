@@ -32,12 +32,12 @@
 #include "daemon/recording/recording_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// What abuse of the control socket costs the servo loop. The real daemon runs, armed by a client that keeps
-// its lease, and records every tick. Slices of a second in which other processes abuse its socket by all
-// means take turns with slices in which nobody does, and with some in which they do the same to a socket of
-// somebody else: that costs the machine as much, and what is left is the daemon's. All in one run, so that
-// what else the machine does falls on all alike. The times that ticks took, and by how much they came late,
-// are taken from the recording.
+// Measures how abuse of the control socket affects the servo loop. The real daemon runs, armed by a client
+// that keeps its lease, and records every tick. Slices of one second alternate between three conditions: no
+// abuse; abuse of the daemon's socket by other processes; and the same abuse of an unrelated socket. The
+// third condition costs the machine as much, so the difference is the daemon's own cost. All conditions run
+// in one recording, so other load affects them equally. Tick durations and wake latencies come from the
+// recording.
 
 namespace {
 
@@ -58,7 +58,7 @@ OwnedFd connected(const fs::path& path) {
   return fd;
 }
 
-/// Sends as much of it as goes without waiting long. False: nobody is there any more.
+/// Sends as many bytes as possible without a long wait. Returns false if the peer is gone.
 bool push(int fd, const std::string& bytes) {
   for (std::size_t sent = 0; sent < bytes.size();) {
     const ssize_t more = ::send(fd, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -80,7 +80,7 @@ void drain(int fd) {
   }
 }
 
-/// One way to misbehave, for as long as it is wanted.
+/// One kind of abuse, repeated until `stop` is set.
 using Abuse = void (*)(const fs::path& path, const std::atomic<bool>& wanted);
 
 void floods_requests(const fs::path& path, const std::atomic<bool>& wanted) {
@@ -131,10 +131,10 @@ void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
 constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
                                           endless_line,    connects,    asks_for_all};
 
-/// The abusers, in a process of their own.
+/// Runs the abusers in a separate process.
 class Abusers {
  public:
-  /// uid: who they are, where this process may say so.
+  /// uid: the user of the abusers, if this process may change its user.
   Abusers(const fs::path& path, int threads, uid_t uid) {
     if (::pipe2(pipe_.data(), O_CLOEXEC) != 0)
       throw std::system_error(errno, std::generic_category(), "pipe");
@@ -177,7 +177,7 @@ class Abusers {
   pid_t pid_ = -1;
 };
 
-/// Somebody else's socket: takes every connection, and reads whatever comes, in a process of its own.
+/// An unrelated socket in a separate process, which accepts every connection and reads all input.
 class Decoy {
  public:
   explicit Decoy(const fs::path& path) : listens_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -245,7 +245,7 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   bool lives() const { return ::waitpid(pid_, nullptr, WNOHANG) == 0; }
-  /// Its exit code; -1: by a signal.
+  /// Ends the process. Returns its exit code; -1 if a signal ended it.
   int end() {
     ::kill(pid_, SIGTERM);
     int status = 0;
@@ -258,7 +258,7 @@ class Daemon {
   pid_t pid_ = -1;
 };
 
-/// Keeps the lease on a connection and a thread of its own, and takes it again where it lost it.
+/// Keeps the lease on its own connection and thread. Acquires the lease again if it is lost.
 class Holder {
  public:
   explicit Holder(const std::string& path) : client_(path) {
@@ -269,7 +269,7 @@ class Holder {
         if (!does("beat")) {
           ++lost_;
           if (longest_ < kTooLong) ++wronged_;
-          does("acknowledge");  // what the machine may have done meanwhile
+          does("acknowledge");  // clears a fault that a busy machine may have caused
           does("lease.take");
           does("arm");
           longest_ = {};
@@ -286,15 +286,14 @@ class Holder {
     thread_.request_stop();
     thread_.join();
   }
-  /// After end(): the longest between two of its beats, answer and all [ms].
+  /// After end(): returns the longest interval between two acknowledged heartbeats [ms].
   double worst_ms() const { return 1e-6 * static_cast<double>(worst_.count()); }
   long lost() const { return lost_; }
-  /// Where it had given every beat in time, the answer included.
+  /// Returns the number of leases lost although every heartbeat, including its answer, was in time.
   long wronged() const { return wronged_; }
 
  private:
-  static constexpr auto kTooLong =
-      80ms;  ///< the lease allows 100, and this machine has to run the daemon too
+  static constexpr auto kTooLong = 80ms;  ///< the lease allows 100 ms, and the daemon shares the machine
 
   bool does(const char* method) try {
     client_.call(method);
@@ -304,13 +303,13 @@ class Holder {
   }
 
   Client client_;
-  std::chrono::nanoseconds longest_{0};  ///< since it took the lease
+  std::chrono::nanoseconds longest_{0};  ///< longest interval since the lease was acquired
   std::chrono::nanoseconds worst_{0};
   long lost_ = 0, wronged_ = 0;
   std::jthread thread_;
 };
 
-/// What happens in a slice.
+/// The condition of a slice.
 enum Kind : std::size_t { kQuiet, kBusy, kAbused, kKinds };
 
 struct Slice {
@@ -357,7 +356,7 @@ int main(int argc, char** argv) {
   try {
     const test::TemporaryDirectory files;
     const fs::path socket = files.path() / "control.sock", recording = files.path() / "run.h5";
-    // Everybody may look, so that nobody in particular, who may nothing else, can abuse what there is.
+    // Anybody may observe, so that abusers without any role can use every method that reads.
     const fs::path config = files.write("wrenchd.toml", "[control]\nobservers = \"*\"\n");
     fs::permissions(files.path(), fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
     Daemon daemon(
@@ -386,7 +385,7 @@ int main(int argc, char** argv) {
       for (const Kind kind : round) {
         if (kind == kBusy) busy.begin();
         if (kind == kAbused) abusers.begin();
-        std::this_thread::sleep_for(100ms);  // until they are all at it, or all done
+        std::this_thread::sleep_for(100ms);  // until all abusers are active, or all have ended
         Slice slice{now_ns(), 0, kind};
         const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(slice_s);
         while (std::chrono::steady_clock::now() < until) {
@@ -407,13 +406,13 @@ int main(int argc, char** argv) {
       }
     }
     holder.end();
-    // Anybody's stop, in the middle of it.
+    // An emergency stop by an unprivileged user during the abuse.
     abusers.begin();
     std::this_thread::sleep_for(200ms);
-    const auto stop_asked = std::chrono::steady_clock::now();
+    const auto stop_requested = std::chrono::steady_clock::now();
     watcher.call("stop");
     const double stop_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_asked).count();
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_requested).count();
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");

@@ -35,7 +35,7 @@ std::optional<ScheduledMotion> later_of(const Json& json) {
 template <class T>
 std::vector<T> part(std::span<const std::byte> bytes, std::size_t offset, std::size_t count) {
   if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T))
-    throw std::runtime_error("the shapes of the scene lie outside of their memory");
+    throw std::runtime_error("the geometry of the scene exceeds its memory");
   std::vector<T> out(count);
   if (count > 0) std::memcpy(out.data(), bytes.data() + offset, count * sizeof(T));
   return out;
@@ -75,7 +75,8 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     const auto add_all = [&](Detail detail, std::size_t most) {
       std::uint32_t number = 0;
       for (const Json& mesh : meshes) {
-        // Each mesh gets its share, and none is made too coarse to be known again.
+        // Distributes the triangles in proportion to the meshes' sizes, with a minimum that keeps a mesh
+        // recognizable.
         constexpr double kLeast = 2'000.0;
         const auto triangles = static_cast<double>(source_triangles_[number]);
         const double share = static_cast<double>(most) * triangles / static_cast<double>(std::max(all, most));
@@ -118,9 +119,9 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
                {"obstacles", obstacles}, {"view", description.value("view", Json())}}
               .dump(-1, ' ', false, Json::error_handler_t::replace);
 } catch (const nlohmann::json::exception& error) {
-  throw std::runtime_error(std::string("the scene is not told as this program knows it: ") + error.what());
+  throw std::runtime_error(std::string("the scene has an unknown format: ") + error.what());
 } catch (const std::invalid_argument& error) {
-  throw std::runtime_error(std::string("the shapes of the scene: ") + error.what());
+  throw std::runtime_error(std::string("the geometry of the scene: ") + error.what());
 }
 
 Json ViewScene::moving_obstacle_poses(std::int64_t time_ns) const {

@@ -87,7 +87,7 @@ TEST_CASE("a holder that hangs up releases the hand in the next tick", "[lease]"
 
 TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
   Rig r;
-  r.s.runtime.loop().arm();
+  r.s.runtime.loop().requests().arm();
   r.s.run(1.0);
   REQUIRE(r.s.state() == State::active);
   r.lease.acquire(kA, r.s.clock.now());

@@ -45,7 +45,7 @@ double farthest_m(const RunConfig& plan, double& pushed_N) {
   double farthest = 0.0;
   pushed_N = 0.0;
   for (int i = 0; i < 3500; ++i) {
-    if (i == 5) s.runtime.loop().arm();
+    if (i == 5) s.runtime.loop().requests().arm();
     REQUIRE(s.tick() == Fault::none);
     pushed_N = std::max(pushed_N, s.force_N());
     const Pose goal = s.simulated.hand_target().X_BG;
@@ -73,7 +73,7 @@ TEST_CASE("a led handle takes from the hand what the motors and friction take", 
   const SimulatedEnergy& energy = s.simulated.handle().energy();
   double most_kinetic_J = 0.0;
   for (int i = 0; i < 2500; ++i) {
-    if (i == 5) s.runtime.loop().arm();
+    if (i == 5) s.runtime.loop().requests().arm();
     s.tick();
     const double kinetic_J = s.simulated.handle().kinetic_energy_J();
     most_kinetic_J = std::max(most_kinetic_J, kinetic_J);
@@ -91,7 +91,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
     VirtualRuntime s(shipped_config());
     RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 5000; ++i) {
-      if (i == 50) s.runtime.loop().arm();
+      if (i == 50) s.runtime.loop().requests().arm();
       s.tick();
       recorder.append_new_ticks();
     }
@@ -117,7 +117,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
   double then_N = 0.0, now_N = 0.0;
   for (const TickRecord& tick : before.ticks) then_N = std::max(then_N, std::abs(tick.F_T[2]));
   for (int i = 0; i < 5000; ++i) {
-    if (i == 50) s.runtime.loop().arm();
+    if (i == 50) s.runtime.loop().requests().arm();
     s.tick();
     now_N = std::max(now_N, std::abs(s.last.F_T[2]));
   }

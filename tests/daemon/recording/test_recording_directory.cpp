@@ -131,13 +131,13 @@ TEST_CASE("the flight recorder's files are named by time and fault, and the olde
   files.write(first.filename(), "1");
   CHECK(flight_path(files.path(), 1795356901, "overspeed") ==
         files.path() / "flight-20261122T141501Z-overspeed-2.h5");
-  files.write("flight-20261122T141500Z-stop_asked.h5", "2");
+  files.write("flight-20261122T141500Z-stop_requested.h5", "2");
   files.write("flight-20261122T141502Z-pinned.h5", "3");
   files.write("run-1.h5", "4");
   files.write("flight-plan.txt", "5");
   prune_flights(files.path(), 2);
   const auto there = [&](const char* name) { return std::filesystem::exists(files.path() / name); };
-  CHECK_FALSE(there("flight-20261122T141500Z-stop_asked.h5"));
+  CHECK_FALSE(there("flight-20261122T141500Z-stop_requested.h5"));
   CHECK(there("flight-20261122T141501Z-overspeed.h5"));
   CHECK(there("flight-20261122T141502Z-pinned.h5"));
   CHECK(there("run-1.h5"));
