@@ -83,7 +83,7 @@ void read_delta(TomlTable& table, Kinematics& k) {
   table.mandatory("zero_rad").number(zero_rad, {-7, 7});
   const TomlValue effort_value = table.mandatory("effort_per_Nm", "effort_per_Nm");
   if (effort_value.number(effort, {-1e6, 1e6}) && effort == 0.0)
-    effort_value.refuse("must not be 0: what the motors are told for 1 N.m about a leg's joint");
+    effort_value.refuse("must not be 0: it is the motor effort for 1 N.m about a leg's joint");
   table.mandatory("max_effort").number(k.max_effort, {1e-3, 1e6});
   for (std::size_t i = 0; i < k.joints; ++i) {
     k.rad_per_count[i] = gear * kTurn_rad / per_turn;

@@ -17,7 +17,7 @@ constexpr Range kStep = {1e-12, 1e3};
 constexpr Range kOffset = {-1e6, 1e6};
 
 constexpr unsigned kBitsPerNibble = 4;
-constexpr std::uint8_t kNibbleA = 0x41;  ///< 'A' stands for 0
+constexpr std::uint8_t kNibbleA = 0x41;  ///< 'A' encodes 0
 
 /// Required properties of a field.
 struct FieldShape {
@@ -79,11 +79,10 @@ bool read_width(TomlTable& table, ReportField& field, const FieldShape& shape) {
   const TomlValue bits = table.optional("bits");
   const TomlValue is_signed = table.optional("signed");
   if (type && bits) {
-    bits.refuse("the type says how wide it is; leave one of the two out");
+    bits.refuse("the type determines the width; leave one of the two out");
     return false;
   }
-  if (type && is_signed)
-    is_signed.refuse("the type says whether it has a sign; leave this out, or give bits");
+  if (type && is_signed) is_signed.refuse("the type determines the sign; leave this out, or give bits");
   if (!bits) return read_type(type, shape, field);
   field.is_signed = shape.is_signed;
   is_signed.boolean(field.is_signed);
@@ -272,7 +271,7 @@ class FrameReader {
                    std::to_string(end_bit_ / 8 - 1) + " at the latest; move it, or lengthen the report");
     }
     if (begin < 8 * first_byte())
-      value.refuse("byte 0 is the report id; move it, or say id = \"none\" if the device uses no ids");
+      value.refuse("byte 0 is the report id; move it, or state id = \"none\" if the device uses no ids");
     for (const Claim& other : claims_) {
       if (begin < other.end && other.begin < end) {
         value.refuse("overlaps '" + other.name + "', which has bytes " + std::to_string(other.begin / 8) +
@@ -365,9 +364,9 @@ void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValu
   frame.field(force, r.force, {3, true, "step_N", profile.max_force_N});
   frame.field(torque, r.torque, {3, true, "step_Nm", profile.max_torque_Nm});
   if (whole && force.is_text("none"))
-    force.refuse("a device without force has no wrench report; say wrench_report = \"none\" above");
+    force.refuse("a device without force has no wrench report; state wrench_report = \"none\" above");
   if (!whole && (r.force.present || r.torque.present))
-    efforts.refuse("stand instead of force and torque; leave one of the two out");
+    efforts.refuse("replaces force and torque; leave one of the two out");
   const bool amperes = profile.kinematics.kind != Kinematics::Kind::delta;
   frame.field(efforts, r.efforts,
               {kMaxMotors, true, amperes ? "step_A" : "step", profile.kinematics.max_effort, !amperes});
@@ -388,20 +387,20 @@ void check_pose_complete(const TomlValue& pose_report, const DeviceProfile& prof
     return std::any_of(layouts.begin(), layouts.end(), [&](const auto* l) { return (l->*field).present; });
   };
   const bool joints = any(&PoseReportLayout::joints);
-  const bool cap = any(&PoseReportLayout::translation) || any(&PoseReportLayout::rotation);
+  const bool puck = any(&PoseReportLayout::translation) || any(&PoseReportLayout::rotation);
   const bool pose = any(&PoseReportLayout::position) || any(&PoseReportLayout::orientation);
   const bool kinematics = profile.kinematics.kind != Kinematics::Kind::none;
-  if (static_cast<int>(joints) + static_cast<int>(cap) + static_cast<int>(pose) > 1)
+  if (static_cast<int>(joints) + static_cast<int>(puck) + static_cast<int>(pose) > 1)
     pose_report.refuse(
         "a device sends poses (position, orientation), or joints, or a deflection (translation, rotation); "
         "leave all but one out");
   else if (joints && !kinematics)
     pose_report.refuse("joints make a pose only by [kinematics]; state it");
-  else if (kinematics && !joints && (cap || pose))
+  else if (kinematics && !joints && (puck || pose))
     pose_report.refuse("[kinematics] needs joints in a report, or must be left out");
-  else if (cap && !profile.deflection)
+  else if (puck && !profile.deflection)
     pose_report.refuse("a translation or rotation moves a pose only by [deflection]; state it");
-  else if (profile.deflection && !cap && (joints || pose))
+  else if (profile.deflection && !puck && (joints || pose))
     pose_report.refuse("[deflection] needs a translation or rotation in a report, or must be left out");
 }
 
@@ -418,8 +417,9 @@ void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_r
       if (a.has_id != b.has_id)
         elements[i - 1].refuse("'" + other + "' and this one must both have an id, or neither");
       else if (!told_apart(a, b))
-        elements[i - 1].refuse("cannot be told from '" + other + "': same " + (a.has_id ? "id" : "length") +
-                               "; a report is known by its " + (a.has_id ? "id" : "length"));
+        elements[i - 1].refuse("cannot be distinguished from '" + other + "': same " +
+                               (a.has_id ? "id" : "length") + "; a report is known by its " +
+                               (a.has_id ? "id" : "length"));
     }
   }
 }

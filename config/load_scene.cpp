@@ -18,46 +18,47 @@ constexpr Range kScale = {1e-9, 1e6};
 constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
-constexpr Range kTurn = {-10.0, 10.0};
+constexpr Range kRotation = {-10.0, 10.0};
 constexpr Range kReversal_s = {0.0, 86400.0};
 
 /// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
 
-void read_kind(const TomlValue& value, GeneratedMesh& made) {
-  if (!value.text(made.kind)) return;
+void read_kind(const TomlValue& value, GeneratedMesh& generated) {
+  if (!value.text(generated.kind)) return;
   std::vector<KnownKey> known;
   for (const MeshKind& kind : mesh_kinds()) known.push_back({kind.name, ""});
-  if (std::any_of(known.begin(), known.end(), [&](const KnownKey& key) { return key.name == made.kind; }))
+  if (std::any_of(known.begin(), known.end(),
+                  [&](const KnownKey& key) { return key.name == generated.kind; }))
     return;
-  const NearestKey nearest = nearest_key(made.kind, known);
+  const NearestKey nearest = nearest_key(generated.kind, known);
   std::string all;
   for (const KnownKey& key : known) all += (all.empty() ? "" : ", ") + key.name;
-  value.refuse("nothing of kind '" + printable(made.kind) + "' can be made; " +
+  value.refuse("no generated mesh of kind '" + printable(generated.kind) + "'; " +
                (nearest.name.empty() ? "there are " + all : nearest.advice));
 }
 
-void read_made(TomlTable& table, GeneratedMesh& made) {
-  read_kind(table.mandatory("make"), made);
+void read_generated(TomlTable& table, GeneratedMesh& generated) {
+  read_kind(table.mandatory("make"), generated);
   table.optional("triangles")
-      .integer(made.triangles, {static_cast<double>(GeneratedMesh::kMinTriangles),
-                                static_cast<double>(GeneratedMesh::kMaxTriangles)});
+      .integer(generated.triangles, {static_cast<double>(GeneratedMesh::kMinTriangles),
+                                     static_cast<double>(GeneratedMesh::kMaxTriangles)});
   const TomlValue seed = table.optional("seed");
-  seed.integer(made.seed, {0, 4294967295.0});
-  if (seed && made.kind != "bumpy" && made.kind != "boulder")
-    seed.refuse("only bumpy and boulder are made by chance; leave it out");
+  seed.integer(generated.seed, {0, 4294967295.0});
+  if (seed && generated.kind != "bumpy" && generated.kind != "boulder")
+    seed.refuse("only bumpy and boulder are random; leave it out");
   const TomlValue size = table.optional("size_m");
-  size.vector(made.size_m, kSide);
-  if (size && made.kind != "box")
+  size.vector(generated.size_m, kSide);
+  if (size && generated.kind != "box")
     size.refuse("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
 }
 
 /// Reads a mesh file name, or a table that describes a generated mesh.
 void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
-               std::optional<GeneratedMesh>& made) {
+               std::optional<GeneratedMesh>& generated) {
   if (value.is_table()) {
-    value.table(read_made, made.emplace());
-    mesh = generated_mesh_name(*made);
+    value.table(read_generated, generated.emplace());
+    mesh = generated_mesh_name(*generated);
     return;
   }
   if (!value.path(mesh)) return;
@@ -65,8 +66,8 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
   std::error_code ignored;
   if (fs::is_regular_file(mesh, ignored)) return;
   value.refuse(
-      "no such file; looked for " + fs::absolute(mesh).lexically_normal().string() +
-      "; name an OFF, OBJ, STL or PLY file, relative to this scene, or say what is to be made, as in { make "
+      "no such file; searched " + fs::absolute(mesh).lexically_normal().string() +
+      "; name an OFF, OBJ, STL or PLY file, relative to this scene, or a mesh to generate, as in { make "
       "= \"gear\" }");
 }
 
@@ -129,7 +130,7 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
   keys.scale.number(obstacle.scale, kScale);
   keys.position.vector(obstacle.X_WM.translation_m, kAny);
   Vector3d rotation_vector_rad = Vector3d::Zero();
-  keys.rotation.vector(rotation_vector_rad, kTurn);
+  keys.rotation.vector(rotation_vector_rad, kRotation);
   obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
   keys.kind.choice(obstacle.kind, {{"solid", BodyKind::solid}, {"surface", BodyKind::surface}});
   read_motion(keys, obstacle.motion);
@@ -153,9 +154,9 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   }
   if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
-    if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
+    if (key) key.refuse("belongs to a mesh; a half_space is defined by normal and offset");
   for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.reverse_after})
-    if (key) key.refuse("belongs to a mesh; a half_space stands still, so give what is to move as a mesh");
+    if (key) key.refuse("belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);
   if (half_space) scene.half_spaces.push_back(settings);
@@ -189,9 +190,9 @@ void read_added(TomlTable& table, SceneSettings& scene) {
 }  // namespace
 
 void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene) {
-  SceneSettings with = scene;
-  read_toml_node(source, obstacle, read_added, with);
-  scene = std::move(with);
+  SceneSettings extended = scene;
+  read_toml_node(source, obstacle, read_added, extended);
+  scene = std::move(extended);
 }
 
 SceneSettings load_scene(const std::filesystem::path& file) {

@@ -130,25 +130,25 @@ bool is_header(Columns columns, std::string_view line) {
 /// Rejects a step from one pose to the next that no hand can make.
 void check_step(Reader& reader, std::size_t line, const TimedPose& from, const TimedPose& to) {
   const double h_s = to.time_s - from.time_s;
-  const double way_m = (to.X.translation_m - from.X.translation_m).norm();
-  const double turn_rad = from.X.rotation.angularDistance(to.X.rotation);
+  const double distance_m = (to.X.translation_m - from.X.translation_m).norm();
+  const double rotation_rad = from.X.rotation.angularDistance(to.X.rotation);
   if (!(h_s > 0.0))
     reader.refuse(line, 1,
                   "time_s is " + to_text(to.time_s) + ", and " + to_text(from.time_s) +
-                      " in the line before; times must rise: sort the lines, and leave out repeated ones");
+                      " in the line before; times must ascend: sort the lines, and leave out repeated ones");
   else if (h_s > kMaxTableGap_s)
     reader.refuse(line, 1,
                   "a gap of " + to_text(h_s) + " s; give a pose at least every " + to_text(kMaxTableGap_s) +
-                      " s, or write a hand script, which is made for far waypoints");
-  else if (way_m > kMaxTableSpeed_m_per_s * h_s)
+                      " s, or use a hand script, which interpolates between distant waypoints");
+  else if (distance_m > kMaxTableSpeed_m_per_s * h_s)
     reader.refuse(line, 1,
-                  "a jump of " + to_text(way_m) + " m in " + to_text(h_s) +
+                  "a jump of " + to_text(distance_m) + " m in " + to_text(h_s) +
                       " s, which no hand makes; give metres and seconds");
-  else if (turn_rad > kMaxTableRotation_rad)
+  else if (rotation_rad > kMaxTableRotation_rad)
     reader.refuse(line, 1,
-                  "a turn of " + to_text(turn_rad) +
-                      " rad in one step; give poses between, so that it is "
-                      "plain which way round is meant");
+                  "a rotation of " + to_text(rotation_rad) +
+                      " rad in one step; add poses between, so that the "
+                      "direction of rotation is unique");
 }
 
 std::vector<TimedPose> read_table(std::istream& in, const std::string& name, Columns columns) {

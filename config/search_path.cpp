@@ -49,7 +49,7 @@ std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in
   for (const fs::path& place : candidates(name, named_in)) {
     places += (places.empty() ? "" : ", ") + fs::absolute(place).lexically_normal().string();
   }
-  return "no such file; looked for " + places;
+  return "no such file; searched " + places;
 }
 
 fs::path profile_file(const std::string& name) {

@@ -66,7 +66,7 @@ void check_semidefinite(const TomlValue& value, const Matrix6d& K) {
   const double smallest = Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric).eigenvalues().minCoeff();
   if (smallest >= -1e-9 * symmetric.norm()) return;
   value.refuse("its symmetric part has the eigenvalue " + to_text(smallest) +
-               "; it must have none below 0, or it pushes where it should hold");
+               "; it must have none below 0, because the law would push instead of hold");
 }
 
 bool read_gain_matrix(const TomlValue& value, Matrix6d& K) {

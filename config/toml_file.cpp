@@ -29,7 +29,7 @@ void require_regular_file(const fs::path& file) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (status.type() == fs::file_type::not_found) {
-    throw ConfigError(file, {}, "no such file; looked for " + fs::absolute(file).string());
+    throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
   }
   if (error) throw ConfigError(file, {}, "cannot be read: " + error.message());
   if (fs::is_directory(status)) throw ConfigError(file, {}, "is a directory; name a file in it");
@@ -107,7 +107,7 @@ TomlNode convert(const fs::path& file, const toml::node& node, int depth) {
 std::string syntax_message(std::string_view description) {
   std::string message = "is not valid TOML: " + printable(std::string(description), 200);
   if (description.find("redefine") != std::string_view::npos)
-    message += "; a key stands once, keep one of them";
+    message += "; a key may appear once only, keep one of them";
   if (description.find("nested") != std::string_view::npos) message += "; flatten it";
   if (description.find("utf-8") != std::string_view::npos) message += "; save the file as UTF-8";
   return message;

@@ -340,7 +340,7 @@ struct DeviceProfile {
   WrenchReportLayout wrench_report;
 
   FixedReport shutdown;     ///< sent after the zero wrenches of a release
-  FixedReport calibration;  ///< tells the device that its encoders are at the home position
+  FixedReport calibration;  ///< sets the encoders of the device to the home position
   FixedReport keep_alive;
   double keep_alive_period_s = kNotStated;
 };

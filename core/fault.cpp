@@ -198,7 +198,7 @@ constexpr std::array kRows = {
     FaultRow{Fault::degraded_too_long, "degraded_too_long", T::hard_fault, R::zero, kImmediately,
              "time in the state degraded",
              "a temporary fault did not clear within half a second",
-             "a temporary fault that does not clear needs a look at its cause",
+             "a temporary fault that does not clear requires a check of its cause",
              "see the faults before it; then acknowledge"},
     FaultRow{Fault::degraded_too_often, "degraded_too_often", T::hard_fault, R::zero, kImmediately,
              "entries into the state degraded: more than five in ten seconds",

@@ -22,10 +22,10 @@ double DurationStatistic::sd_s() const noexcept {
 
 double DurationStatistic::quantile_s(double share) const noexcept {
   const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
-  std::uint64_t seen = 0;
+  std::uint64_t counted = 0;
   for (std::size_t i = 0; i < kBins; ++i) {
-    seen += bins_[i];
-    if (seen >= wanted) return std::min(max_, static_cast<double>(i + 1) * kBin_s);
+    counted += bins_[i];
+    if (counted >= wanted) return std::min(max_, static_cast<double>(i + 1) * kBin_s);
   }
   return max_;
 }

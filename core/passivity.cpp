@@ -18,8 +18,8 @@ double stated_or_zero(double b) noexcept {
   return is_valid(b) ? b : 0.0;
 }
 
-double capped_ratio(double cap, double b) noexcept {
-  return b > 0.0 ? std::min(1.0, cap / b) : 0.0;
+double capped_ratio(double limit, double b) noexcept {
+  return b > 0.0 ? std::min(1.0, limit / b) : 0.0;
 }
 
 [[noreturn]] void refuse(const char* what) {

@@ -38,7 +38,7 @@ struct SimulatedFault {
     // Firmware
     trip_watchdog,     ///< the watchdog trips at the start of the fault
     disable_watchdog,  ///< the watchdog never trips
-    motors_off,        ///< the motors are off, and the report says so
+    motors_off,        ///< the motors are off, and the report states it
   };
   Kind kind = Kind::silence;
   Duration start{};  ///< start time since power-on

@@ -126,7 +126,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"servo = 5", "1:9", "key 'servo': expected a table, found 5"},
       {"[[servo]]\nrate_Hz = 1000", "1:1", "key 'servo': expected a table, found an array of 1"},
       {"[device]\nscene = 'x.toml'", "2:1", "key 'device.scene' is not known; known keys here: 'profile'"},
-      {"scene = 'nowhere.toml'", "1:9", "no such file; looked for /"},
+      {"scene = 'nowhere.toml'", "1:9", "no such file; searched /"},
       {"scene = 7", "1:9", "expected a text between quotation marks, found 7"},
       {"scene = \"a\\u0000b\"", "1:9", "expected a file name without a zero byte"},
       {"\n[device]\nprofile = 'lopback'", "3:11", "profiles/lopback.toml"},
@@ -193,8 +193,8 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"[simulation]\nplayback = 'none.csv'", "2:12", "none.csv"},
       {"[simulation]\nplayback_mode = \"exact\"", "2:17", "\"open\""},
       {"[recording]\n\"\\u0001\\n\" = 1", "2:1", "key 'recording.?\?' is not known"},
-      {"[servo]\nrate_Hz = 1000\nrate_Hz = 2000", "3:11", "a key stands once, keep one of them"},
-      {"[servo]\nrate_Hz = 1000\n[servo]\ncpu = 1", "3:1", "a key stands once, keep one of them"},
+      {"[servo]\nrate_Hz = 1000\nrate_Hz = 2000", "3:11", "a key may appear once only, keep one of them"},
+      {"[servo]\nrate_Hz = 1000\n[servo]\ncpu = 1", "3:1", "a key may appear once only, keep one of them"},
       {"[servo]\nrate_Hz =", "2:10", "is not valid TOML"},
       {"[servo\nrate_Hz = 1000", "1:7", "is not valid TOML"},
       {"scene = \"no end\n", "1:16", "is not valid TOML"},
@@ -222,12 +222,12 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
   const std::vector<Bad> table = {
       {"", "1:1", "key 'tool' is missing; it has no default, so state it here"},
       {"\n[tool]\nscale = 1.0", "2:1", "key 'tool.mesh' is missing; it has no default"},
-      {"[tool]\nmesh = 'missing.off'", "2:8", "no such file; looked for /"},
+      {"[tool]\nmesh = 'missing.off'", "2:8", "no such file; searched /"},
       {"[tool]\nmesh = '.'", "2:8", "name an OFF, OBJ, STL or PLY file"},
       {"[tool]\nmesh = { make = 'geer' }", "2:17",
-       "key 'tool.mesh.make': nothing of kind 'geer' can be made; did you mean 'gear'?"},
+       "key 'tool.mesh.make': no generated mesh of kind 'geer'; did you mean 'gear'?"},
       {"[tool]\nmesh = { make = 'teapot' }", "2:17",
-       "nothing of kind 'teapot' can be made; there are cube, plate, table,"},
+       "no generated mesh of kind 'teapot'; there are cube, plate, table,"},
       {"[tool]\nmesh = { make = 3 }", "2:17", "key 'tool.mesh.make': expected a text"},
       {"[tool]\nmesh = { triangles = 300 }", "2:8", "key 'tool.mesh.make' is missing"},
       {"[tool]\nmesh = { make = 'gear', triangels = 300 }", "2:25", "did you mean 'triangles'?"},
@@ -255,11 +255,11 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {plane + "{ normal = [0, 0, 1], offset = -inf }", "4:45", "found -inf"},
       {plane + "{ normal = [0, 0, 1], offset_mm = 3 }", "4:36", "give it in m as 'offset'"},
       {plane + "[0, 0, 1, 0]", "4:14", "expected a table, found an array of 4"},
-      {kTool + "[[obstacle]]\nmesh = 'none.off'", "4:8", "no such file; looked for /"},
+      {kTool + "[[obstacle]]\nmesh = 'none.off'", "4:8", "no such file; searched /"},
       {kTool + "[[obstacle]]\nmesh = 'cube.off'\nhalf_space = { normal = [0, 0, 1], offset = 0 }", "5:14",
        "the obstacle has a mesh already; give each shape an [[obstacle]] of its own"},
       {kTool + "[[obstacle]]\nscale = 2.0\nhalf_space = { normal = [0, 0, 1], offset = 0 }", "4:9",
-       "belongs to a mesh; a half_space says where it is by normal and offset"},
+       "belongs to a mesh; a half_space is defined by normal and offset"},
       {kTool + "[[obstacle]]\nmesh = 'cube.off'\nposition_m = [0, 0]", "5:14", "3 numbers"},
       {mesh + "velocity_m_per_s = [0, 1]", "5:20",
        "key 'obstacle[0].velocity_m_per_s': expected an array of 3 numbers, found an array of 2"},
@@ -285,11 +285,10 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_ms = 500", "6:1",
        "give it in s as 'reverse_after_s'"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nvelocity_m_per_s = [0, 0, 1]", "5:20",
-       "belongs to a mesh; a half_space stands still, so give what is to move as a mesh"},
+       "belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nangular_velocity_rad_per_s = [0, 0, 1]", "5:30",
-       "a half_space stands still"},
-      {plane + "{ normal = [0, 0, 1], offset = 0 }\nreverse_after_s = 1", "5:19",
-       "a half_space stands still"},
+       "a half_space cannot move"},
+      {plane + "{ normal = [0, 0, 1], offset = 0 }\nreverse_after_s = 1", "5:19", "a half_space cannot move"},
       {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
        "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'half_space', 'scale'"},
       {kTool + "[[obstacle]]\nname = 'x'", "3:1",
@@ -370,7 +369,7 @@ TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config
       {"waypoint = [3]", "1:13", "key 'waypoint[0]': expected a table, found 3"},
       {point("1", "[0, 0, 0]"), "2:10", "the first waypoint is at time 0"},
       {start + point("1", "[0, 0, 1]") + point("1", "[0, 0, 0]"), "8:10",
-       "times must rise by 0.001 s or more; the waypoint before is at 1 s"},
+       "times must ascend by 0.001 s or more; the waypoint before is at 1 s"},
       {start + point("1", "[0, 0, 1]"), "4:1",
        "ends where it starts; add such a waypoint, or set repeats = false"},
       {start + point("-1", "[0, 0, 0]"), "5:10", "from 0 to 86400 s, found -1"},
@@ -405,8 +404,7 @@ TEST_CASE("a misspelt mandatory key is told once", "[config]") {
 TEST_CASE("what is not a readable file of sensible size is refused", "[config]") {
   const TemporaryDirectory dir;
   const fs::path absent = dir.path() / "absent.toml";
-  CHECK(rejection_text(as_scene, absent) ==
-        absent.string() + ": no such file; looked for " + absent.string());
+  CHECK(rejection_text(as_scene, absent) == absent.string() + ": no such file; searched " + absent.string());
   CHECK(test::rejects_at(rejection_text(as_scene, dir.path()), dir.path().string() + ": ",
                          "is a directory; name a file in it"));
   const fs::path pipe = dir.path() / "pipe";

@@ -90,7 +90,7 @@ TEST_CASE("an invalid recorded path is rejected", "[pose_spline]") {
   };
   CHECK_THROWS_WITH(PoseSpline({}), Contains("has no pose"));
   CHECK_THROWS_WITH(PoseSpline({turned(0.1, 0.0)}), Contains("not at time 0"));
-  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.0, 0.1)}), Contains("times must rise"));
+  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.0, 0.1)}), Contains("times must ascend"));
   CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.1, 2.1)}), Contains("which way round"));
   CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(std::nan(""), 0.1)}), Contains("not finite"));
   CHECK(PoseSpline({turned(0.0, 0.5)}).at(from_seconds(3.0)).X_BG.rotation.x() == Approx(std::sin(0.25)));

@@ -356,7 +356,7 @@ TEST_CASE("wrenchctl solve rejects invalid scenes") {
       {"typo", "scene.toml", tool("mesh = \"body.off\"\nscal = 2.0"), ":3:1", "did you mean 'scale'?"},
       {"no mesh", "scene.toml", tool("scale = 1.0"), ":1:1", "key 'tool.mesh' is missing"},
       {"mesh is no text", "scene.toml", tool("mesh = 3"), ":2:8", "expected a text between quotation marks"},
-      {"mesh is not there", "scene.toml", tool("mesh = \"no.off\""), ":2:8", "no such file; looked for "},
+      {"mesh is not there", "scene.toml", tool("mesh = \"no.off\""), ":2:8", "no such file; searched "},
       {"scale of another type", "scene.toml", tool("mesh = \"body.off\"\nscale = \"mm\""), ":3:9",
        "expected a number"},
       {"scale zero", "scene.toml", tool("mesh = \"body.off\"\nscale = 0"), ":3:9", "from 1e-09 to 1000000 m"},
@@ -375,7 +375,7 @@ TEST_CASE("wrenchctl solve rejects invalid scenes") {
       {"no offset", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, 1, 0]"), ":4:14",
        "half_space.offset' is missing"},
       {"mesh obstacle", "scene.toml", "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"none.off\"\n",
-       ":4:8", "no such file; looked for"},
+       ":4:8", "no such file; searched"},
       {"binary", "scene.toml",
        std::string("\x7f"
                    "ELF\0\1\2",
@@ -719,7 +719,7 @@ TEST_CASE("wrenchctl decode and encode reject invalid input with location and re
   refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
   refuses({"decode", "loopback", "--hex", "01 02"},
           "these 2 bytes match no report of loopback:\n  report 0x01 has 64 bytes");
-  refuses({"decode", "nobody", "--hex", "01"}, "no such file; looked for ");
+  refuses({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
   refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
   refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
   refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
