@@ -406,7 +406,7 @@ TEST_CASE("wrenchctl solve rejects invalid meshes") {
        "belongs to face 0 only: the surface is open (4 in all); close the hole"},
       {"self-intersecting", "body.off",
        as_off(concatenated(box({0, 0, 0}, {2, 2, 2}), box({1, 1, 1}, {3, 3, 3}))), "",
-       "cut through each other"},
+       "intersect each other"},
   });
 }
 
@@ -416,7 +416,7 @@ TEST_CASE("wrenchctl solve repairs a mesh and reports the repair on standard err
   const ProgramResult result = bench.solve();
   CHECK(result.exit_code == 0);
   CHECK(result.err ==
-        "wrenchctl: " + bench.mesh.string() + ": turned 6 faces round, first face 0 near (-25, 25, -25)\n");
+        "wrenchctl: " + bench.mesh.string() + ": flipped 6 faces, first face 0 near (-25, 25, -25)\n");
   CHECK(std::abs(rows_of(contents(bench.out)).at(0).at("energy") - kEnergy) < 1e-9);
 }
 
@@ -436,7 +436,7 @@ TEST_CASE("wrenchctl accepts an open mesh as an obstacle of kind surface") {
   const ProgramResult checked = run_program("wrenchctl", {"check", scene.string()});
   INFO(checked.err);
   CHECK(checked.exit_code == 0);
-  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": taken as a surface") !=
+  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": used as a surface") !=
         std::string::npos);
   const fs::path poses =
       dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.05,0,0,0,1\n0,0,-0.1,0,0,0,1\n0,0,-0.1,0,0,0,1\n");
@@ -461,14 +461,14 @@ TEST_CASE("wrenchctl mesh and check report repairs and an implausible size") {
   CHECK(mesh.err == "");
   for (const char* line :
        {"faces              7\n", "repaired           removed 1 duplicate face: face 6 near (0, 0, 0)\n",
-        "repaired           turned 1 face round: face 2 near (0, 0, 80)\n", "triangles          12\n",
+        "repaired           flipped 1 face: face 2 near (0, 0, 80)\n", "triangles          12\n",
         "remark             as a tool, its largest side is 80 m at scale 1: were millimetres taken for "
         "metres? 'scale' would be 0.001\n"})
     CHECK(mesh.out.find(line) != std::string::npos);
   const fs::path scene = dir.write("scene.toml", "[tool]\nmesh = \"body.ply\"\n");
   const ProgramResult check = run_program("wrenchctl", {"check", scene.string()});
   CHECK(check.exit_code == 0);
-  CHECK(check.out.find("  changed: " + file.string() + ": turned 1 face round") != std::string::npos);
+  CHECK(check.out.find("  changed: " + file.string() + ": flipped 1 face") != std::string::npos);
   CHECK(check.out.find("  remark: " + file.string() + ": its largest side is 80 m") != std::string::npos);
   CHECK(run_program("wrenchctl", {"mesh", file.string(), "--scale", "0.001"}).out.find("remark") ==
         std::string::npos);
@@ -866,7 +866,7 @@ TEST_CASE("wrenchctl solve without --proxy leaves obstacles at their start and r
   const ProgramResult planar =
       run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--method", "planar"});
   CHECK(planar.exit_code == 1);
-  CHECK(planar.err.find("the obstacle 'lift' moves, which only method exact can deal with") !=
+  CHECK(planar.err.find("the obstacle 'lift' moves, and only method exact supports moving obstacles") !=
         std::string::npos);
   const ProgramResult check = run_program("wrenchctl", {"check", scene});
   CHECK(check.exit_code == 0);
