@@ -718,10 +718,10 @@ TEST_CASE("wrenchctl decode and encode reject invalid input with location and re
   refuses({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
   refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
   refuses({"decode", "loopback", "--hex", "01 02"},
-          "these 2 bytes are no report of loopback:\n  report 0x01 has 64 bytes");
+          "these 2 bytes match no report of loopback:\n  report 0x01 has 64 bytes");
   refuses({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
-  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: six numbers are wanted, and 3 given");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is wrong, at 'x'");
+  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
   refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
   refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "expected six numbers, found 7");
   refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split accepts no wrench");
