@@ -416,8 +416,8 @@ Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
 Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
   const ServoLoop::HandlePose pose = loop_.handle_pose();
-  const auto pose_of = [](const PoseSettings& placed) {
-    return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
+  const auto pose_of = [](const PoseSettings& pose_settings) {
+    return Pose{rotation_from(pose_settings.rotation_vector_rad), pose_settings.position_m};
   };
   const DeviceSettings& device = config_.settings.device;
   // The configured camera belongs to the configured scene. A scene that a client has loaded has no camera.
