@@ -22,8 +22,8 @@ class FeasiblePoseSearch {
  public:
   explicit FeasiblePoseSearch(const Scene& scene);
 
-  /// Returns true if the tool overlaps no obstacle at X_WT and lies outside every solid. time_s: scene time of
-  /// the obstacle poses [s]. Not RT-safe: may take milliseconds.
+  /// Returns true if the tool overlaps no obstacle at X_WT and lies outside every solid. time_s: scene time
+  /// of the obstacle poses [s]. Not RT-safe: may take milliseconds.
   bool admissible(const Pose& X_WT, double time_s = 0.0) noexcept;
 
   /// Returns the admissible pose nearest to X_WP with its contacts. Returns status infeasible if no pose was

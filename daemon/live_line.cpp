@@ -38,9 +38,9 @@ std::string state(const TickRecord& r) {
   const auto state = static_cast<State>(r.state);
   if (r.state_cause != 0 && (is_latched(state) || state == State::degraded))
     return fmt::format("{}:{}", name(state), fault_row(static_cast<Fault>(r.state_cause)).name);
-  if (const auto placing = static_cast<ProxyInitialization>(r.proxy_initialization);
-      placing != ProxyInitialization::complete)
-    return name(placing);
+  if (const auto initialization = static_cast<ProxyInitialization>(r.proxy_initialization);
+      initialization != ProxyInitialization::complete)
+    return name(initialization);
   return name(state);
 }
 

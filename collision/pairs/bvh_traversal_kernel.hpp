@@ -27,8 +27,8 @@ struct SweptBox {
 
 /// `middle`: pose half way. The points of the box deviate from the path of its centre by at most half the
 /// rotation angle times their distance from the centre.
-WRENCHD_INLINE SweptBox swept_box(const TriangleBvh::Box& box, const Transform& middle, const Transform& travel,
-                              const RelativeMotion& motion) noexcept {
+WRENCHD_INLINE SweptBox swept_box(const TriangleBvh::Box& box, const Transform& middle,
+                                  const Transform& travel, const RelativeMotion& motion) noexcept {
   SweptBox out;
   rotate(middle, box.centre, out.centre);
   float displacement[3];

@@ -303,7 +303,7 @@ Json status_json(const DaemonContext& context) {
          {"wake_latency", times_json(timing.wake_latency)},
          {"overruns", timing.overruns.load()},
          {"skipped_ticks", timing.skipped_ticks.load()}}},
-       {"dropped_events", loop.telemetry().events().dropped()}});
+       {"dropped_events", loop.telemetry().dropped_events()}});
   for (const auto& [name, row] : context.status_sections) status[name] = row();
   return status;
 }

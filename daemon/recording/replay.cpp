@@ -48,17 +48,17 @@ class RecordedProxyInitializer final : public ProxyInitializer {
  public:
   void play(const TickRecord& record) noexcept { record_ = &record; }
 
-  void request(const ProxyInitializationRequest& question) noexcept override { question_ = question; }
-  bool take_result(ProxyInitializationResult& answer) noexcept override {
-    const auto placing = static_cast<ProxyInitialization>(record_->proxy_initialization);
-    answer = {question_.id, placing == ProxyInitialization::found, pose_from_numbers(record_->X_WQ),
-              question_.scene_time_s};
-    return placing == ProxyInitialization::found || placing == ProxyInitialization::failed;
+  void request(const ProxyInitializationRequest& request) noexcept override { request_ = request; }
+  bool take_result(ProxyInitializationResult& result) noexcept override {
+    const auto initialization = static_cast<ProxyInitialization>(record_->proxy_initialization);
+    result = {request_.id, initialization == ProxyInitialization::found, pose_from_numbers(record_->X_WQ),
+              request_.scene_time_s};
+    return initialization == ProxyInitialization::found || initialization == ProxyInitialization::failed;
   }
 
  private:
   const TickRecord* record_ = nullptr;
-  ProxyInitializationRequest question_;
+  ProxyInitializationRequest request_;
 };
 
 DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
