@@ -326,15 +326,16 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   Settings configured = file_settings_;  // values from files after the reload
   bool needs_rendering = false, limits_changed = false;
   const bool armed = loop_.telemetry().state() == State::waiting || is_driving(loop_.telemetry().state());
-  for (const SettingKey& key : setting_keys()) {
-    if (key.same(config.settings, file_settings_)) continue;
-    if (key.effect == SettingKey::Effect::restart) {
-      result.not_applied.push_back(std::string(key.name) + ": requires a restart");
+  for (const Setting& setting : setting_table()) {
+    if (setting.effect == Setting::Effect::scene || setting.effect == Setting::Effect::none) continue;
+    if (setting.equal(config.settings, file_settings_)) continue;
+    if (setting.effect == Setting::Effect::restart) {
+      result.not_applied.push_back(setting.name() + ": requires a restart");
       continue;
     }
     Settings wanted = settings;
-    key.copy(config.settings, wanted);
-    if (key.effect == SettingKey::Effect::limits) {
+    setting.copy(config.settings, wanted);
+    if (setting.effect == Setting::Effect::limits) {
       Settings allowed = wanted;
       if (armed) allowed.limits = tighter(settings.limits, wanted.limits, config_.profile);
       if (!setting.equal(allowed, wanted)) {
@@ -348,8 +349,8 @@ ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
       needs_rendering = true;
     }
     settings = wanted;
-    key.copy(config.settings, configured);
-    result.applied.emplace_back(key.name);
+    setting.copy(config.settings, configured);
+    result.applied.push_back(setting.name());
   }
   if (config.settings.device.profile == file_settings_.device.profile &&
       contents(config.settings.device.profile_file) != profile_text_)
