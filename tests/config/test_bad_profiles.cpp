@@ -219,7 +219,7 @@ std::string rejection_text(const std::filesystem::path& file) {
 }
 
 /// One line of the message starts with the place and holds the cure.
-bool operator_instruction(const std::string& message, const std::string& start, const std::string& cure) {
+bool reported_at(const std::string& message, const std::string& start, const std::string& cure) {
   for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1))
     if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
   return false;
@@ -401,10 +401,10 @@ const std::vector<Bad> kTable = {
     {kWhole, kForce, "force = { byte = 4, bits = 16, sign = 2, step_N = 0.001 }", "2, step_N",
      "from -1 to 1, found 2"},
     {kWhole, kForce, "force = { byte = 4, type = \"i16\", signed = true, step_N = 0.001 }", "true",
-     "the type says whether it has a sign"},
+     "the type determines the sign"},
     {kWhole, kForce, "force = { byte = 4, bits = 16, step_N = 0.001, offset = 1 }", "offset = 1",
      "give it in N as 'offset_N'"},
-    {kWhole, kForce, "force = \"none\"", "\"none\"", "say wrench_report = \"none\""},
+    {kWhole, kForce, "force = \"none\"", "\"none\"", "state wrench_report = \"none\""},
     {kWhole, "step_m = 1e-7", "step_mm = 1e-4", "step_mm", "give it in m as 'step_m'"},
     {kWhole, "\"i32\", step_m", "\"i64\", step_m", "\"i64\"", R"(expected "i8", "i16" or "i32")"},
     {kWhole, "[{ byte = 33, bit = 3 }", "[{ byte = 33, bit = 6 }", "{ byte = 33, bit = 6 }]",
@@ -518,7 +518,7 @@ TEST_CASE("a hundred bad profiles are refused at their place, with the cure", "[
     const std::string message = rejection_text(file);
     const std::string start = file.string() + ":" + recording_path(text, bad) + ": ";
     INFO(bad.from << " -> " << bad.to << "\nexpected " << start << "... " << bad.cure << "\ngot " << message);
-    CHECK(operator_instruction(message, start, bad.cure));
+    CHECK(reported_at(message, start, bad.cure));
   }
 }
 
