@@ -127,7 +127,7 @@ Touches touches(const Projection& projection, const Scene& scene, bool of_meshes
     touch.point_W_m = numbers(point_W(contact, tool.kind, obstacle.kind, projection.X_WQ));
     touch.normal_W = numbers(normal_W(contact, projection.X_WQ));
     touch.multiplier_kg_m = multiplier;
-    touch.share = sum > 0.0 ? multiplier / sum : 0.0;
+    touch.load_fraction = sum > 0.0 ? multiplier / sum : 0.0;
     touch.obstacle = contact.obstacle;
     touch.tool_first = tool.first;
     touch.tool_second = tool.second;

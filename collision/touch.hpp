@@ -44,7 +44,7 @@ struct Touch {
   std::array<double, 3> point_W_m{};   ///< where the two touch, in W
   std::array<double, 3> normal_W{};    ///< unit, from the obstacle to the tool
   double multiplier_kg_m = 0.0;        ///< d T / d gap of Eq. (8): what the contact carries
-  double share = 0.0;                  ///< of what all contacts carry, 0 to 1
+  double load_fraction = 0.0;          ///< Multiplier divided by the sum of all multipliers, 0 to 1.
   std::uint32_t obstacle = 0;          ///< number in the scene
   std::uint32_t tool_first = 0;        ///< of the tool's feature, as in Feature
   std::uint32_t tool_second = 0;       ///< likewise

@@ -17,8 +17,8 @@ struct DeviceSample {
   Twist V_BH;                  ///< velocity of the handle point, in B; zero if the device does not report it
   double device_time_s = 0.0;  ///< time of the device clock, unwrapped
   std::uint64_t sequence = 0;  ///< sequence number of the report, unwrapped
-  std::uint64_t acknowledged =
-      0;                         ///< sequence number of the last command that the device accepted, unwrapped
+  /// Sequence number of the last command that the device accepted, unwrapped.
+  std::uint64_t acknowledged = 0;
   TimePoint arrived{};           ///< time at which the newest report reached the host
   std::uint32_t superseded = 0;  ///< older reports that were read together with the newest one
   std::uint32_t missing = 0;     ///< reports lost since the previous sample, from the sequence numbers
@@ -33,8 +33,8 @@ struct DeviceSample {
   DofMask sensed_dofs = kAllDofs;  ///< degrees of freedom whose motion the device reports; the pose is
                                    ///< constant along the others
   DofMask driven_dofs = kAllDofs;  ///< degrees of freedom with a motor
-  DofMask dropped_dofs =
-      kNoDof;  ///< nonzero components of the last wrench without a motor; the device did not apply them
+  /// Nonzero components of the last wrench without a motor; the device did not apply them.
+  DofMask dropped_dofs = kNoDof;
   Fault fault = Fault::none;  ///< fault found in this read; the pose is then the last valid one
 };
 

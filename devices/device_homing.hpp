@@ -33,9 +33,8 @@ class DeviceHoming {
   const HomingState& state() const noexcept { return state_; }
   /// Returns the measured offsets. Empty before the measurement, or if the profile requires no reference.
   const std::vector<AxisOffset>& offsets() const noexcept { return offsets_; }
-  bool device_lost() const noexcept {
-    return device_lost_;
-  }  ///< true if the device was unplugged during homing
+  /// True if the device was unplugged during homing.
+  bool device_lost() const noexcept { return device_lost_; }
 
  private:
   static HomingPlan plan_with_reference(const DeviceProfile& profile);

@@ -109,7 +109,7 @@ void falcon_open(SerialChip& chip, const std::string& firmware_file) {
     throw std::runtime_error(
         "Falcon: it runs no firmware, and none is named; write a profile that inherits falcon, with the file "
         "of "
-        "the maker's SDK as firmware in [endpoints]");
+        "the manufacturer's SDK as firmware in [endpoints]");
   std::ifstream file(firmware_file, std::ios::binary);
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   if (!file || bytes.empty())

@@ -68,7 +68,7 @@ std::string problem_text(const HomingState& state) {
     case HomingProblem::wrong_axis:
       return std::string("That moved ") + kNames[state.moved_axis] + ", not " + axis + ". ";
     case HomingProblem::wrong_direction:
-      return "That moved " + axis + " the other way. ";
+      return "That moved " + axis + " in the opposite direction. ";
     case HomingProblem::velocity_sign_mismatch:
       return "The velocity that the device reports along " + axis + " has the opposite sign of the motion. ";
     case HomingProblem::outside_workspace:

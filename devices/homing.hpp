@@ -96,8 +96,8 @@ class Homing {
   // The handle is still if it stays within these tolerances for this time. The tremor of a supported hand is
   // less than half of the tolerances.
   static constexpr double kStillTime_s = 0.3;
-  static constexpr double kReferenceTime_s =
-      1.0;  ///< time in the reference pose, over which the offset is averaged
+  /// Time in the reference pose, over which the offset is averaged.
+  static constexpr double kReferenceTime_s = 1.0;
   static constexpr double kStillTolerance_m = 0.001;
   static constexpr double kStillTolerance_rad = 0.02;
 

@@ -11,8 +11,8 @@ namespace wrenchd {
 /// A row of equal integers that is expected in a report.
 struct ExpectedField {
   std::string name;  ///< name in the profile
-  std::size_t bit =
-      0;  ///< first bit of the first integer, from the start of the transmitted report, including its id
+  /// First bit of the first integer, from the start of the transmitted report, including its id.
+  std::size_t bit = 0;
   unsigned bits = 0;  ///< width of one integer
   std::size_t count = 1;
   bool is_signed = false;

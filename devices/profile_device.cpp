@@ -85,7 +85,7 @@ bool carries_pose(const PoseReportLayout& layout) noexcept {
 }  // namespace
 
 ProfileDevice::ProfileDevice(DeviceProfile profile, ReportLink& link)
-    : profile_(std::move(profile)), link_(link) {}
+    : profile_(std::move(profile)), link_(link), pose_observer_(dynamic_cast<PoseObserver*>(&link)) {}
 
 void ProfileDevice::open() {
   check_profile(profile_);
@@ -336,7 +336,7 @@ void ProfileDevice::integrate_deflection(TimePoint now) noexcept {
   sample_.fresh = true;
   sample_.X_BH = deflection_->X_BH();
   sample_.V_BH = deflection_->V_BH();
-  link_.show_pose(now, sample_.X_BH);
+  if (pose_observer_ != nullptr) pose_observer_->observe_pose(now, sample_.X_BH);
   if (no_pose) sample_.fault = Fault::sample_stale;
 }
 

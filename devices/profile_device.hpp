@@ -11,6 +11,7 @@
 #include "devices/device.hpp"
 #include "devices/kinematics.hpp"
 #include "devices/links/report_link.hpp"
+#include "devices/pose_observer.hpp"
 #include "devices/report_codec.hpp"
 
 namespace wrenchd {
@@ -41,7 +42,8 @@ class ProfileDevice final : public Device {
   /// Silence of a lock-step device after which ProfileDevice sends a command again.
   static constexpr Duration kLockStepTimeout = std::chrono::milliseconds(10);
 
-  /// The link must outlive the device.
+  /// The link must outlive the device. If the link also implements PoseObserver, as a simulated link does,
+  /// the device sends it each steered pose.
   ProfileDevice(DeviceProfile profile, ReportLink& link);
 
   /// Throws std::runtime_error if the profile is invalid or the link cannot be opened. Not RT-safe: may take
@@ -103,12 +105,13 @@ class ProfileDevice final : public Device {
 
   DeviceProfile profile_;
   ReportLink& link_;
+  PoseObserver* pose_observer_;  ///< the link, if it observes the steered pose; otherwise null
   bool open_ = false;
   bool disconnected_ = false;
 
   bool same_frames_ = true;  ///< true if D = B and E = H
-  std::uint64_t pose_layouts_ =
-      0;  ///< bit mask of the reports that carry a part of the pose; bit 0 is pose_report
+  /// Bit mask of the reports that carry a part of the pose; bit 0 is pose_report.
+  std::uint64_t pose_layouts_ = 0;
   const ReportField* device_time_field_ = nullptr;  ///< device_time field; null if the device has no clock
   const ReportField* acknowledged_field_ = nullptr;
 
@@ -117,11 +120,11 @@ class ProfileDevice final : public Device {
   std::uint64_t layouts_since_open_ = 0;  ///< bit mask of the layouts received since open()
   std::uint64_t layouts_this_read_ = 0;   ///< bit mask of the layouts received in this read
   bool report_received_ = false;          ///< true if a valid report arrived since open()
-  std::optional<TimePoint>
-      silent_since_;                ///< arrival time of the last valid report, or time of the first read
-  std::uint64_t sequence_ = 0;      ///< raw sequence of the last valid report
-  std::uint64_t device_time_ = 0;   ///< raw device time of the last valid report
-  std::uint64_t device_ticks_ = 0;  ///< device time of the last valid report, unwrapped
+  /// Arrival time of the last valid report, or time of the first read.
+  std::optional<TimePoint> silent_since_;
+  std::uint64_t sequence_ = 0;                 ///< raw sequence of the last valid report
+  std::uint64_t device_time_ = 0;              ///< raw device time of the last valid report
+  std::uint64_t device_ticks_ = 0;             ///< device time of the last valid report, unwrapped
   std::optional<std::uint64_t> acknowledged_;  ///< raw acknowledged sequence of the last valid report
   std::optional<Pose> previous_pose_;          ///< last valid pose, also if it jumped
   double previous_pose_time_s_ = 0.0;          ///< device time of previous_pose_

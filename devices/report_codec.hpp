@@ -37,8 +37,8 @@ struct WrenchReport {
   double hold_time_s = 0.0;    ///< time for which the device may apply the command; 0: default of the device
   std::uint64_t sequence = 0;  ///< raw; wraps at the width of its field
   bool enable = false;         ///< true: motors on
-  std::array<double, kMaxMotors>
-      efforts{};  ///< motor efforts, for devices that accept efforts instead of a wrench
+  /// Motor efforts, for devices that accept efforts instead of a wrench.
+  std::array<double, kMaxMotors> efforts{};
 };
 
 /// A decoded report. If the outcome is not ok, the report has its default values.

@@ -39,24 +39,24 @@ struct UsageRange {
 
 /// A run of equal, consecutive fields of a report: the fields of one Input, Output or Feature item.
 struct DescribedField {
-  std::size_t bit =
-      0;  ///< first bit of the first field, from the start of the transmitted report, including its id
+  /// First bit of the first field, from the start of the transmitted report, including its id.
+  std::size_t bit = 0;
   unsigned bits = 0;             ///< width of one field, 1 to 256
   std::size_t count = 0;         ///< number of fields, 1 or more
   std::int64_t logical_min = 0;  ///< below 0: two's complement; otherwise unsigned
   std::int64_t logical_max = 0;
-  std::int64_t physical_min =
-      0;  ///< physical value of logical_min in the unit; both physical values 0: not stated
+  /// Physical value of logical_min in the unit; both physical values 0: not stated.
+  std::int64_t physical_min = 0;
   std::int64_t physical_max = 0;   ///< physical value of logical_max in the unit
   std::uint32_t unit = 0;          ///< code as in HID 1.11 section 6.2.2.7; 0: none
   int unit_exponent = 0;           ///< decimal exponent of the unit, -8 to 7
   std::vector<UsageRange> usages;  ///< usages in the order of the descriptor; ranges are not expanded
   bool constant = false;           ///< padding
-  bool variable =
-      false;  ///< true: each field is a value of its own; false: an array of indices into the usages
+  /// true: each field is a value of its own; false: an array of indices into the usages
+  bool variable = false;
   bool relative = false;
-  std::size_t collection =
-      0;  ///< innermost collection of the field: index into ReportDescriptor::collections
+  /// Innermost collection of the field: index into ReportDescriptor::collections.
+  std::size_t collection = 0;
   std::size_t declared_at = 0;  ///< byte of the descriptor
 
   bool is_signed() const noexcept { return logical_min < 0; }

@@ -16,8 +16,8 @@ namespace wrenchd {
 struct DeviceCriteria {
   std::string profile = {};  ///< name of the profile; empty: any profile for a real device
   std::string serial = {};   ///< serial number of the device; empty: any
-  std::optional<UsbDevice> previous =
-      {};  ///< the device that was driven and then unplugged: only this device is selected again
+  /// The device that was driven and then unplugged: only this device is selected again.
+  std::optional<UsbDevice> previous = {};
 };
 
 /// The selected device, and the reasons why the others are rejected.

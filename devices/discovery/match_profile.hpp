@@ -33,8 +33,8 @@ struct DeviceIdentity {
 struct MatchResult {
   std::optional<std::size_t> profile;  ///< index into the profiles
   std::string refusal;  ///< why no profile is used: an unusable device, or several matching profiles
-  std::vector<std::string>
-      rejections;  ///< one entry per profile, in their order: why it does not match; empty if it matches
+  /// One entry per profile, in their order: why it does not match; empty if it matches.
+  std::vector<std::string> rejections;
 };
 
 /// Finds the profile of a device. If several match, a profile that names the serial number has priority, then

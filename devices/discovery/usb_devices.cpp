@@ -73,18 +73,18 @@ void read_descriptor(UsbDevice& device) {
   constexpr std::uint8_t usage_page = 0x04, report_id = 0x84, usage = 0x08, collection = 0xA0,
                          long_item = 0xFE;
   bool in_collection = false;
-  std::span<const std::uint8_t> rest(device.report_descriptor);
-  while (!rest.empty()) {
-    const std::uint8_t prefix = rest[0];
+  std::span<const std::uint8_t> remaining(device.report_descriptor);
+  while (!remaining.empty()) {
+    const std::uint8_t prefix = remaining[0];
     const bool is_long = prefix == long_item;
     const std::size_t head = is_long ? 3 : 1;
-    if (rest.size() < head) return;
+    if (remaining.size() < head) return;
     constexpr std::array<std::size_t, 4> sizes{0, 1, 2, 4};
-    const std::size_t size = is_long ? rest[1] : sizes[prefix & 3U];
-    if (rest.size() < head + size) return;
+    const std::size_t size = is_long ? remaining[1] : sizes[prefix & 3U];
+    if (remaining.size() < head + size) return;
     std::uint32_t value = 0;
     for (std::size_t i = 0; i < std::min<std::size_t>(size, 4); ++i)
-      value |= static_cast<std::uint32_t>(rest[head + i]) << (8 * i);
+      value |= static_cast<std::uint32_t>(remaining[head + i]) << (8 * i);
     const std::uint8_t item = is_long ? std::uint8_t{0} : static_cast<std::uint8_t>(prefix & 0xFCU);
     if (item == report_id) device.numbered_reports = true;
     if (item == collection) in_collection = true;
@@ -93,7 +93,7 @@ void read_descriptor(UsbDevice& device) {
       device.usage = static_cast<std::uint16_t>(value);
       if (size == 4) device.usage_page = static_cast<std::uint16_t>(value >> 16U);
     }
-    rest = rest.subspan(head + size);
+    remaining = remaining.subspan(head + size);
   }
 }
 

@@ -20,8 +20,8 @@ struct UsbDevice {
   std::string serial;  ///< empty if the device has no serial number
   std::string manufacturer;
   std::string product_name;
-  std::vector<std::uint8_t>
-      report_descriptor;         ///< raw bytes from the kernel; empty if the interface is not HID
+  /// Raw bytes from the kernel; empty if the interface is not HID.
+  std::vector<std::uint8_t> report_descriptor;
   std::uint16_t usage_page = 0;  ///< of the first collection; 0 if the interface is not HID
   std::uint16_t usage = 0;
   bool numbered_reports = false;  ///< true if reports begin with their id

@@ -26,8 +26,8 @@ class HostWatchdog {
  public:
   /// Makes a watchdog that never sends.
   HostWatchdog() noexcept = default;
-  /// timeout: timeout since the last command of the loop. For a device without motors the watchdog never sends.
-  /// Not RT-safe: allocates.
+  /// timeout: timeout since the last command of the loop. For a device without motors the watchdog never
+  /// sends. Not RT-safe: allocates.
   HostWatchdog(const DeviceProfile& profile, Duration timeout);
 
   /// Processes a report that the loop sent at `now`. RT-safe.

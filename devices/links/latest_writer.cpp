@@ -15,7 +15,7 @@ namespace wrenchd {
 
 struct LatestWriter::SharedState {
   SharedState(Write how, const LinkSettings& settings)
-      : write(std::move(how)), slot(settings.write_deadline), last_word(settings.host_watchdog) {}
+      : write(std::move(how)), slot(settings.write_deadline), host_watchdog(settings.host_watchdog) {}
 
   void run() noexcept;
   bool next(Packet& packet) noexcept;
@@ -23,7 +23,7 @@ struct LatestWriter::SharedState {
 
   Write write;
   WriteSlot slot;
-  HostWatchdog last_word;
+  HostWatchdog host_watchdog;
   WakeUp wake;
   std::atomic<bool> closing{false};
 
@@ -42,7 +42,7 @@ void LatestWriter::SharedState::run() noexcept {
       write_one(packet);
       last_round = false;
     } else if (!last_round) {
-      wake.wait_until(last_word.due());
+      wake.wait_until(host_watchdog.due());
     }
   }
   const std::lock_guard lock(mutex);
@@ -54,8 +54,8 @@ void LatestWriter::SharedState::run() noexcept {
 bool LatestWriter::SharedState::next(Packet& packet) noexcept {
   const bool has_report = slot.take(packet);
   const TimePoint now = std::chrono::steady_clock::now();
-  if (has_report) last_word.feed(now, packet);
-  return has_report || last_word.send_zero(now, packet);
+  if (has_report) host_watchdog.feed(now, packet);
+  return has_report || host_watchdog.send_zero(now, packet);
 }
 
 void LatestWriter::SharedState::write_one(const Packet& packet) noexcept {

@@ -28,8 +28,7 @@ void LoopbackLink::open() {
   const TimePoint now = clock_.now();
   advance_to(now);
   if (device_.fault_active_during(Kind::unplug, now, now))
-    throw std::runtime_error(
-        "simulated device: unplugged by an injected fault; wait until the fault ends");
+    throw std::runtime_error("simulated device: unplugged by an injected fault; wait until the fault ends");
   reports_.clear();
   swapped_report_.length = 0;
   last_arrival_ = now;

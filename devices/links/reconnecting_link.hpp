@@ -15,8 +15,8 @@ namespace wrenchd {
 /// Error: the requested device is not connected.
 class DeviceNotFound : public std::runtime_error {
  public:
-  DeviceNotFound(const std::string& what, std::vector<std::string> seen)
-      : std::runtime_error(what), rejected_devices_(std::move(seen)) {}
+  DeviceNotFound(const std::string& what, std::vector<std::string> rejected)
+      : std::runtime_error(what), rejected_devices_(std::move(rejected)) {}
 
   /// Returns the connected devices and why each was rejected, one line each.
   const std::vector<std::string>& rejected_devices() const noexcept { return rejected_devices_; }
@@ -53,6 +53,6 @@ class ReconnectingLink final : public ReportLink {
 };
 
 /// Returns the rejected devices with their reasons, one line each. Not RT-safe: allocates.
-std::vector<std::string> describe_rejected(std::span<const UsbDevice> plugged, const DeviceChoice& choice);
+std::vector<std::string> describe_rejected(std::span<const UsbDevice> connected, const DeviceChoice& choice);
 
 }  // namespace wrenchd

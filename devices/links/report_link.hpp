@@ -6,7 +6,6 @@
 #include <span>
 
 #include "core/clock.hpp"
-#include "core/pose.hpp"
 
 namespace wrenchd {
 
@@ -38,9 +37,6 @@ class ReportLink {
   virtual LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept = 0;
   /// Sleeps until a report is waiting or the deadline has passed. RT-safe except for the intended sleep.
   virtual void wait_readable(TimePoint deadline) noexcept = 0;
-  /// Where a pose that is steered has come to, in the base: what whoever steers sees on the screen. Only a
-  /// simulated hand looks. RT safe.
-  virtual void show_pose(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
   /// Closes the transport; has no effect when closed. Not RT-safe: may wait for the last write.
   virtual void close() noexcept = 0;
 };

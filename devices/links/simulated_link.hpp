@@ -9,13 +9,14 @@
 #include "core/simulation_settings.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/links/report_link.hpp"
+#include "devices/pose_observer.hpp"
 #include "devices/simulation/device_in_hand.hpp"
 
 namespace wrenchd {
 
 /// Link to an emulated device in a simulated hand, without hardware. All members except the constructor,
 /// open() and device() are RT-safe.
-class SimulatedLink final : public ReportLink {
+class SimulatedLink final : public ReportLink, public PoseObserver {
  public:
   /// The clock must outlive the link.
   SimulatedLink(std::unique_ptr<DeviceInHand> device, Clock& clock, const SimulationSettings& settings)
@@ -33,7 +34,8 @@ class SimulatedLink final : public ReportLink {
     return loopback_.write(now, report);
   }
   void wait_readable(TimePoint deadline) noexcept override { loopback_.wait_readable(deadline); }
-  void show_pose(TimePoint now, const Pose& X_BH) noexcept override { device_->observe_pose(now, X_BH); }
+  /// Shows the pose of the device to the simulated hand. RT-safe.
+  void observe_pose(TimePoint now, const Pose& X_BH) noexcept override { device_->observe_pose(now, X_BH); }
   void close() noexcept override { loopback_.close(); }
 
   /// The simulated device, for fault injection and its true state.

@@ -145,7 +145,7 @@ struct UsbLink::TransferThread {
   std::size_t prefix_bytes;
   bool is_byte_stream;  ///< the packets form a byte stream that the framer separates into reports
   StreamFramer framer;
-  HostWatchdog last_word;
+  HostWatchdog host_watchdog;
   libusb_transfer* out = nullptr;
   Packet out_packet;
   std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE + kMaxReportBytes> out_request{};
@@ -172,7 +172,7 @@ UsbLink::TransferThread::TransferThread(const UsbDevice& device, const LinkSetti
       prefix_bytes(settings.prefix_bytes),
       is_byte_stream(settings.frame.length > 0),
       framer(settings.frame),
-      last_word(settings.host_watchdog),
+      host_watchdog(settings.host_watchdog),
       write_deadline(settings.write_deadline),
       close_within(settings.close_timeout) {
   try {
@@ -345,7 +345,7 @@ void UsbLink::TransferThread::sleep() noexcept {
   if (in_failed || in_halted || out_halted) wait = std::min<Duration>(wait, next_retry - now);
   if (out_in_flight && !out_cancelled) wait = std::min<Duration>(wait, out_deadline - now);
   if (close_deadline) wait = std::min<Duration>(wait, *close_deadline - now);
-  if (last_word.due() != TimePoint::max()) wait = std::min<Duration>(wait, last_word.due() - now);
+  if (host_watchdog.due() != TimePoint::max()) wait = std::min<Duration>(wait, host_watchdog.due() - now);
   wait = std::max(wait, Duration::zero());
   timespec timeout{};
   timeout.tv_nsec = wait.count();
@@ -442,8 +442,8 @@ void UsbLink::TransferThread::write_newest() noexcept {
     return;
   const bool has_report = slot.take(out_packet);
   const TimePoint now = std::chrono::steady_clock::now();
-  if (has_report) last_word.feed(now, out_packet);
-  if (!has_report && !last_word.send_zero(now, out_packet)) return;
+  if (has_report) host_watchdog.feed(now, out_packet);
+  if (!has_report && !host_watchdog.send_zero(now, out_packet)) return;
   out->length = static_cast<int>(out_packet.length);
   if (!out_endpoint) {
     write_request();
@@ -540,8 +540,7 @@ void UsbLink::wait_readable(TimePoint deadline) noexcept {
   while (transfers_ && !transfers_->disconnected.load(std::memory_order_acquire) &&
          transfers_->ring.read_available() == 0) {
     if (wait_for_fd(transfers_->readable.fd(), POLLIN, deadline) == 0) return;
-    transfers_->readable
-        .wait();  // consumed before the ring is checked again, so that no wake-up is lost
+    transfers_->readable.wait();  // consumed before the ring is checked again, so that no wake-up is lost
   }
 }
 

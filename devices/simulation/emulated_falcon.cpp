@@ -14,7 +14,6 @@ constexpr std::uint8_t kStartMarker = '<', kEndMarker = '>', kNibble = 'A';
 constexpr std::array<std::uint8_t, 3> kHandshake = {0x0a, 0x43, 0x0d};
 constexpr std::array<std::uint8_t, 4> kHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d};
 constexpr unsigned kHomingBit = 1;
-constexpr unsigned kLights = 0b1110;
 
 int decode_word(std::span<const std::uint8_t> nibbles) noexcept {
   unsigned value = 0;
@@ -125,7 +124,6 @@ bool EmulatedFalcon::take_command(TimePoint, std::span<const std::uint8_t> bytes
   for (std::size_t i = 0; i < 3; ++i)
     efforts_[i] = std::clamp(decode_word(bytes.subspan(1 + 4 * i, 4)), -kMaxEffort, kMaxEffort);
   const unsigned bits = bytes[13] - unsigned{kNibble};
-  lights_ = bits & kLights;
   homing_ = (bits & kHomingBit) != 0;
   homed_ = homed_ && homing_;  // homing ends when the host leaves homing mode
   reply_due_ = true;

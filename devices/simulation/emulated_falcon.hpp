@@ -38,12 +38,10 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   void set_buttons(unsigned buttons) noexcept { buttons_ = buttons & 0x0fu; }
 
   // Faults; the argument is the number of affected packets, blocks or handshakes.
-  void truncate_packets(int packets) noexcept {
-    packets_to_truncate_ = packets;
-  }  ///< truncates packets to 14 bytes
-  void corrupt_firmware_echoes(int blocks) noexcept {
-    echoes_to_corrupt_ = blocks;
-  }  ///< inverts a bit in the echoes of firmware blocks
+  /// Truncates packets to 14 bytes.
+  void truncate_packets(int packets) noexcept { packets_to_truncate_ = packets; }
+  /// Inverts a bit in the echoes of firmware blocks.
+  void corrupt_firmware_echoes(int blocks) noexcept { echoes_to_corrupt_ = blocks; }
   void ignore_handshakes(int times) noexcept { handshakes_to_ignore_ = times; }
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
@@ -60,7 +58,6 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
 
   State state() const noexcept { return state_; }
   bool homed() const noexcept { return homed_; }
-  unsigned lights() const noexcept { return lights_; }  ///< bits 1 to 3: green, blue, red LED
   const std::array<int, 3>& efforts() const noexcept { return efforts_; }
   const std::vector<std::uint8_t>& firmware() const noexcept { return firmware_; }
 
@@ -82,7 +79,7 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   bool reply_due_ = false;
   std::array<int, 3> true_counts_{}, power_on_counts_{}, efforts_{};
   bool homing_ = false, homed_ = false;
-  unsigned buttons_ = 0, lights_ = 0;
+  unsigned buttons_ = 0;
 };
 
 }  // namespace wrenchd

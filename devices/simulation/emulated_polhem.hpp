@@ -35,9 +35,8 @@ class EmulatedPolhem final : public EmulatedArm {
   MotorEfforts motor_efforts() const noexcept override;  ///< motor currents [A]
 
   bool amplifiers_on() const noexcept { return amplifiers_on_; }
-  const std::array<int, 3>& currents_mA() const noexcept {
-    return currents_mA_;
-  }  ///< commanded currents; 0 while the amplifiers are off
+  /// Commanded currents; 0 while the amplifiers are off.
+  const std::array<int, 3>& currents_mA() const noexcept { return currents_mA_; }
   std::uint64_t reports_sent() const noexcept { return reports_sent_; }
 
  private:

@@ -49,12 +49,10 @@ class SimulatedHandle {
 
   const Pose& X_BH() const noexcept { return X_BH_; }
   const Twist& V_BH() const noexcept { return V_BH_; }
-  const Wrench& motor_wrench() const noexcept {
-    return F_motors_;
-  }  ///< wrench applied in the last substep, after the actuator limits
-  const Wrench& hand_wrench() const noexcept {
-    return F_hand_;
-  }  ///< wrench of the hand on the handle in the last substep
+  /// Wrench applied in the last substep, after the actuator limits.
+  const Wrench& motor_wrench() const noexcept { return F_motors_; }
+  /// Wrench of the hand on the handle in the last substep.
+  const Wrench& hand_wrench() const noexcept { return F_hand_; }
   const SimulatedEnergy& energy() const noexcept { return energy_; }
   double kinetic_energy_J() const noexcept;
 

@@ -54,7 +54,7 @@ Vector3d carried(const Touches& touches) {
 
 double shares(const Touches& touches) {
   double sum = 0.0;
-  for (const Touch& touch : touches) sum += touch.share;
+  for (const Touch& touch : touches) sum += touch.load_fraction;
   return sum;
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("the contacts of a proxy name features of both meshes that are where i
       const Touches told = touches(depth.projection, scene, true);
       if (depth.projection.status != ProjectionStatus::converged || told.empty()) continue;
       for (const Touch& touch : told) {
-        if (touch.share == 0.0) continue;
+        if (touch.load_fraction == 0.0) continue;
         const MeshObstacle& obstacle = scene.meshes()[touch.obstacle];
         const Vector3d p_W = vector(touch.point_W_m);
         const Vector3d p_T = inverse(X_WQ) * p_W;
@@ -97,7 +97,7 @@ TEST_CASE("the contacts of a proxy name features of both meshes that are where i
       const Vector3d pulled = 2.0 * mass_kg * (X_WQ.translation_m - X_WP.translation_m);
       CHECK((carried(told) - pulled).norm() < 1e-6 * pulled.norm() + 1e-12);
       CHECK(shares(told) == Approx(1.0).epsilon(1e-12));
-      for (std::size_t i = 1; i < told.size(); ++i) CHECK(told[i].share <= told[i - 1].share);
+      for (std::size_t i = 1; i < told.size(); ++i) CHECK(told[i].load_fraction <= told[i - 1].load_fraction);
     }
   }
   CHECK(slid < (kinds[0] + kinds[1] + kinds[2]) / 500);
@@ -117,7 +117,7 @@ TEST_CASE("the contacts of convex bodies name features of their hulls that are w
     const Touches told = touches(q, c.scene, false);
     REQUIRE_FALSE(told.empty());
     for (const Touch& touch : told) {
-      if (touch.share == 0.0) continue;
+      if (touch.load_fraction == 0.0) continue;
       const Vector3d p_W = vector(touch.point_W_m);
       CHECK(off_hull_m(c.scene.tool().hull, FeatureKind{touch.tool_feature_kind}, touch.tool_first,
                        touch.tool_second, inverse(q.X_WQ) * p_W) < 1e-9);
@@ -147,7 +147,7 @@ TEST_CASE("of more contacts than are told, those that carry most are", "[touch]"
   for (std::size_t i = 0; i < told.size(); ++i) {
     CHECK(told[i].multiplier_kg_m == static_cast<double>(39 - i));
     CHECK((told[i].tool_first * 7) % 40 == 39 - i);
-    CHECK(told[i].share == Approx(static_cast<double>(39 - i) / 780.0));
+    CHECK(told[i].load_fraction == Approx(static_cast<double>(39 - i) / 780.0));
     CHECK(FeatureKind{told[i].tool_feature_kind} == FeatureKind::hull_vertex);
     CHECK(FeatureKind{told[i].obstacle_feature_kind} == FeatureKind::plane);
   }

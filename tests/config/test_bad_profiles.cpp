@@ -5,12 +5,13 @@
 #include <catch2/catch.hpp>
 
 #include "config/load_profile.hpp"
+#include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Four good profiles, one of each kind; each row of the table below spoils one of them.
+/// Four valid profiles, one of each kind. Each row of the table below changes one of them.
 const std::string kWhole = R"(name = "p"
 transport = "hidraw"
 report_rate_Hz = 1000
@@ -169,7 +170,7 @@ efforts = { byte = 1, bits = 16, coding = "nibble_ascii" }
 template = "3c 41 41 41 41 41 41 41 41 41 41 41 41 42 41 3e"
 )";
 
-/// What is changed, where in the changed file the refusal must stand, and what the message must say.
+/// A change of a valid profile, the text at which the message must point, and a part of the message.
 struct Bad {
   const std::string& good;
   std::string from, to;
@@ -177,9 +178,9 @@ struct Bad {
   std::string cure;
 };
 
-/// "line:column" of where the refusal must stand: in what was changed, or the only place of the whole text;
-/// an empty one is its beginning.
-std::string recording_path(const std::string& text, const Bad& bad) {
+/// Returns "line:column" of the expected error: in the changed part, or at the only occurrence in the whole
+/// text; of the beginning if `at` is empty.
+std::string error_location(const std::string& text, const Bad& bad) {
   std::size_t found = bad.to.find(bad.at);
   if (bad.at.empty()) {
     found = 0;
@@ -190,39 +191,12 @@ std::string recording_path(const std::string& text, const Bad& bad) {
     if (found == std::string::npos || text.find(bad.at, found + 1) != std::string::npos)
       return "no single place";
   }
-  std::size_t line = 1, column = 1;
-  for (std::size_t i = 0; i < found; ++i) {
-    ++column;
-    if (text[i] != '\n') continue;
-    ++line;
-    column = 1;
-  }
-  return std::to_string(line) + ":" + std::to_string(column);
+  return test::line_and_column(text, found);
 }
 
-std::string spoiled(const Bad& bad) {
-  std::string text = bad.good;
-  const std::size_t at = text.find(bad.from);
-  INFO("changing " << bad.from << " in\n" << text);
-  REQUIRE(at != std::string::npos);
-  REQUIRE(text.find(bad.from, at + 1) == std::string::npos);
-  return text.replace(at, bad.from.size(), bad.to);
-}
-
+/// Returns the message with which the profile is rejected; empty if it loads.
 std::string rejection_text(const std::filesystem::path& file) {
-  try {
-    load_profile(file, SearchPath({file.parent_path()}));
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "it loads";
-}
-
-/// One line of the message starts with the place and holds the cure.
-bool reported_at(const std::string& message, const std::string& start, const std::string& cure) {
-  for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1))
-    if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
-  return false;
+  return test::rejection_message<ConfigError>([&] { load_profile(file, SearchPath({file.parent_path()})); });
 }
 
 const std::string kForce = R"(force = { byte = 4, bits = 16, order = "big_endian", step_N = 0.001 })";
@@ -503,22 +477,20 @@ const std::vector<Bad> kTable = {
 
 }  // namespace
 
-TEST_CASE("the profiles that are about to be spoiled are good", "[config]") {
+TEST_CASE("the unchanged profiles load", "[config]") {
   const test::TemporaryDirectory dir;
   for (const std::string* text : {&kWhole, &kMouse, &kArm, &kDelta})
-    CHECK(rejection_text(dir.write("good.toml", *text)) == "it loads");
+    CHECK(rejection_text(dir.write("good.toml", *text)).empty());
 }
 
-TEST_CASE("a hundred bad profiles are refused at their place, with the cure", "[config]") {
+TEST_CASE("a hundred invalid profiles are rejected with location and remedy", "[config]") {
   CHECK(kTable.size() >= 100);
   const test::TemporaryDirectory dir;
   for (const Bad& bad : kTable) {
-    const std::string text = spoiled(bad);
+    const std::string text = test::with(bad.good, bad.from, bad.to);
     const auto file = dir.write("bad.toml", text);
-    const std::string message = rejection_text(file);
-    const std::string start = file.string() + ":" + recording_path(text, bad) + ": ";
-    INFO(bad.from << " -> " << bad.to << "\nexpected " << start << "... " << bad.cure << "\ngot " << message);
-    CHECK(reported_at(message, start, bad.cure));
+    test::check_rejection(rejection_text(file), file.string() + ":" + error_location(text, bad) + ": ",
+                          bad.cure, bad.from + " -> " + bad.to);
   }
 }
 

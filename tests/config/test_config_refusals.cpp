@@ -10,6 +10,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
@@ -17,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::TemporaryDirectory;
+using test::with;
 
 const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
 
@@ -40,17 +42,12 @@ void as_hand_script(const fs::path& file) {
   load_hand_script(file, simulation);
 }
 
-/// What the file is refused with; empty when it loads.
+/// Returns the message with which the loader rejects the file; empty if the file loads.
 std::string rejection_text(Load load, const fs::path& file) {
-  try {
-    load(file);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return {};
+  return test::rejection_message<ConfigError>([&] { load(file); });
 }
 
-/// A file, where it must be refused, and what the message must say.
+/// The text of an invalid file, the location of its error, and a part of the message.
 struct Bad {
   std::string text;
   std::string place;  ///< line:column
@@ -74,14 +71,6 @@ void check_refused(Load load, const std::vector<Bad>& table) {
     INFO(bad.text << "\nexpected " << bad.place << " ... " << bad.cure << "\ngot " << message);
     CHECK(reported_at(message, file.string() + ":" + bad.place + ": ", bad.cure));
   }
-}
-
-/// `text` with its only `from` replaced. A `from` that is not there would make a test say nothing.
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  REQUIRE(text.find(from, at + 1) == std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 const std::string kProfile = R"(name = "p"
@@ -233,7 +222,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
            " = 1",
        "2:1", "has more than 120 dots in one line"},
   };
-  check_refused(as_settings, table);
+  check_rejected(as_settings, table);
 }
 
 TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
@@ -317,7 +306,7 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {kTool + "[obstacle]\nname = 'x'", "3:1", "expected tables, each headed [[obstacle]], found a table"},
       {kTool + "[[obstacles]]\nname = 'x'", "3:3", "did you mean 'obstacle'?"},
   };
-  check_refused(as_scene, table);
+  check_rejected(as_scene, table);
 }
 
 TEST_CASE("a velocity that is refused does not have its turning back refused as well", "[config]") {
@@ -377,7 +366,7 @@ TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") 
       {changed("enable = { byte = 1, bit = 0 }", "enable = { byte = 1, bit = 8 }"), "23:28",
        "from 0 to 7, found 8"},
   };
-  check_refused(as_profile, table);
+  check_rejected(as_profile, table);
 }
 
 TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config]") {
@@ -397,7 +386,7 @@ TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config
       {start + "rotation_vector_deg = [0, 0, 90]", "4:1", "give it in rad as 'rotation_vector_rad'"},
       {point("0", "[0, 0, 40]"), "3:21", "from -10 to 10 m, found 40"},
   };
-  check_refused(as_hand_script, table);
+  check_rejected(as_hand_script, table);
 }
 
 TEST_CASE("everything wrong with a file is told at once, in its order", "[config]") {

@@ -50,19 +50,22 @@ std::vector<fs::path> sources() {
   return files;
 }
 
-/// A text in one line, without the marks that begin comment lines, so that a citation may span two lines.
+/// A text in one line, without comment marks and without the quotes between the parts of a string literal, so
+/// that a citation may continue on the next line.
 class Text {
  public:
   explicit Text(std::string_view text) {
-    static constexpr std::string_view marks = " \t/#*|<!";
+    static constexpr std::string_view marks = " \t/#*|<!\"";
     int line = 1;
     for (std::size_t i = 0; i < text.size(); ++i) {
       char c = text[i];
       if (c == '\n') {
         ++line;
+        if (joined_.ends_with('"')) remove_last();
         while (i + 1 < text.size() && marks.find(text[i + 1]) != std::string_view::npos) ++i;
         c = ' ';
       }
+      if (c == ' ' && joined_.ends_with(' ')) continue;
       joined_ += c;
       line_.push_back(line);
     }
@@ -71,6 +74,11 @@ class Text {
   int line(std::size_t at) const { return line_[at]; }
 
  private:
+  void remove_last() {
+    joined_.pop_back();
+    line_.pop_back();
+  }
+
   std::string joined_;
   std::vector<int> line_;
 };
@@ -202,7 +210,7 @@ class CitationCheck {
     const std::vector<std::string> numbers = numbers_in(match_at(at, citation));
     const bool of_standard = preceded_by(at, R"((?:HID 1\.11|USB 2\.0),? )");
     if (numbers.empty() || of_standard) return;
-    const bool of_paper = preceded_by(at, "paper, "), of_method = preceded_by(at, R"(METHOD\.md, )");
+    const bool of_paper = preceded_by(at, "paper, "), of_method = preceded_by(at, R"(METHOD\.md\)?, )");
     for (const std::string& n : numbers) {
       if (std::count(n.begin(), n.end(), '.') > 1) continue;  // of a standard: neither document is that deep
       if (of_paper && !kPaperSections.contains(n)) report(at, "the paper has no section " + n);
@@ -269,7 +277,9 @@ TEST_CASE("right citations pass, wrong ones are found", "[citations]") {
        {"METHOD (22), core/METHOD.md, section 3.4, Eqs. (26)-(30) and paper, sections 3.2 to 3.4",
         "/// METHOD (24)-(26), METHOD (9), Eq. (8), core/METHOD.md,\n/// section 5",
         "core/METHOD.md, sections 10 and 11", "HID 1.11 section 6.2.2, USB 2.0, section 9.4",
-        "section 6.2.2.4 to 6.2.2.8", "(Sola 2018, Eqs. 143, 144)"}) {
+        "section 6.2.2.4 to 6.2.2.8", "(Sola 2018, Eqs. 143, 144)",
+        "[core/METHOD.md](../core/METHOD.md), section 14",
+        "\"of Eqs. \"\n  \"(43) and \"\n  \"(46) as\\n\""}) {
     INFO(right);
     CHECK(citation_errors(right).empty());
   }

@@ -19,7 +19,7 @@ double norm3(const std::array<double, 6>& x, std::size_t from) {
   return std::hypot(x[from], x[from + 1], x[from + 2]);
 }
 
-/// Of its x axis, seen from above.
+/// Returns the angle of the pose's x axis about the world's z axis.
 double heading_rad(const Pose& X) {
   const Vector3d x = X.rotation * Vector3d::UnitX();
   return std::atan2(x.y(), x.x());
@@ -69,7 +69,7 @@ GalleryRun run_gallery_scene(const std::string& name, double seconds) {
   const auto count = static_cast<std::size_t>(std::lround(last_s * run.config.settings.servo.rate_Hz)) + 1;
   TimePoint first{};
   for (std::size_t i = 0; i < count; ++i) {
-    if (i == 1) station.runtime.loop().arm();
+    if (i == 1) station.runtime.loop().requests().arm();
     station.tick();
     if (i == 0) first = station.clock.now();
     run.ticks.push_back(station.last);
@@ -121,7 +121,7 @@ std::vector<ExpectedFigure> expected_figures(const std::string& name) {
   std::ifstream in(file);
   std::vector<ExpectedFigure> all;
   std::string line;
-  std::getline(in, line);  // time_s,quantity,least,most
+  std::getline(in, line);  // the header: time_s,quantity,min,max
   while (std::getline(in, line)) {
     std::istringstream cells(line);
     std::string time, quantity, least, most;

@@ -9,11 +9,12 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/scene.hpp"
 #include "core/inertia.hpp"
+#include "tests/support/rejection.hpp"
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or refused
-// with its name, the place and the cure.
+// Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or rejected
+// with its name, the location and the remedy.
 
 namespace wrenchd {
 namespace {
@@ -31,7 +32,7 @@ PolygonSoup ball() {
   return soup;
 }
 
-/// Faces spread evenly, `count` of them.
+/// Returns the i-th of `count` evenly distributed face indices.
 std::size_t spread(std::size_t i, std::size_t count, const PolygonSoup& soup) {
   return i * soup.faces.size() / count;
 }
@@ -39,7 +40,7 @@ std::size_t spread(std::size_t i, std::size_t count, const PolygonSoup& soup) {
 enum class Format { off, obj, stl, ply };
 constexpr std::array<Format, 4> kFormats = {Format::off, Format::obj, Format::stl, Format::ply};
 
-/// STL and PLY come as text and as binary, by severity; PLY in both orders of bytes.
+/// The severity selects text or binary STL and PLY, and the byte order of PLY.
 bool binary(Format format, std::size_t severity) {
   return (format == Format::stl || format == Format::ply) && severity % 2 == 0;
 }
@@ -64,13 +65,13 @@ std::string written(const PolygonSoup& soup, Format format, std::size_t severity
 }
 
 struct Expected {
-  enum class Outcome { accepted, repaired, refused } outcome;
-  std::string words;        ///< that are told
-  bool as_surface = false;  ///< it can be used as one
+  enum class Outcome { accepted, repaired, rejected } outcome;
+  std::string words;        ///< part of the report or of the message
+  bool as_surface = false;  ///< the mesh is valid as a surface
 };
 constexpr auto accepted = Expected::Outcome::accepted;
 constexpr auto repaired = Expected::Outcome::repaired;
-constexpr auto refused = Expected::Outcome::refused;
+constexpr auto rejected = Expected::Outcome::rejected;
 
 struct Defect {
   std::string name;
@@ -238,21 +239,21 @@ const std::vector<Defect>& defects() {
       {"truncated", cut_short,
        [](std::size_t severity, Format format) {
          // An OBJ is one wherever it ends: it has a hole, or no faces.
-         if (format != Format::obj) return Expected{refused, "export the mesh again"};
-         if (severity < 2) return Expected{refused, "the surface is open", true};
-         return Expected{refused, severity == 2 ? "has no faces" : "expected 3 numbers"};
+         if (format != Format::obj) return Expected{rejected, "export the mesh again"};
+         if (severity < 2) return Expected{rejected, "the surface is open", true};
+         return Expected{rejected, severity == 2 ? "has no faces" : "expected 3 numbers"};
        }},
-      {"not_finite", with_numbers_that_are_none, always({refused, "number"})},
+      {"not_finite", with_numbers_that_are_none, always({rejected, "number"})},
       {"out_of_range", with_indices_out_of_range,
        [](std::size_t severity, Format format) {
          if (format == Format::stl)
-           return Expected{refused, binary(format, severity) ? "bytes, not" : "has 4 vertices"};
-         return Expected{refused, binary(format, severity) ? "uses vertex 162"
-                                  : format == Format::ply  ? "uses vertex 162"
-                                                           : "there is no vertex '16"};
+           return Expected{rejected, binary(format, severity) ? "bytes, not" : "has 4 vertices"};
+         return Expected{rejected, binary(format, severity) ? "uses vertex 162"
+                                   : format == Format::ply  ? "uses vertex 162"
+                                                            : "there is no vertex '16"};
        }},
-      {"hole", in_any_format(with_holes), always({refused, "the surface is open", true})},
-      {"fin", in_any_format(with_fins), always({refused, "belongs to 3 faces", true})},
+      {"hole", in_any_format(with_holes), always({rejected, "the surface is open", true})},
+      {"fin", in_any_format(with_fins), always({rejected, "belongs to 3 faces", true})},
       {"duplicate_points", in_any_format(with_corners_of_their_own),
        [](std::size_t severity, Format format) {
          if (format == Format::stl) return Expected{accepted, ""};  // it has no others
@@ -272,26 +273,26 @@ const std::vector<Defect>& defects() {
        [](std::size_t severity, Format) {
          return Expected{repaired, "turned " + many(kCounts[severity], "face") + " round"};
        }},
-      {"cut_through", in_any_format(with_spikes_through), always({refused, "cut through each other", true})},
+      {"cut_through", in_any_format(with_spikes_through), always({rejected, "cut through each other", true})},
       {"garbage", with_garbage,
        [](std::size_t severity, Format format) {
          constexpr std::array<const char*, 4> words = {"ends before face 320 of ",
                                                        "is no statement of an OBJ file",
                                                        "is no word of an STL file", "face 320 of "};
-         if (format == Format::stl && binary(format, severity)) return Expected{refused, "bytes, not"};
-         return Expected{refused, words[static_cast<std::size_t>(format)]};
+         if (format == Format::stl && binary(format, severity)) return Expected{rejected, "bytes, not"};
+         return Expected{rejected, words[static_cast<std::size_t>(format)]};
        }},
       {"unit", with_another_unit,
        [](std::size_t severity, Format) {
          if (kScales[severity] == 1e4)
            return Expected{repaired, "were millimetres taken for metres? 'scale' would be 0.001"};
-         return Expected{refused, "give 'scale' in metres per mesh unit"};
+         return Expected{rejected, "give 'scale' in metres per mesh unit"};
        }},
   };
   return all;
 }
 
-/// The file as an obstacle, beside a good tool.
+/// Returns a scene with the file as an obstacle and a valid tool.
 SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind kind) {
   SceneSettings settings;
   settings.tool.mesh = tool;
@@ -304,27 +305,32 @@ SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind ki
   return settings;
 }
 
+/// Checks a scene that was built although the mesh has a defect. Returns its repairs and warnings.
+std::string check_accepted(const Scene& scene, const MeshLoader& loader, const Expected& expected) {
+  std::string report;
+  for (const std::string& change : loader.changes()) report += change + "\n";
+  for (const std::string& warning : loader.warnings()) report += warning + "\n";
+  INFO(report);
+  CHECK(expected.outcome == (report.empty() ? accepted : repaired));
+  const TriangleMesh& mesh = scene.meshes()[0].mesh->surface.mesh();
+  const double size = report.find("millimetres") == std::string::npos ? 1.0 : 1e12;
+  CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(kVolume_m3 * size).epsilon(0.02));
+  return report;
+}
+
 void check_file(const fs::path& file, const fs::path& tool, const Expected& expected) {
   MeshLoader loader;
-  std::string told;
-  try {
+  std::string report;
+  const std::string rejection = rejection_message<MeshError>([&] {
     const Scene scene(scene_with(tool, file, BodyKind::solid), loader);
-    for (const std::string& change : loader.changes()) told += change + "\n";
-    for (const std::string& remark : loader.warnings()) told += remark + "\n";
-    INFO(told);
-    CHECK(expected.outcome == (told.empty() ? accepted : repaired));
-    const TriangleMesh& mesh = scene.meshes()[0].mesh->surface.mesh();
-    const double size = told.find("millimetres") == std::string::npos ? 1.0 : 1e12;
-    CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(kVolume_m3 * size).epsilon(0.02));
-  } catch (const MeshError& error) {
-    told = error.what();
-    INFO(told);
-    CHECK(expected.outcome == refused);
-  }
-  INFO(told);
-  CHECK((told.empty() || told.find(file.string() + ":") == 0));
-  CHECK(told.find(expected.words) != std::string::npos);
-  CHECK((told.find("kind = \"surface\"") != std::string::npos) == expected.as_surface);
+    report = check_accepted(scene, loader, expected);
+  });
+  if (!rejection.empty()) report = rejection;
+  INFO(report);
+  if (!rejection.empty()) CHECK(expected.outcome == rejected);
+  CHECK((report.empty() || report.find(file.string() + ":") == 0));
+  CHECK(report.find(expected.words) != std::string::npos);
+  CHECK((report.find("kind = \"surface\"") != std::string::npos) == expected.as_surface);
   if (expected.as_surface) {
     const Scene scene(scene_with(tool, file, BodyKind::surface), loader);
     CHECK(scene.meshes()[0].mesh->surface.kind() == BodyKind::surface);
@@ -332,7 +338,7 @@ void check_file(const fs::path& file, const fs::path& tool, const Expected& expe
   }
 }
 
-TEST_CASE("240 bad meshes are accepted, repaired with a report, or refused with a reason", "[bad_meshes]") {
+TEST_CASE("240 bad meshes are accepted, repaired with a report, or rejected with a reason", "[bad_meshes]") {
   const TemporaryDirectory dir;
   const fs::path tool = dir.write("tool.off", as_off(box({0, 0, 0}, {1, 1, 1})));
   int files = 0;
