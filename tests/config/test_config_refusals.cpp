@@ -233,7 +233,7 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {"[tool]\nmesh = { make = 'gear', triangels = 300 }", "2:25", "did you mean 'triangles'?"},
       {"[tool]\nmesh = { make = 'gear', triangles = 3 }", "2:37",
        "key 'tool.mesh.triangles': expected a whole number from 8 to 20000000, found 3"},
-      {"[tool]\nmesh = { make = 'gear', seed = 3 }", "2:32", "only bumpy and boulder are made by chance"},
+      {"[tool]\nmesh = { make = 'gear', seed = 3 }", "2:32", "only bumpy and boulder are random"},
       {"[tool]\nmesh = { make = 'gear', size_m = [1, 1, 1] }", "2:34",
        "only a box has sides that can be chosen; use 'scale', beside 'mesh'"},
       {"[tool]\nmesh = { make = 'box', size_m = [1, 1, 0] }", "2:40",
