@@ -191,11 +191,11 @@ TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
 TEST_CASE("a device that may not be opened comes with the udev rule", "[list_devices]") {
   const std::string text = list({space_navigator_in(2)}, false, open_to_root);
   CHECK(holds(text,
-              "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add to "
-              "/etc/udev/rules.d/70-wrenchd.rules the line\n"
+              "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add this line to "
+              "/etc/udev/rules.d/70-wrenchd.rules\n"
               "    SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"046d\", ATTRS{idProduct}==\"c626\", "
               "GROUP=\"wrenchd\", MODE=\"0660\"\n"
-              "  and be in the group wrenchd; "));
+              "  and join the group wrenchd; "));
   CHECK_FALSE(holds(text, "can be opened"));
 
   UsbDevice without = space_navigator_in(2);
