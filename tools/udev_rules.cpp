@@ -15,22 +15,24 @@
 namespace wrenchd {
 namespace {
 
-constexpr std::uint16_t kFirstVendorPage = 0xff00;  ///< from here on the kernel makes no input device of it
+/// For usage pages from here on the kernel creates no input device.
+constexpr std::uint16_t kFirstVendorPage = 0xff00;
 
-/// What all profiles of one id want together.
+/// Requirements of all profiles with one id.
 struct Wanted {
   std::vector<std::string> profiles;
   bool hidraw = false;
   bool libusb = false;
   bool motors = false;
-  bool input = false;   ///< the kernel may take it for a pointer
-  bool starts = false;  ///< the service
+  bool input = false;   ///< the kernel may treat the device as a pointer
+  bool starts = false;  ///< connecting the device starts the service
 };
 
 using WantedById = std::map<std::pair<std::uint16_t, std::uint16_t>, Wanted>;
 
 void want(WantedById& wanted, const DeviceProfile& profile, UsbId id) {
-  if (find_unusable_device(id) != nullptr) return;  // never opened, whatever a profile says
+  // Wrenchd never opens this device, independent of profiles.
+  if (find_unusable_device(id) != nullptr) return;
   Wanted& w = wanted[{id.vendor, id.product}];
   if (std::find(w.profiles.begin(), w.profiles.end(), profile.name) != w.profiles.end()) return;
   w.profiles.push_back(profile.name);
@@ -57,7 +59,7 @@ std::string block(std::uint16_t vendor, std::uint16_t product, const Wanted& w) 
                            (w.starts ? R"(, TAG+="systemd", ENV{SYSTEMD_WANTS}+="wrenchd.service")" : "");
   std::string text = "\n# " + v + ":" + p + ":";
   for (const std::string& name : w.profiles) text += " " + name;
-  // By the name that the HID layer gives it, bus:vendor:product.number: it has one over Bluetooth, too.
+  // Matches the HID layer's name bus:vendor:product.number, which also exists for Bluetooth.
   if (w.hidraw)
     text += "\nSUBSYSTEM==\"hidraw\", KERNELS==\"*:" + hex4(vendor, "%04X") + ":" + hex4(product, "%04X") +
             ".*\", " + node;

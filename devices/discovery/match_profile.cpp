@@ -27,8 +27,8 @@ std::string rejection(const PoseReportLayout& report, const std::vector<InputRep
   for (const InputReportSize& device_report : device_reports) {
     if (device_report.id != (report.has_id ? report.id : 0)) continue;
     if (device_report.length >= min_length && device_report.length <= report.length) return {};
-    return name + " of the device has " + std::to_string(device_report.length) +
-           " bytes, in the profile " + std::to_string(report.length);
+    return name + " of the device has " + std::to_string(device_report.length) + " bytes, in the profile " +
+           std::to_string(report.length);
   }
   return name + " of the profile is not in the device's report descriptor";
 }
@@ -61,8 +61,8 @@ std::string rejection(const DeviceIdentity& device, const DeviceProfile& profile
            (device.serial.empty() ? "a device without one" : device.serial);
   if (profile.transport == Transport::libusb && device.interface &&
       *device.interface != profile.endpoints.interface)
-    return "it uses interface " + std::to_string(profile.endpoints.interface) +
-           " of the device, this is " + std::to_string(*device.interface);
+    return "it uses interface " + std::to_string(profile.endpoints.interface) + " of the device, this is " +
+           std::to_string(*device.interface);
   std::string why = rejection_by_usage("the usage page", match.usage_page, device.usage_page);
   if (why.empty()) why = rejection_by_usage("the usage", match.usage, device.usage);
   if (!why.empty()) return why;
@@ -106,8 +106,7 @@ MatchResult match_profile(const DeviceIdentity& device, std::span<const DevicePr
     } else if (priority == best) {
       result.profile.reset();
       result.refusal = "several profiles match " + text(device.id) + ", the last of them " +
-                       profiles[i].name +
-                       "; name one in the configuration, or add the serial number to one";
+                       profiles[i].name + "; name one in the configuration, or add the serial number to one";
     }
     best = std::max(best, priority);
   }

@@ -7,11 +7,13 @@ namespace wrenchd {
 namespace {
 
 constexpr std::string_view kClosed =
-    "its protocol is not public; use the manufacturer's driver, or ask the manufacturer to publish the protocol";
+    "its protocol is not public; use the manufacturer's driver, or ask the manufacturer to publish the "
+    "protocol";
 constexpr std::string_view kNotSixAxes =
     "it is no six-axis device, although its vendor id is that of the SpaceMouse family; no action needed";
 constexpr std::string_view kUnclear =
-    "sources disagree on whether it has six axes; if yours has, send its report descriptor to the wrenchd project";
+    "sources disagree on whether it has six axes; if yours has, send its report descriptor to the wrenchd "
+    "project";
 
 /// Sources of the ids, udev rules and drivers in public repositories: spacenavd (src/dev.c),
 /// jhu-saw/sawSensablePhantom, MXHsj/ros_geomagic_touch_hid, the rules of libdhd.

@@ -167,7 +167,7 @@ TEST_CASE("what a hand cannot do, and what is no table of times, is refused with
       {header, "t.csv:1:1: has no poses"},
       {"px,py,pz,qx,qy,qz,qw\n", "t.csv:1:1: expected the header 'time_s,px,py,pz,qx,qy,qz,qw'"},
       {header + first + "0,0,0,0,0,0,0,1\n",
-       "t.csv:3:1: time_s is 0, and 0 in the line before; times must rise"},
+       "t.csv:3:1: time_s is 0, and 0 in the line before; times must ascend"},
       {header + first + "-1,0,0,0,0,0,0,1\n", "t.csv:3:1: time_s is -1, and 0 in the line before"},
       {header + first + "1.5,0,0,0,0,0,0,1\n", "t.csv:3:1: a gap of 1.5 s; give a pose at least every 1 s"},
       {header + first + "0.001,0.5,0,0,0,0,0,1\n", "t.csv:3:1: a jump of 0.5 m in 0.001 s"},

@@ -71,7 +71,7 @@ struct Steered {
   void tick() {
     clock.sleep_until(clock.now() + 1ms);
     fault = station->loop().tick(clock.now(), clock.now());
-    station->loop().latest_record().read(last);
+    station->loop().telemetry().latest_record().read(last);
   }
   void ticks(int count) {
     for (int i = 0; i < count; ++i) tick();
@@ -280,7 +280,7 @@ TEST_CASE("a device without motors needs no arming, and its silence is no perman
   CHECK(s.state() == State::disarmed);
   CHECK(s.push_up_N() > 5.0);
 
-  s.station->loop().arm();
+  s.station->loop().requests().arm();
   s.ticks(3000);
   CHECK(s.state() == State::active);
   s.mouse.stop_sending();
@@ -330,7 +330,7 @@ TEST_CASE("a steered session replays with the same bits", "[deflection_pose][rep
     RunRecorder recorder(*s.station, file);
     s.ticks(300);
     recorder.append_new_ticks();
-    s.station->loop().arm();
+    s.station->loop().requests().arm();
     for (const std::array<int, 6>& push :
          {kUp, kDown, {200, 40, 350, 90, 0, -200}, {}, {0, 300, 0, 350, 0, 0}}) {
       s.mouse.set_deflection(push);
@@ -383,7 +383,7 @@ TEST_CASE("the simulated hand observes the displayed tool and steers it along it
   for (int i = 0; i < 36000; ++i) {  // three times along the path: the penetration does not accumulate
     clock.sleep_until(clock.now() + 1ms);
     REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().latest_record().read(last);
+    station.loop().telemetry().latest_record().read(last);
     if (i < 2000) continue;  // it starts in the table
     const Pose p = pose_in(last.X_WP), q = pose_in(last.X_WQ);
     pressed_m = std::max(pressed_m, (p.translation_m - q.translation_m).norm());

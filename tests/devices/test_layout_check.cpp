@@ -197,7 +197,7 @@ TEST_CASE("wrenchctl check --against prints the required changes", "[layout_chec
   shorter.replace(shorter.find("95 3f"), 5, "95 3e");
   const ProgramResult bad = check(profile, shorter);
   CHECK(bad.exit_code == 1);
-  CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with what " + source +
+  CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with the report descriptor of " + source +
                        " says of its reports; change the profile, or name the device it is for:\n"
                        "  input report 0x01: the profile has 64 bytes, the device 63\n"
                        "  input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the "

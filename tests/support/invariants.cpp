@@ -8,8 +8,8 @@
 namespace wrenchd::test {
 namespace {
 
-// Of core/state.hpp and core/command.hpp, as numbers of their own: an oracle that asked them would believe
-// them.
+// The states and commands of core/state.hpp and core/command.hpp as separate numbers: an oracle must not
+// depend on the code under test.
 constexpr int kRamping = 4, kActive = 5, kDegraded = 6, kReleasing = 7, kFault = 8, kStopped = 9,
               kShutdown = 10;
 constexpr int kSelfTest = 1;
@@ -56,14 +56,13 @@ std::optional<std::string> Invariants::check(const TickRecord& r) {
   if (r.authority > 0.0 && !drives(state)) return told(r, "I5 authority ", r.authority);
   if (!begun) return {};
 
-  // A tick may stand for at most two periods.
+  // A tick may last up to two periods.
   const double dt_s = 2.0 * limits_.period_s;
   const double last_F = length(&before.F_out[0]), last_T = length(&before.F_out[3]);
   if (F > last_F + limits_.force_slew_N_per_s * dt_s * (1.0 + 1e-9) ||
       T > last_T + limits_.torque_slew_Nm_per_s * dt_s * (1.0 + 1e-9))
     return told(r, "I4 from ", last_F, " to ", F, " N, ", last_T, " to ", T, " N.m");
-  // The tick in which it is risen is the first of `active`; one whose write was refused ends in another
-  // state.
+  // The ramp ends in the first tick of `active`. A tick whose write was refused ends in another state.
   const bool rose =
       state == kRamping || (before.state == kRamping && (state == kActive || r.write_fault != 0));
   if (r.authority > before.authority && !rose)

@@ -29,7 +29,7 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// What loading it as a profile is refused with.
+/// Returns the message with which the profile is rejected.
 std::string rejection_text(const std::string& text) {
   const TemporaryDirectory dir;
   const auto file = dir.write("proposed.toml", text);
@@ -42,7 +42,7 @@ std::string rejection_text(const std::string& text) {
   return {};
 }
 
-/// As a person would who has read the lines marked FILL IN, and can only know what no descriptor tells.
+/// Completes the lines marked FILL IN with values that no descriptor contains.
 std::string completed(std::string text) {
   const std::array<std::array<std::string, 2>, 8> known = {{{"report_rate_Hz", "62.5"},
                                                             {"stale_fault_s", "0.2"},
@@ -67,7 +67,7 @@ DeviceProfile loaded(const std::string& text) {
   return load_profile(dir.write("proposed.toml", text));
 }
 
-/// Six bytes that go from 0 to 255, and rest in the middle.
+/// Six bytes with the range 0 to 255 and the rest count in the middle.
 Bytes unsigned_axes() {
   return from_hex(
       "05 01 09 08 a1 01 85 07 15 00 26 ff 00 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 c0");
@@ -77,7 +77,7 @@ std::string text_of(const Bytes& bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
+TEST_CASE("a proposal contains the content of the descriptor", "[propose_profile]") {
   const std::string text = proposal(space_navigator());
   CHECK(holds(text, "# Made from a test\n# Device: usb 046d:c626, \"SpaceNavigator\"\n"));
   CHECK(holds(text,
@@ -90,12 +90,12 @@ TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
   CHECK(holds(text, "[pose_report]\nid = 0x01\nlength = 7\n"));
   CHECK(holds(text, "\ntranslation = { byte = 1, type = \"i16\", step_m = 4e-06 }\n"));
   CHECK(holds(text, "# Rx 16 bits from byte 1, -350 to 350; Ry 16 bits from byte 3, -350 to 350;"));
-  CHECK(holds(text, "# GUESSED: the step. The descriptor gives no angle for a count;"));
+  CHECK(holds(text, "# GUESSED: the step. The descriptor gives no angle per count;"));
   CHECK(holds(text, "\nid = 0x03\nlength = 3\n# Buttons: 2 bits from byte 1.\n"));
   CHECK(holds(text, "# LED: byte 1 of output report 0x04;"));
 }
 
-TEST_CASE("limits are never guessed, and no proposal loads as it is", "[propose_profile]") {
+TEST_CASE("limits are never guessed, and no proposal loads before its completion", "[propose_profile]") {
   for (const Bytes& bytes : {space_navigator(), space_mouse_wireless(), home_made_combined(), ten_bit_axes(),
                              teensy_rawhid(), effects_joystick()}) {
     const std::string text = proposal(bytes);
@@ -158,13 +158,13 @@ TEST_CASE("the end of a cap's way means the same speed whatever the device count
 
 TEST_CASE("fields of any width at any bit, and the middle of unsigned axes", "[propose_profile]") {
   const std::string text = proposal(ten_bit_axes());
-  CHECK(holds(text, "What the device says of its reports, which have no id:\n"));
+  CHECK(holds(text, "The device's reports, without ids:\n"));
   CHECK(holds(text, "id = \"none\"\nlength = 8\n"));
   CHECK(holds(text, "\ntranslation = { byte = 0, bit = 3, bits = 10, step_m = "));
   CHECK(holds(text, "\nrotation = { byte = 4, bit = 1, bits = 10, step_rad = "));
   CHECK(holds(text, "\nbuttons = { byte = 0, bits = 3 }\n"));
   const std::string middle = proposal(unsigned_axes());
-  CHECK(holds(middle, "# GUESSED: the offset, which makes the count 128 the one at which the cap rests."));
+  CHECK(holds(middle, "# GUESSED: the offset, which assumes the count 128 for the undeflected puck."));
   const PoseReportLayout pose = loaded(completed(middle)).pose_report;
   CHECK_FALSE(pose.translation.is_signed);
   CHECK(pose.translation.step * 128 + pose.translation.offset == Approx(0.0).margin(1e-12));
@@ -218,15 +218,15 @@ TEST_CASE("buttons become a mask of 32, or are told where other things lie betwe
   // A button, seven bits of a dial, a button, padding.
   const std::string apart = proposal(from_hex(axes + bit + "09 01 95 01 81 02 05 01 09 37 75 07 81 02" + bit +
                                               "09 02 81 02 95 07 81 03 c0"));
-  CHECK(holds(apart,
-              "# Buttons: 9 bits from byte 6. There are other things between them:\n# FILL IN: button_list"));
+  CHECK(
+      holds(apart, "# Buttons: 9 bits from byte 6. Other fields lie between them:\n# FILL IN: button_list"));
   CHECK_FALSE(holds(apart, "\nbuttons ="));
 }
 
 TEST_CASE("a report longer than a profile's may be is told", "[propose_profile]") {
   const std::string text =
       proposal(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 41 09 01 81 02 c0"));
-  CHECK(holds(text, "# FILL IN: length. The device says 65 bytes; a profile's report has 64 at most.\n"));
+  CHECK(holds(text, "# FILL IN: length. The device says 65 bytes, but a profile's report has at most 64.\n"));
   CHECK_FALSE(holds(text, "\nlength ="));
   CHECK(holds(text, "\nwrench_report = \"none\" "));
 }
@@ -322,8 +322,8 @@ TEST_CASE("whatever six axes a device has, a proposal with nothing left open loa
 TEST_CASE("what is no device for wrenchd gets no proposal", "[propose_profile]") {
   CHECK_THROWS_WITH(
       proposal(boot_keyboard()),
-      "a test: nothing to propose: it is no multi-axis controller (01:08); its applications are 01:06 "
-      "(keyboard), and has no report of its maker's own; name another device");
+      "a test: nothing to propose: it is no multi-axis controller (01:08); it wants to be 01:06 "
+      "(keyboard), and has no vendor-defined report; name another device");
   CHECK_THROWS_WITH(proposal(from_hex("05 01 c0")),
                     "a test: report descriptor, byte 2: ends a collection, but none is open");
 }
@@ -416,8 +416,8 @@ TEST_CASE("wrenchctl profile refuses bad sources with their place and the cure",
   };
   says((dir.path() / "none").string(), ": no such file; name a /dev/hidrawN");
   says(dir.path().string(), ": is neither a hidraw device nor a regular file");
-  says("/dev/null", ": is no hidraw device; name a /dev/hidrawN");
-  says(dir.write("empty", "").string(), ": is empty; the device may have been unplugged");
+  says("/dev/null", ": is not a hidraw device; name a /dev/hidrawN");
+  says(dir.write("empty", "").string(), ": is empty; check whether the device is still connected");
   says(dir.write("words", "05 01 oh").string(), ":1:7: expected bytes of two hexadecimal digits");
   says(dir.write("comments", "# no bytes\n").string(),
        ": report descriptor, byte 0: the descriptor is empty");

@@ -122,7 +122,8 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
-  REQUIRE(wrenchd.wait_for_output("the device is back, disarmed: 1209:6d0f serial A1 in 1-4"));
+  REQUIRE(
+      wrenchd.wait_for_output("the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
   REQUIRE(soon([&] { return handle->commands() > 300; }));
   CHECK_FALSE(handle->was_pushed());
 
@@ -182,7 +183,7 @@ TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing"
   wrenchctl.signal(SIGINT);
   const ProgramResult result = wrenchctl.wait();
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.err, Contains("stopped; nothing was stored"));
+  CHECK_THAT(result.err, Contains("cancelled; no calibration was stored"));
   CHECK_FALSE(std::filesystem::exists(files.path() / "calibration"));
   CHECK_FALSE(handle.was_pushed());
 }
