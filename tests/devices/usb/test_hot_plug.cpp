@@ -106,7 +106,7 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   const std::string config = files.write("lenient.toml", kLenient).string();
   RunningProgram wrenchd("wrenchd",
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
-  REQUIRE(wrenchd.wait_for_output("no device of profile patient is plugged in; waiting for it"));
+  REQUIRE(wrenchd.wait_for_output("no device of profile patient is connected; waiting for it"));
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
   REQUIRE(wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
