@@ -207,8 +207,8 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
     return json::object();
   }
   if (method == "lease.take") {
-    int nobody = -1;
-    if (!holder_.compare_exchange_strong(nobody, peer) && nobody != peer)
+    int no_holder = -1;
+    if (!holder_.compare_exchange_strong(no_holder, peer) && no_holder != peer)
       throw Refusal{-32003, "another client has the lease; wait until it gives it back"};
     return {{"beat_within_s", 0.1}};
   }
