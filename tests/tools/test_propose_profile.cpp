@@ -337,7 +337,7 @@ TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") 
     CHECK(parse_hex_text(text) == expected);
   CHECK(parse_hex_text("# nothing").empty());
   CHECK_THROWS_WITH(parse_hex_text("05 01\n 5 01"),
-                    Catch::Contains("2:2: expected bytes of two") && Catch::Contains("found '5'"));
+                    Catch::Contains("2:2: expected bytes with two") && Catch::Contains("found '5'"));
   CHECK_THROWS_WITH(parse_hex_text("0x"), Catch::Contains("1:1: "));
   CHECK_THROWS_WITH(parse_hex_text("05 0g"), Catch::Contains("1:4: "));
   CHECK_THROWS_WITH(parse_hex_text("05 01 / 09"), Catch::Contains("1:7: "));
