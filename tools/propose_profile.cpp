@@ -158,7 +158,7 @@ std::string frame_keys(const DescribedReport& report, const std::string& guess =
   const std::string length = std::to_string(report.length);
   std::string text = "id = " + id_text(report.id) + guess + "\n";
   if (report.length <= kMaxReportBytes) return text + "length = " + length + "\n";
-  return text + "# FILL IN: length. The device says " + length +
+  return text + "# FILL IN: length. The device's report has " + length +
          " bytes, but a profile's report has at most " + std::to_string(kMaxReportBytes) + ".\n";
 }
 

@@ -417,7 +417,7 @@ int main(int argc, char** argv) {
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");
-    if (holder.lost_in_time() > 0) violation("a holder that beat in time lost the lease");
+    if (holder.lost_in_time() > 0) violation("a holder with timely heartbeats lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
 
     std::array<Times, kKinds> times;

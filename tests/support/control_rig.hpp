@@ -129,8 +129,8 @@ class RigClient {
       }
       const auto text = read_line(limit);
       if (!text) return nullptr;
-      Json told = Json::parse(*text);
-      if (told.contains("method")) events.push_back(told["params"]);
+      Json message = Json::parse(*text);
+      if (message.contains("method")) events.push_back(message["params"]);
     }
   }
 

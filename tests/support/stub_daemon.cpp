@@ -206,9 +206,9 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
     peers_[peer].subscribed = false;
     return json::object();
   }
-  if (method == "lease.acquire") {
-    int nobody = -1;
-    if (!holder_.compare_exchange_strong(nobody, peer) && nobody != peer)
+  if (method == "lease.take") {
+    int no_holder = -1;
+    if (!holder_.compare_exchange_strong(no_holder, peer) && no_holder != peer)
       throw Refusal{-32003, "another client has the lease; wait until it gives it back"};
     return {{"heartbeat_timeout_s", 0.1}};
   }

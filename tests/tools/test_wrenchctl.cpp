@@ -519,7 +519,7 @@ TEST_CASE("wrenchctl rejects missing input files and unwritable output files") {
   const std::string missing = dir + "/missing";
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{"solve", missing, "--poses", poses}, missing + ": no such file"},
       {{"solve", dir, "--poses", poses}, dir + ": is a directory; name a file in it"},
@@ -538,12 +538,12 @@ TEST_CASE("wrenchctl rejects missing input files and unwritable output files") {
       {{"mesh", dir}, dir + ": is not a file; name an OFF, OBJ, STL or PLY file"},
       {{"mesh", poses}, poses + ": unknown mesh format '.csv'; save it as .off, .obj, .stl or .ply"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find("wrenchctl: " + told) == 0);
+    CHECK(result.err.find("wrenchctl: " + expected) == 0);
   }
   CHECK(std::distance(fs::directory_iterator(bench.dir.path()), fs::directory_iterator()) == 3);
 }
@@ -553,7 +553,7 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
   const std::string scene = bench.scene.string(), poses = bench.poses.string(), mesh = bench.mesh.string();
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{},
        "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, profile, doctor, status, "
@@ -602,12 +602,12 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
       {{"mesh", mesh, "--scale", "nan"}, "--scale: expected a number from"},
       {{"mesh", mesh, mesh}, mesh},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code > 100);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   }
 }
 
@@ -651,13 +651,13 @@ TEST_CASE("wrenchctl check accepts every file that is shipped") {
 
 TEST_CASE("wrenchctl check rejects the files that the daemon rejects") {
   const Bench bench;
-  const auto bad = [&](const std::string& name, const std::string& text, const std::string& told) {
+  const auto bad = [&](const std::string& name, const std::string& text, const std::string& expected) {
     const fs::path file = bench.dir.write(name, text);
     const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
     INFO(name << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   };
   const auto shipped = [](const std::string& name) {
     return contents(fs::path(WRENCHD_SOURCE_DIR) / "config" / name);
@@ -708,12 +708,12 @@ TEST_CASE("wrenchctl decode and encode reject an empty text with an example") {
 }
 
 TEST_CASE("wrenchctl decode and encode reject invalid input with location and remedy") {
-  const auto refuses = [](std::vector<std::string> arguments, const std::string& told) {
+  const auto refuses = [](std::vector<std::string> arguments, const std::string& expected) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\n" << result.err);
+    INFO(expected << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   };
   refuses({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
   refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
