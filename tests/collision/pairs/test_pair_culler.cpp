@@ -219,10 +219,10 @@ TEST_CASE("the culler tests all pairs that were added", "[pair_culler]") {
   for (int list = 0; list < 2; ++list) {
     culler.clear();
     for (std::uint32_t n = 0; n < 16; ++n) culler.add(tool, 0, obstacle, opposite, 0);
-    const auto sift = [&] { return culler.cull(0, here, here, 0.2, 1e-7, remaining.data()); };
-    CHECK(sift().tested == 16);
-    REQUIRE(sift().remaining == 0);
-    CHECK(sift().tested == 0);
+    const auto cull = [&] { return culler.cull(0, here, here, 0.2, 1e-7, remaining.data()); };
+    CHECK(cull().tested == 16);
+    REQUIRE(cull().remaining == 0);
+    CHECK(cull().tested == 0);
   }
 }
 
