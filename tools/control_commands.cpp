@@ -96,7 +96,7 @@ std::string status_text(const Json& s) {
   std::string text = fmt::format("state      {}\n", s["state"].get<std::string>());
   if (const Json& cause = s["cause"]; cause.is_object())
     text += fmt::format("cause      {}: {}\nremedy     {}\n", cause["name"].get<std::string>(),
-                        cause["sentence"].get<std::string>(), cause["cure"].get<std::string>());
+                        cause["message"].get<std::string>(), cause["cure"].get<std::string>());
   const Json &device = s["device"], &limits = s["limits"], &timing = s["timing"];
   text += fmt::format("device     {}{}, {}\n", text_or(device["profile"], "?"),
                       device["simulated"].get<bool>() ? " (simulated)" : "",
@@ -110,12 +110,12 @@ std::string status_text(const Json& s) {
   else if (const double authority = limits["authority"].get<double>(); authority < 1.0)
     text += fmt::format(", scaled to {:.0f} % because the device has no watchdog", 100.0 * authority);
   text += fmt::format("\nstiffness  {:.0f} % of the configured value\n",
-                      100.0 * s["stiffness_share"].get<double>());
+                      100.0 * s["stiffness_scale"].get<double>());
   text += fmt::format("scene      {}, {} obstacles\n", s["scene"]["file"].get<std::string>(),
                       s["scene"]["obstacles"].get<std::uint64_t>());
   text += fmt::format("ticks      {} at {:g} Hz, {} late, {} skipped\n", s["tick"].get<std::uint64_t>(),
                       s["rates"]["rate_Hz"].get<double>(), timing["overruns"].get<std::uint64_t>(),
-                      timing["skipped"].get<std::uint64_t>());
+                      timing["skipped_ticks"].get<std::uint64_t>());
   if (const auto recording = s.find("recording"); recording != s.end()) {
     if (const Json& running = (*recording)["running"]; running.is_object())
       text += fmt::format("recording  {}, {} ticks so far\n", running["file"].get<std::string>(),
@@ -154,8 +154,8 @@ void run_watch(const ControlOptions& options) {
 int run_arm(const ControlOptions& options) {
   catch_signals();
   Client client(options.socket, kResponseTimeout);
-  call(client, "subscribe", {{"events", {"state", "fault", "refused", "lease", "lost"}}});
-  call(client, "lease.take", options.preempt ? Json{{"from_other", true}} : Json::object());
+  call(client, "subscribe", {{"events", {"state", "fault", "arming_refused", "lease", "events_lost"}}});
+  call(client, "lease.acquire", options.preempt ? Json{{"preempt", true}} : Json::object());
   call(client, "arm");
   std::string state = "waiting";
   while (!interrupted) {
@@ -165,7 +165,7 @@ int run_arm(const ControlOptions& options) {
     show(*event, options);
     const auto name = (*event)["name"].get<std::string>();
     if (name == "state") state = (*event)["state"];
-    if (name == "refused" || !is_armed(state)) {
+    if (name == "arming_refused" || !is_armed(state)) {
       wait_for_release(client, options, state);
       std::fputs("wrenchctl: the daemon has disarmed; wrenchctl status shows the cause\n", stderr);
       return 1;
@@ -173,7 +173,7 @@ int run_arm(const ControlOptions& options) {
   }
   call(client, "disarm");
   wait_for_release(client, options, state);
-  call(client, "lease.give");
+  call(client, "lease.release");
   return 0;
 }
 
@@ -181,7 +181,7 @@ void run_request(const std::string& method, const ControlOptions& options) {
   Client client(options.socket, kResponseTimeout);
   const Json result = call(client, method);
   if (options.json) return print(pretty(result));
-  if (!result.contains("asked")) return print(result.empty() ? "done\n" : pretty(result));
+  if (!result.contains("requested")) return print(result.empty() ? "done\n" : pretty(result));
   std::this_thread::sleep_for(150ms);  // duration of the fade and a margin for the event
   print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
 }
@@ -192,7 +192,7 @@ void list_recordings(const ControlOptions& options) {
   if (options.json) return print(pretty(result));
   for (const Json& one : result["recordings"])
     print(fmt::format("{:<48} {:>10.1f} MB  {}\n", one["name"].get<std::string>(),
-                      1e-6 * one["bytes"].get<double>(), one["written"].get<std::string>()));
+                      1e-6 * one["bytes"].get<double>(), one["modified_utc"].get<std::string>()));
   if (result["recordings"].empty())
     print("no recordings in " + result["directory"].get<std::string>() + "\n");
 }
@@ -249,7 +249,7 @@ void run_describe(const ControlOptions& options) {
     if (!options.method.empty() && method["name"] != options.method) continue;
     found = true;
     print(fmt::format("{}  ({})\n  {}\n", method["name"].get<std::string>(),
-                      method["role"].get<std::string>(), method["doc"].get<std::string>()));
+                      method["min_role"].get<std::string>(), method["doc"].get<std::string>()));
     for (const auto& [name, param] : method["params"].items())
       print(fmt::format("    {}: {}{}; {}\n", name, param["type"].get<std::string>(),
                         param["required"].get<bool>() ? "" : ", optional", param["doc"].get<std::string>()));

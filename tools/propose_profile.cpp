@@ -158,7 +158,7 @@ std::string frame_keys(const DescribedReport& report, const std::string& guess =
   const std::string length = std::to_string(report.length);
   std::string text = "id = " + id_text(report.id) + guess + "\n";
   if (report.length <= kMaxReportBytes) return text + "length = " + length + "\n";
-  return text + "# FILL IN: length. The device says " + length +
+  return text + "# FILL IN: length. The device's report has " + length +
          " bytes, but a profile's report has at most " + std::to_string(kMaxReportBytes) + ".\n";
 }
 
@@ -322,9 +322,11 @@ double full_deflection(const SixAxisController& device, const Half& half) {
 std::string steering(const SixAxisController& device) {
   const double full_m = full_deflection(device, kTranslation), full_rad = full_deflection(device, kRotation);
   if (!(full_m >= 1e-5 && full_m <= 1.0 && full_rad >= 1e-4 && full_rad <= 3.2)) return {};
-  return "full_m = " + number_text(full_m, 4) + "\nfull_rad = " + number_text(full_rad, 4) +
+  return "full_deflection_m = " + number_text(full_m, 4) +
+         "\nfull_deflection_rad = " + number_text(full_rad, 4) +
          "\n# GUESSED: values of the shipped SpaceMouse profiles. A push includes some twist.\n"
-         "dead_zone = 0.08\ncurve = 2.0\nleash_m = 0.010\nleash_rad = 0.2\n";
+         "dead_zone = 0.08\nresponse_exponent = 2.0\nmax_proxy_distance_m = 0.010\nmax_proxy_angle_rad = "
+         "0.2\n";
 }
 
 std::string deflection_table(const SixAxisController& device) {

@@ -94,7 +94,7 @@ void EventFeed::emit(const std::string& name, EventLevel level, const std::strin
   append(std::chrono::steady_clock::now(), name, level, text, fields);
 }
 
-/// With the mutex held, so that what an event changes is known with its number and not before.
+/// Precondition: mutex_ is locked, so that snapshot and sequence number change together.
 void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
                        const Json& fields) {
   Json params = {{"sequence", ++snapshot_.sequence},
@@ -111,9 +111,9 @@ void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, 
   [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof one);  // full is awake
 }
 
-void EventFeed::set_fault_recorder(RecordFault kept_in) {
+void EventFeed::set_fault_recorder(RecordFault recorded_in) {
   const std::scoped_lock draining(drain_mutex_);
-  record_fault_ = std::move(kept_in);
+  record_fault_ = std::move(recorded_in);
 }
 
 void EventFeed::publish(const Event& event) {

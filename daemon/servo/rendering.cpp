@@ -21,10 +21,6 @@ constexpr Duration kRetryDelay = std::chrono::milliseconds(100);
 constexpr auto kWarmUpLimit = std::chrono::milliseconds(50);
 constexpr int kWarmUpTicks = 30;
 
-Pose pose_of(const PoseSettings& pose) noexcept {
-  return {rotation_from(pose.rotation_vector_rad), pose.position_m};
-}
-
 /// FNV-1a over 64-bit words.
 class Checksum64 {
  public:
@@ -50,7 +46,7 @@ Rendering::Rendering(std::uint32_t id, const Settings& settings, const DevicePro
     : id_(id),
       scene_(std::move(scene)),
       proxy_initializer_(std::move(proxy_initializer)),
-      X_HT_(pose_of(settings.device.tool_in_handle) * scene_->tool().X_MT()),
+      X_HT_(settings.device.tool_in_handle.pose() * scene_->tool().X_MT()),
       M_(scene_->tool().solid.inertia),
       spring_law_(settings.wrench.law),
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),

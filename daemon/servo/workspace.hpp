@@ -46,10 +46,9 @@ class Workspace {
   /// RT-safe.
   void recentre() noexcept;
 
-  bool clutched() const noexcept { return clutched_; }            ///< RT-safe.
-  double scale() const noexcept { return scale_; }                ///< Current scale s. RT-safe.
-  double target_scale() const noexcept { return target_scale_; }  ///< Scale at the end of the ramp. RT-safe.
-  const Pose& X_WH() const noexcept { return X_WH_; }             ///< Result of the last update(). RT-safe.
+  bool clutched() const noexcept { return clutched_; }  ///< RT-safe.
+  double scale() const noexcept { return scale_; }      ///< Current scale s. RT-safe.
+  const Pose& X_WH() const noexcept { return X_WH_; }   ///< Result of the last update(). RT-safe.
 
   /// Returns the handle pose in the base for a pose in the world. Precondition: the clutch is disengaged.
   /// RT-safe.

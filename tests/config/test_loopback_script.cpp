@@ -129,7 +129,7 @@ TEST_CASE("a script is for simulated devices that can do what it says", "[loopba
   const auto real =
       run_program("wrenchd", {"--profile", "reference_full_speed", "--loopback-script", file.string()});
   CHECK(real.exit_code == 1);
-  CHECK(says(real, "nothing can be asked of a real device; simulate one"));
+  CHECK(says(real, "a real device cannot run a script; simulate a device"));
   const auto arm = run_program("wrenchd", {"--simulate", "polhem", "--virtual-time", "--seconds", "1",
                                            "--loopback-script", file.string()});
   CHECK(arm.exit_code == 1);

@@ -146,7 +146,7 @@ TEST_CASE("a bad table is refused at its line and column, with the cure") {
 TEST_CASE("poses with times come back as counted from the first", "[playback]") {
   std::istringstream in(
       "time_s,px,py,pz,qx,qy,qz,qw\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,1,0\n");
-  CHECK_THROWS_WITH(read_timed_poses(in, "t.csv"), Catch::Contains("t.csv:5:1: a turn of 3.14"));
+  CHECK_THROWS_WITH(read_timed_poses(in, "t.csv"), Catch::Contains("t.csv:5:1: a rotation of 3.14"));
   std::istringstream good(
       "time_s, "
       "px,py,pz,qx,qy,qz,qw\r\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,0.5,0."

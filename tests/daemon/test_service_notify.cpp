@@ -214,7 +214,7 @@ TEST_CASE("wrenchd without a device is ready, and says what it waits for", "[ser
   RunningProgram wrenchd("wrenchd", {"--profile", "reference_full_speed", "--realtime", "best_effort"});
   CHECK(manager.hears("STATUS=waiting: "));
   CHECK_THAT(manager.all(),
-             Contains("READY=1\n") && Contains("no device of profile reference_full_speed is plugged in\n"));
+             Contains("READY=1\n") && Contains("no device of profile reference_full_speed is connected\n"));
   wrenchd.signal(SIGTERM);
   CHECK(wrenchd.wait().exit_code == 0);
 }

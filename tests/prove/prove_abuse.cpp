@@ -124,8 +124,9 @@ void connects(const fs::path& path, const std::atomic<bool>& wanted) {
 
 void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
-  const std::string line = request("devices") + request("arm") + request("beat") + request("lease.give");
-  while (wanted && fd && send_bytes(fd.get(), line)) drain(fd.get());
+  const std::string line =
+      request("devices") + request("arm") + request("lease.heartbeat") + request("lease.release");
+  while (wanted && fd && push(fd.get(), line)) drain(fd.get());
 }
 
 constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
@@ -262,15 +263,15 @@ class Daemon {
 class Holder {
  public:
   explicit Holder(const std::string& path) : client_(path) {
-    client_.call("lease.take");
+    client_.call("lease.acquire");
     client_.call("arm");
     thread_ = std::jthread([this](const std::stop_token& stop) {
       for (auto last = std::chrono::steady_clock::now(); !stop.stop_requested();) {
-        if (!does("beat")) {
+        if (!does("lease.heartbeat")) {
           ++lost_;
           if (longest_ < kTooLong) ++wronged_;
           does("acknowledge");  // clears a fault that a busy machine may have caused
-          does("lease.take");
+          does("lease.acquire");
           does("arm");
           longest_ = {};
         }
@@ -416,7 +417,7 @@ int main(int argc, char** argv) {
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");
-    if (holder.lost_in_time() > 0) violation("a holder that beat in time lost the lease");
+    if (holder.lost_in_time() > 0) violation("a holder with timely heartbeats lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
 
     std::array<Times, kKinds> times;

@@ -249,7 +249,7 @@ class Proof {
         return violation("the daemon ended by itself with code " + std::to_string(daemon.exit_code()));
       ++figures_.faults;
     }
-    violation("the hand never felt the table");
+    violation("the hand had no contact with the table");
   }
 
   const Figures& figures() const { return figures_; }
@@ -338,7 +338,7 @@ class Proof {
       std::this_thread::sleep_for(kLook);
       device.live();
     }
-    if (device.heard() == heard) violation("nobody speaks for a loop that is stuck");
+    if (device.heard() == heard) violation("the writer thread sends no zero wrench for a hung loop");
     if (device.push_N() != 0.0 || device.last_push() - held > bound_)
       violation("force for " + std::to_string(milliseconds(device.last_push() - held)) +
                 " ms after the loop was stuck");

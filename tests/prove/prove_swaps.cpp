@@ -159,8 +159,8 @@ int main(int argc, char** argv) {
   std::uint64_t missed = 0;
   std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, loop_faults = 0;
   std::atomic<std::uint64_t> pushed{0};
-  std::set<std::uint32_t> felt;     // ids of the renderings in the records
-  std::vector<TickRecord> waiting;  // records whose rendering is not in `sums` yet
+  std::set<std::uint32_t> active_ids;  // ids of the renderings in the records
+  std::vector<TickRecord> waiting;     // records whose rendering is not in `sums` yet
   const auto judge = [&](const TickRecord& r) {
     const std::lock_guard lock(sums_mutex);
     const auto sum = sums.find(r.rendering_id);
@@ -200,7 +200,7 @@ int main(int argc, char** argv) {
       Times& times = changing.load() ? with : without;
       times.tick_us.push_back(tick_us);
       times.late_us.push_back(1e-3 * static_cast<double>(r.wake_latency_ns));
-      felt.insert(r.rendering_id);
+      active_ids.insert(r.rendering_id);
       in_contact += r.contacts > 0 ? 1 : 0;
       pushed += r.F_out[2] > 0.2 ? 1 : 0;
       loop_faults +=
@@ -210,7 +210,7 @@ int main(int argc, char** argv) {
   });
 
   Asker asker(station.reconfigurator(), directory.path(), seed);
-  int applied = 0, refused = 0, done = 0;
+  int applied = 0, rejected = 0, done = 0;
   // Waits until the hand presses, before the first change.
   for (const TimePoint end = clock.now() + std::chrono::seconds(20); pushed == 0 && clock.now() < end;) {
     if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
@@ -222,7 +222,7 @@ int main(int argc, char** argv) {
     changing.store(true);
     const TimePoint began = clock.now();
     for (int i = 0; i < kInARow && done < changes; ++i, ++done) {
-      (asker.ask(done % 2 == 0) ? applied : refused) += 1;
+      (asker.ask(done % 2 == 0) ? applied : rejected) += 1;
       const auto [number, sum] = station.reconfigurator().current_rendering();
       {
         const std::lock_guard lock(sums_mutex);
@@ -245,12 +245,13 @@ int main(int argc, char** argv) {
 
   const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
   std::printf(
-      "swaps changes %d applied %d refused %d felt %zu torn %llu unknown %llu violations %llu in_contact "
+      "swaps changes %d applied %d rejected %d active %zu torn %llu unknown %llu violations %llu in_contact "
       "%llu "
       "pushed %llu late_or_stopped %llu dropped %llu seed %llu\n",
-      changes, applied, refused, felt.size(), number(torn), number(unknown), number(broken + torn + unknown),
-      number(in_contact), number(pushed), number(loop_faults), number(missed), number(seed));
+      changes, applied, rejected, active_ids.size(), number(torn), number(unknown),
+      number(broken + torn + unknown), number(in_contact), number(pushed), number(loop_faults),
+      number(missed), number(seed));
   with.print("swaps_with");
   without.print("swaps_without");
-  return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && refused > 0 && pushed > 0 ? 0 : 1;
+  return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && rejected > 0 && pushed > 0 ? 0 : 1;
 }

@@ -33,7 +33,7 @@ def insist_on_arming(client):
             client.arm()
         except wrenchd.Rejected as refused:  # so busy that a beat came too late
             assert refused.code == wrenchd.Rejected.INVALID_STATE, refused
-            client.call("lease.take")
+            client.call("lease.acquire")
 
 
 def rests(client):

@@ -19,6 +19,7 @@
 #include "daemon/control/control_interface.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/wall_clock.hpp"
+#include "tests/support/request_line.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -128,8 +129,8 @@ class RigClient {
       }
       const auto text = read_line(limit);
       if (!text) return nullptr;
-      Json told = Json::parse(*text);
-      if (told.contains("method")) events.push_back(told["params"]);
+      Json message = Json::parse(*text);
+      if (message.contains("method")) events.push_back(message["params"]);
     }
   }
 

@@ -158,7 +158,7 @@ const std::vector<Injection>& injections() {
     const auto not_testing = [](State s, Phase) { return s != State::self_test; };
 
     add({"unplugged", Fault::device_lost, 1, wire(Kind::unplug, 0.5)});
-    add({"a write finds nobody",
+    add({"a write finds no device",
          Fault::device_lost,
          1,
          [](FaultRig& r) { r.faulty_device.write_result = Fault::device_lost; },
@@ -236,13 +236,13 @@ const std::vector<Injection>& injections() {
          [](FaultRig&) {},
          {},
          [](State s, Phase p) { return s == State::active && p == Phase::saturated; }});
-    add({"whoever armed is gone",
+    add({"the client that armed is lost",
          Fault::heartbeat_lost,
          103,
          [](FaultRig& r) { r.loop.requests().arm_with_lease(); },
          {},
          [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
-    add({"nobody lives",
+    add({"heartbeats stop",
          Fault::heartbeat_missing,
          103,
          [](FaultRig& r) { r.loop.requests().request(kArm | kLease); },
@@ -256,7 +256,7 @@ const std::vector<Injection>& injections() {
          armed});
     add({"the stop button", Fault::stop_button, 1,
          spoil([](DeviceSample& s) { s.buttons |= 1U << kStopButton; })});
-    add({"somebody says stop", Fault::stop_requested, 1, [](FaultRig& r) { r.loop.requests().stop(); }});
+    add({"a stop is requested", Fault::stop_requested, 1, [](FaultRig& r) { r.loop.requests().stop(); }});
     add({"what comes again and again",
          Fault::degraded_too_long,
          560,

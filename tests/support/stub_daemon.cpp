@@ -164,7 +164,7 @@ bool StubDaemon::receive(int peer) {
 void StubDaemon::answer(int peer, const std::string& line) {
   const json request = json::parse(line);
   const std::string method = request.at("method");
-  if (method == "beat") {
+  if (method == "lease.heartbeat") {
     if (holder_.load() == peer) ++heartbeats_;
     loop().requests().heartbeat();
   } else {
@@ -184,7 +184,7 @@ void StubDaemon::answer(int peer, const std::string& line) {
 json StubDaemon::status() {
   json cause;
   if (const Fault fault = loop().telemetry().cause(); fault != Fault::none)
-    cause = {{"name", fault_row(fault).name}, {"sentence", fault_row(fault).message}};
+    cause = {{"name", fault_row(fault).name}, {"message", fault_row(fault).message}};
   return {{"state", name(loop().telemetry().state())}, {"cause", cause}, {"sequence", sequence_}};
 }
 
@@ -207,12 +207,12 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
     return json::object();
   }
   if (method == "lease.take") {
-    int nobody = -1;
-    if (!holder_.compare_exchange_strong(nobody, peer) && nobody != peer)
+    int no_holder = -1;
+    if (!holder_.compare_exchange_strong(no_holder, peer) && no_holder != peer)
       throw Refusal{-32003, "another client has the lease; wait until it gives it back"};
-    return {{"beat_within_s", 0.1}};
+    return {{"heartbeat_timeout_s", 0.1}};
   }
-  if (method == "lease.give") {
+  if (method == "lease.release") {
     int held = peer;
     if (!holder_.compare_exchange_strong(held, -1)) throw Refusal{-32002, "you do not hold the lease"};
     loop().requests().disarm();
@@ -225,7 +225,7 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   if (method == "disarm") return ask(kDisarm);
   if (method == "stop") return ask(kStop);
   if (method == "acknowledge") return ask(kAcknowledge);
-  if (method == "start_over") return ask(kReinitialize);
+  if (method == "reinitialize_proxy") return ask(kReinitialize);
   if (method == "state.open") {
     json answer;
     open_state(state_, simulated_.runtime.reconfigurator().obstacle_names(),

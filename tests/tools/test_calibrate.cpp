@@ -83,7 +83,7 @@ TEST_CASE("a calibration ends if the operator cancels or the device is disconnec
 TEST_CASE("wrenchctl calibrate rejects devices that it cannot calibrate") {
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{"calibrate", "gone"}, "gone.toml: no such file"},
       {{"calibrate", "loopback"}, "profile loopback: it is for the simulated device"},
@@ -91,11 +91,11 @@ TEST_CASE("wrenchctl calibrate rejects devices that it cannot calibrate") {
       {{"calibrate", ""}, "must not be empty; name a profile, or leave it out"},
       {{"calibrate", "polhem", "--serial", ""}, "--serial: must not be empty; give the serial number"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code != 0);
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   }
 }
 

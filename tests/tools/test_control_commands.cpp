@@ -130,11 +130,11 @@ TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wa
   REQUIRE(daemon.comes_to("active"));
   SECTION("killed") {
     arm.signal(SIGKILL);
-    CHECK(daemon.program.wait_for_output("hung up", std::chrono::seconds(5)));
+    CHECK(daemon.program.wait_for_output("disconnected", std::chrono::seconds(5)));
   }
   SECTION("stopped") {
     arm.signal(SIGSTOP);
-    CHECK(daemon.program.wait_for_output("gives no sign of life", std::chrono::seconds(5)));
+    CHECK(daemon.program.wait_for_output("sends no heartbeat", std::chrono::seconds(5)));
   }
   CHECK(daemon.program.wait_for_output("heartbeat_lost: ", std::chrono::seconds(5)));
   CHECK(daemon.comes_to("disarmed"));
@@ -149,7 +149,7 @@ TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
   has(daemon.ctl({"status"}).out, "cause      stop_requested: ");
   const ProgramResult arm = daemon.ctl({"arm"});
   CHECK(arm.exit_code == 1);
-  has(arm.err, "It cannot be armed in state 'stopped': acknowledge the fault or stop first.");
+  has(arm.err, "The loop cannot be armed in state 'stopped': acknowledge what happened first.");
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 0);
   CHECK(daemon.comes_to("disarmed"));
 }
@@ -158,8 +158,8 @@ TEST_CASE("wrenchctl describe lists methods and roles", "[control_commands]") {
   const Daemon daemon;
   const ProgramResult all = daemon.ctl({"describe"});
   CHECK(all.exit_code == 0);
-  for (const char* part : {"lease.take  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
-                           "from_other: true or false, optional; "})
+  for (const char* part : {"lease.acquire  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
+                           "preempt: true or false, optional; "})
     has(all.out, part);
   const ProgramResult one = daemon.ctl({"describe", "arm"});
   CHECK(one.out.find("arm  (operator)\n") == 0);

@@ -192,12 +192,13 @@ TEST_CASE("an unrelated device has one line, and --all shows the rejection reaso
 
 TEST_CASE("a device without access is listed with the udev rule", "[list_devices]") {
   const std::string text = list({space_navigator_in(2)}, false, open_to_root);
-  CHECK(holds(text,
-              "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add to "
-              "/etc/udev/rules.d/70-wrenchd.rules the line\n"
-              "    SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"046d\", ATTRS{idProduct}==\"c626\", "
-              "GROUP=\"wrenchd\", MODE=\"0660\"\n"
-              "  and be in the group wrenchd; "));
+  CHECK(holds(
+      text,
+      "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add this line to "
+      "/etc/udev/rules.d/70-wrenchd.rules\n"
+      "    SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"046d\", ATTRS{idProduct}==\"c626\", "
+      "GROUP=\"wrenchd\", MODE=\"0660\"\n"
+      "  and join the group wrenchd; "));
   CHECK_FALSE(holds(text, "can be opened"));
 
   UsbDevice without = space_navigator_in(2);
@@ -213,9 +214,9 @@ TEST_CASE("differences between profile and report descriptor are listed line by 
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1e 91 02 c0");
   const std::string text = list({hid(1, {0x1209, 0x0001, 0xff00, 1}, shorter, "handle")});
   CHECK(holds(text,
-              "\n  its report descriptor disagrees with the profile; change the profile, unless it belongs "
+              "\n  the report descriptor disagrees with the profile; change the profile, unless it belongs "
               "to another "
-              "device:\n    output report 0x02: the profile says 32 bytes, the device 31\n    output report "
+              "device:\n    output report 0x02: the profile has 32 bytes, the device 31\n    output report "
               "0x02, "));
   Bytes cut = reference_descriptor();
   cut.pop_back();

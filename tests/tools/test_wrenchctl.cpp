@@ -406,7 +406,7 @@ TEST_CASE("wrenchctl solve rejects invalid meshes") {
        "belongs to face 0 only: the surface is open (4 in all); close the hole"},
       {"self-intersecting", "body.off",
        as_off(concatenated(box({0, 0, 0}, {2, 2, 2}), box({1, 1, 1}, {3, 3, 3}))), "",
-       "cut through each other"},
+       "intersect each other"},
   });
 }
 
@@ -416,7 +416,7 @@ TEST_CASE("wrenchctl solve repairs a mesh and reports the repair on standard err
   const ProgramResult result = bench.solve();
   CHECK(result.exit_code == 0);
   CHECK(result.err ==
-        "wrenchctl: " + bench.mesh.string() + ": turned 6 faces round, first face 0 near (-25, 25, -25)\n");
+        "wrenchctl: " + bench.mesh.string() + ": flipped 6 faces, first face 0 near (-25, 25, -25)\n");
   CHECK(std::abs(rows_of(contents(bench.out)).at(0).at("energy") - kEnergy) < 1e-9);
 }
 
@@ -436,7 +436,7 @@ TEST_CASE("wrenchctl accepts an open mesh as an obstacle of kind surface") {
   const ProgramResult checked = run_program("wrenchctl", {"check", scene.string()});
   INFO(checked.err);
   CHECK(checked.exit_code == 0);
-  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": taken as a surface") !=
+  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": used as a surface") !=
         std::string::npos);
   const fs::path poses =
       dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.05,0,0,0,1\n0,0,-0.1,0,0,0,1\n0,0,-0.1,0,0,0,1\n");
@@ -461,14 +461,14 @@ TEST_CASE("wrenchctl mesh and check report repairs and an implausible size") {
   CHECK(mesh.err == "");
   for (const char* line :
        {"faces              7\n", "repaired           removed 1 duplicate face: face 6 near (0, 0, 0)\n",
-        "repaired           turned 1 face round: face 2 near (0, 0, 80)\n", "triangles          12\n",
+        "repaired           flipped 1 face: face 2 near (0, 0, 80)\n", "triangles          12\n",
         "remark             as a tool, its largest side is 80 m at scale 1: were millimetres taken for "
         "metres? 'scale' would be 0.001\n"})
     CHECK(mesh.out.find(line) != std::string::npos);
   const fs::path scene = dir.write("scene.toml", "[tool]\nmesh = \"body.ply\"\n");
   const ProgramResult check = run_program("wrenchctl", {"check", scene.string()});
   CHECK(check.exit_code == 0);
-  CHECK(check.out.find("  changed: " + file.string() + ": turned 1 face round") != std::string::npos);
+  CHECK(check.out.find("  changed: " + file.string() + ": flipped 1 face") != std::string::npos);
   CHECK(check.out.find("  remark: " + file.string() + ": its largest side is 80 m") != std::string::npos);
   CHECK(run_program("wrenchctl", {"mesh", file.string(), "--scale", "0.001"}).out.find("remark") ==
         std::string::npos);
@@ -519,7 +519,7 @@ TEST_CASE("wrenchctl rejects missing input files and unwritable output files") {
   const std::string missing = dir + "/missing";
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{"solve", missing, "--poses", poses}, missing + ": no such file"},
       {{"solve", dir, "--poses", poses}, dir + ": is a directory; name a file in it"},
@@ -538,12 +538,12 @@ TEST_CASE("wrenchctl rejects missing input files and unwritable output files") {
       {{"mesh", dir}, dir + ": is not a file; name an OFF, OBJ, STL or PLY file"},
       {{"mesh", poses}, poses + ": unknown mesh format '.csv'; save it as .off, .obj, .stl or .ply"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find("wrenchctl: " + told) == 0);
+    CHECK(result.err.find("wrenchctl: " + expected) == 0);
   }
   CHECK(std::distance(fs::directory_iterator(bench.dir.path()), fs::directory_iterator()) == 3);
 }
@@ -553,7 +553,7 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
   const std::string scene = bench.scene.string(), poses = bench.poses.string(), mesh = bench.mesh.string();
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{},
        "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, profile, doctor, status, "
@@ -602,12 +602,12 @@ TEST_CASE("wrenchctl rejects an invalid command line") {
       {{"mesh", mesh, "--scale", "nan"}, "--scale: expected a number from"},
       {{"mesh", mesh, mesh}, mesh},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code > 100);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   }
 }
 
@@ -651,13 +651,13 @@ TEST_CASE("wrenchctl check accepts every file that is shipped") {
 
 TEST_CASE("wrenchctl check rejects the files that the daemon rejects") {
   const Bench bench;
-  const auto bad = [&](const std::string& name, const std::string& text, const std::string& told) {
+  const auto bad = [&](const std::string& name, const std::string& text, const std::string& expected) {
     const fs::path file = bench.dir.write(name, text);
     const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
     INFO(name << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   };
   const auto shipped = [](const std::string& name) {
     return contents(fs::path(WRENCHD_SOURCE_DIR) / "config" / name);
@@ -708,20 +708,20 @@ TEST_CASE("wrenchctl decode and encode reject an empty text with an example") {
 }
 
 TEST_CASE("wrenchctl decode and encode reject invalid input with location and remedy") {
-  const auto refuses = [](std::vector<std::string> arguments, const std::string& told) {
+  const auto refuses = [](std::vector<std::string> arguments, const std::string& expected) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\n" << result.err);
+    INFO(expected << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   };
   refuses({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
   refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
   refuses({"decode", "loopback", "--hex", "01 02"},
-          "these 2 bytes are no report of loopback:\n  report 0x01 has 64 bytes");
+          "these 2 bytes match no report of loopback:\n  report 0x01 has 64 bytes");
   refuses({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
-  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: six numbers are wanted, and 3 given");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is wrong, at 'x'");
+  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
   refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
   refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "expected six numbers, found 7");
   refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split accepts no wrench");
@@ -866,7 +866,7 @@ TEST_CASE("wrenchctl solve without --proxy leaves obstacles at their start and r
   const ProgramResult planar =
       run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--method", "planar"});
   CHECK(planar.exit_code == 1);
-  CHECK(planar.err.find("the obstacle 'lift' moves, which only method exact can deal with") !=
+  CHECK(planar.err.find("the obstacle 'lift' moves, and only method exact supports moving obstacles") !=
         std::string::npos);
   const ProgramResult check = run_program("wrenchctl", {"check", scene});
   CHECK(check.exit_code == 0);

@@ -30,7 +30,7 @@ class Client::HeartbeatThread {
           std::unique_lock lock(mutex);
           while (!stop.stop_requested()) {
             try {
-              connection->notify("beat");
+              connection->notify("lease.heartbeat");
             } catch (const ClientError&) {
               return;  // the next call reports the error
             }
@@ -95,22 +95,22 @@ bool Client::poll_event(ClientEvent& out, std::chrono::milliseconds timeout) {
 }
 
 void Client::acquire_lease() {
-  const json lease = connection_->call("lease.take", json::object());
-  const std::chrono::duration<double> within(lease.value("beat_within_s", 0.1));
+  const json lease = connection_->call("lease.acquire", json::object());
+  const std::chrono::duration<double> within(lease.value("heartbeat_timeout_s", 0.1));
   heartbeat_thread_ = std::make_unique<HeartbeatThread>(connection_, within / kHeartbeatsPerTimeout);
 }
 
 void Client::release_lease() {
   heartbeat_thread_.reset();
   try {
-    call("lease.give");
+    call("lease.release");
   } catch (const ClientError& error) {  // the lease ended before, so there is nothing to release
     if (error.code() != ClientError::kInvalidState && error.code() != ClientError::kLeaseHeld) throw;
   }
 }
 
 void Client::heartbeat() {
-  connection_->notify("beat");
+  connection_->notify("lease.heartbeat");
 }
 
 StateReader Client::open_state() {
@@ -120,7 +120,9 @@ StateReader Client::open_state() {
     throw ClientError(ClientError::kProtocol, "wrenchd sent no shared memory; see its log");
   return StateReader(
       answer["layout"].dump(), descriptor, [connection = connection_] { return connection->is_connected(); },
-      [connection = connection_] { return connection->call("state.names", json::object(), nullptr).dump(); });
+      [connection = connection_] {
+        return connection->call("state.obstacles", json::object(), nullptr).dump();
+      });
 }
 
 }  // namespace wrenchd

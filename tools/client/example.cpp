@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Prints what the hand feels, ten times a second, until wrenchd ends or the number of lines given is printed.
+// Prints wrench and contacts ten times per second until wrenchd ends, or until the given number of lines.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

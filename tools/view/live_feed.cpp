@@ -175,7 +175,7 @@ void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
 
 void LiveFeed::fetch_scene(Client& client) {
   int descriptor = -1;
-  const Json description = Json::parse(client.call("scene.shapes", "{}", descriptor));
+  const Json description = Json::parse(client.call("scene.geometry", "{}", descriptor));
   const MappedMemory memory(descriptor);
   const auto known = scene();
   auto made = std::make_shared<const ViewScene>(description, memory.bytes(), known.get());

@@ -94,7 +94,7 @@ void PageLease::arm(std::uint64_t page) {
   if (other != 0)
     throw ClientError(ClientError::kLeaseHeld,
                       "Another page of this view holds the lease; disarm on that page first.");
-  client().call("lease.take");
+  client().call("lease.acquire");
   last_heartbeat_ns_.store(now_ns());
   holder_.store(page);
   armed_at_ = std::chrono::steady_clock::now();
@@ -118,7 +118,7 @@ void PageLease::release(const std::string& why) {
       client().heartbeat();
       std::this_thread::sleep_for(kHeartbeatInterval);
     }
-    client().call("lease.give");
+    client().call("lease.release");
   } catch (const ClientError&) {
     client_.reset();  // the end of the connection also ends the lease
   }

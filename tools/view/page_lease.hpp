@@ -18,9 +18,9 @@
 namespace wrenchd {
 
 /// Sends the pages' requests to the daemon with the rights of the user of this program. A page that arms
-/// holds the lease as long as it sends heartbeats. If the page is closed, hidden or hung, the lease is
-/// released and the force fades out. Own threads wait for the daemon; the methods do not. Not RT-safe: locks
-/// a mutex.
+/// holds the lease as long as it sends heartbeats. If the page is closed, hidden or unresponsive, the lease
+/// is released and the force fades out. Own threads wait for the daemon; the methods do not. Not RT-safe:
+/// locks a mutex.
 class PageLease {
  public:
   /// A page without a heartbeat for this time loses the lease.
@@ -43,7 +43,7 @@ class PageLease {
   PageLease& operator=(const PageLease&) = delete;
 
   /// Queues a request and returns immediately. page: unique number of the page. Thread-safe.
-  void submit(std::uint64_t page, Request wish);
+  void submit(std::uint64_t page, Request request);
   /// Records that the page is visible and running. Thread-safe.
   void heartbeat(std::uint64_t page) noexcept;
   void page_closed(std::uint64_t page);

@@ -33,10 +33,6 @@ void serve(ViewServer& server, const ViewOptions& options) {
   server.run();
 }
 
-Pose pose_of(const PoseSettings& placed) {
-  return {rotation_from(placed.rotation_vector_rad), placed.position_m};
-}
-
 /// Loads the scene that the recording contains.
 std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunConfig& plan) {
   MeshLoader meshes(cache_directory(),
@@ -45,8 +41,8 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunC
   const SceneGeometry shapes(scene);
   Json description = shapes.description(*scene);
   const DeviceSettings& device = plan.settings.device;
-  description["shapes"] = 1;
-  description["rendering"] = 0;
+  description["geometry_id"] = 1;
+  description["rendering_id"] = 0;
   // Scene time starts at tick 0. If the recording starts later, extrapolates with the nominal period.
   const TickRecord& first = recording.ticks.front();
   description["scene_time_begins_ns"] =

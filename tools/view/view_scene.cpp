@@ -23,12 +23,12 @@ Pose pose_of(const Json& x) {
 
 ObstacleMotion motion_of(const Json& json) {
   return {vector_of(json.at("linear_m_per_s")), vector_of(json.at("angular_rad_per_s")),
-          json.at("turn_back_s").get<double>(), json.at("begin_s").get<double>(),
-          json.at("last_s").get<double>()};
+          json.at("reverse_after_s").get<double>(), json.at("start_s").get<double>(),
+          json.at("duration_s").get<double>()};
 }
 
 std::optional<ScheduledMotion> later_of(const Json& json) {
-  return ScheduledMotion{json.at("from_s").get<double>(), pose_of(json.at("X_WO")),
+  return ScheduledMotion{json.at("start_s").get<double>(), pose_of(json.at("X_WO")),
                          motion_of(json.at("motion"))};
 }
 
@@ -59,8 +59,8 @@ std::string message_of(Detail detail, std::uint32_t number, const DisplayMesh& m
 }  // namespace
 
 ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, const ViewScene* known) try
-    : shapes_(description.at("shapes").get<std::uint64_t>()),
-      rendering_id_(description.at("rendering").get<std::uint32_t>()),
+    : shapes_(description.at("geometry_id").get<std::uint64_t>()),
+      rendering_id_(description.at("rendering_id").get<std::uint32_t>()),
       start_ns_(description.at("scene_time_begins_ns").get<std::int64_t>()),
       X_WB_(pose_of(description.at("X_WB"))),
       X_HT_(pose_of(description.at("X_HT"))),
@@ -103,11 +103,11 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     } else {
       shown["mesh"] = one.at("mesh");
       shown["pose"] = one.at("X_WO");
-      if (one.contains("motion") || one.contains("later"))
+      if (one.contains("motion") || one.contains("scheduled"))
         moving_obstacles_.push_back({number, pose_of(one.at("X_WO")),
                                      one.contains("motion") ? motion_of(one["motion"]) : ObstacleMotion{},
-                                     one.contains("later") ? later_of(one["later"]) : std::nullopt});
-      shown["moves"] = one.contains("motion") || one.contains("later");
+                                     one.contains("scheduled") ? later_of(one["scheduled"]) : std::nullopt});
+      shown["moves"] = one.contains("motion") || one.contains("scheduled");
     }
     obstacles.push_back(std::move(shown));
     ++number;

@@ -88,7 +88,7 @@ Json times_json(const RollingHistogram::Summary& tick_duration,
 Json faults_json() {
   Json out = Json::object();
   for (const FaultRow& row : fault_rows())
-    out[std::string(row.name)] = {{"sentence", row.message}, {"cure", row.cure}};
+    out[std::string(row.name)] = {{"message", row.message}, {"cure", row.cure}};
   return out;
 }
 

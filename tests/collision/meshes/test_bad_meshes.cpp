@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using namespace test;
 
 constexpr std::array<std::size_t, 5> kCounts = {1, 2, 5, 20, 80};  ///< of 320 faces, by severity
-constexpr double kVolume_m3 = 1.1e-4;                              ///< of the ball, about
+constexpr double kVolume_m3 = 1.1e-4;                              ///< about the volume of the ball
 
 PolygonSoup ball() {
   const TriangleMesh mesh = make_mesh({"sphere", 320});
@@ -125,8 +125,7 @@ PolygonSoup with_faces_twice(std::size_t count) {
   return soup;
 }
 
-/// A face is cut in two through the middle of a side, and a face without area closes the gap to the one
-/// beyond.
+/// Splits a face through the middle of a side. A face without area closes the gap to the neighbour.
 PolygonSoup with_caps(std::size_t count) {
   PolygonSoup soup = ball();
   for (std::size_t i = 0; i < count; ++i) {
@@ -164,7 +163,7 @@ std::string with_numbers_that_are_none(std::size_t severity, Format format) {
   return written(soup, format, severity);
 }
 
-/// STL has no indices: facets of four corners, or more facets than there are, are the like of it.
+/// STL has no indices. Facets of four corners, or a wrong facet count, are the corresponding defect.
 std::string with_indices_out_of_range(std::size_t severity, Format format) {
   PolygonSoup soup = ball();
   const std::size_t count = kCounts[severity];
@@ -223,7 +222,7 @@ std::string cut_short(std::size_t severity, Format format) {
   return bytes;
 }
 
-/// A defect of the mesh itself, whatever it is written as.
+/// A defect of the mesh itself, independent of the format.
 auto in_any_format(PolygonSoup (*make)(std::size_t count)) {
   return [make](std::size_t severity, Format format) {
     return written(make(kCounts[severity]), format, severity);
@@ -238,7 +237,7 @@ const std::vector<Defect>& defects() {
   static const std::vector<Defect> all = {
       {"truncated", cut_short,
        [](std::size_t severity, Format format) {
-         // An OBJ is one wherever it ends: it has a hole, or no faces.
+         // A truncated OBJ is a valid OBJ with a hole, or without faces.
          if (format != Format::obj) return Expected{rejected, "export the mesh again"};
          if (severity < 2) return Expected{rejected, "the surface is open", true};
          return Expected{rejected, severity == 2 ? "has no faces" : "expected 3 numbers"};
@@ -256,8 +255,8 @@ const std::vector<Defect>& defects() {
       {"fin", in_any_format(with_fins), always({rejected, "belongs to 3 faces", true})},
       {"duplicate_points", in_any_format(with_corners_of_their_own),
        [](std::size_t severity, Format format) {
-         if (format == Format::stl) return Expected{accepted, ""};  // it has no others
-         // Where all faces around a point have points of their own, nobody uses it any longer.
+         if (format == Format::stl) return Expected{accepted, ""};  // STL has no shared vertices
+         // If all faces at a point have points of their own, the point is unused.
          if (severity > 2) return Expected{repaired, " duplicate points, first vertex 16"};
          return Expected{repaired, "merged " + std::to_string(3 * kCounts[severity]) + " duplicate points"};
        }},
@@ -271,9 +270,9 @@ const std::vector<Defect>& defects() {
        }},
       {"turned", in_any_format(with_faces_turned),
        [](std::size_t severity, Format) {
-         return Expected{repaired, "turned " + many(kCounts[severity], "face") + " round"};
+         return Expected{repaired, "flipped " + many(kCounts[severity], "face")};
        }},
-      {"cut_through", in_any_format(with_spikes_through), always({rejected, "cut through each other", true})},
+      {"cut_through", in_any_format(with_spikes_through), always({rejected, "intersect each other", true})},
       {"garbage", with_garbage,
        [](std::size_t severity, Format format) {
          constexpr std::array<const char*, 4> words = {"ends before face 320 of ",

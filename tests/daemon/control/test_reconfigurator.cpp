@@ -260,7 +260,7 @@ TEST_CASE("a block that is moved sets out when it is told, and pushes the tool b
   s.go_for(2.0);
   CHECK(std::abs(s.last.X_WQ[1]) < 0.002);
   CHECK_THROWS_WITH(s.bench().move_obstacle("block", {Quaterniond::Identity(), {9.0, 0.1, 0.02}}, 1.0),
-                    Catch::Contains("give it at least over_s = 1.8"));
+                    Catch::Contains("give it at least duration_s = 1.8"));
 }
 
 TEST_CASE("a tool that a wall comes down on is on the side of it where the proxy was", "[workbench]") {
@@ -392,7 +392,7 @@ TEST_CASE("a local model pushes, and fades out when its client is silent", "[wor
   wall.stiffness_N_per_m = -1.0;
   CHECK_THROWS_WITH(s.bench().set_model(wall, 0.3), Catch::Contains("stiffness_N_per_m: expected 0 to"));
   wall.stiffness_N_per_m = 1.0;
-  CHECK_THROWS_WITH(s.bench().set_model(wall, 60.0), Catch::Contains("sent again"));
+  CHECK_THROWS_WITH(s.bench().set_model(wall, 60.0), Catch::Contains("send it again"));
 }
 
 TEST_CASE("a local model that is stiffer than the device bears is felt softer", "[workbench][models]") {
@@ -438,7 +438,7 @@ struct Configured {
   }
 };
 
-TEST_CASE("a configuration that is read again is applied whole, but for what takes a restart",
+TEST_CASE("a configuration that is read again is applied whole, but for what requires a restart",
           "[workbench][reload]") {
   Configured c;
   Bench s(c.read());
@@ -451,7 +451,7 @@ TEST_CASE("a configuration that is read again is applied whole, but for what tak
   const ReloadResult result = s.bench().reload(read);
   CHECK(result.applied == std::vector<std::string>{"wrench.stiffness", "limits.max_force_N"});
   REQUIRE(result.not_applied.size() == 2);
-  CHECK(result.not_applied[0] == "servo.rate_Hz: takes a restart");
+  CHECK(result.not_applied[0] == "servo.rate_Hz: requires a restart");
   CHECK(result.not_applied[1] ==
         "limits.force_slew_N_per_s: is looser than 2000, which holds as long as the loop is armed; disarm, "
         "and reload again");
@@ -463,7 +463,7 @@ TEST_CASE("a configuration that is read again is applied whole, but for what tak
   s.go_for(0.3);
   const ReloadResult again = s.bench().reload(read);
   CHECK(again.applied == std::vector<std::string>{"limits.force_slew_N_per_s"});
-  CHECK(again.not_applied == std::vector<std::string>{"servo.rate_Hz: takes a restart"});
+  CHECK(again.not_applied == std::vector<std::string>{"servo.rate_Hz: requires a restart"});
 }
 
 TEST_CASE("a limit that is tightened holds in the next tick, in the middle of a push",

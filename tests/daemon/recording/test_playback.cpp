@@ -140,7 +140,7 @@ TEST_CASE("what cannot be played back is refused", "[playback]") {
     writer.append(ticks);
     return file;
   };
-  CHECK_THROWS_WITH(read_playback(recorded("still.h5")), Contains("has no good sample"));
+  CHECK_THROWS_WITH(read_playback(recorded("still.h5")), Contains("has no valid sample"));
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     ticks[i].tick = i;
     ticks[i].now_ns = 1;
@@ -173,8 +173,8 @@ TEST_CASE("wrenchd plays back what its command line names", "[playback][program]
   CHECK(bad.err.find("bad.csv:2:1: expected 8 numbers") != std::string::npos);
   const ProgramResult alone = with({"--playback-mode", "open"});
   CHECK(alone.exit_code == 1);
-  CHECK(alone.err.find("nothing is played back; name it with --playback") != std::string::npos);
+  CHECK(alone.err.find("there is no playback file; name one with --playback") != std::string::npos);
   const ProgramResult real = run_program("wrenchd", {"--profile", "polhem", "--playback", csv.string()});
   CHECK(real.exit_code == 1);
-  CHECK(real.err.find("--playback: a person holds a real device") != std::string::npos);
+  CHECK(real.err.find("--playback: a person moves a real device") != std::string::npos);
 }

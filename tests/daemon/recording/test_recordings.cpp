@@ -89,7 +89,7 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK_FALSE(recordings.stop());
   const auto file = recordings.start("mine", false);
   CHECK(file == files.path() / "mine.h5");
-  CHECK_THROWS_WITH(recordings.start("other", false), Contains("mine.h5: is being recorded already"));
+  CHECK_THROWS_WITH(recordings.start("other", false), Contains("mine.h5: a recording runs already"));
   run(5000);
   CHECK(recordings.status().running->ticks > 3000);
   const auto written = recordings.stop();
@@ -109,8 +109,8 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK(recordings.stop()->ticks == 0);
   const auto events = told(feed);
   REQUIRE(events.size() == 4);
-  CHECK(events[0]["what"] == "started");
-  CHECK(events[1]["what"] == "ended");
+  CHECK(events[0]["phase"] == "started");
+  CHECK(events[1]["phase"] == "ended");
   CHECK(events[1]["ticks"] == 5000);
 }
 
@@ -136,7 +136,7 @@ TEST_CASE("a directory that cannot be written to, and a disk without room, are r
     VirtualRuntime s(plan);
     EventFeed feed(s.runtime.loop());
     Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
-    CHECK_THROWS_WITH(recordings.start("mine", false), Contains("cannot be made"));
+    CHECK_THROWS_WITH(recordings.start("mine", false), Contains("cannot be created"));
     CHECK_THROWS_WITH(recordings.start("/nowhere/x.h5", true), Contains("cannot be created"));
     CHECK_FALSE(recordings.status().running);
   }
@@ -145,7 +145,7 @@ TEST_CASE("a directory that cannot be written to, and a disk without room, are r
   VirtualRuntime s(plan);
   EventFeed feed(s.runtime.loop());
   Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
-  CHECK_THROWS_WITH(recordings.start("mine", false), Contains("MB are left"));
+  CHECK_THROWS_WITH(recordings.start("mine", false), Contains("MB are free"));
   CHECK_FALSE(std::filesystem::exists(files.path() / "mine.h5"));
 }
 
@@ -175,12 +175,12 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
     }
     failed = recordings.status().failed;
     CHECK_FALSE(recordings.status().running);
-    CHECK(told(feed).back()["what"] == "failed");
+    CHECK(told(feed).back()["phase"] == "failed");
     CHECK_FALSE(recordings.stop());
   }
   INFO(failed);
   if (keep_free_MB > 0.0) {
-    CHECK(failed.find("MB are left") != std::string::npos);
+    CHECK(failed.find("MB are free") != std::string::npos);
     CHECK(read_recording(disk / "mine.h5").ticks.size() > 500);
   } else {
     CHECK(failed.find("is the disk full, ") != std::string::npos);
@@ -245,9 +245,9 @@ TEST_CASE("a flight that cannot be written is told, and the loop goes on", "[rec
   run.s.runtime.loop().requests().stop();
   REQUIRE(run.comes_true([&] {
     const auto events = told(run.feed);
-    return !events.empty() && events.back()["what"] == "failed";
+    return !events.empty() && events.back()["phase"] == "failed";
   }));
-  CHECK(told(run.feed).back()["why"].get<std::string>().find("cannot be made") != std::string::npos);
+  CHECK(told(run.feed).back()["reason"].get<std::string>().find("cannot be created") != std::string::npos);
   CHECK(run.recordings.status().flights == 0);
   CHECK(run.s.runtime.loop().telemetry().state() == State::stopped);
 }

@@ -260,5 +260,5 @@ TEST_CASE("a recording is replayed with what is in it alone", "[replay]") {
   for (RecordedFile& f : outside.files)
     if (f.role == "tool") f.embedded = false;
   CHECK_THROWS_WITH(unpack_run_config(outside, directory.path() / "outside"),
-                    Catch::Contains("is not there") && Catch::Contains("SHA-256"));
+                    Catch::Contains("does not exist") && Catch::Contains("SHA-256"));
 }

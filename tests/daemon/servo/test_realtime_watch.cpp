@@ -84,7 +84,7 @@ TEST_CASE("a daemon whose servo thread lost its priority logs it, and disarms if
   REQUIRE(servo > 0);
   REQUIRE(set_priority(servo, 0));
   CHECK(program.wait_for_output("another process lowered the servo thread from SCHED_FIFO priority 45"));
-  CHECK(program.wait_for_output("; disarmed, as realtime = \"required\""));
+  CHECK(program.wait_for_output("; disarmed, because realtime = \"required\""));
   // On a busy machine the ticks of an ordinary thread may be so late that a fault comes first.
   CHECK((program.wait_for_output("state: releasing", 5s) || program.wait_for_output("state: fault", 1s)));
   REQUIRE(set_priority(servo, 45));

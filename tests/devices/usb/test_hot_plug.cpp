@@ -106,7 +106,7 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   const std::string config = files.write("lenient.toml", kLenient).string();
   RunningProgram wrenchd("wrenchd",
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
-  REQUIRE(wrenchd.wait_for_output("no device of profile patient is plugged in; waiting for it"));
+  REQUIRE(wrenchd.wait_for_output("no device of profile patient is connected; waiting for it"));
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
   REQUIRE(wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
@@ -122,7 +122,8 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
-  REQUIRE(wrenchd.wait_for_output("the device is back, disarmed: 1209:6d0f serial A1 in 1-4"));
+  REQUIRE(
+      wrenchd.wait_for_output("the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
   REQUIRE(soon([&] { return handle->commands() > 300; }));
   CHECK_FALSE(handle->was_pushed());
 

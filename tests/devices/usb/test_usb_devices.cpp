@@ -102,8 +102,8 @@ TEST_CASE("without permission the error contains the udev rule", "[usb]") {
                           R"(GROUP="wrenchd", MODE="0660")"));
   CHECK_THAT(open_error(device, device.usb_node, EACCES),
              Contains(R"(SUBSYSTEM=="usb", ATTR{idVendor}=="256f", ATTR{idProduct}=="c635")"));
-  CHECK_THAT(open_error(device, device.hidraw_node, ENODEV), Contains("not plugged in any more"));
-  CHECK_THAT(open_error(device, device.usb_node, EBUSY), Contains("another program holds it"));
+  CHECK_THAT(open_error(device, device.hidraw_node, ENODEV), Contains("no longer connected"));
+  CHECK_THAT(open_error(device, device.usb_node, EBUSY), Contains("another program uses it"));
 }
 
 TEST_CASE("open_error() asks the system whether a node can be opened", "[usb]") {

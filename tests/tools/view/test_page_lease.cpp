@@ -30,10 +30,10 @@ bool soon(const Done& done) {
 struct Rig {
   StubDaemon daemon;
   std::mutex mutex;
-  std::vector<PageLease::Reply> told;
+  std::vector<PageLease::Reply> replies;
   PageLease lease{daemon.socket(), [this](const PageLease::Reply& one) {
                     const std::scoped_lock lock(mutex);
-                    told.push_back(one);
+                    replies.push_back(one);
                   }};
 
   Rig() {
@@ -42,7 +42,7 @@ struct Rig {
   bool was_told(std::uint64_t page, const std::string& what, bool done) {
     return soon([&] {
       const std::scoped_lock lock(mutex);
-      for (const PageLease::Reply& one : told)
+      for (const PageLease::Reply& one : replies)
         if (one.page == page && one.request == what && one.accepted == done) return true;
       return false;
     });
@@ -112,19 +112,19 @@ TEST_CASE("every page can stop, with or without the lease", "[view]") {
 
 TEST_CASE("the page that sent a request receives an error if the daemon is absent", "[view]") {
   Rig rig;
-  std::vector<PageLease::Reply> told;
+  std::vector<PageLease::Reply> replies;
   std::mutex mutex;
   PageLease lost("/nowhere/control.sock", [&](const PageLease::Reply& one) {
     const std::scoped_lock lock(mutex);
-    told.push_back(one);
+    replies.push_back(one);
   });
   for (const Wish wish : {Wish::arm, Wish::stop}) lost.submit(1, wish);
   CHECK(soon([&] {
     const std::scoped_lock lock(mutex);
-    return told.size() == 2;
+    return replies.size() == 2;
   }));
   const std::scoped_lock lock(mutex);
-  for (const PageLease::Reply& one : told) {
+  for (const PageLease::Reply& one : replies) {
     CHECK_FALSE(one.accepted);
     CHECK(one.error.find("/nowhere/control.sock") != std::string::npos);
   }

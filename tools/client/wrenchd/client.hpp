@@ -68,7 +68,7 @@ class Client {
   void disarm() { call("disarm"); }
   void stop() { call("stop"); }  ///< emergency stop; requires no lease
   void acknowledge() { call("acknowledge"); }
-  void reinitialize_proxy() { call("start_over"); }
+  void reinitialize_proxy() { call("reinitialize_proxy"); }
 
   /// Opens the shared memory that contains the state of every tick.
   StateReader open_state();

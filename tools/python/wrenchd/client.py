@@ -104,11 +104,11 @@ class Client:
         return self.call("acknowledge")
 
     def reinitialize_proxy(self):
-        return self.call("start_over")
+        return self.call("reinitialize_proxy")
 
     def heartbeat(self):
         """Sends a heartbeat. A Lease sends its own."""
-        self._send({"jsonrpc": "2.0", "method": "beat", "params": {}})
+        self._send({"jsonrpc": "2.0", "method": "lease.heartbeat", "params": {}})
 
     def lease(self):
         """Acquires the lease, which is the right to arm; one client holds it: `with client.lease(): client.arm(); ...`."""
@@ -119,7 +119,7 @@ class Client:
         answer, descriptor = self._call("state.open", {}, True)
         if descriptor is None or "layout" not in answer:
             raise ProtocolError("wrenchd sent no shared memory; see its log")
-        return State(answer["layout"], descriptor, self.is_connected, lambda: self.call("state.names"))
+        return State(answer["layout"], descriptor, self.is_connected, lambda: self.call("state.obstacles"))
 
     def open_recording(self, name):
         """Opens a recording in call("record.list") as a file: h5py.File(client.open_recording(name))."""
@@ -259,13 +259,13 @@ class Client:
 
 class Lease:
     """The right to arm. A thread sends heartbeats while the lease is held. If the program ends or loses its connection,
-    the daemon fades the force out. A program that may hang should not use that thread: client.call("lease.take"),
+    the daemon fades the force out. A program that may hang should not use that thread: client.call("lease.acquire"),
     and call client.heartbeat() in time."""
 
     def __init__(self, client):
         self._client = client
         self._ended = threading.Event()
-        within_s = client.call("lease.take").get("beat_within_s", 0.1)
+        within_s = client.call("lease.acquire").get("heartbeat_timeout_s", 0.1)
         self._thread = threading.Thread(target=self._send_heartbeats, args=(within_s / _HEARTBEATS_PER_TIMEOUT,), daemon=True)
         self._thread.start()
 
@@ -277,7 +277,7 @@ class Lease:
         self._ended.set()
         self._thread.join()
         try:
-            self._client.call("lease.give")
+            self._client.call("lease.release")
         except Rejected as rejected:
             if rejected.code not in (Rejected.INVALID_STATE, Rejected.LEASE_HELD):
                 raise

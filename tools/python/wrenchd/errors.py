@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why something could not be done. Each says in a sentence what to do."""
+"""Exceptions of the client. Their messages contain the remedy."""
 
 
 class WrenchdError(Exception):

@@ -106,14 +106,14 @@ function showCause(now) {
     const known = faults[cause] ?? link?.status?.cause ?? { sentence: "", cure: "" };
     const stopped = now.state === "stopped";
     const cure = sentence(known.cure) + (stopped && mode === "live" && !/cknowledge/.test(known.cure) ? " Then acknowledge." : "");
-    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.sentence), cure);
+    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.message), cure);
   }
   if (mode === "live" && cause !== "none" && bad && lastFault?.cause !== cause) lastFault = { cause, t: now.t };
   if (mode === "recording") lastFault = lastFaultAt(now.t);
   if (lastFault) {
     const known = faults[lastFault.cause];
     const when = mode === "recording" ? `at ${lastFault.t.toFixed(2)} s` : `${ago(Math.max(now.t - lastFault.t, 0))} ago`;
-    set("last-fault", `${readable(lastFault.cause)}, ${when}` + (known ? `: ${known.sentence}; ${known.cure}` : ""));
+    set("last-fault", `${readable(lastFault.cause)}, ${when}` + (known ? `: ${known.message}; ${known.cure}` : ""));
   } else {
     set("last-fault", mode === "recording" ? "none until now" : "none");
   }
@@ -260,7 +260,7 @@ const connection = new Connection({
     showTimes();
   },
   event({ event }) {
-    if (event.name === "refused" || event.name === "reload") toast(event.text);
+    if (event.name === "arming_refused" || event.name === "reload") toast(event.text);
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
   reply({ request, accepted, error }) {
