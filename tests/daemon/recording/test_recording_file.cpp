@@ -250,7 +250,7 @@ TEST_CASE("recordings are refused with the file and the cure", "[recording]") {
                     Catch::Contains("cannot be created"));
   std::filesystem::create_symlink(directory.path() / "nowhere.h5", directory.path() / "link.h5");
   CHECK_THROWS_WITH(RecordingWriter(directory.path() / "link.h5", {}), Catch::Contains("never overwritten"));
-  CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("is not there"));
+  CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("does not exist"));
   std::ofstream(directory.path() / "text.h5") << "not HDF5";
   CHECK_THROWS_WITH(read_recording(directory.path() / "text.h5"), Catch::Contains("is not an HDF5 file"));
 }
