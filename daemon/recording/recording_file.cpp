@@ -9,7 +9,7 @@
 
 #include <hdf5.h>
 
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
 namespace {
