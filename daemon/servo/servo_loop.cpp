@@ -38,10 +38,11 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
   clock_.lap(Stage::read);
 
   const Verdict v = supervisor_.judge(s, asked.commands, port_.last(), renderer_.proxy_valid(), t);
-  if (v.device_lost) return leave(t, asked, in, Written{}, {});
   if (v.self_test_passed) output_.set_guard(renderer_.derive_stiffness(t));
   const std::uint32_t changes = renderer_.apply(asked, v, in, t);
   if (asked.limits) supervisor_.set_limits(output_.set_limits(*asked.limits, v.armed()));
+  if (v.release) return leave(t, asked, in, Written{}, {});
+
   const ContactState c = renderer_.project(s, v, t);  // p, its proxy q, eps
   clock_.lap(Stage::projection);
 
@@ -50,13 +51,19 @@ Fault ServoLoop::tick(TimePoint now, TimePoint due) noexcept {
 
   const Stabilized f = output_.stabilize(d, s, supervisor_.preview(d, s, ready, t));  // passivity
   const Authority a = supervisor_.authorise(d, f, output_.overheated(), s, ready, t);
-  const Limited out =
-      output_.limit(f, d, a, s, t);  // magnitude, heat, workspace edge, soft start, slew, power
+  const Limited out = output_.limit(f, d, a, s, t);  // magnitude, heat, workspace, soft start, slew, power
   clock_.lap(Stage::limits);
 
   const Written w = port_.write(t.now, out.F, a, d.contact.X_BH_held);
   clock_.lap(Stage::write);
   if (w.device_lost()) return leave(t, asked, in, w, ready);
+  return finish(t, asked, changes, in, d, a, out, w, ready);
+}
+
+/// Writes down what the tick computed. Returns the fault that changed the state in it.
+Fault ServoLoop::finish(const TickTime& t, const Requests& asked, std::uint32_t changes,
+                        const DeviceReading& in, const Demand& d, const Authority& a, const Limited& out,
+                        const Written& w, TimePoint ready) noexcept {
   telemetry_.publish({t, in, d, a, w, asked.commands, out.causes, changes, ready, clock_.stage_ns(),
                       renderer_.stiffness_scale(), output_.stabilizer()},
                      supervisor_, renderer_.active());
@@ -71,11 +78,11 @@ void ServoLoop::release(TimePoint now) noexcept {
   telemetry_.publish_release(now, supervisor_, renderer_.current_demand(), renderer_.active());
 }
 
-/// The device is gone: releases it as far as it can still be reached, and prepares for one that is opened
-/// anew.
+/// The way out of a tick: releases the hand, as far as the device can still be reached, and prepares for a
+/// device that is opened anew.
 Fault ServoLoop::leave(const TickTime& t, const Requests& asked, const DeviceReading& in,
                        const Written& last_write, TimePoint ready) noexcept {
-  supervisor_.lose_device(t);
+  if (last_write.device_lost()) supervisor_.lose_device(t);
   Written released = port_.release(t.now);
   released.result = last_write.result;
   forget_device();
@@ -84,7 +91,8 @@ Fault ServoLoop::leave(const TickTime& t, const Requests& asked, const DeviceRea
                       renderer_.change_count(), ready, clock_.stage_ns(), renderer_.stiffness_scale(),
                       output_.stabilizer(), true},
                      supervisor_, renderer_.active());
-  return Fault::device_lost;
+  return (supervisor_.faults() & bit(Fault::device_lost)) != 0 ? Fault::device_lost
+                                                               : supervisor_.changed_by();
 }
 
 /// The next device may be another one, with another clock.

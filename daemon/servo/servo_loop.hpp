@@ -53,6 +53,9 @@ class ServoLoop {
 
  private:
   TimePoint wait_for_next(Clock& clock, TimePoint due) noexcept;
+  Fault finish(const TickTime& t, const Requests& asked, std::uint32_t changes, const DeviceReading& in,
+               const Demand& d, const Authority& a, const Limited& out, const Written& w,
+               TimePoint ready) noexcept;
   Fault leave(const TickTime& t, const Requests& asked, const DeviceReading& in, const Written& last_write,
               TimePoint ready) noexcept;
   void forget_device() noexcept;

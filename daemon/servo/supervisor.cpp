@@ -33,13 +33,13 @@ Verdict Supervisor::judge(const DeviceSample& sample, CommandSet commands, const
   changed_by_ = Fault::none;
   Verdict verdict;
   verdict.sample_usable = is_usable(sample);
-  verdict.device_lost = sample.fault == Fault::device_lost;
 
   raise(t.faults, t.now, seconds(t.lateness));
   raise(last_write.faults, t.now);
   if (is_driving(machine_.state()))
     raise(watches_.motor_stall.check(last_write.F, sample.X_BH, t.now), t.now);
-  if (!verdict.device_lost && transition(Trigger::device_connected, machine_.state()).changes_state)
+  if (sample.fault != Fault::device_lost &&
+      transition(Trigger::device_connected, machine_.state()).changes_state)
     machine_.on(Trigger::device_connected);
   if ((commands & kHeartbeat) != 0) watches_.client.heartbeat(t.now);
   if ((commands & kClientLost) != 0) watches_.client.client_lost();
@@ -50,6 +50,7 @@ Verdict Supervisor::judge(const DeviceSample& sample, CommandSet commands, const
   run_self_test(sample, verdict, t);
   apply_commands(commands, proxy_valid, verdict, t);
   verdict.state = machine_.state();
+  verdict.release = (faults_ & bit(Fault::device_lost)) != 0 || verdict.state == State::shutdown;
   return verdict;
 }
 
