@@ -198,7 +198,7 @@ TEST_CASE("nothing is told of a small mesh, and nothing kept", "[mesh_loader]") 
 template <class T>
 std::size_t size_of_members(T thing) {
   std::size_t sum = 0;
-  thing.each_member([&](const auto& member) { sum += (sizeof member + 7) / 8 * 8; });
+  thing.visit_members([&](const auto& member) { sum += (sizeof member + 7) / 8 * 8; });
   return sum;
 }
 
