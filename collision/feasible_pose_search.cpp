@@ -8,33 +8,33 @@
 namespace wrenchd {
 namespace {
 
-/// How far from p the search begins and ends, in units of the tool's size and of the scene's, and by what it
-/// grows.
-constexpr double kNearest = 1e-3;
+/// Radius of the first samples, in units of the tool's size, and growth of the radius.
+constexpr double kFirstRadius = 1e-3;
 constexpr double kGrowth = 1.3;
-/// So many poses are looked at before the search grows.
-constexpr int kTries = 40;
-constexpr double kMostTurn_rad = 1.0;
-/// So many poses found are tried.
-constexpr int kMostStarts = 12;
-/// Ticks that a proxy is given to come to rest, and the share of T that it must gain to go on.
-constexpr int kMostTicks = 200;
-constexpr double kGain = 1e-9;
+/// Number of samples at each radius.
+constexpr int kSamplesPerRadius = 40;
+constexpr double kMaxRotation_rad = 1.0;
+/// Maximum number of admissible samples from which a proxy starts.
+constexpr int kMaxStarts = 12;
+/// Maximum number of proxy ticks, and the minimum relative decrease of T per tick.
+constexpr int kMaxTicks = 200;
+constexpr double kMinDecrease = 1e-9;
 
-/// Points spread evenly over the unit ball, the same in every run.
+/// Halton sequence in the unit ball: evenly spread, equal in every run.
 class Halton {
  public:
   Vector3d in_ball() noexcept {
     for (;;) {
       ++index_;
-      Vector3d p = 2.0 * Vector3d(digit_sum(2), digit_sum(3), digit_sum(5)) - Vector3d::Ones();
+      Vector3d p =
+          2.0 * Vector3d(radical_inverse(2), radical_inverse(3), radical_inverse(5)) - Vector3d::Ones();
       if (p.squaredNorm() <= 1.0) return p;
     }
   }
 
  private:
-  /// The digits of the index to a base, behind the point and in reverse order.
-  double digit_sum(int base) const noexcept {
+  /// Returns the digits of the index to a base in reverse order, as a fraction.
+  double radical_inverse(int base) const noexcept {
     double sum = 0.0, weight = 1.0;
     for (int i = index_; i > 0; i /= base) sum += (weight /= base) * (i % base);
     return sum;
@@ -42,8 +42,8 @@ class Halton {
   int index_ = 0;
 };
 
-/// How often a ray from p along x crosses the surface, odd: p is inside. A ray through an edge would count
-/// twice or not at all, so it runs askew.
+/// Returns true if p is inside a closed surface: a ray from p crosses it an odd number of times. The ray's
+/// direction is oblique, because a ray through an edge counts twice or not at all.
 bool inside(const MeshSurface& surface, const Vector3d& p) noexcept {
   const Vector3d along(0.8626, 0.3919, 0.3199);
   bool odd = false;
@@ -57,8 +57,8 @@ bool inside(const MeshSurface& surface, const Vector3d& p) noexcept {
   return odd;
 }
 
-/// Nobody waits for one of its ticks.
-Proxy::WorkLimit all_at_once() noexcept {
+/// The search is not bound to ticks, so its proxy needs no balanced work.
+Proxy::WorkLimit unbalanced() noexcept {
   Proxy::WorkLimit effort;
   effort.balanced = false;
   return effort;
@@ -67,9 +67,9 @@ Proxy::WorkLimit all_at_once() noexcept {
 }  // namespace
 
 FeasiblePoseSearch::FeasiblePoseSearch(const Scene& scene)
-    : scene_(scene), half_spaces_(scene), proxy_(scene, all_at_once()) {}
+    : scene_(scene), half_spaces_(scene), proxy_(scene, unbalanced()) {}
 
-/// Two surfaces that do not meet are apart, or one body holds the other.
+/// Two surfaces that do not intersect are apart, or one body contains the other.
 bool FeasiblePoseSearch::admissible(const Pose& X_WT, double time_s) noexcept {
   if (!half_spaces_.admits(Frame(X_WT), -Proxy::kClearance_m)) return false;
   for (const MeshObstacle& obstacle : scene_.meshes()) {
@@ -78,7 +78,7 @@ bool FeasiblePoseSearch::admissible(const Pose& X_WT, double time_s) noexcept {
     if (centres_m > obstacle.radius_m + scene_.tool_radius_m()) continue;
     const Pose X_OT = inverse(X_WO) * X_WT;
     if (!intersecting_pairs_.find(*scene_.tool_mesh(), *obstacle.mesh, X_OT))
-      return false;  // far too much to be free
+      return false;  // too many pairs for a free pose
     if (!intersecting_pairs_.pairs().empty()) return false;
     const MeshSurface& tool = scene_.tool_mesh()->surface;
     const MeshSurface& solid = obstacle.mesh->surface;
@@ -88,14 +88,15 @@ bool FeasiblePoseSearch::admissible(const Pose& X_WT, double time_s) noexcept {
   return true;
 }
 
-/// From an admissible pose, as near to p as a proxy comes.
+/// Lets a proxy approach p from an admissible pose until T stops decreasing.
 Projection FeasiblePoseSearch::converge_proxy(const Pose& X_WP, const Pose& X_start,
                                               const std::stop_token& stop, double time_s) noexcept {
   proxy_.clear_history(time_s);
   Projection q = proxy_.follow(X_WP, X_start, time_s);
-  for (int tick = 1; tick < kMostTicks && !stop.stop_requested(); ++tick) {
+  for (int tick = 1; tick < kMaxTicks && !stop.stop_requested(); ++tick) {
     const Projection next = proxy_.follow(X_WP, q.X_WQ, time_s);
-    const bool done = next.status != ProjectionStatus::budget_spent && next.energy > (1.0 - kGain) * q.energy;
+    const bool done =
+        next.status != ProjectionStatus::budget_spent && next.energy > (1.0 - kMinDecrease) * q.energy;
     q = next;
     if (done) break;
   }
@@ -109,19 +110,21 @@ Projection FeasiblePoseSearch::nearest(const Pose& X_WP, const std::stop_token& 
   best.X_WQ = X_WP;
   best.status = ProjectionStatus::infeasible;
   best.energy = std::numeric_limits<double>::infinity();
-  double farthest_m = 4.0 * scene_.tool_radius_m();
+  double max_radius_m = 4.0 * scene_.tool_radius_m();
   for (const MeshObstacle& obstacle : scene_.meshes())
-    farthest_m += 2.0 * obstacle.mesh->surface.radius_m() +
-                  (obstacle.X_WO_at(time_s).translation_m - X_WP.translation_m).norm();
+    max_radius_m += 2.0 * obstacle.mesh->surface.radius_m() +
+                    (obstacle.X_WO_at(time_s).translation_m - X_WP.translation_m).norm();
   Halton points;
   int starts = 0;
-  for (double r = kNearest * scene_.tool_radius_m(); r < farthest_m && starts < kMostStarts; r *= kGrowth)
-    for (int i = 0; i < kTries && starts < kMostStarts && !stop.stop_requested(); ++i) {
-      // Every other one turned, by as much as its points are moved.
-      const Vector3d shift_m = r * points.in_ball();
-      const Vector3d turn_rad = std::min(r / scene_.tool_radius_m(), kMostTurn_rad) * points.in_ball();
-      const Quaterniond turn = i % 2 == 0 ? Quaterniond::Identity() : rotation_from(turn_rad);
-      const Pose X_start = {(X_WP.rotation * turn).normalized(), X_WP.translation_m + shift_m};
+  for (double r = kFirstRadius * scene_.tool_radius_m(); r < max_radius_m && starts < kMaxStarts;
+       r *= kGrowth)
+    for (int i = 0; i < kSamplesPerRadius && starts < kMaxStarts && !stop.stop_requested(); ++i) {
+      // Every second sample is rotated, by about the angle that moves its points as far as the translation
+      // does.
+      const Vector3d translation_m = r * points.in_ball();
+      const Vector3d rotation_rad = std::min(r / scene_.tool_radius_m(), kMaxRotation_rad) * points.in_ball();
+      const Quaterniond rotation = i % 2 == 0 ? Quaterniond::Identity() : rotation_from(rotation_rad);
+      const Pose X_start = {(X_WP.rotation * rotation).normalized(), X_WP.translation_m + translation_m};
       if (!admissible(X_start, time_s)) continue;
       ++starts;
       const Projection q = converge_proxy(X_WP, X_start, stop, time_s);

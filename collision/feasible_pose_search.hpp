@@ -9,26 +9,27 @@
 
 namespace wrenchd {
 
-/// Finds a way back where there is no history to follow: at the start, after the tool was changed or an
-/// obstacle was put where it is.
+/// Finds an admissible pose where no previous proxy pose exists: at the start, and after a change of the tool
+/// or of an obstacle (core/METHOD.md, section 14.7).
 ///
-/// Looks around p, nearer first, for poses at which nothing overlaps, lets a proxy come as near to p as it
-/// can from each of them, and takes the nearest. It is admissible, and a local optimum; that no other place
-/// is nearer is likely, not proven.
+/// The search samples poses around p at increasing distance. From each sample without overlap a proxy
+/// approaches p. The search returns the proxy pose with the least distance to p. This pose is admissible and
+/// a local optimum. It is probably the nearest admissible pose, but this is not proven.
 ///
-/// It takes milliseconds, deep inside a fine mesh seconds, and is no work for the servo thread. The scene is
-/// kept by reference.
+/// The object keeps a reference to the scene, which must outlive it. Not RT-safe: may take milliseconds, and
+/// seconds deep inside a fine mesh.
 class FeasiblePoseSearch {
  public:
   explicit FeasiblePoseSearch(const Scene& scene);
 
-  /// Does the tool overlap nothing at this pose, and is it outside of all that is solid? Obstacles stand as
-  /// they do at scene time time_s.
+  /// Returns true if the tool overlaps no obstacle at X_WT and lies outside every solid. time_s: scene time
+  /// of the obstacle poses [s]. Not RT-safe: may take milliseconds.
   bool admissible(const Pose& X_WT, double time_s = 0.0) noexcept;
 
-  /// Status infeasible where nothing was found. The contacts are those that hold q. Once stop is asked for it
-  /// ends with what it has, after no more than one look at a pose or one tick of a proxy: a few milliseconds.
-  /// time_s: as for admissible().
+  /// Returns the admissible pose nearest to X_WP with its contacts. Returns status infeasible if no pose was
+  /// found. After a stop request the search returns its best result so far within a few milliseconds: after
+  /// at most one admissibility test or one proxy tick. time_s: as in admissible(). Not RT-safe: may take
+  /// seconds.
   Projection nearest(const Pose& X_WP, const std::stop_token& stop = {}, double time_s = 0.0) noexcept;
 
  private:

@@ -10,11 +10,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The few smallest of a stream of gaps, smallest first.
+/// The N smallest gaps of a sequence, smallest first.
 template <std::size_t N>
 class Deepest {
  public:
-  /// Below this gap a vertex would be kept.
+  /// Gaps below this value are kept.
   double threshold() const noexcept { return count_ < N ? kInfinity : gap_[N - 1]; }
   void insert(double gap, std::uint32_t vertex) noexcept {
     std::size_t at = std::min(count_, N - 1);
@@ -58,12 +58,12 @@ Contact HalfSpaceContacts::make_contact(std::uint32_t k, std::uint32_t vertex) c
 void HalfSpaceContacts::add_violated(const Frame& X_WT, double tolerance_m,
                                      ContactSet& contacts) const noexcept {
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
-    const HalfSpaceInTool seen = half_space_in_tool(k, X_WT);
+    const HalfSpaceInTool plane = half_space_in_tool(k, X_WT);
     Deepest<kMaxPerObstacle> deepest;
     scene_.tool().hull.visit_above(
-        -seen.n_T, [&] { return -seen.offset_m - std::min(-tolerance_m, deepest.threshold()); },
+        -plane.n_T, [&] { return -plane.offset_m - std::min(-tolerance_m, deepest.threshold()); },
         [&](std::uint32_t v, double depth) {
-          const double gap = -depth - seen.offset_m;
+          const double gap = -depth - plane.offset_m;
           if (gap >= -tolerance_m || gap >= deepest.threshold()) return;
           if (!contacts.contains(make_contact(k, v))) deepest.insert(gap, v);
         });
@@ -74,16 +74,16 @@ void HalfSpaceContacts::add_violated(const Frame& X_WT, double tolerance_m,
 void HalfSpaceContacts::add_touching(const Frame& X_WT, double within_m,
                                      ContactSet& contacts) const noexcept {
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
-    const HalfSpaceInTool seen = half_space_in_tool(k, X_WT);
+    const HalfSpaceInTool plane = half_space_in_tool(k, X_WT);
     const std::size_t known = contacts.size();
     const auto is_known = [&](std::uint32_t v) {
       return std::any_of(contacts.begin(), contacts.begin() + known,
                          [&](const Contact& c) { return c.obstacle == k && c.tool_feature == v; });
     };
     scene_.tool().hull.visit_above(
-        -seen.n_T, [&] { return -seen.offset_m - within_m; },
+        -plane.n_T, [&] { return -plane.offset_m - within_m; },
         [&](std::uint32_t v, double depth) {
-          if (-depth - seen.offset_m < within_m && !is_known(v)) contacts.add(make_contact(k, v));
+          if (-depth - plane.offset_m < within_m && !is_known(v)) contacts.add(make_contact(k, v));
         });
   }
 }
@@ -91,8 +91,9 @@ void HalfSpaceContacts::add_touching(const Frame& X_WT, double within_m,
 bool HalfSpaceContacts::admits(const Frame& X_WT, double tolerance_m) const noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   for (std::uint32_t k = 0; k < scene_.half_spaces().size(); ++k) {
-    const HalfSpaceInTool seen = half_space_in_tool(k, X_WT);
-    if (seen.n_T.dot(tool.vertices_T_m[tool.support(-seen.n_T)]) - seen.offset_m < -tolerance_m) return false;
+    const HalfSpaceInTool plane = half_space_in_tool(k, X_WT);
+    if (plane.n_T.dot(tool.vertices_T_m[tool.support(-plane.n_T)]) - plane.offset_m < -tolerance_m)
+      return false;
   }
   return true;
 }

@@ -9,23 +9,25 @@
 
 namespace wrenchd {
 
-/// The contacts of the tool with the half-spaces of a scene: its hull's vertices, for nothing else of it can
-/// meet a plane first. Has no memory of its own. The scene is kept by reference.
+/// The contacts of the tool with the half-spaces of a scene. Only vertices of the tool's convex hull can
+/// touch a plane first, so only they form contacts. The object has no state. It keeps a reference to the
+/// scene, which must outlive it. All members are RT-safe.
 class HalfSpaceContacts {
  public:
   explicit HalfSpaceContacts(const Scene& scene) : scene_(scene) {}
 
-  /// As ContactSource has it: the deepest vertices, at most kMaxPerObstacle for each half-space. RT safe.
+  /// Same contract as ContactSource: adds the deepest vertices, at most kMaxPerObstacle for each half-space.
+  /// X_WT: pose of the tool body frame T in the world W.
   void add_violated(const Frame& X_WT, double tolerance_m, ContactSet& contacts) const noexcept;
   void add_touching(const Frame& X_WT, double within_m, ContactSet& contacts) const noexcept;
   bool admits(const Frame& X_WT, double tolerance_m) const noexcept;
 
-  /// How many new contacts one obstacle contributes to one round of constraint generation: three hold a face,
-  /// and one more tells which way it would tip.
+  /// The maximum number of new contacts that one obstacle adds in one round of constraint generation. Three
+  /// contacts support a face, and a fourth shows the direction in which the tool would tip.
   static constexpr std::size_t kMaxPerObstacle = 4;
 
  private:
-  /// A half-space seen from the tool: gap of vertex a = n_T . a - below_m.
+  /// A half-space in the tool frame T: gap of vertex a = n_T . a - offset_m.
   struct HalfSpaceInTool {
     Vector3d n_T;
     double offset_m;

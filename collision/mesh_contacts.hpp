@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "collision/pairs/bvh_traversal.hpp"
@@ -17,141 +18,151 @@
 
 namespace wrenchd {
 
-/// What the tool's surface meets on the straight way from one pose to another.
+/// Sweep queries: finds the contacts that the tool's surface meets on the straight path from one pose to
+/// another. collision/README.md ("The sweep") and core/METHOD.md, section 14.3, describe the design.
 ///
-/// Two surfaces that are apart at the start and move straight meet first in a vertex and a face or in two
-/// edges (mesh_surface.hpp). So it is enough to look at those pairs of features: a pair has been *crossed*
-/// where its gap is open at the start, is not at the end, and the features, and not only the plane or the
-/// lines that carry them, are opposite each other when it closes. Of pairs that are crossed close together
-/// only the first counts: once it is held open the others may never be reached.
-///
-/// Nothing that turns moves straight. A way is taken to be straight in the obstacle's frame for the vertices
-/// of the tool, in the tool's frame for those of the obstacle, which is the same but for what a chord leaves
-/// out of an arc. Where that is more than a trifle, the end of a way on which nothing was met is looked at
-/// once more: do any two triangles meet there, whatever their features?
-///
-/// Which pairs of triangles are near the way, lists tell that are made ahead (pairs_ahead.hpp).
-///
-/// Memory is taken at construction. One object serves one thread.
+/// A predictive candidate list (pairs/predictive_candidate_list.hpp) supplies the pairs of triangles near the
+/// path. The constructor allocates all memory. One object serves one thread. All members but the constructor
+/// are RT-safe.
 class MeshContacts {
  public:
   static constexpr std::size_t kMaxContacts = 12;
 
   struct SweepResult {
-    /// The contacts met, the first on the way first; not all, but never none where there is one.
+    /// The contacts met, in the order along the path. The list may be incomplete, but it is never empty if
+    /// the tool meets a contact.
     StaticVector<Contact, kMaxContacts> contacts;
-    bool overlaps = false;  ///< the end pose overlaps, though nothing was seen on the way: it is too long.
-                            ///< Not told of all that do, but of all that are turned far on the way.
-    bool complete = true;   ///< false: the way is too long for what may be looked at; nothing is known
-    bool list_pending = false;  ///< then: but not for long, what is needed to look at it is being made
+    /// True if the end pose overlaps an obstacle and no crossing was found on the path. The path is then too
+    /// long. Only end poses of paths with large rotation are always tested.
+    bool overlaps = false;
+    /// False if the path needs more work than the budget allows. The other members are then undefined.
+    bool complete = true;
+    /// True if `complete` is false because a candidate list is still under construction.
+    bool list_pending = false;
   };
 
-  /// The scene is kept by reference.
+  /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
   explicit MeshContacts(const Scene& scene);
-  MeshContacts(const MeshContacts&) = delete;  // a copy would lose the room that is kept
+  MeshContacts(const MeshContacts&) = delete;  // a copy would lose the reserved memory
   MeshContacts& operator=(const MeshContacts&) = delete;
 
-  /// Starts from a pose that is admissible at a scene time. RT safe.
+  /// Sets the start of the next sweeps: a pose that is admissible at scene time time_s [s]. RT-safe.
   void set_start(const Pose& X_WT, double time_s = 0.0) noexcept;
 
-  /// The way from the start to X_WT, whose contacts are held open by clearance_m, while the obstacles move to
-  /// where they stand at time_s. The contacts are told as they stand then. RT safe.
+  /// Sweeps the path from the start to X_WT while the obstacles move to their poses at time_s [s]. Contacts
+  /// are held open by clearance_m [m]. The result states the contacts for the obstacle poses at time_s.
+  /// Reduces `budget` by the work done. RT-safe.
   SweepResult sweep(const Pose& X_WT, double clearance_m, VisitBudget& budget, double time_s = 0.0) noexcept;
 
-  /// Once a tick, when the tool has come to X_WT, following a hand that has come to X_WP: prepares for where
-  /// it will be. to_spare: visits that may as well be spent on that, if it does not need as many. RT safe.
+  /// Prefetches candidate pairs for the predicted path. Call it once per tick with the tool pose X_WT and the
+  /// commanded pose X_WP. spare_visits: node visits that the prefetch may use even if it does not need them
+  /// yet. RT-safe.
   void prefetch(const Pose& X_WT, const Pose& X_WP, VisitBudget& budget, double time_s = 0.0,
-                std::uint32_t to_spare = 0) noexcept;
+                std::uint32_t spare_visits = 0) noexcept;
 
-  /// The share of the way from the start to X_WT that can be looked at now, in a scene where nothing moves.
-  /// RT safe.
+  /// Returns the fraction [0, 1] of the path from the start to X_WT that the current candidate list covers.
+  /// Precondition: no obstacle moves. RT-safe.
   double covered_fraction(const Pose& X_WT) const noexcept {
     return candidates_.covered_fraction(X_start_, X_WT);
   }
-  /// What it takes to list pairs, for every tick that a list serves; in visits.
+  /// Returns the cost of a candidate list per tick in which it is used [node visits]. RT-safe.
   double list_visits_per_tick() const noexcept { return candidates_.list_visits_per_tick(); }
 
-  /// What the looks of this tick took beside the lists, in visits.
+  /// Returns the work of this tick's sweeps without candidate lists [node visits]. RT-safe.
   std::uint32_t sweep_visits() const noexcept { return sweep_visits_; }
 
-  /// The tool is elsewhere now. RT safe.
+  /// Discards predictions and candidate lists, for example after the tool was placed elsewhere. RT-safe.
   void reset() noexcept { candidates_.reset(); }
 
-  /// The contacts that touch at the end looked at last, with their gap no wider than the clearance, and
-  /// rounding.
+  /// The contacts whose gap at the end pose of the last sweep is at most the clearance, plus rounding.
   const ContactSet& touching() const noexcept { return touching_; }
 
-  std::size_t candidate_count() const noexcept { return candidates_.current().pairs().size(); }  ///< listed
+  std::size_t candidate_count() const noexcept { return candidates_.current().pairs().size(); }
 
  private:
   struct Crossing {
-    double path_fraction;  ///< 0 at the start, 1 at the end
+    double path_fraction;  ///< position on the path: 0 at the start, 1 at the end
     Vector3d point_W_m;
     Contact contact;
   };
-  /// One obstacle, seen along the way.
+  /// One obstacle and the tool's path in the frame O of the obstacle's mesh.
   struct ObstacleView {
     const MeshObstacle* obstacle;
-    std::uint32_t number;  ///< in the scene
-    Frame X_WO;            ///< at the end
+    std::uint32_t number;  ///< number of the obstacle in the scene
+    Frame X_WO;            ///< pose of the obstacle at the end of the path
     Frame X_OT_start, X_OT_end;
   };
-  /// A triangle of the tool as an obstacle sees it, at both ends.
+  /// A triangle of the tool in the obstacle's frame, at both ends of the path.
   struct MovedTriangle {
     std::uint32_t triangle = MeshSurface::kNone;
     std::uint32_t obstacle = MeshSurface::kNone;
     Triangle start, end;
     MeshSurface::Plane plane_start, plane_end;
   };
-  using Heights = std::array<double, 3>;  ///< of a triangle's corners over a plane [m]
+  using Heights = std::array<double, 3>;  ///< heights of a triangle's corners above a plane [m]
 
-  /// Two edges on the way; in the obstacle's frame.
+  /// The motion of a vertex past a face, in the frame of the face's body.
+  struct VertexPass {
+    MeshSurface::Plane plane;    ///< plane of the face, with the normal towards the vertex
+    bool closes = false;         ///< the gap closes on the path; otherwise it touches at the end
+    double path_fraction = 1.0;  ///< where the gap closes, or the end of the path
+    Vector3d p;                  ///< position of the vertex there [m]
+  };
+
+  /// The motion of an edge of the tool (a) relative to an edge of the obstacle (b), in the obstacle's frame.
   struct EdgePairMotion {
     std::uint32_t edge_a, edge_b;
     Vector3d a0_start, a0_end, da_start, da_end, b0, db;
-    Vector3d p;   ///< where they meet
-    double sign;  ///< of the cross product of da and db that points out of the obstacle
+    Vector3d p;   ///< point where the edges touch [m]
+    double sign;  ///< +1 or -1: orients the cross product of da and db out of the obstacle
   };
 
   void update_obstacle_views(const Pose& X_WT, double time_s) noexcept;
-  void test_pairs(VisitBudget& budget, SweepResult& findings) noexcept;
-  bool plane_separates(const Heights& start_m, const Heights& end_m, double least_m) const noexcept;
+  void test_pairs(VisitBudget& budget, SweepResult& result) noexcept;
+  bool plane_separates(const Heights& start_m, const Heights& end_m, double min_gap_m) const noexcept;
   const MovedTriangle& moved_triangle(const CandidatePair& pair) noexcept;
   bool closes(double start_m, double end_m) const noexcept;
-  void test_pair(const CandidatePair& pair, const MovedTriangle& a, SweepResult& findings) noexcept;
-  void vertices_on_face(const ObstacleView& seen, const CandidatePair& pair, const MovedTriangle& a) noexcept;
-  void face_on_vertices(const ObstacleView& seen, const CandidatePair& pair) noexcept;
-  void edges_on_edges(const ObstacleView& seen, const CandidatePair& pair, const MovedTriangle& a,
-                      SweepResult& findings) noexcept;
-  void edge_on_edge(const ObstacleView& seen, const MovedTriangle& a, std::uint32_t edge_a,
-                    std::uint32_t edge_b, SweepResult& findings) noexcept;
-  bool edges_touch(const ObstacleView& seen, EdgePairMotion& pass, double when,
-                   double beyond_m) const noexcept;
-  void add_crossing(double when, const Vector3d& point_W_m, const Contact& contact) noexcept;
-  void select_first_contacts(SweepResult& findings) noexcept;
-  void verify_end_pose(VisitBudget& budget, SweepResult& findings) noexcept;
+  void test_pair(const CandidatePair& pair, const MovedTriangle& a, SweepResult& result) noexcept;
+  template <class AtStart, class AtEnd>
+  std::optional<VertexPass> vertex_pass(const MeshSurface& face_body, std::uint32_t triangle,
+                                        const MeshSurface& vertex_body, std::uint32_t vertex,
+                                        const AtStart& at_start, const AtEnd& at_end) const noexcept;
+  void vertices_on_face(const ObstacleView& view, const CandidatePair& pair) noexcept;
+  void face_on_vertices(const ObstacleView& view, const CandidatePair& pair) noexcept;
+  void edges_on_edges(const ObstacleView& view, const CandidatePair& pair, const MovedTriangle& a,
+                      SweepResult& result) noexcept;
+  void edge_on_edge(const ObstacleView& view, const MovedTriangle& a, std::uint32_t edge_a,
+                    std::uint32_t edge_b, SweepResult& result) noexcept;
+  bool edges_touch(const ObstacleView& view, EdgePairMotion& pass, double fraction,
+                   double tolerance_m) const noexcept;
+  void add_contact(bool closes, double path_fraction, const Vector3d& point_W_m,
+                   const Contact& contact) noexcept;
+  void add_crossing(double fraction, const Vector3d& point_W_m, const Contact& contact) noexcept;
+  void select_first_contacts(SweepResult& result) noexcept;
+  void verify_end_pose(VisitBudget& budget, SweepResult& result) noexcept;
 
   const Scene& scene_;
   PredictiveCandidateList candidates_;
 
   Pose X_start_;
   double start_time_s_ = 0.0;
-  std::vector<ObstacleView> obstacle_views_;  ///< all obstacles
+  std::vector<ObstacleView> obstacle_views_;  ///< one entry for each mesh obstacle of the scene
   double clearance_m_ = 0.0;
-  double displacement_bound_m_ = 0.0;  ///< the longest that an obstacle sees a point of the tool go
-  double rotation_rad_ = 0.0;          ///< likewise, how far it turns
-  double arc_deviation_m_ = 0.0;       ///< by how much a way may leave the straight line as it turns
-  double feature_margin_m_ = 0.0;      ///< by how much features may miss each other as they cross
-  double slope_tolerance_ = 0.0;       ///< by which their surroundings may seem to come first
+  /// largest displacement of any tool point over all obstacle frames [m]
+  double displacement_bound_m_ = 0.0;
+  double rotation_rad_ = 0.0;      ///< largest rotation of the tool over all obstacle frames [rad]
+  double arc_deviation_m_ = 0.0;   ///< largest deviation of a point's arc from its chord [m]
+  double feature_margin_m_ = 0.0;  ///< tolerance beyond the border of a feature at a crossing [m]
+  double slope_tolerance_ = 0.0;   ///< slope by which neighbouring features may seem to be nearer
 
-  std::vector<std::uint32_t> remaining_pairs_;  ///< of the pairs listed: those that may meet on the way
+  std::vector<std::uint32_t> remaining_pairs_;  ///< indices of the candidate pairs that the culler keeps
   SeparatingAxes separating_axes_;
   MovedTriangle moved_triangle_;
-  std::uint32_t tested_pairs_ = 0;  ///< pairs that no plane keeps apart
+  std::uint32_t tested_pairs_ = 0;  ///< number of pairs that reached the feature tests
   std::vector<Crossing> crossings_;
-  BvhTraversal traversal_;  ///< of verify_end_pose()
+  BvhTraversal traversal_;  ///< for verify_end_pose() only
   std::uint32_t sweep_visits_ = 0;
-  bool overlap_found_ = false;  ///< it told of an overlap in this tick
+  bool overlap_found_ = false;  ///< a sweep of this tick reported an overlap
   ContactSet touching_;
 };
 

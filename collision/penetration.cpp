@@ -12,8 +12,8 @@
 namespace wrenchd {
 namespace {
 
-/// An answer is better where its energy is less by more than rounding.
-constexpr double kBetter = 1.0 - 1e-10;
+/// An answer is better if its energy is lower by more than rounding.
+constexpr double kImprovement = 1.0 - 1e-10;
 
 bool in_contact(const Projection& projection) noexcept {
   return projection.status == ProjectionStatus::converged ||
@@ -24,14 +24,15 @@ Vector6d displacement(const Pose& X_WP, const Pose& X_WQ) noexcept {
   return log(inverse(X_WP) * X_WQ);
 }
 
-/// Of a scene of meshes that are not held as convex bodies as well.
-std::string why_only_exact(const Scene& scene) {
+/// For a scene of meshes whose bodies are not all convex and at rest.
+std::string only_exact_reason(const Scene& scene) {
   for (const MeshObstacle& obstacle : scene.meshes())
     if (obstacle.moves())
       return "the obstacle '" + obstacle.name +
-             "' moves, which only method exact can deal with; choose it, or let all obstacles stand still";
+             "' moves, and only method exact supports moving obstacles; choose it, or keep all obstacles at "
+             "rest";
   return "the tool or an obstacle ('" + scene.meshes().front().name +
-         "', ...) is not convex, which only method exact can deal with; choose it, or give convex bodies";
+         "', ...) is not convex, and only method exact supports that; choose it, or use convex bodies";
 }
 
 }  // namespace
@@ -49,14 +50,14 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
   if (options.friction.enabled()) {
     if (options.method != Method::exact)
       throw std::invalid_argument(
-          "only method exact knows friction; choose it, or leave friction out ([rendering.friction], "
+          "only method exact supports friction; choose it, or remove friction ([rendering.friction], "
           "--friction)");
     friction_.emplace(scene.tool().solid.inertia, options.friction,
                       scene.meshes().empty() ? options.clearance_m : Proxy::kClearance_m);
   }
   if (scene.meshes().empty()) return;
   const bool convex = !scene.convex().empty();
-  if (options.method != Method::exact && !convex) throw std::invalid_argument(why_only_exact(scene));
+  if (options.method != Method::exact && !convex) throw std::invalid_argument(only_exact_reason(scene));
   if (options.method == Method::exact) proxy_.emplace(scene);
   if (!convex) pose_search_.emplace(scene);
 }
@@ -66,17 +67,16 @@ Penetration PenetrationDepth::follow(const Pose& X_WP, const Pose& X_last, doubl
                    : follow_frictionless(X_WP, X_last, scene_time_s);
 }
 
-/// What friction does to p comes first. A tool that it holds altogether has nothing to look for, unless what
-/// it stands on moves.
+/// Friction modifies p first. If the tool sticks, there is nothing to solve, unless its support moves.
 Penetration PenetrationDepth::follow_with_friction(const Pose& X_WP, const Pose& X_last,
                                                    double scene_time_s) noexcept {
   const bool moves = proxy_ && bodies_.has_moving_obstacles();
-  Pose X_held = X_last;
+  Pose X_carried = X_last;
   if (moves)
-    X_held = friction_->carry_with_obstacle(X_last, [&](std::uint32_t obstacle) {
+    X_carried = friction_->carry_with_obstacle(X_last, [&](std::uint32_t obstacle) {
       return bodies_.obstacle_displacement(obstacle, proxy_->admissible_time_s(), scene_time_s);
     });
-  const Pose X_felt = friction_->frictional_goal(X_WP, X_held, !moves);
+  const Pose X_felt = friction_->frictional_goal(X_WP, X_carried, !moves);
   Penetration out;
   if (friction_->sticks()) {
     if (proxy_) proxy_->hold(X_last);
@@ -85,7 +85,7 @@ Penetration PenetrationDepth::follow_with_friction(const Pose& X_WP, const Pose&
     out = follow_frictionless(X_felt, X_last, scene_time_s);
     if (!same_bits(X_felt, X_WP)) {
       Projection& q = out.projection;
-      // Off the edge of what it rubbed on: on its way to p, where it comes to at the next tick.
+      // The tool has moved past the edge of the surface. It reaches p in the next tick.
       if (q.status == ProjectionStatus::free) q.status = ProjectionStatus::budget_spent;
       q.energy = energy(M_, X_WP, q.X_WQ);
       out.contacts = std::max<std::uint16_t>(out.contacts, 1);
@@ -142,7 +142,7 @@ Penetration PenetrationDepth::query(const Pose& X_WP, const std::stop_token& sto
   return approximate(X_WP, X_WP);
 }
 
-/// What the paper has: none of it seeks the global optimum.
+/// The methods of the paper do not search the global optimum.
 Penetration PenetrationDepth::approximate(const Pose& X_WP, const Pose& X_start) noexcept {
   if (options_.method == Method::descent) return descend(X_WP, X_start);
   return options_.method == Method::planar ? planar(X_WP) : translational(X_WP);
@@ -155,23 +155,24 @@ Penetration PenetrationDepth::descend(const Pose& X_WP, const Pose& X_start) noe
   return to_penetration(X_WP, q);
 }
 
-/// Changes the planes held until no other plane that admits the best answer gives a better one, which takes
-/// its place. solve: the answer for the planes held, sought from a pose.
+/// Exchanges held planes until no other plane that admits the best answer improves it. solve(pose): returns
+/// the answer for the held planes, searched from a pose.
 template <class Solve>
 void PenetrationDepth::refine_planes(Projection& best, const Solve& solve) noexcept {
-  constexpr int kChanges = 12;        // typical: none or one
-  constexpr std::size_t kTries = 16;  // of the planes that touch, the widest apart first
-  for (int change = 0; change < kChanges; ++change) {
+  constexpr int kMaxChanges = 12;        // usually none or one
+  constexpr std::size_t kMaxTries = 16;  // touching planes with the widest separation
+  for (int change = 0; change < kMaxChanges; ++change) {
     if (!in_contact(best) || scene_contacts_.planes_optimal(best)) return;
-    const std::size_t choices = std::min(kTries, scene_contacts_.find_alternative_planes(best.X_WQ));
+    const std::size_t choices = std::min(kMaxTries, scene_contacts_.find_alternative_planes(best.X_WQ));
     bool improved = false;
     saved_planes_ = scene_contacts_.planes();
     for (std::size_t i = 0; i < choices && !improved; ++i) {
       scene_contacts_.hold_alternative(i);
-      const Projection other = solve(best.X_WQ);
-      improved = other.status != ProjectionStatus::infeasible && other.energy < kBetter * best.energy;
+      const Projection candidate_answer = solve(best.X_WQ);
+      improved = candidate_answer.status != ProjectionStatus::infeasible &&
+                 candidate_answer.energy < kImprovement * best.energy;
       if (improved)
-        best = other;
+        best = candidate_answer;
       else
         scene_contacts_.set_planes(saved_planes_);
     }
@@ -179,39 +180,42 @@ void PenetrationDepth::refine_planes(Projection& best, const Solve& solve) noexc
   }
 }
 
-/// The best answer from every plane worth a try, one obstacle at a time: from the rotation of p, then from
-/// that of the best answer so far, until a round finds nothing better. Half-spaces leave no choice.
+/// Returns the best answer over all candidate planes, exchanged for one obstacle at a time. It starts from
+/// the rotation of p, then from the rotation of the best answer, until a round brings no improvement.
+/// Half-spaces leave no choice.
 Projection PenetrationDepth::project_globally(const Pose& X_WP, const std::stop_token& stop) noexcept {
-  const std::size_t openings = scene_contacts_.survey_planes(X_WP);
-  if (openings == 0) return exact_.project_globally(X_WP, scene_contacts_);
+  const std::size_t alternatives = scene_contacts_.survey_planes(X_WP);
+  if (alternatives == 0) return exact_.project_globally(X_WP, scene_contacts_);
   const auto solve = [&](const Pose& X_start) { return exact_.project(X_WP, scene_contacts_, X_start); };
   Projection best = solve(X_WP);
   refine_planes(best, solve);
   best_planes_ = scene_contacts_.planes();
   const auto try_all_from = [&](const Pose& X_start) {
     bool improved = false;
-    for (std::size_t i = 0; i < openings && best.status != ProjectionStatus::free; ++i) {
+    for (std::size_t i = 0; i < alternatives && best.status != ProjectionStatus::free; ++i) {
       if (stop.stop_requested()) return false;
       scene_contacts_.hold_survey_plane(i);
-      Projection other = solve(X_start);
-      refine_planes(other, solve);
-      if (other.status == ProjectionStatus::infeasible) continue;
-      if (best.status != ProjectionStatus::infeasible && !(other.energy < kBetter * best.energy)) continue;
-      best = other;
+      Projection candidate_answer = solve(X_start);
+      refine_planes(candidate_answer, solve);
+      if (candidate_answer.status == ProjectionStatus::infeasible) continue;
+      if (best.status != ProjectionStatus::infeasible &&
+          !(candidate_answer.energy < kImprovement * best.energy))
+        continue;
+      best = candidate_answer;
       best_planes_ = scene_contacts_.planes();
       improved = true;
     }
     return improved;
   };
-  constexpr int kRounds = 4;
+  constexpr int kMaxRounds = 4;
   try_all_from(X_WP);
-  for (int round = 0; round < kRounds && in_contact(best); ++round)
+  for (int round = 0; round < kMaxRounds && in_contact(best); ++round)
     if (!try_all_from(Pose(best.X_WQ))) break;
   scene_contacts_.set_planes(best_planes_);
   return best;
 }
 
-/// The nearest translation, over the planes that touch.
+/// Returns the nearest translation over the touching planes.
 Projection PenetrationDepth::translate(const Pose& X_WP) noexcept {
   const auto solve = [&](const Pose&) { return exact_.translate(X_WP, scene_contacts_, X_WP); };
   Projection q = solve(X_WP);
@@ -219,24 +223,25 @@ Projection PenetrationDepth::translate(const Pose& X_WP) noexcept {
   return q;
 }
 
-/// What every method says of its answer.
+/// Derives contacts, eps and spring displacement from a projection.
 Penetration PenetrationDepth::to_penetration(const Pose& X_WP, const Projection& projection) noexcept {
   Penetration out;
   out.projection = projection;
   if (!in_contact(projection)) return out;
-  // A proxy that ran out of time may stand on its way, held by nothing but that.
+  // A proxy that has reached its work limit may have no contact. It counts as one contact.
   out.contacts = static_cast<std::uint16_t>(std::max<std::size_t>(projection.active.size(), 1));
   out.eps = displacement(X_WP, projection.X_WQ);
   out.spring_displacement = out.eps;
   return out;
 }
 
-/// Every contact on its own, in every plane of its family; a convex obstacle counts as the half-space of the
-/// plane held, which for two edges is that of their common normal. Generically one vertex collides, and its
-/// projection frees the whole body: the best that does is the answer. Where none does (the family looks at
-/// one cross-section, and a vertex beside it stays inside), the wrenches of the contacts are added, as
-/// section 5 of the paper says, and the pose reported is the best of their rotations lifted until the whole
-/// body is out. Translation alone always is a candidate.
+/// Projects each contact alone, in every plane of its family. A convex obstacle counts as the half-space of
+/// its held plane. Usually one vertex collides and its projection frees the whole body; the best such
+/// projection is the answer.
+/// If no projection frees the body (the family tests one cross-section, and a vertex beside it may stay
+/// inside), the answer is the sum of the contacts' wrenches (core/METHOD.md, section 7.3; paper, section 5).
+/// The reported pose is then the best of the rotations, translated until the whole body is free. The pure
+/// translation is always a candidate.
 Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
   Penetration out = to_penetration(X_WP, translate(X_WP));
   if (out.projection.status == ProjectionStatus::free) return out;
@@ -244,7 +249,7 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
   contacts_.clear();
   while (scene_contacts_.add_violated(X_WP, 0.0, contacts_) > 0) continue;
 
-  bool freed = false;
+  bool body_freed = false;
   Pose X_WQ = out.projection.X_WQ;
   double T = in_contact(out.projection) ? out.projection.energy : std::numeric_limits<double>::infinity();
   Vector6d sum = Vector6d::Zero();
@@ -257,27 +262,27 @@ Penetration PenetrationDepth::planar(const Pose& X_WP) noexcept {
       if (one.minimum.T >= T) continue;
       const Pose candidate = PlanarFamily::pose(X_WP, contact, one);
       if (!scene_contacts_.admits(candidate, exact_.gap_tolerance_m(candidate))) continue;
-      freed = true;
+      body_freed = true;
       X_WQ = candidate;
       T = one.minimum.T;
     }
-    const Pose alone = PlanarFamily::pose(X_WP, contact, best);
-    sum += displacement(X_WP, alone);
-    if (freed) continue;
-    const Projection lifted = exact_.translate(X_WP, scene_contacts_, alone);
-    if (!in_contact(lifted) || lifted.energy >= T) continue;
-    X_WQ = lifted.X_WQ;
-    T = lifted.energy;
+    const Pose X_alone = PlanarFamily::pose(X_WP, contact, best);
+    sum += displacement(X_WP, X_alone);
+    if (body_freed) continue;
+    const Projection translated = exact_.translate(X_WP, scene_contacts_, X_alone);
+    if (!in_contact(translated) || translated.energy >= T) continue;
+    X_WQ = translated.X_WQ;
+    T = translated.energy;
   }
-  const auto lift = [&](const Pose&) { return exact_.translate(X_WP, scene_contacts_, X_WQ); };
-  Projection q = lift(X_WQ);
-  refine_planes(q, lift);  // lets q down onto what it stands clear of
+  const auto translate_out = [&](const Pose&) { return exact_.translate(X_WP, scene_contacts_, X_WQ); };
+  Projection q = translate_out(X_WQ);
+  refine_planes(q, translate_out);  // moves q towards p until it touches
   out = to_penetration(X_WP, q);
-  out.spring_displacement = freed ? out.eps : sum;
+  out.spring_displacement = body_freed ? out.eps : sum;
   return out;
 }
 
-/// The depth of each obstacle acts at the mean of the contacts that touch it.
+/// The depth of each obstacle acts at the mean of the contacts that touch it: METHOD (59).
 Penetration PenetrationDepth::translational(const Pose& X_WP) noexcept {
   Penetration out = to_penetration(X_WP, translate(X_WP));
   if (!in_contact(out.projection)) return out;
@@ -287,7 +292,7 @@ Penetration PenetrationDepth::translational(const Pose& X_WP) noexcept {
     const Vector3d lever_W = contact_point_W(contact, X_WQ) - X_WQ.translation_m;
     moment += multiplier * (X_WP.rotation.conjugate() * lever_W.cross(normal_W(contact, X_WQ)));
   }
-  // 2 m s = sum multiplier_i n_i: contact i carries the displacement multiplier_i n_i / (2 m).
+  // From 2 m s = sum multiplier_i n_i: contact i carries the displacement multiplier_i n_i / (2 m).
   out.spring_displacement.tail<3>() = moment / (2.0 * M_.mass_kg);
   return out;
 }

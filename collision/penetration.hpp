@@ -19,55 +19,61 @@
 
 namespace wrenchd {
 
-/// The generalized penetration depth of one configuration p.
+/// The generalized penetration depth of one configuration p (core/METHOD.md, section 1.3).
 struct Penetration {
-  Projection projection;            ///< q, T and the contacts. q = p where p is admissible.
-  std::uint16_t contacts = 0;       ///< feature pairs that touch at q; 0 where p is admissible
+  Projection projection;            ///< q, T and the contacts; q = p if p is admissible
+  std::uint16_t contacts = 0;       ///< number of feature pairs that touch at q; 0 if p is admissible
   Vector6d eps = Vector6d::Zero();  ///< Eq. (15): exponential coordinates of p^-1 q
-  /// What enters the wrench law. The same as eps for exact. For planar too, unless several contacts need each
-  /// its own projection: then the sum of their eps, as section 5 of the paper adds their wrenches. For
-  /// translational, [d; sum (c_i - x) x d_i]: with the force gain k for both halves this is the force k d at
-  /// each contact and its torque about the centre of mass, which is that method's wrench.
+  /// The displacement that the wrench law multiplies with the stiffness.
+  /// - exact, descent: equal to eps.
+  /// - planar: equal to eps. If several contacts need one projection each, it is the sum of their eps
+  ///   (core/METHOD.md, section 7.3; paper, section 5).
+  /// - translational: METHOD (59), [d; sum (c_i - x) x d_i]. With one force gain k for both halves, this
+  ///   yields the force k d at each contact and its torque about the centre of mass.
   Vector6d spring_displacement = Vector6d::Zero();
 };
 
-/// Computes the generalized penetration depth of a scene's tool by the method chosen. All memory is taken at
-/// construction.
+/// Computes the generalized penetration depth of a scene's tool by the chosen method. The constructor
+/// allocates all memory. One object serves one thread.
 class PenetrationDepth {
  public:
   struct Options {
     Method method = Method::exact;
-    int planes = 47;  ///< N_delta for planar; 47 is the paper's
-    /// How far contacts are held open [m]: zero for the exact optimum, Proxy::kClearance_m for a proxy that
-    /// is to be admissible to the last digit. A scene of meshes always keeps the latter.
+    int planes = 47;  ///< number of planes N_delta of method planar; the paper uses 47
+    /// The gap at which contacts are held open [m]. Zero yields the exact optimum. Proxy::kClearance_m yields
+    /// a proxy that is admissible to the last digit. A scene of meshes always uses Proxy::kClearance_m.
     double clearance_m = 0.0;
-    FrictionSettings friction = {};  ///< of a proxy that is followed; only exact knows it
+    FrictionSettings friction = {};  ///< friction of a followed proxy; method exact only
   };
 
-  /// The scene is kept by reference and must outlive this. Throws std::invalid_argument where the method
-  /// cannot work with the scene, or has no friction: only exact knows bodies that are not convex, and rubs.
+  /// Keeps a reference to the scene, which must outlive this object. Throws std::invalid_argument if the
+  /// method does not support the scene or friction. Only method exact supports bodies that are not convex,
+  /// and friction. Not RT-safe: allocates.
   PenetrationDepth(const Scene& scene, Options options);
   PenetrationDepth(const PenetrationDepth&) = delete;
   PenetrationDepth& operator=(const PenetrationDepth&) = delete;
 
-  /// Follows a proxy: X_last is last tick's q, an admissible pose. Where no admissible pose is found near p
-  /// the proxy stays there, and draws the hand back to where it came from. With friction q lags behind the
-  /// optimum for p: it is that for p moved by friction (core/friction.hpp), and so are multipliers and
-  /// kkt_residual; energy and eps are those between p and q. scene_time_s: at which the obstacles stand [s];
-  /// where they move it never runs back, and X_last was admissible at that of the last follow(), query() or
-  /// forget(). RT safe.
+  /// Follows a proxy and returns its new pose q for the commanded pose X_WP. X_last: q of the previous tick,
+  /// an admissible pose. If no admissible pose exists near p, the proxy stays at X_last and pulls the hand
+  /// back.
+  ///
+  /// With friction q is the optimum for the frictional goal (core/METHOD.md, section 9.3). Multipliers and
+  /// kkt_residual then belong to that goal; energy and eps are between p and q. scene_time_s: scene time of
+  /// the obstacle poses [s]. If obstacles move, it must not decrease, and X_last must be admissible at the
+  /// time of the previous follow(), query() or clear_history(). RT-safe.
   Penetration follow(const Pose& X_WP, const Pose& X_last, double scene_time_s = 0.0) noexcept;
-  /// Knows no history; exact seeks the global optimum, among meshes the nearest of several local ones.
-  /// Neither allocates nor locks, but is up to a thousand times dearer, among meshes more: no work for the
-  /// servo thread. Once stop is asked for, it ends within a few milliseconds; its answer is worth nothing
-  /// then. scene_time_s: at which the obstacles stand [s].
+  /// Returns the penetration depth of X_WP without history. Method exact searches the global optimum; among
+  /// meshes it returns the nearest of several local optima. After a stop request it returns within a few
+  /// milliseconds with an undefined result. scene_time_s: scene time of the obstacle poses [s]. Not RT-safe:
+  /// neither allocates nor locks, but may take seconds among meshes.
   Penetration query(const Pose& X_WP, const std::stop_token& stop = {}, double scene_time_s = 0.0) noexcept;
 
-  /// Forgets what the last answers were held by: the next pose to follow from is none of them. It is one that
-  /// was admissible when the obstacles stood as at scene_time_s [s]. RT safe.
+  /// Clears the contacts of the last answers. The next X_last is a different pose that is admissible at
+  /// scene_time_s [s]. RT-safe.
   void clear_history(double scene_time_s = 0.0) noexcept;
 
-  /// Whether contacts with mesh obstacles number the features of the meshes, or those of their hulls.
+  /// Returns true if contacts with mesh obstacles number mesh features, false if they number features of the
+  /// convex hulls. RT-safe.
   bool uses_mesh_features() const noexcept { return proxy_.has_value(); }
 
  private:
@@ -89,17 +95,17 @@ class PenetrationDepth {
   Inertia M_;
   SceneContacts scene_contacts_;
   ExactProjection exact_;
-  Descent descent_;  ///< works with exact_
+  Descent descent_;  ///< uses exact_
   PlanarFamily planar_;
-  ContactSet contacts_;  ///< what planar works through
-  StaticVector<ActiveContact, ContactSet::kCapacity>
-      warm_start_;                                 ///< what carried at the last answer of follow()
-  std::optional<Pose> X_last_answer_;              ///< that answer: the planes held admit it
-  std::vector<SeparatingPlane> saved_planes_;      ///< while other planes are tried
-  std::vector<SeparatingPlane> best_planes_;       ///< of the best answer so far
-  std::optional<Friction> friction_;               ///< where there is any
-  std::optional<Proxy> proxy_;                     ///< where there are meshes
-  std::optional<FeasiblePoseSearch> pose_search_;  ///< likewise
+  ContactSet contacts_;                                            ///< contacts that method planar processes
+  StaticVector<ActiveContact, ContactSet::kCapacity> warm_start_;  ///< loaded contacts of the last follow()
+  std::optional<Pose> X_last_answer_;          ///< answer of the last follow(); the held planes admit it
+  std::vector<SeparatingPlane> saved_planes_;  ///< held planes, saved while the search tries others
+  std::vector<SeparatingPlane> best_planes_;   ///< held planes of the best answer so far
+  std::optional<Friction> friction_;           ///< empty without friction
+  std::optional<Proxy> proxy_;  ///< empty in scenes without meshes, and for all methods but exact
+  /// empty if the scene has no mesh obstacles, or if all bodies are convex
+  std::optional<FeasiblePoseSearch> pose_search_;
 };
 
 }  // namespace wrenchd

@@ -11,62 +11,59 @@
 
 namespace wrenchd {
 
-/// The admissible proxy (section 4 of the method): a configuration q that follows the hand's p through a
-/// scene of any shape, never enters an obstacle and never passes through one.
+/// The admissible proxy: a configuration q that follows the commanded pose p through a scene of any shape. It
+/// never enters an obstacle and never passes through one (core/METHOD.md, section 14; collision/README.md,
+/// "The proxy").
 ///
-/// Each step goes straight from an admissible pose towards the closest-point projection of p for the contacts
-/// known. What the tool meets on that way becomes a contact, and the projection is sought again; a way on
-/// which it meets nothing is gone. There, contacts whose features no longer lie opposite each other let go.
-/// It ends where p is reached, or where all contacts that carry hold: q then is a local optimum of
-/// min T(p, q), and T has only fallen on the way.
+/// One tick alternates projections and sweeps. The projection yields the pose closest to p that the known
+/// contacts admit. The sweep along the straight path to that pose adds the contacts that the tool meets. The
+/// tick ends if q = p, if all loaded contacts hold (q is a local optimum of min T(p, q)), or if the work
+/// limit is reached. T never increases within a tick unless obstacles move.
 ///
-/// Obstacles that move push it first: it gives way by as little as it can, to the closest-point projection of
-/// where it is itself, and follows the hand from there. Where they move too fast for the work of a tick, it
-/// sees them late: q is admissible for where they stood at admissible_time_s().
+/// Obstacles that move displace the proxy first, by the smallest possible amount. If they are too fast for
+/// the work of one tick, q is admissible for their poses at admissible_time_s(). The work balancer
+/// (work_balancer.hpp) keeps the work of all ticks similar. Where obstacles move, no work is deferred.
 ///
-/// However deep p is and however fast it moves, q is an admissible pose at any time, and the work is bounded:
-/// when it is used up, q is as far as it came. Ticks are kept much alike: what would make one take several
-/// times what most take, a list of pairs that has to be made at once above all, is spread over two or three,
-/// which go as far as what is known to be free allows; and one that has little to do makes more ahead
-/// (even_work.hpp). Where obstacles move nothing waits.
-///
-/// All memory is taken at construction. One object serves one thread.
+/// The constructor allocates all memory. One object serves one thread. All members but the constructor are
+/// RT-safe.
 class Proxy {
  public:
-  /// What contacts are held open by [m]: far more than rounding, far less than anybody feels. Poses are
-  /// admissible to whoever checks them.
+  /// The gap at which contacts are held open [m]. It is far above rounding errors and far below human
+  /// perception, so every check finds the pose admissible.
   static constexpr double kClearance_m = 1e-9;
 
-  /// Of one tick, counted in work and not in time, so that a replay does the same. A visit takes well below a
-  /// tenth of a microsecond; a close fit of tens of thousands of triangles needs some ten thousand.
+  /// Work limit of one tick. The limit counts work, not time, so that a replay gives equal results. A node
+  /// visit takes well below 0.1 us. A tight fit of tens of thousands of triangles needs about 10,000 node
+  /// visits.
   struct WorkLimit {
-    std::uint16_t sweeps = 24;          ///< ways looked along
-    std::uint32_t node_visits = 40000;  ///< nodes and leaves of the trees, and what is found in them
-    bool balanced = true;  ///< where a tick would take far more than most, leaves what can wait to the next
+    std::uint16_t sweeps = 24;          ///< maximum number of sweeps
+    std::uint32_t node_visits = 40000;  ///< maximum number of node visits, pair tests included
+    bool balanced = true;  ///< if true, the balancer defers work of ticks that cost far more than most
   };
 
-  /// The scene is kept by reference and must outlive this.
+  /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
   explicit Proxy(const Scene& scene) : Proxy(scene, WorkLimit{}) {}
   Proxy(const Scene& scene, WorkLimit effort);
 
-  /// One tick: from X_last, last tick's q, towards p, among obstacles as they stand at time_s. The answer is
-  /// infeasible where obstacles have moved into it from all sides. RT safe.
+  /// Computes one tick: moves from X_last, the q of the previous tick, towards p. time_s: scene time of the
+  /// obstacle poses [s]. The status is infeasible if moving obstacles have trapped the tool. RT-safe.
   Projection follow(const Pose& X_WP, const Pose& X_last, double time_s = 0.0) noexcept;
 
-  /// One tick at which the tool is held at X_last, last tick's q, in a scene where nothing moves. RT safe.
+  /// Computes one tick in which the tool stays at X_last, the q of the previous tick. Precondition: no
+  /// obstacle moves. RT-safe.
   void hold(const Pose& X_last) noexcept;
 
-  /// Forgets the contacts of the last tick. The next X_last was admissible at time_s. RT safe.
+  /// Clears the contacts of the last tick. The next X_last must be admissible at time_s [s]. RT-safe.
   void clear_history(double time_s = 0.0) noexcept;
 
   double admissible_time_s() const noexcept {
     return admissible_time_s_;
-  }  ///< the scene time that q is admissible at
+  }  ///< scene time at which q is admissible [s]
 
-  std::uint16_t sweeps() const noexcept { return sweeps_; }  ///< of the last tick
+  std::uint16_t sweeps() const noexcept { return sweeps_; }  ///< number of sweeps of the last tick
   std::uint32_t node_visits() const noexcept {
     return work_limit_.node_visits - budget_.remaining;
-  }  ///< likewise
+  }  ///< node visits of the last tick
   std::size_t candidate_count() const noexcept { return meshes_.candidate_count(); }
 
  private:
@@ -95,16 +92,17 @@ class Proxy {
   HalfSpaceContacts half_spaces_;
   MeshContacts meshes_;
   KnownContacts known_contacts_;
-  std::optional<Pose> X_last_WP_;       ///< last tick's p
-  Pose X_WQ_;                           ///< the admissible pose at hand
-  double admissible_time_s_ = 0.0;      ///< the scene time that it is admissible at
-  double known_contacts_time_s_ = 0.0;  ///< the scene time that the known contacts are of
+  std::optional<Pose> X_last_WP_;       ///< p of the previous tick
+  Pose X_WQ_;                           ///< the present admissible pose
+  double admissible_time_s_ = 0.0;      ///< scene time at which X_WQ_ is admissible [s]
+  double known_contacts_time_s_ = 0.0;  ///< scene time of the obstacle poses in known_contacts_ [s]
   std::uint16_t trapped_ticks_ = 0;
   VisitBudget budget_;
   WorkBalancer balancer_;
-  std::uint32_t min_remaining_visits_ = 0;  ///< of the budget of an even tick
-  bool deferred_ = false;                   ///< this tick was to do more
-  double first_step_fraction_ = 1.0;        ///< of the longest step, for the first of the next tick
+  std::uint32_t min_remaining_visits_ = 0;  ///< remaining budget at which a balanced tick ends [node visits]
+  bool deferred_ = false;                   ///< this tick leaves work for the next one
+  /// length of the next tick's first step, as a fraction of the longest step
+  double first_step_fraction_ = 1.0;
   std::uint16_t sweeps_ = 0;
   std::uint16_t iterations_ = 0;
 };

@@ -16,29 +16,29 @@
 namespace wrenchd {
 namespace {
 
-/// What is made once of each mesh file, scale and kind.
-struct Made {
+/// The results for one combination of mesh file, scale and kind.
+struct LoadedObstacle {
   std::shared_ptr<const LoadedMesh> loaded;
-  std::shared_ptr<const MeshBvh> treed;
-  std::optional<ConvexBody> hull;  ///< in file units, where it is convex
+  std::shared_ptr<const MeshBvh> bvh;
+  std::optional<ConvexBody> hull;  ///< in file units; empty if the mesh is not convex
 };
 
-Made make(const MeshObstacleSettings& obstacle, bool all_convex, MeshLoader& loader) {
-  Made made;
-  made.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.generated);
-  loader.check_size(*made.loaded, obstacle.scale, kPlausibleObstacleSize);
-  require_size_for_contacts(made.loaded->mesh, obstacle.scale, obstacle.mesh);
-  TriangleMesh mesh = made.loaded->mesh;
+LoadedObstacle make(const MeshObstacleSettings& obstacle, bool all_convex, MeshLoader& loader) {
+  LoadedObstacle loaded_obstacle;
+  loaded_obstacle.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.generated);
+  loader.check_size(*loaded_obstacle.loaded, obstacle.scale, kPlausibleObstacleSize);
+  require_size_for_contacts(loaded_obstacle.loaded->mesh, obstacle.scale, obstacle.mesh);
+  TriangleMesh mesh = loaded_obstacle.loaded->mesh;
   if (all_convex && obstacle.kind == BodyKind::solid && may_be_convex(mesh)) {
-    ConvexBody hull = loader.hull(*made.loaded);
-    if (is_convex(mesh, hull)) made.hull = std::move(hull);
+    ConvexBody hull = loader.hull(*loaded_obstacle.loaded);
+    if (is_convex(mesh, hull)) loaded_obstacle.hull = std::move(hull);
   }
   for (Vector3d& p : mesh.vertices_m) p *= obstacle.scale;
-  made.treed = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh);
-  return made;
+  loaded_obstacle.bvh = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh);
+  return loaded_obstacle;
 }
 
-/// Reads what the settings name.
+/// Loads the meshes of the settings.
 Scene load(const SceneSettings& settings, MeshLoader& loader) {
   ToolBody tool = load_tool(settings.tool, loader);
   if (settings.meshes.empty()) return Scene(std::move(tool), settings.half_spaces);
@@ -46,19 +46,20 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
 
   std::vector<ConvexObstacle> convex;
   std::vector<MeshObstacle> meshes;
-  const bool all_stand = std::none_of(
+  const bool all_at_rest = std::none_of(
       settings.meshes.begin(), settings.meshes.end(),
       [](const MeshObstacleSettings& obstacle) { return obstacle.motion.moves() || obstacle.scheduled; });
-  bool all_convex = all_stand && is_convex(tool.mesh, tool.hull);
-  std::map<std::tuple<std::filesystem::path, double, BodyKind>, Made> all_made;
+  bool all_convex = all_at_rest && is_convex(tool.mesh, tool.hull);
+  std::map<std::tuple<std::filesystem::path, double, BodyKind>, LoadedObstacle> loaded_obstacles;
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
-    const auto [at, is_new] = all_made.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
-    Made& made = at->second;
-    if (is_new) made = make(obstacle, all_convex, loader);
-    meshes.emplace_back(obstacle.name, made.treed, obstacle.X_WM, obstacle.motion, obstacle.scheduled);
-    all_convex = all_convex && made.hull;
+    const auto [at, is_new] = loaded_obstacles.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
+    LoadedObstacle& loaded_obstacle = at->second;
+    if (is_new) loaded_obstacle = make(obstacle, all_convex, loader);
+    meshes.emplace_back(obstacle.name, loaded_obstacle.bvh, obstacle.X_WM, obstacle.motion,
+                        obstacle.scheduled);
+    all_convex = all_convex && loaded_obstacle.hull;
     if (!all_convex) continue;
-    ConvexBody hull = *made.hull;
+    ConvexBody hull = *loaded_obstacle.hull;
     for (Vector3d& p : hull.vertices_T_m) p = obstacle.X_WM * Vector3d(p * obstacle.scale);
     convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
@@ -136,7 +137,7 @@ Scene::Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes
     obstacle.scheduled = meshes[k].scheduled;
   }
   has_moving_obstacles_ = any_moves(meshes_);
-  convex_.clear();  // which are made where they stood
+  convex_.clear();  // convex() holds the previous poses
 }
 
 Pose Scene::obstacle_displacement(std::uint32_t number, double from_s, double to_s) const noexcept {

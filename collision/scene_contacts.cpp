@@ -10,25 +10,25 @@ namespace wrenchd {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Edges nearer to parallel than this [rad] have no common normal to rely on.
+/// Edges whose angle is below this [rad] have no usable common normal.
 constexpr double kParallel = 1e-7;
-/// Features this near to a plane touch it, in units of the tool's radius.
-constexpr double kTouching = 1e-7;
-/// The centre of pressure may lie this far outside a body, in units of the tool's radius.
-constexpr double kPressure = 1e-8;
-/// With no more faces than this, all are looked at: finding those that matter would take longer.
-constexpr std::size_t kFewFaces = 16;
-/// Normals that differ by less are the same plane.
+/// Features touch a plane within this distance, in units of the tool's radius.
+constexpr double kTouchDistance = 1e-7;
+/// Tolerance of the centre-of-pressure test, in units of the tool's radius.
+constexpr double kPressureTolerance = 1e-8;
+/// With at most this number of faces it is faster to test all of them.
+constexpr std::size_t kMaxAllFaces = 16;
+/// Normals that differ by less belong to the same plane.
 constexpr double kSamePlane = 1e-9;
 
-/// Does a plane with outward normal m touch the body along this edge? One that touches along a face of the
-/// edge does, whatever rounding makes of it.
+/// Returns true if a plane with outward normal m touches the body along this edge. The tolerance includes a
+/// plane along one of the edge's faces.
 bool touches_along(const ConvexBody::Edge& edge, const Vector3d& m) noexcept {
   const double least = -kSamePlane * m.norm();
   return m.dot(edge.side[0]) >= least && m.dot(edge.side[1]) >= least;
 }
 
-/// The edge of a vertex that runs along d, if there is one.
+/// Returns the edge at a vertex that is parallel to d; null if there is none.
 const ConvexBody::Edge* edge_along(const ConvexBody& body, std::uint32_t vertex, const Vector3d& d) noexcept {
   constexpr double kAlong = 1.0 - 0.5 * kParallel * kParallel;  // cosine
   for (const std::uint32_t e : body.edges_of(vertex))
@@ -36,20 +36,20 @@ const ConvexBody::Edge* edge_along(const ConvexBody& body, std::uint32_t vertex,
   return nullptr;
 }
 
-/// The gap of two edges is the same at all their points: its first end stands for the second.
+/// The gap of two edges is equal at all their points, so the edge's first vertex represents the second.
 std::uint32_t first_end(const ConvexBody& body, std::uint32_t vertex, const Vector3d& d) noexcept {
   const ConvexBody::Edge* edge = edge_along(body, vertex, d);
   return edge != nullptr ? edge->from : vertex;
 }
 
-/// Does a point of the line through an edge lie between its ends?
+/// Returns true if a point of an edge's line lies between the ends of the edge.
 bool between_ends(const ConvexBody& body, const ConvexBody::Edge& edge, const Vector3d& p_m,
                   double tolerance_m) noexcept {
   return edge.d.dot(p_m - body.vertices_T_m[edge.from]) >= -tolerance_m &&
          edge.d.dot(p_m - body.vertices_T_m[edge.to]) <= tolerance_m;
 }
 
-/// Fixed to the same features?
+/// Returns true if two planes are fixed to the same features.
 bool same_plane(const SeparatingPlane& a, const SeparatingPlane& b) noexcept {
   if (a.kind != b.kind) return false;
   if (a.kind == ContactKind::vertex_face) return (a.n_W - b.n_W).norm() < kSamePlane;
@@ -66,11 +66,11 @@ SceneContacts::SceneContacts(const Scene& scene)
       last_nearest_(planes_.size()) {
   candidates_.reserve(kMaxCandidates);
   survey_candidates_.reserve(kMaxSurveyPlanes);
-  std::size_t most = scene.tool().hull.vertices_T_m.size();
+  std::size_t max_contacts = scene.tool().hull.vertices_T_m.size();
   for (const ConvexObstacle& obstacle : scene.convex())
-    most = std::max(most, obstacle.body.vertices_T_m.size());
-  touching_vertices_.reserve(most);
-  obstacle_touching_vertices_.reserve(most);
+    max_contacts = std::max(max_contacts, obstacle.body.vertices_T_m.size());
+  touching_vertices_.reserve(max_contacts);
+  obstacle_touching_vertices_.reserve(max_contacts);
 }
 
 std::size_t SceneContacts::add_violated(const Pose& pose, double tolerance_m,
@@ -107,7 +107,8 @@ void SceneContacts::select_admitting_planes(const Pose& pose, double tolerance_m
       add_centre_line_candidate(k, X_WT);
     else
       add_widest_gap_candidate(k, X_WT);
-    if (candidates_.empty()) {  // they touch: no plane has a width, but one of these has none below zero
+    if (candidates_
+            .empty()) {  // touching bodies: no plane has positive width, but one of these has width zero
       add_face_candidates(k, X_WT);
       add_edge_pair_candidates(k, X_WT);
       sort_candidates();
@@ -122,7 +123,7 @@ bool SceneContacts::out_of_reach(std::uint32_t k, const Frame& X_WT) const noexc
   return (X_WT.x_m - obstacle.centre_W_m).squaredNorm() > reach * reach;
 }
 
-/// Edges that are parallel have no common normal: then it is that of the pose where the plane was taken.
+/// Parallel edges have no common normal. The plane then keeps the normal of the pose where it was selected.
 SceneContacts::PlaneNormal SceneContacts::normal_of(const SeparatingPlane& plane,
                                                     const Frame& X_WT) noexcept {
   switch (plane.kind) {
@@ -139,15 +140,15 @@ SceneContacts::PlaneNormal SceneContacts::normal_of(const SeparatingPlane& plane
   return {plane.n_W, false};
 }
 
-/// The spheres around tool and obstacle are apart along n: most obstacles are told so.
+/// Returns true if the bounding spheres of tool and obstacle are apart along n. This decides most obstacles.
 bool SceneContacts::spheres_separated(std::uint32_t k, const Vector3d& n_W,
                                       const Frame& X_WT) const noexcept {
   const ConvexObstacle& obstacle = scene_.convex()[k];
   return n_W.dot(X_WT.x_m - obstacle.centre_W_m) > scene_.tool_radius_m() + obstacle.radius_m;
 }
 
-/// The vertices of both bodies that lie farthest towards each other along a normal, and how far they are
-/// apart.
+/// Returns the vertices of both bodies that are nearest to each other along a normal, and their separation:
+/// METHOD (28).
 SceneContacts::PlaneSeparation SceneContacts::plane_separation(std::uint32_t k, const PlaneNormal& normal,
                                                                const Frame& X_WT) const noexcept {
   const ConvexBody& tool = scene_.tool().hull;
@@ -159,7 +160,7 @@ SceneContacts::PlaneSeparation SceneContacts::plane_separation(std::uint32_t k, 
   return {n_W, nearest, separation_m(k, n_W, nearest, X_WT), normal.degenerate};
 }
 
-/// How far a pair is apart along a normal.
+/// Returns the separation of a vertex pair along a normal.
 double SceneContacts::separation_m(std::uint32_t k, const Vector3d& n_W, VertexPair pair,
                                    const Frame& X_WT) const noexcept {
   const Vector3d a_W = X_WT * scene_.tool().hull.vertices_T_m[pair.tool_vertex];
@@ -172,10 +173,10 @@ bool SceneContacts::separates(std::uint32_t k, const Frame& X_WT, double toleran
          plane_separation(k, normal, X_WT).separation_m >= -tolerance_m;
 }
 
-/// The deepest pair, and those of its neighbours that lie beyond the plane too: on the side of the tool where
-/// the plane belongs to the obstacle, and the other way round.
-void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
-                               ContactSet& contacts) const noexcept {
+/// Adds the deepest pair and those of its neighbours that lie beyond the plane: neighbours on the tool if the
+/// plane belongs to the obstacle, otherwise neighbours on the obstacle.
+void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m,
+                               std::size_t max_contacts, ContactSet& contacts) const noexcept {
   const SeparatingPlane& plane = planes_[k];
   const PlaneNormal normal = normal_of(plane, X_WT);
   if (spheres_separated(k, normal.n_W, X_WT)) return;
@@ -204,7 +205,7 @@ void SceneContacts::add_convex(std::uint32_t k, const Frame& X_WT, double tolera
   };
 
   add(at.nearest.tool_vertex, at.nearest.obstacle_vertex);
-  std::size_t room = most - 1;
+  std::size_t room = max_contacts - 1;
   const bool tool_side = contact.kind == ContactKind::vertex_face;
   const ConvexBody& body = tool_side ? tool : obstacle;
   const std::uint32_t deepest = tool_side ? at.nearest.tool_vertex : at.nearest.obstacle_vertex;
@@ -227,7 +228,8 @@ bool SceneContacts::planes_optimal(const Projection& q) noexcept {
   return true;
 }
 
-/// The mean of the contacts with one obstacle, each weighted with what it carries. Nothing where none does.
+/// Returns the mean of the contact points with one obstacle, weighted with their multipliers; nothing if no
+/// contact is loaded.
 std::optional<SceneContacts::PressureCentre> SceneContacts::pressure_of(std::uint32_t k,
                                                                         const Projection& q) const noexcept {
   const auto number = static_cast<std::uint32_t>(scene_.half_spaces().size()) + k;
@@ -245,9 +247,8 @@ std::optional<SceneContacts::PressureCentre> SceneContacts::pressure_of(std::uin
   return out;
 }
 
-// The forces of one obstacle's contacts all act along n. They balance on a plane that is free to tilt where
-// their resultant passes through both bodies: where the centre of pressure c = sum m_i c_i / sum m_i lies in
-// the tool and in the obstacle.
+// METHOD (30). The forces of one obstacle's contacts all act along n. They are in equilibrium on a plane that
+// may tilt if the centre of pressure c = sum m_i c_i / sum m_i lies in the tool and in the obstacle.
 bool SceneContacts::plane_optimal(std::uint32_t k, const Projection& q) noexcept {
   const auto pressure = pressure_of(k, q);
   if (!pressure) return true;
@@ -261,7 +262,7 @@ bool SceneContacts::plane_optimal(std::uint32_t k, const Projection& q) noexcept
   if (plane.kind == ContactKind::edge_edge && pressure->contacts == 1) {
     const auto* tool_edge = edge_along(tool, a, plane.d_T);
     const auto* obstacle_edge = edge_along(obstacle, b, plane.d_W);
-    const double tolerance_m = kPressure * scene_.tool_radius_m();
+    const double tolerance_m = kPressureTolerance * scene_.tool_radius_m();
     if (tool_edge != nullptr && obstacle_edge != nullptr)
       return between_ends(tool, *tool_edge, centre_T, tolerance_m) &&
              between_ends(obstacle, *obstacle_edge, centre_W, tolerance_m);
@@ -272,32 +273,33 @@ bool SceneContacts::plane_optimal(std::uint32_t k, const Projection& q) noexcept
          (plane.kind == ContactKind::vertex_face || contains(tool, X_WT.R.transpose() * -n_W, a, centre_T));
 }
 
-/// Does a body hold a point of the plane that touches it, with this outward normal, at its vertex `farthest`?
-/// Only faces that meet the plane can leave the point out.
+/// Returns true if a body contains a point of the plane that touches it at vertex `farthest` with this
+/// outward normal. Only faces that meet the plane can exclude the point.
 bool SceneContacts::contains(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
                              const Vector3d& p_m) noexcept {
-  const double tolerance_m = kPressure * scene_.tool_radius_m();
-  const auto below = [&](const ConvexBody::Face& face) {
+  const double tolerance_m = kPressureTolerance * scene_.tool_radius_m();
+  const auto under_plane = [&](const ConvexBody::Face& face) {
     return face.n.dot(p_m) <= face.offset_m + tolerance_m;
   };
-  if (body.faces.size() <= kFewFaces) return std::all_of(body.faces.begin(), body.faces.end(), below);
+  if (body.faces.size() <= kMaxAllFaces)
+    return std::all_of(body.faces.begin(), body.faces.end(), under_plane);
   collect_touching(body, normal, farthest, touching_vertices_);
   for (const std::uint32_t v : touching_vertices_)
     for (const std::uint32_t f : body.faces_of(v))
-      if (!below(body.faces[f])) return false;
+      if (!under_plane(body.faces[f])) return false;
   return true;
 }
 
-/// Keeps a plane as a choice if it separates well enough.
+/// Adds a plane as a candidate if its separation is sufficient.
 void SceneContacts::add_candidate(std::uint32_t k, SeparatingPlane plane, const Frame& X_WT,
                                   double least_separation_m) noexcept {
   const PlaneNormal normal = normal_of(plane, X_WT);
-  // Any pair tells how far they are apart at most: most planes need no more.
+  // Any vertex pair yields an upper bound of the separation. It excludes most planes.
   if (normal.degenerate || separation_m(k, normal.n_W, last_nearest_[k], X_WT) < least_separation_m) return;
   const PlaneSeparation at = plane_separation(k, normal, X_WT);
   if (!(at.separation_m >= least_separation_m)) return;
-  for (const PlaneCandidate& choice : candidates_)
-    if (choice.obstacle == k && same_plane(choice.plane, plane)) return;
+  for (const PlaneCandidate& candidate : candidates_)
+    if (candidate.obstacle == k && same_plane(candidate.plane, plane)) return;
   plane.n_W = at.n_W;
   if (candidates_.size() == kMaxCandidates) {
     const auto worst = std::min_element(
@@ -310,7 +312,7 @@ void SceneContacts::add_candidate(std::uint32_t k, SeparatingPlane plane, const 
   candidates_.push_back({k, plane, at.separation_m});
 }
 
-/// Spheres that are apart are so along the line between their centres.
+/// Separate spheres are separated along the line between their centres.
 void SceneContacts::add_centre_line_candidate(std::uint32_t k, const Frame& X_WT) noexcept {
   const Vector3d apart = X_WT.x_m - scene_.convex()[k].centre_W_m;
   add_candidate(k, {ContactKind::vertex_face, apart.normalized()}, X_WT, -kInfinity);
@@ -323,8 +325,8 @@ void SceneContacts::add_face_candidates(std::uint32_t k, const Frame& X_WT) noex
     add_candidate(k, {ContactKind::face_vertex, Vector3d::UnitZ(), -face.n}, X_WT, -kInfinity);
 }
 
-/// The common normal of two edges counts where each is the farthest part of its body along it: that is a
-/// facet of the set of all translations that collide. All others are behind one of those.
+/// Edge pairs on the boundary of the set of colliding translations: the common normal counts if each edge is
+/// the farthest part of its body along it.
 void SceneContacts::add_edge_pair_candidate(std::uint32_t k, const Frame& X_WT, const ConvexBody::Edge& a,
                                             const ConvexBody::Edge& b, double least_separation_m) noexcept {
   const Vector3d N = (X_WT.R * a.d).cross(b.d);
@@ -344,8 +346,8 @@ void SceneContacts::add_edge_pair_candidates(std::uint32_t k, const Frame& X_WT)
     for (const auto& b : obstacle.edges) add_edge_pair_candidate(k, X_WT, a, b, -kInfinity);
 }
 
-// Of two bodies that are apart, the widest gap along any n is a least-distance problem by constraint
-// generation:  min |w|^2  s.t.  w . (p_a - p_b) >= 1 for all pairs,  n = w/|w|, and the gap is 1/|w|.
+// METHOD (29). The widest gap between two separate bodies is a least-distance problem, solved by constraint
+// generation: min |w|^2  s.t.  w . (p_a - p_b) >= 1 for all pairs,  n = w/|w|, and the gap is 1/|w|.
 void SceneContacts::add_widest_gap_candidate(std::uint32_t k, const Frame& X_WT) noexcept {
   using Status = LeastDistance<3, 64>::Status;
   constexpr std::size_t kPairs = 64;
@@ -365,7 +367,7 @@ void SceneContacts::add_widest_gap_candidate(std::uint32_t k, const Frame& X_WT)
         X_WT * tool.vertices_T_m[at.nearest.tool_vertex] - obstacle.vertices_T_m[at.nearest.obstacle_vertex];
     if (!(apart.squaredNorm() > 0.0)) return;
     widest_gap_.add(apart / unit_m, 1.0);
-    if (widest_gap_.solve(Vector3d::Zero(), 1e-12) != Status::optimal) return;  // they overlap
+    if (widest_gap_.solve(Vector3d::Zero(), 1e-12) != Status::optimal) return;  // the bodies overlap
     plane.n_W = widest_gap_.z().normalized();
   }
   add_candidate(k, plane, X_WT, 0.0);
@@ -391,7 +393,7 @@ std::size_t SceneContacts::survey_planes(const Pose& pose) noexcept {
     if (candidates_.empty()) continue;
     sort_candidates();
     hold_alternative(0);
-    if (candidates_[0].separation_m >= 0.0) continue;  // one plane is enough for what does not overlap
+    if (candidates_[0].separation_m >= 0.0) continue;  // one plane suffices for bodies that do not overlap
     const std::size_t room = kMaxSurveyPlanes - survey_candidates_.size();
     survey_candidates_.insert(
         survey_candidates_.end(), candidates_.begin(),
@@ -414,11 +416,11 @@ void SceneContacts::fix_planes_to_world(const Pose& pose) noexcept {
   }
 }
 
-/// The vertices of a body that touch a plane with this outward normal; farthest is one.
+/// Collects the vertices of a body that touch a plane with this outward normal. `farthest` is one of them.
 void SceneContacts::collect_touching(const ConvexBody& body, const Vector3d& normal, std::uint32_t farthest,
                                      std::vector<std::uint32_t>& out) const noexcept {
   out.clear();
-  const double least = normal.dot(body.vertices_T_m[farthest]) - kTouching * scene_.tool_radius_m();
+  const double least = normal.dot(body.vertices_T_m[farthest]) - kTouchDistance * scene_.tool_radius_m();
   body.visit_above(
       normal, [&] { return least; },
       [&](std::uint32_t v, double height) {
@@ -426,12 +428,12 @@ void SceneContacts::collect_touching(const ConvexBody& body, const Vector3d& nor
       });
 }
 
-/// Planes of the features that touch the plane held, and of the widest gap.
+/// Adds the planes of the features that touch the held plane, and the plane of the widest gap.
 void SceneContacts::add_touching_candidates(std::uint32_t k, const PlaneSeparation& held,
                                             const Frame& X_WT) noexcept {
   const ConvexBody& tool = scene_.tool().hull;
   const ConvexBody& obstacle = scene_.convex()[k].body;
-  const double touching_m = kTouching * scene_.tool_radius_m();
+  const double touching_m = kTouchDistance * scene_.tool_radius_m();
   collect_touching(tool, X_WT.R.transpose() * -held.n_W, held.nearest.tool_vertex, touching_vertices_);
   collect_touching(obstacle, held.n_W, held.nearest.obstacle_vertex, obstacle_touching_vertices_);
   for (const std::uint32_t v : obstacle_touching_vertices_)
@@ -445,23 +447,24 @@ void SceneContacts::add_touching_candidates(std::uint32_t k, const PlaneSeparati
       for (const std::uint32_t w : obstacle_touching_vertices_)
         for (const std::uint32_t b : obstacle.edges_of(w))
           add_edge_pair_candidate(k, X_WT, tool.edges[a], obstacle.edges[b], -touching_m);
-  const bool apart = std::any_of(candidates_.begin(), candidates_.end(), [&](const PlaneCandidate& choice) {
-    return choice.obstacle == k && choice.separation_m > touching_m;
-  });
+  const bool apart =
+      std::any_of(candidates_.begin(), candidates_.end(), [&](const PlaneCandidate& candidate) {
+        return candidate.obstacle == k && candidate.separation_m > touching_m;
+      });
   if (!apart) add_widest_gap_candidate(k, X_WT);
 }
 
 std::size_t SceneContacts::find_alternative_planes(const Pose& pose) noexcept {
   const Frame X_WT(pose);
   candidates_.clear();
-  const double touching_m = kTouching * scene_.tool_radius_m();
+  const double touching_m = kTouchDistance * scene_.tool_radius_m();
   for (std::uint32_t k = 0; k < planes_.size(); ++k) {
     if (out_of_reach(k, X_WT)) continue;
     const PlaneSeparation held = plane_separation(k, normal_of(planes_[k], X_WT), X_WT);
     if (held.separation_m > touching_m) continue;
     add_touching_candidates(k, held, X_WT);
-    const auto same = [&](const PlaneCandidate& choice) {
-      return choice.obstacle == k && same_plane(choice.plane, planes_[k]);
+    const auto same = [&](const PlaneCandidate& candidate) {
+      return candidate.obstacle == k && same_plane(candidate.plane, planes_[k]);
     };
     candidates_.erase(std::remove_if(candidates_.begin(), candidates_.end(), same), candidates_.end());
   }

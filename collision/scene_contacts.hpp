@@ -14,30 +14,32 @@
 
 namespace wrenchd {
 
-/// The plane that keeps the tool and one convex obstacle apart, and what it is fixed to: the obstacle (any
-/// normal that stands still in the world), a face of the tool, or an edge of each.
+/// A plane between the tool and one convex obstacle. It is fixed to the obstacle (its normal is constant in
+/// the world), to a face of the tool, or to an edge of each.
 struct SeparatingPlane {
   ContactKind kind = ContactKind::vertex_face;
-  Vector3d n_W = Vector3d::UnitZ();  ///< from the obstacle to the tool; of the pose where it was taken
-  Vector3d d_T = Vector3d::Zero();   ///< as in Contact
-  Vector3d d_W = Vector3d::Zero();   ///< as in Contact
+  /// normal from the obstacle to the tool, at the pose where the plane was selected
+  Vector3d n_W = Vector3d::UnitZ();
+  Vector3d d_T = Vector3d::Zero();  ///< normal or edge direction in T; same meaning as Contact::d_T
+  Vector3d d_W = Vector3d::Zero();  ///< edge direction in W; same meaning as Contact::d_W
 };
 
-/// The contacts of a scene, for one user.
+/// The contacts of a scene with half-spaces and convex obstacles.
 ///
-/// Two convex bodies are apart where some plane separates them. For one plane that is a set of gaps which all
-/// must be open, as the projection wants them; but any plane will do. So each obstacle holds a plane, the
-/// projection solves for the planes held, and the planes are changed until no other choice is better. Every
-/// pose that the planes held admit is admissible, whichever they are.
+/// Two convex bodies are apart if and only if a plane separates them. For one plane this yields a set of gaps
+/// that must all be open. For each obstacle this object holds one plane. The projection solves for the held
+/// planes, and the caller exchanges planes until no other choice is better. Every pose that the held planes
+/// admit is admissible (core/METHOD.md, section 3.7).
 ///
-/// Memory is taken at construction. One object serves one thread.
+/// The constructor allocates all memory. One object serves one thread. All members but the constructor are
+/// RT-safe unless stated otherwise.
 class SceneContacts final : public ContactSource {
  public:
-  /// The scene is kept by reference.
+  /// Keeps a reference to the scene, which must outlive this object. Not RT-safe: allocates.
   explicit SceneContacts(const Scene& scene);
 
-  /// The deepest vertices of the tool in each half-space, at most kMaxPerObstacle of each, and the pairs that
-  /// lie deepest beyond the planes held.
+  /// Adds the deepest vertices of the tool in each half-space, at most kMaxPerObstacle of each, and the
+  /// deepest vertex pairs of each held plane. RT-safe.
   std::size_t add_violated(const Pose& X_WT, double tolerance_m,
                            ContactSet& contacts) const noexcept override;
 
@@ -45,70 +47,72 @@ class SceneContacts final : public ContactSource {
 
   bool admits(const Pose& X_WT, double tolerance_m) const noexcept override;
 
-  /// Sees to it that the planes held admit a pose that overlaps nothing: takes the widest apart where they do
-  /// not. RT safe.
+  /// Replaces the planes that do not admit X_WT by the planes of widest separation. Precondition: the pose
+  /// overlaps nothing. RT-safe.
   void select_admitting_planes(const Pose& X_WT, double tolerance_m) noexcept;
 
-  /// Looks at every plane worth a try from this pose: all faces, and all pairs of edges where there are not
-  /// too many. Holds for each convex obstacle the one that separates best, or least badly. Returns how many
-  /// there are to open(). RT safe, but dear.
+  /// Tests all candidate planes at X_WT: all faces, and all edge pairs up to kMaxEdgePairs. Holds for each
+  /// convex obstacle the plane of largest separation. Returns the number of alternatives for
+  /// hold_survey_plane(). Not RT-safe: allocates nothing, but may take several milliseconds.
   std::size_t survey_planes(const Pose& X_WT) noexcept;
-  /// Holds the planes of the last survey, with its i-th, the least deep first, in the place of one of them.
+  /// Holds the planes of the last survey, and replaces one of them by the survey's alternative i.
+  /// Alternatives are sorted by depth, the least deep first. RT-safe.
   void hold_survey_plane(std::size_t i) noexcept;
 
-  /// Lets the planes held stand still in the world, as they stand at this pose. RT safe.
+  /// Fixes the held planes in the world as they are at X_WT. RT-safe.
   void fix_planes_to_world(const Pose& X_WT) noexcept;
 
-  /// Collects the planes other than those held that admit this pose, the widest apart first, among the
-  /// features that touch the planes held. Returns how many. RT safe.
+  /// Collects other planes that admit X_WT from the features that touch the held planes, the widest
+  /// separation first. Returns their number. RT-safe.
   std::size_t find_alternative_planes(const Pose& X_WT) noexcept;
 
-  /// Holds the i-th of them.
+  /// Holds alternative i of find_alternative_planes(). RT-safe.
   void hold_alternative(std::size_t i) noexcept { planes_[candidates_[i].obstacle] = candidates_[i].plane; }
 
   const std::vector<SeparatingPlane>& planes() const noexcept { return planes_; }
-  /// planes: of this scene. RT safe.
+  /// Holds `planes`, one for each convex obstacle of this scene. RT-safe.
   void set_planes(const std::vector<SeparatingPlane>& planes) noexcept { planes_ = planes; }
 
-  /// Do the planes held press where both bodies are? Then no other plane does better: the forces that keep
-  /// the tool at q also balance on the plane. RT safe.
+  /// Returns true if the centre of pressure of every held plane lies in both bodies: METHOD (30). Then no
+  /// other plane yields a better answer. RT-safe.
   bool planes_optimal(const Projection& q) noexcept;
 
  private:
   struct PlaneCandidate {
-    std::uint32_t obstacle;  ///< among the convex ones
+    std::uint32_t obstacle;  ///< index among the convex obstacles
     SeparatingPlane plane;
     double separation_m;
   };
-  /// Vertices of both bodies.
+  /// A vertex of the tool and a vertex of the obstacle.
   struct VertexPair {
     std::uint32_t tool_vertex = 0;
     std::uint32_t obstacle_vertex = 0;
   };
-  /// Where the contacts with one obstacle press.
+  /// The centre of pressure of the contacts with one obstacle.
   struct PressureCentre {
     Vector3d centre_W_m = Vector3d::Zero();
-    VertexPair pair;   ///< one of them
-    int contacts = 0;  ///< how many carry
+    VertexPair pair;   ///< vertices of one of the contacts
+    int contacts = 0;  ///< number of loaded contacts
   };
-  /// Of a plane at one pose.
+  /// The normal of a plane at one pose.
   struct PlaneNormal {
     Vector3d n_W;
-    bool degenerate;  ///< parallel edges: no common normal
+    bool degenerate;  ///< true if the edges are parallel and have no common normal
   };
-  /// A plane at one pose.
+  /// The separation of two bodies along a plane's normal at one pose.
   struct PlaneSeparation {
     Vector3d n_W;
     VertexPair nearest;
     double separation_m;
-    bool degenerate;  ///< as in Normal
+    bool degenerate;  ///< same meaning as PlaneNormal::degenerate
   };
 
   static constexpr std::size_t kMaxCandidates = 96;     ///< for one obstacle
-  static constexpr std::size_t kMaxSurveyPlanes = 288;  ///< for all
-  static constexpr std::size_t kMaxEdgePairs = 200000;  ///< compared at once by survey(): some milliseconds
+  static constexpr std::size_t kMaxSurveyPlanes = 288;  ///< for all obstacles
+  /// survey_planes() compares no more; this many take some milliseconds
+  static constexpr std::size_t kMaxEdgePairs = 200000;
 
-  void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t most,
+  void add_convex(std::uint32_t k, const Frame& X_WT, double tolerance_m, std::size_t max_contacts,
                   ContactSet& contacts) const noexcept;
   static PlaneNormal normal_of(const SeparatingPlane& plane, const Frame& X_WT) noexcept;
   bool spheres_separated(std::uint32_t k, const Vector3d& n_W, const Frame& X_WT) const noexcept;
@@ -138,12 +142,13 @@ class SceneContacts final : public ContactSource {
   const Scene& scene_;
   HalfSpaceContacts half_spaces_;
   std::vector<SeparatingPlane> planes_;       ///< one for each convex obstacle
-  std::vector<SeparatingPlane> survey_best_;  ///< of the last survey
+  std::vector<SeparatingPlane> survey_best_;  ///< held planes at the end of the last survey
   std::vector<PlaneCandidate> candidates_;
   std::vector<PlaneCandidate> survey_candidates_;
-  mutable std::vector<VertexPair> last_nearest_;  ///< what was found nearest last: where to look first
+  /// nearest vertices of the last query, start of the next support search
+  mutable std::vector<VertexPair> last_nearest_;
   LeastDistance<3, 64> widest_gap_;
-  std::vector<std::uint32_t> touching_vertices_;  ///< vertices, of the tool where both bodies are looked at
+  std::vector<std::uint32_t> touching_vertices_;  ///< vertices of the tool, if both bodies are searched
   std::vector<std::uint32_t> obstacle_touching_vertices_;
 };
 

@@ -13,7 +13,7 @@
 namespace wrenchd {
 
 void require_usable(const SolidProperties& solid, const std::filesystem::path& mesh, double scale) {
-  // Volume or inertia underflowed or overflowed: nothing is left to compute with.
+  // Detects underflow and overflow of volume and inertia.
   const Matrix3d& H = solid.inertia.H_kg_m2;
   if (solid.volume_m3 > 0.0 && is_finite(solid.volume_m3) && H.allFinite() && H.diagonal().minCoeff() > 0.0)
     return;
@@ -24,8 +24,8 @@ void require_usable(const SolidProperties& solid, const std::filesystem::path& m
   throw MeshError(text.str());
 }
 
-// The hull is taken of the file's own numbers: scaled and shifted, a vertex within a flat face may come to
-// lie an ulp outside it and become a corner.
+// The hull is computed from the unscaled numbers of the file. After scaling and translation a vertex within a
+// flat face could lie one rounding error outside and become a hull vertex.
 ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg) {
   ConvexBody hull = convex_hull(mesh.vertices_m);
   return tool_body(std::move(mesh), std::move(hull), scale, mass_kg);

@@ -9,27 +9,28 @@
 
 namespace wrenchd {
 
-/// The virtual body in the hand. M: frame of the mesh file. T: the body frame, M's axes at the centre of
-/// mass.
+/// The virtual body in the hand. M: frame of the mesh file. T: body frame, parallel to M, with its origin at
+/// the centre of mass.
 struct ToolBody {
-  SolidProperties solid;  ///< of the uniform solid, in metres and kilograms
-  ConvexBody hull;        ///< what a half-space can touch, in T
-  TriangleMesh mesh;      ///< the whole surface, in T [m]
+  SolidProperties solid;  ///< properties of the uniform solid, in metres and kilograms
+  ConvexBody hull;        ///< convex hull in T; the part of the tool that half-spaces touch
+  TriangleMesh mesh;      ///< complete surface in T [m]
 
-  /// Pose of the body frame T in the mesh frame M.
+  /// Returns the pose of the body frame T in the mesh frame M. RT-safe.
   Pose X_MT() const noexcept { return {Quaterniond::Identity(), solid.p_MT_m}; }
 };
 
-/// Throws MeshError where the scale made a solid too small or too large to compute with.
+/// Throws MeshError if the scale makes the solid too small or too large for floating-point arithmetic. Not
+/// RT-safe: allocates.
 void require_usable(const SolidProperties& solid, const std::filesystem::path& mesh, double scale);
 
-/// A closed, outward-oriented mesh as a uniform solid of this mass. scale: metres per mesh unit. hull: of the
-/// mesh, in its units. Not RT safe.
+/// Returns a closed, outward-oriented mesh as a uniform solid. scale: metres per mesh unit. hull: convex hull
+/// in mesh units; computed from the mesh if omitted. Not RT-safe: allocates, may take seconds.
 ToolBody tool_body(TriangleMesh mesh, ConvexBody hull, double scale, double mass_kg);
 ToolBody tool_body(TriangleMesh mesh, double scale, double mass_kg);
 
 /// Loads and checks the tool's mesh. Throws MeshError that names the file, the defect, its place and the
-/// cure. Not RT safe.
+/// remedy. Not RT-safe: reads a file, may take seconds.
 ToolBody load_tool(const ToolSettings& settings, MeshLoader& loader);
 ToolBody load_tool(const ToolSettings& settings);
 

@@ -10,10 +10,10 @@ namespace {
 constexpr std::array<const char*, kFeatureKindCount> kNames = {
     "none", "vertex", "edge", "face", "hull vertex", "hull edge", "hull face", "plane"};
 
-/// Directions closer than this are the same [1 - cosine].
+/// Directions are equal within this tolerance [1 - cosine].
 constexpr double kSameDirection = 1e-9;
 
-/// The edge of a hull that starts or ends at a vertex and runs along d; its vertex, where none does.
+/// Returns the hull edge at a vertex that is parallel to d; the vertex if there is none.
 Feature hull_edge(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& d) noexcept {
   for (const std::uint32_t e : hull.edges_of(vertex)) {
     const ConvexBody::Edge& edge = hull.edges[e];
@@ -23,8 +23,8 @@ Feature hull_edge(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& 
   return {FeatureKind::hull_vertex, vertex, 0};
 }
 
-/// The face of a hull at a vertex whose outward normal is n. A plane between two convex bodies may touch one
-/// of them in that vertex alone: then it is the vertex.
+/// Returns the hull face at a vertex with outward normal n. If the plane touches the hull in that vertex
+/// only, returns the vertex.
 Feature hull_face(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& n) noexcept {
   for (const std::uint32_t f : hull.faces_of(vertex))
     if (hull.faces[f].n.dot(n) >= 1.0 - kSameDirection) return {FeatureKind::hull_face, f, 0};
@@ -36,8 +36,8 @@ Feature mesh_edge(const MeshSurface& surface, std::uint32_t edge) noexcept {
   return {FeatureKind::edge, std::min(a, b), std::max(a, b)};
 }
 
-/// Where a contact is. A plane along two edges may have come to touch a hull in a vertex that is no end of
-/// its edge: then it is there.
+/// Returns the contact point. A plane along two edges may touch a hull in a vertex that is no end of its
+/// edge; the vertex is then the contact point.
 Vector3d point_W(const Contact& contact, FeatureKind tool, FeatureKind obstacle, const Pose& X_WQ) noexcept {
   if (contact.kind != ContactKind::edge_edge) return contact_point_W(contact, X_WQ);
   if (tool == FeatureKind::hull_vertex) return X_WQ * contact.p_TCa_m;
@@ -49,7 +49,7 @@ std::array<double, 3> numbers(const Vector3d& v) noexcept {
   return {v.x(), v.y(), v.z()};
 }
 
-std::string or_number(const std::string& name, std::uint32_t number) {
+std::string name_or_number(const std::string& name, std::uint32_t number) {
   return name.empty() ? "obstacle " + std::to_string(number) : name;
 }
 
@@ -106,20 +106,21 @@ Feature obstacle_feature(const Contact& contact, const Scene& scene, bool of_mes
 
 Touches touches(const Projection& projection, const Scene& scene, bool of_meshes) noexcept {
   const auto& active = projection.active;
-  std::array<std::uint8_t, ContactSet::kCapacity> order{};  // the one that carries most first
+  std::array<std::uint8_t, ContactSet::kCapacity> order{};  // indices sorted by multiplier, largest first
   double sum = 0.0;
   for (std::size_t i = 0; i < active.size(); ++i) {
     sum += active[i].multiplier;
     order[i] = static_cast<std::uint8_t>(i);
   }
-  const auto place = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
-  const std::size_t told = std::min(kMaxTouches, active.size());
-  std::partial_sort(order.begin(), place(told), place(active.size()), [&](std::uint8_t a, std::uint8_t b) {
-    const double difference = active[a].multiplier - active[b].multiplier;
-    return difference != 0.0 ? difference > 0.0 : a < b;
-  });
+  const auto position = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
+  const std::size_t count = std::min(kMaxTouches, active.size());
+  std::partial_sort(order.begin(), position(count), position(active.size()),
+                    [&](std::uint8_t a, std::uint8_t b) {
+                      const double difference = active[a].multiplier - active[b].multiplier;
+                      return difference != 0.0 ? difference > 0.0 : a < b;
+                    });
   Touches out;
-  for (std::size_t i = 0; i < told; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     const auto& [contact, multiplier] = active[order[i]];
     const Feature tool = tool_feature(contact, scene, of_meshes);
     const Feature obstacle = obstacle_feature(contact, scene, of_meshes);
@@ -127,7 +128,7 @@ Touches touches(const Projection& projection, const Scene& scene, bool of_meshes
     touch.point_W_m = numbers(point_W(contact, tool.kind, obstacle.kind, projection.X_WQ));
     touch.normal_W = numbers(normal_W(contact, projection.X_WQ));
     touch.multiplier_kg_m = multiplier;
-    touch.share = sum > 0.0 ? multiplier / sum : 0.0;
+    touch.load_fraction = sum > 0.0 ? multiplier / sum : 0.0;
     touch.obstacle = contact.obstacle;
     touch.tool_first = tool.first;
     touch.tool_second = tool.second;
@@ -143,11 +144,11 @@ Touches touches(const Projection& projection, const Scene& scene, bool of_meshes
 
 std::string obstacle_name(const Scene& scene, std::uint32_t number) {
   const std::size_t half_spaces = scene.half_spaces().size();
-  if (number < half_spaces) return or_number(scene.half_spaces()[number].name, number);
+  if (number < half_spaces) return name_or_number(scene.half_spaces()[number].name, number);
   const std::size_t k = number - half_spaces;
-  if (k < scene.meshes().size()) return or_number(scene.meshes()[k].name, number);
-  if (k < scene.convex().size()) return or_number(scene.convex()[k].name, number);
-  return or_number({}, number);
+  if (k < scene.meshes().size()) return name_or_number(scene.meshes()[k].name, number);
+  if (k < scene.convex().size()) return name_or_number(scene.convex()[k].name, number);
+  return name_or_number({}, number);
 }
 
 }  // namespace wrenchd

@@ -28,8 +28,9 @@ constexpr int kFormat = 1;
 constexpr std::size_t kMostBytes = 1 << 16;
 constexpr std::size_t kMostOffsets = 32;
 constexpr std::size_t kLongestAxis = 32;
-constexpr std::size_t kLongestName = 240;  ///< of a file, with room for what a temporary one adds
-constexpr double kMostOffset = 1e4;        ///< [m] or [rad]: nothing on a table is farther off
+/// bytes of a file name, with room for the suffix of a temporary file
+constexpr std::size_t kMaxNameBytes = 240;
+constexpr double kMaxOffset = 1e4;  ///< [m] or [rad]; no valid offset is larger
 
 constexpr const char* kCure = "; remove it and calibrate the device again";
 
@@ -37,7 +38,7 @@ bool is_letter_or_digit(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
-// Names. Any bytes go in, and what comes out is good as a file name and between quotation marks in TOML.
+// Names. Any bytes are accepted; the result is valid as a file name and as a TOML string.
 
 std::string encoded(std::string_view bytes) {
   std::string text;
@@ -70,8 +71,8 @@ std::string checksum_line(std::string_view text) {
   return line.data();
 }
 
-/// The first line names the format, so that a file from another time or another program is told apart from a
-/// damaged one.
+/// The first line states the format; it distinguishes a file of another version or program from a damaged
+/// one.
 void require_title(const std::string& text, const fs::path& file) {
   const std::string expected = std::string(kTitle) + std::to_string(kFormat) + "\n";
   if (text.starts_with(expected)) return;
@@ -79,7 +80,7 @@ void require_title(const std::string& text, const fs::path& file) {
     throw ConfigError(file, {1, 1},
                       "is a calibration of format " +
                           printable(text.substr(kTitle.size(), text.find('\n') - kTitle.size()), 20) +
-                          ", and this wrenchd knows format " + std::to_string(kFormat) + kCure);
+                          ", and this wrenchd supports format " + std::to_string(kFormat) + kCure);
   throw ConfigError(file, {}, std::string("is no calibration of a device, or is damaged") + kCure);
 }
 
@@ -94,7 +95,7 @@ void require_checksum(const std::string& text, const fs::path& file) {
 
 void read_offset(TomlTable& table, AxisOffset& offset) {
   table.mandatory("axis").text(offset.axis);
-  table.mandatory("value").number(offset.offset, {-kMostOffset, kMostOffset});
+  table.mandatory("value").number(offset.offset, {-kMaxOffset, kMaxOffset});
 }
 
 void read_calibration(TomlTable& table, Calibration& calibration) {
@@ -105,15 +106,15 @@ void read_calibration(TomlTable& table, Calibration& calibration) {
     element.table(read_offset, calibration.offsets.emplace_back());
 }
 
-/// What is wrong with it; empty where nothing is.
-std::string fault_of(const Calibration& calibration) {
+/// Description of the first defect of a calibration; empty if it is valid.
+std::string defect_of(const Calibration& calibration) {
   if (calibration.offsets.size() > kMostOffsets)
     return "more than " + std::to_string(kMostOffsets) + " axes have an offset";
   std::set<std::string> seen;
   for (const AxisOffset& offset : calibration.offsets) {
     if (!is_axis_name(offset.axis)) return "'" + printable(offset.axis) + "' is no name of an axis";
     if (!seen.insert(offset.axis).second) return "axis '" + offset.axis + "' has two offsets";
-    if (!is_finite(offset.offset) || std::abs(offset.offset) > kMostOffset)
+    if (!is_finite(offset.offset) || std::abs(offset.offset) > kMaxOffset)
       return "the offset of axis '" + offset.axis + "' is not within 10,000 m or rad";
   }
   return {};
@@ -121,7 +122,7 @@ std::string fault_of(const Calibration& calibration) {
 
 // Files
 
-/// Closes what it holds; -1 holds nothing.
+/// Owns a file descriptor and closes it; -1: none.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -139,7 +140,7 @@ class Descriptor {
   int fd_;
 };
 
-/// The file's bytes; nothing where there is none.
+/// The bytes of a file; empty if it does not exist.
 std::optional<std::string> content_of(const fs::path& file) {
   const Descriptor in(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (in.get() < 0 && errno == ENOENT) return {};
@@ -178,23 +179,23 @@ bool write_all(int fd, std::string_view text) {
   return true;
 }
 
-/// A file beside its place until it is put there; gone if it never is.
-class FileBeside {
+/// A temporary file beside its target. Destroys the file if it was not renamed to the target.
+class TemporaryFile {
  public:
-  explicit FileBeside(const fs::path& file)
+  explicit TemporaryFile(const fs::path& file)
       : file_(file),
         beside_((file.parent_path() / ("." + file.filename().string() + ".XXXXXX.part")).string()),
         out_(::mkostemps(beside_.data(), 5, O_CLOEXEC)) {
     if (out_.get() < 0) cannot_write(file_, "making a file beside it");
   }
-  ~FileBeside() {
+  ~TemporaryFile() {
     if (!put_) ::unlink(beside_.c_str());
   }
-  FileBeside(const FileBeside&) = delete;
-  FileBeside& operator=(const FileBeside&) = delete;
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
 
-  /// The data must be on the disk before the name is: a name that points to nothing would be the worst of
-  /// both.
+  /// Flushes the data to disk before the rename. Otherwise a crash could leave the new name with incomplete
+  /// data.
   void fill(std::string_view text) {
     if (!write_all(out_.get(), text)) cannot_write(file_, "writing");
     if (::fchmod(out_.get(), 0644) != 0) cannot_write(file_, "giving it its mode");
@@ -239,7 +240,7 @@ Calibration parse_calibration(const std::string& text, const fs::path& file) {
   require_checksum(text, file);
   Calibration calibration;
   read_toml_text(text, file, read_calibration, calibration);
-  if (const std::string fault = fault_of(calibration); !fault.empty())
+  if (const std::string fault = defect_of(calibration); !fault.empty())
     throw ConfigError(file, {}, "cannot be used: " + fault + kCure);
   return calibration;
 }
@@ -261,14 +262,14 @@ std::optional<Calibration> CalibrationStore::read(const std::string& profile,
 
 void CalibrationStore::write(const Calibration& calibration) const {
   const fs::path file = file_of(calibration.profile, calibration.serial);
-  if (const std::string fault = fault_of(calibration); !fault.empty())
+  if (const std::string fault = defect_of(calibration); !fault.empty())
     throw std::invalid_argument("calibration of '" + printable(calibration.serial) + "': " + fault);
   std::error_code error;
   fs::create_directories(directory_, error);
   if (error)
     throw std::runtime_error(directory_.string() + ": cannot be made (" + error.message() +
                              "); make it, or set STATE_DIRECTORY to a directory that may be written to");
-  FileBeside beside(file);
+  TemporaryFile beside(file);
   beside.fill(to_text(calibration));
   beside.put_in_place();
 }
@@ -277,10 +278,11 @@ fs::path CalibrationStore::file_of(std::string_view profile, std::string_view se
   if (profile.empty()) throw std::invalid_argument("calibration: the profile has no name; give it one");
   if (serial.empty())
     throw std::invalid_argument(
-        "calibration: the device has no serial number, so it cannot be told from its like; its calibration "
+        "calibration: the device has no serial number, so it cannot be distinguished from other devices of "
+        "its model; its calibration "
         "cannot be kept");
   const std::string name = encoded(profile) + "@" + encoded(serial) + ".toml";
-  if (name.size() > kLongestName)
+  if (name.size() > kMaxNameBytes)
     throw std::invalid_argument(
         "calibration: profile name and serial number together are too long for a file "
         "name: '" +

@@ -11,11 +11,10 @@
 
 namespace wrenchd {
 
-/// Where wrenchd keeps what it has learnt: the first of $STATE_DIRECTORY, which systemd sets, else
-/// /var/lib/wrenchd.
+/// Directory of wrenchd's persistent data: $STATE_DIRECTORY, which systemd sets; otherwise /var/lib/wrenchd.
 std::filesystem::path state_directory();
 
-/// Calibrations on disk, one small TOML file for each device, that people can read:
+/// Calibrations on disk: one small readable TOML file per device.
 ///
 ///   # wrenchd calibration 1
 ///   profile = "polhem"
@@ -25,36 +24,35 @@ std::filesystem::path state_directory();
 ///   value = 0.0125
 ///   # crc32 5f0c2a91
 ///
-/// A file is written whole or not at all: beside its place, to the disk, then put there. It is read whole or
-/// not at all: one changed, missing or added byte anywhere is found by the last line, which is a checksum of
-/// all lines before it. To change one by hand is therefore not possible; calibrate again. Not RT safe.
+/// Writes are atomic: to a temporary file, then a rename. The last line is a checksum of all lines before it;
+/// a file with any changed, missing or added byte is rejected. Manual edits are not possible; calibrate
+/// again. Not RT-safe: accesses files.
 class CalibrationStore {
  public:
   explicit CalibrationStore(std::filesystem::path directory = state_directory() / "calibration")
       : directory_(std::move(directory)) {}
 
-  /// Nothing where this device was never calibrated. Throws ConfigError, with the cure, where there is a file
-  /// that is damaged, of another format, or of another device, or cannot be read.
+  /// The calibration of a device; empty if there is none. Throws ConfigError, with the remedy, if the file is
+  /// damaged, has another format, belongs to another device or cannot be read.
   std::optional<Calibration> read(const std::string& profile, const std::string& serial) const;
 
-  /// Replaces what was there, and makes the directory where it is missing. Throws std::runtime_error, with
-  /// the cure, where it cannot be written; what was there is then as it was. Throws std::invalid_argument for
-  /// a calibration that could not be read back: no serial number, two offsets for an axis, an offset that is
-  /// no number. A crash on the way leaves the old file or the new one, and at worst a hidden .part file
-  /// beside it.
+  /// Writes a calibration and creates the directory if necessary. Throws std::runtime_error, with the remedy,
+  /// if the file cannot be written; the old file then remains. Throws std::invalid_argument if the
+  /// calibration has no serial number, two offsets for one axis, or an offset that is not finite. After a
+  /// crash the old or the new file is present, and possibly a hidden .part file.
   void write(const Calibration& calibration) const;
 
-  /// "PROFILE@SERIAL.toml" in the directory. Bytes of either that are not letters, digits, _, - or a dot
-  /// inside are written as % and two digits, so that no name leads out of the directory or means another's.
-  /// Throws std::invalid_argument where one is empty, or both together are too long for a file name.
+  /// "PROFILE@SERIAL.toml" in the directory. Bytes other than letters, digits, _, - and inner dots are
+  /// written as % and two hexadecimal digits, so each device has its own file inside of the directory. Throws
+  /// std::invalid_argument if a part is empty or the name is too long.
   std::filesystem::path file_of(std::string_view profile, std::string_view serial) const;
 
  private:
   std::filesystem::path directory_;
 };
 
-/// The text of a calibration's file, and back. `file` is for messages. Profile and serial number come back as
-/// the file has them, as in its name (file_of). The second throws ConfigError.
+/// File text of a calibration, and the reverse. `file` is for messages. Profile and serial number use the
+/// encoding of file_of(). parse_calibration() throws ConfigError.
 std::string to_text(const Calibration& calibration);
 Calibration parse_calibration(const std::string& text, const std::filesystem::path& file);
 

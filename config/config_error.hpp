@@ -9,28 +9,28 @@
 
 namespace wrenchd {
 
-/// Line and column in a file, both from 1. Line 0: the file as a whole.
+/// Line and column in a file, from 1. Line 0: the whole file.
 struct SourceLocation {
   unsigned line = 0;
   unsigned column = 0;
   std::shared_ptr<const std::filesystem::path> file =
-      nullptr;  ///< where it is not the one being read: a parent
+      nullptr;  ///< file, if it is not the file being read: an inherited profile
 };
 
-/// One thing wrong with a file: where, what was expected, what was found, and the cure.
+/// One defect of a file: location, expected value, found value and remedy.
 struct Refusal {
   std::filesystem::path file;
   SourceLocation location;
   std::string message;
 };
 
-/// "FILE:LINE:COLUMN: message", the form editors and terminals can jump to.
+/// "FILE:LINE:COLUMN: message", which editors and terminals can open.
 std::string to_text(const Refusal& refusal);
 
-/// A user's text as a message may repeat it: cut short, on one line.
+/// The text as a message may quote it: truncated to `longest` bytes, control characters replaced.
 std::string printable(std::string text, std::size_t longest = 60);
 
-/// A file was refused. what() holds one line for each refusal, in the order of the file.
+/// A file was rejected. what() has one line per defect, in file order.
 class ConfigError : public std::runtime_error {
  public:
   explicit ConfigError(std::vector<Refusal> refusals);
@@ -42,7 +42,7 @@ class ConfigError : public std::runtime_error {
   std::vector<Refusal> refusals_;
 };
 
-/// Gathers what is wrong with one file, so that a user sees all of it at once.
+/// Collects all defects of one file, so that the user sees them at once.
 class RefusalList {
  public:
   explicit RefusalList(std::filesystem::path file) : file_(std::move(file)) {}

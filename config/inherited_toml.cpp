@@ -19,20 +19,20 @@ TomlEntry* find(TomlNode::Table& table, const std::string& key) {
   return found == table.end() ? nullptr : &*found;
 }
 
-/// Writes the file into every place of a tree.
-void sign(TomlNode& node, const std::shared_ptr<const fs::path>& file) {
+/// Writes the file into every location of a tree.
+void set_file(TomlNode& node, const std::shared_ptr<const fs::path>& file) {
   node.location.file = file;
   if (auto* array = std::get_if<TomlNode::Array>(&node.value))
-    for (TomlNode& element : *array) sign(element, file);
+    for (TomlNode& element : *array) set_file(element, file);
   if (auto* table = std::get_if<TomlNode::Table>(&node.value)) {
     for (TomlEntry& entry : *table) {
       entry.location.file = file;
-      sign(entry.node, file);
+      set_file(entry.node, file);
     }
   }
 }
 
-void lay_over(TomlNode::Table& table, TomlNode::Table parent) {
+void merge_over(TomlNode::Table& table, TomlNode::Table parent) {
   for (TomlEntry& inherited : parent) {
     TomlEntry* own = find(table, inherited.key);
     if (!own) {
@@ -41,7 +41,7 @@ void lay_over(TomlNode::Table& table, TomlNode::Table parent) {
     }
     auto* own_table = std::get_if<TomlNode::Table>(&own->node.value);
     auto* parent_table = std::get_if<TomlNode::Table>(&inherited.node.value);
-    if (own_table && parent_table) lay_over(*own_table, std::move(*parent_table));
+    if (own_table && parent_table) merge_over(*own_table, std::move(*parent_table));
   }
 }
 
@@ -63,25 +63,25 @@ std::vector<fs::path> candidates(const std::string& name, const fs::path& named_
 fs::path parent_of(const std::string& name, const SourceLocation& place, const std::vector<fs::path>& chain,
                    const SearchPath& search) {
   bool only_in_chain = false;
-  std::string looked_for;
+  std::string searched;
   for (const fs::path& candidate : candidates(name, chain.back(), search)) {
-    looked_for += (looked_for.empty() ? "" : ", ") + fs::absolute(candidate).lexically_normal().string();
+    searched += (searched.empty() ? "" : ", ") + fs::absolute(candidate).lexically_normal().string();
     std::error_code error;
     if (!fs::exists(candidate, error)) continue;
-    const bool seen = std::any_of(chain.begin(), chain.end(),
-                                  [&](const fs::path& file) { return same_file(file, candidate); });
-    if (!seen) return candidate;
+    const bool in_chain = std::any_of(chain.begin(), chain.end(),
+                                      [&](const fs::path& file) { return same_file(file, candidate); });
+    if (!in_chain) return candidate;
     only_in_chain = true;
   }
   if (only_in_chain) {
-    std::string way;
-    for (const fs::path& file : chain) way += file.filename().string() + " -> ";
+    std::string path;
+    for (const fs::path& file : chain) path += file.filename().string() + " -> ";
     throw ConfigError(chain.back(), place,
-                      "key 'inherits': the profiles inherit each other (" + way + printable(name) +
-                          "); one of them must stand on its own");
+                      "key 'inherits': the profiles inherit each other (" + path + printable(name) +
+                          "); one of them must not inherit");
   }
   throw ConfigError(chain.back(), place,
-                    "key 'inherits': no profile of this name; looked for " + looked_for +
+                    "key 'inherits': no profile of this name; searched " + searched +
                         "; name one that is there, or leave the key out");
 }
 
@@ -106,8 +106,8 @@ TomlNode read_inherited(const fs::path& file, const SearchPath& search, std::vec
     std::erase_if(table, [](const TomlEntry& e) { return e.key == kKey; });
     chain.push_back(parent);
     TomlNode inherited = read_toml_file(parent);
-    sign(inherited, std::make_shared<const fs::path>(parent));
-    lay_over(table, std::move(std::get<TomlNode::Table>(inherited.value)));
+    set_file(inherited, std::make_shared<const fs::path>(parent));
+    merge_over(table, std::move(std::get<TomlNode::Table>(inherited.value)));
   }
   if (files != nullptr) *files = chain;
   return merged;

@@ -9,15 +9,14 @@
 
 namespace wrenchd {
 
-/// Reads a profile, and lays it over the one it names with `inherits = "NAME"`, and that over its own parent:
-/// tables are merged key by key, and everything else the nearer file says replaces what the farther one says,
-/// arrays as a whole. The key `inherits` itself is gone from the result, and values that came from a parent
-/// have its file in their place.
+/// Reads a profile and merges it over the profile that it names with `inherits = "NAME"`, recursively. Tables
+/// merge key by key; every other value, arrays included, replaces the inherited one. The result has no key
+/// `inherits`. Inherited values keep their file in their location.
 ///
-/// NAME.toml is looked for beside the file first, then in profiles/ along the search path; a file that is
-/// already part of the chain is passed over, so that /etc/wrenchd/profiles/x.toml may inherit the package's
-/// x. Throws ConfigError: no such parent, a chain that closes on itself, or what read_toml_file() throws.
-/// chain: where given, is filled with the files it was read from, the nearest first.
+/// NAME.toml is searched beside the file, then in profiles/ along the search path. Files already in the chain
+/// are skipped, so /etc/wrenchd/profiles/x.toml may inherit the package's x. chain: if given, receives the
+/// files read, the nearest first. Throws ConfigError if a parent is missing or the chain is cyclic, and what
+/// read_toml_file() throws. Not RT-safe: reads files.
 TomlNode read_inherited(const std::filesystem::path& file, const SearchPath& search,
                         std::vector<std::filesystem::path>* chain = nullptr);
 

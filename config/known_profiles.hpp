@@ -10,14 +10,14 @@
 
 namespace wrenchd {
 
-/// Every profile along a search path, as far as it is good.
+/// All valid profiles along a search path.
 struct KnownProfiles {
-  std::vector<DeviceProfile> profiles;       ///< by the names of their files
-  std::vector<std::filesystem::path> files;  ///< of each of them
-  std::vector<std::string> refused;          ///< what is wrong with each of the other files: place and cure
+  std::vector<DeviceProfile> profiles;       ///< in the order of their file names
+  std::vector<std::filesystem::path> files;  ///< file of each profile
+  std::vector<std::string> refused;          ///< for each rejected file its defects with location and remedy
 };
 
-/// Loads them all. One that is refused is told and hides none of the others. Not RT safe.
+/// Loads all profiles. A rejected profile does not affect the others. Not RT-safe: reads files.
 KnownProfiles known_profiles(const SearchPath& search);
 
 }  // namespace wrenchd

@@ -8,10 +8,10 @@
 namespace wrenchd {
 namespace {
 
-/// First and last waypoint of a repeating path are the same to this [m, rad], or the hand would jump.
+/// Tolerance [m, rad] between the first and last waypoint of a repeating path; a larger difference is a jump.
 constexpr double kSamePoint = 1e-9;
 
-/// Nobody moves a hand between two points in less.
+/// Minimum time between two waypoints.
 constexpr double kMinStep_s = 0.001;
 
 struct HandScript {
@@ -28,7 +28,7 @@ void read_waypoint(TomlTable& table, HandScript& script) {
 
   if (time_good && script.path.empty() && w.time_s != 0.0) time.refuse("the first waypoint is at time 0");
   if (time_good && !script.path.empty() && w.time_s < script.path.back().time_s + kMinStep_s) {
-    time.refuse("times must rise by 0.001 s or more; the waypoint before is at " +
+    time.refuse("times must ascend by 0.001 s or more; the waypoint before is at " +
                 to_text(script.path.back().time_s) + " s");
   }
   script.path.push_back(w);

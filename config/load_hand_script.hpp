@@ -8,8 +8,8 @@
 
 namespace wrenchd {
 
-/// Reads where the simulated hand goes into hand_script, hand_path and hand_repeats;
-/// config/hands/press_and_rock.toml shows the format. Throws ConfigError and then changes nothing.
+/// Reads a hand script into hand_script, hand_path and hand_repeats; format:
+/// config/hands/press_and_rock.toml. Throws ConfigError and then changes nothing. Not RT-safe: reads a file.
 void load_hand_script(const std::filesystem::path& file, SimulationSettings& simulation);
 
 }  // namespace wrenchd

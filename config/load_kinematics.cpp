@@ -12,29 +12,29 @@ constexpr Range kLength_m = {1e-4, 2};
 constexpr Range kOffset_m = {-2, 2};
 constexpr Range kCounts = {-1e6, 1e6};
 
-/// Which integer of the report is which joint: each one once.
-void read_slots(const TomlValue& value, Kinematics& k) {
-  std::array<double, kMaxJoints> slots{};
-  if (!value.numbers({slots.data(), k.joints}, {0, static_cast<double>(k.joints - 1)})) return;
+/// Reads the index of each joint among the integers of the report; each index appears once.
+void read_report_index(const TomlValue& value, Kinematics& k) {
+  std::array<double, kMaxJoints> indices{};
+  if (!value.numbers({indices.data(), k.joints}, {0, static_cast<double>(k.joints - 1)})) return;
   std::array<bool, kMaxJoints> taken{};
   for (std::size_t i = 0; i < k.joints; ++i) {
-    const auto slot = static_cast<std::size_t>(slots[i]);
-    if (static_cast<double>(slot) != slots[i] || taken[slot])
+    const auto index = static_cast<std::size_t>(indices[i]);
+    if (static_cast<double>(index) != indices[i] || taken[index])
       return value.refuse("must name each integer of joints once, from 0 to " + std::to_string(k.joints - 1));
-    taken[slot] = true;
-    k.report_index[i] = slot;
+    taken[index] = true;
+    k.report_index[i] = index;
   }
 }
 
 void read_count_button(TomlTable& table, Kinematics& k) {
   Kinematics::CountButton& b = k.count_button;
-  b.present = table.mandatory("slot").integer(b.report_index, {0, static_cast<double>(k.joints - 1)});
-  b.present = table.mandatory("above").number(b.threshold_counts, kCounts) && b.present;
-  b.present = table.mandatory("minus").number(b.offset_counts, kCounts) && b.present;
+  b.present = table.mandatory("report_index").integer(b.report_index, {0, static_cast<double>(k.joints - 1)});
+  b.present = table.mandatory("threshold_counts").number(b.threshold_counts, kCounts) && b.present;
+  b.present = table.mandatory("offset_counts").number(b.offset_counts, kCounts) && b.present;
   table.optional("button").integer(b.button, {0, 31});
 }
 
-/// +1 or -1 each.
+/// Reads directions, each +1 or -1.
 bool read_directions(const TomlValue& value, std::span<double> out) {
   if (!value.numbers(out, {-1, 1})) return false;
   if (std::all_of(out.begin(), out.end(), [](double d) { return d == 1.0 || d == -1.0; })) return true;
@@ -83,7 +83,7 @@ void read_delta(TomlTable& table, Kinematics& k) {
   table.mandatory("zero_rad").number(zero_rad, {-7, 7});
   const TomlValue effort_value = table.mandatory("effort_per_Nm", "effort_per_Nm");
   if (effort_value.number(effort, {-1e6, 1e6}) && effort == 0.0)
-    effort_value.refuse("must not be 0: what the motors are told for 1 N.m about a leg's joint");
+    effort_value.refuse("must not be 0: it is the motor effort for 1 N.m about a leg's joint");
   table.mandatory("max_effort").number(k.max_effort, {1e-3, 1e6});
   for (std::size_t i = 0; i < k.joints; ++i) {
     k.rad_per_count[i] = gear * kTurn_rad / per_turn;
@@ -101,11 +101,11 @@ void read_kinematics(TomlTable& table, Kinematics& k) {
       kind, {{"capstan_arm", Kinematics::Kind::capstan_arm}, {"delta", Kinematics::Kind::delta}});
   if (kind == Kinematics::Kind::capstan_arm) read_capstan_arm(table, k);
   if (kind == Kinematics::Kind::delta) read_delta(table, k);
-  const TomlValue slots = table.optional("joint_slots");
+  const TomlValue report_index = table.optional("joint_report_index");
   const TomlValue home = table.optional("home_counts");
   const TomlValue button = table.optional("count_button");
   if (k.kind == Kinematics::Kind::none) return;
-  read_slots(slots, k);
+  read_report_index(report_index, k);
   home.numbers({k.home_counts.data(), k.joints}, kCounts);
   if (!button.is_text("none")) button.table(read_count_button, k);
 }

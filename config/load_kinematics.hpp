@@ -6,7 +6,8 @@
 
 namespace wrenchd {
 
-/// Reads [kinematics] of a profile: joints and links of a device that sends encoder counts.
+/// Reads [kinematics] of a profile: joints and links of a device that sends encoder counts. Not RT-safe:
+/// allocates.
 void read_kinematics(TomlTable& table, Kinematics& kinematics);
 
 }  // namespace wrenchd

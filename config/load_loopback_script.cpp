@@ -12,7 +12,7 @@ using Kind = SimulatedFault::Kind;
 
 constexpr Range kTime_s{0, 86400};
 
-/// The largest `value` of a kind, and the smallest; nothing where it has none.
+/// Valid range of `value` for a kind; an empty range if the kind has no value.
 Range value_range(Kind kind) {
   switch (kind) {
     case Kind::drop_reports:
@@ -41,24 +41,24 @@ void read_fault(TomlTable& table, LoopbackScript& script) {
                                               {"freeze", Kind::freeze},
                                               {"repeat", Kind::repeat},
                                               {"swap", Kind::swap},
-                                              {"lose", Kind::drop_reports},
-                                              {"late", Kind::delay_reports},
-                                              {"garble", Kind::corrupt},
+                                              {"drop_reports", Kind::drop_reports},
+                                              {"delay_reports", Kind::delay_reports},
+                                              {"corrupt", Kind::corrupt},
                                               {"short_report", Kind::short_report},
                                               {"long_report", Kind::long_report},
                                               {"wrong_id", Kind::wrong_id},
-                                              {"deaf", Kind::refuse_commands},
-                                              {"swallow", Kind::drop_commands},
+                                              {"refuse_commands", Kind::refuse_commands},
+                                              {"drop_commands", Kind::drop_commands},
                                               {"stall", Kind::stall},
                                               {"bad_quaternion", Kind::bad_quaternion},
-                                              {"teleport", Kind::jump},
-                                              {"run_away", Kind::drift},
-                                              {"shake", Kind::vibrate},
-                                              {"stick", Kind::freeze_pose},
-                                              {"press", Kind::press_button},
-                                              {"trip", Kind::trip_watchdog},
-                                              {"sleepy", Kind::disable_watchdog},
-                                              {"dead_motors", Kind::motors_off}});
+                                              {"jump", Kind::jump},
+                                              {"drift", Kind::drift},
+                                              {"vibrate", Kind::vibrate},
+                                              {"freeze_pose", Kind::freeze_pose},
+                                              {"press_button", Kind::press_button},
+                                              {"trip_watchdog", Kind::trip_watchdog},
+                                              {"disable_watchdog", Kind::disable_watchdog},
+                                              {"motors_off", Kind::motors_off}});
   const TomlValue value = table.optional("value");
   const Range range = value_range(fault.kind);
   if (value && !(range.max > range.min))
@@ -74,14 +74,14 @@ void read_command(TomlTable& table, LoopbackScript& script) {
   TimedCommand command;
   double at_s = 0.0;
   table.mandatory("at_s").number(at_s, kTime_s);
-  table.mandatory("what").choice(command.commands, {{"arm", CommandSet{kArm}},
-                                                    {"arm_with_lease", CommandSet{kArm | kLease}},
-                                                    {"live", CommandSet{kHeartbeat}},
-                                                    {"disarm", CommandSet{kDisarm}},
-                                                    {"start_over", CommandSet{kReinitialize}},
-                                                    {"stop", CommandSet{kStop}},
-                                                    {"acknowledge", CommandSet{kAcknowledge}},
-                                                    {"quit", CommandSet{kQuit}}});
+  table.mandatory("command").choice(command.commands, {{"arm", CommandSet{kArm}},
+                                                       {"arm_with_lease", CommandSet{kArm | kLease}},
+                                                       {"heartbeat", CommandSet{kHeartbeat}},
+                                                       {"disarm", CommandSet{kDisarm}},
+                                                       {"reinitialize", CommandSet{kReinitialize}},
+                                                       {"stop", CommandSet{kStop}},
+                                                       {"acknowledge", CommandSet{kAcknowledge}},
+                                                       {"quit", CommandSet{kQuit}}});
   command.at = from_seconds(at_s);
   script.commands.push_back(command);
 }
@@ -89,8 +89,8 @@ void read_command(TomlTable& table, LoopbackScript& script) {
 void read_script(TomlTable& table, LoopbackScript& script) {
   for (const TomlValue& fault : table.optional("fault").elements("tables, each headed [[fault]]"))
     fault.table(read_fault, script);
-  for (const TomlValue& ask : table.optional("ask").elements("tables, each headed [[ask]]"))
-    ask.table(read_command, script);
+  for (const TomlValue& command : table.optional("command").elements("tables, each headed [[command]]"))
+    command.table(read_command, script);
 }
 
 }  // namespace

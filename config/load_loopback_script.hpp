@@ -8,8 +8,8 @@
 
 namespace wrenchd {
 
-/// Reads what shall go wrong with a simulated device and when, and what is asked of the loop meanwhile;
-/// devices/README.md, "Faults on request", is the format's page. Throws ConfigError.
+/// Reads the faults and requests of a loopback run; format: devices/README.md, "Faults on request". Throws
+/// ConfigError. Not RT-safe: reads a file.
 LoopbackScript load_loopback_script(const std::filesystem::path& file);
 
 }  // namespace wrenchd

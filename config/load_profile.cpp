@@ -18,13 +18,13 @@
 namespace wrenchd {
 namespace {
 
-/// What the rest of a profile must know before it is read.
-struct Shape {
+/// Properties that decide which keys of a profile are mandatory.
+struct Capabilities {
   bool output = true;
   bool torque = true;
 };
 
-/// A key that a profile may take back from the one it inherits.
+/// True if the key is present and not "none". "none" removes an inherited value.
 bool is_stated(const TomlValue& value) {
   return value && !value.is_text("none");
 }
@@ -35,11 +35,11 @@ void read_workspace(TomlTable& table, DeviceProfile& p) {
   if (is_stated(radius)) radius.number(p.workspace_radius_m, {0.01, 2});
   centre.vector(p.workspace_centre_m, {-2, 2});
   if (centre && !centre.is_inherited() && !is_stated(radius))
-    centre.refuse("means nothing without workspace_radius_m; state both");
+    centre.refuse("has no effect without workspace_radius_m; state both");
 }
 
-/// A rating above the maximum is a mistake where somebody wrote both. An inherited one under a maximum that
-/// was lowered says only that the motors bear the maximum for ever.
+/// Rejects a rating above the maximum. An inherited rating above a lowered maximum is clamped to it: the
+/// motors sustain that maximum indefinitely.
 void read_rating(const TomlValue& value, double& rating, Range range, double maximum) {
   if (!value.number(rating, range) || !(rating > maximum)) return;
   if (value.is_inherited())
@@ -49,36 +49,36 @@ void read_rating(const TomlValue& value, double& rating, Range range, double max
                  "; lower it, or leave all three out");
 }
 
-/// What motors bear for ever, and how long they take to warm up: together, or not at all.
-void read_motor_heat(TomlTable& table, DeviceProfile& p, const Shape& shape) {
+/// Reads the continuous ratings and the thermal time constant: all of them, or none.
+void read_motor_ratings(TomlTable& table, DeviceProfile& p, const Capabilities& capabilities) {
   const TomlValue force = table.optional("continuous_force_N");
   const TomlValue torque = table.optional("continuous_torque_Nm");
   const TomlValue time = table.optional("thermal_time_s");
-  if (is_stated(torque) && !shape.torque)
+  if (is_stated(torque) && !capabilities.torque)
     return torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
   std::vector<const TomlValue*> stated, all = {&force, &time};
-  if (shape.torque) all.push_back(&torque);
+  if (capabilities.torque) all.push_back(&torque);
   std::copy_if(all.begin(), all.end(), std::back_inserter(stated),
                [](const auto* v) { return is_stated(*v); });
   if (stated.empty()) return;
   if (stated.size() < all.size())
-    return stated.front()->refuse(shape.torque
+    return stated.front()->refuse(capabilities.torque
                                       ? "needs continuous_force_N, continuous_torque_Nm and "
                                         "thermal_time_s; state all three, or none"
                                       : "needs continuous_force_N and thermal_time_s; state both, or none");
   read_rating(force, p.continuous_force_N, {0.01, kAbsoluteMaxForce_N}, p.max_force_N);
-  if (shape.torque)
+  if (capabilities.torque)
     read_rating(torque, p.continuous_torque_Nm, {0.001, kAbsoluteMaxTorque_Nm}, p.max_torque_Nm);
   time.number(p.thermal_time_s, {0.1, 10000});
 }
 
-/// Optional, and only of a device that has motors.
-void read_more_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
+/// Optional limits of a device with motors.
+void read_more_limits(TomlTable& table, DeviceProfile& p, const Capabilities& capabilities) {
   const TomlValue power = table.optional("max_power_W");
-  if (shape.output) {
+  if (capabilities.output) {
     if (is_stated(power)) power.number(p.max_power_W, {0.01, 10000});
     read_workspace(table, p);
-    return read_motor_heat(table, p, shape);
+    return read_motor_ratings(table, p, capabilities);
   }
   const auto refuse = [](const TomlValue& value) {
     if (value) value.refuse("the device has no motors: there is no wrench_report; leave it out");
@@ -89,23 +89,25 @@ void read_more_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
     refuse(table.optional(key));
 }
 
-/// Mandatory, every one: nobody but the maker knows what a device and the hand on it can bear.
-void read_limits(TomlTable& table, DeviceProfile& p, const Shape& shape) {
-  const TomlValue force = shape.output ? table.mandatory("max_force_N") : table.optional("max_force_N");
-  const TomlValue torque = shape.torque ? table.mandatory("max_torque_Nm") : table.optional("max_torque_Nm");
-  if (shape.output)
+/// Mandatory limits. Only the manufacturer knows what the device may apply to a hand.
+void read_limits(TomlTable& table, DeviceProfile& p, const Capabilities& capabilities) {
+  const TomlValue force =
+      capabilities.output ? table.mandatory("max_force_N") : table.optional("max_force_N");
+  const TomlValue torque =
+      capabilities.torque ? table.mandatory("max_torque_Nm") : table.optional("max_torque_Nm");
+  if (capabilities.output)
     force.number(p.max_force_N, {0.01, kAbsoluteMaxForce_N});
   else if (force)
     force.refuse("the device takes no force: there is no wrench_report; leave it out");
-  if (shape.torque)
+  if (capabilities.torque)
     torque.number(p.max_torque_Nm, {0.001, kAbsoluteMaxTorque_Nm});
   else if (torque)
     torque.refuse("the device takes no torque; leave it out, or give wrench_report its field");
-  if (!shape.output) p.max_force_N = 0.0;
-  if (!shape.torque) p.max_torque_Nm = 0.0;
+  if (!capabilities.output) p.max_force_N = 0.0;
+  if (!capabilities.torque) p.max_torque_Nm = 0.0;
   table.mandatory("max_linear_speed_m_per_s").number(p.max_linear_speed_m_per_s, {0.01, 10});
   table.mandatory("max_angular_speed_rad_per_s").number(p.max_angular_speed_rad_per_s, {0.1, 100});
-  read_more_limits(table, p, shape);
+  read_more_limits(table, p, capabilities);
 }
 
 // --- buttons ----------------------------------------------------------------------------------------------
@@ -114,7 +116,7 @@ std::size_t buttons_in(const PoseReportLayout& layout) {
   return layout.buttons.present ? layout.buttons.bits : layout.button_bits.size();
 }
 
-/// Does any report carry the button of this number?
+/// True if any report has the button of this number.
 bool has_button(const DeviceProfile& p, int button) {
   const Kinematics::CountButton& hidden = p.kinematics.count_button;
   if (hidden.present && static_cast<int>(hidden.button) == button) return true;
@@ -123,7 +125,7 @@ bool has_button(const DeviceProfile& p, int button) {
   return button >= 0 && static_cast<std::size_t>(button) < most;
 }
 
-/// "0 to 7", "0"; empty: none.
+/// Ranges of button numbers, for example "0 to 7" or "0"; empty: no button.
 std::string buttons_text(const DeviceProfile& p) {
   std::string text;
   for (int first = 0; first < 32; ++first) {
@@ -149,7 +151,7 @@ void read_button(const TomlValue& value, int& button, const DeviceProfile& p) {
                              : "no report carries a button of this number; they carry " + known);
 }
 
-/// What buttons mean. The reports must have been read before.
+/// Reads the functions of the buttons. Precondition: the reports were read before.
 void read_buttons(TomlTable& table, DeviceProfile& p) {
   struct Meaning {
     const char* name;
@@ -170,7 +172,7 @@ void read_buttons(TomlTable& table, DeviceProfile& p) {
     }
     if (is_stated(value) && button == &p.slow_button &&
         !(p.deflection && p.deflection->mode == Deflection::Mode::rate)) {
-      value.refuse("only what is steered can go slower: [deflection] with mode \"rate\"; leave it out");
+      value.refuse("a slow button requires [deflection] with mode \"rate\"; leave it out");
       continue;
     }
     read_button(value, *button, p);
@@ -198,7 +200,7 @@ void read_closed_loop(TomlTable& table, DeviceProfile& p) {
 
 // --- which device -----------------------------------------------------------------------------------------
 
-/// "046d:c626": two numbers of four hexadecimal digits.
+/// Parses "046d:c626": two numbers of four hexadecimal digits.
 std::optional<UsbId> usb_id(const std::string& text) {
   if (text.size() != 9 || text[4] != ':') return {};
   const auto number = [&](std::size_t at, std::uint16_t& out) {
@@ -241,7 +243,7 @@ void read_match(TomlTable& table, DeviceMatch& match) {
   read_id16(page, match.usage_page);
   const TomlValue usage = table.optional("usage");
   read_id16(usage, match.usage);
-  if (usage && !page) usage.refuse("means nothing without usage_page; state both");
+  if (usage && !page) usage.refuse("has no effect without usage_page; state both");
 }
 
 void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
@@ -258,7 +260,7 @@ void read_endpoints(TomlTable& table, UsbEndpoints& endpoints) {
 
 // --- frames -----------------------------------------------------------------------------------------------
 
-/// "x", "-y" and so on: a row of a rotation between axes that lie along each other.
+/// Reads "x", "-y" and so on: a row of a rotation between parallel axes.
 bool read_axis(const TomlValue& value, Vector3d& axis) {
   Vector3d chosen = Vector3d::Zero();
   struct Named {
@@ -304,8 +306,8 @@ void read_frames(TomlTable& table, DeviceProfile& p) {
 
 // --- the rest ---------------------------------------------------------------------------------------------
 
-/// Where a steered pose stays. The box stands instead of the reach, unless both are stated.
-void read_reach(TomlTable& table, Deflection& d) {
+/// Limits of a pose in mode rate. A stated box replaces the default of reach_m.
+void read_pose_limits(TomlTable& table, Deflection& d) {
   const TomlValue reach = table.optional("reach_m");
   const TomlValue least = table.optional("box_min_m"), most = table.optional("box_max_m");
   if (is_stated(reach)) reach.number(d.reach_m, {1e-3, 10});
@@ -316,25 +318,27 @@ void read_reach(TomlTable& table, Deflection& d) {
   if (!is_stated(reach)) d.reach_m = Deflection::kUnbounded;
   if (!least.vector(d.box_min_m, {-10, 10}) || !most.vector(d.box_max_m, {-10, 10})) return;
   if (d.box_min_m.maxCoeff() > 0.0)
-    least.refuse("the pose begins at 0, inside of the box; no number may be above 0");
+    least.refuse("the pose starts at 0, which must be inside of the box; no number may be above 0");
   if (d.box_max_m.minCoeff() < 0.0)
-    most.refuse("the pose begins at 0, inside of the box; no number may be below 0");
+    most.refuse("the pose starts at 0, which must be inside of the box; no number may be below 0");
 }
 
-/// How a cap steers, all of it optional; and where "none" takes back what is inherited.
+/// Optional response of a puck. "none" removes an inherited value.
 void read_steering(TomlTable& table, Deflection& d) {
-  const TomlValue full_m = table.optional("full_m"), full_rad = table.optional("full_rad");
-  const TomlValue dead_zone = table.optional("dead_zone"), curve = table.optional("curve");
-  const TomlValue slow = table.optional("slow");
-  const TomlValue leash_m = table.optional("leash_m"), leash_rad = table.optional("leash_rad");
-  const bool has_end = is_stated(full_m) && is_stated(full_rad);
-  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_end) {
+  const TomlValue full_m = table.optional("full_deflection_m");
+  const TomlValue full_rad = table.optional("full_deflection_rad");
+  const TomlValue dead_zone = table.optional("dead_zone"), exponent = table.optional("response_exponent");
+  const TomlValue slow_factor = table.optional("slow_factor");
+  const TomlValue distance = table.optional("max_proxy_distance_m");
+  const TomlValue angle = table.optional("max_proxy_angle_rad");
+  const bool has_full_scale = is_stated(full_m) && is_stated(full_rad);
+  const auto read = [&](const TomlValue& value, double& out, Range range, bool needs_full_scale) {
     if (!is_stated(value)) return;
     if (d.mode != Deflection::Mode::rate) {
       if (!value.is_inherited())
         value.refuse("belongs to mode \"rate\", in which the deflection is a velocity; leave it out");
-    } else if (needs_end && !has_end) {
-      value.refuse("is reckoned by the end of the cap's way; state full_m and full_rad");
+    } else if (needs_full_scale && !has_full_scale) {
+      value.refuse("needs the full deflection of the puck; state full_deflection_m and full_deflection_rad");
     } else {
       value.number(out, range);
     }
@@ -342,12 +346,13 @@ void read_steering(TomlTable& table, Deflection& d) {
   read(full_m, d.full_deflection_m, {1e-5, 1}, true);
   read(full_rad, d.full_deflection_rad, {1e-4, 3.2}, true);
   read(dead_zone, d.dead_zone, {0, 0.9}, true);
-  read(curve, d.response_exponent, {1, 5}, true);
-  read(slow, d.slow_factor, {0.01, 1}, false);
-  read(leash_m, d.max_proxy_distance_m, {1e-4, 0.5}, true);
-  read(leash_rad, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
-  if (is_stated(leash_m) == is_stated(leash_rad)) return;
-  (is_stated(leash_m) ? leash_m : leash_rad).refuse("is one of two: state leash_m and leash_rad, or neither");
+  read(exponent, d.response_exponent, {1, 5}, true);
+  read(slow_factor, d.slow_factor, {0.01, 1}, false);
+  read(distance, d.max_proxy_distance_m, {1e-4, 0.5}, true);
+  read(angle, d.max_proxy_angle_rad, {1e-3, 3.1}, true);
+  if (is_stated(distance) == is_stated(angle)) return;
+  (is_stated(distance) ? distance : angle)
+      .refuse("is one of two: state max_proxy_distance_m and max_proxy_angle_rad, or neither");
 }
 
 void read_deflection(TomlTable& table, DeviceProfile& p) {
@@ -356,7 +361,7 @@ void read_deflection(TomlTable& table, DeviceProfile& p) {
                                 {{"rate", Deflection::Mode::rate}, {"position", Deflection::Mode::position}});
   table.mandatory("linear_gain").number(d.linear_gain, {1e-3, 1e6});
   table.mandatory("angular_gain").number(d.angular_gain, {1e-3, 1e6});
-  read_reach(table, d);
+  read_pose_limits(table, d);
   read_steering(table, d);
   p.deflection = d;
 }
@@ -374,8 +379,8 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   position.vector(plan.X_BR.translation_m, {-2, 2});
   Vector3d turn = Vector3d::Zero();
   if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);
-  table.optional("most_offset_m").number(plan.max_offset_m, {0, 2});
-  table.optional("most_offset_rad").number(plan.max_offset_rad, {0, 4});
+  table.optional("max_offset_m").number(plan.max_offset_m, {0, 2});
+  table.optional("max_offset_rad").number(plan.max_offset_rad, {0, 4});
   table.optional("confirm_buttons").integer(plan.confirm_buttons, {0, 4294967295.0});
   table.optional("travel_m").number(plan.travel_m, {0.001, 0.5});
   table.optional("travel_rad").number(plan.travel_rad, {0.01, 1.5});
@@ -386,7 +391,7 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
   if (least < plan.travel_m)
     most.refuse("the workspace must be larger than travel_m, " + to_text(plan.travel_m) +
                 ", along each axis; along one it is " + to_text(least));
-  const TomlValue turns = table.optional("max_turn_rad");
+  const TomlValue turns = table.optional("max_rotation_rad");
   turns.number(plan.max_rotation_rad, {0.01, 4});
   if (plan.max_rotation_rad < plan.travel_rad) turns.refuse("must be no less than travel_rad");
 }
@@ -429,12 +434,13 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
                                              {"lock_step", StreamStyle::lock_step},
                                              {"silent_at_rest", StreamStyle::silent_at_rest}});
   const TomlValue wrench_report = table.mandatory("wrench_report");
-  const Shape shape = {!wrench_report.is_text("none"),
-                       !wrench_report.is_text("none") && !wrench_report.has("efforts") &&
-                           (!wrench_report.is_table() || !wrench_report.is_none("torque"))};
-  p.has_output = shape.output;
-  const TomlValue watchdog = shape.output ? table.mandatory("watchdog_s") : table.optional("watchdog_s");
-  if (!shape.output && watchdog)
+  const Capabilities capabilities = {!wrench_report.is_text("none"),
+                                     !wrench_report.is_text("none") && !wrench_report.has("efforts") &&
+                                         (!wrench_report.is_table() || !wrench_report.is_none("torque"))};
+  p.has_output = capabilities.output;
+  const TomlValue watchdog =
+      capabilities.output ? table.mandatory("watchdog_s") : table.optional("watchdog_s");
+  if (!capabilities.output && watchdog)
     watchdog.refuse("the device has no motors: there is no wrench_report; leave it out");
   else if (!watchdog.is_text("none"))
     watchdog.number(p.watchdog_s, {0.001, 2});
@@ -451,29 +457,30 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
   if (endpoints && p.transport != Transport::libusb)
     endpoints.refuse("only transport = \"libusb\" speaks to endpoints; choose it, or leave this out");
   table.optional("frames").table(read_frames, p);
-  table.mandatory("limits").table(read_limits, p, shape);
+  table.mandatory("limits").table(read_limits, p, capabilities);
   table.optional("closed_loop").table(read_closed_loop, p);
   table.optional("homing").table(read_homing, p);
   const TomlValue masses = table.optional("masses");
   masses.table(read_masses, p.masses);
-  if (masses && !shape.output)
-    masses.refuse(
-        "nothing holds them: the device has no motors, for there is no wrench_report; leave it out");
+  if (masses && !capabilities.output)
+    masses.refuse("the device has no motors to hold them, because there is no wrench_report; leave it out");
   if (masses && p.wrench_point == WrenchPoint::world_origin)
-    masses.refuse("they are held about the handle point; leave out wrench_point = \"world_origin\", or this");
+    masses.refuse(
+        "gravity compensation acts about the handle point; leave out wrench_point = \"world_origin\", or "
+        "this");
   table.optional("deflection").table(read_deflection, p);
   table.optional("kinematics").table(read_kinematics, p.kinematics);
   const TomlValue pose_report = table.mandatory("pose_report");
   pose_report.table(read_pose_report, p, pose_report);
   const TomlValue more_reports = table.optional("more_reports");
   read_more_reports(more_reports, p);
-  if (shape.output) wrench_report.table(read_wrench_report, p, wrench_report);
+  if (capabilities.output) wrench_report.table(read_wrench_report, p, wrench_report);
   table.optional("shutdown").table(read_fixed_report, p.shutdown);
   table.optional("calibration").table(read_fixed_report, p.calibration);
   const TomlValue keep_alive = table.optional("keep_alive");
   keep_alive.table(read_keep_alive, p);
   if (keep_alive && p.stream == StreamStyle::lock_step)
-    keep_alive.refuse("a lock-step device is spoken to all the time; leave it out");
+    keep_alive.refuse("a lock-step device receives commands all the time; leave it out");
   table.optional("buttons").table(read_buttons, p);
   check_pose_complete(pose_report, p);
   check_distinguishable(pose_report, more_reports, p);

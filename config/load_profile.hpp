@@ -9,12 +9,12 @@
 
 namespace wrenchd {
 
-/// Reads a device profile, and those it inherits along the search path; config/profiles/example.toml is the
-/// manual of the format. Throws ConfigError.
+/// Reads a device profile and the profiles that it inherits along the search path; manual:
+/// config/profiles/example.toml. Throws ConfigError. Not RT-safe: reads files.
 DeviceProfile load_profile(const std::filesystem::path& file, const SearchPath& search = SearchPath());
 
-/// The profile that a person names on a command line: a file where there is one of that name, from here, and
-/// otherwise the one of that name along the search path. Throws as load_profile().
+/// Loads the profile that a user names on a command line: the file of this name if there is one, otherwise
+/// the profile of this name along the search path. Throws as load_profile(). Not RT-safe: reads files.
 DeviceProfile load_profile_named(const std::string& name, const SearchPath& search = SearchPath());
 
 }  // namespace wrenchd

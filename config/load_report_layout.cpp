@@ -12,21 +12,21 @@ namespace {
 /// One packet of a full-speed interrupt endpoint.
 constexpr std::size_t kMaxReportBytes = 64;
 
-/// Smallest and largest SI value of one count that can be meant.
+/// Plausible range of the SI value of one count.
 constexpr Range kStep = {1e-12, 1e3};
 constexpr Range kOffset = {-1e6, 1e6};
 
 constexpr unsigned kBitsPerNibble = 4;
-constexpr std::uint8_t kNibbleA = 0x41;  ///< 'A' stands for 0
+constexpr std::uint8_t kNibbleA = 0x41;  ///< 'A' encodes 0
 
-/// What a field of a given name must look like.
+/// Required properties of a field.
 struct FieldShape {
-  std::size_t count = 1;       ///< integers in a row
-  bool is_signed = false;      ///< counters wrap, so they have no sign; vectors have one
+  std::size_t count = 1;       ///< number of consecutive integers
+  bool is_signed = false;      ///< true for vectors; counters wrap and have no sign
   std::string_view step = {};  ///< key of the step; empty: a plain count
-  double reach = 0.0;          ///< the largest value it has to carry; NaN or 0: any
-  bool plain_step = false;     ///< the step may be left out: 1
-  bool any_sign = false;       ///< the type says whether it has a sign
+  double reach = 0.0;          ///< largest value that the field must represent; NaN or 0: any
+  bool plain_step = false;     ///< the step is optional, default 1
+  bool any_sign = false;       ///< the type decides whether the field is signed
 };
 
 struct IntegerType {
@@ -56,7 +56,7 @@ bool read_type(const TomlValue& value, const FieldShape& shape, ReportField& fie
   return good;
 }
 
-/// A field that saturates below a limit would hide that the limit is passed.
+/// Rejects a field that saturates below a limit: it could not show that the limit is exceeded.
 void check_reach(const TomlValue& step, const ReportField& field, double reach) {
   const double counts = std::ldexp(1.0, static_cast<int>(field.bits) - (field.is_signed ? 1 : 0)) - 1.0;
   const double largest = std::abs(field.step) * counts;
@@ -66,31 +66,30 @@ void check_reach(const TomlValue& step, const ReportField& field, double reach) 
               " it has to carry; use a larger step or a wider type");
 }
 
-/// Bytes from the first to the last of a field.
+/// Number of bits from the first to the last of a field.
 std::size_t bits_of(const ReportField& field) {
   const std::size_t each =
       field.coding == Coding::nibble_ascii ? std::size_t{8} * (field.bits / kBitsPerNibble) : field.bits;
   return each * field.count;
 }
 
-/// The short form `type = "i16"`, or `bits = 10` for any other width.
+/// Reads the short form `type = "i16"`, or `bits = 10` for any width.
 bool read_width(TomlTable& table, ReportField& field, const FieldShape& shape) {
   const TomlValue type = table.mandatory_unless("bits", "type");
   const TomlValue bits = table.optional("bits");
   const TomlValue is_signed = table.optional("signed");
   if (type && bits) {
-    bits.refuse("the type says how wide it is; leave one of the two out");
+    bits.refuse("the type determines the width; leave one of the two out");
     return false;
   }
-  if (type && is_signed)
-    is_signed.refuse("the type says whether it has a sign; leave this out, or give bits");
+  if (type && is_signed) is_signed.refuse("the type determines the sign; leave this out, or give bits");
   if (!bits) return read_type(type, shape, field);
   field.is_signed = shape.is_signed;
   is_signed.boolean(field.is_signed);
   return bits.integer(field.bits, {1, 64});
 }
 
-/// Where in the bytes its bits are. False where that makes no sense.
+/// Reads the bit layout of a field. Returns false if it is inconsistent.
 bool read_coding(TomlTable& table, ReportField& field) {
   const TomlValue bit = table.optional("bit");
   bit.integer(field.bit, {0, 7});
@@ -150,7 +149,7 @@ std::size_t width_of(Checksum checksum) {
   return checksum == Checksum::crc16_ccitt_false ? 2 : 1;
 }
 
-/// A report's id, length and checksum, and who owns each of its bits.
+/// Reads id, length and checksum of a report, and rejects fields that overlap.
 class FrameReader {
  public:
   FrameReader(TomlTable& table, ReportFrame& layout) : layout_(layout) {
@@ -165,7 +164,7 @@ class FrameReader {
                                       {"xor8", Checksum::xor8},
                                       {"none", Checksum::none}});
     const std::size_t length = length_good ? layout.length : kMaxReportBytes;
-    const TomlValue least = table.optional("least_length");
+    const TomlValue least = table.optional("min_length");
     if (least.integer(layout.min_length, {shortest, static_cast<double>(length)}) &&
         layout.checksum != Checksum::none)
       least.refuse("a report with a checksum is never short; leave one of the two out");
@@ -272,7 +271,7 @@ class FrameReader {
                    std::to_string(end_bit_ / 8 - 1) + " at the latest; move it, or lengthen the report");
     }
     if (begin < 8 * first_byte())
-      value.refuse("byte 0 is the report id; move it, or say id = \"none\" if the device uses no ids");
+      value.refuse("byte 0 is the report id; move it, or state id = \"none\" if the device uses no ids");
     for (const Claim& other : claims_) {
       if (begin < other.end && other.begin < end) {
         value.refuse("overlaps '" + other.name + "', which has bytes " + std::to_string(other.begin / 8) +
@@ -287,7 +286,7 @@ class FrameReader {
   std::vector<Claim> claims_;
 };
 
-/// What a report may carry besides a pose, and a part of one, each optional.
+/// Reads the optional parts of a report: parts of a pose, and everything besides a pose.
 void read_parts(TomlTable& table, FrameReader& frame, PoseReportLayout& r, const DeviceProfile& profile) {
   frame.field(table.optional("linear_velocity"), r.linear_velocity,
               {3, true, "step_m_per_s", profile.max_linear_speed_m_per_s});
@@ -311,15 +310,16 @@ void read_parts(TomlTable& table, FrameReader& frame, PoseReportLayout& r, const
   table.optional("name").text(r.name);
 }
 
-constexpr double kUnitQuaternion = 0.999;  // i16 with a step rounded down from 1/32767 ends just below one
+// an i16 with a step rounded down from 1/32767 reaches slightly less than 1
+constexpr double kUnitQuaternion = 0.999;
 
-std::size_t least_length(const ReportFrame& frame) {
+std::size_t min_length(const ReportFrame& frame) {
   return frame.min_length == 0 ? frame.length : frame.min_length;
 }
 
 bool told_apart(const ReportFrame& a, const ReportFrame& b) {
   if (a.has_id && b.has_id && a.id != b.id) return true;
-  return least_length(a) > b.length || least_length(b) > a.length;
+  return min_length(a) > b.length || min_length(b) > a.length;
 }
 
 }  // namespace
@@ -364,9 +364,9 @@ void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValu
   frame.field(force, r.force, {3, true, "step_N", profile.max_force_N});
   frame.field(torque, r.torque, {3, true, "step_Nm", profile.max_torque_Nm});
   if (whole && force.is_text("none"))
-    force.refuse("a device without force has no wrench report; say wrench_report = \"none\" above");
+    force.refuse("a device without force has no wrench report; state wrench_report = \"none\" above");
   if (!whole && (r.force.present || r.torque.present))
-    efforts.refuse("stand instead of force and torque; leave one of the two out");
+    efforts.refuse("replaces force and torque; leave one of the two out");
   const bool amperes = profile.kinematics.kind != Kinematics::Kind::delta;
   frame.field(efforts, r.efforts,
               {kMaxMotors, true, amperes ? "step_A" : "step", profile.kinematics.max_effort, !amperes});
@@ -387,20 +387,20 @@ void check_pose_complete(const TomlValue& pose_report, const DeviceProfile& prof
     return std::any_of(layouts.begin(), layouts.end(), [&](const auto* l) { return (l->*field).present; });
   };
   const bool joints = any(&PoseReportLayout::joints);
-  const bool cap = any(&PoseReportLayout::translation) || any(&PoseReportLayout::rotation);
+  const bool puck = any(&PoseReportLayout::translation) || any(&PoseReportLayout::rotation);
   const bool pose = any(&PoseReportLayout::position) || any(&PoseReportLayout::orientation);
   const bool kinematics = profile.kinematics.kind != Kinematics::Kind::none;
-  if (static_cast<int>(joints) + static_cast<int>(cap) + static_cast<int>(pose) > 1)
+  if (static_cast<int>(joints) + static_cast<int>(puck) + static_cast<int>(pose) > 1)
     pose_report.refuse(
         "a device sends poses (position, orientation), or joints, or a deflection (translation, rotation); "
         "leave all but one out");
   else if (joints && !kinematics)
     pose_report.refuse("joints make a pose only by [kinematics]; state it");
-  else if (kinematics && !joints && (cap || pose))
+  else if (kinematics && !joints && (puck || pose))
     pose_report.refuse("[kinematics] needs joints in a report, or must be left out");
-  else if (cap && !profile.deflection)
+  else if (puck && !profile.deflection)
     pose_report.refuse("a translation or rotation moves a pose only by [deflection]; state it");
-  else if (profile.deflection && !cap && (joints || pose))
+  else if (profile.deflection && !puck && (joints || pose))
     pose_report.refuse("[deflection] needs a translation or rotation in a report, or must be left out");
 }
 
@@ -413,12 +413,13 @@ void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_r
     for (std::size_t j = 0; j < i; ++j) {
       const PoseReportLayout &a = *layouts[j], &b = *layouts[i];
       const std::string other = j == 0 ? pose_report.name() : elements[j - 1].name();
-      if (a.length == 0 || b.length == 0) continue;  // refused already
+      if (a.length == 0 || b.length == 0) continue;  // rejected before
       if (a.has_id != b.has_id)
         elements[i - 1].refuse("'" + other + "' and this one must both have an id, or neither");
       else if (!told_apart(a, b))
-        elements[i - 1].refuse("cannot be told from '" + other + "': same " + (a.has_id ? "id" : "length") +
-                               "; a report is known by its " + (a.has_id ? "id" : "length"));
+        elements[i - 1].refuse("cannot be distinguished from '" + other + "': same " +
+                               (a.has_id ? "id" : "length") + "; a report is known by its " +
+                               (a.has_id ? "id" : "length"));
     }
   }
 }

@@ -6,20 +6,20 @@
 
 namespace wrenchd {
 
-// The reports of a profile. Its limits and its kinematics must have been read before: a field has to reach
-// them. Refused: fields that overlap or stand outside of the report, reports that make no pose together, and
-// such that cannot be told apart.
+// Report layouts of a profile. Read the limits and the kinematics first: fields must cover their range. The
+// functions reject overlapping fields, fields outside of the report, reports that do not determine a pose,
+// and reports that cannot be distinguished. Not RT-safe: allocate.
 
-/// [pose_report]. `value`: the table itself, for what its other keys make of a key.
+/// Reads [pose_report]. value: the same table, to query its keys.
 void read_pose_report(TomlTable& table, DeviceProfile& profile, const TomlValue& value);
-/// One of [[more_reports]]: any part of a pose, and all of it optional.
+/// Reads one of [[more_reports]]: any part of a pose; all fields are optional.
 void read_more_report(TomlTable& table, PoseReportLayout& layout, const DeviceProfile& profile);
-/// [wrench_report]
+/// Reads [wrench_report].
 void read_wrench_report(TomlTable& table, DeviceProfile& profile, const TomlValue& value);
 
-/// Whether the reports make a pose together.
+/// Rejects a profile whose reports do not determine a pose.
 void check_pose_complete(const TomlValue& pose_report, const DeviceProfile& profile);
-/// Whether a report shows by its id or length which it is.
+/// Rejects reports with the same id or length.
 void check_distinguishable(const TomlValue& pose_report, const TomlValue& more_reports,
                            const DeviceProfile& profile);
 

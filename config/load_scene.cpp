@@ -18,46 +18,47 @@ constexpr Range kScale = {1e-9, 1e6};
 constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
-constexpr Range kTurn = {-10.0, 10.0};
-constexpr Range kTurnBack = {0.0, 86400.0};
+constexpr Range kRotation = {-10.0, 10.0};
+constexpr Range kReversal_s = {0.0, 86400.0};
 
-/// Shorter than this a normal is a slip of the keyboard rather than a direction.
+/// A shorter normal is a typing mistake.
 constexpr double kMinNormal = 1e-9;
 
-void read_kind(const TomlValue& value, GeneratedMesh& made) {
-  if (!value.text(made.kind)) return;
+void read_kind(const TomlValue& value, GeneratedMesh& generated) {
+  if (!value.text(generated.kind)) return;
   std::vector<KnownKey> known;
   for (const MeshKind& kind : mesh_kinds()) known.push_back({kind.name, ""});
-  if (std::any_of(known.begin(), known.end(), [&](const KnownKey& key) { return key.name == made.kind; }))
+  if (std::any_of(known.begin(), known.end(),
+                  [&](const KnownKey& key) { return key.name == generated.kind; }))
     return;
-  const NearestKey nearest = nearest_key(made.kind, known);
+  const NearestKey nearest = nearest_key(generated.kind, known);
   std::string all;
   for (const KnownKey& key : known) all += (all.empty() ? "" : ", ") + key.name;
-  value.refuse("nothing of kind '" + printable(made.kind) + "' can be made; " +
+  value.refuse("no generated mesh of kind '" + printable(generated.kind) + "'; " +
                (nearest.name.empty() ? "there are " + all : nearest.advice));
 }
 
-void read_made(TomlTable& table, GeneratedMesh& made) {
-  read_kind(table.mandatory("make"), made);
+void read_generated(TomlTable& table, GeneratedMesh& generated) {
+  read_kind(table.mandatory("make"), generated);
   table.optional("triangles")
-      .integer(made.triangles, {static_cast<double>(GeneratedMesh::kMinTriangles),
-                                static_cast<double>(GeneratedMesh::kMaxTriangles)});
+      .integer(generated.triangles, {static_cast<double>(GeneratedMesh::kMinTriangles),
+                                     static_cast<double>(GeneratedMesh::kMaxTriangles)});
   const TomlValue seed = table.optional("seed");
-  seed.integer(made.seed, {0, 4294967295.0});
-  if (seed && made.kind != "bumpy" && made.kind != "boulder")
-    seed.refuse("only bumpy and boulder are made by chance; leave it out");
+  seed.integer(generated.seed, {0, 4294967295.0});
+  if (seed && generated.kind != "bumpy" && generated.kind != "boulder")
+    seed.refuse("only bumpy and boulder are random; leave it out");
   const TomlValue size = table.optional("size_m");
-  size.vector(made.size_m, kSide);
-  if (size && made.kind != "box")
+  size.vector(generated.size_m, kSide);
+  if (size && generated.kind != "box")
     size.refuse("only a box has sides that can be chosen; use 'scale', beside 'mesh'");
 }
 
-/// A file, or what is to be made instead of one.
+/// Reads a mesh file name, or a table that describes a generated mesh.
 void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mesh,
-               std::optional<GeneratedMesh>& made) {
+               std::optional<GeneratedMesh>& generated) {
   if (value.is_table()) {
-    value.table(read_made, made.emplace());
-    mesh = generated_mesh_name(*made);
+    value.table(read_generated, generated.emplace());
+    mesh = generated_mesh_name(*generated);
     return;
   }
   if (!value.path(mesh)) return;
@@ -65,12 +66,12 @@ void read_mesh(const TomlValue& value, const SceneSettings& scene, fs::path& mes
   std::error_code ignored;
   if (fs::is_regular_file(mesh, ignored)) return;
   value.refuse(
-      "no such file; looked for " + fs::absolute(mesh).lexically_normal().string() +
-      "; name an OFF, OBJ, STL or PLY file, relative to this scene, or say what is to be made, as in { make "
+      "no such file; searched " + fs::absolute(mesh).lexically_normal().string() +
+      "; name an OFF, OBJ, STL or PLY file, relative to this scene, or a mesh to generate, as in { make "
       "= \"gear\" }");
 }
 
-/// The mass may stand in [tool] or at the top of the file.
+/// The mass may be in [tool] or at the top of the file.
 void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass) {
   read_mesh(table.mandatory("mesh"), scene, scene.tool.mesh, scene.tool.generated);
   table.optional("scale", "m").number(scene.tool.scale, kScale);
@@ -80,8 +81,8 @@ void read_tool(TomlTable& table, SceneSettings& scene, const TomlValue& top_mass
   if (mass && top_mass) mass.refuse("is also given at the top of the file; keep one of the two");
 }
 
-/// Solid where normal . x < offset. A normal of another length is made unit, and the offset with it, so that
-/// the solid stays the same set of points.
+/// Reads normal . x < offset. Scales normal and offset to a unit normal, so the set of points does not
+/// change.
 void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   table.mandatory("offset", "m").number(half_space.offset_m, kAny);
   const TomlValue normal = table.mandatory("normal");
@@ -92,13 +93,13 @@ void read_half_space(TomlTable& table, HalfSpaceSettings& half_space) {
   half_space.offset_m /= length;
 }
 
-/// What goes with `mesh` and means nothing to a half-space.
+/// Keys that require `mesh`; a half-space rejects them.
 struct MeshKeys {
   TomlValue scale, position, rotation, kind;
-  TomlValue velocity, angular_velocity, turn_back_after;
+  TomlValue velocity, angular_velocity, reverse_after;
 };
 
-/// Of any direction, and no faster than that. True where it is good, or not given.
+/// Reads a velocity and rejects a length above `fastest`. Returns true if the key is valid or absent.
 bool read_velocity(const TomlValue& key, double fastest, Vector3d& velocity) {
   if (!key) return true;
   if (!key.vector(velocity, {-fastest, fastest})) return false;
@@ -114,9 +115,9 @@ void read_motion(const MeshKeys& keys, ObstacleMotion& motion) {
       read_velocity(keys.velocity, ObstacleMotion::kMaxSpeed_m_per_s, motion.linear_m_per_s);
   const bool angular_is_good = read_velocity(
       keys.angular_velocity, ObstacleMotion::kMaxAngularSpeed_rad_per_s, motion.angular_rad_per_s);
-  const bool turns_back = keys.turn_back_after.number(motion.reverse_after_s, kTurnBack);
-  if (turns_back && linear_is_good && angular_is_good && !motion.moves())
-    keys.turn_back_after.refuse(
+  const bool reverses = keys.reverse_after.number(motion.reverse_after_s, kReversal_s);
+  if (reverses && linear_is_good && angular_is_good && !motion.moves())
+    keys.reverse_after.refuse(
         "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s, or leave this "
         "out");
 }
@@ -129,14 +130,14 @@ void read_mesh_obstacle(const TomlValue& mesh, const MeshKeys& keys, SceneSettin
   keys.scale.number(obstacle.scale, kScale);
   keys.position.vector(obstacle.X_WM.translation_m, kAny);
   Vector3d rotation_vector_rad = Vector3d::Zero();
-  keys.rotation.vector(rotation_vector_rad, kTurn);
+  keys.rotation.vector(rotation_vector_rad, kRotation);
   obstacle.X_WM.rotation = rotation_from(rotation_vector_rad);
   keys.kind.choice(obstacle.kind, {{"solid", BodyKind::solid}, {"surface", BodyKind::surface}});
   read_motion(keys, obstacle.motion);
   scene.meshes.push_back(obstacle);
 }
 
-/// One shape each: half_space or mesh.
+/// Each obstacle has one shape: half_space or mesh.
 void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& place) {
   std::string name = place;
   table.optional("name").text(name);
@@ -145,7 +146,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   const MeshKeys keys = {table.optional("scale", "m"),          table.optional("position_m"),
                          table.optional("rotation_vector_rad"), table.optional("kind"),
                          table.optional("velocity_m_per_s"),    table.optional("angular_velocity_rad_per_s"),
-                         table.optional("turn_back_after_s")};
+                         table.optional("reverse_after_s")};
   if (mesh) {
     if (half_space)
       half_space.refuse("the obstacle has a mesh already; give each shape an [[obstacle]] of its own");
@@ -153,9 +154,9 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
   }
   if (keys.kind) keys.kind.refuse("belongs to a mesh; a half_space is solid");
   for (const TomlValue& key : {keys.scale, keys.position, keys.rotation})
-    if (key) key.refuse("belongs to a mesh; a half_space says where it is by normal and offset");
-  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.turn_back_after})
-    if (key) key.refuse("belongs to a mesh; a half_space stands still, so give what is to move as a mesh");
+    if (key) key.refuse("belongs to a mesh; a half_space is defined by normal and offset");
+  for (const TomlValue& key : {keys.velocity, keys.angular_velocity, keys.reverse_after})
+    if (key) key.refuse("belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle");
   HalfSpaceSettings settings{name, Vector3d::UnitZ(), 0.0};
   half_space.table(read_half_space, settings);
   if (half_space) scene.half_spaces.push_back(settings);
@@ -175,7 +176,7 @@ bool has_name(const SceneSettings& scene, const std::string& name) {
          std::any_of(scene.meshes.begin(), scene.meshes.end(), has_it);
 }
 
-/// By its name it is moved and removed, so it has one of its own.
+/// Reads an added obstacle. It needs a unique name, because clients move and remove it by name.
 void read_added(TomlTable& table, SceneSettings& scene) {
   std::string name;
   const TomlValue key = table.optional("name");
@@ -189,9 +190,9 @@ void read_added(TomlTable& table, SceneSettings& scene) {
 }  // namespace
 
 void add_obstacle(const TomlNode& obstacle, const fs::path& source, SceneSettings& scene) {
-  SceneSettings with = scene;
-  read_toml_node(source, obstacle, read_added, with);
-  scene = std::move(with);
+  SceneSettings extended = scene;
+  read_toml_node(source, obstacle, read_added, extended);
+  scene = std::move(extended);
 }
 
 SceneSettings load_scene(const std::filesystem::path& file) {

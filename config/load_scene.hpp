@@ -9,15 +9,15 @@
 
 namespace wrenchd {
 
-/// Reads a scene; config/scenes/cube_on_table.toml shows the format. A mesh path comes back as one that can
-/// be opened from here, and normals as unit vectors; a scene without obstacles is free space. Throws
-/// ConfigError.
+/// Reads a scene; format: config/scenes/cube_on_table.toml. Mesh paths are returned relative to the current
+/// directory or absolute, normals as unit vectors. A scene without obstacles is free space. Throws
+/// ConfigError. Not RT-safe: reads a file.
 SceneSettings load_scene(const std::filesystem::path& file);
-/// The same of what was read from that file already.
+/// Converts a scene that was read from `file` before.
 SceneSettings load_scene(const TomlNode& tree, const std::filesystem::path& file);
 
-/// Adds an obstacle, given as the table that an [[obstacle]] of a scene file is; its mesh is looked for
-/// beside the scene. source: for messages. Throws ConfigError, also where its name is another's.
+/// Adds an obstacle, given as a table like an [[obstacle]] of a scene file; its mesh is searched beside the
+/// scene. source: for messages. Throws ConfigError, also if its name is in use. Not RT-safe: allocates.
 void add_obstacle(const TomlNode& obstacle, const std::filesystem::path& source, SceneSettings& scene);
 
 }  // namespace wrenchd

@@ -10,14 +10,14 @@
 
 namespace wrenchd {
 
-/// Reads wrenchd.toml; config/wrenchd.toml is the manual of the format. Finds the files it names (scene,
-/// profile, hand script) and reads the hand script. Throws ConfigError.
+/// Reads wrenchd.toml; manual: config/wrenchd.toml. Resolves the files it names (scene, profile, hand script)
+/// and reads the hand script. Throws ConfigError. Not RT-safe: reads files.
 Settings load_settings(const std::filesystem::path& file, const SearchPath& search);
-/// The same of what was read from that file already.
+/// Converts settings that were read from `file` before.
 Settings load_settings(const TomlNode& tree, const std::filesystem::path& file, const SearchPath& search);
 
-/// Changes what [rendering] and [wrench] say, given as a table that holds those tables, or parts of them;
-/// what is not in it stays. source: for messages. Throws ConfigError; then nothing is changed.
+/// Applies a table with [rendering] and [wrench], or parts of them; other settings remain. source: for
+/// messages. Throws ConfigError and then changes nothing. Not RT-safe: allocates.
 void change_rendering(const TomlNode& changes, const std::filesystem::path& source, Settings& settings);
 
 }  // namespace wrenchd

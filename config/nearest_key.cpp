@@ -9,7 +9,7 @@
 namespace wrenchd {
 namespace {
 
-/// Units a user may have in mind; key names join them with "_" and "per".
+/// Units that a user may write; key names join them with "_" and "per".
 constexpr std::array<std::string_view, 50> kUnits = {
     "per", "m",   "dm",  "cm",    "mm",   "um",   "nm",  "km",  "in",  "s",  "ms", "us", "ns",
     "min", "Hz",  "kHz", "MHz",   "rad",  "mrad", "deg", "rpm", "rps", "N",  "mN", "uN", "kN",
@@ -20,8 +20,7 @@ bool is_unit(std::string_view word) {
   return std::find(kUnits.begin(), kUnits.end(), word) != kUnits.end();
 }
 
-/// Where the unit starts in a key: behind the last word that is not part of a unit. The first word never is
-/// one.
+/// Start of the unit in a key: after the last word that is no unit. The first word is never a unit.
 std::size_t unit_start(std::string_view key) {
   std::size_t start = key.size();
   for (std::size_t end = key.size(), bar;
@@ -37,7 +36,7 @@ std::string_view stem_of(std::string_view key) {
   return start == key.size() ? key : key.substr(0, start - 1);
 }
 
-/// No key of ours is half as long; a megabyte of key is not worth a guess.
+/// Longest key for which a suggestion is computed; every known key has less than half of it.
 constexpr std::size_t kMaxGuessed = 80;
 
 /// Levenshtein distance, one row at a time.
@@ -79,7 +78,7 @@ std::string_view unit_of(std::string_view key) {
 
 std::string readable_unit(std::string_view unit) {
   std::string text;
-  bool below = false;  // behind "per"
+  bool below = false;  // true after "per"
   for (std::size_t start = 0; start < unit.size();) {
     const std::size_t end = std::min(unit.find('_', start), unit.size());
     const std::string_view word = unit.substr(start, end - start);

@@ -7,25 +7,26 @@
 
 namespace wrenchd {
 
-/// A key a table may hold. The unit is empty for a pure number or a text.
+/// A key that a table may have. The unit is empty for a dimensionless number or a text.
 struct KnownKey {
   std::string name;
-  std::string unit;  ///< as key names spell it: "N_per_m"
+  std::string unit;  ///< unit in the spelling of key names: "N_per_m"
 };
 
-/// A guess at what an unknown key was meant to be.
+/// Suggestion for an unknown key.
 struct NearestKey {
-  std::string name;    ///< the known key that was probably meant; empty: no idea
+  std::string name;    ///< the known key that was probably meant; empty: no suggestion
   std::string advice;  ///< "give it in N as 'max_force_N'", "did you mean 'rate_Hz'?", "known keys here: ..."
 };
 
-/// The unit at the end of a key name: "N_per_m" for "linear_N_per_m", empty where there is none.
+/// Unit at the end of a key name: "N_per_m" for "linear_N_per_m"; empty if there is none.
 std::string_view unit_of(std::string_view key);
 
-/// A unit as people write it: "N.s/m" for "N_s_per_m".
+/// Unit in common notation: "N.s/m" for "N_s_per_m".
 std::string readable_unit(std::string_view unit);
 
-/// Same stem with another unit first, then the smallest number of edits, then the list of what is known.
+/// The known key with the same stem and another unit; otherwise the key with the fewest edits; otherwise the
+/// list of all known keys. Not RT-safe: allocates.
 NearestKey nearest_key(std::string_view unknown, const std::vector<KnownKey>& known);
 
 }  // namespace wrenchd

@@ -14,14 +14,14 @@
 namespace wrenchd {
 namespace {
 
-/// The columns of both tables: that without times leaves out the first.
+/// Columns of both tables; a table without times omits the first.
 constexpr std::array<std::string_view, 8> kAllColumns = {"time_s", "px", "py", "pz", "qx", "qy", "qz", "qw"};
 using Columns = std::span<const std::string_view>;
 constexpr Columns kPoseColumns = Columns(kAllColumns).subspan(1);
 constexpr Columns kTimedColumns = Columns(kAllColumns);
-/// How far from 1 a quaternion's norm may be: the rounding of three printed digits.
+/// Tolerance on the norm of a quaternion: rounding of three printed digits.
 constexpr double kNormTolerance = 1e-3;
-/// Farther out [m] a double cannot tell a millimetre; such a number is a slip, or in another unit.
+/// Above this coordinate [m] the value is a typing mistake or has another unit.
 constexpr double kFarthest_m = 1e9;
 constexpr std::size_t kMostMessages = 10;
 
@@ -32,7 +32,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Line and column of a message, and the messages so far.
+/// Collects messages with line and column.
 class Reader {
  public:
   explicit Reader(std::string name) : name_(std::move(name)) {}
@@ -53,7 +53,7 @@ class Reader {
     std::string_view text = trimmed(field);
     const std::string found = text.empty() ? "nothing" : "'" + printable(std::string(text), 40) + "'";
     if (text.size() > 1 && text[0] == '+' && text[1] != '-')
-      text.remove_prefix(1);  // from_chars knows no plus
+      text.remove_prefix(1);  // from_chars accepts no plus
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
     if (error == std::errc{} && end == text.data() + text.size() && is_finite(out)) return true;
     refuse(line, column, std::string(what) + " must be a finite number, found " + found);
@@ -66,7 +66,7 @@ class Reader {
   std::size_t count_ = 0;
 };
 
-/// Splits a line at its commas; gives each field's column, from 1.
+/// Splits a line at its commas. Returns each field with its column, from 1.
 std::vector<std::pair<std::size_t, std::string_view>> fields_of(std::string_view line) {
   std::vector<std::pair<std::size_t, std::string_view>> fields;
   std::size_t start = 0;
@@ -84,7 +84,7 @@ std::string header_of(Columns columns) {
   return header;
 }
 
-/// A line of a table; where there is no column for it the time is 0.
+/// Parses a line of a table; without a time column the time is 0.
 bool read_pose(Reader& reader, Columns columns, std::string_view text, std::size_t line, TimedPose& out) {
   const auto fields = fields_of(text);
   if (fields.size() != columns.size()) {
@@ -94,7 +94,7 @@ bool read_pose(Reader& reader, Columns columns, std::string_view text, std::size
                       (fields.size() == 1 ? "; separate them with commas" : ""));
     return false;
   }
-  const std::size_t first = columns.size() - kPoseColumns.size();  // of the pose
+  const std::size_t first = columns.size() - kPoseColumns.size();  // index of the first pose column
   std::array<double, kAllColumns.size()> numbers{};
   bool good = true;
   for (std::size_t i = 0; i < fields.size(); ++i)
@@ -127,28 +127,28 @@ bool is_header(Columns columns, std::string_view line) {
   return true;
 }
 
-/// Whether a hand can have gone from one pose to the next.
+/// Rejects a step from one pose to the next that no hand can make.
 void check_step(Reader& reader, std::size_t line, const TimedPose& from, const TimedPose& to) {
   const double h_s = to.time_s - from.time_s;
-  const double way_m = (to.X.translation_m - from.X.translation_m).norm();
-  const double turn_rad = from.X.rotation.angularDistance(to.X.rotation);
+  const double distance_m = (to.X.translation_m - from.X.translation_m).norm();
+  const double rotation_rad = from.X.rotation.angularDistance(to.X.rotation);
   if (!(h_s > 0.0))
     reader.refuse(line, 1,
                   "time_s is " + to_text(to.time_s) + ", and " + to_text(from.time_s) +
-                      " in the line before; times must rise: sort the lines, and leave out repeated ones");
+                      " in the line before; times must ascend: sort the lines, and leave out repeated ones");
   else if (h_s > kMaxTableGap_s)
     reader.refuse(line, 1,
                   "a gap of " + to_text(h_s) + " s; give a pose at least every " + to_text(kMaxTableGap_s) +
-                      " s, or write a hand script, which is made for far waypoints");
-  else if (way_m > kMaxTableSpeed_m_per_s * h_s)
+                      " s, or use a hand script, which interpolates between distant waypoints");
+  else if (distance_m > kMaxTableSpeed_m_per_s * h_s)
     reader.refuse(line, 1,
-                  "a jump of " + to_text(way_m) + " m in " + to_text(h_s) +
+                  "a jump of " + to_text(distance_m) + " m in " + to_text(h_s) +
                       " s, which no hand makes; give metres and seconds");
-  else if (turn_rad > kMaxTableRotation_rad)
+  else if (rotation_rad > kMaxTableRotation_rad)
     reader.refuse(line, 1,
-                  "a turn of " + to_text(turn_rad) +
-                      " rad in one step; give poses between, so that it is "
-                      "plain which way round is meant");
+                  "a rotation of " + to_text(rotation_rad) +
+                      " rad in one step; add poses between, so that the "
+                      "direction of rotation is unique");
 }
 
 std::vector<TimedPose> read_table(std::istream& in, const std::string& name, Columns columns) {
@@ -160,7 +160,7 @@ std::vector<TimedPose> read_table(std::istream& in, const std::string& name, Col
   bool header = false;
   while (std::getline(in, line)) {
     ++number;
-    if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a byte order mark is no text
+    if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // byte order mark
     if (trimmed(line).empty()) continue;
     if (!header) {
       if (!is_header(columns, line)) {

@@ -37,7 +37,7 @@ ReportBytes parse_bytes(std::string_view text) {
     if (text[i] == '0' && i + 1 < text.size() && (text[i + 1] == 'x' || text[i + 1] == 'X')) i += 2;
     if (i >= text.size() || digit(text[i]) < 0) return refuse(i, "is not a hexadecimal digit");
     if (i + 1 >= text.size() || digit(text[i + 1]) < 0)
-      return refuse(i, "stands alone; a byte is two hexadecimal digits, as in 0a");
+      return refuse(i, "is a single digit; a byte is two hexadecimal digits, as in 0a");
     parsed.bytes.push_back(static_cast<std::uint8_t>(16 * digit(text[i]) + digit(text[i + 1])));
     i += 2;
   }

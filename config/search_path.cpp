@@ -30,8 +30,8 @@ std::vector<fs::path> SearchPath::candidates(const fs::path& name, const fs::pat
 
 std::optional<fs::path> SearchPath::find(const fs::path& name, const fs::path& named_in) const {
   for (const fs::path& place : candidates(name, named_in)) {
-    // What cannot be entered or read counts as there: opening it then fails loudly, where passing it over
-    // would silently put the package's file in place of the administrator's.
+    // A file that cannot be accessed counts as present, so opening it reports the error. Skipping it would
+    // silently replace the administrator's file by the package's.
     std::error_code ignored;
     if (fs::status(place, ignored).type() != fs::file_type::not_found) return place;
   }
@@ -49,7 +49,7 @@ std::string SearchPath::not_found(const fs::path& name, const fs::path& named_in
   for (const fs::path& place : candidates(name, named_in)) {
     places += (places.empty() ? "" : ", ") + fs::absolute(place).lexically_normal().string();
   }
-  return "no such file; looked for " + places;
+  return "no such file; searched " + places;
 }
 
 fs::path profile_file(const std::string& name) {

@@ -20,26 +20,25 @@ enum class Pacing : std::uint8_t { clock, device };
 
 /// [servo]
 struct ServoSettings {
-  double rate_Hz = 1000.0;  ///< 500 to 8000
+  double rate_Hz = 1000.0;  ///< 500 to 8000 Hz
   Pacing pacing = Pacing::clock;
   Realtime realtime = Realtime::required;
-  int priority = 45;            ///< SCHED_FIFO, below threaded interrupts (50)
+  int priority = 45;            ///< SCHED_FIFO priority, below threaded interrupts (50)
   int cpu = -1;                 ///< -1: no affinity
-  double late_limit_s = 0.020;  ///< a tick later than this is a loop that stood still
-  double self_test_s =
-      0.5;  ///< how long a device's reports have to be good before it may be armed; 0: no test
+  double late_limit_s = 0.020;  ///< a tick later than this raises Fault::loop_stalled
+  double self_test_s = 0.5;     ///< duration of valid reports in the self-test; 0: no test
 };
 
 /// [rendering]
 struct RenderingSettings {
   Method method = Method::exact;
-  int planes = 47;            ///< N_delta of Eq. (40), for method = "planar"
-  FrictionSettings friction;  ///< for method = "exact"
+  int planes = 47;            ///< number of planes N_delta of Eq. (40), for method = "planar"
+  FrictionSettings friction;  ///< friction, for method = "exact"
 };
 
-/// What the gains of [wrench] start from. Sampled at 1 kHz with 1.4 ms of delay, a wall is stable up to
-/// (b + B) / (T/2 + delay) = 3400 N/m for the friction b = 0.5 and hand damping B = 6 N.s/m of the simulated
-/// device; a sixth of that feels firm and leaves room for a hand that lets go.
+/// Default gains of [wrench]. At 1 kHz with 1.4 ms of delay a wall is stable up to (b + B) / (T/2 + delay) =
+/// 3400 N/m, for the friction b = 0.5 and the hand damping B = 6 N.s/m of the simulated device. A sixth of
+/// that is firm and leaves a margin for a released handle.
 inline WrenchGains default_gains() {
   WrenchGains gains;
   gains.stiffness = WrenchGains::blockwise(600.0, 1.5);
@@ -54,56 +53,59 @@ struct WrenchSettings {
   WrenchGains gains = default_gains();
 };
 
-/// Where a frame stands in another, as config files give it.
+/// Pose of one frame in another, as configuration files state it.
 struct PoseSettings {
   Vector3d position_m = Vector3d::Zero();
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
+
+  Pose pose() const noexcept { return {rotation_from(rotation_vector_rad), position_m}; }
 };
 
-/// In the place of a profile's name: that of whatever device is plugged in.
+/// Placeholder for a profile name: select the profile of the connected device.
 inline constexpr const char* kAnyProfile = "auto";
 
 /// [device]
 struct DeviceSettings {
-  std::string profile = "loopback";    ///< name of a profile file, without .toml; or a file, with it
-  std::filesystem::path profile_file;  ///< where the profile was found; empty for kAnyProfile
-  std::string serial;                  ///< of the device, where there are several equal ones; empty: any
-  PoseSettings base_in_world;          ///< X_WB
-  PoseSettings tool_in_handle;         ///< X_HM: mesh frame of the tool in the handle frame
+  std::string profile = "loopback";    ///< name of a profile file without .toml, or a file name with .toml
+  std::filesystem::path profile_file;  ///< resolved profile file; empty for kAnyProfile
+  std::string serial;  ///< serial number of the device, if several equal ones are connected; empty: any
+  PoseSettings base_in_world;   ///< X_WB: pose of the device base in the world
+  PoseSettings tool_in_handle;  ///< X_HM: mesh frame of the tool in the handle frame
 };
 
 /// [recording]
 struct RecordingSettings {
-  std::filesystem::path file;       ///< of every tick from the first on; empty: none
-  std::filesystem::path directory;  ///< of recordings started later; empty: the usual place
-  double flight_s = 60.0;           ///< what the flight recorder holds; 0: there is none
-  int flights_kept = 10;            ///< of its files, the newest
-  double keep_free_MB = 500.0;      ///< of the disk: below that nothing is recorded
+  std::filesystem::path file;  ///< recording of all ticks from the start; empty: none
+  /// directory of recordings that are started later; empty: the default directory
+  std::filesystem::path directory;
+  double flight_s = 60.0;       ///< length of the flight recorder; 0: none
+  int flights_kept = 10;        ///< number of flight recordings kept; older ones are deleted
+  double keep_free_MB = 500.0;  ///< free disk space below which nothing is recorded
 };
 
 /// [control]
 struct ControlSettings {
-  std::string socket;          ///< path; empty: the usual place; kNoSocket: none
-  std::string observers;       ///< group that may connect; empty: only the daemon's own user and root
-  std::string operators;       ///< group that may arm besides; its members have to be observers too
-  std::string administrators;  ///< group that may reconfigure besides, likewise
+  std::string socket;          ///< socket path; empty: the default path; kNoSocket: none
+  std::string observers;       ///< group that may connect; empty: only the daemon's user and root
+  std::string operators;       ///< group that may also arm; its members must also be observers
+  std::string administrators;  ///< group that may also reconfigure; its members must also be observers
 };
-/// In the place of the path of the control socket.
+/// Placeholder for the control socket: no socket.
 inline constexpr const char* kNoSocket = "none";
-/// In the place of the group of observers: everybody on this machine.
+/// Placeholder for the observer group: every user of this machine.
 inline constexpr const char* kEverybody = "*";
 
-/// [view]: from where a picture of the scene is best taken. Equal points: nobody has said.
+/// [view]: default camera of the page. Equal points: not stated.
 struct ViewSettings {
   Vector3d eye_m = Vector3d::Zero();
   Vector3d target_m = Vector3d::Zero();
 };
 
-/// All of wrenchd.toml.
+/// Settings of wrenchd.toml.
 struct Settings {
   std::filesystem::path file;
-  std::string description;  ///< what there is to feel and to see, for people
-  std::filesystem::path scene = "scenes/cube_on_table.toml";  ///< looked up along the search path
+  std::string description;  ///< description of the scene and what to try, for display
+  std::filesystem::path scene = "scenes/cube_on_table.toml";  ///< searched along the search path
   DeviceSettings device;
   ServoSettings servo;
   RenderingSettings rendering;

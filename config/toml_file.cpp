@@ -15,21 +15,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The largest shipped file has 8 kB. A megabyte is somebody's mistake (a mesh, a recording).
+/// The largest shipped file has 8 kB. A file above 1 MiB is a mesh or a recording.
 constexpr std::uintmax_t kMaxBytes = 1 << 20;
 
-/// Our formats nest four deep.
+/// wrenchd's formats nest four levels.
 constexpr int kMaxDepth = 16;
 
-/// The parser bounds the nesting of brackets but not of dotted keys, and it frees its tree by recursion: a
-/// key of 500,000 dots overflows the stack. No line of ours needs a tenth of this.
+/// The parser limits the nesting of brackets but not of dotted keys, and it frees its tree recursively. A key
+/// with 500,000 dots would overflow the stack. wrenchd's formats need less than a tenth of this limit.
 constexpr std::ptrdiff_t kMaxDotsInLine = 120;
 
 void require_regular_file(const fs::path& file) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (status.type() == fs::file_type::not_found) {
-    throw ConfigError(file, {}, "no such file; looked for " + fs::absolute(file).string());
+    throw ConfigError(file, {}, "no such file; searched " + fs::absolute(file).string());
   }
   if (error) throw ConfigError(file, {}, "cannot be read: " + error.message());
   if (fs::is_directory(status)) throw ConfigError(file, {}, "is a directory; name a file in it");
@@ -103,11 +103,11 @@ TomlNode convert(const fs::path& file, const toml::node& node, int depth) {
   return {place, convert_value(file, node, depth + 1)};
 }
 
-/// The parser's message is one sentence on what it saw; it may quote a hostile file at length.
+/// Message for a syntax error. The parser's description may quote the file at length, so it is truncated.
 std::string syntax_message(std::string_view description) {
   std::string message = "is not valid TOML: " + printable(std::string(description), 200);
   if (description.find("redefine") != std::string_view::npos)
-    message += "; a key stands once, keep one of them";
+    message += "; a key may appear once only, keep one of them";
   if (description.find("nested") != std::string_view::npos) message += "; flatten it";
   if (description.find("utf-8") != std::string_view::npos) message += "; save the file as UTF-8";
   return message;

@@ -8,9 +8,9 @@
 
 namespace wrenchd {
 
-/// The .toml files of a folder of all directories of the search path. Of two with the same name the one in
-/// the earlier directory counts, as for SearchPath::find(). Sorted by name. What cannot be listed is passed
-/// over.
+/// The .toml files of `folder` in all directories of the search path, sorted by name. Of two with the same
+/// name the earlier directory counts, as in SearchPath::find(). Unreadable directories are skipped. Not
+/// RT-safe: reads directories.
 std::vector<std::filesystem::path> toml_files(const std::filesystem::path& folder, const SearchPath& search);
 
 }  // namespace wrenchd

@@ -187,7 +187,7 @@ void TomlTable::close() {
   }
 }
 
-/// A mandatory key that was only misspelt is not reported a second time as missing.
+/// A misspelt mandatory key is reported as unknown only, not also as missing.
 void TomlTable::refuse_unknown(const TomlEntry& entry) {
   const auto same = [&](const KnownKey& key) { return key.name == entry.key; };
   if (std::any_of(known_.begin(), known_.end(), same)) return;

@@ -18,16 +18,16 @@
 
 namespace wrenchd {
 
-/// What a number may be; both ends belong to it. NaN and infinities never do.
+/// Closed interval of a number. NaN and infinity are always outside.
 struct Range {
   double min;
   double max;
 };
 
-/// The value of a key that was asked for, present or not.
+/// The value of a requested key, present or absent.
 ///
-/// Each conversion returns true when the value is there and good. A value that is there and not good is
-/// refused, with its place, what was expected and what was found, and `out` keeps what it had: its default.
+/// Each conversion returns true if the value is present and valid. It rejects an invalid value with location,
+/// expected and found value, and then leaves `out` at its default. Not RT-safe: allocates.
 class TomlValue {
  public:
   TomlValue(RefusalList& refusals, const TomlNode* node, SourceLocation place, std::string name,
@@ -41,42 +41,43 @@ class TomlValue {
   explicit operator bool() const noexcept { return node_ != nullptr; }
   bool is_table() const noexcept;
   bool is_array() const noexcept;
-  /// Is it this very text? "none" stands for something a device does not have.
+  /// True if the value is exactly this text. "none" stands for an absent feature of a device.
   bool is_text(std::string_view text) const noexcept;
-  /// Does the table hold this key, with anything but the text "none"?
+  /// True if the table has this key and its value is not the text "none".
   bool has(std::string_view key) const noexcept;
-  /// Does the table hold this key with the text "none"?
+  /// True if the table has this key with the text "none".
   bool is_none(std::string_view key) const noexcept;
-  /// Does it come from a profile that the file inherits?
+  /// True if the value comes from an inherited profile.
   bool is_inherited() const noexcept { return location_.file != nullptr; }
-  const std::string& name() const noexcept { return name_; }  ///< dotted, as in "obstacle[0].half_space"
+  const std::string& name() const noexcept { return name_; }  ///< dotted name, as in "obstacle[0].half_space"
 
-  bool number(double& out, Range range) const;  ///< an integer will do
+  bool number(double& out, Range range) const;  ///< accepts an integer
   template <std::integral T>
-  bool integer(T& out, Range range) const;  ///< 45.0 will do, 45.5 will not
+  bool integer(T& out, Range range) const;  ///< accepts 45.0, rejects 45.5
   bool boolean(bool& out) const;
   bool text(std::string& out) const;
   bool path(std::filesystem::path& out) const;
   template <typename E>
   bool choice(E& out, std::initializer_list<std::pair<std::string_view, E>> choices) const;
 
-  bool numbers(std::span<double> out, Range range) const;  ///< exactly out.size() of them
+  bool numbers(std::span<double> out, Range range) const;  ///< exactly out.size() numbers
   bool vector(Vector3d& out, Range range) const;
-  std::vector<TomlValue> elements(std::string_view expected) const;  ///< of an array
+  std::vector<TomlValue> elements(std::string_view expected) const;  ///< elements of an array
 
-  /// Calls read(TomlTable&, args...), then refuses the keys it did not ask for.
+  /// Calls read(TomlTable&, args...), then rejects the keys that were not requested.
   template <typename Read, typename... Args>
   void table(Read read, Args&&... args) const;
-  /// The same, and a table that is not there is read as an empty one: for defaults that have to be looked up.
+  /// Calls read(TomlTable&, args...) with an empty table if the table is absent, for defaults that need a
+  /// lookup.
   template <typename Read, typename... Args>
   void table_or_empty(Read read, Args&&... args) const;
 
   /// A number with the unit of this key, for messages: "10 N".
   std::string with_unit(double x) const;
 
-  /// "key 'NAME': MESSAGE" at the value; where there is none, at the table that lacks it.
+  /// Rejects the value with "key 'NAME': MESSAGE", located at the value, or at the table if it is absent.
   void refuse(const std::string& message) const;
-  /// "key 'NAME': expected EXPECTED, found ...". Returns false.
+  /// Rejects the value with "key 'NAME': expected EXPECTED, found ...". Returns false.
   bool refuse_found(const std::string& expected) const;
 
  private:
@@ -92,25 +93,25 @@ class TomlValue {
   std::string unit_;
 };
 
-/// A table, and the keys somebody asked it for. A loader asks for every key its format has, so the loader
-/// reads as the format's description, and what is left over is a mistake.
+/// A table that tracks the requested keys. A loader requests every key of its format, so the loader documents
+/// the format; close() rejects all other keys.
 class TomlTable {
   struct MissingKey {
     std::string name;
-    std::string alternative;  ///< would do as well; may be empty
+    std::string alternative;  ///< optional key that satisfies the requirement instead; may be empty
   };
 
  public:
   TomlTable(RefusalList& refusals, const TomlNode& node, std::string name)
       : refusals_(refusals), node_(node), name_(std::move(name)) {}
 
-  /// The unit is the one the key name ends with, unless it is given here.
+  /// The unit of the value is the ending of the key, unless `unit` is given.
   TomlValue optional(std::string_view key, std::string_view unit = {});
   TomlValue mandatory(std::string_view key, std::string_view unit = {});
-  /// Where another key, which is optional, would do as well. Both have been asked for then.
+  /// A mandatory key, unless the optional key `other` is present. Both keys count as requested.
   TomlValue mandatory_unless(std::string_view other, std::string_view key);
 
-  /// Refuses keys that nobody asked for, and mandatory keys that are not there.
+  /// Rejects unknown keys and missing mandatory keys.
   void close();
 
  private:
@@ -125,8 +126,7 @@ class TomlTable {
   std::vector<MissingKey> missing_;
 };
 
-/// Reads a root table, which stands in FILE, through read(TomlTable&, args...). Throws one ConfigError that
-/// tells everything wrong with it.
+/// Reads a root table of FILE through read(TomlTable&, args...). Throws one ConfigError with all defects.
 template <typename Read, typename... Args>
 void read_toml_node(const std::filesystem::path& file, const TomlNode& node, Read read, Args&&... args) {
   RefusalList refusals(file);
@@ -136,13 +136,13 @@ void read_toml_node(const std::filesystem::path& file, const TomlNode& node, Rea
   refusals.throw_if_any();
 }
 
-/// The same of FILE as it is.
+/// Reads FILE through read(TomlTable&, args...).
 template <typename Read, typename... Args>
 void read_toml(const std::filesystem::path& file, Read read, Args&&... args) {
   read_toml_node(file, read_toml_file(file), read, args...);
 }
 
-/// The same of text that was read already; `file` is for messages.
+/// Parses text and reads it through read(TomlTable&, args...); `file` is for messages.
 template <typename Read, typename... Args>
 void read_toml_text(const std::string& text, const std::filesystem::path& file, Read read, Args&&... args) {
   read_toml_node(file, read_toml_text(text, file), read, args...);

@@ -6,18 +6,18 @@
 
 namespace wrenchd {
 
-/// What an axis of a device reports where it should report zero.
+/// Zero offset of one axis of a device. The device reports `offset` where the true value is 0.
 ///
 ///   true = reported - offset
 struct AxisOffset {
-  std::string axis;     ///< as the device's profile calls it: letters, digits, _ and -
-  double offset = 0.0;  ///< [m] or [rad], as the axis is
+  std::string axis;     ///< name of the axis in the device profile: letters, digits, _ and -
+  double offset = 0.0;  ///< zero offset, [m] for a linear axis, [rad] for an angular axis
 };
 
-/// What was measured of one device, where the profile speaks of its model.
+/// Values measured on one individual device. They refine the device profile, which describes the model.
 struct Calibration {
-  std::string profile;  ///< name of the profile it was measured with
-  std::string serial;   ///< of the device, any bytes; equal devices of a model are told apart by it
+  std::string profile;  ///< name of the profile that was active during the calibration
+  std::string serial;  ///< serial number of the device, any bytes; it distinguishes devices of the same model
   std::vector<AxisOffset> offsets;
 };
 

@@ -5,7 +5,7 @@
 
 namespace wrenchd {
 
-/// Monotonic time. In virtual time the epoch is the start of the run.
+/// Point in monotonic time. In virtual time the epoch is the start of the run.
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::nanoseconds;
 
@@ -16,18 +16,18 @@ inline Duration from_seconds(double s) noexcept {
   return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s));
 }
 
-/// Where the servo loop gets its time from: the machine's monotonic clock (daemon/wall_clock.hpp), or a clock
-/// that tests turn by hand.
+/// Time source of the servo loop: the machine's monotonic clock (daemon/wall_clock.hpp), or a clock that a
+/// test advances.
 class Clock {
  public:
   virtual ~Clock() = default;
-  virtual TimePoint now() const noexcept = 0;  ///< RT safe.
+  virtual TimePoint now() const noexcept = 0;  ///< current monotonic time. RT-safe.
   virtual void sleep_until(TimePoint t) noexcept = 0;
-  /// How long the machine has slept since it was switched on: time that now() leaves out. RT safe.
+  /// Total time that the machine has been suspended since boot. now() does not count this time. RT-safe.
   virtual Duration time_suspended() const noexcept { return {}; }
 };
 
-/// Time that passes only when somebody sleeps: hours in seconds, and every run the same. RT safe.
+/// Clock that advances only in sleep_until(). Hours run in seconds, and every run is the same. RT-safe.
 class VirtualClock final : public Clock {
  public:
   TimePoint now() const noexcept override { return now_; }
@@ -35,7 +35,7 @@ class VirtualClock final : public Clock {
     if (t > now_) now_ = t;
   }
   Duration time_suspended() const noexcept override { return time_suspended_; }
-  /// The machine goes to sleep, and wakes up.
+  /// Simulates a suspend of the machine for `d`, followed by a resume.
   void suspend_for(Duration d) noexcept { time_suspended_ += d; }
 
  private:

@@ -5,21 +5,22 @@
 
 namespace wrenchd {
 
-/// What can be asked of the servo loop from outside. A bit mask: a tick takes all that was asked for since
-/// the last one, the safest first.
+/// Requests to the servo loop from outside. A bit mask: each tick applies all requests that arrived since the
+/// previous tick, the safest first.
 using CommandSet = std::uint16_t;
 enum Command : CommandSet {
   kNoCommand = 0,
   kArm = 1,
   kDisarm = 2,
-  kReinitialize = 4,          ///< last tick's q means nothing any more
-  kStop = 8,                  ///< emergency stop
-  kAcknowledge = 16,          ///< somebody has looked at a fault, or a stop
-  kQuit = 32,                 ///< the process is asked to end
-  kLease = 64,                ///< with kArm: whoever arms promises signs of life
-  kHeartbeat = 128,           ///< a sign of life
-  kReleasedExternally = 256,  ///< the hand was released from outside: only in records
-  kClientLost = 512,          ///< whoever promised signs of life is gone: no need to wait for its silence
+  kReinitialize = 4,  ///< invalidates the proxy and initializes it again from the handle pose
+  kStop = 8,          ///< emergency stop
+  kAcknowledge = 16,  ///< acknowledges a latched fault or an emergency stop
+  kQuit = 32,         ///< ends the process
+  kLease = 64,        ///< with kArm: the client that arms sends heartbeats; if they stop, the loop disarms
+  kHeartbeat = 128,   ///< heartbeat of the client that armed
+  kReleasedExternally = 256,  ///< force was released outside of the servo loop; appears only in records
+  /// the connection of the client that armed has closed: the loop disarms without waiting for the timeout
+  kClientLost = 512,
 };
 
 }  // namespace wrenchd

@@ -10,17 +10,17 @@
 namespace wrenchd {
 namespace {
 
-/// Normals that differ by less are of one plane: well above the rounding of a triangle's corners.
+/// Two unit normals that differ by less belong to one plane. Well above the rounding of triangle corners.
 constexpr double kSamePlane = 1e-9;
 
-/// The normal of a triangle flatter than this, height over length, is not to be relied on: other vertices may
-/// lie above its plane. Where there are many, only for these is the highest looked for.
+/// Below this ratio of height to length the normal of a triangle is inaccurate, and other vertices may lie
+/// above its plane. Bodies with more than kFewVertices compute the support offset only for such triangles.
 constexpr double kSliver = 1e-3;
 constexpr std::size_t kFewVertices = 4096;
 
-/// What each vertex has, one behind the other: that of vertex i from begin[i] up to begin[i + 1].
-void lay_out(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std::uint32_t>& begin,
-             std::vector<std::uint32_t>& all) {
+/// Compressed rows: `all` holds the entries of all vertices, row i from begin[i] to begin[i + 1] - 1.
+void compress_rows(const std::vector<std::vector<std::uint32_t>>& at, std::vector<std::uint32_t>& begin,
+                   std::vector<std::uint32_t>& all) {
   begin.clear();
   all.clear();
   for (const auto& of_vertex : at) {
@@ -45,8 +45,8 @@ void ConvexBody::compute_derived_data() {
   for (const Vector3d& p : vertices_T_m) middle += p / static_cast<double>(vertices_T_m.size());
   std::vector<std::vector<std::uint32_t>> at(vertices_T_m.size());
 
-  const bool few = vertices_T_m.size() <= kFewVertices;
-  const auto face_like = [&](const Vector3d& n, std::uint32_t vertex) {
+  const bool is_small = vertices_T_m.size() <= kFewVertices;
+  const auto find_face = [&](const Vector3d& n, std::uint32_t vertex) {
     for (const std::uint32_t f : at[vertex])
       if ((faces[f].n - n).norm() < kSamePlane) return static_cast<std::int64_t>(f);
     return std::int64_t{-1};
@@ -54,17 +54,17 @@ void ConvexBody::compute_derived_data() {
   const auto add = [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     const Vector3d& p = vertices_T_m[i];
     Vector3d n = (vertices_T_m[j] - p).cross(vertices_T_m[k] - p);
-    if (!(n.squaredNorm() > 0.0)) return;  // a sliver without a plane of its own
+    if (!(n.squaredNorm() > 0.0)) return;  // degenerate triangle without a plane
     const bool sliver = n.norm() < kSliver * (vertices_T_m[j] - vertices_T_m[k]).squaredNorm() ||
                         n.norm() < kSliver * (vertices_T_m[j] - p).squaredNorm();
     n.normalize();
     if (n.dot(p - middle) < 0.0) n = -n;
-    std::int64_t face = face_like(n, i);
-    if (face < 0) face = face_like(n, j);
-    if (face < 0) face = face_like(n, k);
+    std::int64_t face = find_face(n, i);
+    if (face < 0) face = find_face(n, j);
+    if (face < 0) face = find_face(n, k);
     if (face < 0) {
       face = static_cast<std::int64_t>(faces.size());
-      faces.push_back({n, n.dot(vertices_T_m[sliver || few ? support(n, i) : i])});
+      faces.push_back({n, n.dot(vertices_T_m[sliver || is_small ? support(n, i) : i])});
     }
     const auto f = static_cast<std::uint32_t>(face);
     for (const std::uint32_t v : {i, j, k})
@@ -79,7 +79,7 @@ void ConvexBody::compute_derived_data() {
     }
   }
 
-  lay_out(at, faces_begin, faces_at);
+  compress_rows(at, faces_begin, faces_at);
 
   edges.clear();
   for (std::uint32_t v = 0; v < vertices_T_m.size(); ++v)
@@ -90,10 +90,10 @@ void ConvexBody::compute_derived_data() {
     at[edges[e].from].push_back(e);
     at[edges[e].to].push_back(e);
   }
-  lay_out(at, edges_begin, edges_at);
+  compress_rows(at, edges_begin, edges_at);
 }
 
-/// An edge within a flat face has that face only, and is none.
+/// Adds the edge if it separates two faces. An edge inside a flat face has only one face and is skipped.
 void ConvexBody::add_edge(std::uint32_t from, std::uint32_t to, std::span<const std::uint32_t> faces_from,
                           std::span<const std::uint32_t> faces_to) {
   std::vector<std::uint32_t> both;
@@ -110,22 +110,23 @@ void ConvexBody::add_edge(std::uint32_t from, std::uint32_t to, std::span<const 
   edges.push_back({from, to, d, {towards(n0, n1), towards(n1, n0)}});
 }
 
-/// Halves the vertices along the longest side of their box until few are left. Where they are many, their
-/// blocks are passed over together.
+/// Halves the vertices along the longest side of their box until at most kFew remain. Above kMany vertices it
+/// also adds an inner node that can skip the whole subtree.
 void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
   constexpr std::uint32_t kFew = 16, kMany = 256;
   Eigen::AlignedBox3d extent;
   for (std::uint32_t i = begin; i < end; ++i) extent.extend(vertices_T_m[order_[i]]);
-  const bool few = end - begin <= kFew;
+  const bool is_small = end - begin <= kFew;
   const std::size_t here = blocks_.size();
-  if (few || end - begin > kMany) {
-    Block block{extent.center(), 0.0, begin, few ? end : begin, static_cast<std::uint32_t>(here + 1)};
+  if (is_small || end - begin > kMany) {
+    Block block{extent.center(), 0.0, begin, is_small ? end : begin, static_cast<std::uint32_t>(here + 1)};
     for (std::uint32_t i = begin; i < end; ++i)
       block.radius_m = std::max(block.radius_m, (vertices_T_m[order_[i]] - block.centre_m).norm());
-    block.radius_m *= 1.0 + 1e-12;  // its own rounding, and that of the dot products it stands for
+    // covers the rounding of the radius and of the dot products in visit_above()
+    block.radius_m *= 1.0 + 1e-12;
     blocks_.push_back(block);
   }
-  if (!few) {
+  if (!is_small) {
     Eigen::Index axis = 0;
     extent.sizes().maxCoeff(&axis);
     const std::uint32_t middle = begin + (end - begin) / 2;
@@ -139,10 +140,10 @@ void ConvexBody::build_blocks(std::uint32_t begin, std::uint32_t end) {
   }
 }
 
-// Climbing from neighbour to neighbour would look at fewer vertices. But where a face is split into triangles
-// that are flat but for rounding, the climb ends at a vertex whose neighbours all seem level with it, as far
-// below the true support as the body is wide, and the projection would take that for admissible. Blocks are
-// left out only where none of their vertices can be the one.
+// A local climb from neighbour to neighbour would visit fewer vertices but is not reliable. On faces whose
+// triangles are coplanar up to rounding, all neighbours of a vertex may appear level. The climb would stop
+// far below the true support, and the projection would accept an overlapping pose. This search skips a node
+// only if none of its vertices can be the support.
 std::uint32_t ConvexBody::support(const Vector3d& direction, std::uint32_t near) const noexcept {
   std::uint32_t best = near;
   double height = direction.dot(vertices_T_m[near]);
@@ -157,7 +158,7 @@ std::uint32_t ConvexBody::support(const Vector3d& direction, std::uint32_t near)
 }
 
 std::uint32_t ConvexBody::support(const Vector3d& direction) const noexcept {
-  // The block that reaches highest leaves little to the others.
+  // Start with the leaf that reaches farthest: it skips most of the other nodes.
   const double length = direction.norm();
   const auto reach = [&](const Block& block) {
     return direction.dot(block.centre_m) + length * block.radius_m;

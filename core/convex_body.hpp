@@ -10,31 +10,34 @@
 
 namespace wrenchd {
 
-/// A convex polyhedron in a frame of its own: vertices, and for each vertex its neighbours in order around it
-/// (the sequence N_v of section 3.3). Built once, then only read.
+/// A convex polyhedron in its own frame T: vertices, and for each vertex its neighbours in order around it
+/// (the sequence N_v of the paper, section 3.3). Constant after compute_derived_data().
 struct ConvexBody {
-  /// The solid lies in n . x <= offset. Triangles in one plane are one face.
+  /// A face plane; the solid lies in n . x <= offset. Coplanar triangles form one face.
   struct Face {
-    Vector3d n;  ///< unit, outward
+    Vector3d n;  ///< unit normal, outward
     double offset_m;
   };
-  /// Where two faces meet at an angle. A plane touches the body along the edge where its outward normal m is
-  /// at right angles to the edge and m . side[0] >= 0, m . side[1] >= 0: between the normals of the faces.
+  /// A convex edge between two faces. A plane with outward normal m supports the body along this edge if m is
+  /// perpendicular to d, m . side[0] >= 0 and m . side[1] >= 0. Then m lies between the two face normals.
   struct Edge {
     std::uint32_t from, to;
-    Vector3d d;  ///< unit, from `from` to `to`
+    Vector3d d;  ///< unit direction from vertex `from` to vertex `to`
     Vector3d side[2];
   };
 
   std::vector<Vector3d> vertices_T_m;
-  /// Ring of vertex i: ring[ring_begin[i]] up to ring[ring_begin[i + 1]].
+  /// Start index of each vertex's neighbours: vertex i has ring[ring_begin[i]] to ring[ring_begin[i + 1] -
+  /// 1].
   std::vector<std::uint32_t> ring_begin;
   std::vector<std::uint32_t> ring;
   std::vector<Face> faces;
   std::vector<Edge> edges;
-  std::vector<std::uint32_t> faces_begin;  ///< the faces of vertex i, laid out as the rings
+  /// start index of each vertex's faces in faces_at, same layout as ring_begin
+  std::vector<std::uint32_t> faces_begin;
   std::vector<std::uint32_t> faces_at;
-  std::vector<std::uint32_t> edges_begin;  ///< and its edges
+  /// start index of each vertex's edges in edges_at, same layout as ring_begin
+  std::vector<std::uint32_t> edges_begin;
   std::vector<std::uint32_t> edges_at;
 
   std::span<const std::uint32_t> ring_of(std::size_t vertex) const noexcept {
@@ -47,17 +50,17 @@ struct ConvexBody {
     return adjacency_row(vertex, edges_begin, edges_at);
   }
 
-  /// Fills in faces, edges, which of them are at which vertex, and what support() works with from vertices
-  /// and rings. Not RT safe.
+  /// Computes faces, edges, the faces and edges at each vertex, and the sphere hierarchy of support() from
+  /// vertices and rings. Not RT-safe: allocates.
   void compute_derived_data();
 
-  /// The vertex farthest along a direction, of any length. near: one that is known to be far along it, which
-  /// saves time. RT safe.
+  /// Index of the vertex farthest along `direction`, which may have any length. near: a vertex that is likely
+  /// to be far along it; a good guess saves time. RT-safe.
   std::uint32_t support(const Vector3d& direction) const noexcept;
   std::uint32_t support(const Vector3d& direction, std::uint32_t near) const noexcept;
 
-  /// Calls visit(vertex, direction . p) for every vertex that lies higher along the direction than least(),
-  /// which may rise meanwhile, and for some others. RT safe if they are.
+  /// Calls visit(vertex, direction . p) for every vertex with direction . p > least(), and for some others.
+  /// least() may increase between calls. RT-safe if least and visit are.
   template <class Least, class Visit>
   void visit_above(const Vector3d& direction, const Least& least, const Visit& visit) const noexcept {
     const bool one = blocks_.size() == 1;
@@ -74,13 +77,13 @@ struct ConvexBody {
   }
 
  private:
-  /// Some vertices that lie close together, in a sphere; or, without vertices of its own, the sphere around
-  /// the blocks that follow it up to `after`.
+  /// Node of a bounding sphere hierarchy. A leaf contains the vertices begin to end of order_. An inner node
+  /// has begin == end and bounds the nodes that follow it up to skip_to.
   struct Block {
     Vector3d centre_m;
     double radius_m;
-    std::uint32_t begin, end;  ///< in order_
-    std::uint32_t skip_to;     ///< the block to look at next where none of these can be the one
+    std::uint32_t begin, end;  ///< first and one past the last vertex, as indices into order_
+    std::uint32_t skip_to;     ///< index of the next node if none of this node's vertices can qualify
   };
 
   static std::span<const std::uint32_t> adjacency_row(std::size_t vertex,
@@ -92,8 +95,8 @@ struct ConvexBody {
   void add_edge(std::uint32_t from, std::uint32_t to, std::span<const std::uint32_t> faces_from,
                 std::span<const std::uint32_t> faces_to);
 
-  std::vector<std::uint32_t> order_;  ///< the vertices, block by block
-  std::vector<Vector3d> ordered_m_;   ///< and where they are
+  std::vector<std::uint32_t> order_;  ///< vertex indices, sorted by leaf
+  std::vector<Vector3d> ordered_m_;   ///< positions of the vertices in the order of order_ [m]
   std::vector<Block> blocks_;
 };
 

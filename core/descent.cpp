@@ -8,11 +8,12 @@ namespace wrenchd {
 namespace {
 
 constexpr int kIterations = 200;
-constexpr int kHalvings = 30;
-/// The gradient has vanished, relative to that of the start: less would be lost in the last digits of T.
-constexpr double kSmall = 1e-6;
-/// Armijo's constant, the usual value.
-constexpr double kFairShare = 1e-4;
+constexpr int kMaxHalvings = 30;
+/// Convergence: gradient norm relative to that of the first iterate. A smaller value changes only the last
+/// digits of T.
+constexpr double kConverged = 1e-6;
+/// Armijo constant, usual value.
+constexpr double kArmijo = 1e-4;
 
 bool admissible(const Projection& projection) noexcept {
   return projection.status != ProjectionStatus::infeasible;
@@ -32,20 +33,20 @@ Vector3d Descent::gradient(const Pose& X_WP, const Projection& at) const noexcep
   return g;
 }
 
-// Directions are conjugate in the metric of H (Polak and Ribiere), in which a body turns as easily about each
-// axis; they start anew where they do not descend.
+// Polak-Ribiere directions, METHOD (58), conjugate in the metric of H, in which all rotation axes have equal
+// weight. A direction that does not descend is replaced by the negative gradient.
 Projection Descent::project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept {
   const Matrix3d H_inverse = M_.H_kg_m2.inverse();
   Projection best = translations_.translate(X_WP, scene, X_start);
   if (!admissible(best) || best.status == ProjectionStatus::free) return best;
 
   Vector3d g = gradient(X_WP, best);
-  const double small = kSmall * std::sqrt(g.dot(H_inverse * g));
+  const double tolerance = kConverged * std::sqrt(g.dot(H_inverse * g));
   Vector3d direction = -(H_inverse * g);
-  double step = 0.25;  // in units of a Newton step on 2 H, the curvature of T alone
+  double step = 0.25;  // in units of a Newton step on 2 H, the Hessian of T without contacts
   best.status = ProjectionStatus::budget_spent;
   for (int i = 0; i < kIterations; ++i) {
-    if (std::sqrt(g.dot(H_inverse * g)) <= small) {
+    if (std::sqrt(g.dot(H_inverse * g)) <= tolerance) {
       best.status = ProjectionStatus::converged;
       return best;
     }
@@ -54,16 +55,16 @@ Projection Descent::project(const Pose& X_WP, const ContactSource& scene, const 
       direction = -(H_inverse * g);
       slope = g.dot(direction);
     }
-    step = std::min(2.0 * step, 1.0 / std::max(direction.norm(), 1e-300));  // never more than a radian
+    step = std::min(2.0 * step, 1.0 / std::max(direction.norm(), 1e-300));  // at most 1 rad
     Projection trial;
-    bool fell = false;
-    for (int halving = 0; halving < kHalvings && !fell; ++halving) {
+    bool decreased = false;
+    for (int halving = 0; halving < kMaxHalvings && !decreased; ++halving) {
       const Pose X_trial{best.X_WQ.rotation * rotation_from(step * direction), best.X_WQ.translation_m};
       trial = translations_.translate(X_WP, scene, X_trial);
-      fell = admissible(trial) && trial.energy < best.energy + kFairShare * step * slope;
-      if (!fell) step *= 0.5;
+      decreased = admissible(trial) && trial.energy < best.energy + kArmijo * step * slope;
+      if (!decreased) step *= 0.5;
     }
-    if (!fell) return best;
+    if (!decreased) return best;
     const Vector3d g_new = gradient(X_WP, trial);
     const double beta = std::max(0.0, g_new.dot(H_inverse * (g_new - g)) / g.dot(H_inverse * g));
     direction = beta * direction - H_inverse * g_new;

@@ -7,23 +7,26 @@
 
 namespace wrenchd {
 
-/// The paper's numerical method (section 3.1): conjugate gradient in exponential coordinates from the last
-/// admissible configuration. The reference that the paper measures its analytical family by; slow, and where
-/// several contacts hold the optimum it stops short of it, because T has a kink there.
+/// The paper's numerical method (core/METHOD.md, section 7.4; paper, section 3.1): conjugate gradient from
+/// the last admissible configuration. The paper uses it as the reference for its analytical family. It is
+/// slow. With several active contacts it stops short of the optimum, because F is not differentiable there.
 ///
-/// The translation is not searched: for each rotation the nearest admissible one is known exactly. So the
-/// unknowns are the exponential coordinates eta of the rotation, E <- E exp(eta), and the cost is
+/// For each rotation the nearest admissible translation is known exactly. The only unknowns are the
+/// exponential coordinates eta of the rotation, E <- E exp(eta), with the cost METHOD (56)
 ///
 ///   F(E) = min over admissible u of T(u, E)
 ///
-/// Its gradient is that of the Lagrangian (envelope theorem):  4 (w H v - v x H v) - sum m_i (c_i - x) x n_i.
+/// and the gradient METHOD (57)
+///
+///   4 (w H v - v x H v) - sum m_i (c_i - x) x n_i
 class Descent {
  public:
-  /// The projection is kept by reference: its translate() is the inner problem.
+  /// Keeps a reference to `translations`; its translate() solves the inner problem. It must outlive this
+  /// object.
   Descent(const Inertia& M, ExactProjection& translations) : M_(M), translations_(translations) {}
 
-  /// The least T it finds from X_start on. converged: the gradient has vanished. RT safe, but takes a hundred
-  /// times what ExactProjection does.
+  /// Lowest-T configuration found from X_start; status `converged` if the gradient has vanished. Allocates
+  /// nothing. Not RT-safe: takes about a hundred times as long as ExactProjection.
   Projection project(const Pose& X_WP, const ContactSource& scene, const Pose& X_start) noexcept;
 
  private:

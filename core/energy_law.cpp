@@ -3,20 +3,18 @@
 
 namespace wrenchd {
 
-// q* minimises T for p, so to first order moving p does not gain by moving q* along (envelope theorem): dU is
-// that of T at fixed q. With T = m |x_q - x_p|^2 + 4 v' H v and (w, v) the unit quaternion of p^-1 q:
+// q* minimises T for p. To first order the motion of q* does not change T (envelope theorem), so dU is that
+// of T at fixed q. With (w, v) the unit quaternion of p^-1 q, METHOD (63), (64):
 //
-//   p moves by ds in its own axes:   dU = -k m (R_p'(x_q - x_p)) . ds
-//   p turns by eta in its own axes:  (w, v) becomes (1, -eta/2) o (w, v), dv = (v x eta - w eta)/2
-//                                    dU = 4 k dv' H v = -2 k (w H v + v x (H v)) . eta
-//
-// The wrench is minus the gradient:
+//   translation of p by ds in its own axes:   dU = -k m (R_p'(x_q - x_p)) . ds
+//   rotation of p by eta in its own axes:     (w, v) becomes (1, -eta/2) o (w, v), dv = (v x eta - w eta)/2
+//                                             dU = 4 k dv' H v = -2 k (w H v + v x (H v)) . eta
 //
 //   f   = k m R_p'(x_q - x_p)
 //   tau = 2 k ( w H v + v x (H v) )
 Wrench energy_wrench(const Inertia& M, double k_per_s2, const Pose& X_WP, const Pose& X_WQ) noexcept {
   Quaterniond E = X_WP.rotation.conjugate() * X_WQ.rotation;
-  if (E.w() < 0.0) E.coeffs() *= -1.0;  // the shorter way round
+  if (E.w() < 0.0) E.coeffs() *= -1.0;  // the shorter rotation
   const Vector3d v = E.vec();
   const Vector3d Hv = M.H_kg_m2 * v;
   const Vector3d s = X_WP.rotation.conjugate() * (X_WQ.translation_m - X_WP.translation_m);

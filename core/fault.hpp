@@ -11,88 +11,88 @@
 
 namespace wrenchd {
 
-/// What can be wrong. In a tick a problem is a value, never an exception. The table behind fault_row() says
-/// of each how it is found, what follows, and what to do about it.
+/// Faults that wrenchd detects. A problem in a tick is a value, never an exception. fault_row() returns for
+/// each fault its detection, reaction and remedy.
 enum class Fault : std::uint8_t {
   none,
 
-  // The link and its reports
-  device_lost,       ///< the transport says the device is gone
-  wrong_device,      ///< another one came in its place
-  report_malformed,  ///< of another length or id, or with a wrong checksum
-  report_repeated,   ///< duplicate, or out of order
-  report_missing,    ///< by sequence number
-  link_lossy,        ///< too many of the three above
+  // Link and reports
+  device_lost,       ///< the transport reports that the device is gone
+  wrong_device,      ///< a different device is connected in place of the previous one
+  report_malformed,  ///< a report has a wrong length, id or checksum
+  report_repeated,   ///< a report is a duplicate or out of order
+  report_missing,    ///< the sequence number of the reports has a gap
+  link_lossy,        ///< too many malformed, repeated or missing reports
   sample_late,       ///< the newest pose is a few milliseconds old
-  sample_stale,      ///< no new report for longer than the profile allows
+  sample_stale,      ///< no new report within the time limit of the profile
 
-  // What the reports say
-  pose_not_finite,         ///< NaN or infinity in a reported pose or twist
-  pose_not_a_rotation,     ///< reported quaternion is too far from unit norm
-  pose_jumped,             ///< pose moved farther in one report than any hand can
-  pose_outside_workspace,  ///< far out of the workspace
-  pose_stuck,              ///< the pose stays, and the reported twist says it moves
-  overspeed,               ///< handle faster than the profile allows
-  not_homed,               ///< the encoders do not know where they are any more
-  watchdog_tripped,        ///< the device's own watchdog took the motors' current while it was driven
-  motors_off,              ///< the device says that its motors are off, and was told to drive them
+  // Content of the reports
+  pose_not_finite,         ///< a reported pose or twist contains NaN or infinity
+  pose_not_a_rotation,     ///< the norm of a reported quaternion is too far from 1
+  pose_jumped,             ///< the pose moved farther between two reports than a hand can
+  pose_outside_workspace,  ///< the pose is far outside of the workspace
+  pose_stuck,              ///< the pose is constant although the reported twist is not zero
+  overspeed,               ///< the handle is faster than the profile allows
+  not_homed,               ///< the encoders have lost their reference
+  watchdog_tripped,        ///< the device's watchdog switched the motors off while wrenchd drove them
+  motors_off,              ///< the device reports that its motors are off although wrenchd drives them
 
-  // The rendering
-  wrench_not_finite,  ///< the rendering produced NaN or infinity
-  projection_failed,  ///< no admissible pose was found for several ticks
-  wrench_late,        ///< the wrench was ready too long after its pose
+  // Rendering
+  wrench_not_finite,  ///< the rendering returned NaN or infinity
+  projection_failed,  ///< the projection found no admissible pose in several consecutive ticks
+  wrench_late,        ///< the wrench was ready too long after its pose was sampled
 
-  // The loop and the machine
-  tick_late,       ///< a tick came a few milliseconds late
+  // Servo loop and machine
+  tick_late,       ///< a tick started a few milliseconds late
   loop_stalled,    ///< no tick for longer than the configuration allows
-  clock_reversed,  ///< the monotonic clock went back
-  suspended,       ///< the machine slept
-  write_blocked,   ///< the device takes no wrench for a few milliseconds
-  write_failed,    ///< nor for longer
+  clock_reversed,  ///< the monotonic clock went backwards
+  suspended,       ///< the machine was suspended
+  write_blocked,   ///< the device has accepted no wrench for a few milliseconds
+  write_failed,    ///< the device has accepted no wrench for longer than the limit
 
-  // The hand and the motors
-  oscillating,           ///< the force alternates with the motion: less stiffness from here on
-  oscillation_persists,  ///< again, with what was left of it
-  energy_generated,      ///< the rendering gives more energy than it took
-  motors_stalled,        ///< full force against a hand that does not move
-  overheated,            ///< the motors gave more than they can for ever
+  // Hand and motors
+  oscillating,           ///< the handle oscillates in contact; wrenchd reduces the stiffness
+  oscillation_persists,  ///< the handle still oscillates at the reduced stiffness
+  energy_generated,      ///< the rendering returned more energy than it absorbed
+  motors_stalled,        ///< maximum force on a hand that does not move
+  overheated,            ///< the motors exceeded their continuous rating
 
-  // Who asked for it
-  heartbeat_lost,     ///< whoever armed does not say any more that it is alive
-  heartbeat_missing,  ///< nor ever did
-  deadman_released,   ///< the button that has to be held is not
+  // Clients and buttons
+  heartbeat_lost,     ///< the heartbeat of the client that armed has stopped
+  heartbeat_missing,  ///< the client that armed has never sent a heartbeat
+  deadman_released,   ///< the dead man's button is not held
   stop_requested,     ///< emergency stop by a client or a signal
-  stop_button,        ///< by the device's button
+  stop_button,        ///< emergency stop by the device's stop button
 
-  // What went on for too long, and the test at the start
+  // Persistent degradation, and the self-test at the start
   degraded_too_long,
   degraded_too_often,
-  self_test_reports,   ///< no half second of good reports
-  self_test_rate,      ///< reports at another rate than the profile's
-  self_test_watchdog,  ///< the device's watchdog did not trip when it should have
+  self_test_reports,   ///< no half second of valid reports during the self-test
+  self_test_rate,      ///< the report rate differs from the profile
+  self_test_watchdog,  ///< the device's watchdog did not trip in the self-test
 };
 inline constexpr std::size_t kFaultCount = static_cast<std::size_t>(Fault::self_test_watchdog) + 1;
 
-/// What wrenchd knows of a fault: one row of the table.
+/// Description of one fault.
 struct FaultRow {
   Fault fault;
-  std::string_view name;      ///< as it stands in records and status: "device_lost"
-  Trigger trigger;            ///< what it is to the state machine
-  Reaction reaction;          ///< of its own, where harder than the transition's
-  Duration persistence;       ///< how long it has to be there; the reaction comes within one tick after that
-  std::string_view detector;  ///< how it is found
+  std::string_view name;  ///< name in records and status, for example "device_lost"
+  Trigger trigger;        ///< trigger that the fault sends to the state machine
+  Reaction reaction;      ///< minimum reaction; the harder of it and the transition's reaction applies
+  Duration persistence;   ///< time for which the condition must hold; the reaction follows within one tick
+  std::string_view detector;  ///< how wrenchd detects the fault
   std::string_view message;   ///< what happened
-  std::string_view reason;    ///< why anybody looks for it
-  std::string_view cure;      ///< what to do about it
+  std::string_view reason;    ///< why wrenchd monitors this condition
+  std::string_view cure;      ///< what to do now
 };
 
-/// All faults but `none`, in order.
+/// Rows of all faults except `none`, in the order of the enumeration.
 std::span<const FaultRow> fault_rows() noexcept;
 
-/// The row of a fault. Never fails: an unknown value reads "unknown". RT safe.
+/// Row of a fault. An unknown value returns a row named "unknown". RT-safe.
 const FaultRow& fault_row(Fault fault) noexcept;
 
-/// A set of faults, as bits.
+/// A set of faults as a bit mask.
 using FaultSet = std::uint64_t;
 constexpr FaultSet bit(Fault fault) noexcept {
   return FaultSet{1} << static_cast<unsigned>(fault);

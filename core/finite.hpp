@@ -9,8 +9,8 @@
 
 namespace wrenchd {
 
-/// True for every double that is neither an infinity nor a NaN. Looks at the bits, so it stays true under any
-/// compiler flag and is asked before any arithmetic. RT safe.
+/// True if x is neither infinite nor NaN. Tests the bits, so no compiler flag can remove the test, and no
+/// arithmetic precedes it. RT-safe.
 inline bool is_finite(double x) noexcept {
   constexpr std::uint64_t exponent = 0x7ff0'0000'0000'0000;
   return (std::bit_cast<std::uint64_t>(x) & exponent) != exponent;

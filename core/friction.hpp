@@ -13,96 +13,87 @@
 
 namespace wrenchd {
 
-/// [rendering.friction]: Coulomb's coefficients. 0 <= dynamic <= static; both zero: no friction.
+/// [rendering.friction]: Coulomb coefficients, 0 <= dynamic <= static. Both zero: no friction.
 struct FrictionSettings {
-  static constexpr double kMaxCoefficient = 5.0;  ///< far beyond rubber on rubber
+  /// upper limit of a coefficient, far above rubber on rubber
+  static constexpr double kMaxCoefficient = 5.0;
 
-  double static_coefficient = 0.0;   ///< of a tool that has stuck for a while
-  double dynamic_coefficient = 0.0;  ///< of a tool that slides
+  double static_coefficient = 0.0;   ///< coefficient while the tool sticks (after 20 ticks at rest)
+  double dynamic_coefficient = 0.0;  ///< coefficient while the tool slides
 
   bool enabled() const noexcept { return static_coefficient > 0.0 || dynamic_coefficient > 0.0; }
 };
 
-/// Coulomb friction as the proxy's resistance to sliding.
+/// Coulomb friction of the proxy (core/METHOD.md, section 9). Every tick it moves the goal p to a frictional
+/// goal p', METHOD (76); the proxy then follows p' without friction in the whole scene.
 ///
-/// Under the contacts that touched at last tick's q, and no others, the closest configuration to p is q*; its
-/// multipliers N_i are what presses there. Between the two lies q_0: as near to p as the tool comes
-/// while the points of it that carry at q* stay where they were. (A tool that stands on a face stays as it
-/// is; one that stands on its tip may turn about the tip.) Points slide on the way from q_0 to q* only, and
-/// along it, with s from 0 to 1,
-///
-///   drawn  = (1 - s) sum f_i . slid_i       f_i: what holds point i at q_0 against p, within the ground
-///   D      = s D* + (1 - s) D_0             D = sum N_i |slid_i|, with what presses at q* and at q_0
-///
-/// since nothing draws at q*, a minimum under its contacts. Forces are in the unit of dT. What presses at q_0
-/// is another load, where friction has tilted the tool. Coulomb's law is drawn = mu D, so
-///
-///   1 - s = mu D* / (sum f_i . slid_i + mu (D* - D_0))
-///
-/// unless mu D_0 is as much as draws at q_0: then the tool sticks there. For q_s on that way there is a p'
-/// that q_s is the closest configuration to, with what presses there for multipliers: p moved by friction.
-/// The proxy follows p' instead of p, without friction, in the whole scene. What it meets on the way stops it
-/// there, and rubs from the next tick on.
+/// q* is the closest configuration to p under the contacts that touched at the previous q. q_0 is the stuck
+/// pose: as near to p as the tool comes while its loaded contact points keep their positions. Coulomb's law,
+/// METHOD (74), selects the pose q_s on the segment from q_0 to q*; METHOD (75) gives the fraction 1 - s. p'
+/// is the goal whose closest configuration is q_s. A new contact acts from the next tick on.
 ///
 /// All memory is in the object. One object serves one thread.
 class Friction {
  public:
-  /// clearance_m: what the contacts are held open by, as in ExactProjection.
+  /// clearance_m: gap at which the projection holds contacts, as in ExactProjection. Not RT-safe: set-up.
   Friction(const Inertia& M, const FrictionSettings& settings, double clearance_m);
 
-  /// p': where the proxy is to follow to. X_WP itself where nothing rubs. X_WP: p; X_last: last tick's q.
-  /// Once a tick. may_hold: whether it may be told to stay by holds(). RT safe.
-  Pose frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_hold = true) noexcept;
+  /// The frictional goal p' in W; X_WP itself if no contact carries load. X_WP: p. X_last: q of the previous
+  /// tick. may_stick: if false, sticks() remains false. Call once per tick. RT-safe.
+  Pose frictional_goal(const Pose& X_WP, const Pose& X_last, bool may_stick = true) noexcept;
 
-  /// Before that, where obstacles move: motion_of(k) is by how much obstacle number k has moved in the world
-  /// since the last tick, X_WO now = motion * X_WO then. What rubbed goes with it, and the tool with what
-  /// presses most. Answers where that takes it, the X_last for felt(). RT safe.
+  /// Call before frictional_goal() if obstacles move. motion_of(k): displacement of obstacle k in W since the
+  /// previous tick, X_WO(now) = motion * X_WO(before). Moves the stored contacts with their obstacles, and
+  /// the tool with the obstacle that carries the largest load. Returns the moved tool pose: X_last for
+  /// frictional_goal(). RT-safe, if motion_of is.
   template <class MotionOf>
   Pose carry_with_obstacle(const Pose& X_last, const MotionOf& motion_of) noexcept;
 
-  /// Does the tool stick and cannot turn either? Then it stays at X_last to the bit, and held() says what of
-  /// it: energy, contacts and multipliers for p. RT safe.
+  /// True if the tool sticks and cannot rotate. Then it stays at X_last bit for bit, and stuck_projection()
+  /// has the energy, contacts and multipliers for p. RT-safe.
   bool sticks() const noexcept { return sticks_; }
   const Projection& stuck_projection() const noexcept { return frictionless_; }
 
-  /// The tick's answer: what touches there rubs at the next tick. A tool that comes through the air is not
-  /// held back where it came from. RT safe.
+  /// Stores the contacts of the tick's projection; they cause friction from the next tick on. A contact that
+  /// is new in this tick does not pull the tool back to an earlier pose. RT-safe.
   void store_contacts(const Projection& answer) noexcept;
 
-  void reset() noexcept;  ///< RT safe
+  void reset() noexcept;  ///< Discards all stored contacts. RT-safe.
 
  private:
-  /// A contact of q*, and the point of the tool that is there.
+  /// A contact at q* and the tool point at which it acts.
   struct FrictionPoint {
     Contact contact;
-    Vector3d p_TC_m;                       ///< the point
-    Vector3d p_WC_m;                       ///< where it was at X_last
-    Vector3d n_W;                          ///< at q*
-    Eigen::Matrix<double, 3, 6> jacobian;  ///< its displacement, by a displacement y of the body at q*
-    double gap_m;                          ///< at q*
-    double multiplier;                     ///< zero where it touches idly [kg m]
-    Vector3d slip_W_m;                     ///< tangential displacement of the point from X_last to q*
+    Vector3d p_TC_m;  ///< tool point in T [m]
+    Vector3d p_WC_m;  ///< position of the tool point at X_last, in W [m]
+    Vector3d n_W;     ///< contact normal at q*, in W
+    /// displacement of the point for a displacement y of the body at q*, METHOD (72)
+    Eigen::Matrix<double, 3, 6> jacobian;
+    double gap_m;       ///< gap at q* [m]
+    double multiplier;  ///< contact multiplier at q*; zero for a contact without load [kg m]
+    Vector3d slip_W_m;  ///< tangential displacement of the point from X_last to q*, in W [m]
   };
 
   void collect_points(const Pose& X_last) noexcept;
   Pose stick_pose(const Pose& X_last) const noexcept;
-  Vector3d stick_error_m(const FrictionPoint& touch, const Pose& X_WT) const noexcept;
+  Vector3d stick_error_m(const FrictionPoint& point, const Pose& X_WT) const noexcept;
   double stick_fraction(double mu, const Pose& X_WP, const Pose& X_stuck) noexcept;
   Vector3d rotational_gradient(const Quaterniond& E) const noexcept;
-  double normal_multiplier(std::size_t i, double held) const noexcept;
-  Pose goal_for_pose(const Pose& X_WQ, double held) const noexcept;
+  double normal_multiplier(std::size_t i, double fraction) const noexcept;
+  Pose goal_for_pose(const Pose& X_WQ, double fraction) const noexcept;
 
   Inertia M_;
   Matrix3d H_inverse_;
-  Matrix3d rotation_scale_;  ///< of the last half of y: the turn in T [rad]
+  Matrix3d rotation_scale_;  ///< rotation in T [rad] for the last three components of y
   FrictionSettings settings_;
   ExactProjection projection_;
-  StaticVector<ActiveContact, ContactSet::kCapacity> last_contacts_;  ///< what touched at last tick's answer
-  std::optional<Pose> X_WQ_last_;                                     ///< that answer
-  Projection frictionless_;                                           ///< q*
+  /// contacts that touched at the previous projection
+  StaticVector<ActiveContact, ContactSet::kCapacity> last_contacts_;
+  std::optional<Pose> X_WQ_last_;  ///< pose of the previous projection
+  Projection frictionless_;        ///< q*: projection of p without friction
   StaticVector<FrictionPoint, ContactSet::kCapacity> points_;
   std::array<double, ContactSet::kCapacity>
-      multiplier_increase_;  ///< that each carries at q_0 than at q* [kg m]
+      multiplier_increase_;  ///< increase of each multiplier from q* to q_0 [kg m]
   bool sticks_ = false;
   int ticks_stuck_ = 0;
 };
@@ -110,16 +101,16 @@ class Friction {
 template <class MotionOf>
 Pose Friction::carry_with_obstacle(const Pose& X_last, const MotionOf& motion_of) noexcept {
   if (!X_WQ_last_ || last_contacts_.empty() || !same_bits(*X_WQ_last_, X_last)) return X_last;
-  const auto pressing = [&](std::uint32_t obstacle) {
+  const auto load_on = [&](std::uint32_t obstacle) {
     double sum = 0.0;
-    for (const ActiveContact& touch : last_contacts_)
-      if (touch.contact.obstacle == obstacle) sum += touch.multiplier;
+    for (const ActiveContact& active : last_contacts_)
+      if (active.contact.obstacle == obstacle) sum += active.multiplier;
     return sum;
   };
   std::uint32_t carrier = last_contacts_[0].contact.obstacle;
   StaticVector<ActiveContact, ContactSet::kCapacity> now;
   for (const auto& [contact, multiplier] : last_contacts_) {
-    if (pressing(contact.obstacle) > pressing(carrier)) carrier = contact.obstacle;
+    if (load_on(contact.obstacle) > load_on(carrier)) carrier = contact.obstacle;
     now.add({moved(contact, motion_of(contact.obstacle)), multiplier});
   }
   last_contacts_ = now;

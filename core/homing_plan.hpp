@@ -8,28 +8,32 @@
 
 namespace wrenchd {
 
-/// When a device has to be shown where it is.
+/// When a device needs a reference pose (homing).
 enum class ReferenceSchedule : std::uint8_t {
-  never,       ///< it knows: absolute encoders, calibrated by its maker
-  once,        ///< absolute encoders, which nobody has aligned: the offset is stored
-  each_start,  ///< incremental encoders, which count from wherever they were switched on
+  never,       ///< absolute encoders, calibrated by the manufacturer
+  once,        ///< absolute encoders with unknown offset: homed once, wrenchd stores the offset
+  each_start,  ///< incremental encoders, which start from an arbitrary pose
 };
 
-/// What has to be seen of a device before it may be armed. Axes: x y z of the handle point, then turns about
-/// x y z, all in the base, x forward, y left, z up.
+/// Homing requirements that a device must meet before it may be armed. Axes: x, y, z of the handle point,
+/// then rotation about x, y, z; in the base, x forward, y left, z up.
 struct HomingPlan {
-  std::array<bool, 6> sensed = {true, true, true, true, true, true};  ///< only these are asked for
-  double travel_m = 0.02;    ///< how far a person moves the handle along an axis; plain to see, soon done
-  double travel_rad = 0.25;  ///< likewise about one
-  Vector3d workspace_min_m = Vector3d::Constant(-1.0);  ///< p_BH is never outside of this box
+  /// axes that the device senses; homing asks for motion along these only
+  std::array<bool, 6> sensed = {true, true, true, true, true, true};
+  double travel_m = 0.02;    ///< distance by which a person moves the handle along a linear axis
+  double travel_rad = 0.25;  ///< angle by which a person rotates the handle about an axis
+  /// lower corner of the box that contains every valid p_BH
+  Vector3d workspace_min_m = Vector3d::Constant(-1.0);
   Vector3d workspace_max_m = Vector3d::Constant(1.0);
-  double max_rotation_rad = 3.2;  ///< nor is R_BH turned farther than this; above pi: any turn is good
+  double max_rotation_rad = 3.2;  ///< largest valid rotation angle of R_BH; above pi: any rotation is valid
 
   ReferenceSchedule reference = ReferenceSchedule::never;
-  Pose X_BR;                          ///< the handle in its rest, the pose that is known
-  double max_offset_m = 0.1;          ///< farther off, the handle is not in its rest
-  double max_offset_rad = 0.5;        ///< likewise; encoders that start anywhere need more
-  std::uint32_t confirm_buttons = 0;  ///< any of these says "it is in its rest"; 0: only confirm() does
+  Pose X_BR;  ///< known rest pose of the handle
+  /// largest valid distance between rest pose and reported pose; beyond it homing rejects the reference
+  double max_offset_m = 0.1;
+  /// largest valid angle between rest pose and reported pose; incremental encoders need a larger value
+  double max_offset_rad = 0.5;
+  std::uint32_t confirm_buttons = 0;  ///< any of these buttons confirms the rest pose; 0: only confirm() does
 };
 
 }  // namespace wrenchd

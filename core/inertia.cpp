@@ -3,15 +3,15 @@
 
 namespace wrenchd {
 
-// The solid is the signed sum of the tetrahedra (r, a, b, c) over all triangles, r any reference point. With
-// d = det[a b c] (six times the volume) and s = a + b + c, seen from r:
+// METHOD (16). The solid is the signed sum of the tetrahedra (r, a, b, c) over all triangles, with a
+// reference point r. With d = det[a b c] (six times the volume) and s = a + b + c, relative to r:
 //
 //   V       = sum d / 6
 //   int x   = sum d s / 24
 //   int xx' = sum d (a a' + b b' + c c' + s s') / 120
 //
-// and H = m (tr(C) I - C), C = int (x - c)(x - c)' / V. The reference point is the vertex mean, so that a
-// body far from the mesh's origin keeps its digits.
+// and H = m (tr(C) I - C), C = int (x - c)(x - c)' / V. r is the mean of the vertices, so a body far from the
+// mesh origin loses no digits.
 SolidProperties solid_properties(const TriangleMesh& mesh, double mass_kg) {
   Vector3d r = Vector3d::Zero();
   for (const Vector3d& p : mesh.vertices_m) r += p;

@@ -12,16 +12,16 @@ struct Inertia {
   Matrix3d H_kg_m2 = Matrix3d::Identity();  ///< inertia tensor about the centre of mass, in T
 };
 
-/// The uniform solid inside a closed, outward-oriented mesh. M is the frame of the mesh; T has M's axes.
+/// Mass properties of the uniform solid bounded by a mesh. M: mesh frame. T has the axes of M.
 struct SolidProperties {
   double volume_m3 = 0.0;
   Vector3d p_MT_m = Vector3d::Zero();  ///< centre of mass in M
-  Inertia inertia;                     ///< about T
+  Inertia inertia;                     ///< inertia about the origin of T
 };
 
-/// Volume, centre of mass and inertia of the uniform solid of the given total mass.
-/// The mesh must be closed and outward-oriented; a volume that is not positive is returned as it is, with
-/// the inertia left at its default. Not RT safe.
+/// Volume, centre of mass and inertia of the uniform solid with the given total mass, METHOD (16). The mesh
+/// must be closed and oriented outward. If the volume is not positive, returns it and leaves the inertia at
+/// its default. Not RT-safe: linear in the number of triangles.
 SolidProperties solid_properties(const TriangleMesh& mesh, double mass_kg);
 
 }  // namespace wrenchd

@@ -7,20 +7,21 @@
 
 namespace wrenchd {
 
-/// Hands the newest value of one writer to one reader. Neither ever waits: three slots go round, one being
-/// written, one being read, one in between. What the reader has not taken by the next write is lost, which is
-/// what "latest" means. RT safe on both sides, for a T that copies without allocating.
+/// Passes the newest value from one writer thread to one reader thread without locks. Three slots rotate: one
+/// for the writer, one for the reader, one between them. A value that the reader has not taken before the
+/// next write is lost. RT-safe on both sides if T copies without allocation.
 template <class T>
 class LatestValue {
  public:
-  /// By the writer only.
+  /// Publishes a value. Writer thread only. RT-safe.
   void write(const T& value) noexcept {
     slots_[writing_] = value;
     writing_ =
         middle_.exchange(static_cast<std::uint8_t>(writing_ | kNew), std::memory_order_acq_rel) & kIndex;
   }
 
-  /// By the reader only: takes the newest value, if there is one that was not taken yet.
+  /// Copies the newest value into `value` and returns true; returns false if it has been taken already.
+  /// Reader thread only. RT-safe.
   bool read(T& value) noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kNew) == 0) return false;
     reading_ = middle_.exchange(reading_, std::memory_order_acq_rel) & kIndex;
@@ -33,8 +34,8 @@ class LatestValue {
   static constexpr std::uint8_t kNew = 4;
 
   std::array<T, 3> slots_{};
-  std::uint8_t writing_ = 0;  ///< belongs to the writer
-  std::uint8_t reading_ = 1;  ///< belongs to the reader
+  std::uint8_t writing_ = 0;  ///< slot of the writer
+  std::uint8_t reading_ = 1;  ///< slot of the reader
   std::atomic<std::uint8_t> middle_{2};
 };
 

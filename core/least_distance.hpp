@@ -11,32 +11,32 @@
 
 namespace wrenchd {
 
-/// The point of a polyhedron in R^N nearest to a given one:
+/// The point of a polyhedron in R^N nearest to a given point (core/METHOD.md, section 4), METHOD (31):
 ///
 ///   min 1/2 |z - z0|^2   subject to   b_i . z >= c_i,   |b_i| = 1
 ///
-/// Solved by the dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): start at z0, add
-/// the most violated constraint, and keep the multipliers of the active ones non-negative on the way,
-/// dropping what would turn negative. At most N constraints are active, so each step works with an N x N
-/// triangle. Redundant and parallel constraints are met as such: a constraint in the span of the active ones
-/// is never added, only exchanged. RT safe.
+/// Dual active-set method of Goldfarb and Idnani (Math. Programming 27, 1983): starts at z0, adds the most
+/// violated constraint, keeps the active multipliers non-negative, and drops constraints whose multiplier
+/// reaches zero. At most N constraints are active. A constraint in the span of the active normals replaces
+/// one of them. RT-safe.
 template <int N, std::size_t Capacity>
 class LeastDistance {
  public:
   using Vector = Eigen::Matrix<double, N, 1>;
-  using Coefficients = std::array<double, N>;  ///< one for each active constraint, in their order
+  /// one coefficient per active constraint, in the order of activation
+  using Coefficients = std::array<double, N>;
   enum class Status : std::uint8_t { optimal, infeasible, budget_spent };
 
   void clear() noexcept { count_ = 0; }
 
-  /// Adds b . z >= c. b need not be unit length, but must not be zero.
+  /// Adds b . z >= c. b may have any length above zero.
   void add(const Vector& b, double c) noexcept {
     const double length = b.norm();
     const double scale = 1.0 / length;
     add_unit(b * scale, c * scale);
     length_[count_ - 1] = length;
   }
-  /// The same for a b of unit length.
+  /// Adds b . z >= c for a b of unit length.
   void add_unit(const Vector& b, double c) noexcept {
     normal_[count_] = b;
     bound_[count_] = c;
@@ -44,7 +44,8 @@ class LeastDistance {
     ++count_;
   }
 
-  /// The last constraint takes the place of the i-th. What solve() found is lost, but for its multipliers.
+  /// Removes constraint i by moving the last constraint into its position. Invalidates z(); multipliers move
+  /// along.
   void remove_unordered(std::size_t i) noexcept {
     --count_;
     normal_[i] = normal_[count_];
@@ -53,8 +54,8 @@ class LeastDistance {
     multiplier_[i] = multiplier_[count_];
   }
 
-  /// tolerance: by how much a constraint may stay violated, in units of z. One that is active may by the
-  /// rounding of b . z, should that be more.
+  /// Solves from z0. tolerance: accepted violation of an inactive constraint, in units of z. An active
+  /// constraint is met up to the rounding of b . z, which may be larger.
   Status solve(const Vector& z0, double tolerance) noexcept {
     z_ = z0;
     active_count_ = 0;
@@ -74,18 +75,19 @@ class LeastDistance {
   }
 
   const Vector& z() const noexcept { return z_; }
-  /// Multiplier of constraint i, for b_i as it was given: z - z0 = sum multiplier_i b_i. Zero where not
-  /// active.
+  /// Multiplier of constraint i for b_i as given: z - z0 = sum multiplier_i b_i. Zero if the constraint is
+  /// inactive.
   double multiplier(std::size_t i) const noexcept { return multiplier_[i] / length_[i]; }
   std::size_t count() const noexcept { return count_; }
-  /// A constraint as it was given to add_unit().
+  /// Normal of constraint i, scaled to unit length.
   const Vector& normal(std::size_t i) const noexcept { return normal_[i]; }
   double bound(std::size_t i) const noexcept { return bound_[i]; }
 
  private:
-  static constexpr std::size_t kMaxSteps =
-      std::size_t{8} * N + 2 * Capacity;       ///< typical: as many as are active at the end
-  static constexpr double kDependent = 1e-20;  ///< squared sine below which a normal lies in the active span
+  /// typical number of steps: the number of finally active constraints
+  static constexpr std::size_t kMaxSteps = std::size_t{8} * N + 2 * Capacity;
+  /// squared sine below which a normal counts as dependent on the active normals
+  static constexpr double kDependent = 1e-20;
 
   bool is_active(std::size_t i) const noexcept {
     for (std::size_t k = 0; k < active_count_; ++k)
@@ -93,7 +95,8 @@ class LeastDistance {
     return false;
   }
 
-  /// Of those that are not active. An active one is met by construction, whatever rounding makes of it.
+  /// Index of the most violated inactive constraint; count_ if none exceeds the tolerance. Active constraints
+  /// are met by construction, up to rounding.
   std::size_t most_violated(double tolerance) const noexcept {
     std::size_t worst = count_;
     double most = tolerance;
@@ -107,11 +110,12 @@ class LeastDistance {
     return worst;
   }
 
-  /// Makes constraint p active, dropping others on the way as their multipliers reach zero. False:
-  /// contradiction.
+  /// Makes constraint p active and drops constraints whose multiplier reaches zero, METHOD (33). Returns
+  /// false if the constraints contradict each other.
   bool activate(std::size_t p) noexcept {
     for (;;) {
-      // b_p = Q r + rest,  Q R = active normals,  d = R^-1 r: how the active multipliers give way to p's.
+      // b_p = Q r + rest, Q R = active normals, d = R^-1 r: rate at which p's multiplier changes the active
+      // ones.
       Coefficients r{};
       const Vector rest = project_out(normal_[p], r);
       const Coefficients d = back_substitute(r);
@@ -143,7 +147,7 @@ class LeastDistance {
     }
   }
 
-  /// Takes out what rounding has left between z and the active constraints: R' y = violations, z += Q y.
+  /// Removes the rounding error between z and the active constraints: R' y = violations, z += Q y.
   void refine(double tolerance) noexcept {
     Coefficients y{};
     double most = 0.0;
@@ -158,10 +162,10 @@ class LeastDistance {
     for (std::size_t k = 0; k < active_count_; ++k) z_ += y[k] * q_[k];
   }
 
-  /// b minus its projection on the active normals; r receives the coefficients on Q. Twice where cancellation
-  /// would spoil orthogonality: twice is enough.
+  /// b minus its projection on the active normals; r receives the coefficients on Q. Orthogonalizes a second
+  /// time if cancellation loses digits.
   Vector project_out(const Vector& b, Coefficients& r) const noexcept {
-    constexpr double kLittleLost = 0.5;  // of the squared length, which is 1
+    constexpr double kLittleLost = 0.5;  // fraction of the squared length, which is 1
     Vector rest = b;
     for (int pass = 0; pass < 2; ++pass) {
       for (std::size_t k = 0; k < active_count_; ++k) {
@@ -185,14 +189,14 @@ class LeastDistance {
   }
 
   void append(std::size_t p, const Coefficients& r, const Vector& rest, double length) noexcept {
-    if (active_count_ >= N) return;  // activate() sees to it; said again for whoever reads only this
+    if (active_count_ >= N) return;  // never true: activate() appends fewer than N constraints
     q_[active_count_] = rest / length;
     r_[active_count_] = r;
     r_[active_count_][active_count_] = length;
     active_[active_count_++] = p;
   }
 
-  /// Removes the k-th active constraint and rebuilds the triangle behind it.
+  /// Removes the k-th active constraint and rebuilds the columns behind it.
   void drop(std::size_t k) noexcept {
     multiplier_[active_[k]] = 0.0;
     const std::size_t old_count = active_count_;
@@ -208,7 +212,7 @@ class LeastDistance {
   std::array<Vector, Capacity> normal_;
   std::array<double, Capacity> bound_;
   std::array<double, Capacity> length_;
-  std::array<double, Capacity> multiplier_;  ///< for the unit normals
+  std::array<double, Capacity> multiplier_;  ///< multipliers for the unit normals
   std::size_t count_ = 0;
 
   Vector z_ = Vector::Zero();

@@ -13,37 +13,39 @@ namespace wrenchd {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kBelow = 1.0 - 4.0 * kEpsilon;  ///< keeps a product below its limit when it is rounded up
+constexpr double kRoundDown =
+    1.0 - 4.0 * kEpsilon;  ///< keeps a product below its limit if rounding increases it
 
-/// x where it is a number from 0 to `most`; 0 where it is none, or below.
-double within(double x, double most) noexcept {
+/// x clamped to 0 ... `most`; 0 if x is not finite.
+double clamped(double x, double most) noexcept {
   return is_finite(x) ? std::clamp(x, 0.0, most) : 0.0;
 }
 
-/// A setting of 0, or one that is no number, leaves the profile's. A profile that states nothing allows
-/// nothing.
-double within_profile(double setting, double profile, double highest) noexcept {
-  const double own = within(profile, highest);
-  return is_finite(setting) && setting > 0.0 ? std::min(setting, own) : own;
+/// The smaller of a setting and the profile's value. A setting that is 0 or not finite selects the profile's
+/// value. A profile value that is not stated gives 0.
+double tighter_of(double setting, double profile, double absolute_max) noexcept {
+  const double profile_limit = clamped(profile, absolute_max);
+  return is_finite(setting) && setting > 0.0 ? std::min(setting, profile_limit) : profile_limit;
 }
 
-/// Shortens v to the limit, direction kept, and stays below it by what rounding may add. Taken apart into its
-/// largest component and the rest, because the length of a finite vector may be infinite.
-bool saturate(Vector3d& v, double limit) noexcept {
+/// Clamps the length of v to the limit and keeps the direction. Returns true if it changed v. Divides by the
+/// largest component first, because the length of a finite vector may overflow.
+bool clamp_length(Vector3d& v, double limit) noexcept {
   const double largest = v.cwiseAbs().maxCoeff();
   if (!(largest > 0.0)) return false;
   const Vector3d shape = v / largest;
   const double longest = limit / shape.norm();
   if (!(largest > longest)) return false;
-  v = shape * (kBelow * longest);
+  v = shape * (kRoundDown * longest);
   return true;
 }
 
-/// Lets v grow from what went out last by at most `growth`; shrinking along the last direction is free.
+/// Limits the growth of v relative to the last wrench; a decrease along the last direction is not limited.
+/// Returns true if it changed v.
 ///
-///   keep = the part of v along last, between 0 and |last|        (free)
-///   rest = v - keep                                              (new: at most `growth` long)
-bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
+///   keep = component of v along last, clamped to 0 ... |last|
+///   rest = v - keep                                              clamped to the length `growth`
+bool clamp_growth(Vector3d& v, const Vector3d& last, double growth) noexcept {
   const double last_length = last.norm();
   Vector3d keep = Vector3d::Zero();
   if (last_length > 0.0) {
@@ -57,12 +59,11 @@ bool slew(Vector3d& v, const Vector3d& last, double growth) noexcept {
   return true;
 }
 
-/// What went out last, as far as it could have: a vector that is none was nothing, a longer one was the
-/// limit.
-Vector3d legal(const Vector3d& last, double limit) noexcept {
+/// The last wrench, clamped to the limit; zero if it is not finite.
+Vector3d clamped_last(const Vector3d& last, double limit) noexcept {
   if (!is_finite(last)) return Vector3d::Zero();
   Vector3d v = last;
-  saturate(v, limit);
+  clamp_length(v, limit);
   return v;
 }
 
@@ -74,8 +75,8 @@ bool all_finite(const LimitInput& in) noexcept {
 }  // namespace
 
 LimitSettings tighter(const LimitSettings& a, const LimitSettings& b, const DeviceProfile& profile) noexcept {
-  const auto least = [](double x, double y, double own, double highest) {
-    return within_profile(x, own, highest) <= within_profile(y, own, highest) ? x : y;
+  const auto least = [](double x, double y, double profile_limit, double absolute_max) {
+    return tighter_of(x, profile_limit, absolute_max) <= tighter_of(y, profile_limit, absolute_max) ? x : y;
   };
   LimitSettings both;
   both.max_force_N = least(a.max_force_N, b.max_force_N, profile.max_force_N, kAbsoluteMaxForce_N);
@@ -95,9 +96,9 @@ const char* text(LimitCause cause) noexcept {
     case kTorqueMagnitude:
       return "torque magnitude";
     case kForceSlew:
-      return "force slew";
+      return "force clamp_growth";
     case kTorqueSlew:
-      return "torque slew";
+      return "torque clamp_growth";
     case kAuthority:
       return "authority";
     case kNotFinite:
@@ -127,12 +128,12 @@ std::string limit_causes_text(std::uint16_t causes) {
 }
 
 WrenchLimits::WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile)
-    : max_force_N_(within_profile(settings.max_force_N, profile.max_force_N, kAbsoluteMaxForce_N)),
-      max_torque_Nm_(within_profile(settings.max_torque_Nm, profile.max_torque_Nm, kAbsoluteMaxTorque_Nm)),
+    : max_force_N_(tighter_of(settings.max_force_N, profile.max_force_N, kAbsoluteMaxForce_N)),
+      max_torque_Nm_(tighter_of(settings.max_torque_Nm, profile.max_torque_Nm, kAbsoluteMaxTorque_Nm)),
       force_ceiling_N_(max_force_N_),
       torque_ceiling_Nm_(max_torque_Nm_),
-      force_slew_N_per_s_(within(settings.force_slew_N_per_s, std::numeric_limits<double>::max())),
-      torque_slew_Nm_per_s_(within(settings.torque_slew_Nm_per_s, std::numeric_limits<double>::max())),
+      force_slew_N_per_s_(clamped(settings.force_slew_N_per_s, std::numeric_limits<double>::max())),
+      torque_slew_Nm_per_s_(clamped(settings.torque_slew_Nm_per_s, std::numeric_limits<double>::max())),
       workspace_radius_m_(profile.workspace_radius_m),
       workspace_centre_m_(profile.workspace_centre_m),
       max_power_W_(profile.max_power_W) {}
@@ -144,11 +145,11 @@ void WrenchLimits::set_limits(const LimitSettings& settings, const DeviceProfile
 }
 
 void WrenchLimits::set_ceiling(double force_N, double torque_Nm) noexcept {
-  force_ceiling_N_ = within(force_N, max_force_N_);
-  torque_ceiling_Nm_ = within(torque_Nm, max_torque_Nm_);
+  force_ceiling_N_ = clamped(force_N, max_force_N_);
+  torque_ceiling_Nm_ = clamped(torque_Nm, max_torque_Nm_);
 }
 
-/// 1 within the radius, then along a straight line down to 0 at kWorkspaceFadeEnd of it.
+/// 1 inside of the workspace radius; decreases linearly to 0 at kWorkspaceFadeEnd radii.
 double WrenchLimits::workspace_scale(const Vector3d& p_BH_m) const noexcept {
   if (!is_finite(workspace_radius_m_)) return 1.0;
   const double distance_m = (p_BH_m - workspace_centre_m_).norm();
@@ -158,11 +159,11 @@ double WrenchLimits::workspace_scale(const Vector3d& p_BH_m) const noexcept {
   return (end_m - distance_m) / (end_m - workspace_radius_m_);
 }
 
-/// By how much the wrench has to shrink so that no more than max_power_W goes into the hand.
+/// Factor on the wrench that limits the power into the hand to max_power_W.
 ///
-///   P = f . v + tau . w,  and what its rounding may hide
+///   P = f . v + tau . w + bound of its rounding
 ///
-/// The twist is taken apart into its largest component and the rest, as P may be infinite otherwise.
+/// Divides the twist by its largest component first, because P may overflow.
 double WrenchLimits::power_scale(const Wrench& F, const Twist& V) const noexcept {
   if (!is_finite(max_power_W_)) return 1.0;
   const double largest =
@@ -170,11 +171,11 @@ double WrenchLimits::power_scale(const Wrench& F, const Twist& V) const noexcept
   if (!(largest > 0.0)) return 1.0;
   const Vector3d linear = F.force_N.cwiseProduct(V.linear_m_per_s / largest);
   const Vector3d angular = F.torque_Nm.cwiseProduct(V.angular_rad_per_s / largest);
-  const double hidden = 8.0 * kEpsilon * (linear.lpNorm<1>() + angular.lpNorm<1>());
-  const double power = linear.sum() + angular.sum() + hidden;
+  const double rounding = 8.0 * kEpsilon * (linear.lpNorm<1>() + angular.lpNorm<1>());
+  const double power = linear.sum() + angular.sum() + rounding;
   if (!(power > 0.0)) return 1.0;
   const double most = std::max(max_power_W_, 0.0) / power;
-  return largest > most ? kBelow * (most / largest) : 1.0;
+  return largest > most ? kRoundDown * (most / largest) : 1.0;
 }
 
 Limited WrenchLimits::apply(const LimitInput& in) noexcept {
@@ -192,20 +193,22 @@ Limited WrenchLimits::apply(const LimitInput& in) noexcept {
     force_N *= share;
     torque_Nm *= share;
   };
-  mark(saturate(force_N, max_force_N_), kForceMagnitude);
-  mark(saturate(torque_Nm, max_torque_Nm_), kTorqueMagnitude);
-  mark(saturate(force_N, force_ceiling_N_), kForceThermal);
-  mark(saturate(torque_Nm, torque_ceiling_Nm_), kTorqueThermal);
+  mark(clamp_length(force_N, max_force_N_), kForceMagnitude);
+  mark(clamp_length(torque_Nm, max_torque_Nm_), kTorqueMagnitude);
+  mark(clamp_length(force_N, force_ceiling_N_), kForceThermal);
+  mark(clamp_length(torque_Nm, torque_ceiling_Nm_), kTorqueThermal);
   scale(workspace_scale(in.p_BH_m), kWorkspaceEdge);
   scale(std::clamp(in.authority, 0.0, 1.0), kAuthority);
 
   const double dt_s = std::clamp(in.dt_s, 0.0, kMaxStep_s);
-  mark(slew(force_N, legal(last_sent_.force_N, max_force_N_), force_slew_N_per_s_ * dt_s), kForceSlew);
-  mark(slew(torque_Nm, legal(last_sent_.torque_Nm, max_torque_Nm_), torque_slew_Nm_per_s_ * dt_s),
+  mark(clamp_growth(force_N, clamped_last(last_sent_.force_N, max_force_N_), force_slew_N_per_s_ * dt_s),
+       kForceSlew);
+  mark(clamp_growth(torque_Nm, clamped_last(last_sent_.torque_Nm, max_torque_Nm_),
+                    torque_slew_Nm_per_s_ * dt_s),
        kTorqueSlew);
-  // Between two vectors within the limit lies no longer one, but for rounding.
-  saturate(force_N, force_ceiling_N_);
-  saturate(torque_Nm, torque_ceiling_Nm_);
+  // A vector between two vectors within the limit is within the limit, up to rounding.
+  clamp_length(force_N, force_ceiling_N_);
+  clamp_length(torque_Nm, torque_ceiling_Nm_);
   scale(power_scale(out.F, in.V_BH), kPower);
   last_sent_ = out.F;
   return out;

@@ -10,97 +10,98 @@ namespace wrenchd {
 
 struct DeviceProfile;
 
-/// What the daemon's configuration says of limits. It may tighten a profile's limits, never loosen them.
+/// [limits] of the configuration. Each value tightens the limit of the device profile; none can raise it.
 struct LimitSettings {
-  double max_force_N = 0.0;  ///< 0: the profile's own
+  double max_force_N = 0.0;  ///< 0: the profile's limit applies
   double max_torque_Nm = 0.0;
-  double force_slew_N_per_s = 2000.0;  ///< growth only; towards zero is free
+  double force_slew_N_per_s = 2000.0;  ///< limit on the growth of the force; a decrease is not limited
   double torque_slew_Nm_per_s = 50.0;
-  double soft_start_s = 1.0;  ///< from armed to full authority
+  double soft_start_s = 1.0;  ///< duration of the ramp from armed to full authority
 };
 
-/// Of each limit the tighter one: no more than either of them lets go out with this profile. RT safe.
+/// The tighter of two settings, limit by limit, for this profile. RT-safe.
 LimitSettings tighter(const LimitSettings& a, const LimitSettings& b, const DeviceProfile& profile) noexcept;
 
-/// No profile and no setting reaches further, whatever they say.
+/// Upper limit of any profile or setting.
 inline constexpr double kAbsoluteMaxForce_N = 200.0;
 inline constexpr double kAbsoluteMaxTorque_Nm = 20.0;
 
-/// Growth is never made up for: a longer step counts as this one. Five periods of the slowest loop.
+/// Upper limit of the time step in the slew limit: growth that a late tick missed is not made up. Five
+/// periods of the slowest loop.
 inline constexpr double kMaxStep_s = 0.010;
 
-/// Outside the workspace the wrench fades; at this many radii it is zero.
+/// Distance from the workspace centre, in radii, at which the wrench has faded to zero.
 inline constexpr double kWorkspaceFadeEnd = 1.1;
 
-/// Why a wrench that goes out is not the one the law asked for. A bit mask.
+/// Reasons why the wrench sent differs from the wrench requested. A bit mask.
 enum LimitCause : std::uint16_t {
   kNotLimited = 0,
   kForceMagnitude = 1,
   kTorqueMagnitude = 2,
   kForceSlew = 4,
   kTorqueSlew = 8,
-  kAuthority = 16,     ///< soft start or a stale sample: less than full authority
-  kNotFinite = 32,     ///< NaN or infinity: zero goes out
-  kForceThermal = 64,  ///< the motors are warm: less than the maximum
+  kAuthority = 16,     ///< authority below 1: soft start or a stale sample
+  kNotFinite = 32,     ///< an input contains NaN or infinity: zero is sent
+  kForceThermal = 64,  ///< the motors are warm: the force ceiling is below the maximum
   kTorqueThermal = 128,
   kWorkspaceEdge = 256,  ///< the handle is outside of its workspace
-  kPower = 512,          ///< more power would go into the hand than may
-  kPassivity = 1024,     ///< the passivity guard took from it before any of these
+  kPower = 512,          ///< the power into the hand would exceed its limit
+  kPassivity = 1024,     ///< the passivity guard reduced the wrench before the limits
 };
 
-/// "force magnitude", "power"; of one bit.
+/// Name of one cause, for example "force magnitude". RT-safe.
 const char* text(LimitCause cause) noexcept;
 
-/// The causes of a mask, as in "force magnitude, power"; "none". Not RT safe.
+/// Names of all causes in a mask, for example "force magnitude, power"; "none" for 0. Not RT-safe: allocates.
 std::string limit_causes_text(std::uint16_t causes);
 
-/// What a tick asks for, and where the hand is; all in axes of the base B, about the handle point H.
+/// Requested wrench and handle motion in a tick; in axes of the device base B, about the handle point H.
 struct LimitInput {
   Wrench requested;
-  double authority = 0.0;              ///< scales what is asked for: 0 to 1
-  double dt_s = 0.0;                   ///< since the last call
-  Twist V_BH;                          ///< of the handle
-  Vector3d p_BH_m = Vector3d::Zero();  ///< the handle point
+  double authority = 0.0;              ///< factor on the requested wrench, 0 to 1
+  double dt_s = 0.0;                   ///< time since the previous call
+  Twist V_BH;                          ///< twist of the handle in B
+  Vector3d p_BH_m = Vector3d::Zero();  ///< position of the handle point in B
 };
 
 struct Limited {
   Wrench F;
-  std::uint16_t causes = kNotLimited;  ///< LimitCause bits
+  std::uint16_t causes = kNotLimited;  ///< bit mask of LimitCause
 };
 
-/// The last thing between the rendering and the device, in this order:
+/// Final limits between rendering and device. apply() runs these steps in this order:
 ///
-///   not finite, any number of the input: zero goes out
-///   magnitude, force and torque each as a group, direction kept
-///   thermal ceiling, likewise: below the magnitude while motors are warm
-///   workspace edge: the wrench fades outside
-///   authority
-///   slew: what grows, from what went out last; towards zero is free
-///   power: the whole wrench by one factor; what brakes the hand is free
+///   finite      any input that is not finite: sends zero
+///   magnitude   clamps the lengths of force and torque, keeps their directions
+///   thermal     clamps the lengths to the current ceilings, which are lower while the motors are warm
+///   workspace   fades the wrench outside of the workspace
+///   authority   scales the wrench
+///   slew        limits the growth from the last wrench; a decrease is not limited
+///   power       scales the whole wrench if it puts too much power into the hand; braking is not limited
 ///
-/// Power comes after the slew, which holds back force and torque each on its own: one of them may have been
-/// what kept the power of the other down. A scale for both keeps all that was promised before it.
-///
-/// Whatever came before, legal or not, what goes out is finite and within every limit.
+/// Power follows slew, because slew limits force and torque separately and so can raise the total power. One
+/// scale on both preserves all earlier limits. Every wrench returned is finite and within all limits, for any
+/// input.
 class WrenchLimits {
  public:
-  /// The tighter of settings and profile applies. A maximum that is not stated is 0: no force. Edge and power
-  /// that are not stated are no limits. Slew rates that are no positive numbers let nothing grow.
+  /// Applies the tighter of settings and profile. A maximum that is not stated is 0. A workspace or power
+  /// that is not stated sets no limit. A slew rate that is not positive allows no growth.
   WrenchLimits(const LimitSettings& settings, const DeviceProfile& profile);
 
-  /// RT safe.
+  /// Limits the requested wrench and stores the result as the last wrench sent. RT-safe.
   Limited apply(const LimitInput& input) noexcept;
 
-  /// What the motors bear now, of each group; never above the maxima. What is not finite is 0. RT safe.
+  /// Sets the force and torque that the motors currently sustain; clamped to the maxima. A value that is not
+  /// finite sets 0. RT-safe.
   void set_ceiling(double force_N, double torque_Nm) noexcept;
 
-  /// Nothing goes out any more: the next wrench grows from zero. RT safe.
+  /// Sets the last wrench to zero: the next wrench grows from zero. RT-safe.
   void reset() noexcept { last_sent_ = Wrench{}; }
 
-  /// Other settings from here on, though what went out last stays what it was. RT safe.
+  /// Replaces the settings and keeps the last wrench. RT-safe.
   void set_limits(const LimitSettings& settings, const DeviceProfile& profile) noexcept;
 
-  /// What went out last is this, though it did not come from here: the next wrench grows from it. RT safe.
+  /// Sets the last wrench to one that was sent without apply(); the next wrench grows from it. RT-safe.
   void set_last_sent(const Wrench& last) noexcept { last_sent_ = last; }
 
   double max_force_N() const noexcept { return max_force_N_; }
@@ -116,9 +117,9 @@ class WrenchLimits {
   double torque_ceiling_Nm_;
   double force_slew_N_per_s_;
   double torque_slew_Nm_per_s_;
-  double workspace_radius_m_;  ///< NaN: no edge
+  double workspace_radius_m_;  ///< NaN: no workspace limit
   Vector3d workspace_centre_m_;
-  double max_power_W_;  ///< NaN: any
+  double max_power_W_;  ///< NaN: no power limit
   Wrench last_sent_;
 };
 

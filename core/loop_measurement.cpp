@@ -22,10 +22,10 @@ double DurationStatistic::sd_s() const noexcept {
 
 double DurationStatistic::quantile_s(double share) const noexcept {
   const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
-  std::uint64_t seen = 0;
+  std::uint64_t counted = 0;
   for (std::size_t i = 0; i < kBins; ++i) {
-    seen += bins_[i];
-    if (seen >= wanted) return std::min(max_, static_cast<double>(i + 1) * kBin_s);
+    counted += bins_[i];
+    if (counted >= wanted) return std::min(max_, static_cast<double>(i + 1) * kBin_s);
   }
   return max_;
 }
@@ -49,18 +49,18 @@ void LoopMeasurement::tick(const TickTimes& times) noexcept {
   last_sent_ = times.sent;
 }
 
-/// A command that was lost is acknowledged together with the one after it. What the device did not get acts
-/// no sooner than that one, so the round trip is that of the oldest which is new: the longest.
+/// A lost command is acknowledged together with the one after it. The device acts on neither before that, so
+/// the round trip counts from the oldest newly acknowledged command: the longest.
 void LoopMeasurement::update_round_trip(const TickTimes& times) noexcept {
   const std::uint64_t before = last_acknowledged_;
   if (times.acknowledged == before && has_acknowledgement_) return;
   last_acknowledged_ = times.acknowledged;
-  if (!has_acknowledgement_) {  // how long the first was under way cannot be told: it may be old
+  if (!has_acknowledgement_) {  // age of the first acknowledged command is unknown
     has_acknowledgement_ = true;
     return;
   }
   if (last_acknowledged_ < before ||
-      last_acknowledged_ > last_sent_) {  // it started anew, or answers nonsense: so do we
+      last_acknowledged_ > last_sent_) {  // the device restarted or sent an invalid number: start again
     has_acknowledgement_ = false;
     return;
   }

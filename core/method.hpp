@@ -5,12 +5,13 @@
 
 namespace wrenchd {
 
-/// How the closest admissible configuration is found.
+/// Method that computes the closest admissible configuration.
 enum class Method : std::uint8_t {
-  exact,          ///< all contacts together, no discretisation (core/projection.hpp)
-  planar,         ///< the paper's family of planes, contact by contact (core/planar_family.hpp)
-  descent,        ///< the paper's numerical reference (core/descent.hpp)
-  translational,  ///< the traditional penalty method of section 4: translation only
+  exact,    ///< all contacts together, no discretization (core/projection.hpp)
+  planar,   ///< the paper's family of planes, contact by contact (core/planar_family.hpp)
+  descent,  ///< the paper's numerical reference (core/descent.hpp)
+  /// the traditional penalty method: translation only (core/METHOD.md, section 7.5; paper, section 4)
+  translational,
 };
 
 }  // namespace wrenchd

@@ -24,21 +24,21 @@ Pose ObstacleMotion::pose_at(const Pose& X_WO_0, double t_s) const noexcept {
   if (!linear_m_per_s.isZero(0.0)) X_WO.translation_m += s * linear_m_per_s;
   const double speed = angular_rad_per_s.norm();
   if (speed == 0.0) return X_WO;
-  // Whole turns are left out before they cost the angle its digits; by twos, for a quaternion comes back to
-  // itself, and not to its negative, after two.
-  const double turned_s = std::fmod(s, 4.0 * std::numbers::pi / speed);
-  X_WO.rotation = (rotation_from(turned_s * angular_rad_per_s) * X_WO_0.rotation).normalized();
+  // Removes whole turns, which would cost the angle its digits; two at a time, because a unit quaternion
+  // returns to itself, and not to its negative, after two turns.
+  const double angle_time_s = std::fmod(s, 4.0 * std::numbers::pi / speed);
+  X_WO.rotation = (rotation_from(angle_time_s * angular_rad_per_s) * X_WO_0.rotation).normalized();
   return X_WO;
 }
 
-/// s(t). fmod() is exact, so days later the turning points are still where they were.
+/// s(t) of METHOD (96). fmod() is exact, so the reversals keep their times for days.
 double ObstacleMotion::path_time_s(double t_s) const noexcept {
-  const double since_s = t_s - start_s;
-  if (!(since_s > 0.0)) return 0.0;
-  const double t = std::min(since_s, duration_s > 0.0 ? duration_s : kMaxTime_s);
+  const double elapsed_s = t_s - start_s;
+  if (!(elapsed_s > 0.0)) return 0.0;
+  const double t = std::min(elapsed_s, duration_s > 0.0 ? duration_s : kMaxTime_s);
   if (!(reverse_after_s > 0.0)) return t;
-  const double in_round_s = std::fmod(t, 2.0 * reverse_after_s);
-  return std::min(in_round_s, 2.0 * reverse_after_s - in_round_s);
+  const double in_period_s = std::fmod(t, 2.0 * reverse_after_s);
+  return std::min(in_period_s, 2.0 * reverse_after_s - in_period_s);
 }
 
 }  // namespace wrenchd

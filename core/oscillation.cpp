@@ -20,7 +20,7 @@ void OscillationDetector::update(const Wrench& F_B, const Twist& V_BH, double dt
   for (const Axis& axis : axes_) oscillates_ = oscillates_ || axis.half_cycles >= kMinHalfCycles;
 }
 
-/// A turning point is one from which the handle has come back by way_m: smaller wiggles are an encoder's.
+/// A reversal counts if the handle has come back by min_amplitude_m; smaller motion is encoder noise.
 void OscillationDetector::advance(Axis& axis, double step_m, double work_J, double dt_s,
                                   bool in_contact) const noexcept {
   axis.displacement_m += step_m;

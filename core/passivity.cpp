@@ -10,16 +10,16 @@
 namespace wrenchd {
 namespace {
 
-bool sensible(double x) noexcept {
+bool is_valid(double x) noexcept {
   return is_finite(x) && x >= 0.0;
 }
 
-double stated(double b) noexcept {
-  return sensible(b) ? b : 0.0;
+double stated_or_zero(double b) noexcept {
+  return is_valid(b) ? b : 0.0;
 }
 
-double share_of(double cap, double b) noexcept {
-  return b > 0.0 ? std::min(1.0, cap / b) : 0.0;
+double capped_ratio(double limit, double b) noexcept {
+  return b > 0.0 ? std::min(1.0, limit / b) : 0.0;
 }
 
 [[noreturn]] void refuse(const char* what) {
@@ -29,22 +29,23 @@ double share_of(double cap, double b) noexcept {
 }  // namespace
 
 PassivityGuard::PassivityGuard(const DeviceDamping& device, const PassivityLimits& caps)
-    : device_{stated(device.linear_N_s_per_m), stated(device.angular_Nm_s_per_rad)}, limits_(caps) {
-  if (!sensible(caps.damping_N_s_per_m) || !sensible(caps.damping_Nm_s_per_rad))
+    : device_{stated_or_zero(device.linear_N_s_per_m), stated_or_zero(device.angular_Nm_s_per_rad)},
+      limits_(caps) {
+  if (!is_valid(caps.damping_N_s_per_m) || !is_valid(caps.damping_Nm_s_per_rad))
     refuse("the caps on damping must be 0 or more");
-  if (!sensible(caps.scaling_start_J) || !sensible(caps.scaling_end_J) ||
+  if (!is_valid(caps.scaling_start_J) || !is_valid(caps.scaling_end_J) ||
       caps.scaling_start_J >= caps.scaling_end_J)
     refuse("unseen_J must be 0 or more and below most_J");
   if (caps.delay_ticks > kMaxDelay_ticks) refuse("the delay is too long for a hand; shorten it");
-  const double linear = share_of(caps.damping_N_s_per_m, device_.linear_N_s_per_m);
-  const double angular = share_of(caps.damping_Nm_s_per_rad, device_.angular_Nm_s_per_rad);
+  const double linear = capped_ratio(caps.damping_N_s_per_m, device_.linear_N_s_per_m);
+  const double angular = capped_ratio(caps.damping_Nm_s_per_rad, device_.angular_Nm_s_per_rad);
   max_alpha_ = device_.angular_Nm_s_per_rad > 0.0 && device_.linear_N_s_per_m > 0.0
                    ? std::min(linear, angular)
                    : std::max(linear, angular);
 }
 
 void PassivityGuard::reset() noexcept {
-  *this = PassivityGuard(device_, limits_);  // which were accepted once
+  *this = PassivityGuard(device_, limits_);  // accepted by the constructor before
 }
 
 Wrench PassivityGuard::limit(const Wrench& asked_B, const Pose& X_BH, double dt_s, bool in_contact) noexcept {
@@ -82,6 +83,8 @@ void PassivityGuard::record_sent(const Wrench& sent_B) noexcept {
   sent_[tick_ % kSentHistory] = is_finite(sent_B) ? sent_B : Wrench{};
 }
 
+// METHOD (84)
+//
 //   E <- E + F . dx + tau . dtheta - (b |v|^2 + b_rot |w|^2) dt
 void PassivityGuard::observe(const Motion& step) noexcept {
   Motion& oldest = motion_[++steps_ % kVelocityWindow];
@@ -97,7 +100,7 @@ void PassivityGuard::observe(const Motion& step) noexcept {
   check_energy_runaway(step.dt_s);
 }
 
-/// The mean of the wrenches that acted over the interval: as many ticks of them as it took for a new sample.
+/// Mean of the wrenches that acted since the previous sample, one per tick.
 Wrench PassivityGuard::acting_wrench() const noexcept {
   const std::size_t ticks = std::clamp<std::size_t>(ticks_since_sample_, 1, kSentHistory - kMaxDelay_ticks);
   Wrench sum;
@@ -105,25 +108,27 @@ Wrench PassivityGuard::acting_wrench() const noexcept {
     const std::uint64_t ago = limits_.delay_ticks + i;
     if (ago < kSentHistory && ago <= tick_) sum = sum + sent_[(tick_ - ago) % kSentHistory];
   }
-  const double share = 1.0 / static_cast<double>(ticks);
-  return {share * sum.force_N, share * sum.torque_Nm};
+  const double mean_factor = 1.0 / static_cast<double>(ticks);
+  return {mean_factor * sum.force_N, mean_factor * sum.torque_Nm};
 }
 
-/// The work of the wrenches that were sent and have not shown in a sample yet, at the speed of the last two.
+/// Work of the wrenches that were sent but have not acted in a sample yet, at the velocity of the last two
+/// samples, METHOD (85).
 double PassivityGuard::pending_work_J() const noexcept {
   const Motion& step = motion_[steps_ % kVelocityWindow];
   const Motion& before = motion_[(steps_ + kVelocityWindow - 1) % kVelocityWindow];
-  const double over_s = step.dt_s + before.dt_s;
-  if (!(over_s > 0.0)) return 0.0;
+  const double span_s = step.dt_s + before.dt_s;
+  if (!(span_s > 0.0)) return 0.0;
   const std::uint64_t ticks = std::min<std::uint64_t>(limits_.delay_ticks, tick_);
   Wrench sum;
   for (std::uint64_t i = 0; i < ticks; ++i) sum = sum + sent_[(tick_ - i) % kSentHistory];
-  // A sample comes about as often as a tick.
+  // Assumes one sample per tick.
   return 0.5 * (sum.force_N.dot(step.displacement_m + before.displacement_m) +
                 sum.torque_Nm.dot(step.rotation_rad + before.rotation_rad));
 }
 
-/// |way|^2 / time of the whole window is at most the integral of v^2 over it, by Cauchy and Schwarz.
+/// Energy that the device's friction dissipates. |displacement|^2 / time of the window is at most the
+/// integral of v^2 (Cauchy-Schwarz), so this never overestimates.
 double PassivityGuard::device_dissipation_J(double dt_s) const noexcept {
   if (!(window_motion_.dt_s > 0.0)) return 0.0;
   const double rate_W = (device_.linear_N_s_per_m * window_motion_.displacement_m.squaredNorm() +
@@ -132,17 +137,17 @@ double PassivityGuard::device_dissipation_J(double dt_s) const noexcept {
   return rate_W * dt_s;
 }
 
-/// Nothing is under way that could still push.
+/// True if all pending wrenches are zero.
 bool PassivityGuard::no_wrench_pending() const noexcept {
-  const std::uint64_t look = std::min<std::uint64_t>(limits_.delay_ticks + 1, tick_);
-  for (std::uint64_t i = 0; i < look; ++i) {
+  const std::uint64_t pending_ticks = std::min<std::uint64_t>(limits_.delay_ticks + 1, tick_);
+  for (std::uint64_t i = 0; i < pending_ticks; ++i) {
     const Wrench& F = sent_[(tick_ - i) % kSentHistory];
     if (!F.force_N.isZero(0.0) || !F.torque_Nm.isZero(0.0)) return false;
   }
   return true;
 }
 
-/// Holds E against the least it was within the last kRunawayWindow_s.
+/// Compares E with its minimum over the last kRunawayWindow_s.
 void PassivityGuard::check_energy_runaway(double dt_s) noexcept {
   min_injected_J_[slice_] = std::min(min_injected_J_[slice_], injected_J());
   slice_time_s_ += dt_s;
@@ -155,19 +160,21 @@ void PassivityGuard::check_energy_runaway(double dt_s) noexcept {
       injected_J() - *std::min_element(min_injected_J_.begin(), min_injected_J_.end()) > kRunawayEnergy_J;
 }
 
+// METHOD (87)
+//
 //   F_guard = -alpha (b v, b_rot w),   alpha = E / ((b |v|^2 + b_rot |w|^2) dt)
 Wrench PassivityGuard::damping_wrench(double dt_s) const noexcept {
   const Motion& step = motion_[steps_ % kVelocityWindow];
   const Motion& before = motion_[(steps_ + kVelocityWindow - 1) % kVelocityWindow];
-  const double over_s = step.dt_s + before.dt_s;  // two samples: half the noise of an encoder's steps
-  if (!(over_s > 0.0)) return {};
-  const Vector3d f = device_.linear_N_s_per_m * (step.displacement_m + before.displacement_m) / over_s;
-  const Vector3d t = device_.angular_Nm_s_per_rad * (step.rotation_rad + before.rotation_rad) / over_s;
-  const double takes_J =
+  const double span_s = step.dt_s + before.dt_s;  // two samples halve the quantization noise of the velocity
+  if (!(span_s > 0.0)) return {};
+  const Vector3d f = device_.linear_N_s_per_m * (step.displacement_m + before.displacement_m) / span_s;
+  const Vector3d t = device_.angular_Nm_s_per_rad * (step.rotation_rad + before.rotation_rad) / span_s;
+  const double dissipated_J =
       (f.dot(step.displacement_m + before.displacement_m) + t.dot(step.rotation_rad + before.rotation_rad)) /
-      over_s * (dt_s > 0.0 ? dt_s : step.dt_s);
-  if (!(takes_J > 0.0)) return {};
-  const double alpha = std::min(max_alpha_, predicted_net_J_ / takes_J);
+      span_s * (dt_s > 0.0 ? dt_s : step.dt_s);
+  if (!(dissipated_J > 0.0)) return {};
+  const double alpha = std::min(max_alpha_, predicted_net_J_ / dissipated_J);
   return {-alpha * f, -alpha * t};
 }
 

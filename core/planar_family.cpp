@@ -15,14 +15,14 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A rotation by theta, from x = tan(theta/2) of Eq. (24); infinite for half a turn. No angle is needed to
-/// compare energies, and none of these loses digits for a small one.
-struct Turn {
+/// A rotation by theta, given by x = tan(theta/2) of Eq. (24); x is infinite for half a turn. Energies are
+/// compared without angles, and no term loses digits for small angles.
+struct HalfAngleTangent {
   double x;
   double sine;        ///< sin(theta)
   double half_sine2;  ///< sin^2(theta/2)
 
-  explicit Turn(double tan_half) noexcept : x(tan_half) {
+  explicit HalfAngleTangent(double tan_half) noexcept : x(tan_half) {
     const bool less_than_quarter = std::abs(x) <= 1.0;
     const double t = less_than_quarter ? x : 1.0 / x;
     const double u = 1.0 / (1.0 + t * t);
@@ -31,14 +31,14 @@ struct Turn {
   }
 };
 
-/// Eq. (22) with phi = 0. There  beta - h = -vx sin(theta) - vy cos(theta) - h  by Eq. (20).
-double energy(const PlanarBody& s, const Turn& turn) noexcept {
+/// Eq. (22) with phi = 0; beta - h = -vx sin(theta) - vy cos(theta) - h by Eq. (20).
+double energy(const PlanarBody& s, const HalfAngleTangent& turn) noexcept {
   const double lift = 2.0 * s.vy * turn.half_sine2 - s.vx * turn.sine - (s.vy + s.h);
   return s.m * lift * lift + 4.0 * s.H * turn.half_sine2;
 }
 
-/// The angles of Eq. (21) as x = tan(theta/2), which rises with theta: from min up to max or, where half a
-/// turn lies between, from min up to infinity and from there to max.
+/// Range of angles of Eq. (21) as x = tan(theta/2), which increases with theta: from min to max, or, if the
+/// range contains half a turn, from min to infinity and from minus infinity to max.
 struct Range {
   double min = -kInfinity;
   double max = kInfinity;
@@ -49,15 +49,16 @@ struct Range {
   }
 };
 
-struct Least {
-  Turn turn;
+struct BestRotation {
+  HalfAngleTangent turn;
   double T;
 };
 
-/// Eqs. (31) and (32). Stationary angles solve the quartic (25) in x, with the coefficients (26)-(30) at phi
-/// = 0, where vy + h and vy - h factor out: a shallow contact has a small vy + h, which must keep its digits.
-/// Where A_1 vanishes a root has gone to x = infinity: half a turn, which is tried as well.
-Least least(const PlanarBody& s, const Range& range) noexcept {
+/// Eqs. (31) and (32). Stationary angles are the roots of the quartic Eq. (25) in x with the coefficients of
+/// Eqs. (26)-(30) at phi = 0, METHOD (51). vy + h and vy - h are factored out: for a shallow contact vy + h
+/// is small and must keep its digits. If A_1 is zero, one root is at x = infinity: half a turn, which is
+/// always tried.
+BestRotation best_rotation(const PlanarBody& s, const Range& range) noexcept {
   const double sum = s.vy + s.h;
   const double difference = s.vy - s.h;
   const double A1 = s.m * s.vx * difference;
@@ -66,9 +67,9 @@ Least least(const PlanarBody& s, const Range& range) noexcept {
   const double D1 = 2.0 * (s.H - s.m * (s.vy * sum - s.vx * s.vx));
   const double E1 = s.m * s.vx * sum;
 
-  Least best{Turn(0.0), kInfinity};
+  BestRotation best{HalfAngleTangent(0.0), kInfinity};
   const auto try_turn = [&](double x) noexcept {
-    const Turn turn(x);
+    const HalfAngleTangent turn(x);
     const double T = energy(s, turn);
     if (T < best.T) best = {turn, T};
   };
@@ -80,26 +81,26 @@ Least least(const PlanarBody& s, const Range& range) noexcept {
   return best;
 }
 
-PlanarMinimum minimum_at(const PlanarBody& s, const Least& best) noexcept {
+PlanarMinimum minimum_at(const PlanarBody& s, const BestRotation& best) noexcept {
   const auto& [x, sine, half_sine2] = best.turn;
   const double beta = -s.vx * sine - s.vy * (1.0 - 2.0 * half_sine2);  // Eq. (20)
   return {2.0 * std::atan(x), beta, best.T};                           // Eq. (24)
 }
 
-/// A direction in the section, x along e1 and y along the obstacle's normal; of any length.
+/// A direction in the section: x along e1, y along the obstacle normal; any length.
 struct Direction2 {
   double x;
   double y;
   double length() const noexcept { return std::sqrt(x * x + y * y); }
 };
 
-/// Between the directions a and b of its edges lies the body. Let alpha be the angle from the x-axis of the
-/// one from which a turn by less than pi leads through the body to the other, at angle alpha + gamma. Both
-/// stay above the obstacle for
+/// Range of angles, METHOD (52), from the directions a and b of the section's edges; the body lies between
+/// them. alpha is the angle of the first edge from the x-axis, alpha + gamma that of the second, 0 <= gamma <
+/// pi. Both edges stay above the obstacle for
 ///
 ///   -alpha <= theta <= pi - (alpha + gamma)
 ///
-/// which is Eq. (21) when alpha = 0.
+/// which is Eq. (21) for alpha = 0.
 Range range_of(Direction2 a, Direction2 b) noexcept {
   if (a.x * b.y < a.y * b.x) std::swap(a, b);
   const double tan_a = a.x >= 0.0 ? a.y / (a.length() + a.x) : (a.length() - a.x) / a.y;  // tan(alpha/2)
@@ -112,7 +113,7 @@ Range range_of(Direction2 a, Direction2 b) noexcept {
 PlanarMinimum minimise(const PlanarSection& s) noexcept {
   using std::numbers::pi;
   const Range range{std::tan(0.5 * s.theta_min), std::tan(0.5 * s.theta_max), s.theta_max > pi};
-  const Least best = least(s, range);
+  const BestRotation best = best_rotation(s, range);
   PlanarMinimum minimum = minimum_at(s, best);
   if (range.through_half_turn && best.turn.x <= range.max) minimum.theta += 2.0 * pi;
   minimum.theta = std::clamp(minimum.theta, s.theta_min, s.theta_max);
@@ -131,8 +132,8 @@ PlanarFamily::AtContact::AtContact(const PlanarFamily& family, const Pose& X_WP,
                                    const Contact& contact) noexcept
     : family_(family), ring_(family.body_.ring_of(contact.tool_feature)), apex_T_(contact.p_TCa_m) {
   const Vector3d& n = contact.n_W;
-  const Vector3d along = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
-  Z_W_ = (along - along.dot(n) * n).normalized();
+  const Vector3d reference = std::abs(n.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
+  Z_W_ = (reference - reference.dot(n) * n).normalized();
   X_W_ = n.cross(Z_W_);
   const Matrix3d R_PW = X_WP.rotation.conjugate().toRotationMatrix();
   X_T_ = R_PW * X_W_;
@@ -149,7 +150,8 @@ PlanarFamily::AtContact::AtContact(const PlanarFamily& family, const Pose& X_WP,
 }
 
 PlanarFamily::InPlane PlanarFamily::AtContact::solve(int k) const noexcept {
-  // The axis w_delta, (34) as sine and cosine, and e1 = n x w: the section's axes are (e1, n, w).
+  // METHOD (53): the axis w_delta of Eq. (34) by sine and cosine, and e1 = n x w. The section's axes are (e1,
+  // n, w).
   const auto [sine, cosine] = family_.directions_[static_cast<std::size_t>(k)];
   const Vector3d w_T = sine * X_T_ + cosine * Z_T_;
   const Vector3d e1_T = cosine * X_T_ - sine * Z_T_;
@@ -160,8 +162,9 @@ PlanarFamily::InPlane PlanarFamily::AtContact::solve(int k) const noexcept {
   section.vy = v_n_;
   section.h = h_;
 
-  // Algorithm 2 for any star of faces: the plane cuts them in two directions. A face edge in the plane is its
-  // own direction. Where the plane meets the body in the vertex only, nothing limits the angle.
+  // Paper, Algorithm 2, for any number of faces at the vertex: the plane cuts the faces in two directions. A
+  // face edge in the plane is such a direction. If the plane meets the body in the vertex only, the angle is
+  // not limited.
   const auto& vertices = family_.body_.vertices_T_m;
   std::array<Direction2, 2> cut;
   std::size_t cuts = 0;
@@ -172,15 +175,16 @@ PlanarFamily::InPlane PlanarFamily::AtContact::solve(int k) const noexcept {
     const Vector3d edge = vertices[ring_[i]] - apex_T_;
     const double d = w_T.dot(edge);
     if (d == 0.0) {
-      add(edge);  // lines 1-8: the plane passes through an edge
+      add(edge);  // paper, Algorithm 2, lines 1-8: the plane contains an edge
     } else if (d * d_previous < 0.0) {
-      add(std::abs(d_previous) * edge + std::abs(d) * previous);  // lines 10-15, but for the length
+      // paper, Algorithm 2, lines 10-15, without normalization
+      add(std::abs(d_previous) * edge + std::abs(d) * previous);
     }
     previous = edge;
     d_previous = d;
   }
   const Range range = cuts < 2 ? Range{} : range_of(cut[0], cut[1]);
-  return {minimum_at(section, least(section, range)), sine * X_W_ + cosine * Z_W_};
+  return {minimum_at(section, best_rotation(section, range)), sine * X_W_ + cosine * Z_W_};
 }
 
 Pose PlanarFamily::pose(const Pose& X_WP, const Contact& contact, const InPlane& solution) noexcept {

@@ -6,8 +6,8 @@
 namespace wrenchd {
 namespace {
 
-/// Below this angle [rad] the series of sin and cos quotients are exact to double precision: the first term
-/// left out is theta^4 / 120, which is 1e-18 here.
+/// Below this angle [rad] the series of the quotients of sin and cos are exact to double precision: the first
+/// omitted term, theta^4 / 120, is 1e-18.
 constexpr double kSmallAngle_rad = 1e-4;
 
 /// b = (1 - cos t)/t^2 and c = (t - sin t)/t^3 of the left Jacobian of SO(3).
@@ -52,8 +52,9 @@ Vector3d rotation_vector(const Quaterniond& R) noexcept {
   return n < 0.5 * kSmallAngle_rad ? Vector3d(2.0 * v * (1.0 + n * n / 6.0)) : Vector3d(v * (theta / n));
 }
 
-//   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2        (Murray, Li, Sastry, ref. [18] of the
-//   paper)
+// METHOD (2)
+//
+//   exp([v; w]) = [ exp(w^)  V v ],   V = I + b w^ + c w^^2
 Pose exp(const Vector6d& xi) noexcept {
   const Vector3d v = xi.head<3>();
   const Vector3d w = xi.tail<3>();
@@ -62,7 +63,9 @@ Pose exp(const Vector6d& xi) noexcept {
   return {rotation_from(w), v + b * wv + c * w.cross(wv)};
 }
 
-//   V^-1 = I - w^/2 + (1/t^2)(1 - a/(2 b)) w^^2,   a = sin t / t,  b as above
+// METHOD (3)
+//
+//   V^-1 = I - w^/2 + (1/t^2)(1 - a/(2 b)) w^^2,   a = sin t / t,  b = (1 - cos t)/t^2
 Vector6d log(const Pose& X) noexcept {
   const Vector3d w = rotation_vector(X.rotation);
   const double theta = w.norm();

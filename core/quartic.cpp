@@ -12,27 +12,26 @@
 namespace wrenchd {
 namespace {
 
-/// A root beyond 2^250 is at infinity: its fourth power would overflow.
-constexpr int kFarthest_log2 = 250;
-/// A value this small beside the sum of its terms is zero: the rounding of four multiplications and
-/// additions, and of coefficients that were rounded themselves.
+/// A root beyond 2^250 counts as infinite: its fourth power would overflow.
+constexpr int kMaxRoot_log2 = 250;
+/// A sum below this fraction of the sum of its absolute terms counts as zero: rounding of four
+/// multiplications and additions, and of the coefficients.
 constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
-/// The closed form is for coefficients whose ratios, and the powers of these that it takes, stay far from
-/// overflow and underflow.
-constexpr double kWidest = 0x1p100;
-/// rho in count_is_certain(): some hundred times what rounding leaves, that of the coefficients included.
-constexpr double kExact = 1e-13;
-/// s there, up to the factor of four: 4 sqrt(rho / 0.02) = 0.9e-5.
-constexpr double kApart = 1e-5;
+/// Range of coefficient ratios for the closed form. Their powers stay far from overflow and underflow.
+constexpr double kMaxRatio = 0x1p100;
+/// rho in count_is_certain(): about a hundred times the rounding error of the coefficients and the factors.
+constexpr double kMaxResidual = 1e-13;
+/// s in count_is_certain(), up to the factor of four: 4 sqrt(rho / 0.02) = 0.9e-5.
+constexpr double kMinSeparation = 1e-5;
 
 struct Polynomial {
-  std::array<double, 5> a{};  ///< highest power first
+  std::array<double, 5> a{};  ///< descending powers
   std::size_t degree = 0;
 
   struct At {
     double value;
     double slope;
-    double noise;  ///< what rounding may have added to the value
+    double noise;  ///< bound of the rounding error of the value
   };
   At at(double x) const noexcept {
     double value = a[0];
@@ -45,7 +44,7 @@ struct Polynomial {
     }
     return {value, slope, kRounding * terms};
   }
-  /// -1, 0 or 1; zero where rounding hides the sign.
+  /// Sign of the polynomial: -1 or 1; 0 if rounding hides it.
   int sign(double x) const noexcept {
     const At here = at(x);
     if (std::abs(here.value) <= here.noise) return 0;
@@ -59,7 +58,8 @@ struct Polynomial {
   }
 };
 
-/// Largest coefficient near 1 and leading coefficient not zero. Powers of two: nothing is rounded.
+/// Scales by a power of two, without rounding, so that the largest coefficient is near 1. Removes leading
+/// zeros.
 Polynomial normalised(std::array<double, 5> a) noexcept {
   const auto magnitude = [](double x, double y) { return std::abs(x) < std::abs(y); };
   const double largest = *std::max_element(a.begin(), a.end(), magnitude);
@@ -72,18 +72,19 @@ Polynomial normalised(std::array<double, 5> a) noexcept {
   return p;
 }
 
-/// All roots, of the derivatives too, lie between plus and minus this (Fujiwara:  2 max |a_k / a_0|^(1/k)).
+/// All roots of the polynomial and its derivatives are between minus and plus this bound (Fujiwara: 2 max
+/// |a_k / a_0|^(1/k)).
 double bound(const Polynomial& p) noexcept {
-  int log2 = -kFarthest_log2;
+  int log2 = -kMaxRoot_log2;
   for (std::size_t k = 1; k <= p.degree; ++k) {
     if (p.a[k] == 0.0) continue;
     const int ratio = std::ilogb(p.a[k]) + 1 - std::ilogb(p.a[0]);
     log2 = std::max(log2, static_cast<int>(std::ceil(ratio / static_cast<double>(k))) + 2);
   }
-  return std::scalbn(1.0, std::min(log2, kFarthest_log2));
+  return std::scalbn(1.0, std::min(log2, kMaxRoot_log2));
 }
 
-/// As many doubles lie below this number as above it, between a and b.
+/// The number that halves the set of doubles between a and b.
 double middle(double a, double b) noexcept {
   constexpr std::int64_t sign_bit = std::numeric_limits<std::int64_t>::min();
   const auto rank = [](double x) noexcept {
@@ -94,11 +95,11 @@ double middle(double a, double b) noexcept {
   return std::bit_cast<double>(mid < 0 ? sign_bit - mid : mid);
 }
 
-/// The root between two points where p has different signs and is monotone in between: Newton's method while
-/// each of its steps is at most half the one before, else bisection of the doubles that are left, which ends
-/// it after 64 of them whatever the scales.
+/// The root between two points of opposite sign; p is monotone between them. Newton's method while each step
+/// is at most half of the previous one; otherwise bisection of the set of doubles, at most 64 steps for any
+/// scale.
 double root_between(const Polynomial& p, double below, double above, bool rising) noexcept {
-  constexpr int kPatience = 40;  // quadratic convergence takes less than ten
+  constexpr int kMaxNewtonSteps = 40;  // quadratic convergence takes fewer than ten
   double x = 0.5 * (below + above);
   double last_step = above - below;
   for (int count = 0; below < x && x < above; ++count) {
@@ -107,23 +108,24 @@ double root_between(const Polynomial& p, double below, double above, bool rising
     ((value < 0.0) == rising ? below : above) = x;
     const double step = -value / slope;
     const double next = x + step;
-    if (std::abs(value) <= 0.25 * noise) return std::clamp(next, below, above);  // no more digits to be had
+    // rounding limits the accuracy
+    if (std::abs(value) <= 0.25 * noise) return std::clamp(next, below, above);
     const bool inside = below < next && next < above;
-    const bool converging = inside && std::abs(step) <= 0.5 * std::abs(last_step) && count < kPatience;
+    const bool converging = inside && std::abs(step) <= 0.5 * std::abs(last_step) && count < kMaxNewtonSteps;
     last_step = step;
     x = converging ? next : middle(below, above);
   }
   return x;
 }
 
-/// The roots of p, given those of its derivative in rising order: one in each piece between them at whose
-/// ends the signs differ, and each end that is a root itself.
-RealRoots roots_between(const Polynomial& p, const RealRoots& turning, double far) noexcept {
+/// The roots of p, given the roots of its derivative in ascending order: one between two neighbours if the
+/// signs of p differ there, and each neighbour that is a root itself.
+RealRoots roots_between(const Polynomial& p, const RealRoots& extrema, double bound_x) noexcept {
   RealRoots roots;
-  double below = -far;
+  double below = -bound_x;
   int sign_below = p.sign(below);
-  for (std::size_t i = 0; i <= turning.count; ++i) {
-    const double above = i < turning.count ? turning.x[i] : far;
+  for (std::size_t i = 0; i <= extrema.count; ++i) {
+    const double above = i < extrema.count ? extrema.x[i] : bound_x;
     const int sign_above = p.sign(above);
     if (sign_below * sign_above < 0) roots.x[roots.count++] = root_between(p, below, above, sign_below < 0);
     if (sign_above == 0) roots.x[roots.count++] = above;
@@ -145,20 +147,20 @@ struct Monic {
   double b, c, d, e;
 };
 
-/// What two quadratics are taken for: their product is the quartic.
+/// Two quadratics whose product approximates the quartic.
 struct Factors {
   Quadratic f;
   Quadratic g;
 };
 
-/// The largest real root of  t^3 = 3 p t + 2 q; NaN where p and q are zero.
+/// The largest real root of t^3 = 3 p t + 2 q; NaN if p and q are zero.
 ///
-/// With D = q^2 - p^3 > 0 it is the only one (Cardano):  t = w + p/w,  w^3 = q +- sqrt(D), taken with the
-/// sign of q. Where p < 0 the two cancel, and
+/// For D = q^2 - p^3 > 0 it is the only real root (Cardano): t = w + p/w, w^3 = q +- sqrt(D), with the sign
+/// of q. For p < 0 the two terms cancel; this form does not:
 ///
 ///   w - |p|/w = 2 |q| / (w^2 + |p| + p^2/w^2)
 ///
-/// does not. Else (Vieta)  t = 2 sqrt(p) cos(acos(k)/3),  k = q / p^(3/2).
+/// Otherwise (Vieta) t = 2 sqrt(p) cos(acos(k)/3), k = q / p^(3/2).
 double largest_root(double p, double q) noexcept {
   const double D = q * q - p * p * p;
   if (D > 0.0) {
@@ -176,8 +178,7 @@ struct Around {
   double plus;
 };
 
-/// middle - half and middle + half, whose product is given: the smaller of the two is a quotient, not a
-/// difference.
+/// middle - half and middle + half for a given product: the smaller one is a quotient and loses no digits.
 Around around(double middle, double half, double product) noexcept {
   Around out{middle - half, middle + half};
   double& larger = middle * half >= 0.0 ? out.plus : out.minus;
@@ -186,22 +187,20 @@ Around around(double middle, double half, double product) noexcept {
   return out;
 }
 
-// Ferrari (ref. [24] of the paper). For every y
+// Ferrari's factors, METHOD (54). For every y
 //
 //   x^4 + b x^3 + c x^2 + d x + e = (x^2 + b/2 x + y/2)^2
 //                                   - [(b^2/4 - c + y) x^2 + (b y/2 - d) x + (y^2/4 - e)]
 //
-// and the bracket is a square (R x + S)^2,  R^2 = b^2/4 - c + y,  S^2 = y^2/4 - e,  2 R S = b y/2 - d,  where
-// its discriminant vanishes, which is the resolvent cubic
+// The bracket is a square (R x + S)^2, R^2 = b^2/4 - c + y, S^2 = y^2/4 - e, 2 R S = b y/2 - d, if y solves
+// the resolvent cubic
 //
 //   y^3 - c y^2 + (b d - 4 e) y + (4 c - b^2) e - d^2 = 0,      t = y - c/3,   t^3 = 3 p t + 2 q,
 //   p = (c^2 - 3 b d + 12 e) / 9,   q = (2 c^3 - 9 b c d + 27 d^2 + 27 b^2 e - 72 c e) / 54.
 //
-// A difference of squares is a product:  (x^2 + (b/2 - R) x + y/2 - S) (x^2 + (b/2 + R) x + y/2 + S),
-// where the product of the two b is c - y and that of the two c is e.
-//
-// The largest real y is the one for which R^2 >= 0 is certain. Of R and S one may vanish (R for a biquadratic
-// with e < 0): the one further from zero is taken by its root, the other follows.
+// The factors are (x^2 + (b/2 - R) x + y/2 - S) (x^2 + (b/2 + R) x + y/2 + S). The product of their b is c -
+// y, that of their c is e. For the largest real y, R^2 >= 0 is certain. R or S may be zero: the larger one is
+// computed by its root, the other from 2 R S.
 Factors ferrari(const Monic& a) noexcept {
   const auto [b, c, d, e] = a;
   const double p = (c * c - 3.0 * b * d + 12.0 * e) / 9.0;
@@ -220,7 +219,7 @@ Factors ferrari(const Monic& a) noexcept {
   return {{b_f, c_f}, {b_g, c_g}};
 }
 
-/// The same for  x (x^3 + b x^2 + c x + d): one root r of the cubic goes with the zero.
+/// Factors of x (x^3 + b x^2 + c x + d): the real root r of the cubic and zero form one factor (Cardano).
 Factors cardano(const Monic& a) noexcept {
   const auto [b, c, d, zero] = a;
   const double p = (b * b - 3.0 * c) / 9.0;
@@ -229,23 +228,23 @@ Factors cardano(const Monic& a) noexcept {
   return {{-r, zero}, {b + r, c + r * (b + r)}};
 }
 
-/// What the product lacks: the quartic minus f g, whose x^4 is gone.
+/// The quartic minus the product f g; its x^4 term is zero.
 Monic residual(const Monic& a, const Factors& by) noexcept {
   const auto& [f, g] = by;
   return {a.b - (f.b + g.b), a.c - (f.c + g.c + f.b * g.b), a.d - (f.b * g.c + g.b * f.c), a.e - f.c * g.c};
 }
 
-/// prod (z_i - z_j) over the roots z_i of f and z_j of g, with no more rounding than their sizes ask for.
+/// Resultant: prod (z_i - z_j) over the roots z_i of f and z_j of g, in a form with little rounding.
 double resultant(const Quadratic& f, const Quadratic& g) noexcept {
   const double v = f.c - g.c;
   return v * v + (f.b - g.b) * (f.b * g.c - g.b * f.c);
 }
 
-/// Newton's method for f, which leads the residual r to zero together with the same step for g:
+/// One Newton step for f that, together with the same step for g, reduces the residual r to zero (Bairstow):
 ///
-///   g df + f dg = r    so    (u x + v) df = r  modulo f,    u x + v = g - f = g modulo f,
+///   g df + f dg = r    so    (u x + v) df = r  modulo f,    u x + v = g - f = g modulo f
 ///
-/// two equations for df = db x + dc, whose determinant is the resultant of f and g (Bairstow).
+/// These are two equations for df = db x + dc; their determinant is the resultant of f and g.
 Quadratic corrected(const Quadratic& f, const Quadratic& g, const Monic& r) noexcept {
   const double u = g.b - f.b;
   const double v = g.c - f.c;
@@ -255,18 +254,19 @@ Quadratic corrected(const Quadratic& f, const Quadratic& g, const Monic& r) noex
   return {f.b + (v * r1 - u * r0) / determinant, f.c + ((v - f.b * u) * r0 + f.c * u * r1) / determinant};
 }
 
-/// Are there as many real roots as the factors have? Let z_j be the four roots of f g, and
+/// True if the quartic has as many real roots as the factors, METHOD (55). z_j: the four roots of f g; r: the
+/// residual;
 ///
-///   |r(x)| <= rho m(x),   m(x) = prod_j (|x| + |z_j|),    s_ij = |z_i - z_j| / (|z_i| + |z_j|) <= 1,
+///   |r(x)| <= rho m(x),   m(x) = prod_j (|x| + |z_j|),    s_ij = |z_i - z_j| / (|z_i| + |z_j|) <= 1
 ///
-/// where r is the residual, and let s be the product of all six s_ij, so s <= each. On the circle of radius
-/// s/4 |z_j| about z_j,  |f g| >= s/9 (0.6)^3 s m > 0.02 s^2 m. So if  rho < 0.02 s^2,  Rouche's theorem
-/// leaves just one root of the quartic in each circle. They do not meet each other; those about a complex z_j
-/// do not meet the real line, and in one about a real z_j the root is real, or its conjugate were there too.
+/// s: product of all six s_ij. On the circle of radius s/4 |z_j| about z_j, |f g| >= s/9 (0.6)^3 s m > 0.02
+/// s^2 m. If rho < 0.02 s^2, Rouche's theorem gives exactly one root of the quartic in each circle. The
+/// circles are disjoint. The circle of a complex z_j does not reach the real axis; in that of a real z_j the
+/// root is real.
 ///
-/// Per factor, with the root w of |discriminant|,  n = max(|b|, w) <= |z_1| + |z_2| <= sqrt(2) n  and
-/// s_12 >= w / (sqrt(2) n);  the product of the other four s_ij is the resultant over that of (|z_i| +
-/// |z_j|). What sqrt(2) may take, at most a factor of four in s, is in the number asked for.
+/// Per factor, with w the root of |discriminant|: n = max(|b|, w) <= |z_1| + |z_2| <= sqrt(2) n and s_12 >= w
+/// / (sqrt(2) n). The product of the other four s_ij is the resultant divided by that of (|z_i| + |z_j|).
+/// kMinSeparation includes the factors sqrt(2), at most four in s.
 bool count_is_certain(const Factors& by, const Monic& r) noexcept {
   const auto& [f, g] = by;
   const double w_f = std::sqrt(std::abs(f.discriminant()));
@@ -276,14 +276,16 @@ bool count_is_certain(const Factors& by, const Monic& r) noexcept {
   const double c_f = std::abs(f.c);
   const double c_g = std::abs(g.c);
   const double crossed = n_f * c_g + n_g * c_f;
-  if (!(std::abs(r.b) <= kExact * (n_f + n_g) && std::abs(r.c) <= kExact * (c_f + c_g + n_f * n_g) &&
-        std::abs(r.d) <= kExact * crossed && std::abs(r.e) <= kExact * (c_f * c_g)))
+  if (!(std::abs(r.b) <= kMaxResidual * (n_f + n_g) &&
+        std::abs(r.c) <= kMaxResidual * (c_f + c_g + n_f * n_g) && std::abs(r.d) <= kMaxResidual * crossed &&
+        std::abs(r.e) <= kMaxResidual * (c_f * c_g)))
     return false;
   const double largest = (c_f - c_g) * (c_f - c_g) + (n_f + n_g) * crossed;
-  return w_f * w_g * std::abs(resultant(f, g)) >= kApart * (n_f * n_g * largest);
+  return w_f * w_g * std::abs(resultant(f, g)) >= kMinSeparation * (n_f * n_g * largest);
 }
 
-/// A root of the quartic from one nearly so, by Newton's method. NaN where it is none, to rounding.
+/// Improves an approximate root of the quartic by Newton's method. NaN if the result is no root up to
+/// rounding.
 double polished(const Monic& a, double x) noexcept {
   struct At {
     double value;
@@ -302,12 +304,12 @@ double polished(const Monic& a, double x) noexcept {
   return x - after.value / after.slope;
 }
 
-/// The factors, where they vouch for the number of real roots. Not all of a is zero.
+/// The factors if their number of real roots is certain, otherwise nothing. Precondition: a is not zero.
 std::optional<Factors> factors_of(const Monic& a) noexcept {
-  constexpr int kCorrections = 2;  // seldom needed; a third would seldom help
+  constexpr int kCorrections = 2;  // rarely needed; a third does not help
   if (a.d == 0.0 && a.e == 0.0) {
     const Factors by{{0.0, 0.0}, {a.b, a.c}};
-    const bool certain = std::abs(by.g.discriminant()) >= kApart * (a.b * a.b + std::abs(a.c));
+    const bool certain = std::abs(by.g.discriminant()) >= kMinSeparation * (a.b * a.b + std::abs(a.c));
     return certain ? std::optional(by) : std::nullopt;
   }
   Factors by = a.e == 0.0 ? cardano(a) : ferrari(a);
@@ -319,14 +321,14 @@ std::optional<Factors> factors_of(const Monic& a) noexcept {
   return std::nullopt;
 }
 
-/// Keeps the order that rises.
+/// Inserts x and keeps the ascending order.
 void insert(double x, RealRoots& roots) noexcept {
   std::size_t i = roots.count++;
   for (; i > 0 && roots.x[i - 1] > x; --i) roots.x[i] = roots.x[i - 1];
   roots.x[i] = x;
 }
 
-/// Adds the real roots of f but zero, as roots of a. False where one is none.
+/// Adds the real non-zero roots of f as roots of a. Returns false if one is no root of a.
 bool add_roots(const Monic& a, const Quadratic& f, RealRoots& roots) noexcept {
   const double discriminant = f.discriminant();
   if (discriminant < 0.0) return true;
@@ -341,9 +343,8 @@ bool add_roots(const Monic& a, const Quadratic& f, RealRoots& roots) noexcept {
   return true;
 }
 
-/// All real roots in closed form, or nothing where that cannot vouch for their number and digits. Leading
-/// zeros are shifted out, which multiplies by x: zero is a root of the polynomial asked for only if E is
-/// zero.
+/// All real roots in closed form; nothing if their number or accuracy is not certain. Removes leading zeros
+/// by shifting, which multiplies by x: zero is a root only if E is zero.
 std::optional<RealRoots> closed_form(double A, double B, double C, double D, double E) noexcept {
   RealRoots roots;
   if (E == 0.0) roots.count = 1;
@@ -356,7 +357,7 @@ std::optional<RealRoots> closed_form(double A, double B, double C, double D, dou
   }
   const double last = E != 0.0 ? E : D != 0.0 ? D : C != 0.0 ? C : B;
   const Monic a{B / A, C / A, D / A, E / A};
-  const auto within = [](double x) noexcept { return std::abs(x) <= kWidest; };
+  const auto within = [](double x) noexcept { return std::abs(x) <= kMaxRatio; };
   if (!(within(a.b) && within(a.c) && within(a.d) && within(a.e) && within(A / last))) return std::nullopt;
   const auto by = factors_of(a);
   if (!by || !add_roots(a, by->f, roots) || !add_roots(a, by->g, roots)) return std::nullopt;
@@ -365,17 +366,17 @@ std::optional<RealRoots> closed_form(double A, double B, double C, double D, dou
 
 }  // namespace
 
-// Between two neighbouring roots of its derivative a polynomial is monotone and has one root or none. So the
-// roots of the third derivative lead to those of the second, and so on up.
+// Between neighbouring roots of its derivative a polynomial is monotone and has at most one root. The roots
+// of the third derivative give those of the second, and so on.
 RealRoots real_roots_by_bracketing(double A, double B, double C, double D, double E) noexcept {
   const Polynomial p = normalised({A, B, C, D, E});
   if (p.degree == 0) return {};
   std::array<Polynomial, 5> by_degree;
   by_degree[p.degree] = p;
   for (std::size_t k = p.degree; k > 1; --k) by_degree[k - 1] = by_degree[k].derivative();
-  const double far = bound(p);
+  const double bound_x = bound(p);
   RealRoots roots;
-  for (std::size_t k = 1; k <= p.degree; ++k) roots = roots_between(by_degree[k], roots, far);
+  for (std::size_t k = 1; k <= p.degree; ++k) roots = roots_between(by_degree[k], roots, bound_x);
   return roots;
 }
 

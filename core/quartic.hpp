@@ -6,7 +6,7 @@
 
 namespace wrenchd {
 
-/// Real roots of a polynomial of degree four or less, at most four of them.
+/// Real roots of a polynomial of degree four or less: at most four.
 struct RealRoots {
   std::array<double, 4> x{};
   std::size_t count = 0;
@@ -15,15 +15,14 @@ struct RealRoots {
   const double* end() const noexcept { return x.data() + count; }
 };
 
-/// Real roots of  A x^4 + B x^3 + C x^2 + D x + E = 0  (Eq. 25), in rising order, whatever the scales of the
-/// coefficients: each satisfies the equation to rounding, and none that stands apart from the others is
-/// missed. A multiple root comes once, or as often as rounding has split it. Any leading coefficients may
-/// vanish: what is left is solved as a cubic, quadratic or line. The zero polynomial has no roots here.
-/// Coefficients must be finite. RT safe.
+/// Real roots of A x^4 + B x^3 + C x^2 + D x + E = 0, Eq. (25), in ascending order (core/METHOD.md, section
+/// 7.2). Each root satisfies the equation up to rounding, for any scale of the coefficients; no separated
+/// root is missing. A multiple root appears once, or as often as rounding splits it. Leading coefficients may
+/// be zero. The zero polynomial returns no roots. Precondition: finite coefficients. RT-safe.
 RealRoots real_roots(double A, double B, double C, double D, double E) noexcept;
 
-/// The same by a search that works whatever the polynomial, at seven times the price: what real_roots() falls
-/// back on where the closed form cannot vouch for its answer, and what tests hold it against. RT safe.
+/// The same roots by a bracketing search, which works for every polynomial and takes about seven times as
+/// long. real_roots() uses it if the closed form is not certain; tests compare both. RT-safe.
 RealRoots real_roots_by_bracketing(double A, double B, double C, double D, double E) noexcept;
 
 }  // namespace wrenchd

@@ -13,38 +13,39 @@
 
 namespace wrenchd {
 
-/// The virtual body in the hand. M is the frame the mesh file is written in.
+/// The tool: the virtual body that the user moves. M: frame of the mesh file.
 struct ToolSettings {
-  std::filesystem::path mesh;  ///< OFF, OBJ, STL or PLY; relative paths are relative to the scene file
+  std::filesystem::path mesh;  ///< OFF, OBJ, STL or PLY file; a relative path is relative to the scene file
   double scale = 1.0;          ///< metres per mesh unit
-  double mass_kg = 1.0;        ///< of the uniform solid; scales T, moves no minimiser
+  double mass_kg = 1.0;        ///< mass of the uniform solid; it scales T and moves no minimizer
   std::optional<GeneratedMesh> generated =
-      {};  ///< then it is made, and `mesh` is name_of() it instead of a file
+      {};  ///< mesh that wrenchd generates; then `mesh` is its generated_mesh_name() instead of a file
 };
 
-/// Solid where normal_W . x < offset_m.
+/// Solid half-space normal_W . x < offset_m.
 struct HalfSpaceSettings {
   std::string name;
-  Vector3d normal_W = Vector3d::UnitZ();  ///< unit, points out of the solid
+  Vector3d normal_W = Vector3d::UnitZ();  ///< unit normal, points out of the solid
   double offset_m = 0.0;
 };
 
-/// A body of any shape, that stands still or moves. M is the frame its mesh file is written in.
+/// An obstacle with a mesh, at rest or moving. M: frame of the mesh file.
 struct MeshObstacleSettings {
   std::string name;
   std::filesystem::path mesh;
   double scale = 1.0;  ///< metres per mesh unit
-  Pose X_WM;           ///< at scene time 0
-  /// A surface may be open or cut through itself. It has no inside: nothing pushes a tool out that starts
-  /// beyond it, or that it goes through.
+  Pose X_WM;           ///< pose at scene time 0
+  /// A solid must be closed. A surface may be open or intersect itself; it has no inside, so it does not push
+  /// out a tool that starts behind it or passes through it.
   BodyKind kind = BodyKind::solid;
-  ObstacleMotion motion = {};  ///< of M; turns are about M's origin
+  ObstacleMotion motion = {};  ///< motion of M; rotation is about the origin of M
   std::optional<ScheduledMotion> scheduled = {};
-  std::optional<GeneratedMesh> generated = {};  ///< as for the tool
+  /// mesh that wrenchd generates; then `mesh` is its generated_mesh_name() instead of a file
+  std::optional<GeneratedMesh> generated = {};
 };
 
 struct SceneSettings {
-  std::filesystem::path file;  ///< where it was read from, for messages
+  std::filesystem::path file;  ///< source file, for messages
   ToolSettings tool;
   std::vector<HalfSpaceSettings> half_spaces;
   std::vector<MeshObstacleSettings> meshes;

@@ -10,58 +10,59 @@
 
 namespace wrenchd {
 
-/// One thing that goes wrong with a simulated device, for a while. devices/README.md tells what each does.
+/// A temporary fault of a simulated device; devices/README.md describes each kind.
 struct SimulatedFault {
   enum class Kind : std::uint8_t {
-    // The wire
-    unplug,           ///< the device is gone; the link stays gone until it is opened again
-    silence,          ///< no reports
-    freeze,           ///< the last report again and again, sequence and all
-    repeat,           ///< each report twice
-    swap,             ///< each report after the one that follows it
-    drop_reports,     ///< one report in `value` does not arrive (3)
-    delay_reports,    ///< reports arrive `value` seconds later (0.01)
-    corrupt,          ///< one bit of each report is wrong, so a checksum is too
-    short_report,     ///< half of each report
-    long_report,      ///< one byte too many
-    wrong_id,         ///< the first byte is another
-    refuse_commands,  ///< no room for commands
-    drop_commands,    ///< commands are taken, and do not arrive
-    stall,            ///< a read does not come back before the fault is over
-    // What the device says
-    bad_quaternion,  ///< orientation of half the length
-    jump,            ///< position `value` metres off along x (0.1)
-    drift,           ///< position runs along x at `value` m/s, to and fro (3)
-    vibrate,         ///< position swings along z by `value` metres at 80 Hz (0.001)
-    freeze_pose,     ///< position and orientation stay as they were; the twist goes on
-    press_button,    ///< button number `value` is pressed (0)
-    // What the firmware does
-    trip_watchdog,     ///< its watchdog trips, at once
-    disable_watchdog,  ///< its watchdog never trips
-    motors_off,        ///< the motors are off, and it says so
+    // Link
+    unplug,           ///< the device is gone; the link stays closed until it is opened again
+    silence,          ///< no reports arrive
+    freeze,           ///< the last report arrives again and again, with the same sequence number
+    repeat,           ///< each report arrives twice
+    swap,             ///< each report arrives after its successor
+    drop_reports,     ///< one of `value` reports does not arrive (default 3)
+    delay_reports,    ///< reports arrive `value` seconds late (default 0.01)
+    corrupt,          ///< one bit of each report is inverted, so its checksum is wrong
+    short_report,     ///< reports arrive with half of their length
+    long_report,      ///< reports arrive with one extra byte
+    wrong_id,         ///< the first byte of each report is wrong
+    refuse_commands,  ///< the link accepts no commands
+    drop_commands,    ///< the link accepts commands and drops them
+    stall,            ///< a read blocks until the fault ends
+    // Content of the reports
+    bad_quaternion,  ///< the norm of the orientation is 0.5
+    jump,            ///< the position jumps by `value` metres along x (default 0.1)
+    drift,           ///< the position moves back and forth along x at `value` m/s (default 3)
+    vibrate,         ///< the position oscillates along z with `value` metres at 80 Hz (default 0.001)
+    freeze_pose,     ///< position and orientation are constant; the twist continues
+    press_button,    ///< button number `value` is pressed (default 0)
+    // Firmware
+    trip_watchdog,     ///< the watchdog trips at the start of the fault
+    disable_watchdog,  ///< the watchdog never trips
+    motors_off,        ///< the motors are off, and the report states it
   };
   Kind kind = Kind::silence;
-  Duration start{};  ///< since power-on
+  Duration start{};  ///< start time since power-on
   Duration duration{};
-  double value = 0.0;  ///< how much of it; 0: as much as stands in brackets above
+  double value = 0.0;  ///< size of the fault; 0 selects the default of the kind
 };
 
-/// Whether it happens on the wire, whatever the device: the others only the simulated device can have.
+/// True if the fault acts on the link. Such faults apply to any device; the others only to the simulated
+/// device.
 constexpr bool affects_link(SimulatedFault::Kind kind) noexcept {
   return kind <= SimulatedFault::Kind::stall;
 }
 
-/// Something that is asked of the loop at a time.
+/// A request to the servo loop at a given time.
 struct TimedCommand {
-  Duration at{};  ///< since the start of the run
+  Duration at{};  ///< time since the start of the run
   CommandSet commands = kNoCommand;
 };
 
-/// What a file says shall happen to a simulated device, and to the loop that drives it.
+/// Script of a loopback run: faults of the simulated device and requests to the servo loop.
 struct LoopbackScript {
   std::filesystem::path file;
   std::vector<SimulatedFault> faults;
-  std::vector<TimedCommand> commands;  ///< by time
+  std::vector<TimedCommand> commands;  ///< in ascending time
 };
 
 }  // namespace wrenchd

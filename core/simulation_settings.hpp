@@ -9,26 +9,26 @@
 
 namespace wrenchd {
 
-/// One point of the simulated hand's path: where the hand wants the handle, in the device base.
+/// One point of the simulated hand's path: the goal of the handle in the device base.
 struct Waypoint {
   double time_s = 0.0;
   Vector3d position_m = Vector3d::Zero();
   Vector3d rotation_vector_rad = Vector3d::Zero();  ///< axis times angle
 };
 
-/// Where something was, or shall be, at a time.
+/// A pose with its time.
 struct TimedPose {
   double time_s = 0.0;
   Pose X;
 };
 
-/// What a played-back path is to the simulated hand.
+/// How the simulated hand follows a recorded path.
 enum class PlaybackMode : std::uint8_t {
-  open,    ///< the handle is exactly there, whatever the device pushes with
-  closed,  ///< the hand wants the handle there, as with a hand script
+  open,    ///< the handle is exactly on the path; wrenches have no effect
+  closed,  ///< the path is the goal of the hand, as in a hand script
 };
 
-/// The body of the simulated device, and the hand that holds it.
+/// Dynamics of the simulated device and of the hand that holds it.
 struct SimulationSettings {
   double handle_mass_kg = 0.15;
   double handle_inertia_kg_m2 = 2.0e-4;  ///< isotropic, about the handle point
@@ -38,20 +38,22 @@ struct SimulationSettings {
   double coulomb_friction_Nm = 0.0;
   double position_quantum_m = 1.0e-5;  ///< encoder step
   double rotation_quantum_rad = 1.0e-4;
-  double actuator_max_force_N = 12.0;  ///< what the motors can do, whatever they are told
+  double actuator_max_force_N = 12.0;  ///< clamp of the motors on any command
   double actuator_max_torque_Nm = 0.6;
-  double report_delay_s = 0.0002;   ///< from sampling to the host
-  double command_delay_s = 0.0002;  ///< from the host to the motors
+  double report_delay_s = 0.0002;   ///< delay from the sample to its arrival at the host
+  double command_delay_s = 0.0002;  ///< delay from the host to the motors
   double hand_stiffness_N_per_m = 300.0;
   double hand_stiffness_Nm_per_rad = 2.0;
   double hand_damping_N_s_per_m = 6.0;
   double hand_damping_Nm_s_per_rad = 0.03;
-  bool hand_repeats = true;  ///< the path starts again after its last waypoint
-  std::filesystem::path hand_script = "hands/press_and_rock.toml";  ///< looked up along the search path
-  std::vector<Waypoint> hand_path;  ///< read from hand_script; at least one; times strictly rising from 0
-  std::filesystem::path playback;   ///< recording, or CSV of poses; empty: the hand script
+  bool hand_repeats = true;  ///< true: the path restarts after its last waypoint
+  /// file name, searched along the search path
+  std::filesystem::path hand_script = "hands/press_and_rock.toml";
+  /// path from hand_script: at least one point, times strictly ascending from 0
+  std::vector<Waypoint> hand_path;
+  std::filesystem::path playback;  ///< recording or CSV file of poses; empty: the hand follows hand_script
   PlaybackMode playback_mode = PlaybackMode::closed;
-  std::vector<TimedPose> playback_path;  ///< read from playback: X_BH, times strictly rising from 0
+  std::vector<TimedPose> playback_path;  ///< path from `playback`: X_BH, times strictly ascending from 0
 };
 
 }  // namespace wrenchd

@@ -5,14 +5,14 @@
 
 namespace wrenchd {
 
-/// Velocity of a body: linear velocity of a named point, and angular velocity, in named axes.
-/// V_WB reads: twist of B's origin relative to W, expressed in W.
+/// Velocity of a body: linear velocity of a given point and angular velocity, in given axes. V_WB: twist of
+/// B's origin relative to W, expressed in W.
 struct Twist {
   Vector3d linear_m_per_s = Vector3d::Zero();
   Vector3d angular_rad_per_s = Vector3d::Zero();
 };
 
-/// Force and torque about a named point, in named axes.
+/// Force and torque about a given point, in given axes.
 struct Wrench {
   Vector3d force_N = Vector3d::Zero();
   Vector3d torque_Nm = Vector3d::Zero();
@@ -28,20 +28,21 @@ inline Wrench operator*(double s, const Wrench& F) noexcept {
   return {s * F.force_N, s * F.torque_Nm};
 }
 
-/// The same wrench about another point. p_old_new: from the old point to the new one, in the wrench's axes
-/// [m].
+/// The wrench about another point, METHOD (5). p_old_new: vector from the old point to the new point, in the
+/// wrench's axes [m]. RT-safe.
 ///
 ///   tau_new = tau_old - p_old_new x f
 inline Wrench shifted(const Wrench& F, const Vector3d& p_old_new) noexcept {
   return {F.force_N, F.torque_Nm - p_old_new.cross(F.force_N)};
 }
 
-/// The same wrench in other axes: R_AB turns axes of B into axes of A.
+/// The wrench in other axes. R_AB rotates axes of B to axes of A. RT-safe.
 inline Wrench expressed(const Quaterniond& R_AB, const Wrench& F_B) noexcept {
   return {R_AB * F_B.force_N, R_AB * F_B.torque_Nm};
 }
 
-/// The same twist of another point of the body. p_old_new in the twist's axes [m].
+/// The twist of another point of the body, METHOD (5). p_old_new: vector from the old point to the new point,
+/// in the twist's axes [m]. RT-safe.
 inline Twist shifted(const Twist& V, const Vector3d& p_old_new) noexcept {
   return {V.linear_m_per_s + V.angular_rad_per_s.cross(p_old_new), V.angular_rad_per_s};
 }

@@ -14,7 +14,8 @@
 namespace wrenchd {
 namespace {
 
-/// Rounding of an eigenvalue, as a share of the largest: below it a matrix does not pull apart.
+/// Rounding error of an eigenvalue relative to the largest one. A larger negative eigenvalue is
+/// rejected.
 constexpr double kRounding = 1e-9;
 
 [[noreturn]] void refuse(const std::string& what) {
@@ -50,7 +51,7 @@ void check(const DeviceDamping& device, const LoopDelay& loop, const Coupling& c
   }
 }
 
-/// The rows and columns of what is driven; elsewhere 0.
+/// Sets all rows and columns of degrees of freedom that are not driven to 0.
 Matrix6d driven_block(Matrix6d K, DofMask driven) noexcept {
   for (int i = 0; i < 6; ++i)
     if ((driven >> i & 1) == 0) {
@@ -67,9 +68,9 @@ Vector6d diagonal(const DeviceDamping& device, DofMask driven) noexcept {
   return b;
 }
 
-/// The largest s with s L <= B, for B diagonal and L without negative eigenvalues: one over the largest
-/// eigenvalue of B^-1/2 L B^-1/2. Infinite where L is 0. Where B has a zero, L must not be there.
-double largest_share(const Matrix6d& L, const Vector6d& B) {
+/// The largest s with s L <= B for a diagonal B and a positive semidefinite L: one over the
+/// largest eigenvalue of B^-1/2 L B^-1/2. Infinite if L is 0. 0 if B has a zero where L is positive.
+double largest_scale(const Matrix6d& L, const Vector6d& B) {
   Vector6d root = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
     if (B[i] > 0.0)
@@ -83,24 +84,24 @@ double largest_share(const Matrix6d& L, const Vector6d& B) {
   return most > 0.0 ? 1.0 / most : std::numeric_limits<double>::infinity();
 }
 
-/// The largest k with k L + D <= B, by halving: k L + D is what largest_share() is asked about.
-double largest_beside(const Matrix6d& L, const Matrix6d& D, const Vector6d& B) {
-  if (largest_share(D, B) < 1.0) return 0.0;
-  double most = largest_share(L, B);
+/// The largest k with k L + D <= B, by bisection with largest_scale().
+double largest_beside_damper(const Matrix6d& L, const Matrix6d& D, const Vector6d& B) {
+  if (largest_scale(D, B) < 1.0) return 0.0;
+  double most = largest_scale(L, B);
   if (!(most < std::numeric_limits<double>::infinity()) || D.isZero(0.0)) return most;
   double least = 0.0;
   for (int i = 0; i < 60; ++i) {
     const double k = 0.5 * (least + most);
-    (largest_share(k * L + D, B) >= 1.0 ? least : most) = k;
+    (largest_scale(k * L + D, B) >= 1.0 ? least : most) = k;
   }
   return least;
 }
 
-/// The largest s with s S K S <= 4 kMaxEnergyPerEncoderStep_J I.
+/// The largest s with s S K S <= 4 kMaxEnergyPerEncoderStep_J I, METHOD (82).
 double largest_by_steps(const Matrix6d& K, const EncoderStep& step) {
   Vector6d S;
   S << Vector3d::Constant(step.linear_m), Vector3d::Constant(step.angular_rad);
-  return largest_share(S.asDiagonal() * K * S.asDiagonal(),
+  return largest_scale(S.asDiagonal() * K * S.asDiagonal(),
                        Vector6d::Constant(4.0 * kMaxEnergyPerEncoderStep_J));
 }
 
@@ -113,34 +114,38 @@ Matrix6d energy_stiffness(const Inertia& M, double k_per_s2) noexcept {
   return K;
 }
 
-// V_T = Ad V_H with Ad of X_TH, so F_H = Ad' F_T and K_H = Ad' K_T Ad.
+// METHOD (79). V_T = Ad V_H with Ad of X_TH, so F_H = Ad' F_T and K_H = Ad' K_T Ad.
 Matrix6d transform_to_handle(const Matrix6d& K_T, const Pose& X_HT) noexcept {
   const Matrix6d Ad = adjoint(inverse(X_HT));
   return Ad.transpose() * (0.5 * (K_T + K_T.transpose())) * Ad;
 }
 
+// METHOD (78), (82)
+//
 //   s ( (T/2 + tau) K_H + D_H ) <= diag(b I, b_rot I)         s S K_H S <= 4 kMaxEnergyPerEncoderStep_J I
 StabilityBound stability_bound(const DeviceDamping& device, const LoopDelay& loop, const Coupling& coupling,
                                const Pose& X_HT, DofMask driven, const EncoderStep& step) {
   check(device, loop, coupling, driven, step);
   const double lag_s = 0.5 * loop.period_s + loop.delay_s;
-  const auto felt = [&](const Matrix6d& K_T) { return driven_block(transform_to_handle(K_T, X_HT), driven); };
-  const auto one = [&](int first) {
+  const auto at_handle_driven = [&](const Matrix6d& K_T) {
+    return driven_block(transform_to_handle(K_T, X_HT), driven);
+  };
+  const auto unit_stiffness = [&](int first) {
     Matrix6d K = Matrix6d::Zero();
     K.diagonal().segment<3>(first).setOnes();
     return K;
   };
   const Vector6d B = diagonal(device, driven);
-  const Matrix6d K = felt(coupling.stiffness), D = felt(coupling.damping);
+  const Matrix6d K = at_handle_driven(coupling.stiffness), D = at_handle_driven(coupling.damping);
   const double by_steps = std::min(1.0, largest_by_steps(K, step));
-  const auto stiffest = [&](const Matrix6d& K_one) {
-    return std::min(largest_beside(lag_s * K_one, D, B), largest_by_steps(K_one, step));
+  const auto largest_stiffness = [&](const Matrix6d& K_one) {
+    return std::min(largest_beside_damper(lag_s * K_one, D, B), largest_by_steps(K_one, step));
   };
   StabilityBound out;
-  out.scale = std::min(by_steps, largest_share(lag_s * K + D, B));
-  out.scale_undamped = std::min(by_steps, largest_share(lag_s * K, B));
-  out.max_stiffness_N_per_m = stiffest(felt(one(0)));
-  out.max_stiffness_Nm_per_rad = stiffest(felt(one(3)));
+  out.scale = std::min(by_steps, largest_scale(lag_s * K + D, B));
+  out.scale_undamped = std::min(by_steps, largest_scale(lag_s * K, B));
+  out.max_stiffness_N_per_m = largest_stiffness(at_handle_driven(unit_stiffness(0)));
+  out.max_stiffness_Nm_per_rad = largest_stiffness(at_handle_driven(unit_stiffness(3)));
   return out;
 }
 

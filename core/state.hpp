@@ -6,34 +6,33 @@
 
 namespace wrenchd {
 
-/// Where the servo loop stands. Force can be on the hand in ramping, active, degraded and releasing, and in
-/// no other state; authority rises in ramping alone. core/transitions.hpp says what leads from one to the
-/// next.
+/// State of the servo loop. Force is possible in ramping, active, degraded and releasing only. Authority
+/// rises in ramping only. core/transitions.hpp defines the transitions.
 enum class State : std::uint8_t {
   disconnected,  ///< no device
-  self_test,     ///< it is there, and has to show that it reports as it should and frees the hand by itself
-  disarmed,      ///< zero wrench, motors off: after every start, replug and cleared fault
-  waiting,       ///< armed, but the hand is fast or would be pushed: zero wrench until it is calm
+  self_test,     ///< device present; the self-test checks its reports and its watchdog
+  disarmed,      ///< zero wrench, motors off: after every start, reconnection and cleared fault
+  waiting,       ///< armed, zero wrench until the hand is slow and the requested wrench is small
   ramping,       ///< authority rises from 0 to 1
   active,        ///< full authority
-  degraded,      ///< a fault that may pass: authority falls to zero, and comes back when it has passed
-  releasing,     ///< disarmed on purpose: authority falls to zero
-  fault,         ///< latched: zero wrench until somebody acknowledges
-  stopped,       ///< emergency stop, latched likewise
-  shutdown,      ///< the hand was released for the last time
+  degraded,      ///< temporary fault: authority falls to zero and rises again when the fault clears
+  releasing,     ///< disarmed on request: authority falls to zero
+  fault,         ///< latched fault: zero wrench until an acknowledgement
+  stopped,       ///< latched emergency stop: zero wrench until an acknowledgement
+  shutdown,      ///< final release
 };
 inline constexpr std::size_t kStateCount = 11;
 
-/// "disarmed"
+/// Name of a state, for example "disarmed". RT-safe.
 const char* name(State state) noexcept;
 
-/// Whether force can be on the hand.
+/// True if force is possible in this state.
 constexpr bool is_driving(State state) noexcept {
   return state == State::ramping || state == State::active || state == State::degraded ||
          state == State::releasing;
 }
 
-/// Whether somebody has to acknowledge before anything else can happen.
+/// True if only an acknowledgement leaves this state.
 constexpr bool is_latched(State state) noexcept {
   return state == State::fault || state == State::stopped;
 }

@@ -22,7 +22,7 @@ bool StateMachine::on(Fault fault) noexcept {
   return true;
 }
 
-/// A state entered again from itself begins anew.
+/// Enters a state. Re-entry of the current state resets only the undisturbed time.
 void StateMachine::enter(State to) noexcept {
   const State from = state_;
   state_ = to;
@@ -38,7 +38,8 @@ void StateMachine::enter(State to) noexcept {
   if (to == State::degraded) {
     const double longest_ago_s = degraded_entry_age_s_[next_entry_];
     degraded_too_often_ = longest_ago_s > 0.0 && longest_ago_s < kDegradedWindow_s;
-    degraded_entry_age_s_[next_entry_] = std::numeric_limits<double>::min();  // now, and not never
+    // the smallest positive number means "now"; 0 means "never"
+    degraded_entry_age_s_[next_entry_] = std::numeric_limits<double>::min();
     next_entry_ = (next_entry_ + 1) % degraded_entry_age_s_.size();
   }
   if (to == State::self_test || to == State::waiting || to == State::ramping) cause_ = Fault::none;

@@ -7,11 +7,10 @@
 
 namespace wrenchd {
 
-/// A list with room for N elements in the object itself, so that growing never allocates and copying moves
-/// only what is there: elements beyond size() do not exist. RT safe.
+/// A vector with static capacity N. It never allocates, and a copy copies size() elements only. RT-safe.
 template <class T, std::size_t N>
 class StaticVector {
-  // Elements are overwritten and forgotten without a destructor.
+  // Elements are overwritten without a destructor call.
   static_assert(std::is_trivially_destructible_v<T>);
 
  public:
@@ -32,21 +31,21 @@ class StaticVector {
   const T* begin() const noexcept { return elements_; }
   const T* end() const noexcept { return elements_ + size_; }
 
-  /// False, and nothing is done, where the list is full.
+  /// Appends a copy of the element. Returns false and changes nothing if the vector is full.
   bool add(const T& element) noexcept {
     if (full()) return false;
     std::construct_at(elements_ + size_++, element);
     return true;
   }
-  /// The last element takes the place of the i-th.
+  /// Removes element i by moving the last element into its position.
   void remove_unordered(std::size_t i) noexcept { elements_[i] = elements_[--size_]; }
-  /// Forgets all but the first.
+  /// Keeps at most the first `size` elements.
   void truncate(std::size_t size) noexcept { size_ = size < size_ ? size : size_; }
   void clear() noexcept { size_ = 0; }
 
  private:
   union {
-    T elements_[N];  // raw memory until an element is added
+    T elements_[N];  // raw memory beyond size_
   };
   std::size_t size_ = 0;
 };

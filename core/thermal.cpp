@@ -11,16 +11,16 @@
 namespace wrenchd {
 namespace {
 
-/// What the heat may rise above 1 while the ceiling is on its way down. The rest, up to kMaxHeat, is for the
-/// tick in which it came to 1.
-constexpr double kRiseWhileFolding = 0.04;
+/// Allowed heat above 1 while the ceiling decreases. The rest of kMaxHeat covers the tick in which the heat
+/// reaches 1.
+constexpr double kHeatRiseWhileFolding = 0.04;
 
 bool is_positive(double x) noexcept {
   return is_finite(x) && x > 0.0;
 }
 
-/// How much of the way to where it settles the heat goes in dt.
-double step_share(double dt_s, double time_s) noexcept {
+/// Fraction of the distance to its steady state that the heat covers in dt.
+double settling_fraction(double dt_s, double time_s) noexcept {
   return -std::expm1(-dt_s / time_s);
 }
 
@@ -33,23 +33,25 @@ MotorGroupHeat::MotorGroupHeat(double maximum, double continuous, double thermal
       rated_(is_positive(continuous) && is_positive(thermal_time_s) && continuous < maximum_),
       ceiling_(maximum_) {
   if (!rated_) return;
-  // F falls from r times the rating to the rating along a straight line, in t:
+  // F decreases linearly from r times the rating to the rating in the time t:
+  //
   //   rise = (t / T) (mean of (F / continuous)^2 - 1) = (t / T) ((r^2 + r + 1) / 3 - 1)
   const double r = maximum_ / continuous_;
-  fold_time_s_ = kRiseWhileFolding * time_s_ / ((r * r + r + 1.0) / 3.0 - 1.0);
+  fold_time_s_ = kHeatRiseWhileFolding * time_s_ / ((r * r + r + 1.0) / 3.0 - 1.0);
   ceiling_ = max_next_ceiling();
 }
 
-/// What may be pushed through the next step without passing kMaxHeat, however high the maximum is above the
-/// rating; never less than the rating. h' = h + a ((F / continuous)^2 - h) <= kMaxHeat
+/// Largest effort for the next step that keeps the heat below kMaxHeat, at least the rating.
+///
+///   h' = h + a ((F / continuous)^2 - h) <= kMaxHeat
 double MotorGroupHeat::max_next_ceiling() const noexcept {
-  const double a = step_share(kMaxStep_s, time_s_);
+  const double a = settling_fraction(kMaxStep_s, time_s_);
   const double square = heat_ + (kMaxHeat - heat_) / a;
   return std::min(maximum_, continuous_ * std::sqrt(std::max(square, 1.0)));
 }
 
-/// A ceiling that was on its way goes on from where it was, unless the new maximum is below it. Heat that
-/// nobody counted, because the maximum was below the rating, is taken for as much as it can have been.
+/// Keeps heat and ceiling, but the ceiling is clamped to the new maximum. If the old maximum was below the
+/// rating, heat was not tracked; then the largest possible heat is assumed.
 void MotorGroupHeat::set_maximum(double maximum) noexcept {
   if (maximum == maximum_) return;
   const MotorGroupHeat before = *this;
@@ -64,7 +66,7 @@ void MotorGroupHeat::set_maximum(double maximum) noexcept {
 void MotorGroupHeat::advance(double pushed, double dt_s) noexcept {
   if (!rated_ || !is_positive(dt_s)) return;
   const double share = (is_finite(pushed) ? std::min(pushed, maximum_) : maximum_) / continuous_;
-  heat_ += step_share(dt_s, time_s_) * (share * share - heat_);
+  heat_ += settling_fraction(dt_s, time_s_) * (share * share - heat_);
   if (heat_ >= 1.0) folded_ = true;
   if (heat_ <= kRecoveryHeat) folded_ = false;
   const double step = (maximum_ - continuous_) * (dt_s / fold_time_s_);

@@ -8,58 +8,58 @@
 #include "core/clock.hpp"
 #include "core/state.hpp"
 
-// The whole machine on one page: what happens (Trigger), in which states, where it leads, what the hand feels
-// (Reaction), and why. The table is what runs: core/state_machine.hpp looks everything up in it, `wrenchctl
-// faults` prints it. Each trigger has exactly one row for each state, which is checked when this is compiled.
+// The complete state machine: trigger, states, next state, reaction on the force, and the reason. The program
+// runs from this table: core/state_machine.hpp looks up every transition, and `wrenchctl faults` prints it. A
+// static_assert checks that each trigger has exactly one row for each state.
 
 namespace wrenchd {
 
-/// What can happen. Faults (core/fault.hpp) come as one of these.
+/// Events of the state machine. Each fault (core/fault.hpp) maps to one of them.
 enum class Trigger : std::uint8_t {
-  device_connected,     ///< reports come from a device that was identified
-  device_disconnected,  ///< it left the bus
-  self_test_passed,     ///< the self-test
-  self_test_failed,     ///< the self-test
-  arm,                  ///< somebody asks for force
-  calm,                 ///< the hand was slow, and would not have been pushed, for a moment
+  device_connected,     ///< an identified device sends reports
+  device_disconnected,  ///< the device left the bus
+  self_test_passed,     ///< the self-test passed
+  self_test_failed,     ///< the self-test failed
+  arm,                  ///< a client requests force
+  calm,                 ///< the handle was slow and the requested wrench small for kCalmDuration_s
   ramp_done,            ///< authority has reached 1
-  disarm,               ///< somebody, or a fault, wants no more force
+  disarm,               ///< a client or a fault ends the force
   fade_done,            ///< authority has reached 0
-  interrupted,          ///< the proxy has lost its place, or the hand let go of the dead man's button
-  soft_fault,           ///< something that may pass by itself
-  recovered,            ///< nothing was wrong for a while
-  hard_fault,           ///< something that somebody has to look at
+  interrupted,          ///< the proxy is invalid, or the dead man's button was released
+  soft_fault,           ///< a fault that may clear by itself
+  recovered,            ///< no fault for kRecoveryDuration_s
+  hard_fault,           ///< a fault that requires an acknowledgement
   stop,                 ///< emergency stop
-  acknowledge,          ///< somebody has looked
-  quit,                 ///< the process is asked to end
+  acknowledge,          ///< a user acknowledged a fault or an emergency stop
+  quit,                 ///< request to end the process
   process_end,          ///< the process ends now
-  info,                 ///< something worth knowing that changes nothing
+  info,                 ///< information only; changes nothing
 };
 inline constexpr std::size_t kTriggerCount = 18;
 
-/// "device there"
+/// Name of a trigger, for example "device connected". RT-safe.
 const char* name(Trigger trigger) noexcept;
 
-/// What becomes of the force on the hand, from the mildest to the hardest.
+/// Reaction on the force, from the mildest to the hardest.
 enum class Reaction : std::uint8_t {
   none,
-  fade_100ms,  ///< authority to zero within 100 ms
-  fade_10ms,   ///< within 10 ms
-  zero,        ///< in this tick
-  release,     ///< in this tick, and nothing is sent any more after the zeros of a release
+  fade_100ms,  ///< authority falls to zero within 100 ms
+  fade_10ms,   ///< authority falls to zero within 10 ms
+  zero,        ///< zero wrench in this tick
+  release,     ///< zero wrench in this tick; after the zero wrenches of a release nothing is sent
 };
 
-/// "fade 100 ms"
+/// Name of a reaction, for example "fade 100 ms". RT-safe.
 const char* name(Reaction reaction) noexcept;
 
-/// How long it may take until the hand is free: the time of the fade, and one tick.
+/// Longest time until the force is zero, without the one tick in which the reaction starts. RT-safe.
 constexpr Duration time_to_zero(Reaction reaction) noexcept {
   if (reaction == Reaction::fade_100ms) return std::chrono::milliseconds(100);
   if (reaction == Reaction::fade_10ms) return std::chrono::milliseconds(10);
   return Duration{0};
 }
 
-/// A set of states, as bits.
+/// A set of states as a bit mask.
 using StateSet = std::uint16_t;
 
 template <class... States>
@@ -70,21 +70,21 @@ constexpr bool contains(StateSet set, State state) noexcept {
   return (set >> static_cast<unsigned>(state) & 1U) != 0;
 }
 
-/// One row: what `trigger` does in any of the states `from`. A fault that comes with a harder reaction of its
-/// own has that one.
+/// One row: effect of `trigger` in any of the states `from`. If a fault has a harder reaction, that one
+/// applies.
 struct Transition {
   Trigger trigger;
   StateSet from;
-  bool changes_state;  ///< to `to`; else the state stays as it is
+  bool changes_state;  ///< true: the next state is `to`; false: the state does not change
   State to;
   Reaction reaction;
   const char* reason;
 };
 
-/// All rows, by trigger.
+/// All rows, ordered by trigger.
 std::span<const Transition> transitions() noexcept;
 
-/// The row for a trigger in a state: there is one for each. RT safe.
+/// Row of a trigger in a state. RT-safe.
 const Transition& transition(Trigger trigger, State from) noexcept;
 
 }  // namespace wrenchd

@@ -9,11 +9,11 @@
 
 namespace wrenchd {
 
-/// What a mesh is the skin of: a solid, which has an inside, or nothing. A surface has two sides, and
-/// whatever starts on one of them is kept there.
+/// Kind of body that a mesh bounds. A solid has an inside. A surface has two sides; a tool stays on the side
+/// on which it starts.
 enum class BodyKind : std::uint8_t { solid, surface };
 
-/// Vertices and triangles, counter-clockwise seen from outside. Lengths in metres once loaded.
+/// Vertices and triangles, counter-clockwise seen from outside. Lengths are in metres after loading.
 struct TriangleMesh {
   std::vector<Vector3d> vertices_m;
   std::vector<std::array<std::uint32_t, 3>> triangles;

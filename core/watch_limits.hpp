@@ -5,16 +5,17 @@
 
 namespace wrenchd {
 
-// How long a thing may be wrong until it is a fault: what the detectors use, and the table of faults tells.
+// Time for which a condition must hold until it is a fault. The watches use these values, and the fault table
+// shows them.
 inline constexpr Duration kLateSample = std::chrono::milliseconds(3);  ///< a few reports at 1 kHz
 inline constexpr Duration kStaleSample =
-    std::chrono::milliseconds(20);  ///< unless the profile says otherwise
+    std::chrono::milliseconds(20);  ///< default; the profile may set another value
 inline constexpr Duration kStuckPose = std::chrono::milliseconds(20);
-inline constexpr Duration kMotorsOff = std::chrono::milliseconds(20);  ///< longer than any way there and back
+inline constexpr Duration kMotorsOff = std::chrono::milliseconds(20);  ///< longer than any round trip
 inline constexpr Duration kLateAnswer = std::chrono::milliseconds(3);
 inline constexpr Duration kLateTick = std::chrono::milliseconds(5);
 inline constexpr Duration kStoppedLoop =
-    std::chrono::milliseconds(20);  ///< unless the configuration says otherwise
+    std::chrono::milliseconds(20);  ///< default; the configuration may set another value
 inline constexpr Duration kBlockedWrite = std::chrono::milliseconds(2);
 inline constexpr Duration kFailedWrite = std::chrono::milliseconds(20);
 inline constexpr Duration kOscillation = std::chrono::milliseconds(50);

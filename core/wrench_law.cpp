@@ -16,7 +16,7 @@ WrenchGains gains_for(Method method, const WrenchGains& gains) noexcept {
   return out;
 }
 
-// Eq. (16)
+// METHOD (60), Eq. (16)
 Wrench WrenchLaw::update(const Vector6d& eps, bool in_contact, double dt_s) noexcept {
   if (!in_contact) {
     reset();
@@ -41,8 +41,8 @@ Wrench WrenchLaw::update_damping(const Wrench& spring, const Vector6d& eps, bool
   return {spring.force_N + W_D.head<3>(), spring.torque_Nm + W_D.tail<3>()};
 }
 
-/// Rectangle rule; then the integral is scaled back so that neither its force nor its torque passes its
-/// limit.
+/// METHOD (62). Rectangle rule, then scales the integral so that its force and torque do not exceed their
+/// limits.
 void WrenchLaw::integrate(const Vector6d& eps, double dt_s) noexcept {
   integral_ += dt_s * eps;
   const Vector6d W_I = gains_.integral * integral_;
@@ -54,7 +54,7 @@ void WrenchLaw::integrate(const Vector6d& eps, double dt_s) noexcept {
   integral_ *= keep;
 }
 
-/// First-order low pass by backward Euler, stable for any dt: pass = dt / (dt + 1/(2 pi f)).
+/// METHOD (61). First-order low pass by backward Euler, stable for any dt: pass = dt / (dt + 1/(2 pi f)).
 void WrenchLaw::differentiate(const Vector6d& eps, double dt_s) noexcept {
   const double lag_s = 1.0 / (2.0 * std::numbers::pi * gains_.derivative_cutoff_Hz);
   const double pass = dt_s / (dt_s + lag_s);

@@ -14,28 +14,28 @@ constexpr Duration kHomingPeriod = std::chrono::milliseconds(1);
 
 }  // namespace
 
-bool open_device(Runtime& station, DeviceWait& wait, bool at_start, const StopCondition& stop,
-                 const ReportWaiting& waits) {
+bool open_device(Runtime& runtime, DeviceWait& wait, bool at_start, const StopCondition& stop,
+                 const ReportWaiting& waiting) {
   bool first_attempt = at_start;
-  std::string said;  // the same trouble is told once
-  const auto say = [&](spdlog::level::level_enum level, const std::string& words, const char* more) {
-    if (words != said) {
-      spdlog::log(level, "{}{}", words, more);
-      waits(words);
+  std::string reported;  // a repeated error is reported once
+  const auto report = [&](spdlog::level::level_enum level, const std::string& text, const char* suffix) {
+    if (text != reported) {
+      spdlog::log(level, "{}{}", text, suffix);
+      waiting(text);
     }
-    said = words;
+    reported = text;
   };
   return wait.until(
       [&] {
         try {
-          station.open();
+          runtime.open();
           return true;
         } catch (const DeviceNotFound& missing) {
-          say(spdlog::level::info, missing.what(), "; waiting for it");
+          report(spdlog::level::info, missing.what(), "; waiting for it");
           wait.log_rejected(missing.rejected_devices());
         } catch (const std::runtime_error& error) {
           if (first_attempt) throw;
-          say(spdlog::level::err, error.what(), "");
+          report(spdlog::level::err, error.what(), "");
         }
         first_attempt = false;
         return false;
@@ -53,74 +53,75 @@ void log_missing_motors(const DeviceProfile& profile) {
   const DofMask driven = driven_dofs(profile);
   if (!profile.has_output)
     spdlog::info(
-        "it has no motors: the tool follows it and stops at what it touches, armed or not; the wrench is "
-        "computed "
-        "and shown, and felt by nobody");
+        "the device has no motors: armed or not, the tool follows the handle and the proxy stops at "
+        "obstacles; "
+        "wrenchd computes and shows the wrench, and sends none");
   else if (driven != kAllDofs)
-    spdlog::info("what the wrench has along {} is dropped: no motor pushes there",
+    spdlog::info("the device has no motors along {}: wrenchd drops these components of the wrench",
                  dof_text(static_cast<DofMask>(kAllDofs & ~driven)));
   if (profile.has_output && !(profile.watchdog_s > 0.0))
-    spdlog::warn("the device has no watchdog of its own, so it gets {:.0f} % of its limits",
+    spdlog::warn("the device has no watchdog of its own: wrenchd scales its limits to {:.0f} %",
                  100.0 * ProfileDevice::kAuthorityWithoutWatchdog);
 }
 
-bool choose_profile(RunConfig& plan, const StopCondition& stop, const ReportWaiting& waits) {
+bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWaiting& waiting) {
   DeviceWait wait;
   const KnownProfiles known = known_profiles(SearchPath());
   for (const std::string& refused : known.refused) spdlog::warn("profile refused: {}", refused);
-  bool said = false;
+  bool reported = false;
   return wait.until(
       [&] {
         const std::vector<UsbDevice> plugged = list_usb_devices();
         const DeviceChoice choice =
-            choose_device(plugged, known.profiles, {{}, plan.settings.device.serial, {}});
+            choose_device(plugged, known.profiles, {{}, config.settings.device.serial, {}});
         if (choice.selection) {
-          plan.profile = known.profiles[choice.selection->profile];
-          plan.settings.device.profile_file = known.files[choice.selection->profile];
+          config.profile = known.profiles[choice.selection->profile];
+          config.settings.device.profile_file = known.files[choice.selection->profile];
           return true;
         }
-        if (!said) {
+        if (!reported) {
           spdlog::info("no device that has a profile is plugged in; waiting for one");
-          waits("no device that has a profile is plugged in");
+          waiting("no device that has a profile is plugged in");
         }
-        said = true;
+        reported = true;
         wait.log_rejected(describe_rejected(plugged, choice));
         return false;
       },
       stop);
 }
 
-std::string calibrate(Runtime& station, const UsbDevice& device, const CalibrationStore& store) {
-  const DeviceProfile& profile = station.config().profile;
+std::string apply_calibration(Runtime& runtime, const UsbDevice& device, const CalibrationStore& store) {
+  const DeviceProfile& profile = runtime.config().profile;
   const bool offsets_are_stored = profile.homing.reference == ReferenceSchedule::once;
   if (!offsets_are_stored && !profile.check_axes) return {};
   const std::string cure = "; run wrenchctl calibrate " + profile.name;
   if (device.serial.empty())
-    return "its profile wants it calibrated, and it has no serial number to keep that under; leave [homing] "
-           "out of a profile of your own for it";
+    return "its profile requires a calibration, which wrenchd stores by serial number, and the device has "
+           "none; "
+           "write a profile for it without [homing]";
   try {
     const auto stored = store.read(profile.name, device.serial);
-    if (!stored) return "it was never calibrated" + cure;
-    if (offsets_are_stored) station.device().recalibrate(apply_calibration(profile, stored->offsets));
+    if (!stored) return "it is not calibrated" + cure;
+    if (offsets_are_stored) runtime.device().recalibrate(apply_calibration(profile, stored->offsets));
     return {};
-  } catch (const std::exception& refused) {  // a damaged file, or one of another profile
-    return refused.what() + cure;
+  } catch (const std::exception& error) {  // the file is damaged or belongs to another profile
+    return error.what() + cure;
   }
 }
 
-bool wait_for_rest_pose(Runtime& station, Clock& clock, const StopCondition& stop,
-                        const ReportWaiting& waits) {
-  const DeviceProfile& profile = station.config().profile;
+bool wait_for_rest_pose(Runtime& runtime, Clock& clock, const StopCondition& stop,
+                        const ReportWaiting& waiting) {
+  const DeviceProfile& profile = runtime.config().profile;
   if (profile.homing.reference != ReferenceSchedule::each_start) return true;
-  DeviceHoming homing(station.device(), profile, DeviceHoming::Extent::reference_only);
-  std::string said;
+  DeviceHoming homing(runtime.device(), profile, DeviceHoming::Extent::reference_only);
+  std::string reported;
   while (!stop() && !homing.device_lost()) {
     clock.sleep_until(clock.now() + kHomingPeriod);
     const HomingState& state = homing.step(clock.now());
-    if (const std::string words = operator_instruction(state); words != said) {
-      spdlog::info("homing: {}", words);
-      waits("homing: " + words);
-      said = words;
+    if (const std::string instruction = operator_instruction(state); instruction != reported) {
+      spdlog::info("homing: {}", instruction);
+      waiting("homing: " + instruction);
+      reported = instruction;
     }
     if (state.step == HomingStep::done) return true;
   }

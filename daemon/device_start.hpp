@@ -10,34 +10,37 @@
 
 namespace wrenchd {
 
-// The way of a real device from plugged in to ready, before its servo loop runs. Not RT safe.
+// The steps that take a real device from plugged in to ready, before its servo loop runs. Not RT-safe: each
+// function may wait for a device or a person without limit, unless stated otherwise.
 
-/// When to stop for another reason than a fault.
+/// Returns true when waiting must end although the condition is not met.
 using StopCondition = std::function<bool()>;
-/// Is told that nothing can happen before something outside does, a device or a person, and what.
-using ReportWaiting = std::function<void(const std::string& what)>;
+/// Receives the reason why the daemon waits for a device or a person.
+using ReportWaiting = std::function<void(const std::string& reason)>;
 
-/// Where the configuration leaves the profile to the device: that of the one device that has one, which is
-/// waited for. False: it is time to stop.
-bool choose_profile(RunConfig& plan, const StopCondition& stop, const ReportWaiting& waits);
+/// Waits for exactly one connected device that has a profile, and stores that profile in `config`. Call it if
+/// the configuration names no profile. Returns false if `stop` ended the waiting.
+bool choose_profile(RunConfig& config, const StopCondition& stop, const ReportWaiting& waiting);
 
-/// Opens the station's device, and waits for it where it is not plugged in. False: it is time to stop. What
-/// is wrong with a device that is there at the start is thrown; later it is logged, and waited for its cure.
-bool open_device(Runtime& station, DeviceWait& wait, bool at_start, const StopCondition& stop,
-                 const ReportWaiting& waits);
+/// Opens the device of the runtime, and waits for the device if it is not connected. Returns false if `stop`
+/// ended the waiting. at_start: throws std::runtime_error if the first attempt finds the device but cannot
+/// use it. Otherwise logs such an error and tries again.
+bool open_device(Runtime& runtime, DeviceWait& wait, bool at_start, const StopCondition& stop,
+                 const ReportWaiting& waiting);
 
-/// What the device is, said once.
+/// Logs identity, transport, sensed and driven degrees of freedom of the device. Does not wait.
 void log_device(const DeviceProfile& profile, const UsbDevice& device);
-/// What it has no motors for, said once: that is not felt.
+/// Logs which components of the wrench the device cannot exert. Does not wait.
 void log_missing_motors(const DeviceProfile& profile);
 
-/// Lets the opened device take over its stored calibration, where its profile asks for one. Returns why it
-/// may not be armed, with the cure; empty: it may.
-std::string calibrate(Runtime& station, const UsbDevice& device, const CalibrationStore& store);
+/// Applies the stored calibration to the opened device, if its profile requires one. Returns the reason why
+/// the device must not be armed, with the cure; an empty text allows arming. Does not wait.
+std::string apply_calibration(Runtime& runtime, const UsbDevice& device, const CalibrationStore& store);
 
-/// Where the device counts from wherever it was switched on: has the person put the handle into its rest, and
-/// says so in the log. False: the device was lost, or it is time to stop.
-bool wait_for_rest_pose(Runtime& station, Clock& clock, const StopCondition& stop,
-                        const ReportWaiting& waits);
+/// If the encoders of the device count from the pose at power-up: waits until the operator has put the handle
+/// into its rest pose, and logs the instructions. Returns false if the device was lost or `stop` ended the
+/// waiting.
+bool wait_for_rest_pose(Runtime& runtime, Clock& clock, const StopCondition& stop,
+                        const ReportWaiting& waiting);
 
 }  // namespace wrenchd

@@ -9,9 +9,10 @@
 namespace wrenchd {
 namespace {
 
-/// How often it is looked whether to stop, and how many such looks pass without an attempt.
-constexpr auto kLook = std::chrono::milliseconds(100);
-constexpr int kLooksBetween = 10;
+/// Time between two calls of `stop`.
+constexpr auto kStopPeriod = std::chrono::milliseconds(100);
+/// Without a hotplug event, one attempt follows this many calls of `stop`.
+constexpr int kStopChecksPerAttempt = 10;
 
 }  // namespace
 
@@ -23,7 +24,7 @@ DeviceWait::DeviceWait() {
       changed_.notify_all();
     });
   } catch (const std::runtime_error& error) {
-    spdlog::warn("{}; looking once a second what is plugged in", error.what());
+    spdlog::warn("{}; polling the connected devices once a second", error.what());
   }
 }
 
@@ -31,20 +32,17 @@ bool DeviceWait::until(const std::function<bool()>& attempt, const std::function
   while (!stop()) {
     if (attempt()) return true;
     std::unique_lock lock(mutex_);
-    for (int looks = 0; looks < kLooksBetween && !plug_event_pending_ && !stop(); ++looks)
-      changed_.wait_for(lock, kLook);
+    for (int checks = 0; checks < kStopChecksPerAttempt && !plug_event_pending_ && !stop(); ++checks)
+      changed_.wait_for(lock, kStopPeriod);
     plug_event_pending_ = false;
   }
   return false;
 }
 
-void DeviceWait::log_rejected(const std::vector<std::string>& seen) {
-  std::set<std::string> now;
-  for (const std::string& line : seen) {
+void DeviceWait::log_rejected(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines)
     if (logged_.count(line) == 0) spdlog::info("{}", to_printable(line));
-    now.insert(line);
-  }
-  logged_ = std::move(now);
+  logged_ = {lines.begin(), lines.end()};
 }
 
 }  // namespace wrenchd

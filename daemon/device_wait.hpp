@@ -13,26 +13,27 @@
 
 namespace wrenchd {
 
-/// Waits for a device to be plugged in. Not RT safe: no servo loop runs meanwhile.
+/// Waits for a device. Not RT-safe: waits without limit; no servo loop runs meanwhile.
 class DeviceWait {
  public:
-  /// Hears of devices that are plugged in from now on. Where the system has no monitor to give it logs why.
+  /// Starts to monitor hotplug events. If the system has no monitor, logs the reason and polls.
   DeviceWait();
 
-  /// Calls `attempt` at once, each time something was plugged in or taken out, and once a second, for a node
-  /// may get its name or its permissions a little after the device is told of; until it returns true
-  /// (true) or `stop` does (false), which is asked ten times a second. What attempt throws ends the waiting.
+  /// Calls `attempt` at once, after each hotplug event, and once a second: udev may set the name and the
+  /// permissions of a device node shortly after the event. Returns true when `attempt` returns true. Returns
+  /// false when `stop` returns true; calls `stop` every 100 ms. An exception of `attempt` passes through.
   bool until(const std::function<bool()>& attempt, const std::function<bool()>& stop);
 
-  /// Logs what is plugged in instead, and why it will not do: each line once, until it was not there.
-  void log_rejected(const std::vector<std::string>& seen);
+  /// Logs each line, which names a connected device and why it is rejected. Logs a line again only if it was
+  /// absent from one call.
+  void log_rejected(const std::vector<std::string>& lines);
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  bool plug_event_pending_ = false;
-  std::set<std::string> logged_;
-  std::unique_ptr<HotplugMonitor> monitor_;  ///< last: its thread uses all of the above
+  bool plug_event_pending_ = false;          ///< protected by mutex_
+  std::set<std::string> logged_;             ///< lines of the last call of log_rejected()
+  std::unique_ptr<HotplugMonitor> monitor_;  ///< last member: its thread uses the members above
 };
 
 }  // namespace wrenchd

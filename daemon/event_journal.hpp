@@ -6,16 +6,18 @@
 
 namespace wrenchd {
 
-/// What an entry of the journal says of an event in fields, so that it can be asked for:
+/// Returns the fields of an event's journal entry, by which journalctl finds it:
 ///
-///   MESSAGE_ID         of states, of faults, or of the rest
-///   WRENCHD_STATE      the state that was entered, or the one in which arming was refused
-///   WRENCHD_FAULT      the fault
-///   WRENCHD_CURE       what to do about it
-///   WRENCHD_TIME_NS    monotonic time at which the servo thread said it
+///   MESSAGE_ID         one id for states, one for faults, one for all other events
+///   WRENCHD_STATE      the state that the loop entered, or in which it refused to arm
+///   WRENCHD_FAULT      name of the fault
+///   WRENCHD_CURE       what to do about the fault
+///   WRENCHD_TIME_NS    monotonic time at which the servo thread emitted the event [ns]
+///
+/// Not RT-safe: allocates.
 JournalFieldList journal_fields(const Event& event);
 
-/// The ids, for `journalctl MESSAGE_ID=...`.
+/// Message ids, for `journalctl MESSAGE_ID=...`.
 inline constexpr const char* kStateMessageId = "4e4882be19de4db6b9953f47b8c2b7ef";
 inline constexpr const char* kFaultMessageId = "97836e6f60a2477cb2efbfb243d6577f";
 inline constexpr const char* kRenderingMessageId = "e746b232b843498ebd9f18da5ddae19d";

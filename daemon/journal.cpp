@@ -35,7 +35,8 @@ int priority_of(spdlog::level::level_enum level) {
   }
 }
 
-/// spdlog's own knows no fields. The journal takes entries from any thread, so there is nothing to lock.
+/// The journal sink of spdlog supports no fields. sd_journal_sendv() is thread-safe, so the sink needs no
+/// lock.
 class JournalSink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
   void sink_it_(const spdlog::details::log_msg& message) override {
     const std::string text(message.payload.data(), message.payload.size());

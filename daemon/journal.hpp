@@ -7,18 +7,19 @@
 
 namespace wrenchd {
 
-/// Fields of a journal entry beside its text, in capitals: {"WRENCHD_FAULT", "overspeed"}.
+/// Fields of a journal entry beside its text. Names are in capitals: {"WRENCHD_FAULT", "overspeed"}.
 using JournalFieldList = std::vector<std::pair<std::string, std::string>>;
 
-/// Whether standard error goes into the system's journal: then $JOURNAL_STREAM names the very file.
+/// Returns true if standard error is connected to the system journal, which $JOURNAL_STREAM states. Not
+/// RT-safe: system call.
 bool stderr_is_journal();
 
-/// Lets everything that is logged from now on go to the journal, with its priority in place of words, and the
-/// fields that are set at the time. To be called once, before other threads log.
+/// Sends all later log entries to the system journal, with priority and the current JournalFields. Call it
+/// once, before other threads log. Not RT-safe: allocates.
 void log_to_journal();
 
-/// Sets fields for what the calling thread logs while this lives. Where the log goes elsewhere it does
-/// nothing. Not RT safe.
+/// Adds fields to the log entries of the calling thread while this object lives. Has no effect if the log
+/// does not go to the journal. Not RT-safe: allocates.
 class JournalFields {
  public:
   explicit JournalFields(JournalFieldList fields);
@@ -26,7 +27,7 @@ class JournalFields {
   JournalFields(const JournalFields&) = delete;
   JournalFields& operator=(const JournalFields&) = delete;
 
-  /// Those of the calling thread.
+  /// Fields of the calling thread.
   static const JournalFieldList& current() noexcept;
 
  private:

@@ -29,7 +29,7 @@ std::string times(const DurationHistogram& h) {
                      microseconds(h.max()));
 }
 
-/// Rotation angle of x y z qx qy qz qw [rad].
+/// Rotation angle [rad] of a pose x y z qx qy qz qw.
 double angle(const std::array<double, 7>& X) {
   return 2.0 * std::atan2(length(&X[3]), std::abs(X[6]));
 }
@@ -38,9 +38,9 @@ std::string state(const TickRecord& r) {
   const auto state = static_cast<State>(r.state);
   if (r.state_cause != 0 && (is_latched(state) || state == State::degraded))
     return fmt::format("{}:{}", name(state), fault_row(static_cast<Fault>(r.state_cause)).name);
-  if (const auto placing = static_cast<ProxyInitialization>(r.proxy_initialization);
-      placing != ProxyInitialization::complete)
-    return name(placing);
+  if (const auto initialization = static_cast<ProxyInitialization>(r.proxy_initialization);
+      initialization != ProxyInitialization::complete)
+    return name(initialization);
   return name(state);
 }
 
@@ -81,18 +81,18 @@ void add_sample(RunTotals& totals, const TickRecord& r) {
 
 std::string summary(const RunTotals& totals, const LoopTiming& timing) {
   std::string text = fmt::format(
-      "{} ticks in {:.2f} s ({:.1f} Hz); in contact at {} of {} looks; largest force {:.2f} N, torque {:.1f} "
+      "{} ticks in {:.2f} s ({:.1f} Hz); in contact in {} of {} samples; largest force {:.2f} N, torque "
+      "{:.1f} "
       "mN.m{}\n",
       totals.ticks, totals.seconds, static_cast<double>(totals.ticks) / std::max(totals.seconds, 1e-9),
       totals.samples_in_contact, totals.samples, totals.max_force_N, 1e3 * totals.max_torque_Nm,
       totals.shown == ShownWrench::on_tool ? " on the tool, not sent: no motors" : "");
   text += fmt::format("{:<14} {:>24}\n", "", "p50 / p99.9 / max [us]");
-  text += fmt::format("{:<14} {:>24}\n", "wake-up late", times(timing.wake_latency));
+  text += fmt::format("{:<14} {:>24}\n", "wake latency", times(timing.wake_latency));
   text += fmt::format("{:<14} {:>24}\n", "tick", times(timing.tick));
   for (std::size_t i = 0; i < kStageCount; ++i)
     text += fmt::format("  {:<12} {:>24}\n", name(static_cast<Stage>(i)), times(timing.stage[i]));
-  text +=
-      fmt::format("overruns {}, ticks left out {}\n", timing.overruns.load(), timing.skipped_ticks.load());
+  text += fmt::format("overruns {}, skipped ticks {}\n", timing.overruns.load(), timing.skipped_ticks.load());
   return text;
 }
 

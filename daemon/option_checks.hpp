@@ -8,7 +8,7 @@
 
 namespace wrenchd {
 
-/// A number from min to max. CLI11's own range check lets NaN pass.
+/// Accepts a number from min to max. The range check of CLI11 accepts NaN too. Not RT-safe: allocates.
 inline CLI::Validator number_in_range(double min, double max) {
   const std::string range = CLI::detail::to_string(min) + " to " + CLI::detail::to_string(max);
   return {[=](std::string& text) -> std::string {
@@ -20,7 +20,7 @@ inline CLI::Validator number_in_range(double min, double max) {
           range};
 }
 
-/// An empty text comes from an unset variable in somebody's script; it must not stand for anything.
+/// Rejects an empty text, which an unset variable in a shell script produces. Not RT-safe: allocates.
 inline CLI::Validator not_empty(const std::string& cure = "name a file") {
   return {[=](std::string& text) -> std::string { return text.empty() ? "must not be empty; " + cure : ""; },
           ""};

@@ -7,12 +7,12 @@
 
 namespace wrenchd {
 
-/// What the files say, read and checked, before anything is built from it.
+/// The checked content of all configuration files, before any part is built from it.
 struct RunConfig {
   Settings settings;
-  DeviceProfile profile;  ///< without a name where the settings leave it to the device that is plugged in
+  DeviceProfile profile;  ///< the name is empty if the connected device decides
   SceneSettings scene;
-  bool simulated = true;  ///< a simulated device speaks as the profile says; no other is opened
+  bool simulated = true;  ///< true: wrenchd simulates a device with this profile; false: a real device
 };
 
 }  // namespace wrenchd

@@ -12,7 +12,8 @@
 namespace wrenchd {
 namespace {
 
-std::filesystem::path named_on_command_line(const std::filesystem::path& name, const SearchPath& search) {
+/// Returns the file in the working directory, else in the search path. Throws ConfigError if there is none.
+std::filesystem::path find_file(const std::filesystem::path& name, const SearchPath& search) {
   auto given = std::filesystem::absolute(name);
   std::error_code error;
   if (std::filesystem::exists(given, error)) return given;
@@ -21,16 +22,17 @@ std::filesystem::path named_on_command_line(const std::filesystem::path& name, c
                     search.not_found(name) + ", and from here " + given.lexically_normal().string());
 }
 
-/// How often the loop ticks at most: by the clock, or with each report of the device.
-double tick_rate_Hz(const RunConfig& plan) {
-  const double reports_Hz = plan.profile.report_rate_Hz;
-  const double rate_Hz = plan.settings.servo.rate_Hz;
-  if (plan.settings.servo.pacing == Pacing::clock || !(reports_Hz > rate_Hz)) return rate_Hz;
+/// Returns the highest tick rate: the configured rate, or the report rate if each report starts a tick.
+double tick_rate_Hz(const RunConfig& config) {
+  const double reports_Hz = config.profile.report_rate_Hz;
+  const double rate_Hz = config.settings.servo.rate_Hz;
+  if (config.settings.servo.pacing == Pacing::clock || !(reports_Hz > rate_Hz)) return rate_Hz;
   return reports_Hz;
 }
 
-/// From when on a loop that says nothing is a stuck one: no late tick takes so long.
-Duration silent_after(const ServoSettings& servo) noexcept {
+/// Returns the time without a command after which the loop counts as stalled. It exceeds the longest late
+/// tick.
+Duration stall_timeout(const ServoSettings& servo) noexcept {
   const int periods = servo.pacing == Pacing::device ? kDeviceTimeout_periods : 1;
   return periods * from_seconds(1.0 / servo.rate_Hz) + kLateTick;
 }
@@ -38,46 +40,47 @@ Duration silent_after(const ServoSettings& servo) noexcept {
 }  // namespace
 
 RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search) {
-  RunConfig plan;
-  plan.settings = load_settings(named_on_command_line(files.config, search), search);
-  if (!files.scene.empty()) plan.settings.scene = named_on_command_line(files.scene, search);
+  RunConfig config;
+  config.settings = load_settings(find_file(files.config, search), search);
+  if (!files.scene.empty()) config.settings.scene = find_file(files.scene, search);
   if (!files.profile.empty()) {
-    plan.settings.device.profile = files.profile;
-    plan.settings.device.profile_file = files.profile == kAnyProfile
-                                            ? std::filesystem::path()
-                                            : named_on_command_line(profile_file(files.profile), search);
+    config.settings.device.profile = files.profile;
+    config.settings.device.profile_file = files.profile == kAnyProfile
+                                              ? std::filesystem::path()
+                                              : find_file(profile_file(files.profile), search);
   }
-  if (const auto& file = plan.settings.device.profile_file; !file.empty())
-    plan.profile = load_profile(file, search);
-  plan.simulated =
-      files.simulate || (!plan.profile.name.empty() && plan.profile.transport == Transport::loopback);
-  plan.scene = load_scene(plan.settings.scene);
-  if (SimulationSettings& simulation = plan.settings.simulation; !simulation.playback.empty())
+  if (const auto& file = config.settings.device.profile_file; !file.empty())
+    config.profile = load_profile(file, search);
+  config.simulated =
+      files.simulate || (!config.profile.name.empty() && config.profile.transport == Transport::loopback);
+  config.scene = load_scene(config.settings.scene);
+  if (SimulationSettings& simulation = config.settings.simulation; !simulation.playback.empty())
     simulation.playback_path = read_playback(simulation.playback);
-  return plan;
+  return config;
 }
 
-LinkSettings link_settings(const RunConfig& plan) {
-  const ServoSettings& servo = plan.settings.servo;
-  LinkSettings settings = link_settings(plan.profile, silent_after(servo));
-  settings.write_deadline =
-      kBlockedWrite / 2;  // what is refused for longer is a fault, by the loop's own clock
+LinkSettings link_settings(const RunConfig& config) {
+  const ServoSettings& servo = config.settings.servo;
+  LinkSettings settings = link_settings(config.profile, stall_timeout(servo));
+  settings.write_deadline = kBlockedWrite / 2;  // the loop raises a fault after kBlockedWrite
   settings.priority = servo.realtime == Realtime::off ? 0 : servo.priority;
   return settings;
 }
 
-std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& plan) {
-  return std::make_unique<ReconnectingLink>(plan.profile, plan.settings.device.serial, link_settings(plan));
+std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& config) {
+  return std::make_unique<ReconnectingLink>(config.profile, config.settings.device.serial,
+                                            link_settings(config));
 }
 
-Runtime::Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode place_in,
+Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
                  const MeshLoader& meshes)
-    : Runtime(std::move(plan), link, clock, place_in, meshes, meshes) {}
+    : Runtime(std::move(config), link, clock, search_mode, meshes, meshes) {}
 
-/// The loader that has read the scene is told from a fresh one, by which it is read again.
-Runtime::Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode place_in,
+/// `used` reads the scene and keeps the warnings. `fresh` has read nothing: the reconfigurator copies it for
+/// each reload.
+Runtime::Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
                  const MeshLoader& fresh, MeshLoader used)
-    : config_(std::move(plan)),
+    : config_(std::move(config)),
       clock_(clock),
       scene_(std::make_shared<const Scene>(config_.scene, used)),
       mesh_remarks_(used.changes()),
@@ -85,9 +88,9 @@ Runtime::Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode
       device_(config_.profile, link),
       loop_(config_.settings, config_.profile, device_,
             std::make_unique<Rendering>(0, config_.settings, config_.profile, scene_,
-                                        make_proxy_initializer(scene_, place_in)),
+                                        make_proxy_initializer(scene_, search_mode)),
             clock),
-      reconfigurator_(config_, scene_, loop_, place_in, fresh) {
+      reconfigurator_(config_, scene_, loop_, search_mode, fresh) {
   mesh_remarks_.insert(mesh_remarks_.end(), used.warnings().begin(), used.warnings().end());
 }
 
@@ -98,7 +101,7 @@ Runtime::~Runtime() {
 SharedState& Runtime::enable_shared_state() {
   if (shared_state_) return *shared_state_;
   shared_state_ = std::make_unique<SharedState>(tick_rate_Hz(config_));
-  loop_.publish_to(*shared_state_);
+  loop_.telemetry().publish_to(*shared_state_);
   return *shared_state_;
 }
 

@@ -23,54 +23,58 @@
 
 namespace wrenchd {
 
-/// What a command line names: the configuration, and what stands in place of what the configuration names. A
-/// file is taken as it is given, from the working directory, and then looked for along the search path.
+/// The files that a command line names. A relative path starts at the working directory; if no such file
+/// exists there, it starts at each directory of the search path.
 struct RunConfigFiles {
   std::filesystem::path config = "wrenchd.toml";
-  std::filesystem::path scene;  ///< empty: the configuration's
-  std::string profile;          ///< name or file; empty: the configuration's
-  bool simulate = false;        ///< whatever the profile's transport is
+  std::filesystem::path scene;  ///< empty: the scene of the configuration
+  std::string profile;          ///< name or file; empty: the profile of the configuration
+  bool simulate = false;        ///< simulate the device, whatever transport its profile has
 };
 
-/// Reads the configuration, its scene and its profile. Throws ConfigError.
+/// Reads the configuration, its scene and its profile. Throws ConfigError. Not RT-safe: reads files.
 RunConfig load_run_config(const RunConfigFiles& files, const SearchPath& search);
 
-/// Of any link that has a thread of its own: how long its writes may take, and when a loop that is silent is
-/// spoken for.
-LinkSettings link_settings(const RunConfig& plan);
+/// Returns the settings of a link with a writer thread: write deadline, and the time after which the thread
+/// sends a zero wrench because the loop has sent no command. Not RT-safe: allocates.
+LinkSettings link_settings(const RunConfig& config);
 
-/// The link to the plugged-in device that the plan wants, not opened.
-std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& plan);
+/// Returns the link to the connected device that the configuration selects. The link is not open. Not
+/// RT-safe: allocates.
+std::unique_ptr<ReconnectingLink> make_plugged_link(const RunConfig& config);
 
-/// The parts of one running wrenchd, built from a plan in the order in which they need each other.
+/// The parts of one running wrenchd, built from a run configuration: scene, device, servo loop and
+/// reconfigurator. Not RT-safe.
 class Runtime {
  public:
-  /// Link and clock must outlive this. meshes: reads those of the scene; its changes and remarks are kept.
-  /// Throws MeshError, std::runtime_error.
-  Runtime(RunConfig plan, ReportLink& link, Clock& clock,
-          ProxySearchMode place_in = ProxySearchMode::background, const MeshLoader& meshes = {});
+  /// Link and clock must outlive this object. meshes: loader of the scene's meshes. Throws MeshError,
+  /// std::runtime_error. May take seconds: reads meshes.
+  Runtime(RunConfig config, ReportLink& link, Clock& clock,
+          ProxySearchMode search_mode = ProxySearchMode::background, const MeshLoader& meshes = {});
   ~Runtime();
   Runtime(const Runtime&) = delete;
   Runtime& operator=(const Runtime&) = delete;
 
   const RunConfig& config() const noexcept { return config_; }
-  const Scene& scene() const noexcept { return *scene_; }  ///< of the start
-  /// What a person should know of the meshes of the scene, a sentence each.
+  /// Scene at the start. The reconfigurator has the current scene.
+  const Scene& scene() const noexcept { return *scene_; }
+  /// Repairs and warnings of the mesh loader, a sentence each.
   const std::vector<std::string>& mesh_remarks() const noexcept { return mesh_remarks_; }
-  /// Opens the device, closing it first where it was open: before the loop runs, and after each fault. The
-  /// loop is disarmed then, as release() leaves it. Throws as the link does. No servo thread may run.
+  /// Opens the device, after closing it if it is open. Call it before the loop runs and after each loss of
+  /// the device. The loop is disarmed afterwards. Throws as the link does. Precondition: no servo thread
+  /// runs.
   void open() { device_.open(); }
   void close() noexcept { device_.close(); }
-  /// The device, for its homing; only while no servo thread runs.
+  /// The device, for homing. Precondition: no servo thread runs.
   ProfileDevice& device() noexcept { return device_; }
   ServoLoop& loop() noexcept { return loop_; }
-  /// Where what is rendered is changed while the loop runs.
+  /// Changes scene, rendering and limits while the loop runs.
   Reconfigurator& reconfigurator() noexcept { return reconfigurator_; }
-  /// Shows every tick to recorders and to other processes from now on. First before the loop runs; when
-  /// called again, the same. Throws std::system_error.
+  /// Creates the shared memory that publishes every tick to recorders and other processes. The first call
+  /// must precede the loop; later calls return the same memory. Throws std::system_error.
   SharedState& enable_shared_state();
 
-  /// What a recording of this station must know, that begins now. Reads its mesh files.
+  /// Returns the header of a recording that begins now. Reads the mesh files.
   RecordingHeader recording_header() const;
 
  private:
@@ -78,14 +82,14 @@ class Runtime {
   const Clock& clock_;
   std::shared_ptr<const Scene> scene_;
   std::vector<std::string> mesh_remarks_;
-  RecordingHeader recorded_texts_;  ///< as they were read: files may change while the loop runs
+  RecordingHeader recorded_texts_;  ///< texts of the files at the start; the files may change later
   ProfileDevice device_;
   std::unique_ptr<SharedState> shared_state_;
   ServoLoop loop_;
   Reconfigurator reconfigurator_;
 
-  Runtime(RunConfig plan, ReportLink& link, Clock& clock, ProxySearchMode place_in, const MeshLoader& fresh,
-          MeshLoader used);
+  Runtime(RunConfig config, ReportLink& link, Clock& clock, ProxySearchMode search_mode,
+          const MeshLoader& fresh, MeshLoader used);
 };
 
 }  // namespace wrenchd

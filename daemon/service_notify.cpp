@@ -11,22 +11,22 @@
 namespace wrenchd {
 namespace {
 
-/// How often the loop is looked at, unless the watchdog wants it oftener.
-constexpr auto kLook = std::chrono::milliseconds(100);
-/// Looks within the time after which the manager takes a silent service for dead: an ordinary thread on a
-/// busy machine may come late to some of them.
-constexpr int kLooksInWatchdog = 8;
+/// Longest time between two messages.
+constexpr auto kPeriod = std::chrono::milliseconds(100);
+/// Messages within the watchdog time of the service manager. This thread has no real-time priority, so some
+/// messages may be late on a busy machine.
+constexpr int kMessagesPerWatchdog = 8;
 
-std::string in_one_line(std::string text) {
+std::string to_one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
 }
 
-std::chrono::microseconds look_period() {
+std::chrono::microseconds message_period() {
   std::uint64_t watchdog_us = 0;
-  if (sd_watchdog_enabled(0, &watchdog_us) <= 0) return kLook;
-  return std::min<std::chrono::microseconds>(kLook,
-                                             std::chrono::microseconds(watchdog_us / kLooksInWatchdog));
+  if (sd_watchdog_enabled(0, &watchdog_us) <= 0) return kPeriod;
+  return std::min<std::chrono::microseconds>(kPeriod,
+                                             std::chrono::microseconds(watchdog_us / kMessagesPerWatchdog));
 }
 
 }  // namespace
@@ -37,12 +37,12 @@ std::string status_text(const LoopStatus& loop, const std::string& device) {
     const FaultRow& row = fault_row(loop.cause);
     text += ": " + std::string(row.name) + ": " + std::string(row.message) + "; " + std::string(row.cure);
   }
-  return in_one_line(text + "; device " + device);
+  return to_one_line(text + "; device " + device);
 }
 
-void ServiceReport::waiting(std::string why) {
+void ServiceReport::waiting(std::string reason) {
   phase_ = Phase::waiting;
-  detail_ = std::move(why);
+  detail_ = std::move(reason);
   last_ticks_.reset();
 }
 
@@ -52,10 +52,10 @@ void ServiceReport::running(std::string device) {
   last_ticks_.reset();
 }
 
-void ServiceReport::stopping(std::string words) {
+void ServiceReport::stopping(std::string reason) {
   if (phase_ != Phase::stopping) pending_ += "STOPPING=1\n";
   phase_ = Phase::stopping;
-  detail_ = std::move(words);
+  detail_ = std::move(reason);
 }
 
 void ServiceReport::reloading(std::uint64_t monotonic_us) {
@@ -67,39 +67,39 @@ void ServiceReport::reloaded() {
 }
 
 std::string ServiceReport::next_message(const std::optional<LoopStatus>& loop) {
-  std::string words;
+  std::string status;
   bool ready = ready_sent_, alive = true;
   switch (phase_) {
     case Phase::starting:
-      words = "starting";
-      alive = false;  // the manager does not watch before it is ready
+      status = "starting";
+      alive = false;  // the watchdog starts with READY=1
       break;
     case Phase::waiting:
-      words = in_one_line("waiting: " + detail_);
+      status = to_one_line("waiting: " + detail_);
       ready = true;
       break;
     case Phase::running:
-      if (!loop) break;  // it has just ended
-      words = status_text(*loop, detail_);
+      if (!loop) break;  // the loop has just ended
+      status = status_text(*loop, detail_);
       ready = ready || (loop->state != State::disconnected && loop->state != State::self_test);
       alive = last_ticks_ != loop->ticks;
       last_ticks_ = loop->ticks;
       break;
     case Phase::stopping:
-      words = in_one_line(detail_);
+      status = to_one_line(detail_);
       break;
   }
   std::string text = std::exchange(pending_, {});
   if (ready && !std::exchange(ready_sent_, ready)) text += "READY=1\n";
   if (alive && ready_sent_) text += "WATCHDOG=1\n";
-  if (!words.empty() && words != last_status_) text += "STATUS=" + words + "\n";
-  if (!words.empty()) last_status_ = words;
+  if (!status.empty() && status != last_status_) text += "STATUS=" + status + "\n";
+  if (!status.empty()) last_status_ = status;
   return text;
 }
 
 ServiceNotify::ServiceNotify() : enabled_(std::getenv("NOTIFY_SOCKET") != nullptr) {
   if (!enabled_) return;
-  thread_ = std::jthread([this, period = look_period()](const std::stop_token& stop) {
+  thread_ = std::jthread([this, period = message_period()](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     do {
       send_report();
@@ -108,13 +108,13 @@ ServiceNotify::ServiceNotify() : enabled_(std::getenv("NOTIFY_SOCKET") != nullpt
 }
 
 ServiceNotify::~ServiceNotify() {
-  thread_ = {};  // what was said last has been sent
+  thread_ = {};  // join first: the thread uses the other members
 }
 
-void ServiceNotify::waiting(const std::string& why) {
+void ServiceNotify::waiting(const std::string& reason) {
   update([&] {
     read_loop_status_ = nullptr;
-    report_.waiting(why);
+    report_.waiting(reason);
   });
 }
 
@@ -130,10 +130,10 @@ void ServiceNotify::loop_ended() noexcept {
   read_loop_status_ = nullptr;
 }
 
-void ServiceNotify::stopping(const std::string& words) {
+void ServiceNotify::stopping(const std::string& reason) {
   update([&] {
     read_loop_status_ = nullptr;
-    report_.stopping(words);
+    report_.stopping(reason);
   });
 }
 
@@ -156,7 +156,7 @@ void ServiceNotify::update(const std::function<void()>& change) {
   send_report();
 }
 
-/// Under mutex_.
+/// Precondition: mutex_ is locked.
 void ServiceNotify::send_report() {
   const std::string text =
       report_.next_message(read_loop_status_ ? std::optional(read_loop_status_()) : std::nullopt);

@@ -15,67 +15,67 @@
 
 namespace wrenchd {
 
-/// What the service manager wants to know of a servo loop, at one moment.
+/// State of a servo loop, as the service manager needs it.
 struct LoopStatus {
   State state = State::disconnected;
-  Fault cause = Fault::none;  ///< that led to it
-  std::uint64_t ticks = 0;    ///< since it was made
+  Fault cause = Fault::none;  ///< fault that led to the state
+  std::uint64_t ticks = 0;    ///< ticks since the loop was created
 };
 
-/// One line for a person who asks the service manager: the state, the device, and where a fault led to the
-/// state its sentence and its cure.
+/// Returns one line for `systemctl status`: state, device, and if a fault led to the state its message and
+/// cure. Not RT-safe: allocates.
 std::string status_text(const LoopStatus& loop, const std::string& device);
 
-/// What the service manager is to be told, look after look: assignments as sd_notify(3) has them. No I/O, no
-/// clock.
+/// Builds the messages to the service manager: assignments in the format of sd_notify(3). Does no I/O and
+/// reads no clock. Not RT-safe: allocates.
 ///
-/// READY=1 comes once: when the loop's first self-test is over, however it ended, or when the daemon waits
-/// for a device or for a person, which may take for ever. WATCHDOG=1 comes with every look at which nothing
-/// runs that could stand still; where a loop runs only if it has ticked since the look before.
+/// READY=1 is sent once: when the first self-test of the loop ends, or when the daemon waits for a device or
+/// a person. WATCHDOG=1 is in every message while no loop runs. While a loop runs, WATCHDOG=1 is in a message
+/// only if the loop has ticked since the previous message.
 class ServiceReport {
  public:
-  /// No loop runs from now on: why, in words.
-  void waiting(std::string why);
-  /// A loop runs, on this device.
+  /// No loop runs from now on; `reason` is for people.
+  void waiting(std::string reason);
+  /// A loop runs on this device from now on.
   void running(std::string device);
-  /// It is the end: no loop, nothing to wait for.
-  void stopping(std::string words);
-  /// A new configuration is being read; `monotonic_us` is now. Nothing else changes.
+  /// The daemon ends; `reason` is for people.
+  void stopping(std::string reason);
+  /// The daemon reads its configuration again. monotonic_us: current time.
   void reloading(std::uint64_t monotonic_us);
-  /// That is over, whatever came of it.
+  /// The reload has ended, with or without an error.
   void reloaded();
 
-  /// What to say now; empty: nothing. `loop`: where one runs.
+  /// Returns the next message; empty: nothing to send. loop: state of the running loop, if there is one.
   std::string next_message(const std::optional<LoopStatus>& loop);
 
  private:
   enum class Phase : std::uint8_t { starting, waiting, running, stopping };
   Phase phase_ = Phase::starting;
-  std::string detail_;       ///< why it waits, the device, or how it ends
-  std::string last_status_;  ///< the last status
-  std::string pending_;      ///< to be said with the next look
-  bool ready_sent_ = false;
-  std::optional<std::uint64_t> last_ticks_;  ///< at the look before
+  std::string detail_;                       ///< reason of waiting or stopping; device while running
+  std::string last_status_;                  ///< last STATUS= that was sent
+  std::string pending_;                      ///< assignments for the next message
+  bool ready_sent_ = false;                  ///< READY=1 was sent
+  std::optional<std::uint64_t> last_ticks_;  ///< tick count at the previous message
 };
 
-/// Tells the service manager (systemd, by the socket in $NOTIFY_SOCKET) how the daemon is, from a thread of
-/// its own. Where nobody asked to be told it does nothing. All of its functions may be called from any thread
-/// but the servo thread; they wait for one look at most.
+/// Sends the state of the daemon to the service manager (systemd, by the socket in $NOTIFY_SOCKET) from a
+/// thread of its own. Does nothing if $NOTIFY_SOCKET is not set. Any thread except the servo thread may call
+/// its functions. Not RT-safe: each function waits for at most one message.
 class ServiceNotify {
  public:
   using ReadLoopStatus = std::function<LoopStatus()>;
 
   ServiceNotify();
-  /// The last words are out when it returns.
+  /// Returns after the last message is sent.
   ~ServiceNotify();
   ServiceNotify(const ServiceNotify&) = delete;
   ServiceNotify& operator=(const ServiceNotify&) = delete;
 
-  void waiting(const std::string& why);
-  /// `loop` is called from the thread until waiting(), loop_ended() or stopping() is.
+  void waiting(const std::string& reason);
+  /// The thread calls `loop` until waiting(), loop_ended() or stopping() is called.
   void running(ReadLoopStatus loop, const std::string& device);
   void loop_ended() noexcept;
-  void stopping(const std::string& words);
+  void stopping(const std::string& reason);
   void reloading();
   void reloaded();
 
@@ -88,7 +88,7 @@ class ServiceNotify {
   std::condition_variable_any changed_;
   ServiceReport report_;
   ReadLoopStatus read_loop_status_;
-  std::jthread thread_;  ///< last: it uses all of the above
+  std::jthread thread_;  ///< last member: it uses the members above
 };
 
 }  // namespace wrenchd

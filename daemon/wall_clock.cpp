@@ -18,7 +18,8 @@ void WallClock::sleep_until(TimePoint t) noexcept {
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) continue;
 }
 
-/// CLOCK_BOOTTIME goes on in sleep, CLOCK_MONOTONIC does not. Both are read without a system call.
+/// CLOCK_BOOTTIME advances while the machine is suspended, CLOCK_MONOTONIC does not. Both are read without a
+/// system call.
 Duration WallClock::time_suspended() const noexcept {
   timespec boot{}, monotonic{};
   clock_gettime(CLOCK_BOOTTIME, &boot);

@@ -5,7 +5,8 @@
 
 namespace wrenchd {
 
-/// The machine's monotonic clock, slept on to absolute times, so that no drift adds up.
+/// The monotonic clock of the machine. It sleeps until absolute times, so drift does not accumulate. now()
+/// and time_suspended() are RT-safe. sleep_until() blocks until the time given.
 class WallClock final : public Clock {
  public:
   TimePoint now() const noexcept override;

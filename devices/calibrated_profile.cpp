@@ -37,8 +37,9 @@ JointAngles angles_in_rest(const DeviceProfile& profile) {
   if (!profile.has_rest_pose) return joint_angles(k, k.home_counts);
   const auto angles = inverse(k, inverse(profile.X_BD) * profile.homing.X_BR * inverse(profile.X_EH));
   if (angles) return *angles;
-  throw std::invalid_argument("device profile " + profile.name +
-                              ": homing: no joint angles hold the handle in the rest that is stated");
+  throw std::invalid_argument(
+      "device profile " + profile.name +
+      ": homing: no joint angles reach the stated reference pose; correct it in [homing]");
 }
 
 }  // namespace

@@ -9,25 +9,25 @@
 
 namespace wrenchd {
 
-// What was measured of one device goes into its profile, so that the poses come out true and nothing else has
-// to know of it. Of a device with joints that is an angle a joint, "joint_1" and so on:
+// The calibration of one device is applied to its profile, so that all later poses are correct. For a device
+// with joints, the calibration has one angle per joint, "joint_1" and so on:
 //
 //   true angle = reported angle - offset
 //
-// Of any other it is a PoseOffset (devices/homing.hpp), x y z rx ry rz.
+// For every other device it is a PoseOffset (devices/homing.hpp) with the axes x y z rx ry rz.
 
-/// The profile of the device that this was measured of. Throws std::invalid_argument for an axis that the
-/// profile does not have.
+/// Returns the profile with the calibration applied. Throws std::invalid_argument if the profile does not
+/// have one of the axes. Not RT-safe: allocates.
 DeviceProfile apply_calibration(DeviceProfile profile, const std::vector<AxisOffset>& offsets);
 
-/// The offsets of a device that reports this in its rest: the pose X_BH, and the joint angles where it has
-/// joints. Throws std::invalid_argument where the joints cannot hold the rest that the profile states. Not RT
-/// safe.
+/// Returns the offsets of a device in its reference pose, from the reported pose X_BH and the reported joint
+/// angles (used if the device has joints). Throws std::invalid_argument if no joint angles reach the
+/// reference pose of the profile. Not RT-safe: allocates.
 std::vector<AxisOffset> offsets_at_reference(const DeviceProfile& profile, const Pose& X_BH,
                                              const JointAngles& angles);
 
-/// What homing asks of a device of this profile: of the axes it senses, and with the home position of its
-/// joints as the rest where no other is stated.
+/// Returns the homing plan of a profile: it asks only for the sensed axes. If the profile of a device with
+/// joints states no reference pose, the home position is the reference pose. Not RT-safe: allocates.
 HomingPlan homing_plan(const DeviceProfile& profile);
 
 }  // namespace wrenchd

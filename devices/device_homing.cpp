@@ -5,7 +5,7 @@
 
 namespace wrenchd {
 
-/// A stored offset is never used here, so "once" is asked for like "each_start".
+/// A stored offset is not used here, so "once" also requests the reference pose.
 HomingPlan DeviceHoming::plan_with_reference(const DeviceProfile& profile) {
   HomingPlan plan = homing_plan(profile);
   if (plan.reference == ReferenceSchedule::once) plan.reference = ReferenceSchedule::each_start;
@@ -32,8 +32,8 @@ const HomingState& DeviceHoming::step(TimePoint now) {
   return state_;
 }
 
-/// The poses of this sample on are those of the device with its offsets, so the axes begin with a plan that
-/// asks for no rest.
+/// From this sample on the device applies the offsets, so the axes are checked with a plan without a
+/// reference pose.
 void DeviceHoming::apply_reference_offsets(const DeviceSample& sample) {
   offsets_ = pose_source(profile_) == PoseSource::joints
                  ? offsets_at_reference(profile_, sample.X_BH, device_.joint_angles())

@@ -9,29 +9,32 @@
 
 namespace wrenchd {
 
-/// Homes one opened device, motors off: first its rest, where the profile asks for one, which gives the
-/// offsets; then, with these taken over by the device, its axes. Homing (devices/homing.hpp) judges; here it
-/// is given what the device reports.
+/// Homes one opened device with its motors off. If the profile requires a reference, the first step measures
+/// the offsets in the reference pose and applies them to the device. Then it checks the axes. Homing
+/// (devices/homing.hpp) evaluates the samples; DeviceHoming reads them from the device. Not RT-safe:
+/// allocates.
 class DeviceHoming {
  public:
   enum class Extent : std::uint8_t {
-    reference_only,  ///< what a device needs at each start
-    full,            ///< a calibration: the rest and the axes
+    reference_only,  ///< only the reference pose, at each start
+    full,            ///< a full calibration: the reference pose and the axes
   };
 
-  /// The device has to be open; offsets that it took over before are forgotten. Throws std::invalid_argument
-  /// where the profile's plan cannot work.
+  /// The device must be open. Removes offsets that were applied before. Throws std::invalid_argument if the
+  /// homing plan of the profile is invalid.
   DeviceHoming(ProfileDevice& device, DeviceProfile profile, Extent extent);
 
-  /// Reads the device once, and sends it zeros. About once a millisecond; not RT safe.
+  /// Reads the device once and sends a zero wrench. Call it about once per millisecond. Not RT-safe:
+  /// allocates.
   const HomingState& step(TimePoint now);
-  /// A person says that the handle is in its rest.
+  /// The operator confirms that the handle is in the reference pose.
   void confirm() noexcept { homing_.confirm(); }
 
   const HomingState& state() const noexcept { return state_; }
-  /// What the rest has shown; empty before that, and where the profile asks for no rest.
+  /// Returns the measured offsets. Empty before the measurement, or if the profile requires no reference.
   const std::vector<AxisOffset>& offsets() const noexcept { return offsets_; }
-  bool device_lost() const noexcept { return device_lost_; }  ///< the device was unplugged on the way
+  /// True if the device was unplugged during homing.
+  bool device_lost() const noexcept { return device_lost_; }
 
  private:
   static HomingPlan plan_with_reference(const DeviceProfile& profile);
@@ -40,7 +43,7 @@ class DeviceHoming {
   ProfileDevice& device_;
   DeviceProfile profile_;
   Extent extent_;
-  bool reference_pending_;  ///< the rest has not been shown yet
+  bool reference_pending_;  ///< true until the reference pose has been measured
   Homing homing_;
   HomingState state_;
   std::vector<AxisOffset> offsets_;

@@ -11,13 +11,13 @@
 namespace wrenchd {
 namespace {
 
-constexpr std::array<std::uint8_t, 3> kHello = {0x0a, 0x43, 0x0d};
-constexpr std::array<std::uint8_t, 4> kHelloBack = {0x0a, 0x44, 0x2c, 0x0d};
+constexpr std::array<std::uint8_t, 3> kHandshake = {0x0a, 0x43, 0x0d};
+constexpr std::array<std::uint8_t, 4> kHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d};
 constexpr std::array<std::uint8_t, 1> kReady = {0x41};
-constexpr int kMostHellos = 100;
+constexpr int kMaxHandshakes = 100;
 constexpr std::size_t kBlock = 128;
 
-/// At the loader's latency a shorter timer loses the answers to the handshake.
+/// With a shorter latency timer the answers of the boot loader to the handshake are lost.
 constexpr std::uint16_t kLoaderLatency_ms = 16;
 constexpr std::uint16_t kPacketLatency_ms = 1;
 
@@ -26,7 +26,7 @@ void purge(SerialChip& chip) {
   chip.control(kFtdiReset, kFtdiPurgeOut);
 }
 
-/// Reads until so many bytes have come, or nothing more does.
+/// Reads until `wanted` bytes have arrived, or no more bytes arrive.
 std::vector<std::uint8_t> read_all(SerialChip& chip, std::size_t wanted) {
   std::vector<std::uint8_t> bytes;
   while (bytes.size() < wanted) {
@@ -37,16 +37,16 @@ std::vector<std::uint8_t> read_all(SerialChip& chip, std::size_t wanted) {
   return bytes;
 }
 
-bool shake_hands(SerialChip& chip) {
-  for (int i = 0; i < kMostHellos; ++i) {
-    chip.write(kHello);
-    const auto answer = read_all(chip, kHelloBack.size());
-    if (std::equal(answer.begin(), answer.end(), kHelloBack.begin(), kHelloBack.end())) return true;
+bool perform_handshake(SerialChip& chip) {
+  for (int i = 0; i < kMaxHandshakes; ++i) {
+    chip.write(kHandshake);
+    const auto answer = read_all(chip, kHandshakeReply.size());
+    if (std::equal(answer.begin(), answer.end(), kHandshakeReply.begin(), kHandshakeReply.end())) return true;
   }
   return false;
 }
 
-/// Empty where all went well.
+/// Returns the reason of a failure; empty on success.
 std::string try_to_load(SerialChip& chip, std::span<const std::uint8_t> firmware) {
   purge(chip);
   chip.control(kFtdiLatency, kLoaderLatency_ms);
@@ -56,19 +56,19 @@ std::string try_to_load(SerialChip& chip, std::span<const std::uint8_t> firmware
   chip.control(kFtdiModemControl, kFtdiRtsLow);
   chip.control(kFtdiModemControl, kFtdiDtrLow);
   chip.control(kFtdiModemControl, kFtdiDtrHigh);
-  if (!shake_hands(chip)) return "its loader does not answer";
+  if (!perform_handshake(chip)) return "its boot loader does not answer";
   chip.control(kFtdiModemControl, kFtdiDtrLow);
   chip.control(kFtdiBaudRate, kFtdiLoaderSpeed);
   chip.write(kReady);
   const auto ready = read_all(chip, kReady.size());
   if (!std::equal(ready.begin(), ready.end(), kReady.begin(), kReady.end()))
-    return "its loader is not ready for a firmware";
+    return "its boot loader is not ready for the firmware";
   for (std::size_t at = 0; at < firmware.size(); at += kBlock) {
     const auto block = firmware.subspan(at, std::min(kBlock, firmware.size() - at));
     chip.write(block);
     const auto echo = read_all(chip, block.size());
     if (!std::equal(echo.begin(), echo.end(), block.begin(), block.end()))
-      return "byte " + std::to_string(at) + " and after of the firmware came back wrong";
+      return "byte " + std::to_string(at) + " and later of the firmware were echoed wrongly";
   }
   return {};
 }
@@ -83,18 +83,18 @@ void falcon_resume(SerialChip& chip) {
 
 void falcon_start(SerialChip& chip, std::span<const std::uint8_t> firmware, int tries) {
   if (firmware.empty())
-    throw std::runtime_error("Falcon: the firmware is empty; name the file of the maker's SDK");
+    throw std::runtime_error("Falcon: the firmware is empty; set the file of the manufacturer's SDK");
   std::string problem;
   for (int i = 0; i < tries; ++i) {
     problem = try_to_load(chip, firmware);
     if (problem.empty()) return falcon_resume(chip);
   }
   throw std::runtime_error("Falcon: the firmware could not be loaded in " + std::to_string(tries) +
-                           " tries: " + problem + "; unplug its power and the cable, and try again");
+                           " attempts: " + problem + "; disconnect power and cable, and try again");
 }
 
 bool falcon_answers(SerialChip& chip) {
-  // Zeros, with homing mode on: without it a Falcon forgets where it is.
+  // Zero efforts with homing mode on; without homing mode a Falcon loses its homing.
   constexpr std::array<std::uint8_t, 16> kZeros = {'<', 'A', 'A', 'A', 'A', 'A', 'A', 'A',
                                                    'A', 'A', 'A', 'A', 'A', 'B', 'A', '>'};
   falcon_resume(chip);
@@ -109,12 +109,12 @@ void falcon_open(SerialChip& chip, const std::string& firmware_file) {
     throw std::runtime_error(
         "Falcon: it runs no firmware, and none is named; write a profile that inherits falcon, with the file "
         "of "
-        "the maker's SDK as firmware in [endpoints]");
+        "the manufacturer's SDK as firmware in [endpoints]");
   std::ifstream file(firmware_file, std::ios::binary);
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   if (!file || bytes.empty())
     throw std::runtime_error("Falcon: cannot read the firmware " + firmware_file +
-                             "; name the file of the maker's SDK");
+                             "; set the file of the manufacturer's SDK");
   falcon_start(chip, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 

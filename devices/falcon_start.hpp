@@ -9,38 +9,38 @@
 
 namespace wrenchd {
 
-/// An FTDI serial chip, as far as a Falcon needs it. A transport that reaches the device implements it:
-/// control() is a vendor request to the device (type 0x40, index 0), write() and read() are the bulk
-/// endpoints, and the two bytes of modem status before each packet are taken off. All of them may wait and
-/// throw. Not RT safe.
+/// Contract of an FTDI serial chip, as far as a Falcon needs it. control() is a vendor request to the device
+/// (type 0x40, index 0). write() and read() use the bulk endpoints; read() removes the two bytes of modem
+/// status before each packet. Not RT-safe: every function may wait and throw.
 class SerialChip {
  public:
   virtual ~SerialChip() = default;
   virtual void control(std::uint8_t request, std::uint16_t value) = 0;
   virtual void write(std::span<const std::uint8_t> bytes) = 0;
-  /// What has arrived, at most so many bytes; empty after a second of nothing.
+  /// Returns the bytes received, at most `most`. Returns an empty vector if nothing arrives within one
+  /// second.
   virtual std::vector<std::uint8_t> read(std::size_t most) = 0;
 };
 
-/// Brings a Falcon from power-on to where it exchanges packets: handshake with its loader, the firmware in
-/// blocks that it echoes, then the speed at which the firmware talks. Loading fails now and then on real
-/// devices, so it is tried `tries` times. Throws std::runtime_error that says what failed and what to do. Not
-/// RT safe. Facts: github.com/libnifalcon/libnifalcon, FalconComm.h, FalconCommLibUSB.cpp,
-/// FalconFirmware.cpp.
+/// Starts a Falcon after power-on: handshake with its boot loader, the firmware in blocks that the loader
+/// echoes, then the packet baud rate. Loading sometimes fails on real devices, so falcon_start() tries up to
+/// `tries` times. Throws std::runtime_error with the reason and the remedy. Not RT-safe: may take seconds.
+/// Source: github.com/libnifalcon/libnifalcon, FalconComm.h, FalconCommLibUSB.cpp, FalconFirmware.cpp.
 void falcon_start(SerialChip& chip, std::span<const std::uint8_t> firmware, int tries = 10);
 
-/// Only the speed: for a Falcon whose firmware is loaded already.
+/// Sets the packet baud rate, for a Falcon with a loaded firmware. Not RT-safe: waits for USB transfers.
 void falcon_resume(SerialChip& chip);
 
-/// Whether a firmware runs and answers: a packet of zeros brings one back. Motors stay at zero.
+/// Returns true if a firmware runs: it answers a packet of zeros, which keeps the motors at zero. Not
+/// RT-safe: may take a second.
 bool falcon_answers(SerialChip& chip);
 
-/// Brings a Falcon to where it exchanges packets, whatever state it is in: one that answers at the firmware's
-/// speed is left as it is, any other is started with the firmware in that file. Throws std::runtime_error,
-/// also where a firmware is needed and no file is named.
+/// Brings a Falcon from any state to packet exchange. If it answers at the packet baud rate, leaves its state
+/// unchanged; otherwise starts it with the firmware in the file. Throws std::runtime_error, also if a
+/// firmware is needed and no file is named. Not RT-safe: reads a file, may take seconds.
 void falcon_open(SerialChip& chip, const std::string& firmware_file);
 
-// What the FTDI chip is asked for, and with which values. For it and for what stands in for it.
+// Vendor requests of the FTDI chip and their values, for drivers and emulators.
 inline constexpr std::uint8_t kFtdiReset = 0;
 inline constexpr std::uint8_t kFtdiModemControl = 1;
 inline constexpr std::uint8_t kFtdiFlowControl = 2;

@@ -13,8 +13,8 @@ namespace {
 constexpr std::size_t kAxes = 6;
 constexpr std::array<const char*, kAxes> kNames = {"x", "y", "z", "rx", "ry", "rz"};
 
-/// The positive direction of each axis, as one would say it to the person who holds the handle.
-constexpr std::array<const char*, kAxes> kAsk = {
+/// Instruction for the positive direction of each axis.
+constexpr std::array<const char*, kAxes> kInstructions = {
     "Push the handle straight away from you.",
     "Move the handle straight to the left.",
     "Lift the handle straight up.",
@@ -23,16 +23,17 @@ constexpr std::array<const char*, kAxes> kAsk = {
     "Turn the handle to the left, counterclockwise as seen from above.",
 };
 
-/// Slower than this, sign and velocity are matters of noise and of the firmware's filter.
-constexpr double kMoving_m_per_s = 0.01;
-constexpr double kMoving_rad_per_s = 0.1;
-constexpr int kEnoughVelocities = 3;
+/// Below these velocities noise and the firmware filter determine the sign.
+constexpr double kMinSpeed_m_per_s = 0.01;
+constexpr double kMinSpeed_rad_per_s = 0.1;
+constexpr int kMinMismatches = 3;
 
-/// Way from one pose to another: along and about the axes of the base.
-Vector6d way_between(const Pose& from, const Pose& to) noexcept {
-  Vector6d way;
-  way << to.translation_m - from.translation_m, rotation_vector(to.rotation * from.rotation.conjugate());
-  return way;
+/// Returns translation and rotation vector from one pose to another, in the base.
+Vector6d displacement_between(const Pose& from, const Pose& to) noexcept {
+  Vector6d displacement;
+  displacement << to.translation_m - from.translation_m,
+      rotation_vector(to.rotation * from.rotation.conjugate());
+  return displacement;
 }
 
 void require(bool holds, const char* what) {
@@ -46,14 +47,14 @@ void check(const HomingPlan& plan) {
   require(plan.travel_rad > 0.0 && plan.travel_rad <= 1.5, "travel_rad must be above 0 and 1.5 at most");
   for (int i = 0; i < 3; ++i)
     require(plan.workspace_max_m[i] - plan.workspace_min_m[i] >= plan.travel_m,
-            "the workspace must be larger than the way that the handle is to be moved");
-  require(plan.max_rotation_rad >= plan.travel_rad, "max_turn_rad must be larger than travel_rad");
-  require(plan.max_offset_m >= 0.0 && plan.max_offset_rad >= 0.0, "the offsets allowed must not be negative");
+            "the workspace must be larger than travel_m");
+  require(plan.max_rotation_rad >= plan.travel_rad, "max_rotation_rad must be larger than travel_rad");
+  require(plan.max_offset_m >= 0.0 && plan.max_offset_rad >= 0.0, "the maximum offsets must not be negative");
   require(is_finite(plan.X_BR) && std::abs(plan.X_BR.rotation.norm() - 1.0) < 1e-6,
-          "the pose of the rest must be a pose");
+          "the reference pose must be finite, with a unit quaternion");
 }
 
-std::string sentence_of(const HomingState& state) {
+std::string problem_text(const HomingState& state) {
   const std::string axis = state.axis < kAxes ? kNames[state.axis] : "";
   switch (state.problem) {
     case HomingProblem::none:
@@ -61,38 +62,38 @@ std::string sentence_of(const HomingState& state) {
     case HomingProblem::device_fault:
       return "The device: " + std::string(fault_row(state.fault).message) + " ";
     case HomingProblem::not_at_reference:
-      return "The handle is too far from its rest, or the device counts from somewhere else. ";
+      return "The handle is too far from the reference pose, or the encoders started at a different pose. ";
     case HomingProblem::not_still:
-      return "The handle still moves. ";
+      return "The handle is still moving. ";
     case HomingProblem::wrong_axis:
       return std::string("That moved ") + kNames[state.moved_axis] + ", not " + axis + ". ";
     case HomingProblem::wrong_direction:
-      return "That moved " + axis + " the other way. ";
+      return "That moved " + axis + " in the opposite direction. ";
     case HomingProblem::velocity_sign_mismatch:
-      return "The velocity that the device reports along " + axis + " has another sign than its motion. ";
+      return "The velocity that the device reports along " + axis + " has the opposite sign of the motion. ";
     case HomingProblem::outside_workspace:
-      return "The pose is outside of the workspace in " + axis + ", where the handle cannot be. ";
+      return "The pose is outside the workspace in " + axis + ". ";
     case HomingProblem::stored_offset_too_large:
-      return "The stored calibration is farther off than the profile believes. ";
+      return "The stored calibration exceeds the maximum offset of the profile. ";
   }
   return "";
 }
 
-/// What to do when homing has failed of this.
-const char* cure_of(HomingProblem trouble) {
-  switch (trouble) {
+/// Returns the remedy after homing has failed.
+const char* remedy_text(HomingProblem problem) {
+  switch (problem) {
     case HomingProblem::wrong_axis:
-      return "Axes are exchanged: look at their order in the profile, and at the encoders' plugs.";
+      return "Axes are exchanged: check their order in the profile, and the plugs of the encoders.";
     case HomingProblem::wrong_direction:
-      return "Its sign is wrong: look at it in the profile, and at the encoder's plug.";
+      return "The sign is wrong: check it in the profile, and the plug of the encoder.";
     case HomingProblem::velocity_sign_mismatch:
-      return "Look at the sign of the velocity's step in the profile, or leave the velocity out.";
+      return "Check the sign of the velocity step in the profile, or leave the velocity out.";
     case HomingProblem::outside_workspace:
-      return "Calibrate the device, and look at the steps and the workspace in the profile.";
+      return "Calibrate the device, and check the steps and the workspace in the profile.";
     case HomingProblem::stored_offset_too_large:
       return "Calibrate the device again.";
     default:
-      return "Begin again.";
+      return "Start again.";
   }
 }
 
@@ -120,29 +121,29 @@ std::vector<AxisOffset> axis_offsets(const PoseOffset& offset) {
 std::optional<PoseOffset> pose_offset(const std::vector<AxisOffset>& offsets) {
   PoseOffset pose;
   for (const AxisOffset& offset : offsets) {
-    const auto* const found = std::find(kNames.begin(), kNames.end(), offset.axis);
-    if (found == kNames.end()) return {};
-    const auto i = found - kNames.begin();
+    const auto* const measured = std::find(kNames.begin(), kNames.end(), offset.axis);
+    if (measured == kNames.end()) return {};
+    const auto i = measured - kNames.begin();
     (i < 3 ? pose.position_m : pose.rotation_rad)[i % 3] = offset.offset;
   }
   return pose;
 }
 
 std::string operator_instruction(const HomingState& state) {
-  const std::string trouble = sentence_of(state);
+  const std::string problem = problem_text(state);
   switch (state.step) {
     case HomingStep::awaiting_sample:
-      return trouble + "Waiting for the device to report.";
+      return problem + "Waiting for the device to report.";
     case HomingStep::reference:
-      return trouble + "Put the handle into its rest, let go of it, and confirm.";
+      return problem + "Put the handle into its reference pose, release it, and confirm.";
     case HomingStep::holding_still:
-      return trouble + "Hold the handle still.";
+      return problem + "Hold the handle still.";
     case HomingStep::moving:
-      return trouble + kAsk[std::min(state.axis, kAxes - 1)];
+      return problem + kInstructions[std::min(state.axis, kAxes - 1)];
     case HomingStep::done:
       return "Homed: the device may be armed.";
     case HomingStep::failed:
-      return "Homing failed. " + trouble + cure_of(state.problem);
+      return "Homing failed. " + problem + remedy_text(state.problem);
   }
   return "";
 }
@@ -196,20 +197,20 @@ const HomingState& Homing::advance(const DeviceSample& sample, TimePoint now) no
 }
 
 void Homing::begin_first_step() noexcept {
-  const bool shown = plan_.reference == ReferenceSchedule::each_start ||
-                     (plan_.reference == ReferenceSchedule::once && !has_stored_);
-  if (shown) {
+  const bool needs_reference = plan_.reference == ReferenceSchedule::each_start ||
+                               (plan_.reference == ReferenceSchedule::once && !has_stored_);
+  if (needs_reference) {
     state_.step = HomingStep::reference;
     return;
   }
-  const bool believable =
+  const bool plausible =
       offset_.position_m.norm() <= plan_.max_offset_m && offset_.rotation_rad.norm() <= plan_.max_offset_rad;
-  if (has_stored_ && !believable) return fail(HomingProblem::stored_offset_too_large, 0);
+  if (has_stored_ && !plausible) return fail(HomingProblem::stored_offset_too_large, 0);
   state_.axis = 0;
   next_axis();
 }
 
-/// From the one in the state on; behind the last, settling leads to done.
+/// Skips axes that are not sensed. After the last axis, holding_still leads to done.
 void Homing::next_axis() noexcept {
   while (state_.axis < kAxes && !plan_.sensed[state_.axis]) ++state_.axis;
   state_.step = HomingStep::holding_still;
@@ -231,13 +232,14 @@ void Homing::measure_reference(const DeviceSample& sample, TimePoint now) noexce
   const double share = 1.0 / static_cast<double>(offset_count_);
   const Pose mean{anchor_->rotation * rotation_from(share * offset_sum_.rotation_rad),
                   anchor_->translation_m + share * offset_sum_.position_m};
-  const PoseOffset found = offset_between(mean, plan_.X_BR);
+  const PoseOffset measured = offset_between(mean, plan_.X_BR);
   reference_confirmed_ = false;
-  if (!(found.position_m.norm() <= plan_.max_offset_m && found.rotation_rad.norm() <= plan_.max_offset_rad)) {
+  if (!(measured.position_m.norm() <= plan_.max_offset_m &&
+        measured.rotation_rad.norm() <= plan_.max_offset_rad)) {
     state_.problem = HomingProblem::not_at_reference;
     return;
   }
-  offset_ = found;
+  offset_ = measured;
   state_.axis = 0;
   next_axis();
 }
@@ -258,29 +260,29 @@ void Homing::wait_until_still(const Pose& X_BH, TimePoint now) noexcept {
   velocity_matches_ = velocity_mismatches_ = 0;
 }
 
-/// The first axis of its kind that went far enough decides which one was moved.
+/// The first axis of the requested kind that moves far enough counts as the moved axis.
 void Homing::track_motion(const DeviceSample& sample, const Pose& X_BH) noexcept {
   compare_velocity(sample, X_BH);
-  const bool turn = state_.axis >= 3;
-  const double enough = turn ? plan_.travel_rad : plan_.travel_m;
-  const Vector6d way = way_between(*anchor_, X_BH);
-  state_.progress = std::clamp(way[static_cast<Eigen::Index>(state_.axis)] / enough, 0.0, 1.0);
+  const bool rotation = state_.axis >= 3;
+  const double travel = rotation ? plan_.travel_rad : plan_.travel_m;
+  const Vector6d displacement = displacement_between(*anchor_, X_BH);
+  state_.progress = std::clamp(displacement[static_cast<Eigen::Index>(state_.axis)] / travel, 0.0, 1.0);
   Eigen::Index moved = 0;
-  const double farthest = way.segment<3>(turn ? 3 : 0).cwiseAbs().maxCoeff(&moved);
-  if (turn) moved += 3;
-  if (farthest >= enough) finish_axis(static_cast<std::size_t>(moved), way[moved] > 0.0);
+  const double largest = displacement.segment<3>(rotation ? 3 : 0).cwiseAbs().maxCoeff(&moved);
+  if (rotation) moved += 3;
+  if (largest >= travel) finish_axis(static_cast<std::size_t>(moved), displacement[moved] > 0.0);
 }
 
-/// Zero velocities are those of a device that reports none.
+/// A device that reports no velocities sends zeros, which do not count.
 void Homing::compare_velocity(const DeviceSample& sample, const Pose& X_BH) noexcept {
-  const double passed_s = sample.device_time_s - previous_time_s_;
-  if (previous_pose_ && passed_s > 0.0) {
+  const double elapsed_s = sample.device_time_s - previous_time_s_;
+  if (previous_pose_ && elapsed_s > 0.0) {
     Vector6d V;
     V << sample.V_BH.linear_m_per_s, sample.V_BH.angular_rad_per_s;
     const auto axis = static_cast<Eigen::Index>(state_.axis);
-    const double least = state_.axis < 3 ? kMoving_m_per_s : kMoving_rad_per_s;
-    const double differenced = way_between(*previous_pose_, X_BH)[axis] / passed_s;
-    if (std::abs(V[axis]) > least && std::abs(differenced) > least)
+    const double min_speed = state_.axis < 3 ? kMinSpeed_m_per_s : kMinSpeed_rad_per_s;
+    const double differenced = displacement_between(*previous_pose_, X_BH)[axis] / elapsed_s;
+    if (std::abs(V[axis]) > min_speed && std::abs(differenced) > min_speed)
       ++((V[axis] > 0.0) == (differenced > 0.0) ? velocity_matches_ : velocity_mismatches_);
   }
   previous_pose_ = X_BH;
@@ -289,23 +291,23 @@ void Homing::compare_velocity(const DeviceSample& sample, const Pose& X_BH) noex
 
 void Homing::finish_axis(std::size_t moved, bool forward) noexcept {
   if (moved == state_.axis && forward) {
-    if (velocity_mismatches_ >= kEnoughVelocities && velocity_mismatches_ > velocity_matches_)
+    if (velocity_mismatches_ >= kMinMismatches && velocity_mismatches_ > velocity_matches_)
       return fail(HomingProblem::velocity_sign_mismatch, moved);
     ++state_.axis;
     return next_axis();
   }
-  const HomingProblem trouble =
+  const HomingProblem problem =
       moved == state_.axis ? HomingProblem::wrong_direction : HomingProblem::wrong_axis;
   state_.moved_axis = moved;
-  if (axis_retried_) return fail(trouble, state_.axis);
+  if (axis_retried_) return fail(problem, state_.axis);
   axis_retried_ = true;
-  state_.problem = trouble;
+  state_.problem = problem;
   state_.step = HomingStep::holding_still;
   state_.progress = 0.0;
   anchor_.reset();
 }
 
-/// Fails where it is not. What is not a number is nowhere.
+/// Fails homing if the pose is outside the workspace or not finite.
 bool Homing::within_workspace(const Pose& X_BH) noexcept {
   const Vector3d& p = X_BH.translation_m;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -313,17 +315,17 @@ bool Homing::within_workspace(const Pose& X_BH) noexcept {
     fail(HomingProblem::outside_workspace, static_cast<std::size_t>(i));
     return false;
   }
-  const Vector3d turn = rotation_vector(X_BH.rotation);
-  if (turn.norm() <= plan_.max_rotation_rad) return true;
+  const Vector3d rotation = rotation_vector(X_BH.rotation);
+  if (rotation.norm() <= plan_.max_rotation_rad) return true;
   Eigen::Index most = 0;
-  turn.cwiseAbs().maxCoeff(&most);
+  rotation.cwiseAbs().maxCoeff(&most);
   fail(HomingProblem::outside_workspace, 3 + static_cast<std::size_t>(most));
   return false;
 }
 
-void Homing::fail(HomingProblem trouble, std::size_t axis) noexcept {
+void Homing::fail(HomingProblem problem, std::size_t axis) noexcept {
   state_.step = HomingStep::failed;
-  state_.problem = trouble;
+  state_.problem = problem;
   state_.axis = axis;
   state_.progress = 0.0;
 }
@@ -335,17 +337,17 @@ void Homing::set_anchor(const Pose& X_BH, TimePoint now) noexcept {
   offset_count_ = 0;
 }
 
-/// How long the handle has been where it is; the mean of its poses since then is kept.
+/// Returns how long the handle has been still, and sums its poses for the mean.
 double Homing::time_still_s(const Pose& X_BH, TimePoint now) noexcept {
-  const PoseOffset away = anchor_ ? offset_between(X_BH, *anchor_) : PoseOffset{};
+  const PoseOffset offset = anchor_ ? offset_between(X_BH, *anchor_) : PoseOffset{};
   if (!anchor_ ||
-      !(away.position_m.norm() <= kStillTolerance_m && away.rotation_rad.norm() <= kStillTolerance_rad)) {
+      !(offset.position_m.norm() <= kStillTolerance_m && offset.rotation_rad.norm() <= kStillTolerance_rad)) {
     set_anchor(X_BH, now);
     offset_count_ = 1;
     return 0.0;
   }
-  offset_sum_.position_m += away.position_m;
-  offset_sum_.rotation_rad += away.rotation_rad;
+  offset_sum_.position_m += offset.position_m;
+  offset_sum_.rotation_rad += offset.rotation_rad;
   ++offset_count_;
   return seconds(now - anchor_time_);
 }

@@ -27,7 +27,7 @@ Quaterniond about_z(double angle) noexcept {
   return Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitZ()));
 }
 
-/// An acos or sqrt argument that rounding may have pushed out of its range by this much still counts.
+/// Tolerance for arguments of acos and sqrt that leave their range through rounding.
 constexpr double kRounding = 1e-12;
 
 // --- capstan arm ------------------------------------------------------------------------------------------
@@ -43,8 +43,7 @@ Pose arm_forward(const Kinematics& k, const JointAngles& t) noexcept {
   return X_DE;
 }
 
-/// The wrist: R = Rx(tD) Ry(tE) Rx(tF), tE taken from 0 to pi. Where tE is 0 only the sum tD + tF is known,
-/// and all of it is given to tF.
+/// Wrist: R = Rx(tD) Ry(tE) Rx(tF) with tE in 0 .. pi. If tE = 0, only tD + tF is determined; then tD = 0.
 void wrist_inverse(const Matrix3d& R, JointAngles& t) noexcept {
   const double sin_E = std::hypot(R(0, 1), R(0, 2));
   t[4] = std::atan2(sin_E, R(0, 0));
@@ -57,14 +56,14 @@ void wrist_inverse(const Matrix3d& R, JointAngles& t) noexcept {
   t[5] = std::atan2(R(0, 1), R(0, 2));
 }
 
-/// Bodies b and c are a planar arm of two links, in the half plane at the angle tA: height and reach of E
-/// over the shoulder are  b [cos, sin](tB) + c [cos, sin](pi - tC).
+/// Bodies b and c are a planar arm with two links in the half plane at the angle tA. Height and reach of E
+/// relative to the shoulder:  b [cos, sin](tB) + c [cos, sin](pi - tC).
 std::optional<JointAngles> arm_inverse(const Kinematics& k, const Pose& X_DE) noexcept {
   const double a = k.length_m.x(), b = k.length_m.y(), c = k.length_m.z();
   const Vector3d p = X_DE.translation_m + k.origin_m;
   const double reach = std::hypot(p.x(), p.y()), height = p.z() - a;
-  const double far = std::hypot(reach, height);
-  const double cos_b = (b * b + far * far - c * c) / (2.0 * b * far);
+  const double distance = std::hypot(reach, height);
+  const double cos_b = (b * b + distance * distance - c * c) / (2.0 * b * distance);
   if (!(std::abs(cos_b) <= 1.0 + kRounding)) return {};
   JointAngles t{};
   t[0] = std::atan2(p.y(), p.x());
@@ -89,11 +88,11 @@ Matrix3d arm_jacobian(const Kinematics& k, const JointAngles& t) noexcept {
 
 // --- delta ------------------------------------------------------------------------------------------------
 
-/// E as one leg sees it.
+/// Position of E in the axes of one leg.
 struct Leg {
   double u, v, w;
-  double rho;      ///< length of the shin in the plane of u and w
-  double drho_dv;  ///< how it changes along v
+  double rho;      ///< length of the shin projected onto the plane of u and w
+  double drho_dv;  ///< derivative of rho with respect to v
 };
 
 std::optional<Leg> leg_at(const Kinematics& k, std::size_t i, const Vector3d& p) noexcept {
@@ -102,22 +101,22 @@ std::optional<Leg> leg_at(const Kinematics& k, std::size_t i, const Vector3d& p)
   leg.u = p.x() * cos_phi + p.y() * sin_phi - k.leg_base_m.x();
   leg.v = p.y() * cos_phi - p.x() * sin_phi - k.leg_base_m.y();
   leg.w = p.z();
-  const double aside = leg.v + k.shin_joint_m.z();
-  const double along2 = k.shin_m * k.shin_m - aside * aside;
-  if (!(along2 > 0.0)) return {};
-  const double along = std::sqrt(along2);
-  leg.rho = k.shin_joint_m.y() + along;
-  leg.drho_dv = -aside / along;
+  const double lateral = leg.v + k.shin_joint_m.z();
+  const double projected2 = k.shin_m * k.shin_m - lateral * lateral;
+  if (!(projected2 > 0.0)) return {};
+  const double projected = std::sqrt(projected2);
+  leg.rho = k.shin_joint_m.y() + projected;
+  leg.drho_dv = -lateral / projected;
   return leg;
 }
 
-/// The thigh's angle t:  U cos t + w sin t = K  with  U = u + c,  K = (U^2 + w^2 + a^2 - rho^2) / (2 a).
-/// Of the two answers the lower is the knee that points outward, as the device is built.
+/// Thigh angle t:  U cos t + w sin t = K  with  U = u + c,  K = (U^2 + w^2 + a^2 - rho^2) / (2 a). The
+/// smaller of the two solutions has the knee outward, as in the real device.
 std::optional<double> thigh_angle(const Kinematics& k, const Leg& leg) noexcept {
   const double a = k.thigh_m;
   const double U = leg.u + k.shin_joint_m.x();
-  const double far = std::hypot(U, leg.w);
-  const double cos_delta = (far * far + a * a - leg.rho * leg.rho) / (2.0 * a * far);
+  const double distance = std::hypot(U, leg.w);
+  const double cos_delta = (distance * distance + a * a - leg.rho * leg.rho) / (2.0 * a * distance);
   if (!(std::abs(cos_delta) <= 1.0 + kRounding)) return {};
   return std::atan2(leg.w, U) - std::acos(std::clamp(cos_delta, -1.0, 1.0));
 }
@@ -134,8 +133,8 @@ std::optional<JointAngles> delta_inverse(const Kinematics& k, const Vector3d& p)
   return t;
 }
 
-/// dt/dp, from the derivative of the equation that ties t to p:  g = (U - a cos t)^2 + (w - a sin t)^2 -
-/// rho^2.
+/// Returns dt/dp from the derivative of the constraint between t and p:  g = (U - a cos t)^2 + (w - a sin
+/// t)^2 - rho^2.
 Matrix3d delta_inverse_jacobian(const Kinematics& k, const JointAngles& t, const Vector3d& p) noexcept {
   const double a = k.thigh_m;
   Matrix3d J = Matrix3d::Zero();
@@ -143,63 +142,65 @@ Matrix3d delta_inverse_jacobian(const Kinematics& k, const JointAngles& t, const
     const std::optional<Leg> leg = leg_at(k, i, p);
     if (!leg) return Matrix3d::Zero();
     const double cos_phi = cos(k.leg_angle_rad[i]), sin_phi = sin(k.leg_angle_rad[i]);
-    const double out = leg->u + k.shin_joint_m.x() - a * cos(t[i]);
-    const double up = leg->w - a * sin(t[i]);
+    const double radial = leg->u + k.shin_joint_m.x() - a * cos(t[i]);
+    const double vertical = leg->w - a * sin(t[i]);
     const double g_v = -leg->rho * leg->drho_dv;
-    const double g_t = a * (out * sin(t[i]) - up * cos(t[i]));
+    const double g_t = a * (radial * sin(t[i]) - vertical * cos(t[i]));
     const auto row = static_cast<Eigen::Index>(i);
-    J.row(row) << out * cos_phi - g_v * sin_phi, out * sin_phi + g_v * cos_phi, up;
+    J.row(row) << radial * cos_phi - g_v * sin_phi, radial * sin_phi + g_v * cos_phi, vertical;
     J.row(row) /= -g_t;
   }
   return J;
 }
 
-/// Newton's method from the last position: the hand moves a millimetre between reports, so two or three steps
-/// do. A step is halved until it leads to a place within reach whose angles are nearer to those wanted.
-constexpr int kMostNewtonSteps = 40;
-constexpr int kMostHalvings = 12;
+/// Newton's method from the previous position. The handle moves about a millimetre between reports, so two or
+/// three steps are enough. A step is halved until it leads to a reachable position with a smaller angle
+/// error.
+constexpr int kMaxNewtonSteps = 40;
+constexpr int kMaxHalvings = 12;
 constexpr double kAngleTolerance_rad = 1e-13;
-/// What may be left where no step leads nearer: rounding, of the acos at a stretched leg at worst.
-constexpr double kWorstAngle_rad = 1e-9;
-/// Where the search begins when nothing is known: in the middle of the Falcon's workspace, in parts of b. A
-/// last position below half of it is none: there the legs fold through each other, and a second answer is
-/// near.
-constexpr double kMiddle = 1.2;
-constexpr double kLowest = 0.6;
+/// Accepted angle error if no step reduces it further. The largest rounding error is that of the acos at a
+/// stretched leg.
+constexpr double kAcceptedError_rad = 1e-9;
+/// Height of the initial guess without a previous position, as a multiple of b: the middle of the Falcon's
+/// workspace. A previous position below kLowest is not used: there the legs intersect, and a second solution
+/// is near.
+constexpr double kInitialHeight = 1.2;
+constexpr double kMinHeight = 0.6;
 
-std::optional<Pose> delta_from(const Kinematics& k, const JointAngles& wanted, Vector3d p) noexcept {
+std::optional<Pose> delta_from(const Kinematics& k, const JointAngles& target, Vector3d p) noexcept {
   std::optional<JointAngles> t = delta_inverse(k, p);
-  const auto miss_of = [&](const JointAngles& angles) {
-    return Vector3d(wanted[0] - angles[0], wanted[1] - angles[1], wanted[2] - angles[2]);
+  const auto error_of = [&](const JointAngles& angles) {
+    return Vector3d(target[0] - angles[0], target[1] - angles[1], target[2] - angles[2]);
   };
   if (!t) return {};
-  Vector3d miss = miss_of(*t);
-  for (int step = 0; step < kMostNewtonSteps && is_finite(miss); ++step) {
-    if (miss.cwiseAbs().maxCoeff() < kAngleTolerance_rad) break;
+  Vector3d error = error_of(*t);
+  for (int iteration = 0; iteration < kMaxNewtonSteps && is_finite(error); ++iteration) {
+    if (error.cwiseAbs().maxCoeff() < kAngleTolerance_rad) break;
     Matrix3d J;
     bool invertible = false;
     delta_inverse_jacobian(k, *t, p).computeInverseWithCheck(J, invertible);
     if (!invertible) break;
-    Vector3d way = J * miss;
-    bool nearer = false;
-    for (int i = 0; i < kMostHalvings && !nearer; ++i, way *= 0.5) {
-      const std::optional<JointAngles> next = delta_inverse(k, p + way);
-      nearer = next && miss_of(*next).norm() < miss.norm();
-      if (!nearer) continue;
-      p += way;
+    Vector3d step = J * error;
+    bool improved = false;
+    for (int i = 0; i < kMaxHalvings && !improved; ++i, step *= 0.5) {
+      const std::optional<JointAngles> next = delta_inverse(k, p + step);
+      improved = next && error_of(*next).norm() < error.norm();
+      if (!improved) continue;
+      p += step;
       t = next;
     }
-    if (!nearer) break;
-    miss = miss_of(*t);
+    if (!improved) break;
+    error = error_of(*t);
   }
-  if (!is_finite(miss) || miss.cwiseAbs().maxCoeff() > kWorstAngle_rad) return {};
+  if (!is_finite(error) || error.cwiseAbs().maxCoeff() > kAcceptedError_rad) return {};
   return Pose{Quaterniond::Identity(), p};
 }
 
-std::optional<Pose> delta_forward(const Kinematics& k, const JointAngles& wanted, const Pose& near) noexcept {
+std::optional<Pose> delta_forward(const Kinematics& k, const JointAngles& target, const Pose& near) noexcept {
   std::optional<Pose> found;
-  if (near.translation_m.z() > kLowest * k.shin_m) found = delta_from(k, wanted, near.translation_m);
-  return found ? found : delta_from(k, wanted, {0.0, 0.0, kMiddle * k.shin_m});
+  if (near.translation_m.z() > kMinHeight * k.shin_m) found = delta_from(k, target, near.translation_m);
+  return found ? found : delta_from(k, target, {0.0, 0.0, kInitialHeight * k.shin_m});
 }
 
 }  // namespace
@@ -219,12 +220,12 @@ JointCounts joint_counts(const Kinematics& k, const JointAngles& angles) noexcep
 }
 
 JointCounts strip_count_button(const Kinematics& k, JointCounts counts, std::uint32_t& buttons) noexcept {
-  const Kinematics::CountButton& hidden = k.count_button;
-  if (!hidden.present) return counts;
-  const std::uint32_t bit = std::uint32_t{1} << hidden.button;
+  const Kinematics::CountButton& button = k.count_button;
+  if (!button.present) return counts;
+  const std::uint32_t bit = std::uint32_t{1} << button.button;
   buttons &= ~bit;
-  if (counts[hidden.report_index] > hidden.threshold_counts) {
-    counts[hidden.report_index] -= hidden.offset_counts;
+  if (counts[button.report_index] > button.threshold_counts) {
+    counts[button.report_index] -= button.offset_counts;
     buttons |= bit;
   }
   return counts;
@@ -266,14 +267,14 @@ Matrix3d jacobian(const Kinematics& k, const JointAngles& angles, const Pose& X_
 MotorEfforts motor_efforts(const Kinematics& k, const Matrix3d& J, const Vector3d& force_N) noexcept {
   const Vector3d tau = J.transpose() * force_N;
   MotorEfforts efforts{};
-  double most = 0.0;
+  double max_effort = 0.0;
   for (std::size_t i = 0; i < kMaxMotors; ++i) {
     efforts[i] = k.effort_per_Nm[i] * tau[static_cast<Eigen::Index>(i)];
     if (!is_finite(efforts[i])) return {};
-    most = std::max(most, std::abs(efforts[i]));
+    max_effort = std::max(max_effort, std::abs(efforts[i]));
   }
-  if (most > k.max_effort)
-    for (double& effort : efforts) effort *= k.max_effort / most;
+  if (max_effort > k.max_effort)
+    for (double& effort : efforts) effort *= k.max_effort / max_effort;
   return efforts;
 }
 

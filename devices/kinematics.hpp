@@ -8,62 +8,66 @@
 
 namespace wrenchd {
 
-/// Joint angles [rad], the driven ones first.
+/// Joint angles [rad], the driven joints first.
 using JointAngles = std::array<double, kMaxJoints>;
-/// One number a report integer: what the encoders count, before any scale.
+/// Encoder counts, one per integer of the report, before any scaling.
 using JointCounts = std::array<double, kMaxJoints>;
-/// One number a motor, in what the device's efforts are counted in.
+/// Motor efforts, one per motor, in the unit of the efforts of the profile.
 using MotorEfforts = std::array<double, kMaxMotors>;
 
-// Encoders to pose, and force to motors, for devices that leave both to the host. D = the device's own base
-// axes, E = its end: for these devices the point where the axes of the wrist meet. Everything is RT safe.
+// Encoder counts to pose, and force to motor efforts, for devices without kinematics of their own. D = the
+// device's own frame, E = its end frame; its origin is the intersection of the wrist axes. All functions are
+// RT-safe.
 //
-// capstan_arm (WoodenHaptics, Polhem 1). Body a turns about the vertical by tA, bodies b and c lean out by tB
-// and tC from it; each motor stays where it is, so tC is an angle in space and not one between b and c.
-// Lengths a, b, c; the facts are those of github.com/forsslund/haptikfabrikenapi, src/kinematics.cpp.
+// capstan_arm (WoodenHaptics, Polhem 1). Body a rotates about the vertical by tA. Bodies b and c tilt by tB
+// and tC from the vertical. All motors are fixed to body a, so tC is an angle in space and not an angle
+// between b and c. Lengths a, b, c. Source: github.com/forsslund/haptikfabrikenapi, src/kinematics.cpp.
 //
 //   r = b sin tB + c sin tC
 //   p_DE = [ r cos tA,  r sin tA,  a + b cos tB - c cos tC ] - origin
 //   R_DE = Rz(tA) Ry(pi/2 - tC) Rx(tD) Ry(tE) Rx(tF)         with three more encoders, else 1
 //
-// delta (Novint Falcon): Stamper's three legs with parallelograms. Leg i stands at the angle phi_i about z;
-// in its own axes u (outward), v (along the hinge), w = z. Letters and numbers are those of
-// github.com/libnifalcon/libnifalcon, FalconGeometry.h and FalconKinematicStamper.cpp.
+// delta (Novint Falcon): Stamper's three legs with parallelograms. Leg i is at the angle phi_i about z. Its
+// own axes are u (outward), v (along the hinge), w = z. Symbols as in github.com/libnifalcon/libnifalcon,
+// FalconGeometry.h and FalconKinematicStamper.cpp.
 //
 //   u = x cos phi + y sin phi - r
 //   v = y cos phi - x sin phi - s
 //   rho = d + e + sqrt(b^2 - (v + f)^2)
-//   (u + c - a cos t)^2 + (w - a sin t)^2 = rho^2            ties the angle t of the thigh to p_DE
+//   (u + c - a cos t)^2 + (w - a sin t)^2 = rho^2            relates the thigh angle t to p_DE
 
-/// Joint angles of what the encoders count.
+/// Returns the joint angles of encoder counts. RT-safe.
 JointAngles joint_angles(const Kinematics& kinematics, const JointCounts& counts) noexcept;
-/// The counts, not rounded, at which the encoders stand for these angles.
+/// Returns the encoder counts of joint angles, not rounded. RT-safe.
 JointCounts joint_counts(const Kinematics& kinematics, const JointAngles& angles) noexcept;
 
-/// The counts without the button that hides in one of them; adds it to `buttons`.
+/// Returns the counts without the offset of a button that is coded in one of them, and sets the button in
+/// `buttons`. RT-safe.
 JointCounts strip_count_button(const Kinematics& kinematics, JointCounts counts,
                                std::uint32_t& buttons) noexcept;
 
-/// X_DE of joint angles. `near`: where E was last; the delta is solved from there by Newton's method. Empty
-/// where no position belongs to these angles: an encoder that lies.
+/// Returns X_DE of joint angles. `near`: initial guess for the Newton iteration of the delta, the previous
+/// pose of E. Empty if no pose exists for these angles, for example after an encoder error. RT-safe.
 std::optional<Pose> forward_kinematics(const Kinematics& kinematics, const JointAngles& angles,
                                        const Pose& near) noexcept;
 
-/// Angles that hold E at X_DE: of the two the one with the elbow as the device is built. What the joints
-/// cannot do (the orientation, without a wrist) is left out. Empty out of reach.
+/// Returns the joint angles at which E is at X_DE. Of the two solutions, returns the one with the elbow of
+/// the real device. Without a wrist, ignores the orientation. Empty if X_DE is out of reach. RT-safe.
 std::optional<JointAngles> inverse(const Kinematics& kinematics, const Pose& X_DE) noexcept;
 
-/// dp_DE / dt of the driven joints, in D [m/rad]. `angles` and `X_DE` belong together.
+/// Returns dp_DE / dt of the driven joints, in D [m/rad]. X_DE must be the pose of `angles`. RT-safe.
 Matrix3d jacobian(const Kinematics& kinematics, const JointAngles& angles, const Pose& X_DE) noexcept;
 
-/// What the motors are told for a force on the hand at E, in D [N]:
+/// Returns the motor efforts for a force on the hand at E, in D [N]:
 ///
-///   tau = J' f,   effort_i = effort_per_Nm_i tau_i,   all cut by one factor to max_effort
+///   tau = J' f,   effort_i = effort_per_Nm_i tau_i,   all scaled by one factor to at most max_effort
+///
+/// RT-safe.
 MotorEfforts motor_efforts(const Kinematics& kinematics, const Matrix3d& J, const Vector3d& force_N) noexcept;
-/// The torques about the joints that efforts make [N.m].
+/// Returns the joint torques of motor efforts [N.m]. RT-safe.
 Vector3d joint_torques(const Kinematics& kinematics, const MotorEfforts& efforts) noexcept;
 
-/// E at the home position: what the encoders say there is in the profile.
+/// Returns X_DE at the home position; the profile has its encoder counts. RT-safe.
 std::optional<Pose> home_pose(const Kinematics& kinematics) noexcept;
 
 }  // namespace wrenchd

@@ -8,20 +8,20 @@
 namespace wrenchd {
 namespace {
 
-/// One of the equal fields that an item of the descriptor declares.
+/// One of the equal fields of an item of the descriptor.
 struct Cell {
   const DescribedField* field;
   std::size_t index;
 
   std::size_t begin() const { return field->bit + field->bits * index; }
   std::size_t end() const { return begin() + field->bits; }
-  /// Only the maker knows what it is.
-  bool of_maker() const {
+  /// Vendor-defined; only the vendor knows its meaning.
+  bool vendor_defined() const {
     const auto usage = field->usage(index);
     return !usage || usage->page >= kFirstVendorPage;
   }
-  /// A byte of which the device says nothing but that it is there.
-  bool opaque() const { return field->bits == 8 && !field->constant && of_maker(); }
+  /// A vendor-defined byte without further structure.
+  bool opaque() const { return field->bits == 8 && !field->constant && vendor_defined(); }
 };
 
 std::string id_text(std::optional<std::uint8_t> id) {
@@ -52,14 +52,14 @@ std::string text(const Cell& cell) {
 }
 
 std::string text(const std::vector<Cell>& cells) {
-  constexpr std::size_t kEnough = 3;
+  constexpr std::size_t kMaxListed = 3;
   std::string all;
-  for (std::size_t i = 0; i < std::min(cells.size(), kEnough); ++i)
+  for (std::size_t i = 0; i < std::min(cells.size(), kMaxListed); ++i)
     all += (i > 0 ? "; " : "") + text(cells[i]);
-  return all + (cells.size() > kEnough ? "; and more" : "");
+  return all + (cells.size() > kMaxListed ? "; and more" : "");
 }
 
-/// The device's fields that have a bit in [begin, end).
+/// Returns the device's fields that have a bit in [begin, end).
 std::vector<Cell> cells_within(const DescribedReport& report, std::size_t begin, std::size_t end) {
   std::vector<Cell> cells;
   for (const DescribedField& field : report.fields) {
@@ -70,7 +70,7 @@ std::vector<Cell> cells_within(const DescribedReport& report, std::size_t begin,
   return cells;
 }
 
-/// May somebody read [begin, end) as one integer, when the device has these cells there?
+/// Returns true if [begin, end) can be read as one integer, given the device's cells there.
 bool agrees(const std::vector<Cell>& cells, std::size_t begin, std::size_t end, bool is_signed) {
   const auto all = [&](auto holds) { return std::all_of(cells.begin(), cells.end(), holds); };
   if (all([](const Cell& cell) { return cell.field->constant; })) return false;
@@ -78,32 +78,34 @@ bool agrees(const std::vector<Cell>& cells, std::size_t begin, std::size_t end, 
   if (cells.size() == 1) {
     const bool whole = cells[0].begin() == begin && cells[0].end() == end;
     if (whole) return cells[0].field->bits == 1 || cells[0].field->is_signed() == is_signed;
-    return cells[0].of_maker() && !is_signed;  // some bits of a maker's own word
+    return cells[0].vendor_defined() && !is_signed;  // some bits of a vendor-defined word
   }
-  // A mask: bits put together, and padding where they do not fill it.
+  // A mask: single bits, and padding in unused positions.
   return all([](const Cell& cell) { return cell.field->bits == 1 || cell.field->constant; });
 }
 
-/// Is a report of the device shorter than expected, and good nevertheless?
-bool good_but_short(const DescribedReport& device, const ExpectedReport& wanted) {
-  return wanted.min_length != 0 && device.length >= wanted.min_length && device.length < wanted.length;
+/// Returns true if a report of the device is shorter than expected, but long enough.
+bool acceptably_short(const DescribedReport& device, const ExpectedReport& expected_report) {
+  return expected_report.min_length != 0 && device.length >= expected_report.min_length &&
+         device.length < expected_report.length;
 }
 
-/// What is wrong with one field, once, however many of its numbers are affected.
+/// Returns the difference of one field, only once even if several of its integers differ.
 std::optional<std::string> difference(const DescribedReport& device, const ExpectedField& field,
-                                      bool may_end_early) {
+                                      bool may_be_short) {
   for (std::size_t i = 0; i < field.count; ++i) {
     const std::size_t begin = field.bit + i * field.bits;
     const std::size_t whole_end = begin + field.bits;
-    const std::size_t end = may_end_early ? std::min(whole_end, 8 * device.length) : whole_end;
-    if (begin >= end) return {};  // what the report lacks is 0
-    const std::string which = field.name + (field.count > 1 ? "[" + std::to_string(i) + "]" : "") +
-                              ": the profile says " + shape_text(field.bits, field.is_signed, begin) + "; ";
+    const std::size_t end = may_be_short ? std::min(whole_end, 8 * device.length) : whole_end;
+    if (begin >= end) return {};  // missing bytes read as 0
+    const std::string report_name = field.name + (field.count > 1 ? "[" + std::to_string(i) + "]" : "") +
+                                    ": the profile has " + shape_text(field.bits, field.is_signed, begin) +
+                                    "; ";
     if (end > 8 * device.length)
-      return which + "the device's report ends with byte " + std::to_string(device.length - 1);
+      return report_name + "the device's report ends with byte " + std::to_string(device.length - 1);
     const std::vector<Cell> cells = cells_within(device, begin, end);
-    if (cells.empty()) return which + "there the device declares nothing";
-    if (!agrees(cells, begin, end, field.is_signed)) return which + "there the device has " + text(cells);
+    if (cells.empty()) return report_name + "the device declares nothing there";
+    if (!agrees(cells, begin, end, field.is_signed)) return report_name + "the device has " + text(cells);
   }
   return {};
 }
@@ -121,20 +123,21 @@ std::string ids_of(const ReportDescriptor& device, ReportKind kind) {
 std::vector<std::string> find_differences(const ReportDescriptor& device,
                                           const std::vector<ExpectedReport>& expected) {
   std::vector<std::string> lines;
-  for (const ExpectedReport& wanted : expected) {
-    const std::string which = report_text(wanted.kind, wanted.id);
-    const DescribedReport* report = device.find(wanted.kind, wanted.id);
+  for (const ExpectedReport& expected_report : expected) {
+    const std::string report_name = report_text(expected_report.kind, expected_report.id);
+    const DescribedReport* report = device.find(expected_report.kind, expected_report.id);
     if (report == nullptr) {
-      if (wanted.may_be_absent) continue;
-      lines.push_back(which + ": the device has none such; " + ids_of(device, wanted.kind));
+      if (expected_report.may_be_absent) continue;
+      lines.push_back(report_name + ": the device has no such report; " +
+                      ids_of(device, expected_report.kind));
       continue;
     }
-    const bool short_one = good_but_short(*report, wanted);
-    if (report->length != wanted.length && !short_one)
-      lines.push_back(which + ": the profile says " + std::to_string(wanted.length) + " bytes, the device " +
-                      std::to_string(report->length));
-    for (const ExpectedField& field : wanted.fields)
-      if (const auto line = difference(*report, field, short_one)) lines.push_back(which + ", " + *line);
+    const bool is_short = acceptably_short(*report, expected_report);
+    if (report->length != expected_report.length && !is_short)
+      lines.push_back(report_name + ": the profile has " + std::to_string(expected_report.length) +
+                      " bytes, the device " + std::to_string(report->length));
+    for (const ExpectedField& field : expected_report.fields)
+      if (const auto line = difference(*report, field, is_short)) lines.push_back(report_name + ", " + *line);
   }
   return lines;
 }

@@ -11,11 +11,11 @@
 namespace wrenchd {
 namespace {
 
-/// Below this angle the series of the Jacobians are exact to a double.
+/// Below this angle the series of the Jacobians are exact to double precision.
 constexpr double kSmall_rad = 1e-4;
 
 [[noreturn]] void refuse(std::size_t i, const std::string& what) {
-  throw std::invalid_argument("pose " + std::to_string(i + 1) + " of the path to play back: " + what);
+  throw std::invalid_argument("pose " + std::to_string(i + 1) + " of the recorded path: " + what);
 }
 
 /// Right Jacobian of exp on SO(3), and its inverse: exp(phi + d) = exp(phi) exp(Jr(phi) d) to first order
@@ -38,20 +38,20 @@ Matrix3d inverse_right_jacobian(const Vector3d& phi) noexcept {
          (1.0 / a2 - (1.0 + std::cos(angle)) / (2.0 * angle * std::sin(angle))) * h * h;
 }
 
-/// H and its derivative by u, from 0 with the slope m0 to `way` with the slope m1.
+/// H and its derivative with respect to u, from 0 with slope m0 to `end` with slope m1.
 struct Hermite {
   Vector3d value, slope;
 };
-Hermite hermite(double u, const Vector3d& m0, const Vector3d& way, const Vector3d& m1) noexcept {
+Hermite hermite(double u, const Vector3d& m0, const Vector3d& end, const Vector3d& m1) noexcept {
   const double u2 = u * u, u3 = u2 * u;
-  return {(u3 - 2.0 * u2 + u) * m0 + (3.0 * u2 - 2.0 * u3) * way + (u3 - u2) * m1,
-          (3.0 * u2 - 4.0 * u + 1.0) * m0 + (6.0 * u - 6.0 * u2) * way + (3.0 * u2 - 2.0 * u) * m1};
+  return {(u3 - 2.0 * u2 + u) * m0 + (3.0 * u2 - 2.0 * u3) * end + (u3 - u2) * m1,
+          (3.0 * u2 - 4.0 * u + 1.0) * m0 + (6.0 * u - 6.0 * u2) * end + (3.0 * u2 - 2.0 * u) * m1};
 }
 
 }  // namespace
 
 PoseSpline::PoseSpline(const std::vector<TimedPose>& poses) {
-  if (poses.empty()) throw std::invalid_argument("the path to play back has no pose");
+  if (poses.empty()) throw std::invalid_argument("the recorded path has no pose");
   if (poses.front().time_s != 0.0) refuse(0, "it is not at time 0");
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const auto& [time_s, X] = poses[i];
@@ -63,10 +63,10 @@ PoseSpline::PoseSpline(const std::vector<TimedPose>& poses) {
     knots_[i].rotation_rad =
         rotation_vector(knots_[i].X_BG.rotation.conjugate() * knots_[i + 1].X_BG.rotation);
     if (knots_[i].rotation_rad.norm() > kMaxRotation_rad)
-      refuse(i + 1, "it is turned too far from the one before to know which way round is meant");
+      refuse(i + 1, "its rotation from the previous pose is too large to be unambiguous");
   }
-  // The mean over both intervals. The axis of a turn is the same before and after it, so both are in axes of
-  // G.
+  // Mean over both intervals. The axis of a rotation is the same in its start and end frame, so both vectors
+  // are in axes of G.
   for (std::size_t i = 1; i + 1 < knots_.size(); ++i) {
     const double span_s = knots_[i + 1].time_s - knots_[i - 1].time_s;
     knots_[i].v_m_per_s = (knots_[i + 1].X_BG.translation_m - knots_[i - 1].X_BG.translation_m) / span_s;

@@ -10,46 +10,48 @@
 #include <utility>
 
 #include "core/finite.hpp"
+#include "devices/layout_validation.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Squared length of a reported quaternion that still passes for a rotation. Integers round to parts in 1e4
-/// at worst (16 bits); what is outside is another field, another unit or noise.
-constexpr double kLeastQuaternionNorm2 = 0.8;
-constexpr double kMostQuaternionNorm2 = 1.2;
+/// Permitted squared norm of a reported quaternion. Integer rounding changes it by at most 1e-4 (16 bits). A
+/// larger deviation is a wrong field, a wrong unit or noise.
+constexpr double kMinQuaternionNorm2 = 0.8;
+constexpr double kMaxQuaternionNorm2 = 1.2;
 
-/// A pose may move this many times as far as the fastest allowed handle would: room for jitter of the device
-/// clock, far from what a wrong encoder does.
-constexpr double kTeleportFactor = 3.0;
-/// Motion that is never held against a device: a step of the coarsest encoder that is of use (100 um), and as
-/// much at a 50 mm grip.
+/// Permitted motion between two poses, as a multiple of the motion at the speed limit. Leaves room for jitter
+/// of the device clock; encoder errors are far larger.
+constexpr double kJumpFactor = 3.0;
+/// Motion that is always permitted: one step of the coarsest useful encoder (100 um), and the same at a grip
+/// radius of 50 mm.
 constexpr double kEncoderStep_m = 1e-4;
 constexpr double kEncoderStep_rad = 2e-3;
-/// Samples over speed before it counts: one may be a glitch.
-constexpr int kFastSamples = 2;
+/// Consecutive samples above the speed limit that raise a fault; a single one may be a glitch.
+constexpr int kMaxOverspeedSamples = 2;
 
-/// The largest value of a counter.
-std::uint64_t largest(const ReportField& field) noexcept {
+/// Returns the largest value of a counter.
+std::uint64_t max_count(const ReportField& field) noexcept {
   return field.bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << field.bits) - 1;
 }
 
-/// How far a counter has moved on, modulo its width; 0 where the device has none.
-std::uint64_t ahead(const ReportField& field, std::uint64_t from, std::uint64_t to) noexcept {
-  return field.present ? (to - from) & largest(field) : 0;
+/// Returns the increment of a counter modulo its width; 0 if the device has none.
+std::uint64_t increment(const ReportField& field, std::uint64_t from, std::uint64_t to) noexcept {
+  return field.present ? (to - from) & max_count(field) : 0;
 }
 
-/// The farthest move that is one forward and not one back.
-std::uint64_t half_way(const ReportField& field) noexcept {
-  return field.present ? largest(field) >> 1 : 1;
+/// Returns the largest increment that counts as forward.
+std::uint64_t max_increment(const ReportField& field) noexcept {
+  return field.present ? max_count(field) >> 1 : 1;
 }
 
-/// Cut to a length, direction kept, with room for the rounding of three components to counts of `step`.
-Vector3d within(const Vector3d& v, double most, double step) noexcept {
+/// Scales a vector to a maximum length, with a margin for the rounding of three components to counts of
+/// `step`.
+Vector3d clamp_norm(const Vector3d& v, double max_norm, double step) noexcept {
   constexpr double half_diagonal = 0.87;  // > sqrt(3)/2
-  const double ceiling = std::max(most - half_diagonal * std::abs(step), 0.0);
+  const double limit = std::max(max_norm - half_diagonal * std::abs(step), 0.0);
   const double length = v.norm();
-  return length <= ceiling ? v : Vector3d(v * (ceiling / length));
+  return length <= limit ? v : Vector3d(v * (limit / length));
 }
 
 [[noreturn]] void refuse(const DeviceProfile& profile, const std::string& why) {
@@ -70,7 +72,7 @@ void check_profile(const DeviceProfile& profile) {
   check_number(profile, "max_angular_speed_rad_per_s", profile.max_angular_speed_rad_per_s);
   check_number(profile, "stale_fault_s", profile.stale_fault_s);
   try {
-    check_reports(profile);
+    validate_reports(profile);
   } catch (const std::invalid_argument& e) {
     refuse(profile, e.what());
   }
@@ -83,7 +85,7 @@ bool carries_pose(const PoseReportLayout& layout) noexcept {
 }  // namespace
 
 ProfileDevice::ProfileDevice(DeviceProfile profile, ReportLink& link)
-    : profile_(std::move(profile)), link_(link) {}
+    : profile_(std::move(profile)), link_(link), pose_observer_(dynamic_cast<PoseObserver*>(&link)) {}
 
 void ProfileDevice::open() {
   check_profile(profile_);
@@ -152,7 +154,7 @@ DeviceSample ProfileDevice::read_newest(TimePoint now) noexcept {
   return sample_;
 }
 
-/// The first read throws away what waited since open(), however old, and the time of silence begins.
+/// The first read discards the reports that waited since open(). The time of silence starts here.
 void ProfileDevice::discard_waiting_reports(TimePoint now) noexcept {
   drain(now);
   sample_ = {};
@@ -163,11 +165,11 @@ void ProfileDevice::discard_waiting_reports(TimePoint now) noexcept {
   state_ = {};
   if (deflection_) deflection_->set_deflection(Vector3d::Zero(), Vector3d::Zero());
   silent_since_ = deflection_time_ = now;
-  prompted_at_ = now - kLockStepTimeout;  // a lock-step device is spoken to at once
+  prompted_at_ = now - kLockStepTimeout;  // prompts a lock-step device at once
 }
 
-/// Speaks to a device that needs it: a lock-step one that has lost count of the conversation, or never heard
-/// its beginning, and one that wants to be kept alive.
+/// Sends a command to a lock-step device that is silent since open() or since a lost report, and keep-alive
+/// reports to a device that needs them.
 void ProfileDevice::prompt_device(TimePoint now) noexcept {
   const bool lock_step = profile_.stream == StreamStyle::lock_step;
   if (!open_ || disconnected_ || (!lock_step && profile_.keep_alive.bytes.empty())) return;
@@ -180,7 +182,7 @@ void ProfileDevice::prompt_device(TimePoint now) noexcept {
     send(now, {}, false);
 }
 
-/// Silence after a report of rest is what a device does that is silent at rest.
+/// A device that is silent at rest may be silent after a report of zero deflection.
 bool ProfileDevice::silent_too_long(TimePoint now) const noexcept {
   if (profile_.stream == StreamStyle::silent_at_rest && (!deflection_ || deflection_->at_rest()))
     return false;
@@ -196,26 +198,26 @@ std::optional<ProfileDevice::Arrival> ProfileDevice::drain(TimePoint now) noexce
     disconnected_ = read.status == LinkStatus::disconnected;
     if (read.status != LinkStatus::ok) break;
     const auto bytes = std::span<const std::uint8_t>(buffer).first(std::min(read.length, buffer.size()));
-    const PoseReportLayout* known = nullptr;
-    if (read.length <= buffer.size()) known = decode_report(bytes, read.arrived);
-    if (known == nullptr) {
+    const PoseReportLayout* matching = nullptr;
+    if (read.length <= buffer.size()) matching = decode_report(bytes, read.arrived);
+    if (matching == nullptr) {
       ++sample_.rejected;
       continue;
     }
-    newest = Arrival{known, read.arrived};
+    newest = Arrival{matching, read.arrived};
   }
   return newest;
 }
 
-/// The layout that this report has, and its content in state_. A report of a kind that came before in this
-/// read makes the earlier one one that was skipped.
+/// Finds the layout of a report and decodes it into state_. A second report of the same layout in one read
+/// supersedes the first.
 const PoseReportLayout* ProfileDevice::decode_report(std::span<const std::uint8_t> bytes,
                                                      TimePoint arrived) noexcept {
   for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
-    const PoseReportLayout& known = *layout(i);
+    const PoseReportLayout& matching = *layout(i);
     PoseReport report = state_;
-    if (decode_into(known, bytes, report) != Decoding::ok) continue;
-    if (!accept_counters(known, report, arrived)) {
+    if (decode_into(matching, bytes, report) != Decoding::ok) continue;
+    if (!accept_counters(matching, report, arrived)) {
       ++sample_.repeated;
       return nullptr;
     }
@@ -228,22 +230,24 @@ const PoseReportLayout* ProfileDevice::decode_report(std::span<const std::uint8_
     if ((layouts_this_read_ & bit) != 0) ++sample_.superseded;
     layouts_this_read_ |= bit;
     layouts_since_open_ |= bit;
-    return &known;
+    return &matching;
   }
   return nullptr;
 }
 
-/// Follows the counters. False for a repetition, or a step back: more than half way round. After a silence
-/// that is a fault by itself the counters may be anywhere, so then a step back is a new start.
+/// Updates the counters. Returns false for a repeated or decreasing counter, which has moved more than half
+/// its range. After a silence that is itself a fault, counters may have any value, so the report counts as a
+/// restart.
 bool ProfileDevice::accept_counters(const PoseReportLayout& layout, const PoseReport& report,
                                     TimePoint arrived) noexcept {
   const bool after_silence = silent_too_long(arrived);
   if (report_received_) {
     const std::uint64_t reports =
-        layout.sequence.present ? ahead(layout.sequence, sequence_, report.sequence) : 1;
-    const std::uint64_t ticks = ahead(layout.device_time, device_time_, report.device_time);
-    const bool back = reports > half_way(layout.sequence) || ticks > half_way(layout.device_time);
-    if (reports == 0 || (back && !after_silence)) return false;
+        layout.sequence.present ? increment(layout.sequence, sequence_, report.sequence) : 1;
+    const std::uint64_t ticks = increment(layout.device_time, device_time_, report.device_time);
+    const bool decreasing =
+        reports > max_increment(layout.sequence) || ticks > max_increment(layout.device_time);
+    if (reports == 0 || (decreasing && !after_silence)) return false;
     sample_.sequence += reports;
     sample_.missing += static_cast<std::uint32_t>(reports - 1);
     device_ticks_ += ticks;
@@ -254,7 +258,7 @@ bool ProfileDevice::accept_counters(const PoseReportLayout& layout, const PoseRe
   }
   if (after_silence) {
     sample_.fault = Fault::sample_stale;
-    previous_pose_.reset();  // nothing to compare motion with
+    previous_pose_.reset();  // no pose to compare motion with
   }
   sequence_ = report.sequence;
   device_time_ = report.device_time;
@@ -269,7 +273,7 @@ void ProfileDevice::update_sample(const Arrival& newest) noexcept {
   sample_.buttons = state_.buttons;
   if (newest.layout->motors_on.present) sample_.motors_on = state_.motors_on;
   sample_.watchdog_tripped = state_.watchdog_tripped;
-  if (!state_.homed) previous_pose_.reset();  // where the encoders begin to count is about to change
+  if (!state_.homed) previous_pose_.reset();  // the zero of the encoders is about to change
   sample_.homed = state_.homed;
   if (deflection_ || !state_.homed || (layouts_since_open_ & pose_layouts_) != pose_layouts_ ||
       (layouts_this_read_ & pose_layouts_) == 0) {
@@ -305,12 +309,12 @@ Fault ProfileDevice::compute_pose(PoseReport& report) noexcept {
   if (!is_finite(X_DE_) || norm == 0.0) return Fault::pose_not_a_rotation;
   X_DE_.rotation.coeffs() /= norm;
   report.X_BH = profile_.X_BD * X_DE_ * profile_.X_EH;
-  report.X_BH.rotation.coeffs() *= norm;  // judge() wants it as reported
+  report.X_BH.rotation.coeffs() *= norm;  // validate_pose() checks the norm as reported
   report.V_BH = expressed(R_BD, shifted(report.V_BH, X_DE_.rotation * profile_.X_EH.translation_m));
   return Fault::none;
 }
 
-/// What the cap and its buttons ask for from now on.
+/// Sets the deflection and handles the buttons of the puck.
 void ProfileDevice::apply_deflection(const PoseReport& report) noexcept {
   const Quaterniond& R_BD = profile_.X_BD.rotation;
   deflection_->set_deflection(R_BD * report.translation_m, R_BD * report.rotation_rad);
@@ -319,11 +323,11 @@ void ProfileDevice::apply_deflection(const PoseReport& report) noexcept {
   deflection_->set_slow((report.buttons & button_bit(profile_.slow_button)) != 0);
 }
 
-/// The cap's pose goes on between reports, and is as of now.
+/// Integrates the steered pose up to `now`, also between reports.
 void ProfileDevice::integrate_deflection(TimePoint now) noexcept {
   if (now <= deflection_time_) return;
-  const bool lost = silent_too_long(now);
-  if (lost) deflection_->set_deflection(Vector3d::Zero(), Vector3d::Zero());
+  const bool no_pose = silent_too_long(now);
+  if (no_pose) deflection_->set_deflection(Vector3d::Zero(), Vector3d::Zero());
   const double dt_s = seconds(now - deflection_time_);
   deflection_->advance(dt_s);
   deflection_time_ = now;
@@ -332,11 +336,11 @@ void ProfileDevice::integrate_deflection(TimePoint now) noexcept {
   sample_.fresh = true;
   sample_.X_BH = deflection_->X_BH();
   sample_.V_BH = deflection_->V_BH();
-  link_.show_pose(now, sample_.X_BH);
-  if (lost) sample_.fault = Fault::sample_stale;
+  if (pose_observer_ != nullptr) pose_observer_->observe_pose(now, sample_.X_BH);
+  if (no_pose) sample_.fault = Fault::sample_stale;
 }
 
-/// Moves arrival and device time on to a new sample. A device without a clock lives by the host's.
+/// Updates arrival and device time of the sample. For a device without a clock the host time is used.
 void ProfileDevice::update_device_time(const Arrival& newest) noexcept {
   if (deflection_) return;
   if (device_time_field_ != nullptr) {
@@ -347,27 +351,27 @@ void ProfileDevice::update_device_time(const Arrival& newest) noexcept {
   sample_.arrived = newest.arrived;
 }
 
-/// The most time that can have passed since the last pose that was one [s]: a coarse clock must not make
-/// motion look fast. Never more than the time after which silence is a fault anyway.
+/// Returns the maximum time since the previous valid pose [s], so that a coarse clock does not make motion
+/// appear fast. At most the time after which silence is a fault.
 double ProfileDevice::elapsed_s() const noexcept {
   const double one_tick_s = device_time_field_ != nullptr ? device_time_field_->step : 0.0;
   return std::min(sample_.device_time_s - previous_pose_time_s_ + one_tick_s, profile_.stale_fault_s);
 }
 
-/// The newest command whose low bits the device names, if it was sent since open(). What the device names
-/// until it takes one of these is somebody else's.
+/// Unwraps the acknowledged sequence if the command was sent since open(). Before the device accepts such a
+/// command, the value refers to an earlier session.
 void ProfileDevice::update_acknowledged() noexcept {
   const std::uint64_t raw = state_.acknowledged;
   if (acknowledged_field_ == nullptr || raw == acknowledged_) return;
   acknowledged_ = raw;
-  const std::uint64_t behind = (commands_sent_ - raw) & largest(*acknowledged_field_);
+  const std::uint64_t behind = (commands_sent_ - raw) & max_count(*acknowledged_field_);
   if (behind < commands_sent_ - sent_before_open_) sample_.acknowledged = commands_sent_ - behind;
 }
 
 Fault ProfileDevice::validate_pose(PoseReport report) noexcept {
   if (!is_finite(report.X_BH) || !is_finite(report.V_BH)) return Fault::pose_not_finite;
   const double norm2 = report.X_BH.rotation.squaredNorm();
-  if (norm2 < kLeastQuaternionNorm2 || norm2 > kMostQuaternionNorm2) return Fault::pose_not_a_rotation;
+  if (norm2 < kMinQuaternionNorm2 || norm2 > kMaxQuaternionNorm2) return Fault::pose_not_a_rotation;
   report.X_BH.rotation.normalize();
   const Fault fault = validate_motion(report);
   previous_pose_ = report.X_BH;
@@ -381,18 +385,20 @@ Fault ProfileDevice::validate_motion(const PoseReport& report) noexcept {
   double v = report.V_BH.linear_m_per_s.norm();
   double w = report.V_BH.angular_rad_per_s.norm();
   if (previous_pose_) {
-    const double way_m = (report.X_BH.translation_m - previous_pose_->translation_m).norm() - kEncoderStep_m;
-    const double turn_rad = report.X_BH.rotation.angularDistance(previous_pose_->rotation) - kEncoderStep_rad;
+    const double distance_m =
+        (report.X_BH.translation_m - previous_pose_->translation_m).norm() - kEncoderStep_m;
+    const double angle_rad =
+        report.X_BH.rotation.angularDistance(previous_pose_->rotation) - kEncoderStep_rad;
     const double t = elapsed_s();
-    if (way_m > kTeleportFactor * max_v * t || turn_rad > kTeleportFactor * max_w * t)
+    if (distance_m > kJumpFactor * max_v * t || angle_rad > kJumpFactor * max_w * t)
       return Fault::pose_jumped;
     if (t > 0.0) {
-      v = std::max(v, way_m / t);
-      w = std::max(w, turn_rad / t);
+      v = std::max(v, distance_m / t);
+      w = std::max(w, angle_rad / t);
     }
   }
   overspeed_samples_ = v > max_v || w > max_w ? overspeed_samples_ + 1 : 0;
-  return overspeed_samples_ >= kFastSamples ? Fault::overspeed : Fault::none;
+  return overspeed_samples_ >= kMaxOverspeedSamples ? Fault::overspeed : Fault::none;
 }
 
 // --- writing ----------------------------------------------------------------------------------------------
@@ -405,15 +411,15 @@ Fault ProfileDevice::write(TimePoint now, const Wrench& F, bool motors_on) noexc
   }
   sample_.dropped_dofs = motors_on ? static_cast<DofMask>(nonzero_dofs(F) & ~driven_dofs(profile_)) : kNoDof;
   if (!profile_.has_output) return open_ && !disconnected_ ? Fault::none : Fault::device_lost;
-  const bool lost = profile_.kinematics.kind != Kinematics::Kind::none && !kinematics_valid_;
-  if (!motors_on || lost || !sample_.homed) return send(now, {}, false);
+  const bool no_pose = profile_.kinematics.kind != Kinematics::Kind::none && !kinematics_valid_;
+  if (!motors_on || no_pose || !sample_.homed) return send(now, {}, false);
   const double authority = profile_.watchdog_s > 0.0 ? 1.0 : kAuthorityWithoutWatchdog;
   const WrenchReportLayout& report = profile_.wrench_report;
   Wrench sent;
   sent.force_N =
-      within(F.force_N, authority * profile_.max_force_N, report.force.present ? report.force.step : 0);
+      clamp_norm(F.force_N, authority * profile_.max_force_N, report.force.present ? report.force.step : 0);
   if (report.torque.present)
-    sent.torque_Nm = within(F.torque_Nm, authority * profile_.max_torque_Nm, report.torque.step);
+    sent.torque_Nm = clamp_norm(F.torque_Nm, authority * profile_.max_torque_Nm, report.torque.step);
   return send(now, sent, true);
 }
 
@@ -432,7 +438,8 @@ Fault ProfileDevice::send(TimePoint now, const Wrench& F, bool motors_on) noexce
   WrenchReport report;
   fill_wrench(F, report);
   report.hold_time_s =
-      std::max(profile_.watchdog_s, profile_.wrench_report.hold_time.step);  // 0 is "default"
+      std::max(profile_.watchdog_s,
+               profile_.wrench_report.hold_time.step);  // 0 would select the default of the device
   report.sequence = ++commands_sent_;
   report.enable = motors_on;
   if (!profile_.pose_report.motors_on.present) sample_.motors_on = motors_on;

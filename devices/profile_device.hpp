@@ -11,48 +11,52 @@
 #include "devices/device.hpp"
 #include "devices/kinematics.hpp"
 #include "devices/links/report_link.hpp"
+#include "devices/pose_observer.hpp"
 #include "devices/report_codec.hpp"
 
 namespace wrenchd {
 
-/// A device that its profile describes completely: bytes come and go over a link, the codec gives them
-/// meaning, kinematics or a deflection makes a pose of them where the device does not, and what is left here
-/// is judgement. Everything after open() is RT safe.
+/// Device that is completely described by its profile. A link transfers the bytes and the codec decodes them.
+/// If the device does not send a pose, kinematics or the deflection of a puck gives one. ProfileDevice
+/// validates the result.
 ///
-/// A device may have fewer than six degrees of freedom. Along those it does not sense it stays where it is,
-/// and of a wrench only what it has motors for is sent; DeviceSample tells which, and what was dropped.
+/// A device may have fewer than six degrees of freedom. Along axes without a sensor the pose is constant.
+/// Wrench components without a motor are dropped. DeviceSample lists both.
 ///
-/// A lock-step device speaks only when spoken to. It is sent zeros when it is opened, and again whenever it
-/// has been silent for kLockStepTimeout.
+/// A lock-step device sends only after it has received a command. ProfileDevice sends it zeros after open(),
+/// and again whenever it has been silent for kLockStepTimeout.
 ///
-/// A fault stands in the sample of the read that found it. It is not latched here: who reads decides what
-/// follows, and a later good report reads as good.
+/// A sample carries the fault that its read found. ProfileDevice does not latch faults: the caller decides on
+/// the reaction, and a later valid report gives a valid sample.
+///
+/// All members except the constructor, open() and close() are RT-safe.
 class ProfileDevice final : public Device {
  public:
-  /// Reports taken from the link in one read: the ring of a Linux hidraw reader. A device that floods the
-  /// host costs no more than this a tick.
+  /// Maximum number of reports per read: the capacity of a Linux hidraw reader. It bounds the time of a read
+  /// if a device sends too fast.
   static constexpr int kMaxReportsPerRead = 64;
-  /// Zero commands that release() sends, so that a lost one does not matter.
+  /// Number of zero commands of release(), so that the loss of one has no effect.
   static constexpr int kReleaseReports = 5;
-  /// Share of its limits that a device gets which has no watchdog of its own: nothing but the host frees the
-  /// hand then.
+  /// Factor of the limits for a device without a watchdog, because then only the host can release the device.
   static constexpr double kAuthorityWithoutWatchdog = 0.25;
-  /// Silence of a lock-step device after which it is spoken to again.
+  /// Silence of a lock-step device after which ProfileDevice sends a command again.
   static constexpr Duration kLockStepTimeout = std::chrono::milliseconds(10);
 
-  /// The link must outlive the device.
+  /// The link must outlive the device. If the link also implements PoseObserver, as a simulated link does,
+  /// the device sends it each steered pose.
   ProfileDevice(DeviceProfile profile, ReportLink& link);
 
-  /// Throws std::runtime_error where the profile cannot work, or the link cannot be opened.
+  /// Throws std::runtime_error if the profile is invalid or the link cannot be opened. Not RT-safe: may take
+  /// seconds.
   void open() override;
-  /// The first read after open() only empties the link.
+  /// Returns the newest sample. The first read after open() only discards waiting reports. RT-safe.
   DeviceSample read_newest(TimePoint now) noexcept override;
-  /// Cuts the wrench to the profile's limits, force and torque each with its direction kept: the last
-  /// ceiling, independent of all limits above. With motors off the wrench sent is zero. A wrench that is not
-  /// finite sends zero with the motors off.
+  /// Scales force and torque to the limits of the profile and keeps their directions. This is the last limit,
+  /// independent of all limits above. With motors off it sends a zero wrench. If the wrench is not finite, it
+  /// sends zero with the motors off and returns wrench_not_finite. RT-safe.
   Fault write(TimePoint now, const Wrench& F, bool motors_on) noexcept override;
-  void set_proxy_pose(const std::optional<Pose>& X_BG) noexcept override {
-    if (deflection_) deflection_->set_proxy_pose(X_BG);
+  void set_proxy_pose(const std::optional<Pose>& X_BQ) noexcept override {
+    if (deflection_) deflection_->set_proxy_pose(X_BQ);
   }
   void release(TimePoint now) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override { link_.wait_readable(deadline); }
@@ -61,10 +65,10 @@ class ProfileDevice final : public Device {
   const DeviceProfile& profile() const noexcept { return profile_; }
   std::uint64_t commands_sent() const noexcept override { return commands_sent_; }
 
-  /// Joint angles of the last good sample, where the device has joints. RT safe.
+  /// Returns the joint angles of the last valid sample, if the device has joints. RT-safe.
   const JointAngles& joint_angles() const noexcept { return joint_angles_; }
-  /// Takes over what a calibration has changed of the profile: the frames and the zeros of the joints. The
-  /// next pose is not held against the one before. For between the ticks; RT safe.
+  /// Applies the calibrated frames and joint zeros of a profile. The next pose is not compared with the
+  /// previous one. Call it between ticks. RT-safe.
   void recalibrate(const DeviceProfile& calibrated) noexcept;
 
  private:
@@ -74,10 +78,11 @@ class ProfileDevice final : public Device {
   };
 
   void discard_waiting_reports(TimePoint now) noexcept;
-  /// Oldest to newest, counting, into state_. The newest; empty where nothing good arrived.
+  /// Decodes all waiting reports into state_, oldest first, and counts them. Returns the newest; empty if no
+  /// valid report arrived.
   std::optional<Arrival> drain(TimePoint now) noexcept;
   const PoseReportLayout* layout(std::size_t index) const noexcept;
-  /// Takes a report into state_, or says why not.
+  /// Decodes a report into state_ and returns its layout; nullptr if it is invalid.
   const PoseReportLayout* decode_report(std::span<const std::uint8_t> bytes, TimePoint arrived) noexcept;
   bool accept_counters(const PoseReportLayout& layout, const PoseReport& report, TimePoint arrived) noexcept;
   bool silent_too_long(TimePoint now) const noexcept;
@@ -85,7 +90,7 @@ class ProfileDevice final : public Device {
   void update_device_time(const Arrival& newest) noexcept;
   double elapsed_s() const noexcept;
   void update_acknowledged() noexcept;
-  /// The pose the reports make, X_BH and V_BH; a fault where they make none.
+  /// Computes X_BH and V_BH from the reports. Returns a fault if they give no pose.
   Fault compute_pose(PoseReport& report) noexcept;
   Fault validate_pose(PoseReport report) noexcept;
   Fault validate_motion(const PoseReport& report) noexcept;
@@ -95,42 +100,45 @@ class ProfileDevice final : public Device {
 
   Fault send(TimePoint now, const Wrench& F, bool motors_on) noexcept;
   Fault transmit(TimePoint now, std::span<const std::uint8_t> bytes) noexcept;
-  /// What the device is told for a wrench on the hand about H in B.
+  /// Fills the command for a wrench on the hand about H in B.
   void fill_wrench(const Wrench& F_B, WrenchReport& report) const noexcept;
 
   DeviceProfile profile_;
   ReportLink& link_;
+  PoseObserver* pose_observer_;  ///< the link, if it observes the steered pose; otherwise null
   bool open_ = false;
   bool disconnected_ = false;
 
-  bool same_frames_ = true;         ///< D is B and E is H
-  std::uint64_t pose_layouts_ = 0;  ///< reports that carry a part of the pose, as bits; 0 is pose_report
-  const ReportField* device_time_field_ = nullptr;  ///< of the device, where it has one
+  bool same_frames_ = true;  ///< true if D = B and E = H
+  /// Bit mask of the reports that carry a part of the pose; bit 0 is pose_report.
+  std::uint64_t pose_layouts_ = 0;
+  const ReportField* device_time_field_ = nullptr;  ///< device_time field; null if the device has no clock
   const ReportField* acknowledged_field_ = nullptr;
 
-  DeviceSample sample_;                        ///< the last one given out
-  PoseReport state_;                           ///< what the reports said last, each for its part
-  std::uint64_t layouts_since_open_ = 0;       ///< that came since open(), as bits
-  std::uint64_t layouts_this_read_ = 0;        ///< that came in this read
-  bool report_received_ = false;               ///< a good report came since open()
-  std::optional<TimePoint> silent_since_;      ///< arrival of the last good report, or the first read
-  std::uint64_t sequence_ = 0;                 ///< raw, of the last good report
-  std::uint64_t device_time_ = 0;              ///< raw, likewise
-  std::uint64_t device_ticks_ = 0;             ///< the same, unwrapped
-  std::optional<std::uint64_t> acknowledged_;  ///< raw, likewise
-  std::optional<Pose> previous_pose_;          ///< last pose that was a pose, teleported or not
-  double previous_pose_time_s_ = 0.0;          ///< device time of that pose
-  int overspeed_samples_ = 0;                  ///< samples in a row that were over speed
+  DeviceSample sample_;                   ///< sample returned by the last read
+  PoseReport state_;                      ///< content of the last reports, merged
+  std::uint64_t layouts_since_open_ = 0;  ///< bit mask of the layouts received since open()
+  std::uint64_t layouts_this_read_ = 0;   ///< bit mask of the layouts received in this read
+  bool report_received_ = false;          ///< true if a valid report arrived since open()
+  /// Arrival time of the last valid report, or time of the first read.
+  std::optional<TimePoint> silent_since_;
+  std::uint64_t sequence_ = 0;                 ///< raw sequence of the last valid report
+  std::uint64_t device_time_ = 0;              ///< raw device time of the last valid report
+  std::uint64_t device_ticks_ = 0;             ///< device time of the last valid report, unwrapped
+  std::optional<std::uint64_t> acknowledged_;  ///< raw acknowledged sequence of the last valid report
+  std::optional<Pose> previous_pose_;          ///< last valid pose, also if it jumped
+  double previous_pose_time_s_ = 0.0;          ///< device time of previous_pose_
+  int overspeed_samples_ = 0;                  ///< consecutive samples above the speed limit
 
-  JointAngles joint_angles_{};     ///< of the last sample, where the device has joints
-  Pose X_DE_;                      ///< likewise
-  Matrix3d J_ = Matrix3d::Zero();  ///< at that place: what the motors are told is computed by it
-  bool kinematics_valid_ = false;  ///< joint_angles_, X_DE_ and J_ are those of a good sample
+  JointAngles joint_angles_{};     ///< angles of the last sample, if the device has joints
+  Pose X_DE_;                      ///< pose of E at joint_angles_
+  Matrix3d J_ = Matrix3d::Zero();  ///< Jacobian at joint_angles_, which converts forces to motor efforts
+  bool kinematics_valid_ = false;  ///< true if joint_angles_, X_DE_ and J_ belong to a valid sample
   std::optional<DeflectionPose> deflection_;
-  TimePoint deflection_time_{};  ///< time the deflection has been followed to
-  TimePoint prompted_at_{};      ///< when a lock-step device was last spoken to
+  TimePoint deflection_time_{};  ///< time up to which the deflection has been integrated
+  TimePoint prompted_at_{};      ///< time at which a lock-step device was last prompted
 
-  std::uint64_t commands_sent_ = 0;  ///< also the unwrapped sequence of the last one
+  std::uint64_t commands_sent_ = 0;  ///< number of commands sent; also the unwrapped sequence of the last one
   std::uint64_t sent_before_open_ = 0;
 };
 

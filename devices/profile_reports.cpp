@@ -6,10 +6,10 @@
 namespace wrenchd {
 namespace {
 
-/// Gathers the fields of one layout.
-class Gathering {
+/// Collects the fields of one layout.
+class FieldCollector {
  public:
-  Gathering(ReportKind kind, const ReportFrame& frame) {
+  FieldCollector(ReportKind kind, const ReportFrame& frame) {
     report_.kind = kind;
     if (frame.has_id) report_.id = frame.id;
     report_.length = frame.length;
@@ -44,7 +44,7 @@ class Gathering {
 };
 
 ExpectedReport expected_report(const PoseReportLayout& p) {
-  Gathering pose(ReportKind::input, p);
+  FieldCollector pose(ReportKind::input, p);
   pose.bit("motors_on", p.motors_on);
   pose.bit("watchdog_tripped", p.watchdog_tripped);
   pose.field("sequence", p.sequence);
@@ -66,7 +66,7 @@ ExpectedReport expected_report(const PoseReportLayout& p) {
 }
 
 ExpectedReport expected_report(const WrenchReportLayout& w) {
-  Gathering wrench(ReportKind::output, w);
+  FieldCollector wrench(ReportKind::output, w);
   wrench.bit("enable", w.enable);
   wrench.field("sequence", w.sequence);
   wrench.field("force", w.force);

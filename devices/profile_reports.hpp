@@ -6,10 +6,10 @@
 
 namespace wrenchd {
 
-/// What a profile expects its device's report descriptor to say: all that it reads of the device, and what it
-/// writes where it writes. As when it is matched, a device may lack what carries nothing of a pose, a
-/// battery's state for one, and its reports may be as short as the profile allows. Checksums and constant
-/// bytes are fields like any other. Not RT safe.
+/// Returns the reports that a profile expects in the report descriptor: all input reports, and the output
+/// report if the device has motors. As in match_profile(), a report that carries no part of the pose, such as
+/// a battery state, may be absent, and reports may be as short as the profile permits. Checksums and constant
+/// bytes count as fields. Not RT-safe: allocates.
 std::vector<ExpectedReport> expected_reports(const DeviceProfile& profile);
 
 }  // namespace wrenchd

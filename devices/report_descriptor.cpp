@@ -13,7 +13,7 @@ namespace {
 /// Bits 2 and 3 of an item's first byte (HID 1.11 section 6.2.2.2).
 enum class ItemType : std::uint8_t { main = 0, global = 1, local = 2, reserved = 3 };
 
-/// One short item: a tag and up to four bytes.
+/// One short item: a tag and up to four bytes of data.
 struct Item {
   std::size_t at = 0;  ///< byte of the descriptor
   ItemType type = ItemType::main;
@@ -61,7 +61,7 @@ std::string hex(std::uint64_t value, int digits = 2) {
   throw DescriptorError(item.at, why);
 }
 
-/// A usage as it is written: with 4 bytes it brings its page along, with fewer it takes the one that holds.
+/// A usage as written: with 4 bytes of data it contains its page; with fewer the current page applies.
 struct WrittenUsage {
   std::uint32_t value = 0;
   bool with_page = false;
@@ -76,14 +76,13 @@ struct WrittenRange {
   std::size_t at;
 };
 
-/// One end of a range, bytes as they stand: whether they are signed the minimum decides, which may come
-/// later.
+/// One end of a range, in both interpretations. The sign of the minimum decides, and it may come later.
 struct Extent {
   std::int64_t as_signed = 0;
   std::int64_t as_unsigned = 0;
 };
 
-/// What holds until it is changed, and what Push keeps.
+/// State of the global items, which Push saves.
 struct GlobalState {
   std::uint16_t usage_page = 0;
   Extent logical_min, logical_max, physical_min, physical_max;
@@ -94,16 +93,16 @@ struct GlobalState {
   std::optional<std::uint8_t> report_id;
 };
 
-/// What holds for the next main item only.
+/// State of the local items, which applies to the next main item only.
 struct LocalState {
   std::vector<WrittenRange> usages;
   std::optional<Item> usage_minimum;
   std::optional<Item> usage_maximum;
-  bool delimited = false;            ///< between two delimiters
-  std::size_t alternatives_met = 0;  ///< usages since the delimiter opened
+  bool delimited = false;        ///< between two delimiters
+  std::size_t alternatives = 0;  ///< usages since the delimiter opened
 };
 
-/// Walks the items from first to last; the members are what the items before have left behind.
+/// Processes the items in order.
 class DescriptorParser {
  public:
   explicit DescriptorParser(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -113,8 +112,8 @@ class DescriptorParser {
     if (bytes_.size() > kMaxDescriptorBytes)
       throw DescriptorError(kMaxDescriptorBytes, "the descriptor has " + std::to_string(bytes_.size()) +
                                                      " bytes; " + std::to_string(kMaxDescriptorBytes) +
-                                                     " are the most that Linux takes");
-    while (next_ < bytes_.size()) take(next_item());
+                                                     " is the maximum of Linux");
+    while (next_ < bytes_.size()) process(next_item());
     close();
     return std::move(found_);
   }
@@ -125,7 +124,7 @@ class DescriptorParser {
     const std::uint8_t prefix = bytes_[next_];
     const unsigned bits = prefix;
     Item item{next_, static_cast<ItemType>(bits >> 2 & 3), bits >> 4, kSizes[bits & 3], 0};
-    if (prefix == kLongItem) refuse(item, "is a long item; none is defined, and Linux takes none");
+    if (prefix == kLongItem) refuse(item, "is a long item; none is defined, and Linux accepts none");
     if (bytes_.size() - next_ - 1 < item.size)
       refuse(item, "item 0x" + hex(prefix) + " needs " + std::to_string(item.size) +
                        " more bytes, and the descriptor ends after " +
@@ -136,27 +135,27 @@ class DescriptorParser {
     return item;
   }
 
-  void take(const Item& item) {
+  void process(const Item& item) {
     if (item.type == ItemType::main) main_item(item);
     if (item.type == ItemType::global) global_item(item);
     if (item.type == ItemType::local) local_item(item);
   }
 
-  /// What was opened must have been closed.
+  /// Checks that everything that was opened is closed.
   void close() const {
     const Item end{bytes_.size(), ItemType::main, 0, 0, 0};
     if (local_.delimited) refuse(end, "a delimiter is still open; close it");
     if (!open_.empty())
       refuse(end, std::to_string(open_.size()) + " collection(s) are still open; end them (c0)");
     if (!pushed_.empty())
-      refuse(end, std::to_string(pushed_.size()) + " push(es) without a pop; pop them (b4)");
+      refuse(end, std::to_string(pushed_.size()) + " push(es) without a pop; add pops (b4)");
     if (found_.reports.empty()) refuse(end, "it declares no report");
   }
 
   // Main items
 
   void main_item(const Item& item) {
-    if (local_.delimited) refuse(item, "stands between delimiters, where only usages may");
+    if (local_.delimited) refuse(item, "is between delimiters, where only usages are allowed");
     if (local_.usage_minimum || local_.usage_maximum) {
       const Item& half = local_.usage_minimum ? *local_.usage_minimum : *local_.usage_maximum;
       refuse(half, std::string("a usage ") + (local_.usage_minimum ? "minimum without its maximum"
@@ -180,59 +179,59 @@ class DescriptorParser {
   }
 
   void end_collection(const Item& item) {
-    if (open_.empty()) refuse(item, "ends a collection, and none is open");
+    if (open_.empty()) refuse(item, "ends a collection, but none is open");
     open_.pop_back();
   }
 
   void declare(const Item& item, ReportKind kind) {
-    if (open_.empty()) refuse(item, "declares a field outside of every collection");
-    if (!global_.report_size) refuse(item, "declares a field before any Report Size was given");
-    if (!global_.report_count) refuse(item, "declares a field before any Report Count was given");
+    if (open_.empty()) refuse(item, "declares a field outside every collection");
+    if (!global_.report_size) refuse(item, "declares a field before any Report Size");
+    if (!global_.report_count) refuse(item, "declares a field before any Report Count");
     DescribedField field;
     field.bits = *global_.report_size;
     field.count = *global_.report_count;
-    if (field.bits == 0 || field.count == 0) return;  // declares nothing
+    if (field.bits == 0 || field.count == 0) return;  // no field
     const std::size_t index = report_of(item, kind);
     DescribedReport& report = found_.reports[index];
-    field.bit = bits_so_far_[index];
+    field.bit = bits_used_[index];
     require_room(item, field);
     if (report.fields.size() >= kMaxFieldsPerReport)
       refuse(item, "is field " + std::to_string(kMaxFieldsPerReport + 1) + " of its report; " +
-                       std::to_string(kMaxFieldsPerReport) + " are the most that Linux takes");
+                       std::to_string(kMaxFieldsPerReport) + " is the maximum of Linux");
     field.constant = (item.data & kConstantBit) != 0;
     field.variable = (item.data & kVariableBit) != 0;
     field.relative = (item.data & kRelativeBit) != 0;
     field.collection = open_.back();
     field.declared_at = item.at;
-    take_ranges(item, field);
-    take_usages(field);
-    bits_so_far_[index] = field.end_bit();
+    set_ranges(item, field);
+    set_usages(field);
+    bits_used_[index] = field.end_bit();
     report.length = (field.end_bit() + 7) / 8;
     report.fields.push_back(std::move(field));
   }
 
-  /// Index of the report that the field belongs to; a new one where it is the first.
+  /// Returns the index of the report of the field; adds the report if it is new.
   std::size_t report_of(const Item& item, ReportKind kind) {
     if (!found_.reports.empty() && found_.has_ids() != global_.report_id.has_value())
-      refuse(item, "declares a field without a report id where others have one; give all of them one");
-    if (const DescribedReport* met = found_.find(kind, global_.report_id))
-      return static_cast<std::size_t>(met - found_.reports.data());
+      refuse(item, "declares a field without a report id, but other fields have one; give all fields an id");
+    if (const DescribedReport* existing = found_.find(kind, global_.report_id))
+      return static_cast<std::size_t>(existing - found_.reports.data());
     const std::size_t id_bytes = global_.report_id ? 1 : 0;
     found_.reports.push_back({kind, global_.report_id, id_bytes, {}});
-    bits_so_far_.push_back(8 * id_bytes);
-    return bits_so_far_.size() - 1;
+    bits_used_.push_back(8 * id_bytes);
+    return bits_used_.size() - 1;
   }
 
-  /// Each factor is small enough that their product cannot wrap.
+  /// The factors are bounded so that their product cannot overflow.
   static void require_room(const Item& item, const DescribedField& field) {
     const std::size_t most = 8 * kMaxDescribedReportBytes;
     if (field.count <= most && field.bit + field.bits * field.count <= most) return;
     refuse(item, std::to_string(field.count) + " fields of " + std::to_string(field.bits) +
                      " bits make the report longer than " + std::to_string(kMaxDescribedReportBytes) +
-                     " bytes, the most that Linux takes");
+                     " bytes, the maximum of Linux");
   }
 
-  void take_ranges(const Item& item, DescribedField& field) const {
+  void set_ranges(const Item& item, DescribedField& field) const {
     const auto range = [](const Extent& min, const Extent& max) {
       return std::pair(min.as_signed, min.as_signed < 0 ? max.as_signed : max.as_unsigned);
     };
@@ -245,12 +244,12 @@ class DescriptorParser {
     field.unit_exponent = global_.unit_exponent;
   }
 
-  void take_usages(DescribedField& field) const {
+  void set_usages(DescribedField& field) const {
     for (const WrittenRange& range : local_.usages) {
       const Usage first = range.first.on(global_.usage_page), last = range.last.on(global_.usage_page);
       if (first.page != last.page || first.id > last.id)
         throw DescriptorError(range.at, "the usages " + to_text(first) + " to " + to_text(last) +
-                                            " are no range: one page, the smaller first");
+                                            " are no range: use one page, the smaller first");
       field.usages.push_back({first, last.id});
     }
   }
@@ -277,18 +276,18 @@ class DescriptorParser {
         global_.physical_max = extent;
         return;
       case kUnitExponent:
-        return take_exponent(item);
+        return set_exponent(item);
       case kUnit:
         global_.unit = item.data;
         return;
       case kReportSize:
         if (item.data > kMaxFieldBits)
           refuse(item, "fields of " + std::to_string(item.data) + " bits; " + std::to_string(kMaxFieldBits) +
-                           " are the most that Linux takes");
+                           " is the maximum of Linux");
         global_.report_size = item.data;
         return;
       case kReportId:
-        return take_id(item);
+        return set_report_id(item);
       case kReportCount:
         global_.report_count = item.data;
         return;
@@ -298,7 +297,7 @@ class DescriptorParser {
         pushed_.push_back(global_);
         return;
       case kPop:
-        if (pushed_.empty()) refuse(item, "pops what was never pushed");
+        if (pushed_.empty()) refuse(item, "is a pop without a push");
         global_ = pushed_.back();
         pushed_.pop_back();
         return;
@@ -307,8 +306,8 @@ class DescriptorParser {
     }
   }
 
-  /// A nibble in two's complement; many write it as a signed byte, and both read the same.
-  void take_exponent(const Item& item) {
+  /// A nibble in two's complement. Many descriptors use a signed byte; both forms give the same value.
+  void set_exponent(const Item& item) {
     const auto nibble = static_cast<int>(item.data & 0xF);
     const std::int64_t exponent = item.data <= 0xF ? (nibble < 8 ? nibble : nibble - 16) : item.as_signed();
     if (exponent < -8 || exponent > 7)
@@ -316,26 +315,26 @@ class DescriptorParser {
     global_.unit_exponent = static_cast<int>(exponent);
   }
 
-  void take_id(const Item& item) {
+  void set_report_id(const Item& item) {
     if (item.data == 0 || item.data > 255)
       refuse(item, "report id " + std::to_string(item.data) + "; 1 to 255 are allowed");
     if (!found_.reports.empty() && !found_.has_ids())
-      refuse(item, "gives a report id where fields before it have none; give all of them one");
+      refuse(item, "sets a report id, but previous fields have none; give all fields an id");
     global_.report_id = static_cast<std::uint8_t>(item.data);
   }
 
   // Local items
 
   void local_item(const Item& item) {
-    const WrittenUsage written{item.data, item.size == 4};
-    if (item.tag == kUsage) add_usages(item, written, written);
-    if (item.tag == kUsageMinimum) take_end(item, local_.usage_minimum);
-    if (item.tag == kUsageMaximum) take_end(item, local_.usage_maximum);
-    if (item.tag == kDelimiter) take_delimiter(item);
+    const WrittenUsage usage{item.data, item.size == 4};
+    if (item.tag == kUsage) add_usages(item, usage, usage);
+    if (item.tag == kUsageMinimum) add_range_end(item, local_.usage_minimum);
+    if (item.tag == kUsageMaximum) add_range_end(item, local_.usage_maximum);
+    if (item.tag == kDelimiter) set_delimiter(item);
   }
 
-  void take_end(const Item& item, std::optional<Item>& end) {
-    if (end) refuse(item, "a second end of a usage range whose other end has not come");
+  void add_range_end(const Item& item, std::optional<Item>& end) {
+    if (end) refuse(item, "is a second end of a usage range without its other end");
     end = item;
     if (!local_.usage_minimum || !local_.usage_maximum) return;
     const Item &first = *local_.usage_minimum, &last = *local_.usage_maximum;
@@ -345,17 +344,17 @@ class DescriptorParser {
   }
 
   void add_usages(const Item& item, WrittenUsage first, WrittenUsage last) {
-    if (local_.delimited && local_.alternatives_met++ > 0) return;
+    if (local_.delimited && local_.alternatives++ > 0) return;
     local_.usages.push_back({first, last, item.at});
   }
 
-  void take_delimiter(const Item& item) {
+  void set_delimiter(const Item& item) {
     const bool opens = item.data == 1;
     if (item.data > 1) refuse(item, "delimiter " + std::to_string(item.data) + "; 1 opens and 0 closes");
     if (opens == local_.delimited)
-      refuse(item, opens ? "opens a delimiter inside of one" : "closes a delimiter, and none is open");
+      refuse(item, opens ? "opens a delimiter inside another" : "closes a delimiter, but none is open");
     local_.delimited = opens;
-    local_.alternatives_met = 0;
+    local_.alternatives = 0;
   }
 
   std::span<const std::uint8_t> bytes_;
@@ -363,12 +362,12 @@ class DescriptorParser {
   GlobalState global_;
   LocalState local_;
   std::vector<GlobalState> pushed_;
-  std::vector<std::size_t> open_;         ///< collections, outermost first
-  std::vector<std::size_t> bits_so_far_;  ///< of each report, by its index
+  std::vector<std::size_t> open_;       ///< indices of the open collections, outermost first
+  std::vector<std::size_t> bits_used_;  ///< bits used so far, by index of the report
   ReportDescriptor found_;
 };
 
-const char* word_for(Usage usage) {
+const char* name_of(Usage usage) {
   static constexpr std::array<const char*, 6> kAxes = {"X", "Y", "Z", "Rx", "Ry", "Rz"};
   if (usage.page == 0x01 && usage.id >= 0x30 && usage.id < 0x36) return kAxes[usage.id - 0x30U];
   if (usage == Usage{0x01, 0x02}) return "mouse";
@@ -396,7 +395,7 @@ const char* name(ReportKind kind) noexcept {
 }
 
 std::string to_text(Usage usage) {
-  const std::string word = word_for(usage);
+  const std::string word = name_of(usage);
   return hex(usage.page) + ":" + hex(usage.id) + (word.empty() ? "" : " (" + word + ")");
 }
 

@@ -11,12 +11,12 @@
 
 namespace wrenchd {
 
-/// The three ways a HID report travels: device to host, host to device, and on request either way.
+/// Kind of a HID report: device to host, host to device, or on request in either direction.
 enum class ReportKind : std::uint8_t { input, output, feature };
 
 const char* name(ReportKind kind) noexcept;
 
-/// What a number is for, as the HID usage tables name it: page 0x01, id 0x30 is X.
+/// Meaning of a field, as in the HID usage tables: page 0x01, id 0x30 is X.
 struct Usage {
   std::uint16_t page = 0;
   std::uint16_t id = 0;
@@ -24,10 +24,11 @@ struct Usage {
   bool operator==(const Usage&) const = default;
 };
 
-/// "01:30", page and id in hexadecimal; with the word for it where it is one of the few we meet: "01:30 (X)".
+/// Returns page and id in hexadecimal, "01:30", with a name for common usages: "01:30 (X)". Not RT-safe:
+/// allocates.
 std::string to_text(Usage usage);
 
-/// Pages from here on are the makers' own: what is in such a field, only the maker knows.
+/// First vendor-defined page. Only the vendor knows the meaning of these fields.
 inline constexpr std::uint16_t kFirstVendorPage = 0xFF00;
 
 /// Usages first, first + 1, ..., last of one page.
@@ -36,61 +37,66 @@ struct UsageRange {
   std::uint16_t last_id = 0;
 };
 
-/// A run of equal fields that follow each other in a report: what one Input, Output or Feature item declares.
+/// A run of equal, consecutive fields of a report: the fields of one Input, Output or Feature item.
 struct DescribedField {
-  std::size_t bit = 0;    ///< of the first, from the start of the report as it travels, its id included
-  unsigned bits = 0;      ///< width of one, 1 to 256
-  std::size_t count = 0;  ///< how many, 1 or more
+  /// First bit of the first field, from the start of the transmitted report, including its id.
+  std::size_t bit = 0;
+  unsigned bits = 0;             ///< width of one field, 1 to 256
+  std::size_t count = 0;         ///< number of fields, 1 or more
   std::int64_t logical_min = 0;  ///< below 0: two's complement; otherwise unsigned
   std::int64_t logical_max = 0;
-  std::int64_t physical_min = 0;   ///< what logical_min means, in the unit; both 0: nothing is said
-  std::int64_t physical_max = 0;   ///< what logical_max means, likewise
-  std::uint32_t unit = 0;          ///< as HID 1.11 section 6.2.2.7 codes it; 0: none
-  int unit_exponent = 0;           ///< the unit is to be taken times ten to this power, -8 to 7
-  std::vector<UsageRange> usages;  ///< in order, as they were written: ranges are not spread out
+  /// Physical value of logical_min in the unit; both physical values 0: not stated.
+  std::int64_t physical_min = 0;
+  std::int64_t physical_max = 0;   ///< physical value of logical_max in the unit
+  std::uint32_t unit = 0;          ///< code as in HID 1.11 section 6.2.2.7; 0: none
+  int unit_exponent = 0;           ///< decimal exponent of the unit, -8 to 7
+  std::vector<UsageRange> usages;  ///< usages in the order of the descriptor; ranges are not expanded
   bool constant = false;           ///< padding
-  bool variable = false;  ///< each is a value of its own; otherwise an array of indices into the usages
+  /// true: each field is a value of its own; false: an array of indices into the usages
+  bool variable = false;
   bool relative = false;
-  std::size_t collection = 0;   ///< the innermost one around it: an index into ReportDescriptor::collections
+  /// Innermost collection of the field: index into ReportDescriptor::collections.
+  std::size_t collection = 0;
   std::size_t declared_at = 0;  ///< byte of the descriptor
 
   bool is_signed() const noexcept { return logical_min < 0; }
   std::size_t end_bit() const noexcept { return bit + bits * count; }
-  /// What the i-th is for: where there are fewer usages than fields the last one serves for the rest. Nothing
-  /// where the descriptor names none, as for padding.
+  /// Returns the usage of field i. If there are fewer usages than fields, the last usage applies to the rest.
+  /// Empty if the descriptor names none, as for padding. RT-safe.
   std::optional<Usage> usage(std::size_t i) const noexcept;
 };
 
-/// One report, in the order of its bits.
+/// One report; its fields are in the order of their bits.
 struct DescribedReport {
   ReportKind kind = ReportKind::input;
-  std::optional<std::uint8_t> id;  ///< none: the device has one report of a kind, and no id travels
-  std::size_t length = 0;  ///< bytes as Linux's hidraw hands them over: the id included if there is one
-  std::vector<DescribedField> fields;  ///< padding included; nothing is left out between them
+  std::optional<std::uint8_t> id;  ///< empty: the device has one report of each kind and sends no id
+  std::size_t length = 0;  ///< length in bytes as delivered by hidraw: including the id if there is one
+  std::vector<DescribedField> fields;  ///< all fields without gaps, including padding
 };
 
-/// Fields that belong together. Type 1 is an application: one for each thing a device wants to be.
+/// Collection of fields. Type 1 is an application: one per function of the device.
 struct DescribedCollection {
   static constexpr std::size_t kOutermost = SIZE_MAX;
   static constexpr std::uint8_t kApplication = 1;
 
   std::uint8_t type = 0;
-  Usage usage;                      ///< {0, 0} where it has none
-  std::size_t parent = kOutermost;  ///< index of the collection around it
+  Usage usage;                      ///< {0, 0} if it has none
+  std::size_t parent = kOutermost;  ///< index of the enclosing collection
 };
 
-/// Everything a device says of its reports.
+/// Content of a report descriptor.
 struct ReportDescriptor {
-  std::vector<DescribedReport> reports;  ///< in the order in which they are first met
+  std::vector<DescribedReport> reports;  ///< in the order of their first occurrence
   std::vector<DescribedCollection> collections;
 
   bool has_ids() const noexcept { return !reports.empty() && reports.front().id.has_value(); }
   const DescribedReport* find(ReportKind kind, std::optional<std::uint8_t> id) const noexcept;
-  /// Usage of the outermost collection around a field: what the device wants to be with it.
+  /// Returns the usage of the outermost collection of a field: the function of the device to which it
+  /// belongs. RT-safe.
   Usage application(const DescribedField& field) const noexcept;
 };
 
-/// A descriptor was refused. what() is "byte 12: what is wrong; what it should be".
+/// Error: the descriptor is invalid. what() is "byte 12: what is wrong; what it should be".
 class DescriptorError : public std::runtime_error {
  public:
   DescriptorError(std::size_t at, const std::string& why);
@@ -100,17 +106,17 @@ class DescriptorError : public std::runtime_error {
   std::size_t at_;
 };
 
-/// Reads a report descriptor, HID 1.11 section 6.2.2. Throws DescriptorError where it is cut off, does not
-/// balance, contradicts itself, or asks for more than the limits below; time and memory are bounded by them.
+/// Parses a report descriptor, HID 1.11 section 6.2.2. Throws DescriptorError if it is truncated, unbalanced,
+/// contradictory, or exceeds the limits below. The limits bound time and memory.
 ///
-/// Where HID 1.11 leaves room we read as Linux does, so that what we check is what the kernel does: a maximum
-/// is unsigned unless the minimum is negative; a usage takes the page that holds when its field is declared;
-/// of alternatives between delimiters the first is taken; items with reserved tags are passed over.
-/// Stricter than Linux: a field outside of every collection, a push that is not popped, half a usage range,
-/// and reports with and without ids side by side are refused. Not RT safe.
+/// If HID 1.11 is ambiguous, the parser follows Linux, so that the check agrees with the kernel: a maximum is
+/// unsigned unless the minimum is negative; a usage takes the page that is current when its field is
+/// declared; of alternatives between delimiters it uses the first; it skips items with reserved tags. It is
+/// stricter than Linux in these cases: it rejects a field outside every collection, a push without a pop,
+/// half a usage range, and reports with and without ids in one descriptor. Not RT-safe: allocates.
 ReportDescriptor parse_report_descriptor(std::span<const std::uint8_t> bytes);
 
-// Limits. The first four are those of Linux, which would not bind a device beyond them.
+// Limits. The first four are those of Linux, which does not bind a device beyond them.
 inline constexpr std::size_t kMaxDescriptorBytes = 4096;
 inline constexpr std::size_t kMaxDescribedReportBytes = 16384;
 inline constexpr std::size_t kMaxFieldBits = 256;

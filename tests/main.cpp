@@ -7,10 +7,10 @@
 
 #include "tests/support/temporary_directory.hpp"
 
-/// Daemons that tests start beside each other have no socket unless a test gives them one: the usual place is
-/// for one daemon, and may be that of the machine's own. What their flight recorders write is gone with the
-/// tests. The meshes they keep are the build's own, not the user's: no test passes for what another build
-/// left behind. WRENCHD_TEST_CACHE names another directory for them. What is logged here nobody reads.
+/// Daemons in tests have no socket unless the test gives them one, because the default path is for one daemon
+/// and may belong to the machine's own. Flight recordings go to a directory that is removed after the tests.
+/// The mesh cache belongs to the build directory, so that no test passes because of another build's cache;
+/// WRENCHD_TEST_CACHE names another directory. The log is discarded.
 int main(int argc, char** argv) {
   setenv("WRENCHD_SOCKET", "none", 1);
   const wrenchd::test::TemporaryDirectory state;

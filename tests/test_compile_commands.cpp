@@ -37,7 +37,7 @@ std::string last(const std::vector<std::string>& command, const std::string& beg
 
 }  // namespace
 
-TEST_CASE("nothing is compiled with -ffast-math, or with what makes a NaN vanish", "[compile_commands]") {
+TEST_CASE("no file is compiled with -ffast-math or other flags that ignore NaN", "[compile_commands]") {
   const auto all = commands();
   REQUIRE(all.size() > 50);
   for (const auto& command : all) {
@@ -49,7 +49,7 @@ TEST_CASE("nothing is compiled with -ffast-math, or with what makes a NaN vanish
   }
 }
 
-TEST_CASE("what limits the wrench is compiled with IEEE to the letter, said of its own files",
+TEST_CASE("the files that limit the wrench have explicit flags for strict IEEE arithmetic",
           "[compile_commands]") {
   int found = 0;
   for (const auto& command : commands()) {

@@ -14,7 +14,7 @@ namespace {
 
 using namespace test;
 
-/// The cells of a line, quotes taken off.
+/// Returns the cells of a line without quotes.
 std::vector<std::string> cells_of(const std::string& line) {
   std::istringstream in(line);
   std::vector<std::string> cells;
@@ -25,7 +25,7 @@ std::vector<std::string> cells_of(const std::string& line) {
   return cells;
 }
 
-TEST_CASE("how the cost grows is written cell by cell, and drawn", "[growth]") {
+TEST_CASE("the cost by mesh size is written cell by cell and plotted", "[growth]") {
   const TemporaryDirectory files;
   const auto csv = files.path() / "growth.csv";
   const ProgramResult bench = run_program("bench_contact", {"--quick", "--growth", "--csv", csv.string()});
@@ -44,7 +44,7 @@ TEST_CASE("how the cost grows is written cell by cell, and drawn", "[growth]") {
     const auto cells = cells_of(line);
     REQUIRE(cells.size() == 5);
     const std::size_t column = static_cast<std::size_t>(rows % 4);
-    CHECK(cells[0] == "growth: a tool of 10k triangles on a boulder of so many [us]");
+    CHECK(cells[0] == "growth: a tool of 10k triangles on a boulder with N triangles [us]");
     CHECK(cells[1] == (rows < 8 ? "2000" : "6000"));
     CHECK(cells[2] == (rows % 8 < 4 ? "wrenchd all pairs" : "wrenchd whole tick"));
     CHECK(cells[3] == columns[column]);

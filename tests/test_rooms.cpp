@@ -8,7 +8,7 @@
 
 #include <catch2/catch.hpp>
 
-// The rooms of the source tree, as the README draws them: arrows point one way.
+// The rooms of the source tree, as the README draws them: dependencies point one way.
 
 namespace {
 
@@ -76,4 +76,22 @@ TEST_CASE("headers do not carry CGAL, hidapi, toml++ or HDF5 along", "[rooms]") 
       for (const char* heavy : {"CGAL/", "hidapi", "libusb", "toml++", "hdf5", "spdlog"})
         CHECK(include.name.find(heavy) == std::string::npos);
     }
+}
+
+TEST_CASE("what runs on the servo thread includes nothing that allocates, locks or writes by itself",
+          "[rooms]") {
+  const std::vector<std::string> forbidden = {
+      "nlohmann/",          "spdlog/", "fmt/",    "filesystem", "hdf5",    "H5",
+      "iostream",           "fstream", "sstream", "ostream",    "istream", "mutex",
+      "condition_variable", "future",  "CGAL/",   "toml++/"};
+  std::size_t files = 0;
+  for (const Include& include : includes_of("daemon")) {
+    if (include.file.parent_path().filename() != "servo") continue;
+    ++files;
+    INFO(include.file << " includes " << include.name);
+    for (const std::string& name : forbidden) CHECK_FALSE(include.name.starts_with(name));
+    // The rest of the daemon may know the servo loop, and never the other way round.
+    if (include.name.starts_with("daemon/")) CHECK(include.name.starts_with("daemon/servo/"));
+  }
+  REQUIRE(files > 100);
 }

@@ -33,7 +33,7 @@ std::vector<DeviceProfile> profiles_named(const std::string& name) {
   return {profile};
 }
 
-/// The profile of the plugged-in device that is meant, and its serial number.
+/// Profile and serial number of the connected device to calibrate.
 struct Target {
   DeviceProfile profile;
   std::string serial;
@@ -41,26 +41,26 @@ struct Target {
 
 Target find_target(const CalibrateOptions& options) {
   const std::vector<DeviceProfile> profiles = profiles_named(options.profile);
-  const std::vector<UsbDevice> plugged = list_usb_devices();
-  DeviceCriteria wanted;
-  wanted.serial = options.serial;
-  if (options.profile != kAnyProfile) wanted.profile = profiles.front().name;
-  const DeviceChoice choice = choose_device(plugged, profiles, wanted);
+  const std::vector<UsbDevice> connected = list_usb_devices();
+  DeviceCriteria criteria;
+  criteria.serial = options.serial;
+  if (options.profile != kAnyProfile) criteria.profile = profiles.front().name;
+  const DeviceChoice choice = choose_device(connected, profiles, criteria);
   if (!choice.selection) {
-    std::string text = "no such device is plugged in; wrenchctl devices lists what is";
-    for (const std::string& seen : describe_rejected(plugged, choice)) text += "\n  " + seen;
+    std::string text = "no such device is connected; wrenchctl devices lists the connected devices";
+    for (const std::string& rejected : describe_rejected(connected, choice)) text += "\n  " + rejected;
     throw std::runtime_error(text);
   }
-  const UsbDevice& device = plugged[choice.selection->device];
+  const UsbDevice& device = connected[choice.selection->device];
   if (device.serial.empty())
     throw std::runtime_error(
         describe(device) +
-        ": it has no serial number, so nothing can be kept for it and no other; have its "
-        "firmware send one");
+        ": the device has no serial number, so its calibration cannot be stored; change its "
+        "firmware to send a serial number");
   return {profiles[choice.selection->profile], device.serial};
 }
 
-/// Whether a line was typed since it was asked last.
+/// Returns true if the operator has typed a line since the last call.
 bool line_typed() {
   pollfd input = {STDIN_FILENO, POLLIN, 0};
   if (poll(&input, 1, 0) <= 0 || (input.revents & POLLIN) == 0) return false;
@@ -73,22 +73,22 @@ bool line_typed() {
 }  // namespace
 
 Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const std::string& serial,
-                      Clock& clock, const OperatorInterface& person) {
+                      Clock& clock, const OperatorInterface& operator_interface) {
   DeviceHoming homing(device, profile, DeviceHoming::Extent::full);
-  std::string said;
-  while (!person.cancelled()) {
+  std::string last_instruction;
+  while (!operator_interface.cancelled()) {
     clock.sleep_until(clock.now() + kPeriod);
-    if (homing.state().step == HomingStep::reference && person.confirmed()) homing.confirm();
+    if (homing.state().step == HomingStep::reference && operator_interface.confirmed()) homing.confirm();
     const HomingState& state = homing.step(clock.now());
     if (homing.device_lost())
-      throw std::runtime_error("the device was unplugged; plug it in, and begin again");
-    const std::string words = operator_instruction(state);
-    if (state.step == HomingStep::failed) throw std::runtime_error(words);
-    if (words != said) person.instruct(words);
-    said = words;
+      throw std::runtime_error("the device was disconnected; connect it and start again");
+    const std::string instruction = operator_instruction(state);
+    if (state.step == HomingStep::failed) throw std::runtime_error(instruction);
+    if (instruction != last_instruction) operator_interface.instruct(instruction);
+    last_instruction = instruction;
     if (state.step == HomingStep::done) return {profile.name, serial, homing.offsets()};
   }
-  throw std::runtime_error("stopped; nothing was stored");
+  throw std::runtime_error("cancelled; no calibration was stored");
 }
 
 int run_calibrate(const CalibrateOptions& options) {
@@ -99,25 +99,25 @@ int run_calibrate(const CalibrateOptions& options) {
   WallClock clock;
   device.open();
   std::signal(SIGINT, [](int) { interrupted.store(true); });
-  std::printf("%s, serial number %s. Its motors stay off. Ctrl-C ends.\n", target.profile.name.c_str(),
+  std::printf("%s, serial number %s. The motors stay off. Ctrl-C cancels.\n", target.profile.name.c_str(),
               target.serial.c_str());
-  const OperatorInterface person = {[](const std::string& words) {
-                                      std::printf("%s\n", words.c_str());
-                                      std::fflush(stdout);
-                                    },
-                                    line_typed, [] { return interrupted.load(); }};
-  const auto released = [&] {
+  const OperatorInterface operator_interface = {[](const std::string& instruction) {
+                                                  std::printf("%s\n", instruction.c_str());
+                                                  std::fflush(stdout);
+                                                },
+                                                line_typed, [] { return interrupted.load(); }};
+  const auto release_device = [&] {
     device.release(clock.now());
     device.close();
   };
   Calibration calibration;
   try {
-    calibration = calibrate(device, target.profile, target.serial, clock, person);
+    calibration = calibrate(device, target.profile, target.serial, clock, operator_interface);
   } catch (...) {
-    released();
+    release_device();
     throw;
   }
-  released();
+  release_device();
   store.write(calibration);
   std::printf("Stored in %s.\n", store.file_of(calibration.profile, calibration.serial).c_str());
   return 0;

@@ -10,15 +10,17 @@
 
 namespace wrenchd {
 
-/// The person beside the device.
+/// Callbacks to the operator who moves the device during the calibration.
 struct OperatorInterface {
-  std::function<void(const std::string&)> instruct;  ///< a sentence on what to do
-  std::function<bool()> confirmed;                   ///< whether the handle is in its rest, by now
-  std::function<bool()> cancelled;                   ///< whether they have had enough
+  std::function<void(const std::string&)> instruct;  ///< shows the operator the next instruction
+  /// Returns true once the operator has confirmed that the handle is at its reference pose.
+  std::function<bool()> confirmed;
+  std::function<bool()> cancelled;  ///< returns true if the operator has cancelled the calibration
 };
 
-/// Calibrates an opened device: its rest, where the profile asks for one, and its axes, motors off all the
-/// while. Throws std::runtime_error where it failed, was lost or was stopped; nothing is stored here.
+/// Calibrates an opened device: first its reference pose, if the profile requires one, then its axes. The
+/// motors stay off. Returns the calibration without storing it. Throws std::runtime_error if the calibration
+/// fails or is cancelled, or if the device is disconnected. Not RT-safe: waits for the operator.
 Calibration calibrate(ProfileDevice& device, const DeviceProfile& profile, const std::string& serial,
                       Clock& clock, const OperatorInterface& person);
 
@@ -27,8 +29,9 @@ struct CalibrateOptions {
   std::string serial;
 };
 
-/// `wrenchctl calibrate`: finds the device, calibrates it with whoever sits at the terminal, and stores what
-/// it found. Returns the exit code. Throws as calibrate() does, and where there is no such device.
+/// `wrenchctl calibrate`: finds the device, calibrates it with the operator at the terminal, and stores the
+/// calibration. Returns the exit code. Throws std::runtime_error if no such device is connected or if
+/// calibrate() throws. Not RT-safe: waits for the operator.
 int run_calibrate(const CalibrateOptions& options);
 
 }  // namespace wrenchd

@@ -51,7 +51,7 @@ std::string about(const DeviceProfile& profile) {
   text << "  device " << profile.name << ": " << profile.report_rate_Hz << " reports/s, at most "
        << profile.max_force_N << " N and " << profile.max_torque_Nm << " N.m\n";
   if (sensed_dofs(profile) != kAllDofs || driven_dofs(profile) != kAllDofs)
-    text << "  it senses " << dof_text(sensed_dofs(profile)) << ", and drives "
+    text << "  the device senses " << dof_text(sensed_dofs(profile)) << " and drives "
          << dof_text(driven_dofs(profile)) << '\n';
   return text.str();
 }
@@ -61,22 +61,21 @@ std::string about(const DeviceProfile& profile) {
 std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
   switch (kind_of(file)) {
     case Kind::scene:
-      return file.string() + ": a good scene\n" + about(load_scene(file), meshes);
+      return file.string() + ": valid scene\n" + about(load_scene(file), meshes);
     case Kind::profile:
-      return file.string() + ": a good device profile\n" + about(load_profile(file));
+      return file.string() + ": valid device profile\n" + about(load_profile(file));
     case Kind::hand_script: {
       SimulationSettings simulation;
       load_hand_script(file, simulation);
-      return file.string() + ": a good hand script of " + std::to_string(simulation.hand_path.size()) +
+      return file.string() + ": valid hand script with " + std::to_string(simulation.hand_path.size()) +
              " waypoints\n";
     }
     case Kind::settings:
       break;
   }
   const RunConfig plan = load_run_config({file, {}, {}, false}, SearchPath());
-  return file.string() + ": a good configuration\n" +
-         (plan.profile.name.empty() ? "profile: that of the device that is plugged in\n"
-                                    : about(plan.profile)) +
+  return file.string() + ": valid configuration\n" +
+         (plan.profile.name.empty() ? "profile: that of the connected device\n" : about(plan.profile)) +
          about(plan.scene, meshes);
 }
 
@@ -84,8 +83,8 @@ std::string check_against_descriptor(const std::filesystem::path& profile, const
   const auto expected = expected_reports(load_profile(profile));
   const auto lines = find_differences(parse_descriptor(device), expected);
   if (lines.empty()) return profile.string() + ": agrees with the report descriptor of " + device.file + '\n';
-  std::string text = profile.string() + ": disagrees with what " + device.file +
-                     " says of its reports; change the profile, or name the device it is for:";
+  std::string text = profile.string() + ": disagrees with the report descriptor of " + device.file +
+                     "; change the profile, or name the device that it belongs to:";
   for (const std::string& line : lines) text += "\n  " + line;
   throw std::runtime_error(text);
 }

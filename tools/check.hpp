@@ -9,16 +9,15 @@
 
 namespace wrenchd {
 
-/// Reads a TOML file of any of our kinds, and the files it names, as the daemon would. Returns what it found,
-/// in a few lines for a person, with what was repaired in meshes and what is unlikely about them; throws what
-/// the loaders throw where something is wrong. The kind is told by the keys: [tool] makes a scene,
-/// [pose_report], transport or inherits a profile, [[waypoint]] a hand script, anything else a
-/// configuration.
+/// Loads a TOML file and the files that it refers to, as the daemon does. Returns a summary for the user in a
+/// few lines, with mesh repairs and implausible properties. The keys determine the type: [tool] makes a
+/// scene, [pose_report], transport or inherits a profile, [[waypoint]] a hand script, anything else a
+/// configuration. Throws the loaders' exceptions. Not RT-safe: reads files; large meshes take seconds.
 std::string check_file(const std::filesystem::path& file, MeshLoader& meshes);
 
-/// Reads a device profile and holds it against what a device says of its reports. Returns a line that they
-/// agree; throws std::runtime_error with a line for each thing they disagree about, and what the loader and
-/// the parser throw.
+/// Compares a device profile with the report descriptor of a device. Returns a line that confirms the
+/// agreement. Throws std::runtime_error with one line per difference, and the exceptions of loader and
+/// parser. Not RT-safe: reads files.
 std::string check_against_descriptor(const std::filesystem::path& profile, const DescriptorSource& device);
 
 }  // namespace wrenchd

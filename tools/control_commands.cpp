@@ -26,11 +26,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A third of what the lease allows, so that two may be late.
-constexpr auto kBeatEvery = 30ms;
-constexpr auto kFadesWithin = 2s;
-/// What takes longest, a mesh of a million triangles, takes less.
-constexpr auto kAnswerWithin = 60s;
+/// Heartbeat interval: a third of the heartbeat timeout, so that two heartbeats may be late.
+constexpr auto kHeartbeatInterval = 30ms;
+constexpr auto kFadeTimeout = 2s;
+/// Response timeout, above the duration of the slowest request (a mesh of a million triangles).
+constexpr auto kResponseTimeout = 60s;
 
 std::atomic<bool> interrupted{false};
 
@@ -49,8 +49,8 @@ std::string pretty(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
-std::string text_or(const Json& value, const char* otherwise) {
-  return value.is_string() ? value.get<std::string>() : otherwise;
+std::string text_or(const Json& value, const char* fallback) {
+  return value.is_string() ? value.get<std::string>() : fallback;
 }
 
 std::string times(const Json& times) {
@@ -62,7 +62,7 @@ void show(const Json& event, const ControlOptions& options) {
   print(options.json ? event.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n' : event_text(event));
 }
 
-/// The states in which there is force, or will be.
+/// Returns true in states with force, and in states that lead to force.
 bool is_armed(const std::string& state) {
   return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
 }
@@ -71,18 +71,18 @@ Json call(Client& client, const std::string& method, const Json& params = Json::
   return Json::parse(client.call(method, params.dump()));
 }
 
-/// The next event; nothing: none came so soon.
+/// Returns the next event; empty if none came in time.
 std::optional<Json> next_event(Client& client, std::chrono::milliseconds limit) {
   ClientEvent event;
   if (!client.poll_event(event, limit)) return {};
   return Json::parse(event.json);
 }
 
-/// Until the hand is free: the daemon tells. The connection may end before.
-void see_it_fade(Client& client, const ControlOptions& options, std::string state) {
-  const auto end = std::chrono::steady_clock::now() + kFadesWithin;
+/// Waits until the daemon reports that the force is zero. The connection may end before.
+void wait_for_release(Client& client, const ControlOptions& options, std::string state) {
+  const auto end = std::chrono::steady_clock::now() + kFadeTimeout;
   while ((is_armed(state) || state == "releasing") && std::chrono::steady_clock::now() < end) {
-    const auto event = next_event(client, kBeatEvery);
+    const auto event = next_event(client, kHeartbeatInterval);
     client.heartbeat();
     if (!event) continue;
     show(*event, options);
@@ -95,27 +95,27 @@ void see_it_fade(Client& client, const ControlOptions& options, std::string stat
 std::string status_text(const Json& s) {
   std::string text = fmt::format("state      {}\n", s["state"].get<std::string>());
   if (const Json& cause = s["cause"]; cause.is_object())
-    text += fmt::format("cause      {}: {}\nwhat to do {}\n", cause["name"].get<std::string>(),
-                        cause["sentence"].get<std::string>(), cause["cure"].get<std::string>());
+    text += fmt::format("cause      {}: {}\nremedy     {}\n", cause["name"].get<std::string>(),
+                        cause["message"].get<std::string>(), cause["cure"].get<std::string>());
   const Json &device = s["device"], &limits = s["limits"], &timing = s["timing"];
   text += fmt::format("device     {}{}, {}\n", text_or(device["profile"], "?"),
                       device["simulated"].get<bool>() ? " (simulated)" : "",
-                      device["present"].get<bool>() ? "present" : "not there");
-  text += fmt::format("armed by   {}\nlease      {}\n", text_or(s["armed_by"], "nobody"),
-                      text_or(s["lease"], "nobody has it"));
+                      device["present"].get<bool>() ? "present" : "absent");
+  text +=
+      fmt::format("armed by   {}\nlease      {}\n", text_or(s["armed_by"], "-"), text_or(s["lease"], "free"));
   text += fmt::format("limits     {:g} N, {:g} N.m", limits["max_force_N"].get<double>(),
                       limits["max_torque_Nm"].get<double>());
   if (limits["max_force_N"] == 0.0 && limits["max_torque_Nm"] == 0.0)
-    text += ": it has no motors, and nothing is felt";
+    text += ": the device has no motors and applies no force";
   else if (const double authority = limits["authority"].get<double>(); authority < 1.0)
-    text += fmt::format(", and {:.0f} % of them: the device has no watchdog", 100.0 * authority);
-  text +=
-      fmt::format("\nstiffness  {:.0f} % of what is asked for\n", 100.0 * s["stiffness_share"].get<double>());
+    text += fmt::format(", scaled to {:.0f} % because the device has no watchdog", 100.0 * authority);
+  text += fmt::format("\nstiffness  {:.0f} % of the configured value\n",
+                      100.0 * s["stiffness_scale"].get<double>());
   text += fmt::format("scene      {}, {} obstacles\n", s["scene"]["file"].get<std::string>(),
                       s["scene"]["obstacles"].get<std::uint64_t>());
-  text += fmt::format("ticks      {} at {:g} Hz, {} late, {} left out\n", s["tick"].get<std::uint64_t>(),
+  text += fmt::format("ticks      {} at {:g} Hz, {} late, {} skipped\n", s["tick"].get<std::uint64_t>(),
                       s["rates"]["rate_Hz"].get<double>(), timing["overruns"].get<std::uint64_t>(),
-                      timing["skipped"].get<std::uint64_t>());
+                      timing["skipped_ticks"].get<std::uint64_t>());
   if (const auto recording = s.find("recording"); recording != s.end()) {
     if (const Json& running = (*recording)["running"]; running.is_object())
       text += fmt::format("recording  {}, {} ticks so far\n", running["file"].get<std::string>(),
@@ -123,7 +123,7 @@ std::string status_text(const Json& s) {
     if (const Json& flight = (*recording)["last_flight"]; flight.is_string())
       text += fmt::format("last fault {}\n", flight.get<std::string>());
   }
-  return text + fmt::format("a tick     {} (p50 / p99.9 / max)\nwake-up    {} late\n", times(timing["tick"]),
+  return text + fmt::format("duration   {} (p50 / p99.9 / max)\nlatency    {}\n", times(timing["tick"]),
                             times(timing["wake_latency"]));
 }
 
@@ -133,7 +133,7 @@ std::string event_text(const Json& event) {
 }
 
 void run_status(const ControlOptions& options) {
-  Client client(options.socket, kAnswerWithin);
+  Client client(options.socket, kResponseTimeout);
   const Json status = call(client, "status");
   print(options.json ? pretty(status)
                      : status_text(status) + "wrenchd    " + status["version"].get<std::string>() + " at " +
@@ -142,7 +142,7 @@ void run_status(const ControlOptions& options) {
 
 void run_watch(const ControlOptions& options) {
   catch_signals();
-  Client client(options.socket, kAnswerWithin);
+  Client client(options.socket, kResponseTimeout);
   const Json params = options.events.empty() ? Json::object() : Json{{"events", options.events}};
   const Json status = call(client, "subscribe", params);
   print(options.json ? status.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n'
@@ -153,55 +153,55 @@ void run_watch(const ControlOptions& options) {
 
 int run_arm(const ControlOptions& options) {
   catch_signals();
-  Client client(options.socket, kAnswerWithin);
-  call(client, "subscribe", {{"events", {"state", "fault", "refused", "lease", "lost"}}});
-  call(client, "lease.take", options.preempt ? Json{{"from_other", true}} : Json::object());
+  Client client(options.socket, kResponseTimeout);
+  call(client, "subscribe", {{"events", {"state", "fault", "arming_refused", "lease", "events_lost"}}});
+  call(client, "lease.acquire", options.preempt ? Json{{"preempt", true}} : Json::object());
   call(client, "arm");
   std::string state = "waiting";
   while (!interrupted) {
     client.heartbeat();
-    const auto event = next_event(client, kBeatEvery);
+    const auto event = next_event(client, kHeartbeatInterval);
     if (!event) continue;
     show(*event, options);
     const auto name = (*event)["name"].get<std::string>();
     if (name == "state") state = (*event)["state"];
-    if (name == "refused" || !is_armed(state)) {
-      see_it_fade(client, options, state);
-      std::fputs("wrenchctl: the daemon has disarmed; wrenchctl status says why\n", stderr);
+    if (name == "arming_refused" || !is_armed(state)) {
+      wait_for_release(client, options, state);
+      std::fputs("wrenchctl: the daemon has disarmed; wrenchctl status shows the cause\n", stderr);
       return 1;
     }
   }
   call(client, "disarm");
-  see_it_fade(client, options, state);
-  call(client, "lease.give");
+  wait_for_release(client, options, state);
+  call(client, "lease.release");
   return 0;
 }
 
 void run_request(const std::string& method, const ControlOptions& options) {
-  Client client(options.socket, kAnswerWithin);
+  Client client(options.socket, kResponseTimeout);
   const Json result = call(client, method);
   if (options.json) return print(pretty(result));
-  if (!result.contains("asked")) return print(result.empty() ? "done\n" : pretty(result));
-  std::this_thread::sleep_for(150ms);  // a fade, and a little for the event
+  if (!result.contains("requested")) return print(result.empty() ? "done\n" : pretty(result));
+  std::this_thread::sleep_for(150ms);  // duration of the fade and a margin for the event
   print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
 }
 
 void list_recordings(const ControlOptions& options) {
-  Client client(options.socket, kAnswerWithin);
+  Client client(options.socket, kResponseTimeout);
   const Json result = call(client, "record.list");
   if (options.json) return print(pretty(result));
   for (const Json& one : result["recordings"])
     print(fmt::format("{:<48} {:>10.1f} MB  {}\n", one["name"].get<std::string>(),
-                      1e-6 * one["bytes"].get<double>(), one["written"].get<std::string>()));
+                      1e-6 * one["bytes"].get<double>(), one["modified_utc"].get<std::string>()));
   if (result["recordings"].empty())
     print("no recordings in " + result["directory"].get<std::string>() + "\n");
 }
 
-/// The daemon's files are its own: it hands over a descriptor, from which a copy is made.
+/// The daemon owns its files, so it sends a file descriptor from which this program copies.
 void get_recording(const ControlOptions& options) {
   if (options.file.empty())
-    throw std::runtime_error("record get: which one? `wrenchctl record list` names them");
-  Client client(options.socket, kAnswerWithin);
+    throw std::runtime_error("record get: a name is missing; `wrenchctl record list` shows the names");
+  Client client(options.socket, kResponseTimeout);
   int received = -1;
   client.call("record.open", Json{{"name", options.file}}.dump(), received);
   const OwnedFd recording(received);
@@ -221,18 +221,18 @@ void get_recording(const ControlOptions& options) {
 
 void run_record(const ControlOptions& options) {
   if (!options.file.empty() && options.method != "start" && options.method != "get")
-    throw std::runtime_error("record " + options.method + ": takes no file; only start and get do");
+    throw std::runtime_error("record " + options.method + ": accepts no file; only start and get do");
   if (!options.output.empty() && options.method != "get")
-    throw std::runtime_error("record " + options.method + ": takes no -o; only get does");
+    throw std::runtime_error("record " + options.method + ": accepts no -o; only get does");
   if (options.method == "list") return list_recordings(options);
   if (options.method == "get") return get_recording(options);
   Json params = Json::object();
-  if (!options.file.empty()) {  // a path is meant from here, and the daemon is elsewhere
+  if (!options.file.empty()) {  // the user's path is relative to this process, not to the daemon
     const bool is_name = options.file.find('/') == std::string::npos;
     params["file"] =
         is_name ? options.file : std::filesystem::absolute(options.file).lexically_normal().string();
   }
-  Client client(options.socket, kAnswerWithin);
+  Client client(options.socket, kResponseTimeout);
   const Json result = call(client, "record." + options.method, params);
   if (options.json || options.method == "status") return print(pretty(result));
   if (options.method == "start") return print("recording " + result["file"].get<std::string>() + "\n");
@@ -241,7 +241,7 @@ void run_record(const ControlOptions& options) {
 }
 
 void run_describe(const ControlOptions& options) {
-  Client client(options.socket, kAnswerWithin);
+  Client client(options.socket, kResponseTimeout);
   const Json all = call(client, "describe");
   if (options.json) return print(pretty(all));
   bool found = false;
@@ -249,15 +249,14 @@ void run_describe(const ControlOptions& options) {
     if (!options.method.empty() && method["name"] != options.method) continue;
     found = true;
     print(fmt::format("{}  ({})\n  {}\n", method["name"].get<std::string>(),
-                      method["role"].get<std::string>(), method["doc"].get<std::string>()));
+                      method["min_role"].get<std::string>(), method["doc"].get<std::string>()));
     for (const auto& [name, param] : method["params"].items())
       print(fmt::format("    {}: {}{}; {}\n", name, param["type"].get<std::string>(),
-                        param["required"].get<bool>() ? "" : ", may be left out",
-                        param["doc"].get<std::string>()));
+                        param["required"].get<bool>() ? "" : ", optional", param["doc"].get<std::string>()));
   }
   if (!found)
     throw std::runtime_error("there is no method '" + options.method +
-                             "'; wrenchctl describe, without a name, lists them");
+                             "'; wrenchctl describe without a name lists the methods");
   if (!options.method.empty()) return;
   print("\nevents\n");
   for (const Json& event : all["events"])

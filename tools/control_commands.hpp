@@ -8,10 +8,10 @@
 
 namespace wrenchd {
 
-/// How a command speaks to the daemon, and to a person.
+/// Options that the commands for a running daemon share.
 struct ControlOptions {
-  std::string socket;  ///< empty: the usual places
-  bool json = false;   ///< what the daemon answers, as it is
+  std::string socket;  ///< path of the daemon's socket; empty: default paths
+  bool json = false;   ///< print the daemon's response unchanged
   std::vector<std::string> events;
   std::string method;
   std::string file;
@@ -19,24 +19,24 @@ struct ControlOptions {
   bool preempt = false;
 };
 
-// What `wrenchctl` does with a daemon that runs. Each prints to standard output, and throws what Client
-// throws.
+// Commands of `wrenchctl` for a running daemon. Each prints to standard output and throws ClientError. Not
+// RT-safe: each waits for the daemon.
 
 void run_status(const ControlOptions& options);
-/// Prints events until the daemon ends, or a signal comes.
+/// Prints events until the daemon ends or a signal arrives.
 void run_watch(const ControlOptions& options);
-/// Takes the lease, arms, and keeps both until a signal comes; then disarms. Returns the exit code: 0 when it
-/// was ended so, 1 when the daemon took the force away.
+/// Acquires the lease, arms, and keeps both until a signal arrives; then disarms. Returns the exit code: 0
+/// after a signal, 1 if the daemon removed the force.
 int run_arm(const ControlOptions& options);
-/// One request without parameters, and what follows from it.
+/// Sends a request without parameters, and prints its effect.
 void run_request(const std::string& method, const ControlOptions& options);
 /// options.method: start, stop, status, list or get.
 void run_record(const ControlOptions& options);
 void run_describe(const ControlOptions& options);
 
-/// The status for a person.
+/// Returns the daemon's status as text for the user.
 std::string status_text(const Json& status);
-/// One line for an event.
+/// Returns an event as one line for the user.
 std::string event_text(const Json& event);
 
 }  // namespace wrenchd

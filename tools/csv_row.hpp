@@ -10,8 +10,8 @@
 
 namespace wrenchd {
 
-/// A row of numbers and words, comma between them, each in the shortest form that reads back the same. The
-/// row ends with this object.
+/// A row of numbers and words, separated by commas. Numbers have the shortest form that converts back to the
+/// same value. The destructor ends the row.
 class CsvRow {
  public:
   explicit CsvRow(std::ostream& out) : out_(out) {}

@@ -23,23 +23,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A descriptor in hexadecimal with a comment on every byte stays far below this.
-constexpr std::size_t kMostText = 1 << 20;
+/// Maximum size of a text file: well above a hexadecimal descriptor with a comment on every byte.
+constexpr std::size_t kMaxTextBytes = 1 << 20;
 
-[[noreturn]] void refuse(const fs::path& file, const std::string& why) {
+[[noreturn]] void reject(const fs::path& file, const std::string& why) {
   throw std::runtime_error(file.string() + ": " + why);
 }
 
 constexpr std::string_view kBlanks = " \t\r\n,";
 
-/// Every descriptor has a byte below the blank: its first item gives a usage page, or a usage, or begins a
-/// collection. Text has none but for tabs and ends of lines.
+/// A binary descriptor always contains a byte below 0x20, because its first item is a usage page, a usage or
+/// the start of a collection. A text contains only tabs and line ends below 0x20.
 bool is_text(std::string_view content) {
   return std::all_of(content.begin(), content.end(),
                      [](char c) { return kBlanks.find(c) != kBlanks.npos || (c > ' ' && c <= '~'); });
 }
 
-/// Closes what it holds.
+/// Closes its file descriptor on destruction.
 class OpenFile {
  public:
   explicit OpenFile(const fs::path& file) : fd_(open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
@@ -70,34 +70,34 @@ void take_device(int fd, DescriptorSource& source) {
 DescriptorSource ask_kernel(const fs::path& file) {
   const OpenFile node(file);
   if (node.fd() < 0 && (errno == EACCES || errno == EPERM))
-    refuse(file, "may not be opened by this user; be root, or let a udev rule give access");
-  if (node.fd() < 0) refuse(file, std::string("cannot be opened: ") + std::strerror(errno));
+    reject(file, "cannot be opened by this user; run as root, or grant access with a udev rule");
+  if (node.fd() < 0) reject(file, std::string("cannot be opened: ") + std::strerror(errno));
   int size = 0;
   if (ioctl(node.fd(), HIDIOCGRDESCSIZE, &size) < 0)
-    refuse(file, "is no hidraw device; name a /dev/hidrawN, or a file with a report descriptor");
+    reject(file, "is not a hidraw device; name a /dev/hidrawN, or a file with a report descriptor");
   hidraw_report_descriptor descriptor{};
   descriptor.size = static_cast<unsigned>(std::clamp(size, 0, HID_MAX_DESCRIPTOR_SIZE));
   if (ioctl(node.fd(), HIDIOCGRDESC, &descriptor) < 0)
-    refuse(file, std::string("the kernel does not give its report descriptor: ") + std::strerror(errno));
+    reject(file, std::string("the kernel does not provide its report descriptor: ") + std::strerror(errno));
   DescriptorSource source{{descriptor.value, descriptor.value + descriptor.size}, file.string(), {}, {}};
   take_device(node.fd(), source);
   return source;
 }
 
-/// Files of /sys do not know their size, so this one reads until the end.
+/// Reads until the end, because files in /sys have no known size.
 std::string content_of(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) refuse(file, "cannot be opened; check that this user may read it");
-  std::string content(kMostText + 1, '\0');
+  if (!stream) reject(file, "cannot be opened; check that this user may read it");
+  std::string content(kMaxTextBytes + 1, '\0');
   stream.read(content.data(), static_cast<std::streamsize>(content.size()));
   content.resize(static_cast<std::size_t>(stream.gcount()));
-  if (content.size() > kMostText)
-    refuse(file, "is larger than 1 MiB; is this really a report descriptor? Those have 4096 bytes at most");
-  if (content.empty()) refuse(file, "is empty; the device may have been unplugged");
+  if (content.size() > kMaxTextBytes)
+    reject(file, "is larger than 1 MiB; a report descriptor has at most 4096 bytes");
+  if (content.empty()) reject(file, "is empty; check whether the device is still connected");
   return content;
 }
 
-/// "05", "0x05" or "05010908".
+/// Parses "05", "0x05" or "05010908".
 void add_bytes_of_word(std::string_view word, const std::string& place, std::vector<std::uint8_t>& bytes) {
   std::string_view digits = word;
   if (digits.starts_with("0x") || digits.starts_with("0X")) digits.remove_prefix(2);
@@ -105,7 +105,7 @@ void add_bytes_of_word(std::string_view word, const std::string& place, std::vec
                     digits.find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
   if (!good)
     throw std::runtime_error(place +
-                             ": expected bytes of two hexadecimal digits, as in 05 01 or 0x05, 0x01; " +
+                             ": expected bytes with two hexadecimal digits, as in 05 01 or 0x05, 0x01; " +
                              "found '" + printable(std::string(word), 20) + "'");
   for (std::size_t k = 0; k < digits.size(); k += 2) {
     std::uint8_t byte = 0;
@@ -140,11 +140,11 @@ DescriptorSource read_descriptor_source(const fs::path& file) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (status.type() == fs::file_type::not_found)
-    refuse(file, "no such file; name a /dev/hidrawN, or a file with a report descriptor");
-  if (error) refuse(file, "cannot be read: " + error.message());
+    reject(file, "no such file; name a /dev/hidrawN, or a file with a report descriptor");
+  if (error) reject(file, "cannot be read: " + error.message());
   if (fs::is_character_file(status)) return ask_kernel(file);
   if (!fs::is_regular_file(status))
-    refuse(file,
+    reject(file,
            "is neither a hidraw device nor a regular file; name a /dev/hidrawN, or a file with a report "
            "descriptor");
   const std::string content = content_of(file);

@@ -33,21 +33,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a servo thread of 1 kHz bears: a tenth of its period is not noticed; a whole one is a lost tick.
-constexpr Duration kGoodWakeUp = std::chrono::microseconds(100);
-constexpr Duration kBadWakeUp = std::chrono::milliseconds(1);
-constexpr std::uint64_t kServoPriority = 45;  ///< of wrenchd.toml
+/// Acceptable p99.9 wake latency for a 1 kHz servo thread: a tenth of its period has no noticeable effect; a
+/// whole period loses a tick.
+constexpr Duration kGoodWakeLatency = std::chrono::microseconds(100);
+constexpr Duration kBadWakeLatency = std::chrono::milliseconds(1);
+constexpr std::uint64_t kServoPriority = 45;  ///< as in wrenchd.toml
 constexpr std::uint64_t kLeastMemory_bytes = std::uint64_t{512} << 20U;
 constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
 
 constexpr const char* kGroup = "wrenchd";
 constexpr const char* kOperators = "wrench";
 
-Finding ok(std::string what) {
-  return {Health::ok, std::move(what), {}};
+Finding ok(std::string summary) {
+  return {Health::ok, std::move(summary), {}};
 }
 
-/// A file's text without the line's end; empty where it cannot be read.
+/// Returns the text of a file without its line end; empty if the file cannot be read.
 std::string content(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
@@ -62,7 +63,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// The first of these that is there.
+/// Returns the first of these directories that contains the file.
 std::optional<fs::path> first_of(const fs::path& root, std::initializer_list<const char*> directories,
                                  const std::string& name) {
   for (const char* directory : directories) {
@@ -83,11 +84,11 @@ Finding kernel(const MachineState& p) {
   const std::string release = content(p.root / "proc/sys/kernel/osrelease");
   if (content(p.root / "sys/kernel/realtime") == "1") return ok("kernel: " + release + ", PREEMPT_RT");
   return {Health::warning,
-          "kernel: " + release + " is not PREEMPT_RT: under load it may wake the servo thread late",
-          "apt install linux-image-rt-amd64, and boot it"};
+          "kernel: " + release + " is not PREEMPT_RT: it may wake the servo thread late under load",
+          "apt install linux-image-rt-amd64, then boot that kernel"};
 }
 
-/// What else stands on the kernel's command line is for those who want the last microseconds.
+/// Further kernel options improve the latency by microseconds only, so this check ignores them.
 Finding boot_options(const MachineState& p) {
   std::istringstream line(content(p.root / "proc/cmdline"));
   bool isolated = false, threaded = content(p.root / "sys/kernel/realtime") == "1";
@@ -95,18 +96,20 @@ Finding boot_options(const MachineState& p) {
     isolated = isolated || word.starts_with("isolcpus=");
     threaded = threaded || word == "threadirqs";
   }
-  if (isolated && threaded) return ok("boot options: a processor is isolated, interrupts are threads");
-  std::string what = "boot options:", cure;
+  if (isolated && threaded) return ok("boot options: a processor is isolated, and interrupts run in threads");
+  std::string summary = "boot options:", remedy;
   if (!isolated) {
-    what += " no processor is kept for the servo thread";
-    cure =
-        "isolcpus=N on the kernel's command line and cpu = N under [servo], where two or more are to spare";
+    summary += " no processor is reserved for the servo thread";
+    remedy =
+        "isolcpus=N on the kernel command line and cpu = N in [servo], if at least two processors are "
+        "available";
   }
   if (!threaded) {
-    what += std::string(isolated ? "" : ";") + " interrupts come before the servo thread";
-    cure += std::string(cure.empty() ? "" : "; ") + "threadirqs there, or a PREEMPT_RT kernel";
+    summary += std::string(isolated ? "" : ";") + " interrupts preempt the servo thread";
+    remedy += std::string(remedy.empty() ? "" : "; ") +
+              "threadirqs on the kernel command line, or a PREEMPT_RT kernel";
   }
-  return {Health::warning, what, cure};
+  return {Health::warning, summary, remedy};
 }
 
 Finding governor(const MachineState& p) {
@@ -122,24 +125,23 @@ Finding governor(const MachineState& p) {
     ++slow;
     others.insert(name);
   }
-  if (processors == 0)
-    return ok("governor: the kernel does not change the speed of this machine's processors");
+  if (processors == 0) return ok("governor: the kernel does not control the processor frequency");
   if (slow == 0) return ok("governor: performance on all " + std::to_string(processors) + " processors");
   std::string names;
   for (const std::string& name : others) names += (names.empty() ? "" : ", ") + name;
   return {Health::warning,
           "governor: " + names + " on " + std::to_string(slow) + " of " + std::to_string(processors) +
-              " processors: they are slow when the servo thread wakes",
+              " processors: they are slow when the servo thread wakes up",
           "cpupower frequency-set -g performance (package linux-cpupower)"};
 }
 
-Finding rt_share(const MachineState& p) {
+Finding realtime_share(const MachineState& p) {
   const std::string text = content(p.root / "proc/sys/kernel/sched_rt_runtime_us");
   const long us = text.empty() ? -1 : std::atol(text.c_str());
   if (us < 0 || us >= 500000)
     return ok("real-time share: " +
-              (us < 0 ? std::string("all of a processor") : std::to_string(us / 10000) + " %"));
-  return {Health::failure, "real-time share: only " + std::to_string(us / 10000) + " % of a processor's time",
+              (us < 0 ? std::string("all processor time") : std::to_string(us / 10000) + " %"));
+  return {Health::failure, "real-time share: only " + std::to_string(us / 10000) + " % of processor time",
           "sysctl -w kernel.sched_rt_runtime_us=950000"};
 }
 
@@ -150,27 +152,27 @@ std::string size_text(std::uint64_t bytes) {
 }
 
 std::vector<Finding> user_limits(const MachineState& p) {
-  if (p.is_root) return {ok("limits of " + p.user + ": root needs none")};
-  const std::string cure =
-      "nothing, where it runs as a service; else a line in /etc/security/limits.d, and log in anew: " +
+  if (p.is_root) return {ok("limits of " + p.user + ": root has none")};
+  const std::string remedy =
+      "none if wrenchd runs as a service; otherwise add a line to /etc/security/limits.d and log in again: " +
       p.user;
-  std::vector<Finding> found;
+  std::vector<Finding> findings;
   if (p.rtprio_limit >= kServoPriority)
-    found.push_back(ok("real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit)));
+    findings.push_back(ok("real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit)));
   else
-    found.push_back({Health::warning,
-                     "real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit) +
-                         ", and the servo thread wants " + std::to_string(kServoPriority),
-                     cure + " - rtprio 49"});
+    findings.push_back({Health::warning,
+                        "real-time priority of " + p.user + ": up to " + std::to_string(p.rtprio_limit) +
+                            ", but the servo thread requires " + std::to_string(kServoPriority),
+                        remedy + " - rtprio 49"});
   const std::string memory = "memory that " + p.user + " may lock: " + size_text(p.memlock_limit_bytes);
   if (p.memlock_limit_bytes >= kLeastMemory_bytes)
-    found.push_back(ok(memory));
+    findings.push_back(ok(memory));
   else
-    found.push_back({Health::warning, memory, cure + " - memlock unlimited"});
-  return found;
+    findings.push_back({Health::warning, memory, remedy + " - memlock unlimited"});
+  return findings;
 }
 
-/// The value of a setting in a unit file and its drop-ins; the last counts.
+/// Returns the value of a setting in a unit file and its drop-ins; the last one wins.
 std::string setting(const MachineState& p, const fs::path& unit, const std::string& key) {
   std::vector<fs::path> files = {unit};
   std::vector<fs::path> more;
@@ -191,23 +193,23 @@ std::vector<Finding> service(const MachineState& p) {
   const auto unit = unit_file(p.root);
   if (!unit)
     return {{Health::warning,
-             "service: wrenchd.service is not installed: wrenchd runs only where somebody starts it",
+             "service: wrenchd.service is not installed: wrenchd runs only after a manual start",
              "install the package: tools/package, then apt install ./build/package/wrenchd_*.deb"}};
-  std::vector<Finding> found;
+  std::vector<Finding> findings;
   const std::string priority = setting(p, *unit, "LimitRTPRIO"), memory = setting(p, *unit, "LimitMEMLOCK");
-  const std::string cure = "systemctl edit wrenchd: under [Service], ";
+  const std::string remedy = "systemctl edit wrenchd: in [Service], ";
   const bool may = priority == "infinity" || std::strtoul(priority.c_str(), nullptr, 10) >= kServoPriority;
-  found.push_back(may ? ok("service: LimitRTPRIO=" + priority)
-                      : Finding{Health::failure,
-                                "service: LimitRTPRIO=" + priority + ", and the servo thread wants " +
-                                    std::to_string(kServoPriority),
-                                cure + "LimitRTPRIO=49"});
-  found.push_back(memory == "infinity"
-                      ? ok("service: LimitMEMLOCK=infinity")
-                      : Finding{Health::warning,
-                                "service: LimitMEMLOCK=" + memory + ": a large mesh may not fit",
-                                cure + "LimitMEMLOCK=infinity"});
-  return found;
+  findings.push_back(may ? ok("service: LimitRTPRIO=" + priority)
+                         : Finding{Health::failure,
+                                   "service: LimitRTPRIO=" + priority + ", but the servo thread requires " +
+                                       std::to_string(kServoPriority),
+                                   remedy + "LimitRTPRIO=49"});
+  findings.push_back(memory == "infinity"
+                         ? ok("service: LimitMEMLOCK=infinity")
+                         : Finding{Health::warning,
+                                   "service: LimitMEMLOCK=" + memory + ": too little for a large mesh",
+                                   remedy + "LimitMEMLOCK=infinity"});
+  return findings;
 }
 
 // --- groups, rules and devices ----------------------------------------------------------------------------
@@ -221,23 +223,23 @@ bool has_group(const MachineState& p, const std::string& name) {
 Finding groups(const MachineState& p) {
   if (!has_group(p, kGroup))
     return {unit_file(p.root) ? Health::failure : Health::warning,
-            std::string("groups: there is no group ") + kGroup + ", which the nodes of devices belong to",
-            std::string("systemd-sysusers, which the package runs; or groupadd --system ") + kGroup};
+            std::string("groups: there is no group ") + kGroup + ", which the udev rules require",
+            std::string("install the package, which runs systemd-sysusers; or groupadd --system ") + kGroup};
   const auto in = [&p](const char* group) {
     return std::find(p.groups.begin(), p.groups.end(), group) != p.groups.end();
   };
   if (!p.is_root && in(kGroup))
     return {Health::failure,
-            "groups: " + p.user + " is in " + kGroup + ", and may push the hand past all limits",
-            "gpasswd -d " + p.user + " " + kGroup + ": it is the service's alone"};
+            "groups: " + p.user + " is in " + kGroup + ", and can apply force beyond all limits",
+            "gpasswd -d " + p.user + " " + kGroup + "; only the service belongs to this group"};
   if (p.is_root || in(kOperators)) return ok("groups: " + p.user + " may arm");
   return {Health::warning,
-          "groups: " + p.user + " is not in " + kOperators + ", and may only look on and stop",
-          "usermod -aG " + std::string(kOperators) + " " + p.user + ", and log in anew"};
+          "groups: " + p.user + " is not in " + kOperators + ", and may only observe and stop",
+          "usermod -aG " + std::string(kOperators) + " " + p.user + ", and log in again"};
 }
 
-/// Those of its lines that act.
-std::set<std::string> acting(const std::string& rules) {
+/// Returns the effective lines: no comments and no blank lines.
+std::set<std::string> effective_lines(const std::string& rules) {
   std::set<std::string> lines;
   for (const std::string& line : lines_of(rules))
     if (!line.empty() && line[0] != '#') lines.insert(line);
@@ -248,52 +250,54 @@ Finding rules(const MachineState& p) {
   const auto file =
       first_of(p.root, {"etc/udev/rules.d", "run/udev/rules.d", "lib/udev/rules.d", "usr/lib/udev/rules.d"},
                "70-wrenchd.rules");
-  const std::string cure = "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules, then udevadm trigger";
+  const std::string remedy =
+      "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules, then udevadm trigger";
   if (!file)
     return {p.nodes.empty() && !unit_file(p.root) ? Health::warning : Health::failure,
-            "udev rules: there are none, so that only root can open a device", cure};
+            "udev rules: none, so only root can open a device", remedy};
   const std::string name = "/" + file->lexically_relative(p.root).string(), installed = content(*file);
-  const std::set<std::string> there = acting(installed);
+  const std::set<std::string> there = effective_lines(installed);
   std::size_t missing = 0;
-  const std::set<std::string> wanted = acting(udev_rules(p.profiles));
+  const std::set<std::string> wanted = effective_lines(udev_rules(p.profiles));
   for (const std::string& line : wanted) missing += there.count(line) == 0 ? 1 : 0;
   if (missing > 0)
     return {Health::failure,
             "udev rules: " + name + " lacks " + std::to_string(missing) + " of the " +
-                std::to_string(wanted.size()) + " lines for the profiles of wrenchd " + kVersion,
-            cure};
-  return ok("udev rules: " + name + " has all profiles");
+                std::to_string(wanted.size()) + " rules for the profiles of wrenchd " + kVersion,
+            remedy};
+  return ok("udev rules: " + name + " covers all profiles");
 }
 
 std::vector<Finding> devices(const MachineState& p) {
-  if (p.nodes.empty()) return {ok("devices: none that has a profile is plugged in")};
-  std::vector<Finding> found;
+  if (p.nodes.empty()) return {ok("devices: no device with a profile is connected")};
+  std::vector<Finding> findings;
   for (const DeviceNode& node : p.nodes) {
     std::array<char, 8> mode{};
     std::snprintf(mode.data(), mode.size(), "%04o", node.mode);
     const std::string who =
         "device " + node.profile + ": " + node.node + " is of group " + node.group + ", mode " + mode.data();
     if (node.group != kGroup || (node.mode & 0060U) != 0060U)
-      found.push_back({Health::failure, who + ": the service cannot open it",
-                       "udevadm trigger, or unplug it and plug it in again, where the udev rules are right"});
+      findings.push_back({Health::failure, who + ": the service cannot open it",
+                          "correct the udev rules, then udevadm trigger, or reconnect the device"});
     else if ((node.mode & 0006U) != 0)
-      found.push_back({Health::failure, who + ": anybody may push the hand past all limits",
-                       "look for the rule that opens it: grep -l 0666 /etc/udev/rules.d/*"});
+      findings.push_back({Health::failure, who + ": any user can apply force beyond all limits",
+                          "find the rule that grants access: grep -l 0666 /etc/udev/rules.d/*"});
     else
-      found.push_back(ok(who));
+      findings.push_back(ok(who));
     if (node.port_path.empty()) continue;
     const std::string control = content(p.root / "sys/bus/usb/devices" / node.port_path / "power/control");
     if (control == "auto")
-      found.push_back(
-          {Health::failure, "device " + node.profile + " in " + node.port_path + ": it may fall asleep",
+      findings.push_back(
+          {Health::failure, "device " + node.profile + " in " + node.port_path + ": autosuspend is on",
            "udevadm trigger, or: echo on > /sys/bus/usb/devices/" + node.port_path + "/power/control"});
     else if (!control.empty())
-      found.push_back(ok("device " + node.profile + " in " + node.port_path + ": it stays awake"));
+      findings.push_back(ok("device " + node.profile + " in " + node.port_path + ": autosuspend is off"));
   }
-  return found;
+  return findings;
 }
 
-// --- wake-ups ---------------------------------------------------------------------------------------------
+// --- wake latency
+// -----------------------------------------------------------------------------------------
 
 std::string us_text(Duration d) {
   std::array<char, 32> text{};
@@ -301,36 +305,38 @@ std::string us_text(Duration d) {
   return text.data();
 }
 
-Finding wake_ups(const WakeLatency& seen) {
-  const std::string what = "wake-ups: p50 " + us_text(seen.p50) + ", p99.9 " + us_text(seen.p999) +
-                           ", at most " + us_text(seen.max) + " late, " + (seen.fifo ? "with" : "without") +
-                           " SCHED_FIFO";
-  if (seen.p999 <= kGoodWakeUp) return ok(what);
-  if (!seen.fifo)
-    return {Health::warning, what, "run it as root, or raise the limits above, to see what the service gets"};
-  return {seen.p999 <= kBadWakeUp ? Health::warning : Health::failure, what,
-          "the cures above; nothing else that is heavy on this machine; no virtual machine"};
+Finding wake_latency_finding(const WakeLatency& measured) {
+  const std::string summary = "wake latency: p50 " + us_text(measured.p50) + ", p99.9 " +
+                              us_text(measured.p999) + ", at most " + us_text(measured.max) + ", " +
+                              (measured.fifo ? "with" : "without") + " SCHED_FIFO";
+  if (measured.p999 <= kGoodWakeLatency) return ok(summary);
+  if (!measured.fifo)
+    return {Health::warning, summary,
+            "run as root, or raise the limits above, to measure the service's latency"};
+  return {measured.p999 <= kBadWakeLatency ? Health::warning : Health::failure, summary,
+          "apply the remedies above; stop other heavy programs; avoid virtual machines"};
 }
 
 }  // namespace
 
-std::vector<Finding> check_machine(const MachineState& patient) {
-  std::vector<Finding> all = {kernel(patient), boot_options(patient), governor(patient), rt_share(patient)};
+std::vector<Finding> check_machine(const MachineState& machine) {
+  std::vector<Finding> all = {kernel(machine), boot_options(machine), governor(machine),
+                              realtime_share(machine)};
   const auto add = [&all](std::vector<Finding> more) {
     all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
   };
-  add(user_limits(patient));
-  add(service(patient));
-  add({groups(patient), rules(patient)});
-  add(devices(patient));
-  if (patient.wake_latency) add({wake_ups(*patient.wake_latency)});
+  add(user_limits(machine));
+  add(service(machine));
+  add({groups(machine), rules(machine)});
+  add(devices(machine));
+  if (machine.wake_latency) add({wake_latency_finding(*machine.wake_latency)});
   return all;
 }
 
 std::string text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& f : findings) {
-    text += f.health == Health::ok ? "ok      " : f.health == Health::warning ? "better  " : "WRONG   ";
+    text += f.health == Health::ok ? "ok      " : f.health == Health::warning ? "warning " : "ERROR   ";
     text += f.summary + "\n";
     if (!f.cure.empty()) text += "        -> " + f.cure + "\n";
   }
@@ -374,12 +380,12 @@ MachineState read_machine_state(std::vector<DeviceProfile> profiles) {
 
 WakeLatency measure_wake_latency(Duration for_so_long) {
   constexpr Duration kPeriod = std::chrono::milliseconds(1);
-  WakeLatency seen;
+  WakeLatency measured;
   DurationHistogram late;
   std::thread([&] {
     sched_param priority{};
     priority.sched_priority = static_cast<int>(kServoPriority);
-    seen.fifo = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority) == 0;
+    measured.fifo = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority) == 0;
     WallClock clock;
     const TimePoint end = clock.now() + for_so_long;
     for (TimePoint due = clock.now() + kPeriod; due < end; due = std::max(due, clock.now()) + kPeriod) {
@@ -387,10 +393,10 @@ WakeLatency measure_wake_latency(Duration for_so_long) {
       late.add(std::max<Duration>(clock.now() - due, Duration::zero()));
     }
   }).join();
-  seen.p50 = late.quantile(0.5);
-  seen.p999 = late.quantile(0.999);
-  seen.max = late.max();
-  return seen;
+  measured.p50 = late.quantile(0.5);
+  measured.p999 = late.quantile(0.999);
+  measured.max = late.max();
+  return measured;
 }
 
 }  // namespace wrenchd

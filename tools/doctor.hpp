@@ -13,57 +13,60 @@
 
 namespace wrenchd {
 
-/// How a machine is for a servo loop, as far as one thing goes.
+/// The result of one check of the machine for a servo loop.
 enum class Health : std::uint8_t { ok, warning, failure };
 
 struct Finding {
   Health health = Health::ok;
-  std::string summary;  ///< "governor: powersave on 4 processors"
-  std::string cure;     ///< empty where it is ok
+  std::string summary;  ///< such as "governor: powersave on 4 processors"
+  std::string cure;     ///< empty if there is no problem
 };
 
-/// How late a thread wakes up from a sleep of a millisecond.
+/// The latency of a thread that wakes from a sleep of 1 ms.
 struct WakeLatency {
-  bool fifo = false;  ///< SCHED_FIFO was granted
+  bool fifo = false;  ///< true if the system granted SCHED_FIFO
   Duration p50{}, p999{}, max{};
 };
 
-/// A node that a plugged-in device is driven through.
+/// A device node through which wrenchd drives a connected device.
 struct DeviceNode {
   std::string profile;
-  std::string node;       ///< "/dev/hidraw3"
-  std::string port_path;  ///< of the device, "3-1.2"; empty where not on USB
-  std::string group;      ///< that it belongs to
-  unsigned mode = 0;      ///< permissions, as in 0660
+  std::string node;       ///< such as "/dev/hidraw3"
+  std::string port_path;  ///< USB port path of the device, such as "3-1.2"; empty if the device is not on USB
+  std::string group;      ///< group of the node
+  unsigned mode = 0;      ///< permissions, such as 0660
 };
 
-/// All that is looked at. Tests give their own.
+/// All data that the checks use. Tests supply their own.
 struct MachineState {
-  std::filesystem::path root = "/";  ///< that etc, lib, proc, sys and usr are below
-  std::string user;                  ///< who asks
+  std::filesystem::path root = "/";  ///< directory that contains etc, lib, proc, sys and usr
+  std::string user;                  ///< user who runs the program
   bool is_root = false;
-  std::vector<std::string> groups;        ///< of the user
+  std::vector<std::string> groups;        ///< groups of the user
   std::uint64_t rtprio_limit = 0;         ///< RLIMIT_RTPRIO
-  std::uint64_t memlock_limit_bytes = 0;  ///< RLIMIT_MEMLOCK; all ones: none
+  std::uint64_t memlock_limit_bytes = 0;  ///< RLIMIT_MEMLOCK; all bits set: unlimited
   std::vector<DeviceNode> nodes;
-  std::vector<DeviceProfile> profiles;      ///< that there should be rules for
+  std::vector<DeviceProfile> profiles;      ///< profiles that need udev rules
   std::optional<WakeLatency> wake_latency;  ///< empty: not measured
 };
 
-/// This machine, the user that runs this, what is plugged in. Opens no device. Measures nothing yet.
+/// Reads the state of this machine, its user and its connected devices. Opens no device and leaves
+/// wake_latency empty. Not RT-safe: reads files.
 MachineState read_machine_state(std::vector<DeviceProfile> profiles);
 
-/// Sleeps until every millisecond for so long, with SCHED_FIFO and locked memory where the system grants
-/// them, on a thread of its own.
+/// Measures for this duration how late a thread wakes every millisecond. Uses its own thread, with SCHED_FIFO
+/// and locked memory if the system grants them. Not RT-safe: takes the given duration.
 WakeLatency measure_wake_latency(Duration for_so_long);
 
-/// Looks at everything, in a fixed order: kernel, processors, limits, service, rules, devices, wake-ups.
+/// Runs all checks in a fixed order: kernel, processors, limits, service, rules, devices, wake latency. Not
+/// RT-safe: reads files.
 std::vector<Finding> check_machine(const MachineState& patient);
 
-/// For a person, a line each and its cure below: "ok", "better" or "WRONG" first.
+/// Formats one line per finding, which begins with "ok", "warning" or "ERROR", and its remedy below. Not
+/// RT-safe: allocates.
 std::string text(std::span<const Finding> findings);
 
-/// Whether something is wrong.
+/// Returns true if any check failed. RT-safe.
 bool has_failure(std::span<const Finding> findings) noexcept;
 
 }  // namespace wrenchd

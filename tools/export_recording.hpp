@@ -10,17 +10,18 @@
 
 namespace wrenchd {
 
-/// What of a recording is wanted.
+/// Selects the columns and rows of an export.
 struct ExportSettings {
-  std::vector<std::string> columns;  ///< none: all
-  std::size_t every = 1;             ///< so many ticks for a row
-  double from_s = 0.0;               ///< since the first tick
-  double to_s = std::numeric_limits<double>::infinity();
+  std::vector<std::string> columns;                       ///< Names of fields; empty exports all fields.
+  std::size_t every = 1;                                  ///< Exports one tick out of this number.
+  double from_s = 0.0;                                    ///< First time to export, since the first tick.
+  double to_s = std::numeric_limits<double>::infinity();  ///< Last time to export, since the first tick.
 };
 
-/// Writes ticks as CSV. First the time since the first tick, then the columns; each heading has its unit, and
-/// parts of a column have names: "time_s [s],F_out.fx [N]". What stands for names is written as such. Numbers
-/// read back as they were. Throws std::invalid_argument where there is no such column.
+/// Writes ticks as CSV. The first column is the time since the first tick. Each heading has a unit, and each
+/// component of an array has a column: "time_s [s],F_out.fx [N]". Enumerations are written by name. Numbers
+/// read back bit for bit. Throws std::invalid_argument if a column does not exist. Not RT-safe: writes a
+/// stream.
 void write_csv(std::ostream& out, const Recording& recording, const ExportSettings& settings);
 
 }  // namespace wrenchd

@@ -15,17 +15,17 @@ double milliseconds(Duration d) {
   return 1e3 * seconds(d);
 }
 
-/// When the reaction to a fault begins, counted from the moment at which the fault can be seen.
-std::string begins(const FaultRow& row) {
+/// Returns when the reaction begins, measured from the moment at which the fault is detectable.
+std::string begin_text(const FaultRow& row) {
   if (row.persistence == Duration{0}) return "in the same tick";
   return fmt::format("after {:.0f} ms, within one tick", milliseconds(row.persistence));
 }
 
-/// Until when the hand is free of force, counted from there.
-std::string ends(Reaction reaction) {
+/// Returns when the force has ended, measured from the same moment.
+std::string end_text(Reaction reaction) {
   switch (reaction) {
     case Reaction::none:
-      return "the force stays";
+      return "the force remains";
     case Reaction::fade_100ms:
     case Reaction::fade_10ms:
       return fmt::format("no force {:.0f} ms later", milliseconds(time_to_zero(reaction)));
@@ -34,19 +34,19 @@ std::string ends(Reaction reaction) {
   }
 }
 
-/// Where a trigger leads from a loop at full force.
-std::string follows(const FaultRow& row) {
+/// Returns the effect of a fault on an active loop.
+std::string reaction_text(const FaultRow& row) {
   const Transition& from_active = transition(row.trigger, State::active);
-  if (!from_active.changes_state) return "it is told, and the force stays";
-  return fmt::format("state {}; {}, {}", name(from_active.to), begins(row),
-                     ends(std::max(from_active.reaction, row.reaction)));
+  if (!from_active.changes_state) return "the loop reports it, and the force remains";
+  return fmt::format("state {}; {}, {}", name(from_active.to), begin_text(row),
+                     end_text(std::max(from_active.reaction, row.reaction)));
 }
 
 std::string paragraph(const FaultRow& row) {
   return fmt::format(
-      "{}\n  what happened  {}\n  found by       {}\n  what follows   {}\n  why it exists  {}\n"
-      "  what to do     {}\n",
-      row.name, row.message, row.detector, follows(row), row.reason, row.cure);
+      "{}\n  description  {}\n  detection    {}\n  reaction     {}\n  reason       {}\n"
+      "  remedy       {}\n",
+      row.name, row.message, row.detector, reaction_text(row), row.reason, row.cure);
 }
 
 std::string names_of(StateSet set) {
@@ -63,7 +63,7 @@ std::string fault_text() {
   std::string text;
   for (const FaultRow& row : fault_rows()) text += paragraph(row) + "\n";
   return text +
-         fmt::format("{} faults. wrenchctl faults --states shows what leads where.\n", fault_rows().size());
+         fmt::format("{} faults. wrenchctl faults --states shows the state machine.\n", fault_rows().size());
 }
 
 std::string fault_text(const std::string& name) {
@@ -76,8 +76,8 @@ std::string fault_text(const std::string& name) {
 }
 
 std::string state_machine_text() {
-  std::string text = fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", "what happens", "in the states",
-                                 "leads to", "the force", "free in", "because");
+  std::string text = fmt::format("{:<13} {:<58} {:<13} {:<12} {:<10} {}\n", "trigger", "in the states",
+                                 "next state", "force", "zero in", "reason");
   for (const Transition& row : transitions()) {
     const std::string to = row.changes_state ? name(row.to) : "-";
     const std::string within = row.reaction == Reaction::none ? "-"

@@ -5,15 +5,15 @@
 
 namespace wrenchd {
 
-/// The table of faults, for people: what each is, how it is found, what follows and when, why anybody looks
-/// for it, what to do.
+/// Returns the fault table for the user: description, detection, reaction and its timing, reason for the
+/// check, remedy. Not RT-safe: allocates.
 std::string fault_text();
 
-/// One fault, by the name that stands in log and status. Throws std::runtime_error, with the names there are,
-/// where there is none of that name.
+/// Returns the row of one fault, by its name in log and status. Throws std::runtime_error with all names if
+/// the name is unknown. Not RT-safe: allocates.
 std::string fault_text(const std::string& name);
 
-/// The state machine, row by row.
+/// Returns the state machine, one row per transition. Not RT-safe: allocates.
 std::string state_machine_text();
 
 }  // namespace wrenchd

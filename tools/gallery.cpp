@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kColumns = 100;
 
-/// Words, with single blanks between them.
+/// Replaces all white space by single blanks.
 std::string on_one_line(const std::string& text) {
   std::istringstream words(text);
   std::string line;
@@ -50,7 +50,7 @@ std::vector<GalleryScene> gallery(const SearchPath& search) {
 std::string gallery_text(const SearchPath& search) {
   const std::vector<GalleryScene> all = gallery(search);
   std::size_t wide = 0;
-  for (const GalleryScene& exhibit : all) wide = std::max(wide, exhibit.name.size());
+  for (const GalleryScene& scene : all) wide = std::max(wide, scene.name.size());
   std::string text;
   for (const auto& [name, file, description] : all)
     text += name + std::string(wide - name.size() + 2, ' ') + first_sentence(description) + '\n';
@@ -61,13 +61,13 @@ std::string gallery_text(const SearchPath& search, const std::string& name) {
   const std::vector<GalleryScene> all = gallery(search);
   std::vector<KnownKey> known;
   std::string names;
-  for (const GalleryScene& exhibit : all) {
-    if (exhibit.name == name)
-      return paragraph(exhibit.description) + "\n    wrenchd --arm --live --config gallery/" + name +
-             ".toml\n\n" + "or, from a source tree, tools/run " + name + ". It is " + exhibit.file.string() +
-             ".\n";
-    known.push_back({exhibit.name, ""});
-    names += (names.empty() ? "" : ", ") + exhibit.name;
+  for (const GalleryScene& scene : all) {
+    if (scene.name == name)
+      return paragraph(scene.description) + "\n    wrenchd --arm --live --config gallery/" + name +
+             ".toml\n\n" + "or, in a source tree, tools/run " + name + ". The file is " +
+             scene.file.string() + ".\n";
+    known.push_back({scene.name, ""});
+    names += (names.empty() ? "" : ", ") + scene.name;
   }
   const NearestKey nearest = nearest_key(name, known);
   throw std::runtime_error("gallery: there is no '" + name + "'; " +

@@ -9,21 +9,23 @@
 
 namespace wrenchd {
 
-/// A scene of the gallery: a whole configuration that says what there is to feel and to see.
+/// A scene of the gallery: a complete configuration with a description of the expected forces.
 struct GalleryScene {
   std::string name;
   std::filesystem::path file;
   std::string description;
 };
 
-/// Those in gallery/ along the search path, by name. Throws ConfigError where one of them cannot be read.
+/// Returns the scenes in the gallery/ directories of the search path, sorted by name. Throws ConfigError if a
+/// scene cannot be read. Not RT-safe: reads files.
 std::vector<GalleryScene> gallery(const SearchPath& search);
 
-/// A line for each: its name, and the first sentence of what it says.
+/// Returns one line per scene: its name and the first sentence of its description. Throws ConfigError if a
+/// scene cannot be read. Not RT-safe: reads files.
 std::string gallery_text(const SearchPath& search);
 
-/// One of them: what there is to feel and to see, and the command that runs it. Throws std::runtime_error,
-/// with those there are, where there is none of that name.
+/// Returns the description of one scene and the command that runs it. Throws std::runtime_error with all
+/// names if the name is unknown. Not RT-safe: reads files.
 std::string gallery_text(const SearchPath& search, const std::string& name);
 
 }  // namespace wrenchd

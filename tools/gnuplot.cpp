@@ -27,7 +27,7 @@ void run_gnuplot(const std::filesystem::path& directory, const std::string& scri
   int status = 0;
   waitpid(child, &status, 0);
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    throw std::runtime_error("gnuplot: failed on " + script + "; what it said stands above" + left);
+    throw std::runtime_error("gnuplot: failed on " + script + "; see its message above" + left);
 }
 
 }  // namespace wrenchd

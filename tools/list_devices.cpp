@@ -16,18 +16,18 @@ namespace {
 
 constexpr Usage kMultiAxis = {0x01, 0x08};
 
-/// One interface, and what came of holding the profiles against it.
+/// One USB interface, and the result of matching it with the profiles.
 struct Entry {
-  UsbDevice shown;  ///< its strings made plain
+  UsbDevice printable;  ///< the device with printable strings
   InspectedDevice facts;
   MatchResult match;
-  bool ours = false;  ///< it has to do with us, whether or not it can be used
+  bool related = false;  ///< the interface belongs to a supported or related device
 };
 
-/// A device, by its interfaces.
+/// The interfaces of one device.
 using Interfaces = std::span<const Entry>;
 
-// --- what there is ----------------------------------------------------------------------------------------
+// --- collecting the devices -------------------------------------------------------------------------------
 
 constexpr std::size_t kLongestName = 60, kLongestReason = 400;
 
@@ -52,10 +52,10 @@ Entry entry_of(const UsbDevice& device, const std::vector<DeviceProfile>& profil
   Entry entry{to_printable(device), inspect_device(device), {}, false};
   entry.match = match_profile(entry.facts.identity, profiles);
   const bool multi_axis = Usage{device.usage_page, device.usage} == kMultiAxis;
-  entry.ours = entry.match.profile || !entry.match.refusal.empty() || multi_axis ||
-               std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
-                 return claims(profile, entry.facts.identity.id);
-               });
+  entry.related = entry.match.profile || !entry.match.refusal.empty() || multi_axis ||
+                  std::any_of(profiles.begin(), profiles.end(), [&](const DeviceProfile& profile) {
+                    return claims(profile, entry.facts.identity.id);
+                  });
   return entry;
 }
 
@@ -63,36 +63,36 @@ bool same_socket(const UsbDevice& a, const UsbDevice& b) {
   return !a.port_path.empty() && a.port_path == b.port_path && a.vendor == b.vendor && a.product == b.product;
 }
 
-/// The interfaces of one device follow each other in the list.
+/// Groups the interfaces. The interfaces of one device are adjacent in the list.
 std::vector<Interfaces> by_device(const std::vector<Entry>& entries) {
   std::vector<Interfaces> devices;
   for (std::size_t i = 0; i < entries.size();) {
     std::size_t end = i + 1;
-    while (end < entries.size() && same_socket(entries[i].shown, entries[end].shown)) ++end;
+    while (end < entries.size() && same_socket(entries[i].printable, entries[end].printable)) ++end;
     devices.push_back(Interfaces(entries).subspan(i, end - i));
     i = end;
   }
   return devices;
 }
 
-/// The interfaces that tell what there is to tell of a device: those with a profile, else the first that has
-/// to do with us, for the others are of the same id and would say the same.
-std::vector<const Entry*> telling(Interfaces device, bool all) {
+/// Returns the interfaces that the list describes: those with a profile, otherwise the first related one. The
+/// others have the same id and would repeat its text.
+std::vector<const Entry*> described_interfaces(Interfaces device, bool all) {
   std::vector<const Entry*> found;
   for (const Entry& entry : device)
     if (all || entry.match.profile) found.push_back(&entry);
   if (!found.empty()) return found;
   const auto with_usage = std::find_if(device.begin(), device.end(), [](const Entry& entry) {
-    return entry.ours && Usage{entry.shown.usage_page, entry.shown.usage} == kMultiAxis;
+    return entry.related && Usage{entry.printable.usage_page, entry.printable.usage} == kMultiAxis;
   });
   if (with_usage != device.end()) return {&*with_usage};
   const auto first =
-      std::find_if(device.begin(), device.end(), [](const Entry& entry) { return entry.ours; });
+      std::find_if(device.begin(), device.end(), [](const Entry& entry) { return entry.related; });
   if (first != device.end()) found.push_back(&*first);
   return found;
 }
 
-// --- a device in words ------------------------------------------------------------------------------------
+// --- describing a device ----------------------------------------------------------------------------------
 
 std::string indented(const std::string& text) {
   std::string lines = "  ";
@@ -119,33 +119,34 @@ std::string head(const UsbDevice& device) {
 }
 
 std::string in_one_line(Interfaces device) {
-  const UsbDevice& first = device.front().shown;
+  const UsbDevice& first = device.front().printable;
   std::vector<std::string> kinds;
   for (const Entry& entry : device) {
-    if (entry.shown.report_descriptor.empty()) continue;
-    const std::string kind = to_text(Usage{entry.shown.usage_page, entry.shown.usage});
+    if (entry.printable.report_descriptor.empty()) continue;
+    const std::string kind = to_text(Usage{entry.printable.usage_page, entry.printable.usage});
     if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) kinds.push_back(kind);
   }
   std::string text = where(first) + ": " + who(first);
   for (const std::string& kind : kinds) text += ", " + kind;
-  return text + (kinds.empty() ? ", not HID" : "") + "; no profile is for it\n";
+  return text + (kinds.empty() ? ", not HID" : "") + "; no profile matches\n";
 }
 
-/// Whether we may open what the transport opens.
+/// Returns whether wrenchd may open the node that the transport uses.
 std::string access(const UsbDevice& device, Transport transport, const OpenCheck& why_not_open) {
   const bool hidraw = transport == Transport::hidraw;
   const std::string& node = hidraw ? device.hidraw_node : device.usb_node;
   if (node.empty())
-    return indented(hidraw
-                        ? "it has no hidraw node: no HID driver has it; unplug it and plug it in again, and "
-                          "look at what the kernel says (dmesg)"
-                        : "it has no USB node: the profile wants libusb, and it is not on USB; plug in its "
-                          "cable");
+    return indented(
+        hidraw
+            ? "the device has no hidraw node because no HID driver handles it; reconnect it, then check "
+              "the kernel messages (dmesg)"
+            : "the device has no USB node, which the profile's transport libusb requires; connect it with a "
+              "cable");
   const std::string why = why_not_open(device, node);
   return indented(why.empty() ? node + " can be opened" : why);
 }
 
-/// Of an unmatched device, the node that would be opened first.
+/// Returns whether wrenchd may open the preferred node of a device without a profile.
 std::string access(const UsbDevice& device, const OpenCheck& why_not_open) {
   return access(device, device.hidraw_node.empty() ? Transport::libusb : Transport::hidraw, why_not_open);
 }
@@ -154,37 +155,39 @@ std::string degrees_of_freedom(const DeviceProfile& profile) {
   const DofMask sensed = sensed_dofs(profile), driven = driven_dofs(profile);
   const auto others = [](DofMask dofs) { return dof_text(static_cast<DofMask>(kAllDofs & ~dofs)); };
   std::string text = "senses " + dof_text(sensed) + "; drives " + dof_text(driven);
-  if (sensed != kAllDofs) text += "; along " + others(sensed) + " the handle stays where it is";
+  if (sensed != kAllDofs) text += "; the pose stays constant along " + others(sensed);
   if (driven == kNoDof)
-    text += ": it moves a tool, and every wrench is dropped";
+    text += ": the device moves a tool, and wrenchd drops every wrench";
   else if (driven != kAllDofs)
-    text += "; of a wrench " + others(driven) + " is dropped";
+    text += "; wrenchd drops " + others(driven) + " of every wrench";
   return indented(text);
 }
 
-/// The profile held against what the device says of its reports.
+/// Returns the result of comparing the profile with the device's report descriptor.
 std::string agreement(const InspectedDevice& facts, const DeviceProfile& profile) {
   if (!facts.descriptor_error.empty())
-    return indented("its report descriptor is refused, so the profile could not be held against it: " +
+    return indented("the report descriptor is invalid, so it cannot be compared with the profile: " +
                     facts.descriptor_error);
   if (!facts.descriptor)
-    return indented("it is not HID: there is no report descriptor to hold the profile against");
+    return indented("the device is not HID, so there is no report descriptor to compare with the profile");
   const auto lines = find_differences(*facts.descriptor, expected_reports(profile));
-  if (lines.empty()) return indented("its report descriptor agrees with the profile");
+  if (lines.empty()) return indented("the report descriptor agrees with the profile");
   std::string text =
-      "its report descriptor disagrees with the profile; change the profile, or it is for another device:";
+      "the report descriptor disagrees with the profile; change the profile, unless it belongs to another "
+      "device:";
   for (const std::string& line : lines) text += "\n  " + line;
   return indented(text);
 }
 
-/// Profiles with the same reason share a line.
+/// Returns the reasons for rejection. Profiles with the same reason share a line.
 std::string why_not(const Entry& entry, const std::vector<DeviceProfile>& profiles) {
   std::vector<std::pair<std::string, std::string>> names_by_reason;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     if (entry.match.profile == i) continue;
     std::string reason = to_printable(entry.match.rejections[i], kLongestReason);
     if (reason.empty())
-      reason = entry.match.profile ? "it fits as well, and the other is nearer" : "it fits, and is not alone";
+      reason = entry.match.profile ? "this profile also matches, but less specifically"
+                                   : "this profile also matches";
     const auto same = std::find_if(names_by_reason.begin(), names_by_reason.end(),
                                    [&](const auto& pair) { return pair.first == reason; });
     if (same == names_by_reason.end())
@@ -206,7 +209,7 @@ std::string paragraph_of_matched(const Entry& entry, const DeviceProfile& profil
 
 std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& profiles,
                       const OpenCheck& why_not_open) {
-  const UsbDevice& device = entry.shown;
+  const UsbDevice& device = entry.printable;
   const std::string begin = head(device);
   if (entry.match.profile) {
     const DeviceProfile& profile = profiles[*entry.match.profile];
@@ -216,34 +219,34 @@ std::string paragraph(const Entry& entry, const std::vector<DeviceProfile>& prof
   }
   if (find_unusable_device(entry.facts.identity.id) != nullptr)
     return begin + indented(entry.match.refusal) +
-           indented("wrenchd does not open it, whatever a profile says");
+           indented("wrenchd does not open this device, independent of profiles");
   std::string text = begin + access(device, why_not_open);
   if (!entry.facts.descriptor_error.empty())
-    text += indented("its report descriptor is refused: " + entry.facts.descriptor_error);
-  text += indented(entry.match.refusal.empty() ? "no profile is for it:" : entry.match.refusal);
+    text += indented("the report descriptor is invalid: " + entry.facts.descriptor_error);
+  text += indented(entry.match.refusal.empty() ? "no profile matches:" : entry.match.refusal);
   text += why_not(entry, profiles);
   if (entry.match.refusal.empty() && entry.facts.descriptor && !device.hidraw_node.empty())
     text += indented("wrenchctl profile --from " + device.hidraw_node + " proposes one");
   return text;
 }
 
-// --- below the list ---------------------------------------------------------------------------------------
+// --- notes below the list ---------------------------------------------------------------------------------
 
-/// Devices that have the same profile, and what tells them apart.
+/// Returns the devices that share a profile, and how to distinguish them.
 std::string equal_devices(const std::vector<Entry>& entries, const std::vector<DeviceProfile>& profiles) {
   std::string text;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     std::vector<std::string> serials;
     for (const Entry& entry : entries)
-      if (entry.match.profile == i) serials.push_back(entry.shown.serial);
+      if (entry.match.profile == i) serials.push_back(entry.printable.serial);
     if (serials.size() < 2) continue;
     const std::set<std::string> different(serials.begin(), serials.end());
     text += std::to_string(serials.size()) + " devices have the profile " + profiles[i].name;
     if (different.size() < serials.size() || different.count("") != 0) {
-      text += ", and no serial numbers that tell them apart: leave in the one you mean\n";
+      text += ", and no serial numbers to distinguish them: connect only the intended device\n";
       continue;
     }
-    text += ": for one of them alone write a profile with inherits = \"" + profiles[i].name +
+    text += ": to select one of them, write a profile with inherits = \"" + profiles[i].name +
             "\" and its serial in [match]:";
     for (const std::string& serial : different) text += " \"" + serial + '"';
     text += '\n';
@@ -253,9 +256,9 @@ std::string equal_devices(const std::vector<Entry>& entries, const std::vector<D
 
 std::string about_profiles(const KnownProfiles& known) {
   std::string text;
-  if (known.profiles.empty()) text += "There is no profile to hold a device against.\n";
+  if (known.profiles.empty()) text += "There are no profiles.\n";
   if (known.refused.empty()) return text;
-  text += "Profiles that were refused, and not asked:\n";
+  text += "Invalid profiles, which were ignored:\n";
   for (const std::string& why : known.refused) text += indented(why);
   return text;
 }
@@ -269,16 +272,16 @@ std::string device_list(std::span<const UsbDevice> devices, const KnownProfiles&
 
   std::string paragraphs, lines;
   for (const Interfaces device : by_device(entries)) {
-    const auto tell = telling(device, all);
+    const auto tell = described_interfaces(device, all);
     for (const Entry* entry : tell) paragraphs += paragraph(*entry, known.profiles, why_not_open) + '\n';
     if (tell.empty()) lines += in_one_line(device);
   }
   std::string text = paragraphs;
-  if (entries.empty()) text += "Nothing is plugged in: no USB device but hubs, and no HID device.\n";
-  if (!lines.empty() && paragraphs.empty()) text += "Nothing is plugged in that wrenchd knows.\n";
+  if (entries.empty()) text += "No device is connected: no USB device except hubs, and no HID device.\n";
+  if (!lines.empty() && paragraphs.empty()) text += "No known device is connected.\n";
   if (!lines.empty())
-    text += "Other devices (--all says of each why no profile is for it):\n" +
-            indented(lines.substr(0, lines.size() - 1));
+    text +=
+        "Other devices (--all shows the rejection reasons):\n" + indented(lines.substr(0, lines.size() - 1));
   for (const std::string& part : {equal_devices(entries, known.profiles), about_profiles(known)})
     if (!part.empty()) text += (text.ends_with("\n\n") ? "" : "\n") + part;
   while (text.ends_with("\n\n")) text.pop_back();

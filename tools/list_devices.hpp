@@ -10,15 +10,15 @@
 
 namespace wrenchd {
 
-/// Why a node cannot be opened, and the cure; empty where it can. why_not_open(), where it is not a test that
-/// asks.
+/// Returns why a node cannot be opened, with the remedy; empty if it can be opened. Tests replace the
+/// default, open_error().
 using OpenCheck = std::function<std::string(const UsbDevice& device, const std::string& node)>;
 
-/// What is plugged in, for a person. A paragraph for each device that a profile is for or might be meant for,
-/// that wrenchd knows and cannot use, or that is a multi-axis controller: where it is, whether it can be
-/// opened, its profile, and for every other profile why not. A line for each of the rest; with `all` they
-/// have a paragraph too. Then what the profiles themselves want to be told of. What devices say of themselves
-/// comes out as plain characters, whatever it is. Speaks to no device. Not RT safe.
+/// Describes the connected devices for the user. Devices with a matching profile, devices that a profile may
+/// be meant for, known devices that wrenchd cannot use, and multi-axis controllers have a paragraph each:
+/// port, access, profile, and the reason why each other profile does not match. Other devices have one line,
+/// or a paragraph if `all` is true. Warnings about the profiles follow. Text from devices is made printable.
+/// Opens no device. Not RT-safe: reads files.
 std::string device_list(std::span<const UsbDevice> devices, const KnownProfiles& known, bool all,
                         const OpenCheck& why_not_open);
 

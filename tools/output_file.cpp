@@ -13,8 +13,8 @@ namespace {
 
 using Write = std::function<void(std::ostream&)>;
 
-/// A file is written whole or not at all: beside its place first, then put there. A symbolic link keeps
-/// pointing.
+/// Writes a temporary file beside the target and then renames it, so that the target is complete or
+/// unchanged. Keeps a symbolic link.
 bool replace_file(const std::filesystem::path& file, const Write& write) {
   std::error_code error;
   const auto place =
@@ -29,7 +29,7 @@ bool replace_file(const std::filesystem::path& file, const Write& write) {
   return false;
 }
 
-/// A pipe, a terminal or /dev/null cannot be replaced, only written to.
+/// Writes directly: a pipe, a terminal or /dev/null cannot be replaced.
 bool write_into(const std::filesystem::path& file, const Write& write) {
   std::ofstream out(file, std::ios::binary);
   write(out);
@@ -49,8 +49,7 @@ void write_output(const std::string& name, const std::function<void(std::ostream
   const auto status = std::filesystem::status(name, ignored);
   const bool replaceable = !std::filesystem::exists(status) || std::filesystem::is_regular_file(status);
   if (!(replaceable ? replace_file(name, write) : write_into(name, write)))
-    throw std::runtime_error(
-        name + ": cannot be written; name a file in a directory that exists and may be written to");
+    throw std::runtime_error(name + ": cannot be written; name a file in an existing, writable directory");
 }
 
 }  // namespace wrenchd

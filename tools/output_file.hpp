@@ -7,10 +7,11 @@
 
 namespace wrenchd {
 
-/// Writes text to a file, whole or not at all; to standard output where the name is "-". Throws
-/// std::runtime_error that says what to do where it cannot be written.
+/// Writes text to a file, or to standard output if the name is "-". If writing fails, the file is unchanged.
+/// Throws std::runtime_error that says what to do. Not RT-safe: writes a file.
 void write_output(const std::string& name, const std::string& text);
-/// The same for what is too long to be held in memory.
+/// Writes a file through a stream, for output that is too large for memory. If writing fails, the file is
+/// unchanged. Throws std::runtime_error that says what to do. Not RT-safe: writes a file.
 void write_output(const std::string& name, const std::function<void(std::ostream&)>& write);
 
 }  // namespace wrenchd

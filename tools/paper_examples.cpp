@@ -17,7 +17,7 @@ constexpr double kMass_kg = 1.0;
 constexpr double kStep_s = 0.05;
 constexpr int kSteps = 120;
 
-/// A cube about the origin; its corners are numbered by the bits of x, y and z.
+/// A cube about the origin. The bits of a corner's number select its x, y and z.
 TriangleMesh cube() {
   TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner)
@@ -28,7 +28,7 @@ TriangleMesh cube() {
   return mesh;
 }
 
-/// Eq. (16) to the letter: nothing limits the integral, and the derivative is a plain difference.
+/// Eq. (16) unchanged: the integral has no limit, and the derivative is a finite difference.
 WrenchGains paper_gains() {
   WrenchGains gains;
   gains.stiffness = WrenchGains::scalar(1.0);
@@ -40,11 +40,11 @@ WrenchGains paper_gains() {
   return gains;
 }
 
-/// A rigid body that nothing holds, in its own axes at its centre of mass (Newton and Euler):
+/// A free rigid body, in its own axes at its centre of mass (Newton and Euler):
 ///
 ///   m (dv/dt + w x v) = f        H dw/dt + w x (H w) = tau
 ///
-/// One semi-implicit step: the velocity first, then the pose with the new velocity.
+/// One semi-implicit step: first the velocity, then the pose with the new velocity.
 void move(const Inertia& M, const Wrench& F_T, Twist& V, Pose& X_WP) {
   const Vector3d w = V.angular_rad_per_s;
   const Vector3d v = V.linear_m_per_s;

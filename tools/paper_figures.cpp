@@ -19,7 +19,7 @@ namespace {
 
 using Steps = std::vector<PaperStep>;
 
-/// The outline of the cube in the plane of motion, and its centre of mass.
+/// Writes the outline of the cube in the plane of motion, and its centre of mass.
 std::string trajectory_csv(const Steps& steps) {
   constexpr double kHalf = 25.0;
   std::ostringstream csv;
@@ -35,7 +35,7 @@ std::string trajectory_csv(const Steps& steps) {
   return csv.str();
 }
 
-/// Of a step at which contact starts, or the first without it.
+/// Returns the value at a step where contact begins, or at the first step without contact.
 double starts_or_ends(const Steps& steps, std::size_t i) {
   const bool before = i > 0 && steps[i - 1].in_contact;
   return before != steps[i].in_contact ? 1.0 : 0.0;
@@ -70,7 +70,8 @@ void write_paper_figures(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (!std::filesystem::is_directory(directory))
-    throw std::runtime_error(directory.string() + ": is no directory and cannot be made one; name another");
+    throw std::runtime_error(directory.string() +
+                             ": is not a directory and cannot be created; name another directory");
   const auto write = [&](const char* name, const std::string& text) {
     write_output((directory / name).string(), text);
   };
@@ -84,7 +85,7 @@ void write_paper_figures(const std::filesystem::path& directory) {
   write("fig15.csv", over_time_csv("tau_z", ours, traditional,
                                    [](const PaperStep& step) { return step.F_W.torque_Nm.z(); }));
   write("figures.gp", kPaperScript);
-  run_gnuplot(directory, "figures.gp", "; the tables it would draw are in " + directory.string());
+  run_gnuplot(directory, "figures.gp", "; the data of the figures is in " + directory.string());
 }
 
 }  // namespace wrenchd

@@ -5,10 +5,10 @@
 
 namespace wrenchd {
 
-/// Writes Figs. 11 to 15 of the paper, as wrenchd computes them, into a directory, which is made where it
-/// does not exist: fig11.csv to fig15.csv with what they show, figures.gp to draw them again in another
-/// style, and fig11.png to fig15.png, drawn by gnuplot. Throws std::runtime_error that says what to do where
-/// a file cannot be written or gnuplot cannot be run; the tables are there then.
+/// Computes the paper, Figs. 11 to 15, and writes them to a directory, which it creates if necessary. Writes
+/// the data as fig11.csv to fig15.csv, the script as figures.gp, and the figures as fig11.png to fig15.png by
+/// gnuplot. Throws std::runtime_error that says what to do if a file cannot be written or gnuplot fails; the
+/// data exists in the latter case. Not RT-safe: writes files and runs gnuplot.
 void write_paper_figures(const std::filesystem::path& directory);
 
 }  // namespace wrenchd

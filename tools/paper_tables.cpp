@@ -15,8 +15,8 @@ namespace {
 
 constexpr const char* kHeading = "{:<22} {:>10}  {:>16}  {:>16}  {:>16}\n";
 
-/// A quantity the paper prints to four decimals, and what each method makes of it. A star marks what lies
-/// further from the paper than half of its last digit.
+/// Formats a number that the paper prints with four decimals, and the result of each method. A star marks
+/// results that differ by more than half of the last printed digit.
 std::string row(std::string_view name, double printed, const std::vector<double>& computed) {
   constexpr double kHalfDigit = 0.5e-4 * (1.0 + 1e-9);
   std::string text = fmt::format("{:<22} {:>10.4f}", name, printed);
@@ -33,7 +33,7 @@ std::vector<Penetration> projections(double scale) {
   return answers;
 }
 
-/// One row: a number of each answer.
+/// Formats one row with one number per answer.
 template <class Number>
 std::string row_of(std::string_view name, double printed, const std::vector<Penetration>& answers,
                    const Number& number) {
@@ -42,7 +42,7 @@ std::string row_of(std::string_view name, double printed, const std::vector<Pene
   return row(name, printed, computed);
 }
 
-/// Rows of the planar motion: of exponential coordinates [v; w], those that are not zero.
+/// Formats the nonzero exponential coordinates [v; w] of the planar motion.
 template <class Coordinates>
 std::string rows_of(std::string_view name, std::initializer_list<double> printed,
                     const std::vector<Penetration>& answers, const Coordinates& coordinates) {
@@ -68,7 +68,7 @@ std::string rows_of_matrix(std::string_view name, double cosine, double sine, do
                 [](const Penetration& answer) { return answer.projection.X_WQ.translation_m.y(); });
 }
 
-/// eps of p and q as the paper prints their matrices.
+/// Returns eps of p and q from the matrices as printed in the paper.
 Vector6d eps_of_printed_matrices() {
   const Pose p{rotation_from({0.0, 0.0, std::atan2(-0.1987, 0.9801)}), {0.0, 25.0, 0.0}};
   const Pose q{rotation_from({0.0, 0.0, std::atan2(-0.0866, 0.9962)}), {0.0, 27.0712, 0.0}};
@@ -79,8 +79,8 @@ std::string example_4_1() {
   const std::vector<Penetration> answers = projections(1.0);
   const Vector6d xi_p = log(pose_of_example_4_1(1.0));
   const Vector6d printed = eps_of_printed_matrices();
-  std::string text = "Example 4.1: closest admissible configuration of a cube turned into a plane\n\n";
-  text += fmt::format(kHeading, "p, as given", "paper", "here", "", "");
+  std::string text = "Example 4.1: closest admissible configuration of a rotated cube in a plane\n\n";
+  text += fmt::format(kHeading, "p, given", "paper", "here", "", "");
   text += row("(44) xi_p v_x", -2.5, {xi_p[0]}) + row("(44) xi_p v_y", 24.9166, {xi_p[1]}) +
           row("(44) xi_p w_z", -0.2, {xi_p[5]}) + '\n';
   text += fmt::format(kHeading, "q and eps", "paper", "exact", "planar (47)", "descent");
@@ -91,7 +91,8 @@ std::string example_4_1() {
   text += rows_of("(47) eps", {-0.2959, 2.0510, 0.1133}, answers,
                   [](const Penetration& answer) { return answer.eps; });
   text += fmt::format(
-      "\n* further from the paper than half of its last digit. Of the paper's own p and q, Eqs. (43) and "
+      "\n* differs from the paper by more than half of its last digit. From the paper's own p and q, Eqs. "
+      "(43) and "
       "(46) as\n"
       "  printed, eps is ({:.4f}, {:.4f}, {:.4f}).\n",
       printed[0], printed[1], printed[5]);
@@ -99,8 +100,7 @@ std::string example_4_1() {
                                      .query(pose_of_example_4_1(1.0))
                                      .projection.energy);
   return text +
-         fmt::format("  The depth of p along y is {:.4f} units of length, which the paper calls 4.5 mm.\n",
-                     depth);
+         fmt::format("  The depth of p along y is {:.4f} units of length; the paper states 4.5 mm.\n", depth);
 }
 
 std::string example_4_1_larger() {
@@ -126,13 +126,13 @@ std::string example_4_2() {
   text += line("steps in contact", "-", 0, [](const PaperSummary& s) { return double(s.steps_in_contact); });
   text += line("largest f_y", "Fig. 14", 4, [](const PaperSummary& s) { return s.max_force_y; });
   text += line("largest |tau_z|", "Fig. 15", 4, [](const PaperSummary& s) { return s.max_torque_z; });
-  return text + fmt::format(
-                    "\nThe paper shows this example in figures only: similar forces, and a far larger torque "
-                    "of the\n"
-                    "traditional method. Here its force is {:.2f} times and its torque {:.0f} times that of "
-                    "exact.\n",
-                    found[2].max_force_y / found[0].max_force_y,
-                    found[2].max_torque_z / found[0].max_torque_z);
+  return text +
+         fmt::format(
+             "\nThe paper shows this example only in figures: similar forces, and a much larger torque "
+             "of the\n"
+             "traditional method. Here its force is {:.2f} times and its torque {:.0f} times that of "
+             "exact.\n",
+             found[2].max_force_y / found[0].max_force_y, found[2].max_torque_z / found[0].max_torque_z);
 }
 
 }  // namespace

@@ -5,7 +5,8 @@
 
 namespace wrenchd {
 
-/// The examples of section 4 of the paper, run by wrenchd's methods, beside the numbers the paper prints.
+/// Returns the examples of the paper, section 4, computed with wrenchd's methods, beside the numbers that the
+/// paper prints. Not RT-safe: allocates.
 std::string paper_tables();
 
 }  // namespace wrenchd

@@ -23,9 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// More points than a line of a figure can show only make its file large.
-constexpr std::size_t kMostRows = 6000;
-/// Bins of a decade of the histogram of times.
+/// A figure cannot show more points than this.
+constexpr std::size_t kMaxRows = 6000;
+/// Resolution of the histogram of durations.
 constexpr double kBinsPerDecade = 20.0;
 constexpr std::array kFigures = {"force", "torque", "penetration", "energy", "ticks", "trajectory"};
 
@@ -33,29 +33,26 @@ double time_s(const Recording& recording, const TickRecord& tick) {
   return 1e-9 * static_cast<double>(tick.now_ns - recording.ticks.front().now_ns);
 }
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 double norm(const std::array<double, 6>& F, std::size_t from) {
   return std::hypot(F[from], F[from + 1], F[from + 2]);
 }
 
-/// How far q is from p [mm], and turned [deg]; NaN where there is no q.
+/// Returns the distance [mm] and the angle [deg] between p and q; NaN if q is not valid.
 std::array<double, 2> penetration(const TickRecord& tick) {
-  const Pose p = pose_of(tick.X_WP), q = pose_of(tick.X_WQ);
+  const Pose p = pose_from_numbers(tick.X_WP), q = pose_from_numbers(tick.X_WQ);
   return {1e3 * (q.translation_m - p.translation_m).norm(),
           180.0 / std::numbers::pi * rotation_vector(p.rotation.conjugate() * q.rotation).norm()};
 }
 
-/// One row of so many ticks. Of those the one that pushes hardest: no peak is lost.
+/// Writes at most kMaxRows rows. Each row shows the tick with the largest force of its interval, so that no
+/// peak is lost.
 std::string over_time_csv(const Recording& recording) {
   std::ostringstream csv;
-  csv << "t,fx,fy,fz,f,tx,ty,tz,torque,depth_mm,turn_deg,in_mJ,out_mJ,injected_mJ,armed,"
+  csv << "t,fx,fy,fz,f,tx,ty,tz,torque,depth_mm,rotation_deg,in_mJ,out_mJ,injected_mJ,armed,"
          "px,py,pz,qx,qy,qz\n";
   const auto& ticks = recording.ticks;
-  bool seen = false;
-  const std::size_t every = (ticks.size() + kMostRows - 1) / kMostRows;
+  bool sampled = false;
+  const std::size_t every = (ticks.size() + kMaxRows - 1) / kMaxRows;
   for (std::size_t i = 0; i < ticks.size(); i += every) {
     const auto begin = ticks.begin() + static_cast<std::ptrdiff_t>(i);
     const auto end = ticks.begin() + static_cast<std::ptrdiff_t>(std::min(i + every, ticks.size()));
@@ -69,45 +66,45 @@ std::string over_time_csv(const Recording& recording) {
     for (const double x : penetration(tick)) row << x;
     row << 1e3 * tick.energy_in_J << 1e3 * tick.energy_out_J << 1e3 * tick.injected_J
         << (is_driving(static_cast<State>(tick.state)) ? 1.0 : 0.0);
-    seen = seen || tick.fresh != 0;  // before the first sample nobody knows where p is
+    sampled = sampled || tick.fresh != 0;  // p is unknown before the first sample
     for (const auto* X : {&tick.X_WP, &tick.X_WQ})
-      for (std::size_t k = 0; k < 3; ++k) row << (seen ? 1e3 * (*X)[k] : std::nan(""));
+      for (std::size_t k = 0; k < 3; ++k) row << (sampled ? 1e3 * (*X)[k] : std::nan(""));
   }
   return csv.str();
 }
 
-/// Of what ticks took, and of how late they began: how many a bin, and which share takes longer.
+/// Writes histograms of tick durations and wake latencies, with the fraction of ticks above each bin.
 std::string tick_times_csv(const Recording& recording) {
-  std::vector<double> took_us, late_us;
+  std::vector<double> duration_us, latency_us;
   for (const TickRecord& tick : recording.ticks) {
     double us = 0.0;
     for (const std::int64_t ns : tick.stage_ns) us += 1e-3 * static_cast<double>(ns);
     if (tick.released != 0 || us <= 0.0) continue;
-    took_us.push_back(us);
-    late_us.push_back(std::max(1e-3 * static_cast<double>(tick.wake_latency_ns), 0.0));
+    duration_us.push_back(us);
+    latency_us.push_back(std::max(1e-3 * static_cast<double>(tick.wake_latency_ns), 0.0));
   }
   std::ostringstream csv;
-  csv << "from_us,to_us,took,late,took_longer,later\n";
-  if (took_us.empty()) return csv.str();
-  std::sort(took_us.begin(), took_us.end());
-  std::sort(late_us.begin(), late_us.end());
-  const double all = static_cast<double>(took_us.size());
+  csv << "from_us,to_us,durations,latencies,duration_tail,latency_tail\n";
+  if (duration_us.empty()) return csv.str();
+  std::sort(duration_us.begin(), duration_us.end());
+  std::sort(latency_us.begin(), latency_us.end());
+  const double all = static_cast<double>(duration_us.size());
   const auto below = [](const std::vector<double>& sorted, double us) {
     return static_cast<double>(std::lower_bound(sorted.begin(), sorted.end(), us) - sorted.begin());
   };
-  const double longest_us = std::max(took_us.back(), late_us.back());
+  const double longest_us = std::max(duration_us.back(), latency_us.back());
   for (int bin = 0;; ++bin) {
     const double from_us = bin == 0 ? 0.0 : std::pow(10.0, bin / kBinsPerDecade);
     const double to_us = std::pow(10.0, (bin + 1) / kBinsPerDecade);
-    CsvRow(csv) << std::max(from_us, 1.0) << to_us << below(took_us, to_us) - below(took_us, from_us)
-                << below(late_us, to_us) - below(late_us, from_us) << 1.0 - below(took_us, from_us) / all
-                << 1.0 - below(late_us, from_us) / all;
+    CsvRow(csv) << std::max(from_us, 1.0) << to_us << below(duration_us, to_us) - below(duration_us, from_us)
+                << below(latency_us, to_us) - below(latency_us, from_us)
+                << 1.0 - below(duration_us, from_us) / all << 1.0 - below(latency_us, from_us) / all;
     if (to_us > longest_us) break;
   }
   return csv.str();
 }
 
-/// What the script has to know.
+/// Returns the variables of the gnuplot script.
 std::string variables(const Recording& recording, const std::string& terminal, const std::string& one,
                       const std::string& title) {
   std::string text = "terminal = '" + terminal + "'\none = '" + one + "'\ntitle = '" + title + "'\n";
@@ -116,9 +113,9 @@ std::string variables(const Recording& recording, const std::string& terminal, c
   const bool timed = std::any_of(recording.ticks.begin(), recording.ticks.end(), [](const TickRecord& tick) {
     return tick.released == 0 && tick.stage_ns != TickRecord{}.stage_ns;
   });
-  const bool placed = std::any_of(recording.ticks.begin(), recording.ticks.end(),
-                                  [](const TickRecord& tick) { return std::isfinite(tick.X_WQ[0]); });
-  text += "placed = " + std::string(placed ? "1" : "0") + "\n";
+  const bool proxy_valid = std::any_of(recording.ticks.begin(), recording.ticks.end(),
+                                       [](const TickRecord& tick) { return std::isfinite(tick.X_WQ[0]); });
+  text += "proxy_valid = " + std::string(proxy_valid ? "1" : "0") + "\n";
   text += "timed = " + std::string(timed ? "1" : "0") + "\n";
   return text;
 }
@@ -139,20 +136,20 @@ void write_tables(const Recording& recording, const fs::path& directory, const s
   write("figures.gp", variables + kPlotScript);
 }
 
-/// A directory of its own, gone with this.
-class Workshop {
+/// A temporary directory, removed by the destructor.
+class TemporaryDirectory {
  public:
-  Workshop() {
+  TemporaryDirectory() {
     std::string name = (fs::temp_directory_path() / "wrenchctl-plot-XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) throw std::system_error(errno, std::generic_category(), name);
     path_ = name;
   }
-  ~Workshop() {
+  ~TemporaryDirectory() {
     std::error_code ignored;
     fs::remove_all(path_, ignored);
   }
-  Workshop(const Workshop&) = delete;
-  Workshop& operator=(const Workshop&) = delete;
+  TemporaryDirectory(const TemporaryDirectory&) = delete;
+  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
   const fs::path& path() const { return path_; }
 
  private:
@@ -163,28 +160,29 @@ class Workshop {
 
 std::vector<fs::path> plot_recording(const Recording& recording, const fs::path& output) {
   if (recording.ticks.empty())
-    throw std::runtime_error("the recording has no ticks, so there is nothing to draw");
+    throw std::runtime_error("the recording has no ticks; record again while the loop runs");
   const std::string title = to_printable(recording.header.scene_file.stem().string());
   const std::string kind = output.extension().string();
   if (kind == ".svg" || kind == ".pdf" || kind == ".png") {
-    const Workshop workshop;
-    write_tables(recording, workshop.path(), variables(recording, kind.substr(1), "all" + kind, title));
-    run_gnuplot(workshop.path(), "figures.gp", "");
+    const TemporaryDirectory directory;
+    write_tables(recording, directory.path(), variables(recording, kind.substr(1), "all" + kind, title));
+    run_gnuplot(directory.path(), "figures.gp", "");
     std::error_code error;
-    fs::copy_file(workshop.path() / ("all" + kind), output, fs::copy_options::overwrite_existing, error);
+    fs::copy_file(directory.path() / ("all" + kind), output, fs::copy_options::overwrite_existing, error);
     if (error)
       throw std::runtime_error(output.string() + ": cannot be written (" + error.message() +
-                               "); name a file in a directory that exists and may be written to");
+                               "); name a file in a writable directory");
     return {output};
   }
   std::error_code error;
   fs::create_directories(output, error);
   if (!fs::is_directory(output))
-    throw std::runtime_error(output.string() +
-                             ": is no directory and cannot be made one; name another, or a file that ends in "
-                             ".svg, .pdf or .png");
+    throw std::runtime_error(
+        output.string() +
+        ": is not a directory and cannot be created; name another directory, or a file that "
+        "ends in .svg, .pdf or .png");
   write_tables(recording, output, variables(recording, "svg", "", title));
-  run_gnuplot(output, "figures.gp", "; the tables it would draw are in " + output.string());
+  run_gnuplot(output, "figures.gp", "; the tables are in " + output.string());
   std::vector<fs::path> pictures;
   for (const char* figure : kFigures) pictures.push_back(output / (std::string(figure) + ".svg"));
   return pictures;

@@ -1,5 +1,5 @@
-# Figures of a run, drawn from run.csv and ticks.csv beside this script. Run it in their directory. `terminal` is svg,
-# pdf or png; `one` names one file for all of them, or is empty: then each is a file of its own.
+# Draws the figures of a run from run.csv and ticks.csv. Run it in their directory. `terminal` is svg,
+# pdf or png; `one` is the file for all figures; if it is empty, each figure is a file.
 set datafile separator ','
 wide = one eq '' ? 1 : 2
 if (terminal eq 'svg') set terminal svg size (wide == 1 ? 720 : 1300),(wide == 1 ? 440 : 1300) dynamic font 'DejaVu Sans,13' linewidth 1.2 background '#ffffff'
@@ -9,7 +9,7 @@ set grid linecolor rgb '#e2e2e2' linetype 1 linewidth 0.6
 set border 3 linecolor rgb '#666666'
 set tics nomirror textcolor rgb '#333333'
 set key at graph 1, graph 1.02 right bottom horizontal samplen 1.4 width -1 textcolor rgb '#333333'
-# Of Okabe and Ito, which everybody can tell apart; a magnitude behind its parts, in grey.
+# Colours of Okabe and Ito, safe for colour-blind readers. The magnitude is grey, behind its components.
 set style line 1 linewidth 1.3 linecolor rgb '#0072b2'
 set style line 2 linewidth 1.3 linecolor rgb '#d55e00'
 set style line 3 linewidth 1.3 linecolor rgb '#009e73'
@@ -46,16 +46,16 @@ plot 'run.csv' using 't':'torque' with lines linestyle 6 title 'magnitude', '' u
 
 if (one eq '') { set output figure('penetration') }
 set ylabel 'from p to q [mm]'
-set y2label 'turn from p to q [°]'
+set y2label 'rotation from p to q [°]'
 set border 11
 set y2tics nomirror
 set yrange [0:0.1<*]
 set y2range [0:0.1<*]
-if (placed) {
+if (proxy_valid) {
   plot 'run.csv' using 't':'depth_mm' with lines linestyle 1 title 'distance (left)', \
-       '' using 't':'turn_deg' axes x1y2 with lines linestyle 2 title 'turn (right)'
+       '' using 't':'rotation_deg' axes x1y2 with lines linestyle 2 title 'rotation (right)'
 } else {
-  set label 1 'the tool never had a place' at graph 0.5, graph 0.5 center textcolor rgb '#777777'
+  set label 1 'the proxy was never initialised' at graph 0.5, graph 0.5 center textcolor rgb '#777777'
   plot [begin_s:end_s] [0:1] 2 notitle
   unset label 1
 }
@@ -69,28 +69,28 @@ set ylabel 'energy since the force began [mJ]'
 set yrange [*<0:0.1<*]
 plot 'run.csv' using 't':'in_mJ' with lines linestyle 1 title 'from the hand', \
      '' using 't':'out_mJ' with lines linestyle 2 title 'to the hand', \
-     '' using 't':(column('in_mJ')-column('out_mJ')) with lines linestyle 4 title 'kept', \
-     '' using 't':'injected_mJ' with lines linestyle 3 title 'from nowhere'
+     '' using 't':(column('in_mJ')-column('out_mJ')) with lines linestyle 4 title 'stored or dissipated', \
+     '' using 't':'injected_mJ' with lines linestyle 3 title 'generated'
 
-# Which share of ticks takes so long, and which share longer: the tail is what a hand would feel.
+# Distribution of tick durations and wake latencies. The tail matters for the hand.
 if (one eq '') { set output figure('ticks') }
 set autoscale x
-set xlabel 'time of a tick, and how late it began [µs]'
-set ylabel 'share of ticks'
+set xlabel 'tick duration and wake latency [µs]'
+set ylabel 'fraction of ticks'
 if (timed) {
   stats 'ticks.csv' using 'to_us' nooutput name 'U'
-  stats 'ticks.csv' using 'took' nooutput name 'K'
+  stats 'ticks.csv' using 'durations' nooutput name 'K'
   set logscale xy
   set format '10^{%T}'
   set xrange [1:(period_us > U_max ? 1.3 * period_us : 1.3 * U_max)]
   set yrange [0.5 / K_sum:1.3]
   set arrow 1 from period_us, graph 0 to period_us, graph 1 nohead linestyle 5 dashtype 2
   set label 1 'period ' at period_us, graph 0.96 right textcolor rgb '#777777'
-  plot 'ticks.csv' using 'from_us':(column('took') > 0 ? column('took') / K_sum : NaN) with fillsteps linecolor rgb '#c4dbec' title 'histogram', \
-       '' using 'from_us':'took_longer' with steps linestyle 1 title 'take longer', \
-       '' using 'from_us':'later' with steps linestyle 2 title 'begin later'
+  plot 'ticks.csv' using 'from_us':(column('durations') > 0 ? column('durations') / K_sum : NaN) with fillsteps linecolor rgb '#c4dbec' title 'histogram', \
+       '' using 'from_us':'duration_tail' with steps linestyle 1 title 'duration above', \
+       '' using 'from_us':'latency_tail' with steps linestyle 2 title 'latency above'
 } else {
-  set label 1 'in virtual time a tick takes none' at graph 0.5, graph 0.5 center textcolor rgb '#777777'
+  set label 1 'virtual time: ticks have no duration' at graph 0.5, graph 0.5 center textcolor rgb '#777777'
   plot [0:1] [0:1] 2 notitle
 }
 unset arrow 1
@@ -99,7 +99,7 @@ unset logscale
 set format
 set autoscale
 
-# The way of the tool, in the plane in which it is longest.
+# Path of the tool, in the vertical plane with the largest extent.
 if (one eq '') { set output figure('trajectory') }
 stats 'run.csv' using (column('px')) nooutput name 'PX'
 stats 'run.csv' using (column('py')) nooutput name 'PY'
@@ -110,11 +110,11 @@ set size ratio -1
 span = PX_max - PX_min > PY_max - PY_min ? PX_max - PX_min : PY_max - PY_min
 if (span > 0) { set xtics 10**floor(log10(span)) * (span / 10**floor(log10(span)) > 3 ? 2 : 1) / (span / 10**floor(log10(span)) > 3 ? 1 : 2.0) }
 set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05
-if (placed) {
-  plot 'run.csv' using (column('p'.across)):(column('pz')) with lines linestyle 5 title 'p, the hand', \
-       '' using (column('q'.across)):(column('qz')) with lines linestyle 1 title 'q, what the world allows'
+if (proxy_valid) {
+  plot 'run.csv' using (column('p'.across)):(column('pz')) with lines linestyle 5 title 'p, commanded pose', \
+       '' using (column('q'.across)):(column('qz')) with lines linestyle 1 title 'q, proxy pose'
 } else {
-  plot 'run.csv' using (column('p'.across)):(column('pz')) with lines linestyle 5 title 'p, the hand'
+  plot 'run.csv' using (column('p'.across)):(column('pz')) with lines linestyle 5 title 'p, commanded pose'
 }
 if (one ne '') { unset multiplot }
 unset output

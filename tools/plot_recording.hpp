@@ -8,11 +8,11 @@
 
 namespace wrenchd {
 
-/// Draws what papers show of a run, by gnuplot: force, torque, penetration and energy over time, the time of
-/// ticks with its tail, and the way of p and of q. Where `output` ends in .svg, .pdf or .png it becomes that
-/// one file; else a directory, which is made, with an SVG for each figure, the tables they show (CSV) and the
-/// script, to draw them again in another style. Returns the pictures. Throws std::runtime_error that says
-/// what to do, also for a recording without ticks.
+/// Draws a recording with gnuplot: force, torque, penetration and energy over time, the distribution of tick
+/// durations, and the paths of p and q. If `output` ends in .svg, .pdf or .png, all figures go to that file.
+/// Otherwise `output` is a directory, which is created; it receives one SVG per figure, the plotted tables
+/// (CSV) and the gnuplot script. Returns the paths of the pictures. Throws std::runtime_error with the
+/// remedy, also for a recording without ticks. Not RT-safe: writes files and runs gnuplot.
 std::vector<std::filesystem::path> plot_recording(const Recording& recording,
                                                   const std::filesystem::path& output);
 

@@ -15,8 +15,9 @@
 namespace wrenchd {
 namespace {
 
-// What a profile may say; config/load_report_layout.cpp and load_profile.cpp refuse what is beyond.
-constexpr std::size_t kMostReportBytes = 64;
+// Maximum length of a report in a profile. config/load_report_layout.cpp and config/load_profile.cpp reject
+// longer ones.
+constexpr std::size_t kMaxReportBytes = 64;
 constexpr std::size_t kMostButtons = 32;
 constexpr double kLeastStep = 1e-12, kLargestStep = 1e3;
 constexpr double kLargestOffset = 1e6;
@@ -36,23 +37,23 @@ std::string place_text(std::size_t bit) {
   return "byte " + std::to_string(bit / 8) + (bit % 8 == 0 ? "" : " bit " + std::to_string(bit % 8));
 }
 
-/// A name that somebody else chose, fit for a comment: TOML wants one line of good UTF-8.
+/// Makes a device's name fit for a TOML comment: one line of valid UTF-8.
 std::string to_printable(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c > '~'; }, '?');
   return printable(text, 200);
 }
 
-// What the descriptor says, as comments
+// Comments that repeat the descriptor
 
 std::string field_text(const DescribedField& field) {
   const std::string where = "#     " + place_text(field.bit) + ": ";
   if (field.constant) return where + std::to_string(field.bits * field.count) + " bits of padding\n";
   const auto first = field.usage(0), last = field.usage(field.count - 1);
-  std::string what = first ? to_text(*first) : "unnamed";
-  if (first && *first != *last) what += " to " + to_text(*last);
+  std::string usages = first ? to_text(*first) : "unnamed";
+  if (first && *first != *last) usages += " to " + to_text(*last);
   return where + std::to_string(field.count) + " x " + std::to_string(field.bits) + " bits, " +
-         std::to_string(field.logical_min) + " to " + std::to_string(field.logical_max) + ", " + what +
+         std::to_string(field.logical_min) + " to " + std::to_string(field.logical_max) + ", " + usages +
          (field.relative ? ", relative" : "") + (field.variable ? "" : ", an array") + "\n";
 }
 
@@ -65,17 +66,18 @@ std::string report_text(const DescribedReport& report) {
 
 std::string head(const DescriptorSource& source, const ReportDescriptor& descriptor) {
   std::string text =
-      "# wrenchd device profile: a PROPOSAL, made from a report descriptor by `wrenchctl profile`.\n"
+      "# wrenchd device profile: a PROPOSAL from a report descriptor, by `wrenchctl profile`.\n"
       "#\n"
-      "# A descriptor tells where numbers lie in reports, and little of what they mean. Lines marked "
-      "GUESSED\n"
-      "# want to be looked at; lines marked FILL IN are things that nobody but you can know, and until they\n"
-      "# are filled in the profile does not load. profiles/example.toml explains every key.\n"
+      "# A descriptor contains the layout of the reports, but little of their meaning. Check the lines "
+      "marked "
+      "GUESSED.\n"
+      "# Complete the lines marked FILL IN, which no descriptor contains; the profile does not load before.\n"
+      "# profiles/example.toml explains every key.\n"
       "#\n";
   text += "# Made from " + to_printable(source.file) + "\n";
   if (!source.device.empty()) text += "# Device: " + to_printable(source.device) + "\n";
-  text += "# What the device says of its reports";
-  if (!descriptor.has_ids()) text += ", which have no id";
+  text += "# The device's reports";
+  if (!descriptor.has_ids()) text += ", without ids";
   text += ":\n";
   for (const DescribedReport& report : descriptor.reports) text += report_text(report);
   return text;
@@ -88,8 +90,8 @@ bool of_maker(const DescribedReport& report) {
   });
 }
 
-/// What drives motors, as far as bytes can tell: the longest output report that does more than light lamps,
-/// one of the maker's own before any other.
+/// Returns the output report that most likely drives motors: the longest one that does more than set LEDs,
+/// preferably vendor-defined.
 const DescribedReport* driving_report(const ReportDescriptor& descriptor) {
   const DescribedReport* found = nullptr;
   const auto drives = [](const DescribedField& field) {
@@ -106,7 +108,7 @@ const DescribedReport* driving_report(const ReportDescriptor& descriptor) {
   return found;
 }
 
-// What every profile has
+// Keys of every profile
 
 std::string match_table(const DescriptorSource& source, const ReportDescriptor& descriptor) {
   std::array<char, 80> line{};
@@ -117,7 +119,7 @@ std::string match_table(const DescriptorSource& source, const ReportDescriptor& 
                   unsigned{source.id->product});
     text = line.data();
   }
-  // The kernel's lists know a device by the first thing it wants to be.
+  // The kernel names a device after its first collection.
   const Usage usage = descriptor.collections.empty() ? Usage{} : descriptor.collections.front().usage;
   if (usage == Usage{}) return text;
   std::snprintf(line.data(), line.size(), "usage_page = 0x%02x\nusage = 0x%02x\n", unsigned{usage.page},
@@ -125,47 +127,47 @@ std::string match_table(const DescriptorSource& source, const ReportDescriptor& 
   return text + line.data();
 }
 
-/// All that stands above the reports.
+/// Returns the keys above the reports.
 std::string general_keys(const DescriptorSource& source, const ReportDescriptor& descriptor,
                          const std::string& description, const char* stream) {
   const bool driven = driving_report(descriptor) != nullptr;
   std::string text =
-      "\nname = \"unnamed\"                  # FILL IN: what status and recordings should show\n"
+      "\nname = \"unnamed\"                  # FILL IN: name in status and recordings\n"
       "description = \"" +
       description +
       "\"\n"
       "transport = \"hidraw\"              # GUESSED: \"libusb\" goes past the kernel\n"
-      "# FILL IN: report_rate_Hz =        measured, not hoped for: count its reports over ten "
+      "# FILL IN: report_rate_Hz =        measured: count the reports over ten "
       "seconds\n" +
-      stream + "# FILL IN: stale_fault_s =         how long it may be silent when it should speak\n";
-  text += driven
-              ? "# FILL IN: watchdog_s =            the firmware's own; ask its maker, or read its source\n"
-              : "wrench_report = \"none\"            # it has no output report that could drive a motor\n";
+      stream + "# FILL IN: stale_fault_s =         longest silence before a fault\n";
+  text += driven ? "# FILL IN: watchdog_s =            of the firmware; ask its maker, or read its source\n"
+                 : "wrench_report = \"none\"            # the device has no output report that could drive a "
+                   "motor\n";
   text += match_table(source, descriptor);
   text +=
-      "\n# What the device and the hand on it can bear. No descriptor says this and nothing guesses it: a "
+      "\n# Limits of the device and the hand. No descriptor contains them, and no tool guesses them: a "
       "number\n"
-      "# too large here can hurt somebody.\n"
+      "# that is too large can injure a person.\n"
       "[limits]\n";
   if (driven) text += "# FILL IN: max_force_N =\n# FILL IN: max_torque_Nm =\n";
   return text + "# FILL IN: max_linear_speed_m_per_s =\n# FILL IN: max_angular_speed_rad_per_s =\n";
 }
 
-/// Id and length. `guess`: what was guessed of the report.
+/// Returns id and length of a report. `guess`: text that marks which part is a guess.
 std::string frame_keys(const DescribedReport& report, const std::string& guess = {}) {
   const std::string length = std::to_string(report.length);
   std::string text = "id = " + id_text(report.id) + guess + "\n";
-  if (report.length <= kMostReportBytes) return text + "length = " + length + "\n";
-  return text + "# FILL IN: length. The device says " + length + " bytes; a profile's report has " +
-         std::to_string(kMostReportBytes) + " at most.\n";
+  if (report.length <= kMaxReportBytes) return text + "length = " + length + "\n";
+  return text + "# FILL IN: length. The device's report has " + length +
+         " bytes, but a profile's report has at most " + std::to_string(kMaxReportBytes) + ".\n";
 }
 
-std::string makers_table(const char* table, const DescribedReport* report, const char* fields) {
+std::string vendor_table(const char* table, const DescribedReport* report, const char* fields) {
   if (report == nullptr) return std::string("\n# FILL IN: [") + table + "]. The device has no such report.\n";
   return std::string("\n[") + table + "]\n" +
          frame_keys(*report, "                          # GUESSED: the longest report of its kind") +
          "# FILL IN: " + fields + "\n" +
-         "#   What its fields mean is known to the maker only. \"none\" stands for what it has not; joints, "
+         "#   Only the maker knows the meaning of the fields. Write \"none\" for absent ones; joints, "
          "parts of a\n"
          "#   pose and motor currents are in profiles/example.toml.\n";
 }
@@ -173,42 +175,43 @@ std::string makers_table(const char* table, const DescribedReport* report, const
 std::string wrench_table(const ReportDescriptor& descriptor) {
   const DescribedReport* report = driving_report(descriptor);
   if (report == nullptr) return {};
-  return makers_table("wrench_report", report, "enable, sequence, force, torque, hold_time, checksum") +
-         "#   If it drives no motor, leave this table, force, torque and watchdog out, and say wrench_report "
+  return vendor_table("wrench_report", report, "enable, sequence, force, torque, hold_time, checksum") +
+         "#   If the report drives no motor, delete this table, force, torque and watchdog, and write "
+         "wrench_report "
          "= "
          "\"none\"\n#   above [match].\n";
 }
 
 // Multi-axis controllers
 
-/// The six axes are two fields of a profile.
+/// Half of the six axes: a profile describes them as two fields.
 struct Half {
-  const char* key;       ///< of the field
-  const char* step_key;  ///< [m] or [rad] of one count
+  const char* key;       ///< name of the field
+  const char* step_key;  ///< key of the size of one count [m] or [rad]
   const char* offset_key;
   const char* gain_key;
-  const char* what;  ///< the step is
+  const char* step_description;  ///< description of the step for the comment
   const char* full_text;
-  double full;   ///< taken as the end of the cap's way where the device gives no unit
-  double speed;  ///< that the end of the cap's way shall mean
+  double full;   ///< assumed full deflection if the device gives no unit
+  double speed;  ///< commanded speed at full deflection
   const char* speed_text;
-  std::size_t first;  ///< of its three axes
+  std::size_t first;  ///< index of the first of its three axes
 };
 
-// A guess each, and marked as one. Where a device gives no unit only the product of step and gain moves
-// anything, so the ends may be any; the speeds are slow enough to follow with the eye.
+// Default values, which the proposal marks as guesses. If a device gives no unit, only the product of step
+// and gain has an effect, so the full deflections are arbitrary. The speeds are slow enough to follow by eye.
 constexpr Half kTranslation = {"translation", "step_m", "offset_m", "linear_gain", "length",
                                "10 mm",       0.01,     0.1,        "0.1 m/s",     0};
 constexpr Half kRotation = {"rotation", "step_rad", "offset_rad", "angular_gain", "angle",
                             "0.1 rad",  0.1,        1.0,          "1 rad/s",      3};
 
-/// The count at which the cap rests: 0, or the middle where there is no 0 between its ends.
+/// Returns the count of the undeflected cap: 0, or the middle if 0 is outside its range.
 double rest_count(const DescribedNumber& axis) {
   if (axis.logical_min < 0 && axis.logical_max > 0) return 0.0;
   return std::ceil(0.5 * (static_cast<double>(axis.logical_min) + static_cast<double>(axis.logical_max)));
 }
 
-/// Counts from rest to the farther end, of the widest of the three.
+/// Returns the counts from rest to the farther end, for the axis with the widest range.
 double counts_to_end(const SixAxisController& device, const Half& half) {
   double most = 0.0;
   for (std::size_t i = half.first; i < half.first + 3; ++i) {
@@ -220,8 +223,9 @@ double counts_to_end(const SixAxisController& device, const Half& half) {
   return most;
 }
 
-/// Three equal numbers that follow each other: what a field is. The step is one for all three.
-bool is_row(const SixAxisController& device, const Half& half) {
+/// Returns true if the three axes are equal and adjacent, as a field of a profile requires. They share one
+/// step.
+bool is_field(const SixAxisController& device, const Half& half) {
   const DescribedNumber& a = device.axes[half.first];
   for (std::size_t i = 1; i < 3; ++i) {
     const DescribedNumber& b = device.axes[half.first + i];
@@ -233,7 +237,8 @@ bool is_row(const SixAxisController& device, const Half& half) {
   return counts_to_end(device, half) > 0.0;
 }
 
-/// [m] or [rad] of a count: the device's own, or a guess where it gives none that a profile may have.
+/// Size of a count [m] or [rad]: the device's own, or a guess if the device gives none that a profile
+/// accepts.
 struct Step {
   double si = 0.0;
   bool guessed = false;
@@ -264,7 +269,7 @@ std::string axes_places(const SixAxisController& device, std::size_t first) {
   return text;
 }
 
-/// Where a field lies and how wide it is: `byte = 1, type = "i16"`, or `byte = 0, bit = 3, bits = 10`.
+/// Returns position and width of a field: `byte = 1, type = "i16"`, or `byte = 0, bit = 3, bits = 10`.
 std::string place_keys(std::size_t bit, unsigned bits, bool is_signed, bool signed_by_itself) {
   std::string text = "byte = " + std::to_string(bit / 8);
   const bool plain_width = bits == 8 || bits == 16 || bits == 32;
@@ -277,53 +282,55 @@ std::string place_keys(std::size_t bit, unsigned bits, bool is_signed, bool sign
 
 std::string axes_field(const SixAxisController& device, const Half& half) {
   const DescribedNumber& axis = device.axes[half.first];
-  if (!is_row(device, half))
+  if (!is_field(device, half))
     return std::string("# FILL IN: ") + half.key + ". " + axes_places(device, half.first) +
-           ":\n#   not three equal numbers in a row with one step, as a field is\n";
+           ":\n#   not three equal, adjacent numbers with a common step, as a field requires\n";
   const Step step = step_of(device, half);
   const double rest = rest_count(axis);
   std::string text = "# " + axes_places(device, half.first) + ".\n";
   if (step.guessed)
-    text += std::string("# GUESSED: the step. The descriptor gives no ") + half.what +
-            " for a count; the end of the cap's way is taken as " + half.full_text + ".\n";
+    text += std::string("# GUESSED: the step. The descriptor gives no ") + half.step_description +
+            " per count; the proposal assumes a full deflection of " + half.full_text + ".\n";
   else
-    text += "# The step is what the descriptor says of a count.\n";
+    text += "# The step comes from the descriptor.\n";
   if (rest != 0.0)
-    text += "# GUESSED: the offset, which makes the count " + number_text(rest, 12) +
-            " the one at which the cap rests.\n";
+    text += "# GUESSED: the offset, which assumes the count " + number_text(rest, 12) +
+            " for the undeflected puck.\n";
   text += std::string(half.key) + " = { " + place_keys(axis.bit, axis.bits, axis.is_signed(), true) + ", " +
           half.step_key + " = " + number_text(step.si, 9);
   if (rest != 0.0) text += std::string(", ") + half.offset_key + " = " + number_text(-rest * step.si, 12);
   return text + " }\n";
 }
 
-/// As much a metre, or a radian, as makes the end of the cap's way the speed that is wanted there.
+/// Returns the gain per metre or radian for which full deflection gives the intended speed.
 std::string gain(const SixAxisController& device, const Half& half) {
   const double value =
-      is_row(device, half) ? half.speed / (step_of(device, half).si * counts_to_end(device, half)) : 0.0;
+      is_field(device, half) ? half.speed / (step_of(device, half).si * counts_to_end(device, half)) : 0.0;
   if (!(value >= kLeastGain && value <= kLargestGain))
     return std::string("# FILL IN: ") + half.gain_key + " =\n";
   std::string key = std::string(half.gain_key) + " = " + number_text(value, 3) + ' ';
   key.resize(std::max(key.size(), kCommentColumn), ' ');
-  return key + "# GUESSED: " + half.speed_text + " at the end of the cap's way\n";
+  return key + "# GUESSED: " + half.speed_text + " at full deflection\n";
 }
 
-/// [m] or [rad] at the end of the cap's way; 0 where that cannot be told.
-double end_of_way(const SixAxisController& device, const Half& half) {
-  return is_row(device, half) ? step_of(device, half).si * counts_to_end(device, half) : 0.0;
+/// Returns the full deflection [m] or [rad]; 0 if it is unknown.
+double full_deflection(const SixAxisController& device, const Half& half) {
+  return is_field(device, half) ? step_of(device, half).si * counts_to_end(device, half) : 0.0;
 }
 
-/// How it steers: as the SpaceMouse's shipped profiles have it.
+/// Returns the steering keys, with the values of the shipped SpaceMouse profiles.
 std::string steering(const SixAxisController& device) {
-  const double full_m = end_of_way(device, kTranslation), full_rad = end_of_way(device, kRotation);
+  const double full_m = full_deflection(device, kTranslation), full_rad = full_deflection(device, kRotation);
   if (!(full_m >= 1e-5 && full_m <= 1.0 && full_rad >= 1e-4 && full_rad <= 3.2)) return {};
-  return "full_m = " + number_text(full_m, 4) + "\nfull_rad = " + number_text(full_rad, 4) +
-         "\n# GUESSED: what feels right. A push goes with some twist, and nobody feels a wall with it.\n"
-         "dead_zone = 0.08\ncurve = 2.0\nleash_m = 0.010\nleash_rad = 0.2\n";
+  return "full_deflection_m = " + number_text(full_m, 4) +
+         "\nfull_deflection_rad = " + number_text(full_rad, 4) +
+         "\n# GUESSED: values of the shipped SpaceMouse profiles. A push includes some twist.\n"
+         "dead_zone = 0.08\nresponse_exponent = 2.0\nmax_proxy_distance_m = 0.010\nmax_proxy_angle_rad = "
+         "0.2\n";
 }
 
 std::string deflection_table(const SixAxisController& device) {
-  return "\n# GUESSED: that the axes say how far a cap is pushed and twisted, which springs back. If they "
+  return "\n# GUESSED: that the axes are the deflections of a puck with return springs. If they "
          "say "
          "where a\n"
          "# handle is, mode = \"position\" with gains of 1.\n"
@@ -331,7 +338,7 @@ std::string deflection_table(const SixAxisController& device) {
          gain(device, kTranslation) + gain(device, kRotation) + steering(device);
 }
 
-/// Nothing but buttons from its first to its last, and padding: what a mask can hold.
+/// Returns true if the field contains only buttons and padding, as a mask requires.
 bool is_mask(const DescribedReport& report, const DescribedBits& bits) {
   return std::all_of(report.fields.begin(), report.fields.end(), [&](const DescribedField& field) {
     const bool apart = field.end_bit() <= bits.bit || field.bit >= bits.bit + bits.count;
@@ -343,14 +350,13 @@ std::string buttons_field(const SixAxisController& device, const DescribedReport
   const DescribedBits& bits = *device.buttons;
   const std::string which =
       "# Buttons: " + std::to_string(bits.count) + " bits from " + place_text(bits.bit) + ".";
-  if (!is_mask(report, bits))
-    return which + " There are other things between them:\n# FILL IN: button_list\n";
+  if (!is_mask(report, bits)) return which + " Other fields lie between them:\n# FILL IN: button_list\n";
   const auto count = static_cast<unsigned>(std::min(bits.count, kMostButtons));
-  return which + (count < bits.count ? " The first 32 of them, which is all that a mask holds." : "") +
+  return which + (count < bits.count ? " Only the first 32, the capacity of a mask." : "") +
          "\nbuttons = { " + place_keys(bits.bit, count, false, false) + " }\n";
 }
 
-/// What a report of the device carries of axes and buttons.
+/// Returns the axes and buttons of an input report.
 std::string report_fields(const SixAxisController& device, const DescribedReport& report) {
   std::string text;
   for (const Half& half : {kTranslation, kRotation})
@@ -371,14 +377,13 @@ std::string multi_axis(const DescriptorSource& source, const SixAxisController& 
   };
   const DescribedReport &first = input(device.axes[0].report_id), &second = input(device.axes[3].report_id);
   const bool split = device.layout == AxesLayout::split;
-  std::string text =
-      general_keys(source, descriptor,
-                   split ? "Multi-axis controller, X Y Z and Rx Ry Rz in two reports"
-                         : "Multi-axis controller, six axes in one report",
-                   "stream = \"silent_at_rest\"         # GUESSED: such devices are silent while "
-                   "nobody touches them\n");
+  std::string text = general_keys(source, descriptor,
+                                  split ? "Multi-axis controller, X Y Z and Rx Ry Rz in two reports"
+                                        : "Multi-axis controller, six axes in one report",
+                                  "stream = \"silent_at_rest\"         # GUESSED: such devices are silent at "
+                                  "rest\n");
   text +=
-      "\n# GUESSED: that the device keeps to HID's axes, x right, y towards the user, z down; ours are x "
+      "\n# GUESSED: that the device uses HID's axes, x right, y towards the user, z down; wrenchd's are x "
       "forward,\n"
       "# y left, z up.\n"
       "[frames]\nbase_axes = [\"-y\", \"-x\", \"-z\"]\n" +
@@ -393,9 +398,9 @@ std::string multi_axis(const DescriptorSource& source, const SixAxisController& 
   return text;
 }
 
-// Devices with reports of their maker's own
+// Devices with vendor-defined reports
 
-/// The longest of its kind: what carries poses or wrenches is seldom the shortest.
+/// Returns the longest report of a kind, which most likely carries poses or wrenches.
 const DescribedReport* longest(const ReportDescriptor& descriptor, ReportKind kind) {
   const DescribedReport* found = nullptr;
   for (const DescribedReport& report : descriptor.reports)
@@ -407,17 +412,17 @@ const DescribedReport* longest(const ReportDescriptor& descriptor, ReportKind ki
 std::string makers_own(const DescriptorSource& source, const ReportDescriptor& descriptor) {
   const DescribedReport* pose = longest(descriptor, ReportKind::input);
   const DescribedReport* wrench = driving_report(descriptor);
-  std::string text = general_keys(source, descriptor, "Reports of its maker's own",
+  std::string text = general_keys(source, descriptor, "Vendor-defined reports",
                                   "stream = \"free_running\"           # GUESSED\n");
   const bool reference = pose != nullptr && wrench != nullptr && pose->id == 1 && pose->length == 64 &&
                          wrench->id == 2 && wrench->length == 32;
   if (reference)
     text +=
-        "\n# GUESSED: ids and lengths are those of the wrenchd reference report layout. If the device speaks "
+        "\n# GUESSED: ids and lengths are those of the wrenchd reference report layout. If the device uses "
         "it,\n"
-        "# take both tables below from profiles/loopback.toml as they stand.\n";
+        "# copy both tables below from profiles/loopback.toml.\n";
   return text +
-         makers_table("pose_report", pose,
+         vendor_table("pose_report", pose,
                       "motors_on, watchdog_tripped, sequence, device_time, position, orientation, checksum") +
          wrench_table(descriptor);
 }
@@ -430,7 +435,7 @@ std::string propose_profile(const DescriptorSource& source) {
   if (axes.controller) return head(source, descriptor) + multi_axis(source, *axes.controller, descriptor);
   if (std::none_of(descriptor.reports.begin(), descriptor.reports.end(), of_maker))
     throw std::runtime_error(source.file + ": nothing to propose: " + axes.rejection +
-                             ", and has no report of its maker's own; name another device");
+                             ", and has no vendor-defined report; name another device");
   return head(source, descriptor) + makers_own(source, descriptor);
 }
 

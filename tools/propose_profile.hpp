@@ -7,13 +7,14 @@
 
 namespace wrenchd {
 
-/// The text of a profile for a device of which only the report descriptor is known: what it says is written
-/// down, what was guessed from it is marked, and what only a person can know is left open, so that the text
-/// is good TOML and does not load before somebody has completed it. Limits are never guessed. A multi-axis
-/// controller's loads once the lines marked FILL IN are filled in, and agrees with its descriptor.
+/// Returns the text of a profile for a device whose report descriptor is known. Properties from the
+/// descriptor are filled in, guesses are marked, and properties that only a person can know are left open.
+/// The text is valid TOML, but loads only after its completion. Limits are never guessed. The proposal for a
+/// multi-axis controller loads once the lines marked FILL IN are complete, and then agrees with its
+/// descriptor.
 ///
-/// Throws std::runtime_error where the descriptor is refused, or where the device is neither a multi-axis
-/// controller nor one with reports of its maker's own.
+/// Throws std::runtime_error if the descriptor is invalid, or if the device is neither a multi-axis
+/// controller nor a device with vendor-defined reports. Not RT-safe: allocates.
 std::string propose_profile(const DescriptorSource& source);
 
 }  // namespace wrenchd

@@ -18,23 +18,23 @@ bool replay_recording(const std::filesystem::path& file, const std::optional<Run
     plan = load_run_config(*files, SearchPath());
     if (plan.profile.name.empty())
       throw std::runtime_error(
-          "the configuration leaves the profile to the device that is plugged in; name the one of the "
+          "the configuration selects the profile by the connected device; name the profile of the "
           "recording with --profile");
   } else {
     recorded.emplace(recording.header);
     plan = recorded->config();
   }
   if (recording.header.version != kVersion)
-    std::printf("recorded by wrenchd %s, replayed by %s: the bits may differ for that\n",
+    std::printf("recorded by wrenchd %s, replayed by %s: the versions differ, so the bits may differ\n",
                 recording.header.version.c_str(), kVersion);
   const auto difference = replay(recording, plan);
   std::printf("compared: %s\nwith: %s\n", compared_fields(),
-              files ? "the files named" : "what is in the recording");
+              files ? "the named files" : "the files in the recording");
   if (!difference) {
-    std::printf("%zu ticks, all the same, bit for bit\n", recording.ticks.size());
+    std::printf("%zu ticks, all bits are equal\n", recording.ticks.size());
     return true;
   }
-  std::printf("tick %llu differs first: %s was %.17g and is %.17g\n",
+  std::printf("first difference at tick %llu: %s was %.17g and is %.17g\n",
               static_cast<unsigned long long>(difference->tick), difference->field.c_str(),
               difference->recorded, difference->replayed);
   return false;

@@ -8,10 +8,10 @@
 
 namespace wrenchd {
 
-/// Feeds a recording through the servo loop again, and prints what it compared, and whether all bits are the
-/// same or where the first differs. files: what it is replayed with; none: what is in the recording itself.
-/// Returns whether all are the same. Throws as read_recording(), unpack_run_config(), load_run_config() and
-/// replay().
+/// Replays a recording through the servo loop. Prints the number of compared ticks, and whether all bits are
+/// equal or where the first difference is. files: configuration for the replay; empty: the configuration in
+/// the recording. Returns true if all bits are equal. Throws the exceptions of read_recording(),
+/// unpack_run_config(), load_run_config() and replay(). Not RT-safe: takes seconds for long recordings.
 bool replay_recording(const std::filesystem::path& file, const std::optional<RunConfigFiles>& files);
 
 }  // namespace wrenchd

@@ -10,6 +10,7 @@
 
 #include "devices/kinematics.hpp"
 #include "devices/profile_device.hpp"
+#include "devices/report_bits.hpp"
 #include "devices/report_codec.hpp"
 
 namespace wrenchd {
@@ -19,11 +20,11 @@ using Bytes = std::span<const std::uint8_t>;
 
 std::string number(double x) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.9g", x == 0.0 ? 0.0 : x);  // no -0
+  std::snprintf(text.data(), text.size(), "%.9g", x == 0.0 ? 0.0 : x);  // avoids -0
   return text.data();
 }
 
-/// Lines of a name, values and a unit.
+/// Lines with a name, values and a unit.
 class LineReader {
  public:
   void add(const std::string& name, const std::string& text) {
@@ -36,7 +37,7 @@ class LineReader {
     double largest = 0.0;
     for (const double value : values) largest = std::max(largest, std::abs(value));
     std::string line;
-    for (const double value : values)  // what rounding of a rotation leaves is nothing
+    for (const double value : values)  // suppresses the rounding error of a rotation
       line += (line.empty() ? "" : " ") + number(std::abs(value) < 1e-14 * largest ? 0.0 : value);
     add(name, line + (unit.empty() ? "" : " " + unit) + more);
   }
@@ -71,25 +72,25 @@ std::string label(const ReportFrame& frame, const std::string& name) {
   return "report" + std::string(id.data()) + (name.empty() ? "" : " (" + name + ")");
 }
 
-std::string why(const ReportFrame& frame, Decoding outcome, Bytes bytes) {
+std::string mismatch_text(const ReportFrame& frame, Decoding outcome, Bytes bytes) {
   switch (outcome) {
     case Decoding::ok:
       return "fits";
     case Decoding::wrong_length:
       return "has " + (frame.min_length == 0 ? "" : std::to_string(frame.min_length) + " to ") +
-             std::to_string(frame.length) + " bytes, these are " + std::to_string(bytes.size());
+             std::to_string(frame.length) + " bytes, found " + std::to_string(bytes.size());
     case Decoding::wrong_id:
-      return "begins with another id: these begin with " + hex_text(bytes.first(1));
+      return "begins with another id: found " + hex_text(bytes.first(1));
     case Decoding::bad_checksum:
-      return "has another checksum: a byte is wrong";
+      return "has another checksum: at least one byte is wrong";
     case Decoding::wrong_marker:
       for (const auto& [byte, value] : frame.constants)
         if (byte < bytes.size() && bytes[byte] != value)
-          return "has " + hex_text({&value, 1}) + " at byte " + std::to_string(byte) + ", these have " +
+          return "has " + hex_text({&value, 1}) + " at byte " + std::to_string(byte) + ", found " +
                  hex_text(bytes.subspan(byte, 1));
       break;
   }
-  return "does not fit";
+  return "does not match";
 }
 
 std::string buttons_text(std::uint32_t buttons) {
@@ -106,7 +107,7 @@ void add_pose(LineReader& lines, const std::string& where, const Pose& X) {
   lines.add("orientation " + where, q, "(x y z w)");
 }
 
-/// What wrenchd makes of a report, in the axes of the base.
+/// Adds wrenchd's interpretation of a report, in the base frame.
 void add_meaning(LineReader& lines, const DeviceProfile& profile, const PoseReportLayout& layout,
                  PoseReport report) {
   const Quaterniond& R_BD = profile.X_BD.rotation;
@@ -115,7 +116,7 @@ void add_meaning(LineReader& lines, const DeviceProfile& profile, const PoseRepo
     const JointAngles angles = joint_angles(k, strip_count_button(k, report.joints, report.buttons));
     lines.add("joint angles", std::span<const double>(angles.data(), k.joints), "rad");
     const auto X_DE = forward_kinematics(k, angles, {});
-    if (!X_DE) return lines.add("position in base", "none: no place of the handle belongs to these angles");
+    if (!X_DE) return lines.add("position in base", "none: these angles belong to no handle pose");
     lines.add("position in device", X_DE->translation_m, "m");
     add_pose(lines, "in base", profile.X_BD * *X_DE * profile.X_EH);
   } else if (layout.position.present && layout.orientation.present) {
@@ -127,9 +128,9 @@ void add_meaning(LineReader& lines, const DeviceProfile& profile, const PoseRepo
   if (profile.deflection && profile.deflection->mode == Deflection::Mode::rate) {
     const Deflection& d = *profile.deflection;
     if (layout.translation.present)
-      lines.add("moves the tool at", d.linear_gain * (R_BD * report.translation_m), "m/s");
+      lines.add("tool velocity", d.linear_gain * (R_BD * report.translation_m), "m/s");
     if (layout.rotation.present)
-      lines.add("turns the tool at", d.angular_gain * (R_BD * report.rotation_rad), "rad/s");
+      lines.add("tool angular vel.", d.angular_gain * (R_BD * report.rotation_rad), "rad/s");
   }
   if (layout.buttons.present || !layout.button_bits.empty() ||
       (layout.joints.present && profile.kinematics.count_button.present))
@@ -180,7 +181,8 @@ std::string wrench_text(const DeviceProfile& profile, Bytes bytes) {
   return lines.take();
 }
 
-/// The report itself: without an FTDI chip's status bytes, or the 00 by which host libraries say "no id".
+/// Returns the report itself: without the status bytes of an FTDI chip, and without the byte 00 that host
+/// libraries write for "no report id".
 Bytes without_wrapping(const DeviceProfile& profile, Bytes bytes) {
   const PoseReportLayout& r = profile.pose_report;
   const std::size_t prefix = profile.endpoints.prefix_bytes;
@@ -191,7 +193,7 @@ Bytes without_wrapping(const DeviceProfile& profile, Bytes bytes) {
   return bytes;
 }
 
-/// A link that gives what it was given to the device, and keeps what the device writes.
+/// A link that supplies one given report and stores the report that the device writes.
 class BytesLink final : public ReportLink {
  public:
   void open() override {}
@@ -215,7 +217,7 @@ class BytesLink final : public ReportLink {
   std::size_t written_length = 0;
 };
 
-/// A report of a device that stands at its home position.
+/// Returns a report of a device at its home pose.
 std::vector<std::uint8_t> home_report(const DeviceProfile& profile) {
   PoseReport report;
   report.joints = profile.kinematics.home_counts;
@@ -225,20 +227,20 @@ std::vector<std::uint8_t> home_report(const DeviceProfile& profile) {
 }
 
 [[noreturn]] void refuse_place(const DeviceProfile& profile, Bytes at) {
-  std::string why = "it is a report to the device, not one from it";
+  std::string reasons = "it is a report to the device, not from it";
   try {
     report_text(profile, at);
   } catch (const std::runtime_error& error) {
-    why = error.what();
+    reasons = error.what();
   }
-  throw std::runtime_error("--at: " + why);
+  throw std::runtime_error("--at: " + reasons);
 }
 
-void remark_cut(std::vector<std::string>& remarks, const char* what, double asked, double most,
-                const char* unit) {
-  if (asked > most)
-    remarks.push_back(std::string(what) + " is cut from " + number(asked) + " to " + number(most) + " " +
-                      unit + ", the limit of the profile");
+void add_limit_remark(std::vector<std::string>& remarks, const char* what, double requested, double limit,
+                      const char* unit) {
+  if (requested > limit)
+    remarks.push_back(std::string(what) + " is limited from " + number(requested) + " to " + number(limit) +
+                      " " + unit + ", the limit in the profile");
 }
 
 }  // namespace
@@ -258,7 +260,7 @@ std::string report_text(const DeviceProfile& profile, Bytes given, bool to_devic
   const Bytes bytes = without_wrapping(profile, given);
   std::string reasons;
   const auto reason = [&](const ReportFrame& frame, const std::string& name, Decoding outcome) {
-    reasons += "\n  " + label(frame, name) + ' ' + why(frame, outcome, bytes);
+    reasons += "\n  " + label(frame, name) + ' ' + mismatch_text(frame, outcome, bytes);
   };
   for (std::size_t i = 0; !to_device && i <= profile.more_reports.size(); ++i) {
     const PoseReportLayout& layout = i == 0 ? profile.pose_report : profile.more_reports[i - 1];
@@ -272,13 +274,13 @@ std::string report_text(const DeviceProfile& profile, Bytes given, bool to_devic
     if (outcome == Decoding::ok) return wrench_text(profile, bytes);
     reason(profile.wrench_report, "to the device", outcome);
   }
-  throw std::runtime_error("these " + std::to_string(bytes.size()) + " bytes are no report of " +
+  throw std::runtime_error("these " + std::to_string(bytes.size()) + " bytes match no report of " +
                            profile.name + ":" + reasons);
 }
 
 EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes at, std::uint64_t sequence) {
   if (!profile.has_output)
-    throw std::runtime_error(profile.name + " takes no wrench: it has no motors; name another profile");
+    throw std::runtime_error(profile.name + " accepts no wrench: it has no motors; name another profile");
   EncodedWrench encoded;
   const bool joints = profile.kinematics.kind != Kinematics::Kind::none;
   BytesLink link;
@@ -292,23 +294,25 @@ EncodedWrench encode_wrench(const DeviceProfile& profile, const Wrench& F, Bytes
     const DeviceSample sample = device.read_newest(now += std::chrono::milliseconds(1));
     if (sample.rejected > 0) refuse_place(profile, at);
     if (!sample.homed)
-      encoded.remarks.push_back("the encoders are not homed in --at: the motors get nothing");
+      encoded.remarks.push_back("the encoders in --at are not homed: the motors stay off");
     else if (sample.fault != Fault::none)
       throw std::runtime_error("--at: " + std::string(fault_row(sample.fault).message));
     if (at.empty())
-      encoded.remarks.push_back("at the home position, which the device reports as " +
+      encoded.remarks.push_back("at the home pose, which the device reports as " +
                                 hex_text(home_report(profile)));
   }
   const double authority = profile.watchdog_s > 0.0 ? 1.0 : ProfileDevice::kAuthorityWithoutWatchdog;
   if (authority < 1.0)
-    encoded.remarks.push_back("the device has no watchdog of its own, so it gets a quarter of its limits");
-  remark_cut(encoded.remarks, "the force", F.force_N.norm(), authority * profile.max_force_N, "N");
+    encoded.remarks.push_back("the device has no watchdog, so a quarter of its limits applies");
+  add_limit_remark(encoded.remarks, "the force", F.force_N.norm(), authority * profile.max_force_N, "N");
   if (profile.wrench_report.torque.present)
-    remark_cut(encoded.remarks, "the torque", F.torque_Nm.norm(), authority * profile.max_torque_Nm, "N.m");
+    add_limit_remark(encoded.remarks, "the torque", F.torque_Nm.norm(), authority * profile.max_torque_Nm,
+                     "N.m");
   do device.write(now, F, true);
   while (device.commands_sent() < sequence);
   const DofMask dropped = device.read_newest(now).dropped_dofs;
-  if (dropped != kNoDof) encoded.remarks.push_back("dropped, for there are no motors: " + dof_text(dropped));
+  if (dropped != kNoDof)
+    encoded.remarks.push_back("dropped, because there are no motors: " + dof_text(dropped));
   encoded.bytes.assign(link.written.begin(), link.written.begin() + static_cast<long>(link.written_length));
   return encoded;
 }

@@ -18,14 +18,14 @@ constexpr const char* kHeader =
     "body_fx,body_fy,body_fz,body_tx,body_ty,body_tz,"
     "spatial_fx,spatial_fy,spatial_fz,spatial_tx,spatial_ty,spatial_tz,solve_ns";
 
-const char* generated_mesh_name(ProjectionStatus status) {
+const char* status_name(ProjectionStatus status) {
   switch (status) {
     case ProjectionStatus::free:
       return "free";
     case ProjectionStatus::converged:
       return "converged";
     case ProjectionStatus::budget_spent:
-      return "budget_spent";
+      return "iteration_limit";
     case ProjectionStatus::infeasible:
       break;
   }
@@ -42,7 +42,7 @@ std::vector<SolvedPose> solve(const Scene& scene, const std::vector<Pose>& X_WM,
   PenetrationDepth::Options options = settings.depth;
   if (settings.proxy) options.clearance_m = Proxy::kClearance_m;
   PenetrationDepth depth(scene, options);
-  std::optional<Pose> X_last;  // of the proxy
+  std::optional<Pose> X_last;  // previous pose of the proxy
   WrenchGains gains;
   gains.stiffness = WrenchGains::scalar(settings.k_P);
   WrenchLaw law(gains_for(settings.depth.method, gains));
@@ -82,8 +82,7 @@ void write_csv(std::ostream& out, const std::vector<SolvedPose>& rows, bool prox
         << q.z() << q.w();
     row << Vector3d(r.penetration.eps.head<3>()) << Vector3d(r.penetration.eps.tail<3>());
     row << r.F_T.force_N << r.F_T.torque_Nm << r.F_S.force_N << r.F_S.torque_Nm << r.solve_ns;
-    if (proxy)
-      row << generated_mesh_name(r.penetration.projection.status) << r.penetration.projection.iterations;
+    if (proxy) row << status_name(r.penetration.projection.status) << r.penetration.projection.iterations;
   }
 }
 

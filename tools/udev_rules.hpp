@@ -8,17 +8,18 @@
 
 namespace wrenchd {
 
-/// The udev rules that let the service use the devices of these profiles, as the text of a rules file:
+/// Returns the udev rules that let the service use the devices of these profiles, as the text of a rules
+/// file:
 ///
-///   - the node that a profile's transport needs belongs to the group "wrenchd", and to nobody else. hidraw
-///   and
-///     usbfs know no exclusive use: whoever else may open a node may push the hand past all limits. What
-///     drives nothing keeps the people that other rules let in;
-///   - a device does not fall asleep between two reports;
-///   - no pointer moves with it, where its usage page would have the kernel make an input device of it;
-///   - plugging it in starts the service, unless its profile is for those only who name it.
+///   - The node that the profile's transport uses belongs to the group "wrenchd" exclusively, because hidraw
+///     and usbfs have no exclusive access: any program that opens the node could apply force beyond all
+///     limits. Rules of other packages continue to apply to devices without motors.
+///   - The device is not suspended between two reports.
+///   - The device moves no pointer, even if its usage page makes the kernel create an input device.
+///   - Connecting the device starts the service, unless its profile requires explicit selection.
 ///
-/// One block for each id, sorted. The first lines name the version they were made by.
+/// The rules have one block per id, sorted. The first lines name the version that created them. Not RT-safe:
+/// allocates.
 std::string udev_rules(std::span<const DeviceProfile> profiles);
 
 }  // namespace wrenchd

@@ -19,8 +19,7 @@ ConvexBody convex_hull(std::span<const Vector3d> points_T_m) {
   SurfaceMesh hull;
   CGAL::convex_hull_3(points.begin(), points.end(), hull);
 
-  // CGAL's order of vertices follows addresses in memory; ours is that of their coordinates, so that the same
-  // mesh is the same body in every run.
+  // CGAL orders vertices by memory addresses. Sorting by coordinates makes the body equal in every run.
   using Vertex = SurfaceMesh::Vertex_index;
   std::vector<Vertex> ordered(hull.vertices_begin(), hull.vertices_end());
   std::sort(ordered.begin(), ordered.end(),
@@ -43,7 +42,7 @@ ConvexBody convex_hull(std::span<const Vector3d> points_T_m) {
   return body;
 }
 
-/// Tetrahedra from the first vertex to each triangle.
+/// Sums the tetrahedra from the first vertex to each triangle.
 double volume(const ConvexBody& body) {
   double sixfold = 0.0;
   const Vector3d& o = body.vertices_T_m.front();

@@ -7,11 +7,11 @@
 
 namespace wrenchd {
 
-/// Convex hull of points in T, with each vertex's neighbours in order, and its faces. The points must span a
-/// volume. Not RT safe.
+/// Returns the convex hull of points in T with the ordered neighbours of each vertex and its faces.
+/// Precondition: the points span a volume. Not RT-safe: allocates, may take seconds.
 ConvexBody convex_hull(std::span<const Vector3d> points_T_m);
 
-/// Volume of a convex body [the unit of its vertices, cubed].
+/// Returns the volume of a convex body [cube of the vertices' unit]. RT-safe.
 double volume(const ConvexBody& body);
 
 }  // namespace wrenchd

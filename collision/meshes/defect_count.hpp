@@ -9,25 +9,25 @@
 
 namespace wrenchd {
 
-/// "(1, 2, 3)", as messages name a place.
+/// Formats a point for messages: "(1, 2, 3)". Not RT-safe: allocates.
 std::string format_point(const Vector3d& p);
 
-/// " (12 in all)"; nothing for one.
+/// Returns " (12 in all)", or nothing if count is at most 1. Not RT-safe: allocates.
 std::string total_suffix(std::size_t count);
 
-/// First place and number of one kind of defect.
+/// Counts the defects of one kind and describes the first one. Not RT-safe: allocates.
 class DefectCount {
  public:
-  /// sentence: makes the text, which only the first of a million needs.
+  /// Counts a defect. sentence(): makes its description; called for the first defect only.
   template <class Sentence>
   void add(const Sentence& sentence) {
     if (count_++ == 0) first_ = sentence();
   }
-  /// Adds "FIRST (N in all); CURE".
+  /// Appends "FIRST (N in all); REMEDY" if there was a defect.
   void report(std::vector<std::string>& defects, const std::string& cure) const {
     if (count_ > 0) defects.push_back(first_ + total_suffix(count_) + "; " + cure);
   }
-  /// Adds "BEFORE N AFTER, the first FIRST". One: the word for what is counted, which takes an s for more.
+  /// Appends "BEFORE N NOUN(s) AFTER, first FIRST" if there was a defect.
   void report(std::vector<std::string>& changes, const std::string& before, const std::string& one,
               const std::string& after) const;
 

@@ -7,7 +7,7 @@
 
 namespace wrenchd {
 
-// Put down vertex by vertex first: what is left to sort is short.
+// Buckets by vertex first, so that each sort is short.
 std::vector<HalfEdge> half_edges_of(const PolygonSoup& soup) {
   const auto each = [&](const auto& use) {
     for (std::size_t f = 0; f < soup.faces.size(); ++f) {
@@ -19,18 +19,19 @@ std::vector<HalfEdge> half_edges_of(const PolygonSoup& soup) {
     }
   };
   std::vector<std::size_t> begin(soup.vertices.size() + 1, 0);
-  each([&](const HalfEdge& side) { ++begin[side.edge.first + 1]; });
+  each([&](const HalfEdge& half_edge) { ++begin[half_edge.edge.first + 1]; });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<HalfEdge> sides(begin.back());
+  std::vector<HalfEdge> half_edges(begin.back());
   std::vector<std::size_t> at(begin.begin(), begin.end() - 1);
-  each([&](const HalfEdge& side) { sides[at[side.edge.first]++] = side; });
+  each([&](const HalfEdge& half_edge) { half_edges[at[half_edge.edge.first]++] = half_edge; });
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
-    std::sort(
-        sides.begin() + static_cast<std::ptrdiff_t>(begin[v]),
-        sides.begin() + static_cast<std::ptrdiff_t>(begin[v + 1]), [](const HalfEdge& a, const HalfEdge& b) {
-          return std::tuple(a.edge.second, a.face, a.forward) < std::tuple(b.edge.second, b.face, b.forward);
-        });
-  return sides;
+    std::sort(half_edges.begin() + static_cast<std::ptrdiff_t>(begin[v]),
+              half_edges.begin() + static_cast<std::ptrdiff_t>(begin[v + 1]),
+              [](const HalfEdge& a, const HalfEdge& b) {
+                return std::tuple(a.edge.second, a.face, a.forward) <
+                       std::tuple(b.edge.second, b.face, b.forward);
+              });
+  return half_edges;
 }
 
 }  // namespace wrenchd

@@ -11,23 +11,23 @@
 
 namespace wrenchd {
 
-/// A side of a face, as the face runs along it.
+/// A half-edge of a face: one side of the face with its direction.
 struct HalfEdge {
-  std::pair<std::size_t, std::size_t> edge;  ///< its vertices, the smaller first
+  std::pair<std::size_t, std::size_t> edge;  ///< its vertices, the smaller number first
   std::size_t face;
-  bool forward;  ///< from the smaller vertex to the larger
+  bool forward;  ///< true if the face traverses it from the smaller to the larger number
 };
 
-/// The sides of all faces, those of one edge next to each other, in the order of the faces. Edges come in the
-/// order of their vertices. Every index must be in range.
+/// Returns the half-edges of all faces, sorted by edge (first vertex, second vertex) and then by face.
+/// Precondition: all indices are in range. Not RT-safe: allocates.
 std::vector<HalfEdge> half_edges_of(const PolygonSoup& soup);
 
-/// Calls look(sides) with the sides of each edge.
-template <class Look>
-void for_each_edge(std::span<const HalfEdge> sides, const Look& look) {
-  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
-    while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
-    look(sides.subspan(i, end - i));
+/// Calls use(span of half-edges) for each edge.
+template <class Use>
+void for_each_edge(std::span<const HalfEdge> half_edges, const Use& use) {
+  for (std::size_t i = 0, end = 0; i < half_edges.size(); i = end) {
+    while (end < half_edges.size() && half_edges[end].edge == half_edges[i].edge) ++end;
+    use(half_edges.subspan(i, end - i));
   }
 }
 

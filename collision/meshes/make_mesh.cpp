@@ -15,13 +15,13 @@
 namespace wrenchd {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kFullTurn_rad = 2.0 * std::numbers::pi;
 
-std::uint32_t at_least(double wanted, std::uint32_t least) {
-  return std::max(least, static_cast<std::uint32_t>(std::lround(wanted)));
+std::uint32_t at_least(double request, std::uint32_t least) {
+  return std::max(least, static_cast<std::uint32_t>(std::lround(request)));
 }
 
-/// Gives equal points one number.
+/// Assigns one index to equal points.
 class Welder {
  public:
   explicit Welder(TriangleMesh& mesh, double grain) : mesh_(mesh), grain_(grain) {}
@@ -41,7 +41,7 @@ class Welder {
   std::map<std::array<long long, 3>, std::uint32_t> numbers_;
 };
 
-/// The unit sphere: an icosahedron whose 20 faces are cut into f^2 triangles each.
+/// Returns the unit sphere: an icosahedron whose 20 faces are divided into f^2 triangles each.
 TriangleMesh geodesic(std::uint32_t f) {
   const double g = std::numbers::phi;
   const std::array<Vector3d, 12> corners = {{{-1, g, 0},
@@ -79,23 +79,25 @@ TriangleMesh geodesic(std::uint32_t f) {
   return mesh;
 }
 
-/// A sphere with smooth bumps all over it: sums of sines with seeded directions and phases.
-TriangleMesh bumpy(const GeneratedMesh& wanted, double radius_m, double height) {
+/// Returns a sphere with smooth bumps: sums of sines with seeded directions and phases.
+TriangleMesh bumpy(const GeneratedMesh& request, double radius_m, double height) {
   struct Wave {
     Vector3d k;
     double amplitude, phase;
   };
-  std::mt19937 generator(wanted.seed);
-  // The standard's distributions differ between libraries, its generators do not.
+  std::mt19937 generator(request.seed);
+  // The distributions of the standard library differ between implementations, its generators do not.
   const auto uniform = [&] { return (static_cast<double>(generator()) + 0.5) / 4294967296.0; };
-  const auto normal = [&] { return std::sqrt(-2.0 * std::log(uniform())) * std::cos(kTurn * uniform()); };
+  const auto normal = [&] {
+    return std::sqrt(-2.0 * std::log(uniform())) * std::cos(kFullTurn_rad * uniform());
+  };
   std::vector<Wave> waves;
   for (int i = 0; i < 24; ++i) {
     const double x = normal(), y = normal(), z = normal();
     waves.push_back(
-        {(3.0 + i) * Vector3d(x, y, z).normalized(), height / (1.0 + 0.25 * i), kTurn * uniform()});
+        {(3.0 + i) * Vector3d(x, y, z).normalized(), height / (1.0 + 0.25 * i), kFullTurn_rad * uniform()});
   }
-  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(wanted.triangles) / 20.0), 1));
+  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(request.triangles) / 20.0), 1));
   for (Vector3d& p : mesh.vertices_m) {
     double scale = 1.0;
     for (const auto& [k, amplitude, phase] : waves) scale += amplitude * std::sin(k.dot(p) + phase);
@@ -104,10 +106,10 @@ TriangleMesh bumpy(const GeneratedMesh& wanted, double radius_m, double height) 
   return mesh;
 }
 
-/// A box cut into nearly square cells of two triangles each.
-TriangleMesh box(const GeneratedMesh& wanted, const Vector3d& size_m) {
+/// Returns a box whose sides are divided into nearly square cells of two triangles each.
+TriangleMesh box(const GeneratedMesh& request, const Vector3d& size_m) {
   const double area = 2.0 * (size_m.x() * size_m.y() + size_m.y() * size_m.z() + size_m.z() * size_m.x());
-  const double cell_m = std::sqrt(2.0 * area / static_cast<double>(wanted.triangles));
+  const double cell_m = std::sqrt(2.0 * area / static_cast<double>(request.triangles));
   std::array<std::uint32_t, 3> cells{};
   for (int d = 0; d < 3; ++d) cells[static_cast<std::size_t>(d)] = at_least(size_m[d] / cell_m, 1);
   TriangleMesh mesh;
@@ -134,14 +136,14 @@ TriangleMesh box(const GeneratedMesh& wanted, const Vector3d& size_m) {
   return mesh;
 }
 
-/// A closed line around the z axis, at one height.
+/// A closed curve around the z axis at one height.
 struct Ring {
   double z_m;
   std::function<double(double angle)> radius_m;
 };
 
-/// What lies between rings: those outside, from low to high, and those of its bore, if it has one. Two rings
-/// may have the same height where their radii differ everywhere.
+/// Returns the solid between rings: the outer rings from low to high, and the rings of the bore, if any. Two
+/// rings may have the same height if their radii differ everywhere.
 TriangleMesh lathe(const std::vector<double>& angles, const std::vector<Ring>& outside,
                    const std::vector<Ring>& bore) {
   TriangleMesh mesh;
@@ -187,19 +189,19 @@ TriangleMesh lathe(const std::vector<double>& angles, const std::vector<Ring>& o
 
 std::vector<double> even_angles(std::uint32_t around) {
   std::vector<double> angles;
-  for (std::uint32_t i = 0; i < around; ++i) angles.push_back(kTurn * i / around);
+  for (std::uint32_t i = 0; i < around; ++i) angles.push_back(kFullTurn_rad * i / around);
   return angles;
 }
 
-/// Rings along z, closed by the two ends: what is turned, or has a constant profile.
-struct Turned {
+/// A body of revolution or of constant profile along z, closed at both ends.
+struct Revolved {
   double length_m;
   std::function<double(double angle, double z_m)> radius_m;
-  std::function<double(double angle, double z_m)> bore_m;  ///< none: solid
+  std::function<double(double angle, double z_m)> bore_m;  ///< empty: no bore
   std::uint32_t around, along;
 };
 
-TriangleMesh turned(const Turned& body) {
+TriangleMesh revolve(const Revolved& body) {
   const auto rings = [&](const auto& radius_m) {
     std::vector<Ring> out;
     for (std::uint32_t k = 0; radius_m && k <= body.along; ++k) {
@@ -211,33 +213,34 @@ TriangleMesh turned(const Turned& body) {
   return lathe(even_angles(body.around), rings(body.radius_m), rings(body.bore_m));
 }
 
-/// Cells around and along so that they are about square, and their triangles as many as wanted.
-Turned cut(const GeneratedMesh& wanted, double length_m, double radius_m, int sheets) {
-  const double cells = static_cast<double>(wanted.triangles) / (2.0 * sheets);
-  const double around = std::sqrt(cells * kTurn * radius_m / length_m);
+/// Chooses the cell counts around and along the axis so that the cells are nearly square and the triangle
+/// count is as requested.
+Revolved cell_grid(const GeneratedMesh& request, double length_m, double radius_m, int sheets) {
+  const double cells = static_cast<double>(request.triangles) / (2.0 * sheets);
+  const double around = std::sqrt(cells * kFullTurn_rad * radius_m / length_m);
   return {length_m, {}, {}, at_least(around, 8), at_least(cells / around, 1)};
 }
 
-TriangleMesh peg(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.060, 0.0098, 1);
+TriangleMesh peg(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.060, 0.0098, 1);
   body.radius_m = [](double angle, double z) {
     return 0.0098 + 0.00002 * std::sin(5.0 * angle) * std::sin(25.0 * z / 0.060);
   };
-  return turned(body);
+  return revolve(body);
 }
 
-TriangleMesh hole(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.080, 0.0130, 2);
+TriangleMesh hole(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.080, 0.0130, 2);
   body.radius_m = [](double, double) { return 0.020; };
   body.bore_m = [](double angle, double z) {
     return 0.0100 + 0.00002 * std::sin(5.0 * angle) * std::sin(25.0 * z / 0.080);
   };
-  return turned(body);
+  return revolve(body);
 }
 
-/// 0 to 1 to 0 over one period.
-double triangle_wave(double turns) {
-  const double x = turns - std::floor(turns);
+/// A triangle wave of period 1: 0 to 1 to 0.
+double triangle_wave(double phase) {
+  const double x = phase - std::floor(phase);
   return x < 0.5 ? 2.0 * x : 2.0 - 2.0 * x;
 }
 
@@ -245,60 +248,60 @@ constexpr double kPitch_m = 0.0015;
 constexpr double kThread_m = 0.0008;
 
 double thread(double angle, double z) {
-  return kThread_m * triangle_wave(z / kPitch_m - angle / kTurn);
+  return kThread_m * triangle_wave(z / kPitch_m - angle / kFullTurn_rad);
 }
 
-TriangleMesh bolt(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.030, 0.005, 1);
+TriangleMesh bolt(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.030, 0.005, 1);
   body.radius_m = [](double angle, double z) { return 0.0041 + thread(angle, z); };
-  return turned(body);
+  return revolve(body);
 }
 
-TriangleMesh nut(const GeneratedMesh& wanted) {
-  Turned body = cut(wanted, 0.008, 0.0067, 2);
-  body.around = (body.around + 5) / 6 * 6;  // six corners
+TriangleMesh nut(const GeneratedMesh& request) {
+  Revolved body = cell_grid(request, 0.008, 0.0067, 2);
+  body.around = (body.around + 5) / 6 * 6;  // a multiple of six corners
   body.radius_m = [](double angle, double) {
-    const double sixth = kTurn / 6.0;
+    const double sixth = kFullTurn_rad / 6.0;
     const double off = angle - sixth * std::floor(angle / sixth) - 0.5 * sixth;
     return 0.0085 / std::cos(off);
   };
   body.bore_m = [](double angle, double z) { return 0.0042 + thread(angle, z); };
-  return turned(body);
+  return revolve(body);
 }
 
-TriangleMesh gear(const GeneratedMesh& wanted) {
+TriangleMesh gear(const GeneratedMesh& request) {
   constexpr double kTeeth = 20.0;
-  Turned body = cut(wanted, 0.010, 0.021, 2);
+  Revolved body = cell_grid(request, 0.010, 0.021, 2);
   body.radius_m = [](double angle, double) {
-    return 0.019 + 0.004 * std::clamp(2.4 * triangle_wave(kTeeth * angle / kTurn) - 0.7, 0.0, 1.0);
+    return 0.019 + 0.004 * std::clamp(2.4 * triangle_wave(kTeeth * angle / kFullTurn_rad) - 0.7, 0.0, 1.0);
   };
   body.bore_m = [](double, double) { return 0.006; };
-  return turned(body);
+  return revolve(body);
 }
 
-/// A circle at one height.
+/// Returns a circle at one height.
 Ring circle(double z_m, double radius_m) {
   return {z_m, [radius_m](double) { return radius_m; }};
 }
 
-/// So many around that rings like these come to about the triangles wanted.
-std::uint32_t around_for(const GeneratedMesh& wanted, std::size_t rings) {
-  return at_least(static_cast<double>(wanted.triangles) / (2.0 * static_cast<double>(rings)), 8);
+/// Returns the number of vertices per ring that yields about the requested number of triangles.
+std::uint32_t around_for(const GeneratedMesh& request, std::size_t rings) {
+  return at_least(static_cast<double>(request.triangles) / (2.0 * static_cast<double>(rings)), 8);
 }
 
-TriangleMesh dowel(const GeneratedMesh& wanted) {
+TriangleMesh dowel(const GeneratedMesh& request) {
   const std::vector<Ring> rings = {circle(-0.030, 0.0079), circle(-0.028, 0.0099), circle(0.028, 0.0099),
                                    circle(0.030, 0.0079)};
-  return lathe(even_angles(around_for(wanted, rings.size())), rings, {});
+  return lathe(even_angles(around_for(request, rings.size())), rings, {});
 }
 
-TriangleMesh socket(const GeneratedMesh& wanted) {
+TriangleMesh socket(const GeneratedMesh& request) {
   const std::vector<Ring> outside = {circle(-0.025, 0.020), circle(0.025, 0.020)};
   const std::vector<Ring> bore = {circle(-0.025, 0.010), circle(0.022, 0.010), circle(0.025, 0.013)};
-  return lathe(even_angles(around_for(wanted, outside.size() + bore.size())), outside, bore);
+  return lathe(even_angles(around_for(request, outside.size() + bore.size())), outside, bore);
 }
 
-/// A circle with a slot on the side of +x, or a shaft with a bit there: how far it reaches in a direction.
+/// The outline of a keyhole (a circle with a slot towards +x) or of a key's bit, as radius over angle.
 struct Keyhole {
   double radius_m, half_width_m, reach_m;
 
@@ -307,19 +310,19 @@ struct Keyhole {
     if (c <= 0.0 || s * radius_m >= half_width_m) return radius_m;
     return s * reach_m <= half_width_m * c ? reach_m / c : half_width_m / s;
   }
-  /// Where it has corners.
+  /// Returns the angles of its corners [rad].
   std::array<double, 2> corners() const {
     return {std::atan2(half_width_m, reach_m), std::asin(half_width_m / radius_m)};
   }
 };
 
-/// Evenly, and at the corners.
+/// Returns evenly spaced angles and the angles of the corners.
 std::vector<double> angles_of(const Keyhole& shape, std::uint32_t around) {
-  constexpr double kNear = 1e-3;  // [rad] no slivers
+  constexpr double kNear = 1e-3;  // minimum distance of angles [rad]; avoids thin triangles
   std::vector<double> angles;
   for (const double corner : shape.corners()) {
     angles.push_back(corner);
-    angles.push_back(kTurn - corner);
+    angles.push_back(kFullTurn_rad - corner);
   }
   for (const double angle : even_angles(around))
     if (std::none_of(angles.begin(), angles.begin() + 4,
@@ -329,8 +332,9 @@ std::vector<double> angles_of(const Keyhole& shape, std::uint32_t around) {
   return angles;
 }
 
-/// Shaft, bit near its lower end, and a flat bow to hold it by. Its middle is that of the shaft's length.
-TriangleMesh key(const GeneratedMesh& wanted) {
+/// Returns a key: a shaft with a bit near its lower end and a flat bow. The origin is the middle of the
+/// shaft.
+TriangleMesh key(const GeneratedMesh& request) {
   const Keyhole bit = {0.0030, 0.0012, 0.0080};
   const auto bow = [](double angle) {
     return 1.0 / std::hypot(std::cos(angle) / 0.010, std::sin(angle) / 0.0025);
@@ -338,43 +342,43 @@ TriangleMesh key(const GeneratedMesh& wanted) {
   const std::vector<Ring> rings = {circle(-0.025, 0.0022), circle(-0.024, 0.0030), circle(-0.0235, 0.0030),
                                    {-0.0230, bit},         {-0.0150, bit},         circle(-0.0145, 0.0030),
                                    circle(0.010, 0.0030),  {0.014, bow},           {0.025, bow}};
-  return lathe(angles_of(bit, around_for(wanted, rings.size())), rings, {});
+  return lathe(angles_of(bit, around_for(request, rings.size())), rings, {});
 }
 
-/// A round plate with a keyhole, z from 0 to 6 mm, above a chamber that is open below.
-TriangleMesh lock(const GeneratedMesh& wanted) {
+/// Returns a lock: a round plate with a keyhole, z from 0 to 6 mm, above a chamber that is open below.
+TriangleMesh lock(const GeneratedMesh& request) {
   const Keyhole hole = {0.0033, 0.0015, 0.0084}, mouth = {0.0043, 0.0025, 0.0094};
   const std::vector<Ring> outside = {circle(-0.012, 0.020), circle(0.006, 0.020)};
   const std::vector<Ring> bore = {
       circle(-0.012, 0.0100), circle(0.0, 0.0100), {0.0, hole}, {0.005, hole}, {0.006, mouth}};
-  return lathe(angles_of(hole, around_for(wanted, outside.size() + bore.size())), outside, bore);
+  return lathe(angles_of(hole, around_for(request, outside.size() + bore.size())), outside, bore);
 }
 
-/// A thread whose lines of vertices follow it, so that few triangles make a sharp one: line j goes around as
-/// a helix and meets line j + kLines where it comes round.
+/// A thread whose vertex lines follow the helix, so that few triangles form a sharp thread. Line j runs
+/// around as a helix and joins line j + kLines after one turn.
 ///
 ///   z(j, angle) = z_j + pitch angle / 2 pi
 class Thread {
  public:
   static constexpr double kPitch_m = 0.003;
   static constexpr double kRoot_m = 0.0040, kCrest_m = 0.0050;
-  static constexpr std::uint32_t kLines = 4;  ///< a turn: root, root, crest, crest
+  static constexpr std::uint32_t kLines = 4;  ///< lines per turn: root, root, crest, crest
 
-  /// turns: even, so that all threads stand alike about their middles. wider_m: than the screw's. In its
-  /// first and last turn it is cut off, to the radius of this line.
+  /// turns: an even number, so that all threads have the same phase about their middles. wider_m: radius in
+  /// excess of the screw's [m]. The first and the last turn are cut off at the radius of line cut_off_to.
   Thread(std::uint32_t turns, std::uint32_t around, double wider_m, std::uint32_t cut_off_to)
       : turns_(turns), around_(around), wider_m_(wider_m), cut_off_to_(cut_off_to) {}
 
-  /// From low to high, with a ring of so many vertices below and one above that close its ends. The skin
-  /// looks outwards, or, of a nut, inwards.
+  /// Adds the thread between two rings that close its ends. inwards: the faces point to the axis, as those of
+  /// a nut.
   void add_to(TriangleMesh& mesh, bool inwards, const std::vector<std::uint32_t>& below,
               const std::vector<std::uint32_t>& above) const {
     const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
-    const std::uint32_t last = (turns_ - 1) * kLines;  // of the lines that come round
+    const std::uint32_t last = (turns_ - 1) * kLines;  // number of lines that complete a turn
     for (std::uint32_t j = 0; j <= last; ++j)
       for (std::uint32_t i = 0; i < around_; ++i) mesh.vertices_m.push_back(point(i, j));
     for (std::uint32_t j = last + 1; j <= last + kLines; ++j) mesh.vertices_m.push_back(point(0, j));
-    // Past its last column a line goes on as the one a turn above.
+    // After its last column a line continues as the line one turn above.
     const auto at = [&](std::uint32_t i, std::uint32_t j) {
       if (i == around_) i = 0, j += kLines;
       return j <= last ? first + j * around_ + i : first + (last + 1) * around_ + (j - last - 1);
@@ -388,7 +392,7 @@ class Thread {
         add(at(i, j), at(i + 1, j), at(i + 1, j + 1));
         add(at(i, j), at(i + 1, j + 1), at(i, j + 1));
       }
-    // The ends: a ramp of one turn each, and the step where it begins.
+    // Each end has a ramp of one turn and the step at its start.
     for (std::uint32_t i = 0; i < around_; ++i) {
       const std::uint32_t next = (i + 1) % around_;
       add(below[i], below[next], at(i + 1, 0));
@@ -404,10 +408,10 @@ class Thread {
 
  private:
   Vector3d point(std::uint32_t i, std::uint32_t j) const {
-    constexpr std::array<double, kLines> kHeight = {0.0, 0.2, 0.5, 0.7};  // in pitches
-    const double turn = static_cast<double>(i) / around_, angle = kTurn * turn;
-    const std::uint32_t below = j / kLines;  // turns
-    const double z = kPitch_m * (below + kHeight[j % kLines] + turn - 0.5 * turns_);
+    constexpr std::array<double, kLines> kHeight = {0.0, 0.2, 0.5, 0.7};  // in units of the pitch
+    const double revolution = static_cast<double>(i) / around_, angle = kFullTurn_rad * revolution;
+    const std::uint32_t below = j / kLines;  // number of turns below
+    const double z = kPitch_m * (below + kHeight[j % kLines] + revolution - 0.5 * turns_);
     const std::uint32_t line = j <= kLines || j >= (turns_ - 1) * kLines ? cut_off_to_ : j % kLines;
     const double r = wider_m_ + (line < kLines / 2 ? kRoot_m : kCrest_m);
     return {r * std::cos(angle), r * std::sin(angle), z};
@@ -418,7 +422,8 @@ class Thread {
   std::uint32_t cut_off_to_;
 };
 
-/// Rings of an outside as lathe() makes them, without its ends. Returns their vertices, from low to high.
+/// Adds rings and the faces between them, as lathe() does, without the ends. Returns the vertices of each
+/// ring, from low to high.
 std::vector<std::vector<std::uint32_t>> add_rings(TriangleMesh& mesh, const std::vector<double>& angles,
                                                   const std::vector<Ring>& rings) {
   std::vector<std::vector<std::uint32_t>> all;
@@ -439,7 +444,7 @@ std::vector<std::vector<std::uint32_t>> add_rings(TriangleMesh& mesh, const std:
   return all;
 }
 
-/// Closes a ring by a point on the axis.
+/// Closes a ring with a point on the axis.
 void add_tip(TriangleMesh& mesh, const std::vector<std::uint32_t>& ring, double z_m, bool above) {
   const auto tip = static_cast<std::uint32_t>(mesh.vertices_m.size());
   mesh.vertices_m.emplace_back(0, 0, z_m);
@@ -449,20 +454,21 @@ void add_tip(TriangleMesh& mesh, const std::vector<std::uint32_t>& ring, double 
   }
 }
 
-/// How far a hexagon of that half width reaches.
+/// Returns the radius of a hexagon at an angle. half_width_m: radius of its inscribed circle [m].
 double hexagon(double angle, double half_width_m) {
-  const double sixth = kTurn / 6.0;
+  const double sixth = kFullTurn_rad / 6.0;
   return half_width_m / std::cos(angle - sixth * std::floor(angle / sixth) - 0.5 * sixth);
 }
 
-/// Vertices around a thread so that all of it comes to about the triangles wanted; six corners.
-std::uint32_t around_thread(const GeneratedMesh& wanted, double lines) {
-  return (at_least(static_cast<double>(wanted.triangles) / (2.0 * lines), 12) + 5) / 6 * 6;
+/// Returns the number of vertices around a thread that yields about the requested number of triangles, a
+/// multiple of six.
+std::uint32_t around_thread(const GeneratedMesh& request, double lines) {
+  return (at_least(static_cast<double>(request.triangles) / (2.0 * lines), 12) + 5) / 6 * 6;
 }
 
-TriangleMesh screw(const GeneratedMesh& wanted) {
+TriangleMesh screw(const GeneratedMesh& request) {
   constexpr std::uint32_t kTurns = 10;
-  const std::uint32_t around = around_thread(wanted, Thread::kLines * kTurns + 5);
+  const std::uint32_t around = around_thread(request, Thread::kLines * kTurns + 5);
   const std::vector<double> angles = even_angles(around);
   const auto head = [](double angle) { return hexagon(angle, 0.0080); };
   const double end_m = 0.5 * kTurns * Thread::kPitch_m;
@@ -476,10 +482,10 @@ TriangleMesh screw(const GeneratedMesh& wanted) {
   return mesh;
 }
 
-TriangleMesh screw_nut(const GeneratedMesh& wanted) {
+TriangleMesh screw_nut(const GeneratedMesh& request) {
   constexpr std::uint32_t kTurns = 4;
   constexpr double kWider_m = 0.0001;
-  const std::uint32_t around = around_thread(wanted, Thread::kLines * kTurns + 5);
+  const std::uint32_t around = around_thread(request, Thread::kLines * kTurns + 5);
   const std::vector<double> angles = even_angles(around);
   const auto side = [](double angle) { return hexagon(angle, 0.0085); };
   const double end_m = 0.5 * kTurns * Thread::kPitch_m + 0.001;
@@ -490,11 +496,11 @@ TriangleMesh screw_nut(const GeneratedMesh& wanted) {
   return mesh;
 }
 
-/// An ellipsoid that has the origin inside, so that every ray from there leaves it once.
+/// An ellipsoid that contains the origin, so that every ray from the origin leaves it once.
 struct Ellipsoid {
   Vector3d centre_m;
-  Vector3d along;              ///< unit: the direction of its first axis
-  double half_m, across_m[2];  ///< semi-axes; the first of those across lies level
+  Vector3d along;              ///< unit vector of its first axis
+  double half_m, across_m[2];  ///< semi-axes; across_m[0] is horizontal
 
   double reach_m(const Vector3d& u) const {
     const Vector3d side = Vector3d::UnitZ().cross(along).norm() > 1e-3
@@ -510,14 +516,15 @@ struct Ellipsoid {
   }
 };
 
-/// A limb: from the origin in a direction, to its tip.
+/// Returns an ellipsoid from the origin to a tip in a direction.
 Ellipsoid limb(const Vector3d& direction, double tip_m, double wide_m, double thick_m) {
   const Vector3d along = direction.normalized();
   const double half_m = 0.545 * tip_m;
   return {(tip_m - half_m) * along, along, half_m, {wide_m, thick_m}};
 }
 
-/// How far the hare reaches in a direction from a point in its neck: the largest of its parts, rounded off.
+/// Returns the distance of the hare's surface from the origin, in its neck, in a direction: a smooth maximum
+/// over its parts.
 double hare_reach_m(const Vector3d& u) {
   static const std::array<Ellipsoid, 9> parts = {{
       {{-0.012, 0, -0.022}, Vector3d::UnitX(), 0.034, {0.026, 0.030}},  // body
@@ -536,11 +543,11 @@ double hare_reach_m(const Vector3d& u) {
   return 0.05 * std::pow(sum, 1.0 / kRound);
 }
 
-/// Every ray from the origin meets its skin once, so that it cannot cut through itself. Directions are first
-/// drawn to where the edges are long, on the flanks of the ears, as by springs along them.
-TriangleMesh hare(const GeneratedMesh& wanted) {
+/// Every ray from the origin crosses the surface once, so the surface cannot intersect itself. Before, the
+/// directions are moved towards long edges, on the flanks of the ears, as if springs acted along the edges.
+TriangleMesh hare(const GeneratedMesh& request) {
   constexpr int kRounds = 60;
-  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(wanted.triangles) / 20.0), 1));
+  TriangleMesh mesh = geodesic(at_least(std::sqrt(static_cast<double>(request.triangles) / 20.0), 1));
   std::vector<Vector3d>& directions = mesh.vertices_m;
   const std::size_t count = directions.size();
   std::vector<Vector3d> points(count), pulled(count);
@@ -556,7 +563,7 @@ TriangleMesh hare(const GeneratedMesh& wanted) {
     std::fill(pulled.begin(), pulled.end(), Vector3d::Zero());
     for (const auto& t : mesh.triangles)
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t i = t[k], j = t[(k + 1) % 3];  // each edge once from either side
+        const std::uint32_t i = t[k], j = t[(k + 1) % 3];  // every edge occurs once from each side
         pulled[i] += (points[i] - points[j]).norm() * directions[j];
       }
     for (Vector3d& p : pulled) p.normalize();
@@ -609,10 +616,10 @@ const std::vector<Maker>& makers() {
 
 }  // namespace
 
-TriangleMesh make_mesh(const GeneratedMesh& wanted) {
+TriangleMesh make_mesh(const GeneratedMesh& request) {
   for (const Maker& maker : makers())
-    if (maker.kind == wanted.kind) return maker.make(wanted);
-  throw std::invalid_argument("no mesh of kind '" + wanted.kind + "' can be made");
+    if (maker.kind == request.kind) return maker.make(request);
+  throw std::invalid_argument("no mesh of kind '" + request.kind + "' can be made");
 }
 
 void write_off(std::ostream& out, const TriangleMesh& mesh) {

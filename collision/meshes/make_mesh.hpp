@@ -8,12 +8,13 @@
 
 namespace wrenchd {
 
-/// A closed, outward-oriented solid in metres, its middle at the origin where nothing else is said. The same
-/// arguments make the same mesh, but for how the machine's library rounds sines. Throws std::invalid_argument
-/// where the kind is not known. Not RT safe.
-TriangleMesh make_mesh(const GeneratedMesh& wanted);
+/// Generates a closed, outward-oriented solid in metres with its centre at the origin unless its kind states
+/// otherwise. Equal arguments yield equal meshes, except for the rounding of the machine's sine function.
+/// Throws std::invalid_argument if the kind is unknown. Not RT-safe: allocates, may take seconds.
+TriangleMesh make_mesh(const GeneratedMesh& request);
 
-/// As an OFF file, numbers in the shortest form that reads back the same.
+/// Writes the mesh as an OFF file. Each number has the shortest text that reads back to the same value. Not
+/// RT-safe: writes to a stream.
 void write_off(std::ostream& out, const TriangleMesh& mesh);
 
 }  // namespace wrenchd

@@ -9,9 +9,9 @@
 
 namespace wrenchd {
 
-/// The surface of a body of any shape, and the tree over its triangles.
+/// The surface of a body of any shape and the BVH over its triangles.
 struct MeshBvh {
-  MeshBvh() = default;  ///< of nothing, to be filled in
+  MeshBvh() = default;  ///< empty; the mesh cache fills it through visit_members()
   explicit MeshBvh(TriangleMesh mesh, MeshSurface::Kind kind = MeshSurface::Kind::solid)
       : surface(std::move(mesh), kind), bvh(surface) {}
 

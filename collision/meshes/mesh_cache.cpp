@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kMagic = "wrenchd mesh cache 1\n";
 constexpr std::string_view kSuffix = ".mesh";
-constexpr std::size_t kHash = 32;  // SHA-256: nobody can make a file that passes for another
-constexpr std::uintmax_t kMostBytes = std::uintmax_t{2} << 30;
+constexpr std::size_t kHash = 32;  // SHA-256; collisions cannot be constructed
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{2} << 30;
 constexpr std::size_t kHeader = kMagic.size() + 3 * kHash;
 
 std::string sha256(const std::vector<std::string_view>& parts) {
@@ -41,7 +41,7 @@ std::string sha256(const std::vector<std::string_view>& parts) {
   return hash;
 }
 
-/// A descriptor that is closed at the end.
+/// A file descriptor that the destructor closes.
 class File {
  public:
   explicit File(int descriptor) : descriptor_(descriptor) {}
@@ -84,7 +84,7 @@ std::string hexadecimal(std::string_view bytes) {
   return text;
 }
 
-/// The header: magic, key, hash of the bytes that follow, and a hash of these three.
+/// Returns the header: magic, key, hash of the payload, and a hash of these three.
 std::string header(const std::string& key, std::string_view bytes) {
   const std::string content = sha256({bytes});
   return std::string(kMagic) + key + content + sha256({kMagic, key, content});
@@ -111,22 +111,22 @@ std::optional<std::string> MeshCache::read(const std::string& key) const {
   const bool ours =
       S_ISREG(status.st_mode) && status.st_uid == ::geteuid() && (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
   if (!ours || status.st_size < static_cast<off_t>(kHeader) ||
-      static_cast<std::uintmax_t>(status.st_size) > kMostBytes)
+      static_cast<std::uintmax_t>(status.st_size) > kMaxBytes)
     return {};
   std::string head(kHeader, '\0');
   if (!file.read(head.data(), head.size())) return {};
   std::string bytes(static_cast<std::size_t>(status.st_size) - kHeader, '\0');
   if (!file.read(bytes.data(), bytes.size()) || head != header(key, bytes)) return {};
-  ::futimens(file.get(), nullptr);  // it was of use: others are older now
+  ::futimens(file.get(), nullptr);  // marks the file as recently used
   return bytes;
 }
 
 bool MeshCache::fail(const std::string& why) {
-  error_ = directory_.string() + ": " + why + "; what is made of large meshes is not kept";
+  error_ = directory_.string() + ": " + why + "; results for large meshes are not cached";
   return false;
 }
 
-// Written beside its place and renamed: whoever reads finds all of it or nothing.
+// Writes a temporary file and renames it, so that readers find a complete file or none.
 bool MeshCache::write(const std::string& key, std::string_view bytes) {
   if (disabled()) return false;
   std::error_code error;
@@ -146,27 +146,27 @@ bool MeshCache::write(const std::string& key, std::string_view bytes) {
 }
 
 void MeshCache::evict_oldest() const {
-  struct Kept {
+  struct Entry {
     fs::file_time_type time;
     std::uintmax_t size;
     fs::path file;
   };
-  std::vector<Kept> all;
+  std::vector<Entry> all;
   std::uintmax_t bytes = 0;
   std::error_code error;
   for (fs::directory_iterator at(directory_, error), end; !error && at != end; at.increment(error)) {
     if (at->path().extension() != kSuffix) continue;
     std::error_code gone;
-    const Kept kept{at->last_write_time(gone), at->file_size(gone), at->path()};
+    const Entry entry{at->last_write_time(gone), at->file_size(gone), at->path()};
     if (gone) continue;
-    bytes += kept.size;
-    all.push_back(kept);
+    bytes += entry.size;
+    all.push_back(entry);
   }
-  std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.time < b.time; });
-  for (const Kept& kept : all) {
-    if (bytes <= kMostBytes) return;
-    bytes -= kept.size;
-    fs::remove(kept.file, error);
+  std::sort(all.begin(), all.end(), [](const Entry& a, const Entry& b) { return a.time < b.time; });
+  for (const Entry& entry : all) {
+    if (bytes <= kMaxBytes) return;
+    bytes -= entry.size;
+    fs::remove(entry.file, error);
   }
 }
 
@@ -174,7 +174,7 @@ fs::path cache_directory() {
   const auto from = [](const char* variable) -> fs::path {
     const char* value = std::getenv(variable);
     const std::string text = value == nullptr ? "" : value;
-    const fs::path path = text.substr(0, text.find(':'));  // systemd gives a list
+    const fs::path path = text.substr(0, text.find(':'));  // systemd sets a list
     return path.is_absolute() ? path : fs::path();
   };
   if (const fs::path given = from("CACHE_DIRECTORY"); !given.empty()) return given;

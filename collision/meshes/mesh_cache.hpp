@@ -9,26 +9,26 @@
 
 namespace wrenchd {
 
-/// Keeps on disk what takes long to make, a file for each content. The key is a hash of all that it was made
-/// from, and of the sources of the code that made it: what is found under a key is what would be made again.
+/// A cache on disk for results that take long to compute. Each content has one file. The key is a hash of the
+/// inputs and of the source files that compute the result. So a cached result equals a fresh one.
 ///
-/// A file that is cut short, changed, of somebody else's or no cache file at all counts as none. A directory
-/// that cannot be written to is no error, only a remark. The oldest files go when all together take more than
-/// 2 GiB. Any number of processes may share a directory. Not RT safe.
+/// A file that is truncated, modified, owned by another user or malformed counts as missing. If the directory
+/// is not writable, write() fails and the caller warns. The cache deletes its oldest files when its total
+/// size exceeds 2 GiB. Any number of processes may share a directory. Not RT-safe: reads and writes files.
 class MeshCache {
  public:
-  /// A directory; it is made when it is first written to. Empty: nothing is kept.
+  /// directory: created by the first write(). Empty: the cache is disabled.
   explicit MeshCache(std::filesystem::path directory) : directory_(std::move(directory)) {}
 
   bool disabled() const noexcept { return directory_.empty(); }
 
-  /// From what something is made, in this order, to its key.
+  /// Returns the key for ordered inputs.
   static std::string key(const std::vector<std::string_view>& made_from);
 
-  /// The bytes kept under a key, if there are any, and good.
+  /// Returns the cached bytes, or nothing if the file is missing or invalid.
   std::optional<std::string> read(const std::string& key) const;
 
-  /// False where it cannot be written; why() says it then.
+  /// Returns false if the bytes cannot be written; error() then states the reason.
   bool write(const std::string& key, std::string_view bytes);
   const std::string& error() const noexcept { return error_; }
 
@@ -41,8 +41,9 @@ class MeshCache {
   std::string error_;
 };
 
-/// Where caches belong: $CACHE_DIRECTORY, which systemd gives a service (/var/cache/wrenchd), else
-/// $XDG_CACHE_HOME/wrenchd, else ~/.cache/wrenchd. Empty where there is none of these.
+/// Returns the cache directory: $CACHE_DIRECTORY (set by systemd for a service, /var/cache/wrenchd),
+/// otherwise $XDG_CACHE_HOME/wrenchd, otherwise ~/.cache/wrenchd. Empty if none of these is set. Not RT-safe:
+/// allocates.
 std::filesystem::path cache_directory();
 
 }  // namespace wrenchd

@@ -37,13 +37,13 @@ std::string edge_place(const PolygonSoup& soup, const Edge& e) {
   return format_point(soup.vertices[e.first]) + " to " + format_point(soup.vertices[e.second]);
 }
 
-/// A negative index of the file has wrapped around; it is told as it was written.
+/// Prints an index. A negative index of the file has wrapped around and is printed as in the file.
 std::string index_text(std::size_t v) {
   return v > std::numeric_limits<std::size_t>::max() / 2 ? "-" + std::to_string(0 - v) : std::to_string(v);
 }
 
-/// Where everything cuts through everything, pairs grow with the square of the faces.
-constexpr std::size_t kMostIntersections = 1000;
+/// In a mesh that intersects itself everywhere the number of pairs grows with the square of the faces.
+constexpr std::size_t kMaxIntersections = 1000;
 
 std::string face_name(const PolygonSoup& soup, std::size_t f) {
   return "face " + std::to_string(soup.face_in_file(f));
@@ -54,7 +54,7 @@ bool uses_a_vertex_twice(const std::vector<std::size_t>& face) {
   return std::set<std::size_t>(face.begin(), face.end()).size() != face.size();
 }
 
-/// Without numbers and indices right, nothing else can be asked.
+/// All later checks need finite coordinates and valid indices.
 void check_numbers(const PolygonSoup& soup, std::vector<std::string>& defects) {
   DefectCount not_finite, out_of_range;
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
@@ -75,7 +75,7 @@ void check_numbers(const PolygonSoup& soup, std::vector<std::string>& defects) {
   out_of_range.report(defects, "vertex numbers start at 0; export the mesh again");
 }
 
-/// Faces that are no polygons.
+/// Checks that every face is a polygon.
 void check_elements(const PolygonSoup& soup, std::vector<std::string>& defects) {
   check_numbers(soup, defects);
   DefectCount too_few, repeated;
@@ -107,60 +107,60 @@ void check_areas(const PolygonSoup& soup, std::vector<std::string>& defects) {
   flat.report(defects, "remove degenerate faces in the modeller");
 }
 
-/// Closed and consistently oriented: every edge runs once in each direction.
+/// Checks that every edge occurs once in each direction: the mesh is closed and consistently oriented.
 void check_edges(const PolygonSoup& soup, MeshReport& report) {
-  DefectCount open, crowded, same_way;
-  for_each_edge(half_edges_of(soup), [&](std::span<const HalfEdge> sides) {
+  DefectCount open, crowded, same_direction;
+  for_each_edge(half_edges_of(soup), [&](std::span<const HalfEdge> half_edges) {
     const auto where = [&] {
-      const Edge& e = sides[0].edge;
-      const bool as_stored = sides[0].forward || sides.size() > 2;
+      const Edge& e = half_edges[0].edge;
+      const bool as_stored = half_edges[0].forward || half_edges.size() > 2;
       return "the edge from " + edge_place(soup, as_stored ? e : Edge(e.second, e.first));
     };
-    const auto face = [&](std::size_t k) { return std::to_string(soup.face_in_file(sides[k].face)); };
-    if (sides.size() == 1)
+    const auto face = [&](std::size_t k) { return std::to_string(soup.face_in_file(half_edges[k].face)); };
+    if (half_edges.size() == 1)
       open.add([&] { return where() + " belongs to face " + face(0) + " only: the surface is open"; });
-    else if (sides.size() > 2)
-      crowded.add([&] { return where() + " belongs to " + std::to_string(sides.size()) + " faces"; });
-    else if (sides[0].forward == sides[1].forward)
-      same_way.add([&] {
+    else if (half_edges.size() > 2)
+      crowded.add([&] { return where() + " belongs to " + std::to_string(half_edges.size()) + " faces"; });
+    else if (half_edges[0].forward == half_edges[1].forward)
+      same_direction.add([&] {
         return "faces " + face(0) + " and " + face(1) + " are oriented against each other along " + where();
       });
   });
   open.report(report.defects, "close the hole in the modeller");
   crowded.report(report.defects, "a solid has two faces at every edge: split or remove the extra ones");
-  same_way.report(report.defects, "make all faces counter-clockwise seen from outside");
+  same_direction.report(report.defects, "make all faces counter-clockwise seen from outside");
   report.closed = !open.any() && !crowded.any();
-  report.consistent = !same_way.any();
+  report.consistent = !same_direction.any();
 }
 
-/// Every edge has two faces here, so the faces around a vertex form rings: the face that leaves the vertex
-/// towards n is followed by the one that comes in from n. A vertex with more than one ring joins parts of the
-/// surface in a point.
+/// Every edge has two faces here, so the faces at a vertex form rings. A face that leaves the vertex towards
+/// n is followed by the face that arrives from n. A vertex with more than one ring joins parts of the surface
+/// in a point.
 void check_vertices(const PolygonSoup& soup, MeshReport& report) {
-  struct Turn {
-    std::size_t vertex, from, to;  ///< a face comes in from `from` and leaves towards `to`
+  struct FaceCorner {
+    std::size_t vertex, from, to;  ///< a face arrives at `vertex` from `from` and leaves towards `to`
   };
-  std::vector<Turn> turns;
+  std::vector<FaceCorner> corners;
   for (const auto& face : soup.faces)
     for (std::size_t i = 0; i < face.size(); ++i)
-      turns.push_back(
+      corners.push_back(
           {face[i], face[i > 0 ? i - 1 : face.size() - 1], face[i + 1 < face.size() ? i + 1 : 0]});
-  const auto before = [](const Turn& a, const Turn& b) {
+  const auto before = [](const FaceCorner& a, const FaceCorner& b) {
     return a.vertex != b.vertex ? a.vertex < b.vertex : a.from < b.from;
   };
-  std::sort(turns.begin(), turns.end(), before);
+  std::sort(corners.begin(), corners.end(), before);
   DefectCount pinched;
-  for (auto begin = turns.begin(); begin != turns.end();) {
+  for (auto begin = corners.begin(); begin != corners.end();) {
     const auto end =
-        std::find_if(begin, turns.end(), [&](const Turn& t) { return t.vertex != begin->vertex; });
+        std::find_if(begin, corners.end(), [&](const FaceCorner& c) { return c.vertex != begin->vertex; });
     std::ptrdiff_t ring = 0;
     auto at = begin;
     do {
-      at = std::lower_bound(begin, end, Turn{begin->vertex, at->to, 0}, before);
+      at = std::lower_bound(begin, end, FaceCorner{begin->vertex, at->to, 0}, before);
     } while (++ring < end - begin && at != begin);
     if (ring < end - begin)
       pinched.add([&] {
-        return "parts of the surface meet only in vertex " +
+        return "parts of the surface are joined only in vertex " +
                std::to_string(soup.vertex_in_file(begin->vertex)) + " at " +
                format_point(soup.vertices[begin->vertex]);
       });
@@ -174,14 +174,15 @@ SurfaceMesh surface_mesh(const PolygonSoup& soup) {
   points.reserve(soup.vertices.size());
   for (const Vector3d& p : soup.vertices) points.emplace_back(p.x(), p.y(), p.z());
   auto faces = soup.faces;
-  PMP::remove_isolated_points_in_polygon_soup(points, faces);  // does_bound_a_volume() falls over them
+  PMP::remove_isolated_points_in_polygon_soup(points,
+                                              faces);  // isolated points make does_bound_a_volume() fail
   SurfaceMesh mesh;
   PMP::polygon_soup_to_polygon_mesh(points, faces, mesh);
   return mesh;
 }
 
-/// Whether a face, seen along its normal, neither crosses nor touches itself. CGAL cuts others with more than
-/// four corners into triangles too, and falls over some of them.
+/// Returns true if a face, projected along its normal, neither crosses nor touches itself. CGAL also
+/// triangulates other faces with more than four corners, and crashes on some of them.
 bool is_simple(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
   Vector3d normal = Vector3d::Zero();
   std::vector<Kernel::Point_3> points;
@@ -195,8 +196,8 @@ bool is_simple(const PolygonSoup& soup, const std::vector<std::size_t>& face) {
   return CGAL::is_simple_2(points.begin(), points.end(), along);
 }
 
-/// Cuts every face of a mesh made of the soup into triangles. Returns for each triangle its face's number in
-/// the file.
+/// Triangulates every face of a mesh made from the soup. Returns the face number in the file for each
+/// triangle.
 std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh, MeshReport& report) {
   std::vector<std::size_t> face_of(soup.faces.size());
   DefectCount uncut;
@@ -207,11 +208,11 @@ std::vector<std::size_t> triangulate(const PolygonSoup& soup, SurfaceMesh& mesh,
         (corners > 3 && !PMP::triangulate_face(SurfaceMesh::Face_index(static_cast<std::uint32_t>(f)), mesh)))
       uncut.add([&] {
         return face_name(soup, f) + " near " + format_point(soup.vertices[soup.faces[f][0]]) +
-               " cannot be cut into triangles";
+               " cannot be triangulated";
       });
     face_of.resize(mesh.number_of_faces(), soup.face_in_file(f));
   }
-  uncut.report(report.defects, "make it flat, or cut it in the modeller");
+  uncut.report(report.defects, "make it planar, or triangulate it in the modeller");
   return face_of;
 }
 
@@ -219,7 +220,7 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
                              MeshReport& report) {
   std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
   PMP::self_intersections(mesh, std::back_inserter(pairs),
-                          CGAL::parameters::maximum_number(kMostIntersections));
+                          CGAL::parameters::maximum_number(kMaxIntersections));
   report.self_intersecting = !pairs.empty();
   if (pairs.empty()) return;
   const auto corner = mesh.point(mesh.target(mesh.halfedge(pairs[0].first)));
@@ -227,8 +228,8 @@ void check_self_intersection(const SurfaceMesh& mesh, const std::vector<std::siz
   report.defects.push_back(
       (a == b ? "two halves of face " + std::to_string(a)
               : "faces " + std::to_string(a) + " and " + std::to_string(b)) +
-      " near " + format_point({corner.x(), corner.y(), corner.z()}) + " cut through each other" +
-      (pairs.size() < kMostIntersections ? total_suffix(pairs.size()) : " (1000 or more in all)") +
+      " near " + format_point({corner.x(), corner.y(), corner.z()}) + " intersect each other" +
+      (pairs.size() < kMaxIntersections ? total_suffix(pairs.size()) : " (1000 or more in all)") +
       "; unite the parts in the modeller");
 }
 
@@ -237,14 +238,13 @@ void check_volume(const SurfaceMesh& mesh, MeshReport& report) {
   report.outward = !report.self_intersecting && report.volume > 0.0 && PMP::does_bound_a_volume(mesh);
   if (report.outward || report.self_intersecting) return;
   report.defects.push_back(
-      report.volume < 0.0
-          ? "all faces look inwards (the volume is negative); flip the faces in the modeller"
-          : "its shells do not bound a volume: one looks the wrong way, or nothing is inside; "
-            "make outer shells look outwards and cavities inwards");
+      report.volume < 0.0 ? "all faces point inwards (the volume is negative); flip the faces in the modeller"
+                          : "its shells do not bound a volume: one faces the wrong way, or encloses nothing; "
+                            "make outer shells face outwards and cavities inwards");
 }
 
-/// The faces side by side, with nothing shared: what is no manifold can be cut into triangles so. The corners
-/// of the mesh are those of the faces, one after the other.
+/// Returns a mesh of separate faces that share no vertex, so that non-manifold soups can be triangulated. Its
+/// vertices are the corners of the faces in order.
 SurfaceMesh separate_faces(const PolygonSoup& soup) {
   PolygonSoup apart;
   for (const auto& face : soup.faces) {
@@ -298,7 +298,7 @@ MeshReport check_surface(const PolygonSoup& soup, TriangleMesh* triangles) {
   SurfaceMesh mesh = separate_faces(soup);
   triangulate(soup, mesh, report);
   if (triangles == nullptr || !report.defects.empty()) return report;
-  std::vector<std::uint32_t> vertex;  // of the soup, for each of the mesh
+  std::vector<std::uint32_t> vertex;  // soup vertex for each vertex of the mesh
   for (const auto& face : soup.faces) vertex.insert(vertex.end(), face.begin(), face.end());
   *triangles = triangles_of(mesh);
   triangles->vertices_m = soup.vertices;

@@ -18,7 +18,7 @@ bool is_convex(const TriangleMesh& solid, const ConvexBody& hull) {
   return solid_properties(solid, 1.0).volume_m3 >= kFull * volume(hull);
 }
 
-// The hull of some vertices lies in that of all.
+// The hull of a sample of the vertices lies in the hull of all vertices.
 bool may_be_convex(const TriangleMesh& solid) {
   const std::size_t count = solid.vertices_m.size();
   if (count <= 2 * kSome) return true;

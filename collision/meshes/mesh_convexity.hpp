@@ -6,11 +6,12 @@
 
 namespace wrenchd {
 
-/// Is a solid convex, but for what rounding of its corners takes away? Not RT safe.
+/// Returns true if the solid fills its convex hull except for the rounding of its corners. Not RT-safe: may
+/// take milliseconds.
 bool is_convex(const TriangleMesh& solid, const ConvexBody& hull);
 
-/// False where some of the vertices alone tell that it is not; true where the hull has to. Quick. Not RT
-/// safe.
+/// Returns false if a sample of the vertices proves that the solid is not convex. True means that is_convex()
+/// must decide. Not RT-safe: allocates.
 bool may_be_convex(const TriangleMesh& solid);
 
 }  // namespace wrenchd

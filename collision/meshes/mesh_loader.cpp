@@ -21,26 +21,26 @@ std::string_view bytes_of(const std::vector<T>& list) {
   return {reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T)};
 }
 
-/// Of thousands of bodies of one file the first has said it.
+/// Adds a text once, although thousands of bodies may share a file.
 void add_once(std::vector<std::string>& list, const std::string& text) {
   if (std::find(list.begin(), list.end(), text) == list.end()) list.push_back(text);
 }
 
-std::string_view generated_mesh_name(BodyKind kind) {
+std::string_view body_kind_name(BodyKind kind) {
   return kind == BodyKind::solid ? "solid" : "surface";
 }
 
 template <class Use>
-void each_part(LoadedMesh& loaded, const Use& use) {
+void visit_parts(LoadedMesh& loaded, const Use& use) {
   use(loaded.mesh.vertices_m), use(loaded.mesh.triangles), use(loaded.repairs);
 }
 template <class Use>
-void each_part(ConvexBody& hull, const Use& use) {
+void visit_parts(ConvexBody& hull, const Use& use) {
   use(hull.vertices_T_m), use(hull.ring_begin), use(hull.ring);
 }
 template <class Use>
-void each_part(MeshBvh& treed, const Use& use) {
-  treed.surface.visit_members(use), treed.bvh.visit_members(use);
+void visit_parts(MeshBvh& mesh_bvh, const Use& use) {
+  mesh_bvh.surface.visit_members(use), mesh_bvh.bvh.visit_members(use);
 }
 
 }  // namespace
@@ -72,7 +72,7 @@ void MeshLoader::report_progress(const std::filesystem::path& file, std::size_t 
     progress_(file.filename().string() + ": " + with_thousands_separators(triangles) + " triangles, " + what);
 }
 
-/// From the cache, or made and put there. key: all that it is made from.
+/// Returns the cached result for `made_from`, or computes and caches it.
 template <class T, class Make>
 T MeshLoader::cached(const std::vector<std::string_view>& made_from, bool large, const Make& make) {
   if (cache_.disabled() || !large) return make();
@@ -80,12 +80,12 @@ T MeshLoader::cached(const std::vector<std::string_view>& made_from, bool large,
   if (const auto bytes = cache_.read(key)) {
     T value;
     const Unpacker unpack(*bytes);
-    each_part(value, unpack);
+    visit_parts(value, unpack);
     if (unpack.at_end()) return value;
   }
   T value = make();
   std::string bytes;
-  each_part(value, Packer(bytes));
+  visit_parts(value, Packer(bytes));
   if (!cache_.write(key, bytes)) {
     add_once(warnings_, cache_.error());
     cache_ = MeshCache({});
@@ -103,7 +103,7 @@ std::shared_ptr<const LoadedMesh> MeshLoader::load(const std::filesystem::path& 
   for (const std::string& change : loaded->repairs) add_once(changes_, begin + change);
   if (kind == BodyKind::surface)
     add_once(changes_, begin +
-                           "taken as a surface: it has two sides and no inside, so that nothing pushes out a "
+                           "used as a surface: it has two sides and no inside, so that nothing pushes out a "
                            "tool that starts "
                            "beyond it");
   return loaded;
@@ -127,18 +127,18 @@ LoadedMesh MeshLoader::read(const std::filesystem::path& file, BodyKind kind) {
   if (progress_ && large)
     progress_(file.filename().string() + ": reading " + with_thousands_separators(size / 1'000'000) + " MB");
   const std::string extension = file.extension().string();
-  LoadedMesh loaded = cached<LoadedMesh>({"mesh", extension, generated_mesh_name(kind), source.bytes}, large,
+  LoadedMesh loaded = cached<LoadedMesh>({"mesh", extension, body_kind_name(kind), source.bytes}, large,
                                          [&] { return repair_and_check(parse_mesh(source), file, kind); });
   loaded.file = file;
   return loaded;
 }
 
-/// What was made is looked at like a file: a body of somebody's measures may come out thinner than it can be.
+/// A generated mesh is checked as a file is, because some dimensions may yield walls that are too thin.
 LoadedMesh MeshLoader::make(const GeneratedMesh& made, const std::filesystem::path& name, BodyKind kind) {
   const TriangleMesh mesh = make_mesh(made);
   const bool large = mesh.triangles.size() >= kLargeMeshTriangles;
-  const std::vector<std::string_view> made_from = {"made", generated_mesh_name(kind),
-                                                   bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
+  const std::vector<std::string_view> made_from = {"made", body_kind_name(kind), bytes_of(mesh.vertices_m),
+                                                   bytes_of(mesh.triangles)};
   LoadedMesh loaded = cached<LoadedMesh>(made_from, large, [&] {
     PolygonSoup soup{mesh.vertices_m, {}};
     for (const auto& [a, b, c] : mesh.triangles) soup.faces.push_back({a, b, c});
@@ -160,10 +160,10 @@ ConvexBody MeshLoader::hull(const LoadedMesh& loaded) {
 std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind kind,
                                                      const std::filesystem::path& file) {
   const std::size_t triangles = mesh.triangles.size();
-  const std::vector<std::string_view> made_from = {"treed", generated_mesh_name(kind),
-                                                   bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
+  const std::vector<std::string_view> made_from = {"bvh", body_kind_name(kind), bytes_of(mesh.vertices_m),
+                                                   bytes_of(mesh.triangles)};
   return std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
-    report_progress(file, triangles, "finding its edges and building its tree");
+    report_progress(file, triangles, "finding its edges and building its BVH");
     return MeshBvh(mesh, kind);
   }));
 }

@@ -21,49 +21,50 @@
 
 namespace wrenchd {
 
-/// A mesh file that was read, repaired and checked; or a mesh that was made, and checked like one.
+/// A mesh that was read from a file, repaired and checked, or a mesh that was generated and checked.
 struct LoadedMesh {
   std::filesystem::path file;
-  TriangleMesh mesh;                 ///< in the file's own units
-  std::vector<std::string> repairs;  ///< what was repaired (collision/meshes/mesh_repair.hpp)
+  TriangleMesh mesh;                 ///< in the units of the file
+  std::vector<std::string> repairs;  ///< one sentence for each kind of repair (mesh_repair.hpp)
 };
 
-/// Reads meshes and makes of them what contacts need. A file is read once, however many bodies it is.
+/// Loads meshes and prepares them for contact queries. It reads each file once, for any number of bodies.
 ///
-/// A million triangles take seconds: what is about to be done with a large mesh is told beforehand, and what
-/// comes out is kept on disk (collision/meshes/mesh_cache.hpp). Nothing is told of small ones, and nothing
-/// kept. Not RT safe.
+/// A million triangles take seconds. For large meshes the loader reports each step before it starts, and
+/// caches the result on disk (mesh_cache.hpp). Small meshes are neither reported nor cached. Not RT-safe:
+/// reads files, may take seconds.
 class MeshLoader {
  public:
   using Progress = std::function<void(const std::string&)>;
-  /// From here on a mesh takes long enough to be told of, and to be worth keeping: a fifth of a second.
+  /// A mesh with this number of triangles takes about 0.2 s. From here on the loader reports progress and
+  /// uses the cache.
   static constexpr std::size_t kLargeMeshTriangles = 50'000;
   static constexpr std::size_t kLargeMeshBytes = 50 * kLargeMeshTriangles;
 
-  MeshLoader() : MeshLoader({}, {}) {}  ///< keeps nothing and tells nothing
-  /// cache: a directory; empty: nothing is kept. progress: is given "FILE: ...".
+  MeshLoader() : MeshLoader({}, {}) {}  ///< no cache, no progress reports
+  /// cache: directory of the cache; empty: no cache. progress: receives "FILE: ...".
   MeshLoader(std::filesystem::path cache, Progress progress)
       : cache_(std::move(cache)), progress_(std::move(progress)) {}
 
-  /// made: what is to be made in the place of the file, whose name is name_of() it. Throws MeshError that
-  /// names the file, the defect, its place and the cure.
+  /// Returns the mesh of a file, or a generated mesh if `generated` is given; `file` is then its name
+  /// (generated_mesh_name()). Throws MeshError that names the file, the defect, its place and the remedy.
   std::shared_ptr<const LoadedMesh> load(const std::filesystem::path& file, BodyKind kind,
                                          const std::optional<GeneratedMesh>& made = {});
 
-  /// The convex hull, in file units.
+  /// Returns the convex hull in file units.
   ConvexBody hull(const LoadedMesh& loaded);
 
-  /// The surface and its tree. mesh: of that file, placed and scaled.
+  /// Returns the surface and its BVH. mesh: the mesh of `file`, placed and scaled.
   std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind,
                                            const std::filesystem::path& file);
 
-  /// Remarks on a size that is not likely.
+  /// Adds a warning if the size of a mesh is implausible.
   void check_size(const LoadedMesh& loaded, double scale, PlausibleSize likely);
 
-  /// How the meshes loaded so far differ from their files, each as "FILE: ...": what was repaired, and which
-  /// are surfaces.
+  /// The differences between the loaded meshes and their files, each as "FILE: ...": repairs, and use as a
+  /// surface.
   const std::vector<std::string>& changes() const noexcept { return changes_; }
-  /// What else a person should know of them: sizes that are not likely, and why nothing is kept on disk.
+  /// Warnings for the user: implausible sizes, and the reason why the cache cannot be written.
   const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
  private:
@@ -82,12 +83,12 @@ class MeshLoader {
   std::map<std::pair<std::filesystem::path, BodyKind>, std::shared_ptr<const LoadedMesh>> loaded_;
 };
 
-/// Why a mesh cannot be used as a body of this kind, and what can be done about it: "FILE: ...", a line for
-/// each defect. soup: as it was repaired.
+/// Returns why a mesh cannot be used as a body of this kind and how to correct it: "FILE: ...", one line for
+/// each defect. soup: the mesh after its repair. Not RT-safe: allocates.
 std::string rejection_text(const std::filesystem::path& file, const PolygonSoup& soup, BodyKind kind,
                            const MeshReport& report);
 
-/// "1,000,000", for people.
+/// Returns a number with separators: "1,000,000". Not RT-safe: allocates.
 std::string with_thousands_separators(std::size_t number);
 
 }  // namespace wrenchd

@@ -8,19 +8,19 @@
 
 namespace wrenchd {
 
-/// Repairs what can be repaired without guessing at a shape: no point is moved by more than what single
-/// precision rounds away, no hole is filled, nothing that cuts through itself is parted.
+/// Repairs what needs no guess about the shape. The repair moves no point by more than the rounding of single
+/// precision. It fills no hole and does not separate intersecting parts. It does the following:
 ///
-/// - Points that no face uses are left out, points at the same place merged.
-/// - Of corners given twice in a row one is left out; a face left with two is none.
-/// - Faces without area are left out; a corner on another's side becomes a corner of that face.
-/// - Of faces given twice, either way up, one is kept.
-/// - Cracks no wider than rounding are closed: the points along them are merged.
-/// - Faces against their neighbours are turned as most of their shell are.
-/// - Shells that look inwards are turned, with all that is in them, where they are in no other shell.
+/// - Removes unused points and merges equal points.
+/// - Removes repeated corners, and faces with fewer than three corners.
+/// - Removes faces without area. A corner on a side of another face becomes a corner of that face.
+/// - Keeps one of several equal faces, whatever their orientation.
+/// - Closes cracks that are no wider than rounding: merges the points along them.
+/// - Flips faces whose orientation differs from the majority of their shell.
+/// - Flips shells that face inwards and lie in no other shell, together with their contents.
 ///
-/// Returns a sentence for each kind of change: how many, and where the first was. None where nothing was
-/// done, as with numbers or indices that are wrong. Not RT safe.
+/// Returns one sentence for each kind of repair with the number and the first place. Does nothing if a number
+/// or an index is invalid. Not RT-safe: allocates, may take seconds.
 std::vector<std::string> repair(PolygonSoup& soup);
 
 }  // namespace wrenchd

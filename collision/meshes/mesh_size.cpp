@@ -13,10 +13,10 @@
 namespace wrenchd {
 namespace {
 
-/// A thousand clearances of the proxy.
-constexpr double kLeast_m = 1e-6;
-/// Here a coordinate is rounded by a thousandth of the clearance.
-constexpr double kFarthest_m = 1e4;
+/// A thousand times the clearance of the proxy.
+constexpr double kMinSide_m = 1e-6;
+/// At this coordinate rounding is a thousandth of the clearance.
+constexpr double kMaxCoordinate_m = 1e4;
 
 double largest_side(const TriangleMesh& mesh) {
   Eigen::AlignedBox3d box;
@@ -32,8 +32,8 @@ std::string size_text(double side_m, double scale) {
   return text.str();
 }
 
-/// The scale that would make the size a likely one: a unit beside the one that was taken.
-std::string cure(double side_m, double scale, PlausibleSize likely) {
+/// Suggests a scale that makes the size plausible: a factor of 1000 up or down.
+std::string scale_question(double side_m, double scale, PlausibleSize likely) {
   std::ostringstream text;
   text.imbue(std::locale::classic());
   const double factor = side_m > likely.max_m ? 1e-3 : 1e3;
@@ -50,18 +50,18 @@ std::string cure(double side_m, double scale, PlausibleSize likely) {
 std::optional<std::string> implausible_size(const TriangleMesh& mesh, double scale, PlausibleSize likely) {
   const double side_m = scale * largest_side(mesh);
   if (side_m >= likely.min_m && side_m <= likely.max_m) return {};
-  return size_text(side_m, scale) + ": " + cure(side_m, scale, likely);
+  return size_text(side_m, scale) + ": " + scale_question(side_m, scale, likely);
 }
 
 void require_size_for_contacts(const TriangleMesh& mesh, double scale, const std::filesystem::path& file) {
   const double side_m = scale * largest_side(mesh);
   double farthest = 0.0;
   for (const Vector3d& p : mesh.vertices_m) farthest = std::max(farthest, p.lpNorm<Eigen::Infinity>());
-  if (!(side_m >= kLeast_m && side_m <= kFarthest_m))
+  if (!(side_m >= kMinSide_m && side_m <= kMaxCoordinate_m))
     throw MeshError(file.string() + ": " + size_text(side_m, scale) +
                     ", and contacts between meshes can be found from 1e-06 to 10000 m; give 'scale' in "
                     "metres per mesh unit");
-  if (!(scale * farthest <= kFarthest_m)) {
+  if (!(scale * farthest <= kMaxCoordinate_m)) {
     std::ostringstream text;
     text.imbue(std::locale::classic());
     text << file.string() << ": lies up to " << scale * farthest

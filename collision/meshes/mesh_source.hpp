@@ -1,30 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace wrenchd {
 
+/// Reports a mesh that cannot be used: the file, the defect, its place and the remedy. The message has one
+/// line for each defect.
+class MeshError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The bytes of a mesh file, and its name for messages.
 struct MeshSource {
   std::filesystem::path file;
   std::string bytes;
 
-  /// Throws MeshError "FILE: message" or, from line 1 on, "FILE:LINE: message".
+  /// Throws MeshError "FILE: message", or "FILE:LINE: message" if line > 0. Not RT-safe: throws.
   [[noreturn]] void reject(std::size_t line, const std::string& message) const;
 };
 
-/// Walks the lines of a text; a carriage return at the end is no part of a line.
+/// Iterates over the lines of a text. Removes a carriage return at the end of a line.
 class LineReader {
  public:
   explicit LineReader(std::string_view text) : rest_(text) {}
 
+  /// Returns false at the end of the text. RT-safe.
   bool next(std::string_view& line) noexcept;
-  std::size_t number() const noexcept { return number_; }  ///< of the last line given, from 1
+  /// Splits the next line that contains a word. Returns false, and no words, at the end of the text. Not
+  /// RT-safe: allocates.
+  bool next_words(std::vector<std::string_view>& words);
+  std::size_t number() const noexcept { return number_; }  ///< number of the last line, from 1
   std::string_view rest() const noexcept { return rest_; }
 
  private:
@@ -32,25 +45,29 @@ class LineReader {
   std::size_t number_ = 0;
 };
 
-/// The words between blanks, in front of a '#'.
+/// Splits a line into words up to a '#'. Blanks separate words. Not RT-safe: allocates.
+void split_words(std::string_view line, std::vector<std::string_view>& words);
 std::vector<std::string_view> split_words(std::string_view line);
 
-/// The whole word as a number: nothing where it is none, infinite or NaN. Knows no locale.
+/// Returns the value of the whole word, or nothing if it is not a finite number. Independent of the locale.
+/// RT-safe.
 std::optional<double> parse_number(std::string_view word) noexcept;
 std::optional<long long> parse_integer(std::string_view word) noexcept;
+/// Returns the value of the whole word rounded once to single precision, or nothing if it is not a finite
+/// number in the range of float. RT-safe.
+std::optional<float> parse_single(std::string_view word) noexcept;
 
-/// 'WORD', cut short and on one line, as a message may repeat it.
+/// Returns the value of a word. Rejects the file if it is not a finite number. what: the element, for
+/// example "vertex 3". Not RT-safe: throws MeshError.
+double require_number(const MeshSource& source, std::size_t line, std::string_view word,
+                      const std::string& what);
+/// Returns three consecutive values, from words[first] on. Precondition: the words exist. Not RT-safe: throws
+/// MeshError.
+std::array<double, 3> require_point(const MeshSource& source, std::size_t line,
+                                    const std::vector<std::string_view>& words, std::size_t first,
+                                    const std::string& what);
+
+/// Returns 'WORD' for messages: truncated, on one line. Not RT-safe: allocates.
 std::string quote_word(std::string_view word);
-
-/// What CGAL's readers take on trust, looked at before them: counts that they reserve memory for, types that
-/// they assume, numbers that they round or pass over. Each throws MeshError that names the line and the cure,
-/// and returns when the reader has nothing left to trip on. Time and memory are in proportion to the file.
-void validate_off(const MeshSource& source);
-/// The same; what exporters write in other ways than CGAL expects is rewritten. Of OBJ the vertex and face
-/// lines are left, with single blanks and vertices counted from 1; of ascii STL the corners, without names,
-/// normals and capitals; of PLY the header without carriage returns.
-std::string normalise_obj(const MeshSource& source);
-std::string normalise_stl(MeshSource source);
-std::string normalise_ply(MeshSource source);
 
 }  // namespace wrenchd

@@ -11,36 +11,36 @@
 namespace wrenchd {
 namespace {
 
-/// Triangles whose corners lie this near to one plane lie in it: in units of the mesh's size, and never more
-/// than a tenth of the clearance that a proxy keeps [m].
-constexpr double kFlat = 1e-10;
-constexpr double kFlat_m = 1e-10;
-/// Neighbours that fall away from a vertex by less than this [rad] do not point it.
-constexpr double kBlunt = 1e-7;
+/// Triangles are coplanar if their corners lie within this distance of one plane: a fraction of the mesh's
+/// size, and at most a tenth of the proxy's clearance [m].
+constexpr double kCoplanar = 1e-10;
+constexpr double kMaxCoplanar_m = 1e-10;
+/// A vertex is convex only if its neighbours fall away by at least this angle [rad].
+constexpr double kMinFallAngle_rad = 1e-7;
 
 constexpr int next(int i) noexcept {
   return i == 2 ? 0 : i + 1;
 }
 
-/// Is there a direction n with n . e < 0 for all of these? The one that all fall away from the most, by the
-/// least-distance problem  min |z|  s.t.  -e . z >= 1,  met a few rows at a time, for a vertex may have any
-/// number of neighbours.
+/// Returns true if a direction n exists with n . e < 0 for all directions e. Searches the direction of
+/// steepest descent with the least-distance problem  min |z|  s.t.  -e . z >= 1.  Rows are added a few at a
+/// time, because a vertex may have any number of neighbours.
 bool all_fall_away(const std::vector<Vector3d>& directions, const Vector3d& first_guess) {
   const auto worst_of = [&](const Vector3d& n) {
     return *std::max_element(directions.begin(), directions.end(),
                              [&](const Vector3d& a, const Vector3d& b) { return n.dot(a) < n.dot(b); });
   };
-  if (first_guess.dot(worst_of(first_guess)) < -kBlunt) return true;
+  if (first_guess.dot(worst_of(first_guess)) < -kMinFallAngle_rad) return true;
   constexpr std::size_t kRows = 32;
   LeastDistance<3, kRows> problem;
   Vector3d n = first_guess;
   for (std::size_t row = 0; row < kRows; ++row) {
     const Vector3d worst = worst_of(n);
-    if (row > 0 && n.dot(worst) < -kBlunt) return true;
+    if (row > 0 && n.dot(worst) < -kMinFallAngle_rad) return true;
     problem.add_unit(-worst, 1.0);
     if (problem.solve(Vector3d::Zero(), 1e-12) != decltype(problem)::Status::optimal) return false;
     const double length = problem.z().norm();
-    if (length * kBlunt > 1.0) return false;
+    if (length * kMinFallAngle_rad > 1.0) return false;
     n = problem.z() / length;
   }
   return false;
@@ -57,40 +57,39 @@ MeshSurface::MeshSurface(TriangleMesh mesh, Kind kind) : mesh_(std::move(mesh)),
   find_convex_vertices();
 }
 
-/// Pairs the sides of the triangles: a side that runs from a to b meets one that runs from b to a. Where
-/// there is not exactly one of each, nothing is paired.
+/// Pairs a side from a to b with a side from b to a. Sides stay unpaired unless there is exactly one of each
+/// direction.
 void MeshSurface::find_neighbours() {
-  struct Side {
-    std::uint64_t key;  ///< both vertices, the smaller first
+  struct TriangleHalfEdge {
+    std::uint64_t key;  ///< both vertices, the smaller number first
     std::uint32_t triangle;
     std::uint8_t side;
     bool forward;
   };
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh_.triangles.size());
+  std::vector<TriangleHalfEdge> half_edges;
+  half_edges.reserve(3 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
       const std::uint64_t a = mesh_.triangles[t][static_cast<std::size_t>(i)];
       const std::uint64_t b = mesh_.triangles[t][static_cast<std::size_t>(next(i))];
-      sides.push_back({std::min(a, b) << 32 | std::max(a, b), t, static_cast<std::uint8_t>(i), a < b});
+      half_edges.push_back({std::min(a, b) << 32 | std::max(a, b), t, static_cast<std::uint8_t>(i), a < b});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+  std::sort(half_edges.begin(), half_edges.end(), [](const TriangleHalfEdge& a, const TriangleHalfEdge& b) {
     return std::pair(a.key, a.triangle) < std::pair(b.key, b.triangle);
   });
   neighbours_.assign(mesh_.triangles.size(), {kNone, kNone, kNone});
-  for (std::size_t i = 0; i < sides.size();) {
+  for (std::size_t i = 0; i < half_edges.size();) {
     std::size_t end = i + 1;
-    while (end < sides.size() && sides[end].key == sides[i].key) ++end;
-    if (end - i == 2 && sides[i].forward != sides[i + 1].forward) {
-      neighbours_[sides[i].triangle][sides[i].side] = sides[i + 1].triangle;
-      neighbours_[sides[i + 1].triangle][sides[i + 1].side] = sides[i].triangle;
+    while (end < half_edges.size() && half_edges[end].key == half_edges[i].key) ++end;
+    if (end - i == 2 && half_edges[i].forward != half_edges[i + 1].forward) {
+      neighbours_[half_edges[i].triangle][half_edges[i].side] = half_edges[i + 1].triangle;
+      neighbours_[half_edges[i + 1].triangle][half_edges[i + 1].side] = half_edges[i].triangle;
     }
     i = end;
   }
 }
 
-/// Grows flat regions from the largest triangle left: each takes the plane of the triangle that it began
-/// with.
+/// Grows flat regions from the largest remaining triangle. All triangles of a region take its plane.
 void MeshSurface::find_planes() {
   const std::size_t count = mesh_.triangles.size();
   std::vector<Vector3d> area_normals(count);
@@ -105,7 +104,7 @@ void MeshSurface::find_planes() {
   std::stable_sort(largest_first.begin(), largest_first.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return area[a] > area[b]; });
 
-  const double flat_m = std::min(kFlat * radius_m_, kFlat_m);
+  const double flat_m = std::min(kCoplanar * radius_m_, kMaxCoplanar_m);
   planes_.resize(count);
   planar_region_.assign(count, kNone);
   std::vector<std::uint32_t> front;
@@ -133,7 +132,7 @@ void MeshSurface::find_planes() {
   }
 }
 
-/// Does the face across this side fall away? Its far corner then lies below the plane.
+/// Returns true if the face across this side falls away: its far corner lies below the plane.
 bool MeshSurface::is_convex_edge(std::uint32_t triangle, int side) const noexcept {
   const std::uint32_t other = neighbours_[triangle][static_cast<std::size_t>(side)];
   if (other == kNone) return true;
@@ -153,21 +152,21 @@ void MeshSurface::find_convex_edges() {
     for (int i = 0; i < 3; ++i) {
       const auto side = static_cast<std::size_t>(i);
       const std::uint32_t other = neighbours_[t][side];
-      if (other < t || !is_convex_edge(t, i)) continue;  // the lower number speaks for the edge
+      if (other < t || !is_convex_edge(t, i)) continue;  // the triangle with the smaller number owns the edge
       features_[t].edges[side] = static_cast<std::uint32_t>(convex_edges_.size());
       const Corners& corners = mesh_.triangles[t];
       convex_edges_.push_back({{corners[side], corners[static_cast<std::size_t>(next(i))]}, {t, other}});
     }
 }
 
-/// At a pointed vertex at least three sharp edges meet: the corners of the cone that its neighbours span.
+/// At a convex vertex at least three convex edges meet: the edges of the cone that its neighbours span.
 void MeshSurface::find_convex_vertices() {
   const std::size_t count = mesh_.vertices_m.size();
   std::vector<std::uint32_t> sharp_edges(count, 0);
   for (const Edge& edge : convex_edges_)
     for (const std::uint32_t v : edge.vertices) ++sharp_edges[v];
 
-  // The triangles around each vertex, one list after the other.
+  // Lists the triangles at each vertex, one list after the other.
   std::vector<std::uint32_t> begin(count + 1, 0), at(3 * mesh_.triangles.size());
   for (const Corners& corners : mesh_.triangles)
     for (const std::uint32_t v : corners) ++begin[v + 1];
@@ -196,12 +195,11 @@ void MeshSurface::find_convex_vertices() {
     for (const std::uint32_t n : neighbours)
       directions.push_back((mesh_.vertices_m[n] - mesh_.vertices_m[v]).normalized());
     if (kind_ == Kind::solid && !all_fall_away(directions, mean_normal.normalized())) continue;
-    const std::uint32_t speaker = at[begin[v]];
+    const std::uint32_t owner = at[begin[v]];
     for (std::size_t i = 0; i < 3; ++i)
-      if (mesh_.triangles[speaker][i] == v) features_[speaker].vertices[i] = v;
+      if (mesh_.triangles[owner][i] == v) features_[owner].vertices[i] = v;
     ring_.insert(ring_.end(), neighbours.begin(), neighbours.end());
     ring_begin_[v + 1] = static_cast<std::uint32_t>(ring_.size());
-    ++convex_vertex_count_;
   }
 }
 

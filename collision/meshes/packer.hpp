@@ -13,8 +13,8 @@
 
 namespace wrenchd {
 
-/// Types whose bytes say all that they hold. Eigen's vectors have a copy constructor of their own, and are so
-/// nevertheless.
+/// True for types whose bytes are their complete value. Eigen's vectors are such types although they have a
+/// user-defined copy constructor.
 template <class T>
 constexpr bool kBytewiseCopyable = std::is_trivially_copyable_v<T>;
 template <>
@@ -22,7 +22,7 @@ inline constexpr bool kBytewiseCopyable<Vector3d> = true;
 template <>
 inline constexpr bool kBytewiseCopyable<MeshSurface::Plane> = true;
 
-/// Appends values to bytes. For this machine alone: sizes and order of bytes are its own.
+/// Appends values to a byte string in the format of this machine (sizes, byte order). Not RT-safe: allocates.
 class Packer {
  public:
   explicit Packer(std::string& bytes) : bytes_(bytes) {}
@@ -46,8 +46,8 @@ class Packer {
   std::string& bytes_;
 };
 
-/// Takes them out again, in the same order. good() is false once something was not there; the values are
-/// worth nothing then.
+/// Reads values in the order in which a Packer wrote them. good() is false after a value was missing; the
+/// values are then undefined. Not RT-safe: allocates.
 class Unpacker {
  public:
   explicit Unpacker(std::string_view bytes) : rest_(bytes) {}

@@ -13,13 +13,13 @@ namespace wrenchd {
 namespace {
 
 constexpr std::size_t kWidth = TriangleBvh::kWidth;
-/// Boxes grow by this share of the mesh's extent: what rounding to single precision may take from them.
+/// Boxes grow by this fraction of the mesh's extent, to contain the rounding to single precision.
 constexpr double kRounding = 4e-7;
 
-/// A box in double precision, and the mean of the surface in it.
+/// A box in double precision, and the centroid of the surface in it.
 struct Fitted {
   Vector3d centre_m;
-  Matrix3d axes;  ///< rows, the widest first
+  Matrix3d axes;  ///< rows, the longest axis first
   Vector3d half_m;
   Vector3d mean_m;
 
@@ -28,11 +28,11 @@ struct Fitted {
   }
 };
 
-/// A binary tree first: it is folded into nodes of eight afterwards.
+/// A node of the binary tree from which the nodes with eight boxes are formed.
 struct Branch {
   Fitted box;
-  std::uint32_t begin, end;   ///< in the order of the triangles
-  std::uint32_t left, right;  ///< 0: a leaf
+  std::uint32_t begin, end;   ///< range in the order of the triangles
+  std::uint32_t left, right;  ///< children; 0: leaf
 };
 
 std::uint16_t features_of(const MeshSurface::Features& features) {
@@ -60,7 +60,7 @@ class Builder {
   const std::vector<Branch>& branches() const noexcept { return branches_; }
 
   TriangleBvh::Leaf leaf(const Branch& branch) const;
-  /// Of all triangles under a branch.
+  /// Returns the features of all triangles under a branch.
   std::uint16_t features(const Branch& branch) const;
 
  private:
@@ -78,10 +78,10 @@ class Builder {
   double extent_m_ = 0.0;
 };
 
-/// The axes are those of the covariance of the surface: for a triangle with corners p, middle g and area A
-/// that is  A/12 (9 g g' + sum p p').
+/// The axes are those of the covariance of the surface. A triangle with corners p, centroid g and area A
+/// contributes  A/12 (9 g g' + sum p p').
 Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
-  constexpr double kLeastArea = 1e-30;  // so that nothing divides by zero
+  constexpr double kLeastArea = 1e-30;  // prevents a division by zero
   const Vector3d origin = middle_[order_[begin]];
   double area = 0.0;
   Vector3d first = Vector3d::Zero();
@@ -103,7 +103,7 @@ Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
   Fitted box;
   box.mean_m = origin + mean;
   box.axes.row(0) = eigen.eigenvectors().col(2).normalized();
-  // computeDirect is quick, not orthogonal to the last digit.
+  // computeDirect() is fast but its vectors are not exactly orthogonal.
   const Vector3d second_axis = eigen.eigenvectors().col(1);
   box.axes.row(1) =
       (second_axis - box.axes.row(0).dot(second_axis) * box.axes.row(0).transpose()).normalized();
@@ -120,7 +120,7 @@ Fitted Builder::fit(std::uint32_t begin, std::uint32_t end) const {
   return box;
 }
 
-/// Cuts near the mean across the widest axis until eight triangles or fewer are left.
+/// Splits near the mean across the longest axis until each leaf has at most eight triangles.
 void Builder::split() {
   const auto add = [&](std::uint32_t begin, std::uint32_t end) {
     branches_.push_back({fit(begin, end), begin, end, 0, 0});
@@ -135,7 +135,7 @@ void Builder::split() {
     const auto first = order_.begin() + begin, last = order_.begin() + end;
     const auto below = [&](std::uint32_t t) { return along.dot(middle_[t]); };
     const auto at_mean = std::count_if(first, last, [&](std::uint32_t t) { return below(t) < cut; });
-    // Leaves are to be full: whole eights go to the lower side.
+    // The lower part takes a multiple of eight triangles, so that leaves are full.
     const std::ptrdiff_t eights = std::clamp<std::ptrdiff_t>((at_mean + 4) / 8, 1, (last - first - 1) / 8);
     const auto middle = first + 8 * eights;
     std::nth_element(first, middle, last, [&](std::uint32_t a, std::uint32_t b) {
@@ -200,7 +200,7 @@ TriangleBvh::Box single(const Fitted& fitted, double rounding_m) {
   return box;
 }
 
-/// A box far away that has no size: nothing meets it.
+/// Returns an empty box far away that overlaps nothing.
 TriangleBvh::Box nothing() {
   TriangleBvh::Box box{};
   box.centre[0] = box.centre[1] = box.centre[2] = 1e18F;
@@ -228,8 +228,8 @@ TriangleBvh::Node side_by_side(const TriangleBvh::Box* boxes) {
   return node;
 }
 
-/// The up to eight boxes that stand under one. What has more than eight leaves is opened first; then what
-/// still fits is dissolved into its leaves: few nodes, and full ones.
+/// Returns up to eight branches below a branch. Branches with more than eight leaves are opened first. Then
+/// every branch that still fits is replaced by its leaves, for few and full nodes.
 std::vector<std::uint32_t> opened(const std::vector<Branch>& branches, std::uint32_t top) {
   const auto leaves = [&](std::uint32_t i) {
     return (branches[i].end - branches[i].begin + kWidth - 1) / kWidth;
@@ -268,7 +268,7 @@ TriangleBvh::TriangleBvh(const MeshSurface& surface) {
   const std::vector<Branch>& branches = builder.branches();
   extent_m_ = static_cast<float>(builder.extent_m());
   const double rounding_m = kRounding * builder.extent_m();
-  std::vector<std::uint32_t> tops = {0};  // the branch that each node stands under
+  std::vector<std::uint32_t> tops = {0};  // branch of each node
   for (std::size_t n = 0; n < tops.size(); ++n) {
     const std::vector<std::uint32_t> under = opened(branches, tops[n]);
     std::array<Box, kWidth> boxes;

@@ -9,61 +9,62 @@
 
 namespace wrenchd {
 
-/// A hierarchy of oriented boxes over the triangles of a mesh, eight to a node, with up to eight triangles in
-/// a leaf: one box against eight, one triangle against eight, is what the walk
-/// (collision/pairs/bvh_traversal.hpp) does at a time.
+/// A bounding volume hierarchy of oriented boxes over the triangles of a mesh. Each node has eight children,
+/// each leaf up to eight triangles. The traversal (pairs/bvh_traversal.hpp) tests one box against eight
+/// boxes, or one triangle against eight triangles, at a time.
 ///
-/// Boxes and triangles know whether there are pointed vertices and sharp edges in them (mesh_surface.hpp):
-/// two that have none between them cannot be the first to meet.
+/// Boxes and triangles state whether they contain convex vertices and convex edges (mesh_surface.hpp). Two
+/// that contain none cannot meet first.
 ///
-/// Single precision, for what it leaves out is left out by a margin; what it lets through is looked at again
-/// in double precision by whoever asked. Built once, then only read.
+/// The data are in single precision with a margin for rounding. The caller tests the remaining pairs in
+/// double precision. Immutable after construction. Construction is not RT-safe: it may take seconds.
+/// Accessors are RT-safe.
 class TriangleBvh {
  public:
   static constexpr int kWidth = 8;
 
-  /// A box by itself, to be moved and held against the eight of a node. One cache line.
+  /// One box. It has the size of one cache line.
   struct alignas(64) Box {
     float centre[3];
-    float axis[2][3];  ///< unit; the third is their cross product
-    float half[3];     ///< half its size along each axis
-    float half_area;   ///< half its area: the larger of two boxes is opened first
+    float axis[2][3];  ///< unit vectors; the third axis is their cross product
+    float half[3];     ///< half the length along each axis
+    float half_area;   ///< half the surface area; a traversal opens the larger of two boxes first
     std::uint32_t child;
-    std::int16_t count;      ///< of triangles in the leaf `child`; 0: `child` is a node; -1: there is no box
-    std::uint16_t features;  ///< kVertices, kEdges: what triangles in it speak for
+    std::int16_t count;      ///< number of triangles in leaf `child`; 0: `child` is a node; -1: no box
+    std::uint16_t features;  ///< kVertices, kEdges: features that its triangles own
   };
   static constexpr std::uint16_t kVertices = 1, kEdges = 2;
-  /// The same eight boxes side by side.
+  /// Eight boxes as structure of arrays.
   struct alignas(64) Node {
     float centre[3][kWidth];
-    float axis[3][3][kWidth];  ///< [which][component]
+    float axis[3][3][kWidth];  ///< [axis][component]
     float half[3][kWidth];
-    std::uint32_t has_vertices, has_edges;  ///< a bit for each box
+    std::uint32_t has_vertices, has_edges;  ///< one bit for each box
   };
-  /// Up to eight triangles side by side. Lanes without one hold a box that nothing meets.
+  /// Up to eight triangles as structure of arrays. Unused lanes hold a box that overlaps nothing.
   struct alignas(64) Leaf {
-    float corner[3][3][kWidth];  ///< [which][component]
+    float corner[3][3][kWidth];  ///< [corner][component]
     float low[3][kWidth];        ///< bounds of each triangle
     float high[3][kWidth];
     float bounds_low[3], bounds_high[3];
-    float normal[3][kWidth];  ///< of its plane, outward unit
+    float normal[3][kWidth];  ///< outward unit normal of the triangle's plane
     float offset[kWidth];     ///< normal . corner
     std::uint32_t triangle[kWidth];
-    std::uint32_t has_vertices, has_edges;  ///< a bit for each triangle
+    std::uint32_t has_vertices, has_edges;  ///< one bit for each triangle
   };
 
-  TriangleBvh() = default;  ///< of nothing, to be filled in by each_member()
+  TriangleBvh() = default;  ///< empty; the mesh cache fills it through visit_members()
   explicit TriangleBvh(const MeshSurface& surface);
 
-  /// Number i of node n is boxes()[8 n + i]. Node 0 is the root; there is none in a tree without triangles.
+  /// Box i of node n is boxes()[8 n + i]. Node 0 is the root. A BVH without triangles has no node.
   const std::vector<Box>& boxes() const noexcept { return boxes_; }
   const std::vector<Node>& nodes() const noexcept { return nodes_; }
   const std::vector<Leaf>& leaves() const noexcept { return leaves_; }
-  /// Bound of the coordinates: single precision rounds them by 6e-8 of it [m].
+  /// Bound of the coordinates [m]. Single precision rounds them by at most 6e-8 of it.
   float extent_m() const noexcept { return extent_m_; }
   std::size_t bytes() const noexcept;
 
-  /// Calls use(member) for all that it holds: how it is kept on disk (collision/meshes/mesh_cache.hpp).
+  /// Calls use(member) for each data member, for the mesh cache (mesh_cache.hpp).
   template <class Use>
   void visit_members(const Use& use) {
     use(boxes_), use(nodes_), use(leaves_), use(extent_m_);

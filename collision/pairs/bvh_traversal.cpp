@@ -11,17 +11,18 @@ simd::Transform single(const Pose& X) noexcept {
   return simd::to_single(X.rotation.toRotationMatrix(), X.translation_m);
 }
 
-simd::Transform travel(const Pose& from, const Pose& to) noexcept {
+simd::Transform displacement(const Pose& from, const Pose& to) noexcept {
   return simd::to_single(to.rotation.toRotationMatrix() - from.rotation.toRotationMatrix(),
                          to.translation_m - from.translation_m);
 }
 
-/// The motion in single precision. The boxes are moved half way and grown by what is missing to both ends; a
-/// point at a distance r from A's origin leaves the straight line between its ends by no more than
-/// angle^2 r / 8, and the line's middle lies as far from where the pose half way takes it.
+/// Converts the motion to single precision. The boxes stand half way along the path and are enlarged to
+/// contain both ends. A point at a distance r from A's origin deviates from the straight line between its
+/// ends by at most angle^2 r / 8. The middle of that line deviates by the same amount from the point of the
+/// pose half way.
 simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, double extent_m) noexcept {
   const double radius_a_m = std::sqrt(3.0) * least_radius_a_m;
-  const auto& [start, end, reach_m, all_pairs, settle] = sweep;
+  const auto& [start, end, reach_m, all_pairs, classify] = sweep;
   simd::RelativeMotion motion;
   const Pose middle = {start.rotation.slerp(0.5, end.rotation),
                        0.5 * (start.translation_m + end.translation_m)};
@@ -29,24 +30,24 @@ simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, doub
   motion.X_AB_middle = single(inverse(middle));
   motion.X_BA_start = single(start);
   motion.X_BA_end = single(end);
-  motion.displacement_BA = travel(start, end);
-  motion.displacement_AB = travel(inverse(start), inverse(end));
+  motion.displacement_BA = displacement(start, end);
+  motion.displacement_AB = displacement(inverse(start), inverse(end));
   const double angle = start.rotation.angularDistance(end.rotation);
-  const double bulge_m = 0.25 * angle * angle * radius_a_m;
+  const double arc_deviation_m = 0.25 * angle * angle * radius_a_m;
   const double rounding_m =
       simd::kRounding * (extent_m + std::max(start.translation_m.lpNorm<Eigen::Infinity>(),
                                              end.translation_m.lpNorm<Eigen::Infinity>()));
   motion.all_pairs = all_pairs;
   motion.half_angle = static_cast<float>(0.5 * angle);
-  motion.margin = static_cast<float>(reach_m + bulge_m + rounding_m);
-  motion.reach = static_cast<float>(reach_m + bulge_m);
+  motion.margin = static_cast<float>(reach_m + arc_deviation_m + rounding_m);
+  motion.reach = static_cast<float>(reach_m + arc_deviation_m);
   motion.radius = static_cast<float>(least_radius_a_m);
   motion.rounding = static_cast<float>(rounding_m);
   for (int d = 0; d < 3; ++d) motion.centre_B[d] = static_cast<float>(end.translation_m[d]);
   motion.centre_travel = static_cast<float>((end.translation_m - start.translation_m).norm());
   motion.moving =
       start.translation_m != end.translation_m || start.rotation.coeffs() != end.rotation.coeffs();
-  motion.classify = settle && all_pairs && !motion.moving && reach_m == 0.0;
+  motion.classify = classify && all_pairs && !motion.moving && reach_m == 0.0;
   return motion;
 }
 
@@ -58,8 +59,8 @@ simd::BvhArrays arrays_of(const TriangleBvh& tree) noexcept {
 
 BvhTraversal::BvhTraversal(simd::TraversalKernel kernel)
     : kernel_(kernel != nullptr  ? kernel
-              : simd::has_avx2() ? simd::walk_avx2
-                                 : simd::walk_portable),
+              : simd::has_avx2() ? simd::traverse_avx2
+                                 : simd::traverse_portable),
       job_(),
       pairs_(kCapacity),
       stack_(2 * simd::kStack),
@@ -73,7 +74,7 @@ void BvhTraversal::start(const TriangleBvh& a, const TriangleBvh& b, const Sweep
           static_cast<std::uint32_t>(pairs_.size()),
           stack_.data(),
           moved_leaves_.data()};
-  job_.started = a.nodes().empty() || b.nodes().empty();  // then there is nothing to begin with
+  job_.started = a.nodes().empty() || b.nodes().empty();  // without nodes there is nothing to start with
 }
 
 bool BvhTraversal::resume(VisitBudget& budget) noexcept {

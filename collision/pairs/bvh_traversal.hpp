@@ -12,47 +12,49 @@
 
 namespace wrenchd {
 
-/// A triangle of A and one of B.
+/// A triangle of mesh A and a triangle of mesh B.
 struct TrianglePair {
   std::uint32_t a, b;
 
   friend bool operator==(const TrianglePair&, const TrianglePair&) = default;
 };
 
-/// A moves in B from one pose to another.
+/// A motion of A in the frame of B from one pose to another.
 struct Sweep {
   Pose X_BA_start, X_BA_end;
-  /// Pairs are to be found not only for the poses on the way but for every one near them: as far as this
-  /// from one of them in all, |shift| + angle times the farthest point of A.
+  /// The traversal finds the pairs for all poses within reach_m of the path. The distance of two poses is
+  /// |translation| + angle * radius of A [m].
   double reach_m = 0.0;
-  /// False: list only pairs with features that can meet first, a vertex in one of them or an edge in each.
+  /// False: list only pairs whose features can meet first, a convex vertex in one triangle or a convex edge
+  /// in each.
   bool all_pairs = true;
-  /// For a single pose without reach, all pairs: which meet there is told as far as single precision can.
+  /// True: classify pairs as intersecting, separate or in doubt. Precondition: a single pose, reach_m = 0,
+  /// all_pairs.
   bool classify = false;
 };
 
-/// How much work a walk may do, and did: it is counted in work and not in time, so that a replay does the
-/// same.
+/// Work limit of traversals. The limit counts work, not time, so that a replay gives equal results.
 struct VisitBudget {
-  std::uint32_t remaining = 0;  ///< nodes and leaves looked at
-  std::uint32_t reserved = 0;   ///< of these, so many are not for what can wait until the next tick
+  std::uint32_t remaining = 0;  ///< node and leaf visits left
+  std::uint32_t reserved = 0;   ///< part of `remaining` that deferrable work must not use
 };
 
 namespace simd {
 
-/// What the kernels work on: plain arrays (single_precision.hpp).
+/// Input of the kernels, as plain arrays (single_precision.hpp).
 struct RelativeMotion {
-  Transform X_BA_middle, X_AB_middle;  ///< half way
+  Transform X_BA_middle, X_AB_middle;  ///< pose half way along the path
   Transform X_BA_start, X_BA_end;
   Transform displacement_BA,
-      displacement_AB;  ///< R p + t is by how much a point of A, seen from B, moves in all
-  float half_angle;     ///< half the angle in all [rad]
-  float margin;         ///< by which all boxes grow [m]
-  float reach, radius;  ///< a plane of A may come nearer to a point by reach * max(1, its distance / radius),
-                        ///< what a chord leaves out of an arc included
+      displacement_AB;  ///< R p + t is the displacement of a point p of A, in B
+  float half_angle;     ///< half the rotation angle of the path [rad]
+  float margin;         ///< all boxes grow by this amount [m]
+  /// A plane of A may approach a point by reach * max(1, distance of the point / radius) in addition [m]. The
+  /// arc deviation is included.
+  float reach, radius;
   float rounding;
-  float centre_B[3];    ///< of A at the end, from which that distance counts
-  float centre_travel;  ///< how far the centre has come [m]
+  float centre_B[3];    ///< origin of A at the end of the path, in B [m]
+  float centre_travel;  ///< travel of the origin of A [m]
   bool moving;
   bool all_pairs;
   bool classify;
@@ -62,64 +64,64 @@ struct BvhArrays {
   const TriangleBvh::Node* nodes;
   const TriangleBvh::Leaf* leaves;
 };
-/// A walk under way: it may be interrupted after any visit.
+/// The state of a traversal. The traversal can be interrupted after every node visit.
 struct TraversalJob {
   BvhArrays a, b;
   RelativeMotion motion;
-  TrianglePair* pairs;  ///< room for pairs: listed from the front, those that surely meet from the back
+  TrianglePair* pairs;  ///< room for pairs: listed pairs from the front, intersecting pairs from the back
   std::uint32_t capacity;
   std::uint32_t* stack;  ///< room for kStack pairs of box numbers
-  void* moved_leaves;    ///< room for kMovedLeavesBytes, aligned to 64
+  void* moved_leaves;    ///< room for kMovedLeavesBytes, aligned to 64 bytes
   std::uint32_t max_node_visits = 0;
-  // How far it has come:
+  // Progress:
   std::uint32_t node_visits = 0, pair_count = 0, intersecting_count = 0, stack_top = 0;
   bool started = false;
-  bool overflow = false;  ///< there was no room for all
+  bool overflow = false;  ///< true if the room for pairs or the stack is exhausted
 };
 constexpr std::size_t kStack = 8192;
 constexpr std::size_t kMovedLeavesBytes = std::size_t{1} << 17;
 
-/// Goes on until the stack is empty, there is no room, or the visits are used up.
+/// Continues until the stack is empty, the room is exhausted or max_node_visits is reached. RT-safe.
 using TraversalKernel = void (*)(TraversalJob&) noexcept;
-void walk_portable(TraversalJob& job) noexcept;
-void walk_avx2(TraversalJob& job) noexcept;
-/// Does this processor run walk_avx2()?
+void traverse_portable(TraversalJob& job) noexcept;
+void traverse_avx2(TraversalJob& job) noexcept;
+/// Returns true if the processor supports traverse_avx2(). RT-safe.
 bool has_avx2() noexcept;
 
 }  // namespace simd
 
-/// Walks two trees together and lists the pairs of triangles that may meet.
+/// Traverses two BVHs together and lists the pairs of triangles that may meet.
 ///
-/// No pair that comes to touch on the way is left out (points of A are taken to move straight from start to
-/// end), nor one that touches at a pose within reach of the way. Pairs that a plane of one of the two
-/// triangles keeps apart all the way are left out, most others that do not meet too; what remains must be
-/// looked at in double precision. Which pairs remain depends on the processor, whether a pair that meets is
-/// among them does not.
+/// The list contains every pair that touches on the path (points of A move straight from start to end) or at
+/// a pose within reach of it. It omits the pairs that the plane of one of the two triangles separates on the
+/// whole path, and most other separate pairs. The caller tests the listed pairs in double precision. The
+/// processor decides which separate pairs remain in the list. It does not affect the pairs that meet.
 ///
-/// All memory is taken at construction. One object serves one thread.
+/// The constructor allocates all memory. One object serves one thread. All members but the constructor are
+/// RT-safe.
 class BvhTraversal {
  public:
   static constexpr std::size_t kCapacity = std::size_t{1} << 16;
 
   explicit BvhTraversal(
-      simd::TraversalKernel kernel = nullptr);  ///< null: the fastest that this processor runs
+      simd::TraversalKernel kernel = nullptr);  ///< null: selects the fastest kernel for this processor
 
-  /// False where the list or the budget was too small; what was found is there. The budget falls by the work
-  /// done. RT safe.
+  /// Runs a complete traversal. Returns false if the room for pairs or the budget is too small; the list then
+  /// holds the pairs found so far. Reduces the budget by the work done. RT-safe.
   bool find(const TriangleBvh& a, const TriangleBvh& b, const Sweep& sweep, VisitBudget& budget) noexcept {
     start(a, b, sweep);
     return resume(budget) && complete();
   }
 
-  /// The same in parts: sets out, goes on until the budget is used up; true: the walk has ended. The trees
-  /// must outlive it. RT safe.
+  /// The same traversal in parts: start() prepares it, resume() continues until it has ended (returns true)
+  /// or the budget is spent (returns false). Both BVHs must outlive the traversal. RT-safe.
   void start(const TriangleBvh& a, const TriangleBvh& b, const Sweep& sweep) noexcept;
   bool resume(VisitBudget& budget) noexcept;
-  /// Was there room for all pairs, as far as it came?
+  /// Returns true if the room for pairs was sufficient so far. RT-safe.
   bool complete() const noexcept { return !job_.overflow; }
 
-  /// Of a walk that settles: pairs that meet for sure. What is listed besides is in doubt, what is not
-  /// listed is apart.
+  /// Returns the pairs that certainly intersect, for a traversal with Sweep::classify. Listed pairs are
+  /// then in doubt, all others are separate. RT-safe.
   std::span<const TrianglePair> intersecting() const noexcept {
     return std::span(pairs_).last(job_.intersecting_count);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For every processor.
-#define WRENCHD_WALK walk_portable
+// Compiled for every processor.
+#define WRENCHD_TRAVERSE traverse_portable
 #include "collision/pairs/bvh_traversal_kernel.hpp"
 
 namespace wrenchd::simd {

@@ -12,8 +12,8 @@ CandidatePairs::CandidatePairs(const Scene& scene)
   relative_paths_.reserve(scene.meshes().size());
 }
 
-void CandidatePairs::start(const Path& way) noexcept {
-  path_ = way;
+void CandidatePairs::start(const Path& path) noexcept {
+  path_ = path;
   node_visits_ = 0;
   pairs_.clear();
   culler_.clear();
@@ -45,14 +45,14 @@ bool CandidatePairs::will_cover(const Pose& X_WT, double time_s) const noexcept 
   if (state_ == State::empty || margin_m(X_WT) < 0.0) return false;
   if (!scene_.has_moving_obstacles()) return true;
   return path_.start_s <= time_s && time_s <= path_.end_s &&
-         std::all_of(relative_paths_.begin(), relative_paths_.end(), [&](const RelativePath& seen) {
-           const Pose X_OW = inverse(scene_.meshes()[seen.obstacle].X_WO_at(time_s));
-           return distance_m(seen.path, X_OW * X_WT) <= path_.reach_m;
+         std::all_of(relative_paths_.begin(), relative_paths_.end(), [&](const RelativePath& relative) {
+           const Pose X_OW = inverse(scene_.meshes()[relative.obstacle].X_WO_at(time_s));
+           return distance_m(relative.path, X_OW * X_WT) <= path_.reach_m;
          });
 }
 
 bool CandidatePairs::resume(VisitBudget& budget) noexcept {
-  const std::uint32_t granted = budget.remaining;
+  const std::uint32_t initial_budget = budget.remaining;
   bool ended = true;
   while (in_progress() && ended) {
     ended = traversal_.resume(budget);
@@ -63,18 +63,18 @@ bool CandidatePairs::resume(VisitBudget& budget) noexcept {
       start_next_obstacle();
     }
   }
-  node_visits_ += granted - budget.remaining;
+  node_visits_ += initial_budget - budget.remaining;
   return !in_progress();
 }
 
-/// What the walk has found since. False where there is no room for it.
+/// Appends the pairs that the traversal has found since the last call. Returns false if there is no room.
 bool CandidatePairs::append_found_pairs() noexcept {
-  const std::size_t found = traversal_.size() - appended_;
-  if (!traversal_.complete() || pairs_.size() + found > pairs_.capacity()) return false;
+  const std::size_t count = traversal_.size() - appended_;
+  if (!traversal_.complete() || pairs_.size() + count > pairs_.capacity()) return false;
   const std::uint32_t obstacle = nearby_obstacles_[next_obstacle_];
   const MeshSurface& tool = scene_.tool_mesh()->surface;
   const MeshSurface& surface = scene_.meshes()[obstacle].mesh->surface;
-  for (const TrianglePair& pair : std::span(traversal_.begin() + appended_, found)) {
+  for (const TrianglePair& pair : std::span(traversal_.begin() + appended_, count)) {
     pairs_.push_back({pair.a, pair.b, obstacle});
     culler_.add(tool, pair.a, surface, pair.b, obstacle);
   }
@@ -82,20 +82,20 @@ bool CandidatePairs::append_found_pairs() noexcept {
   return true;
 }
 
-/// The nearest pose on the way is as far along it as the shift and the turn together say.
-double CandidatePairs::distance_m(const Path& way, const Pose& X_WT) const noexcept {
-  const Pose& start = way.X_WT_start;
-  const Pose& end = way.X_WT_end;
+/// Finds the nearest pose of the path by projecting translation and rotation together on the path.
+double CandidatePairs::distance_m(const Path& path, const Pose& X_WT) const noexcept {
+  const Pose& start = path.X_WT_start;
+  const Pose& end = path.X_WT_end;
   const double r_m = scene_.tool_radius_m();
-  const Vector3d shift_m = end.translation_m - start.translation_m;
-  const Vector3d turn = small_rotation_vector(start.rotation.conjugate() * end.rotation);
-  const double length2 = shift_m.squaredNorm() + r_m * r_m * turn.squaredNorm();
-  const double along =
-      shift_m.dot(X_WT.translation_m - start.translation_m) +
-      r_m * r_m * turn.dot(small_rotation_vector(start.rotation.conjugate() * X_WT.rotation));
-  const double share = length2 > 0.0 ? std::clamp(along / length2, 0.0, 1.0) : 0.0;
+  const Vector3d translation_m = end.translation_m - start.translation_m;
+  const Vector3d rotation = small_rotation_vector(start.rotation.conjugate() * end.rotation);
+  const double length2 = translation_m.squaredNorm() + r_m * r_m * rotation.squaredNorm();
+  const double projection =
+      translation_m.dot(X_WT.translation_m - start.translation_m) +
+      r_m * r_m * rotation.dot(small_rotation_vector(start.rotation.conjugate() * X_WT.rotation));
+  const double fraction = length2 > 0.0 ? std::clamp(projection / length2, 0.0, 1.0) : 0.0;
   return displacement_bound_m(
-      X_WT, {start.rotation.slerp(share, end.rotation), start.translation_m + share * shift_m});
+      X_WT, {start.rotation.slerp(fraction, end.rotation), start.translation_m + fraction * translation_m});
 }
 
 double CandidatePairs::displacement_bound_m(const Pose& from, const Pose& to) const noexcept {
@@ -103,28 +103,29 @@ double CandidatePairs::displacement_bound_m(const Pose& from, const Pose& to) co
          scene_.tool_radius_m() * from.rotation.angularDistance(to.rotation);
 }
 
-/// Of thousands of obstacles few are near, and they stay the same while the tool moves by its own size.
+/// Selects the obstacles at rest that are near. Few of thousands are near, and the selection stays valid
+/// while the tool moves by its own size.
 void CandidatePairs::find_nearby_static_obstacles() noexcept {
-  const auto from_there_m = [&](const Pose& X) { return (X.translation_m - nearby_centre_W_m_).norm(); };
+  const auto from_centre_m = [&](const Pose& X) { return (X.translation_m - nearby_centre_W_m_).norm(); };
   nearby_obstacles_.resize(nearby_static_count_);
-  if (std::max(from_there_m(path_.X_WT_start), from_there_m(path_.X_WT_end)) + path_.reach_m <=
+  if (std::max(from_centre_m(path_.X_WT_start), from_centre_m(path_.X_WT_end)) + path_.reach_m <=
       nearby_radius_m_)
     return;
   const double tool_m = scene_.tool_radius_m();
   nearby_centre_W_m_ = path_.X_WT_start.translation_m;
-  nearby_radius_m_ = tool_m + path_.reach_m + from_there_m(path_.X_WT_end);
+  nearby_radius_m_ = tool_m + path_.reach_m + from_centre_m(path_.X_WT_end);
   nearby_obstacles_.clear();
   for (std::uint32_t k = 0; k < scene_.meshes().size(); ++k) {
     const MeshObstacle& obstacle = scene_.meshes()[k];
     if (obstacle.moves()) continue;
-    const double together_m = obstacle.radius_m + tool_m + nearby_radius_m_;
-    if ((obstacle.centre_W_m - nearby_centre_W_m_).squaredNorm() <= together_m * together_m)
+    const double contact_distance_m = obstacle.radius_m + tool_m + nearby_radius_m_;
+    if ((obstacle.centre_W_m - nearby_centre_W_m_).squaredNorm() <= contact_distance_m * contact_distance_m)
       nearby_obstacles_.push_back(k);
   }
   nearby_static_count_ = nearby_obstacles_.size();
 }
 
-/// Of those that move, all that may be met on the way; they are few.
+/// Selects the moving obstacles that the tool may meet on the path. They are few.
 void CandidatePairs::find_nearby_moving_obstacles() noexcept {
   relative_paths_.clear();
   if (!scene_.has_moving_obstacles()) return;
@@ -135,8 +136,9 @@ void CandidatePairs::find_nearby_moving_obstacles() noexcept {
     if (!obstacle.moves()) continue;
     const Pose X_WO = obstacle.X_WO_at(path_.start_s);
     const double moved_m = (path_.end_s - path_.start_s) * obstacle.speed_bound_m_per_s();
-    const double together_m = obstacle.radius_m + tool_m + moved_m;
-    if ((X_WO * obstacle.centre_O_m - path_.X_WT_start.translation_m).squaredNorm() > together_m * together_m)
+    const double contact_distance_m = obstacle.radius_m + tool_m + moved_m;
+    if ((X_WO * obstacle.centre_O_m - path_.X_WT_start.translation_m).squaredNorm() >
+        contact_distance_m * contact_distance_m)
       continue;
     nearby_obstacles_.push_back(k);
     relative_paths_.push_back({k,

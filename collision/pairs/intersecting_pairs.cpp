@@ -21,18 +21,18 @@ IntersectingPairs::IntersectingPairs(simd::TraversalKernel kernel) : traversal_(
 
 bool IntersectingPairs::find(const MeshBvh& a, const MeshBvh& b, const Pose& X_BA) noexcept {
   VisitBudget unlimited = {std::numeric_limits<std::uint32_t>::max()};
-  Sweep here = {X_BA, X_BA};
-  here.classify = true;
-  const bool all = traversal_.find(a.bvh, b.bvh, here, unlimited);
-  const std::span<const TrianglePair> sure = traversal_.intersecting();
-  pairs_.assign(sure.begin(), sure.end());
+  Sweep sweep = {X_BA, X_BA};
+  sweep.classify = true;
+  const bool complete = traversal_.find(a.bvh, b.bvh, sweep, unlimited);
+  const std::span<const TrianglePair> certain = traversal_.intersecting();
+  pairs_.assign(certain.begin(), certain.end());
   const Frame X(X_BA);
   for (const TrianglePair& pair : traversal_) {
     Triangle moved = triangle(a.surface, pair.a);
     for (Vector3d& corner : moved) corner = X * corner;
     if (triangles_intersect(moved, triangle(b.surface, pair.b))) pairs_.push_back(pair);
   }
-  return all;
+  return complete;
 }
 
 }  // namespace wrenchd

@@ -9,21 +9,20 @@
 
 namespace wrenchd {
 
-/// All pairs of triangles of two meshes that meet at one pose, touching included.
+/// Finds all pairs of triangles of two meshes that intersect at one pose, touching pairs included.
 ///
-/// A walk decides what single precision can decide for sure; of the few pairs that are left each is asked in
-/// double precision (triangles_intersect()). All memory is taken at construction. One object serves one
-/// thread.
+/// The BVH traversal classifies pairs in single precision. Pairs in doubt are tested in double precision
+/// (triangles_intersect()). The constructor allocates all memory. One object serves one thread.
 class IntersectingPairs {
  public:
   explicit IntersectingPairs(
-      simd::TraversalKernel kernel = nullptr);  ///< null: the fastest that this processor runs
+      simd::TraversalKernel kernel = nullptr);  ///< null: selects the fastest kernel for this processor
 
-  /// A at X_BA, B standing. False where there was no room for all that may meet; what was found is there.
-  /// RT safe.
+  /// Searches the pairs with A at X_BA in the frame of B. Returns false if the room for pairs was too small;
+  /// pairs() then holds the pairs found so far. Not RT-safe: allocates nothing, but its work is unbounded.
   bool find(const MeshBvh& a, const MeshBvh& b, const Pose& X_BA) noexcept;
   std::span<const TrianglePair> pairs() const noexcept { return pairs_; }
-  /// Of the last search: how many pairs were asked in double precision.
+  /// Returns the number of pairs that the last search tested in double precision.
   std::size_t double_precision_tests() const noexcept { return traversal_.size(); }
 
  private:

@@ -14,78 +14,85 @@ namespace wrenchd {
 
 namespace simd {
 
-/// The planes of eight triangles and the corners of eight others, side by side, each as its own body has it.
+/// The planes of eight triangles of one body and the corners of eight triangles of the other. Each is in the
+/// frame of its own body.
 struct PairBlock {
   float normal[3][8], offset[8];
-  float corner[3][3][8];  ///< [which][component]
+  float corner[3][3][8];  ///< [corner][component]
 };
-/// How the tool T moves as the obstacle O sees it, and the other way round: at the start and at the end.
+/// The path of the tool T in the frame of the obstacle O, and its inverse, at start and end.
 struct CullPath {
   Transform X_TO[2], X_OT[2];
-  float margin;  ///< pairs that are apart by more are left out [m]
+  float margin;  ///< separation beyond which a pair is culled [m]
 };
-/// For these blocks, by their numbers: how far apart all of its pairs are at least, all the way, and a bit
-/// for every pair that is apart by no more than the margin.
-using CullKernel = void (*)(const PairBlock* of_obstacle, const PairBlock* of_tool,
-                            const std::uint32_t* which, std::size_t blocks, const CullPath& way,
-                            float* apart_m, std::uint8_t* left) noexcept;
-void sift_portable(const PairBlock* of_obstacle, const PairBlock* of_tool, const std::uint32_t* which,
-                   std::size_t blocks, const CullPath& way, float* apart_m, std::uint8_t* left) noexcept;
-void sift_avx2(const PairBlock* of_obstacle, const PairBlock* of_tool, const std::uint32_t* which,
-               std::size_t blocks, const CullPath& way, float* apart_m, std::uint8_t* left) noexcept;
+/// Tests the given blocks. For each block it stores a lower bound of the separation of its pairs on the whole
+/// path, and a bit mask of the pairs whose separation is at most the margin. RT-safe.
+using CullKernel = void (*)(const PairBlock* obstacle_blocks, const PairBlock* tool_blocks,
+                            const std::uint32_t* block_indices, std::size_t blocks, const CullPath& path,
+                            float* separation_m, std::uint8_t* remaining) noexcept;
+void cull_portable(const PairBlock* obstacle_blocks, const PairBlock* tool_blocks,
+                   const std::uint32_t* block_indices, std::size_t blocks, const CullPath& path,
+                   float* separation_m, std::uint8_t* remaining) noexcept;
+void cull_avx2(const PairBlock* obstacle_blocks, const PairBlock* tool_blocks,
+               const std::uint32_t* block_indices, std::size_t blocks, const CullPath& path,
+               float* separation_m, std::uint8_t* remaining) noexcept;
 
 }  // namespace simd
 
-/// Pairs of a triangle of the tool and one of an obstacle, of which most are kept apart all the way by the
-/// plane of one of the two, or lie beside each other. Tells which are left: eight at a time, in single
-/// precision, and those that it leaves out by a margin.
+/// Removes candidate pairs that do not meet on a path. The plane of one of the two triangles, or their
+/// bounds, separate most pairs on the whole path. The test runs on eight pairs at a time in single precision,
+/// with a margin for rounding.
 ///
-/// It remembers how far apart eight pairs were: they are not asked again before the tool has come so far.
+/// The culler stores the separation of each block of eight pairs. It tests the block again only when the tool
+/// has moved by that distance.
 ///
-/// Memory is taken at construction. One object serves one thread.
+/// The constructor allocates all memory. One object serves one thread. All members but the constructor are
+/// RT-safe.
 class PairCuller {
  public:
-  /// Pairs with one obstacle, added one after the other.
+  /// The consecutive pairs with one obstacle.
   struct Group {
     std::uint32_t obstacle;
     std::uint32_t first_pair, first_block;
     std::uint32_t pairs;
-    Frame X_OT_start, X_OT_end;  ///< the way that was asked for last
-    double displacement_m;       ///< how far any point of the tool may have come, from way to way
+    Frame X_OT_start, X_OT_end;  ///< path of the last query
+    /// upper bound of the displacement of any tool point since separation_m_ was reset
+    double displacement_m;
   };
 
-  /// Room for so many pairs of so many obstacles with a tool of this size, its farthest point from its
-  /// centre. kernel: null is the fastest that this processor runs.
+  /// Allocates room for the pairs of a tool of this radius (distance of its farthest point from the centre of
+  /// mass). kernel: null selects the fastest kernel for this processor. Not RT-safe: allocates.
   PairCuller(std::size_t pairs, std::size_t obstacles, double tool_radius_m,
              simd::CullKernel kernel = nullptr);
 
   void clear() noexcept { groups_.clear(); }
-  /// Triangle a of the tool and b of an obstacle, which has this number. There must be room. RT safe.
+  /// Adds triangle a of the tool and triangle b of an obstacle. obstacle: index of the obstacle.
+  /// Precondition: there is room. RT-safe.
   void add(const MeshSurface& tool, std::uint32_t a, const MeshSurface& surface, std::uint32_t b,
            std::uint32_t obstacle) noexcept;
 
   std::span<const Group> groups() const noexcept { return groups_; }
 
   struct CullResult {
-    std::size_t remaining;  ///< pairs
-    std::size_t tested;     ///< pairs that were not known to be far apart
+    std::size_t remaining;  ///< pairs that may meet
+    std::size_t tested;     ///< pairs that were tested; the stored separation decided the others
   };
-  /// Of the pairs of part k, those that may meet while the tool moves straight from one pose to the other, in
-  /// the order in which they were added: their numbers in that order, of all parts. extent_m bounds the
-  /// coordinates of both bodies; margin_m: by how much they are to be kept apart, at least, what a chord
-  /// leaves out of an arc included. `left` has room for all. RT safe.
+  /// Finds the pairs of group k that may meet while the tool moves straight between two poses. Writes their
+  /// indices, in the order of add(), to `left`, which must have room for all pairs.
+  /// extent_m: bound of the coordinates of both bodies. margin_m: minimum separation of a culled pair,
+  /// including the arc deviation [m]. RT-safe.
   CullResult cull(std::size_t k, const Frame& X_OT_start, const Frame& X_OT_end, double extent_m,
-                  double margin_m, std::uint32_t* left) noexcept;
+                  double margin_m, std::uint32_t* remaining) noexcept;
 
  private:
-  void accumulate_displacement(Group& part, const Frame& X_OT_start, const Frame& X_OT_end) noexcept;
+  void accumulate_displacement(Group& group, const Frame& X_OT_start, const Frame& X_OT_end) noexcept;
   double displacement_bound_m(const Frame& from, const Frame& to) const noexcept;
 
   double tool_radius_m_;
   simd::CullKernel kernel_;
   std::vector<Group> groups_;
   std::vector<simd::PairBlock> obstacle_blocks_, tool_blocks_;
-  std::vector<float> separation_m_;  ///< of each block, from where the tool was when displacement_m was 0
+  std::vector<float> separation_m_;  ///< lower bound of each block's separation at displacement_m = 0
 };
 
 }  // namespace wrenchd

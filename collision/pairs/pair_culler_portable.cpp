@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For every processor.
-#define WRENCHD_SIFT sift_portable
+// Compiled for every processor.
+#define WRENCHD_CULL cull_portable
 #include "collision/pairs/pair_culler_kernel.hpp"

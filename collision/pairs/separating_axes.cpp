@@ -10,8 +10,8 @@ namespace wrenchd {
 
 SeparatingAxes::SeparatingAxes(simd::AxesKernel kernel)
     : kernel_(kernel != nullptr  ? kernel
-              : simd::has_avx2() ? simd::apart_avx2
-                                 : simd::apart_portable) {}
+              : simd::has_avx2() ? simd::separated_avx2
+                                 : simd::separated_portable) {}
 
 bool SeparatingAxes::separated(const Triangle& a_start, const Triangle& a_end, const Triangle& b,
                                double margin_m) const noexcept {

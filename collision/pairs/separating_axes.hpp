@@ -7,29 +7,30 @@ namespace wrenchd {
 
 namespace simd {
 
-/// Corners from a place between them, in units of the farthest coordinate.
+/// Corners relative to a point between the triangles, in units of the largest coordinate.
 struct AxesTriangles {
   float a[2][3][3];  ///< [start, end][corner][component]
   float b[3][3];
   float margin;
 };
-/// True: a plane keeps the two apart all the way, by more than the margin.
+/// Returns true if a plane separates the triangles on the whole path by more than the margin. RT-safe.
 using AxesKernel = bool (*)(const AxesTriangles& pair) noexcept;
-bool apart_portable(const AxesTriangles& pair) noexcept;
-bool apart_avx2(const AxesTriangles& pair) noexcept;
+bool separated_portable(const AxesTriangles& pair) noexcept;
+bool separated_avx2(const AxesTriangles& pair) noexcept;
 
 }  // namespace simd
 
-/// Is a triangle that moves straight kept apart from one that stands still by a plane upright on a side of
-/// one of them, or parallel to an edge of each? These are the planes that the sieve (pair_sieve.hpp) does not
-/// try. In single precision, from a place near by, so that a margin of a nanometre counts between small
-/// triangles.
+/// Tests whether a plane separates a triangle that moves straight from a triangle at rest. It tests the
+/// planes that contain an edge and the normal of one triangle, and the planes parallel to an edge of each.
+/// The pair culler (pair_culler.hpp) tests all other planes. The test runs in single precision, relative to a
+/// nearby point, so that a margin of 1 nm is significant between small triangles.
 class SeparatingAxes {
  public:
-  /// kernel: null is the fastest that this processor runs.
+  /// kernel: null selects the fastest kernel for this processor.
   explicit SeparatingAxes(simd::AxesKernel kernel = nullptr);
 
-  /// False does not say that they meet. margin_m: by how much they are to be kept apart, at least. RT safe.
+  /// Returns true if a plane separates the triangles by more than margin_m [m]. False does not imply that
+  /// they meet. RT-safe.
   bool separated(const Triangle& a_start, const Triangle& a_end, const Triangle& b,
                  double margin_m) const noexcept;
 

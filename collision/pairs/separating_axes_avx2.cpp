@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compiled for AVX2 and FMA, and called only where the processor has them.
-#define WRENCHD_APART apart_avx2
+// Compiled for AVX2 and FMA; called only on processors that support them.
+#define WRENCHD_SEPARATED separated_avx2
 #include "collision/pairs/separating_axes_kernel.hpp"

@@ -5,11 +5,11 @@
 
 namespace wrenchd::simd {
 
-/// What single precision may be wrong by, as a share of the coordinates: rounding of the input, of two
-/// products of three terms each, and of a plane's offset.
+/// Error bound of single precision as a fraction of the coordinates: rounding of the input, of two products
+/// of three terms each, and of a plane's offset.
 constexpr double kRounding = 1.5e-6;
 
-/// R p + t, for the kernels: plain arrays, so that the translation units for AVX2 share no inline function
+/// The transformation R p + t as plain arrays. The AVX2 translation units must not share inline functions
 /// with the rest of the program.
 struct Transform {
   float R[3][3];

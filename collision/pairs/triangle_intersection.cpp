@@ -7,16 +7,17 @@
 namespace wrenchd {
 namespace {
 
-/// Does a plane across this axis pass between the two?
+/// Returns true if a plane perpendicular to this axis separates the triangles.
 bool apart_along(const Vector3d& axis, const Triangle& p, const Triangle& q) noexcept {
-  // From one corner, so that a place far from the origin costs no digits.
+  // Coordinates are relative to one corner, so that a position far from the origin loses no digits.
   const double p1 = axis.dot(p[1] - p[0]), p2 = axis.dot(p[2] - p[0]);
   const double q0 = axis.dot(q[0] - p[0]), q1 = axis.dot(q[1] - p[0]), q2 = axis.dot(q[2] - p[0]);
   return std::min({q0, q1, q2}) > std::max({0.0, p1, p2}) || std::max({q0, q1, q2}) < std::min({0.0, p1, p2});
 }
 
-/// Two convex polygons in space are apart where a plane passes between them that is parallel to one of them,
-/// to an edge of each, or, where they lie in one plane, upright on an edge of one.
+/// Two convex polygons in space are apart if one of these planes separates them: a plane parallel to one of
+/// them, a plane parallel to an edge of each, or, for coplanar polygons, a plane that contains an edge and
+/// the normal.
 bool meet_by_axes(const Triangle& p, const Triangle& q) noexcept {
   const Triangle e = {p[1] - p[0], p[2] - p[1], p[0] - p[2]};
   const Triangle f = {q[1] - q[0], q[2] - q[1], q[0] - q[2]};
@@ -42,13 +43,13 @@ Heights heights(const Triangle& t, const Vector3d& origin, const Vector3d& norma
   return out;
 }
 
-/// Where a triangle that a plane cuts meets it, along the line of the cut.
+/// The interval in which a plane cuts a triangle, along the line of intersection.
 struct Interval {
   double low, high;
 };
 
-/// x: the corners' coordinates along the line. The two sides that leave the corner which is alone on its side
-/// of the plane are cut where their height is zero.
+/// x: coordinates of the corners along the line. The plane cuts the two sides at the corner that is alone on
+/// its side of the plane.
 Interval cut(const double (&x)[3], const double (&h)[3]) noexcept {
   const int alone = (h[0] > 0.0) == (h[1] > 0.0) ? 2 : (h[0] > 0.0) == (h[2] > 0.0) ? 1 : 0;
   const int i = alone == 2 ? 0 : alone + 1, j = alone == 0 ? 2 : alone - 1;
@@ -59,11 +60,11 @@ Interval cut(const double (&x)[3], const double (&h)[3]) noexcept {
 
 }  // namespace
 
-// Each triangle must cut the other's plane; both cuts lie on the line where the planes meet, and the
-// triangles meet where the cuts overlap. Where a corner lies in the other's plane, as far as rounding can
-// tell, or the ends of the cuts coincide, all axes are looked at instead.
+// Two triangles intersect if each cuts the other's plane and the two cuts overlap on the line of intersection
+// of the planes. If rounding leaves in doubt whether a corner lies in the other's plane, or whether the ends
+// of the cuts coincide, the test uses all separating axes.
 bool triangles_intersect(const Triangle& p, const Triangle& q) noexcept {
-  constexpr double kRounding = 1e-9;  // of the largest height, far above what rounding can make of it
+  constexpr double kRounding = 1e-9;  // fraction of the largest height, far above rounding
   const Vector3d m = (q[1] - q[0]).cross(q[2] - q[0]);
   const Heights p_above = heights(p, q[0], m);
   const auto all_one_side = [](const Heights& a) {

@@ -9,8 +9,8 @@ namespace wrenchd {
 
 using Triangle = std::array<Vector3d, 3>;
 
-/// Do two triangles have a point in common? Double precision: two that are apart or overlap by less than
-/// rounding may be called either. RT safe.
+/// Returns true if two triangles have a point in common. Uses double precision. The result is undefined if
+/// the gap or the overlap is below rounding. RT-safe.
 bool triangles_intersect(const Triangle& p, const Triangle& q) noexcept;
 
 }  // namespace wrenchd

@@ -6,11 +6,11 @@
 
 namespace wrenchd {
 
-ControlInterface::ControlInterface(Runtime& station, EventFeed& feed)
-    : runtime_(station),
+ControlInterface::ControlInterface(Runtime& runtime, EventFeed& feed)
+    : runtime_(runtime),
       feed_(feed),
-      lease_(station.loop(), feed),
-      methods_(station.config().settings.control) {
+      lease_(runtime.loop(), feed),
+      methods_(runtime.config().settings.control) {
   add_daemon_methods(methods_, {runtime_, feed_, lease_, status_sections_});
 }
 

@@ -15,20 +15,20 @@ namespace wrenchd {
 
 class Runtime;
 
-/// The control socket of a running station, and what is behind it: the methods, the lease, the events. Parts
-/// of the daemon add their methods, then it opens.
+/// The control interface of a runtime: control socket, method table and lease. Parts of the daemon add their
+/// methods before open(). Not RT-safe: allocates.
 class ControlInterface {
  public:
   /// Station and feed must outlive this.
-  ControlInterface(Runtime& station, EventFeed& feed);
+  ControlInterface(Runtime& runtime, EventFeed& feed);
 
-  /// To add rows to, before open().
+  /// Method table. Add rows before open().
   MethodTable& methods() noexcept { return methods_; }
-  /// Likewise, of what `status` answers.
+  /// Additional members of the result of `status`. Add them before open().
   StatusSections& status_sections() noexcept { return status_sections_; }
 
-  /// Serves from now on. Throws std::runtime_error, which names the path, or the setting of a group that does
-  /// not exist, and the cure.
+  /// Starts to serve clients. Throws std::runtime_error if the path cannot be used or a configured group does
+  /// not exist; the message names the path or the setting, and the cure.
   void open(const std::filesystem::path& path, const IdentifyPeer& identify = peer_of);
 
  private:
@@ -38,7 +38,7 @@ class ControlInterface {
   StatusSections status_sections_;
   MethodTable methods_;
   std::optional<ListeningSocket> listening_socket_;
-  std::optional<ControlSocket> control_socket_;  ///< last: its thread uses all of the above
+  std::optional<ControlSocket> control_socket_;  ///< last member: its thread uses the members above
 };
 
 }  // namespace wrenchd

@@ -13,15 +13,15 @@
 namespace wrenchd {
 namespace {
 
-/// Of the protocol: one more when a client that knows the last would misread us.
-constexpr int kProtocol = 1;
+/// Version of the protocol. Increase it with each change that breaks a client of the previous version.
+constexpr int kProtocol = 2;
 
 bool is_vector(const Json& value) {
   return value.is_array() && value.size() == 3 &&
          std::all_of(value.begin(), value.end(), [](const Json& x) { return x.is_number(); });
 }
 
-/// 2.0 is whole too; what an int64 does not hold is not.
+/// Returns true if the value is an integer that fits into int64.
 bool is_whole(const Json& value) {
   if (value.is_number_unsigned())
     return value.get<std::uint64_t>() <= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
@@ -49,17 +49,17 @@ bool is(const Json& value, ParamType type) {
   return false;
 }
 
-/// With the point that it may lack.
-std::string sentence(const std::string& words) {
-  return words.ends_with('?') || words.ends_with('.') ? words : words + '.';
+/// Returns the text with a full stop at its end.
+std::string sentence(const std::string& text) {
+  return text.ends_with('?') || text.ends_with('.') ? text : text + '.';
 }
 
-std::string found(const Json& value) {
+std::string dumped(const Json& value) {
   return printable(value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-RpcError wrong_params(const MethodRow& row, const std::string& what) {
-  return {RpcCode::invalid_params, sentence("Method '" + row.name + "': " + what)};
+RpcError invalid_params(const MethodRow& row, const std::string& error) {
+  return {RpcCode::invalid_params, sentence("Method '" + row.name + "': " + error)};
 }
 
 void check_params(const MethodRow& row, const Json& params) {
@@ -69,17 +69,17 @@ void check_params(const MethodRow& row, const Json& params) {
     const auto param = std::find_if(row.params.begin(), row.params.end(),
                                     [&name = name](const ParamRow& p) { return p.name == name; });
     if (param == row.params.end())
-      throw wrong_params(row, known.empty() ? "it takes no parameters, and not '" + printable(name) + "'"
-                                            : "there is no parameter '" + printable(name) + "'; " +
-                                                  nearest_key(name, known).advice);
+      throw invalid_params(row, known.empty() ? "it takes no parameters, found '" + printable(name) + "'"
+                                              : "there is no parameter '" + printable(name) + "'; " +
+                                                    nearest_key(name, known).advice);
     if (!is(value, param->type))
-      throw wrong_params(row, "parameter '" + name + "' has to be " + type_text(param->type) + ", and is " +
-                                  found(value) + "; it is: " + param->doc);
+      throw invalid_params(row, "parameter '" + name + "' must be " + type_text(param->type) + ", found " +
+                                    dumped(value) + "; it is: " + param->doc);
   }
   for (const ParamRow& param : row.params)
     if (param.required && !params.contains(param.name))
-      throw wrong_params(row, "parameter '" + param.name + "', " + type_text(param.type) +
-                                  ", is missing; it is: " + param.doc);
+      throw invalid_params(row, "parameter '" + param.name + "', " + type_text(param.type) +
+                                    ", is missing; it is: " + param.doc);
 }
 
 }  // namespace
@@ -125,13 +125,13 @@ const MethodRow& MethodTable::look_up(const RpcRequest& request, Role role) cons
                                                        "'; " + nearest_key(request.method, known).advice));
   }
   const MethodRow& row = found->second;
-  // Who may not ask learns nothing of whether it asked well.
+  // The role comes first: a client without permission gets no advice about parameters.
   if (role < row.min_role)
     throw RpcError(RpcCode::permission_denied,
                    "Method '" + row.name + "' is for " + name(row.min_role) + "s, and you are " +
                        (role == Role::observer ? "an " : "a ") + name(role) + ". It is for " +
                        role_group_text(row.min_role, settings_) + ".",
-                   {{"role", name(role)}, {"needs", name(row.min_role)}});
+                   {{"role", name(role)}, {"min_role", name(row.min_role)}});
   check_params(row, request.params);
   return row;
 }
@@ -156,7 +156,7 @@ Json MethodTable::describe() const {
       params[param.name] = {
           {"type", type_text(param.type)}, {"required", param.required}, {"doc", param.doc}};
     methods.push_back(
-        {{"name", name}, {"role", wrenchd::name(row.min_role)}, {"params", params}, {"doc", row.doc}});
+        {{"name", name}, {"min_role", wrenchd::name(row.min_role)}, {"params", params}, {"doc", row.doc}});
   }
   Json events = Json::array();
   for (const EventRow& row : events_) events.push_back({{"name", row.name}, {"doc", row.doc}});
@@ -172,15 +172,15 @@ Json MethodTable::describe() const {
           {"methods", methods},
           {"events", events},
           {"errors",
-           {error(RpcCode::parse_error, "The line was not understood."),
-            error(RpcCode::invalid_request, "It is JSON, and no request."),
+           {error(RpcCode::parse_error, "The line is no valid JSON."),
+            error(RpcCode::invalid_request, "The line is valid JSON, but no request."),
             error(RpcCode::method_not_found, "There is no such method."),
-            error(RpcCode::invalid_params, "A parameter is unknown, missing, or of another type."),
-            error(RpcCode::internal_error, "It failed, and that is the daemon's fault."),
-            error(RpcCode::permission_denied, "The role is too low. data: role, needs."),
-            error(RpcCode::invalid_state, "The state does not allow it. data: state."),
-            error(RpcCode::lease_held, "Somebody else holds the lease. data: holder."),
-            error(RpcCode::rejected, "What the request names is not as it has to be.")}},
+            error(RpcCode::invalid_params, "A parameter is unknown, missing, or of the wrong type."),
+            error(RpcCode::internal_error, "The method failed because of an error in the daemon."),
+            error(RpcCode::permission_denied, "The role is too low. data: role, min_role."),
+            error(RpcCode::invalid_state, "The present state does not allow the request. data: state."),
+            error(RpcCode::lease_held, "Another client holds the lease. data: holder."),
+            error(RpcCode::rejected, "A file or value that the request names is invalid.")}},
           {"limits",
            {{"line_bytes", kMaxLineBytes}, {"depth", kMaxDepth}, {"events_kept", EventFeed::kHistorySize}}}};
 }

@@ -17,48 +17,49 @@
 
 namespace wrenchd {
 
-// What can be asked of the daemon: one row of one table for each method, in which `describe`, the checks and
-// the socket look everything up. A part of the daemon adds its rows from a file of its own.
+// The method table: one row for each method of the control socket. `describe`, the parameter checks and the
+// socket read this table. Each part of the daemon adds its rows from a file of its own. Not RT-safe:
+// allocates.
 
-/// What a parameter may be. No number is ever NaN or infinite: JSON has none.
+/// Type of a parameter. A number is always finite, because JSON has neither NaN nor infinity.
 enum class ParamType : std::uint8_t { boolean, integer, number, text, texts, vector, object };
 
-/// "three numbers"
+/// Returns the type in words: "an array of three numbers".
 const char* type_text(ParamType type) noexcept;
 
 struct ParamRow {
-  std::string name;  ///< ends in its unit
+  std::string name;  ///< ends in the unit of the parameter
   ParamType type;
   bool required;
   std::string doc;
 };
 
-/// What a client hears of events. Belongs to its connection.
+/// Event subscription of a client. Belongs to its connection.
 struct Subscription {
   bool active = false;
-  std::set<std::string> event_names;  ///< none: all
-  std::uint64_t next_sequence = 0;    ///< sequence number of the first that it has not got
-  bool has_backlog = false;           ///< there are events already that it has not got
+  std::set<std::string> event_names;  ///< empty: all events
+  std::uint64_t next_sequence = 0;    ///< sequence number of the first event that is not sent yet
+  bool has_backlog = false;           ///< true: the feed holds events that did not fit into the last batch
 };
 
-/// Who asks.
+/// The client that calls a method.
 struct Caller {
-  std::uint64_t client = 0;  ///< number of the connection, never used again
+  std::uint64_t client = 0;  ///< number of the connection; each number is used once
   Role role = Role::observer;
   std::string identity;                  ///< for people: "process 4242 of uid 1000"
   Subscription* subscription = nullptr;  ///< null in slow methods
 };
 
-/// What a method answers.
+/// Result of a method.
 struct MethodResult {
   Json result;
-  int fd = -1;  ///< goes with the reply (SCM_RIGHTS); -1: none
+  int fd = -1;  ///< sent with the reply (SCM_RIGHTS); -1: none
   std::shared_ptr<const OwnedFd> owned_fd;
 
-  MethodResult(Json json) : result(std::move(json)) {}  // NOLINT: a result is an answer
-  /// A descriptor that stays open here.
+  MethodResult(Json json) : result(std::move(json)) {}  // NOLINT: implicit, so that a method returns JSON
+  /// The caller keeps the descriptor open.
   MethodResult(Json json, int descriptor) : result(std::move(json)), fd(descriptor) {}
-  /// One that is for whoever asked alone.
+  /// The result owns the descriptor and closes it.
   MethodResult(Json json, OwnedFd descriptor)
       : result(std::move(json)),
         fd(descriptor.get()),
@@ -67,20 +68,19 @@ struct MethodResult {
 
 struct MethodRow {
   std::string name;  ///< "scene.move", or a plain verb
-  Role min_role;     ///< the lowest role that may ask
+  Role min_role;     ///< lowest role that may call the method
   std::vector<ParamRow> params;
-  std::string doc;  ///< what it does and answers, in a sentence or two
-  /// params: all that are required are there, of their types, and no other than those of the row. Throws
-  /// RpcError; a ConfigError becomes RpcCode::refused. Runs on the control thread, where it must not wait, or
-  /// where `slow` is set on a thread for such.
+  std::string doc;  ///< effect and result, in one or two sentences
+  /// params: have the types of the row, include every required parameter and no unknown one. Throws RpcError;
+  /// a ConfigError becomes RpcCode::rejected. Must not block unless `slow` is set.
   std::function<MethodResult(const Json& params, const Caller& caller)> run;
-  bool slow = false;
+  bool slow = false;  ///< true: runs on the worker thread; false: runs on the control thread
 };
 
-/// All that can be asked. Built before the socket opens, and constant from then on.
+/// All methods and events. Complete before the socket opens, and constant afterwards.
 class MethodTable {
  public:
-  /// settings: for messages that say which group has a role.
+  /// settings: name the group of each role in error messages.
   explicit MethodTable(ControlSettings settings = {}) : settings_(std::move(settings)) {}
 
   void add(MethodRow row);
@@ -89,11 +89,11 @@ class MethodTable {
   const std::map<std::string, MethodRow>& methods() const noexcept { return methods_; }
   const std::vector<EventRow>& events() const noexcept { return events_; }
 
-  /// The row for the request, when it is one that this role may make, with the parameters it has to have.
-  /// Throws RpcError.
+  /// Returns the row of the requested method. Throws RpcError if the method is unknown, the role is too low
+  /// or a parameter is wrong.
   const MethodRow& look_up(const RpcRequest& request, Role role) const;
 
-  /// Runs it. Throws RpcError, and nothing else.
+  /// Runs the method. Turns every exception into RpcError.
   static MethodResult run(const MethodRow& row, const Json& params, const Caller& caller);
 
   /// {version, protocol, roles, methods, events, errors, limits}

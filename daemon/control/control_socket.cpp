@@ -14,48 +14,49 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-// A round: wait; let newcomers in; each client in turn, the most modest first, is read, a few of its lines
-// are done, and it is sent what is there for it; who holds the lease in silence loses it.
+// A round: wait for input; accept new clients; then serve each client, the one with the most tokens first:
+// read, process a few lines, send replies and events. At its end the round checks the lease.
 
 namespace wrenchd {
 namespace {
 
 constexpr std::uint64_t kListening = 0;
 constexpr std::uint64_t kWake = 1;
-constexpr int kAdmitPerRound = 16;
-constexpr Duration kNoDescriptors = std::chrono::milliseconds(100);
-/// What a read costs, so that nobody gains by sending a byte at a time.
+constexpr int kAcceptPerRound = 16;
+/// Pause before the next accept() if the process has no free descriptors.
+constexpr Duration kAcceptPause = std::chrono::milliseconds(100);
+/// Cost of a read. It makes many small writes no cheaper than one large write.
 constexpr double kRead_lines = 0.25;
-/// Events are handed over in pieces of this, so that one client's backlog does not hold up the others.
+/// Events for one client in one round, so that the backlog of one client does not delay the others.
 constexpr std::size_t kEventsPerRound_bytes = std::size_t{32} * 1024;
 
 TimePoint wall_now() {
   return std::chrono::steady_clock::now();
 }
 
-OwnedFd checked(int fd, const char* what) {
-  if (fd < 0) throw std::runtime_error(std::string(what) + ": " + std::strerror(errno));
+OwnedFd checked(int fd, const char* call) {
+  if (fd < 0) throw std::runtime_error(std::string(call) + ": " + std::strerror(errno));
   return OwnedFd(fd);
 }
 
-void add(int epoll, int fd, std::uint64_t who) {
+void add(int epoll, int fd, std::uint64_t number) {
   epoll_event event{};
   event.events = EPOLLIN;
-  event.data.u64 = who;
+  event.data.u64 = number;
   if (epoll_ctl(epoll, EPOLL_CTL_ADD, fd, &event) != 0)
     throw std::runtime_error(std::string("epoll_ctl: ") + std::strerror(errno));
 }
 
 void notify(int eventfd) {
   const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(eventfd, &one, sizeof one);  // full is awake
+  [[maybe_unused]] const ssize_t written = ::write(eventfd, &one, sizeof one);  // a full counter wakes too
 }
 
 double cost_lines(std::size_t bytes) {
   return 1.0 + static_cast<double>(bytes) / 1024.0;
 }
 
-/// With the descriptor beside its first byte, where there is one. As send(2).
+/// Sends bytes like send(2). If fd >= 0, sends the descriptor with the first byte.
 ssize_t send_some(int socket, std::string_view bytes, int fd) {
   iovec part{const_cast<char*>(bytes.data()), bytes.size()};
   msghdr message{};
@@ -74,9 +75,9 @@ ssize_t send_some(int socket, std::string_view bytes, int fd) {
   return ::sendmsg(socket, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
-/// To somebody who is not let in: one line, if there is room for it.
-void turn_away(int socket, const std::string& sentence) {
-  send_some(socket, error_line(nullptr, RpcError(RpcCode::permission_denied, sentence)), -1);
+/// Sends one error line, if the socket has room for it.
+void send_rejection(int socket, const std::string& message) {
+  send_some(socket, error_line(nullptr, RpcError(RpcCode::permission_denied, message)), -1);
 }
 
 }  // namespace
@@ -103,7 +104,7 @@ ControlSocket::~ControlSocket() {
   thread_.request_stop();
   notify(wake_fd_.get());
   thread_.join();
-  worker_.reset();  // uses what follows
+  worker_.reset();  // its tasks use the members
   feed_.set_wake_fd(-1);
 }
 
@@ -130,7 +131,7 @@ void ControlSocket::run(const std::stop_token& stop) {
   flush_before_exit();
 }
 
-/// Until something has to be done that no descriptor tells of.
+/// Returns the time until the next action that no descriptor triggers [ms]; -1: none.
 int ControlSocket::wait_ms(TimePoint now) const {
   TimePoint until = lease_.next_check_at();
   if (accept_again_at_ > now) until = std::min(until, accept_again_at_);
@@ -147,22 +148,23 @@ int ControlSocket::wait_ms(TimePoint now) const {
       std::chrono::ceil<std::chrono::milliseconds>(std::max(until - now, Duration{0})).count());
 }
 
-void ControlSocket::handle_epoll_event(std::uint64_t who, std::uint32_t what) {
-  if (who == kWake) {
+void ControlSocket::handle_epoll_event(std::uint64_t number, std::uint32_t events) {
+  if (number == kWake) {
     std::uint64_t ignored = 0;
     [[maybe_unused]] const ssize_t got = ::read(wake_fd_.get(), &ignored, sizeof ignored);
   }
-  const auto found = clients_.find(who);
+  const auto found = clients_.find(number);
   if (found == clients_.end()) return;
   Client& client = found->second;
-  if ((what & EPOLLIN) != 0) client.readable = true;
-  // Whoever can say nothing more can give no sign of life: the hand is not kept until that is read.
-  if ((what & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) {
+  if ((events & EPOLLIN) != 0) client.readable = true;
+  // No heartbeat can follow: end the lease at once, before the remaining input is read.
+  if ((events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0) {
     client.write_side_closed = true;
-    lease_.client_lost(who);
+    lease_.client_lost(number);
   }
-  if ((what & (EPOLLHUP | EPOLLERR)) == 0) return;
-  // What it said before is still done, as far as its share goes; epoll would not stop telling meanwhile.
+  if ((events & (EPOLLHUP | EPOLLERR)) == 0) return;
+  // The remaining input is still processed, as far as the tokens allow. Epoll would report the event
+  // meanwhile.
   client.disconnected = true;
   client.subscription.active = false;
   epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, client.socket.get(), nullptr);
@@ -170,20 +172,20 @@ void ControlSocket::handle_epoll_event(std::uint64_t who, std::uint32_t what) {
 
 void ControlSocket::accept_clients(TimePoint now) {
   if (now < accept_again_at_) return;
-  for (int i = 0; i < kAdmitPerRound; ++i) {
+  for (int i = 0; i < kAcceptPerRound; ++i) {
     OwnedFd socket(::accept4(listening_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
       if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;
-      accept_again_at_ = now + kNoDescriptors;
+      accept_again_at_ = now + kAcceptPause;
       return;
     }
     const std::optional<Peer> peer = identify_peer_(socket.get());
     const std::optional<Role> role = peer ? role_of(*peer, rules_) : std::nullopt;
     if (!role) {
-      turn_away(
+      send_rejection(
           socket.get(),
-          "You may not connect: you are in none of the groups that [control] in wrenchd.toml names. Ask "
-          "its administrator to add you to the one of its observers.");
+          "You may not connect: you are in none of the groups under [control] in wrenchd.toml. Ask the "
+          "administrator to add you to the group of the observers.");
       continue;
     }
     if (clients_.size() >= kMaxClients) evict_client();
@@ -205,7 +207,7 @@ void ControlSocket::accept_clients(TimePoint now) {
 void ControlSocket::evict_client() {
   std::map<uid_t, int> connections;
   for (const auto& [number, client] : clients_) ++connections[client.peer.uid];
-  auto leaves = clients_.end();
+  auto evicted = clients_.end();
   const auto before = [&](const Client& a, const Client& b) {
     const int of_a = connections[a.peer.uid], of_b = connections[b.peer.uid];
     if (of_a != of_b) return of_a > of_b;
@@ -214,14 +216,14 @@ void ControlSocket::evict_client() {
   };
   for (auto client = clients_.begin(); client != clients_.end(); ++client)
     if (!lease_.held_by(client->first) &&
-        (leaves == clients_.end() || before(client->second, leaves->second)))
-      leaves = client;
-  turn_away(leaves->second.socket.get(),
-            "You were silent for longest, and another needs the place; connect again.");
-  clients_.erase(leaves);
+        (evicted == clients_.end() || before(client->second, evicted->second)))
+      evicted = client;
+  send_rejection(evicted->second.socket.get(),
+                 "There are too many connections, and yours was silent for longest; connect again.");
+  clients_.erase(evicted);
 }
 
-/// Not before its share allows, nor before it has read what it asked for.
+/// Returns true if the client has tokens and reads its replies.
 bool ControlSocket::can_process_line(const Client& client) const noexcept {
   return client.tokens > 0.0 && client.output_bytes < kMaxUnsent_bytes && !client.close_after_flush &&
          !client.to_remove;
@@ -258,7 +260,7 @@ void ControlSocket::read_input(Client& client, TimePoint now) {
   }
 }
 
-/// A few whole lines, if there are any.
+/// Processes at most kLinesPerRound complete lines.
 void ControlSocket::process_lines(Client& client) {
   std::size_t begin = 0;
   for (int lines = 0; lines < kLinesPerRound && can_process_line(client); ++lines) {
@@ -269,10 +271,9 @@ void ControlSocket::process_lines(Client& client) {
     begin = end + 1;
   }
   client.input.erase(0, begin);
-  const bool whole = client.input.find('\n') != std::string::npos;
-  client.has_complete_line = whole;
-  if (whole || client.input.size() <= kMaxLineBytes || client.close_after_flush) return;
-  // Nobody knows where its next line would begin.
+  client.has_complete_line = client.input.find('\n') != std::string::npos;
+  if (client.has_complete_line || client.input.size() <= kMaxLineBytes || client.close_after_flush) return;
+  // The start of the next line is unknown, so the connection ends.
   queue_line(client, error_line(nullptr, RpcError(RpcCode::parse_error,
                                                   "The line is longer than " + std::to_string(kMaxLineBytes) +
                                                       " bytes, and the connection ends here; "
@@ -304,14 +305,13 @@ void ControlSocket::process_line(Client& client, std::string_view line) {
 void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const RpcRequest& request,
                                     const Caller& caller) {
   if (client.pending_methods > 0)
-    throw RpcError(RpcCode::invalid_state,
-                   "Your last request of this kind is still under way; wait for its answer.");
-  Caller away = caller;
-  away.subscription = nullptr;
-  const bool posted = worker_->post([this, &row, request, away] {
-    Finished finished{away.client, {}, {}};
+    throw RpcError(RpcCode::invalid_state, "Your last request of this kind still runs; wait for its reply.");
+  Caller worker_caller = caller;
+  worker_caller.subscription = nullptr;
+  const bool posted = worker_->post([this, &row, request, worker_caller] {
+    Finished finished{worker_caller.client, {}, {}};
     try {
-      const MethodResult answer = MethodTable::run(row, request.params, away);
+      const MethodResult answer = MethodTable::run(row, request.params, worker_caller);
       if (answer.fd >= 0) finished.fd = OwnedFd(::fcntl(answer.fd, F_DUPFD_CLOEXEC, 0));
       if (request.wants_reply) finished.line = reply_line(request.id, answer.result);
     } catch (const RpcError& error) {
@@ -324,8 +324,7 @@ void ControlSocket::run_slow_method(Client& client, const MethodRow& row, const 
     notify(wake_fd_.get());
   });
   if (!posted)
-    throw RpcError(RpcCode::invalid_state,
-                   "Others have asked for so much that takes long; try again in a moment.");
+    throw RpcError(RpcCode::invalid_state, "The queue of slow requests is full; try again in a moment.");
   ++client.pending_methods;
 }
 
@@ -343,7 +342,8 @@ void ControlSocket::send_finished_results() {
   }
 }
 
-/// What it does not read stays in the feed, for as long as that keeps it.
+/// Sends the next events of the subscription. Events that the client does not read stay in the feed's
+/// history.
 void ControlSocket::send_events(Client& client) {
   Subscription& subscription = client.subscription;
   if (!subscription.active || client.to_remove || client.output_bytes >= kMaxUnsent_bytes / 2) return;
@@ -353,11 +353,11 @@ void ControlSocket::send_events(Client& client) {
     queue_line(client,
                notification_line("event", {{"sequence", subscription.next_sequence + batch.lost - 1},
                                            {"time_ns", wall_now().time_since_epoch().count()},
-                                           {"name", "lost"},
+                                           {"name", "events_lost"},
                                            {"level", "warning"},
                                            {"text", std::to_string(batch.lost) +
-                                                        " events were lost: they were not read in time; ask "
-                                                        "for the status"},
+                                                        " events were lost: the client did not read them in "
+                                                        "time; request the status"},
                                            {"count", batch.lost}}));
   subscription.next_sequence = batch.next;
   subscription.has_backlog = batch.more;
@@ -375,7 +375,7 @@ void ControlSocket::flush(Client& client) {
     const std::string_view rest = std::string_view(chunk.bytes).substr(chunk.sent);
     const ssize_t sent = send_some(client.socket.get(), rest, chunk.fd.get());
     if (sent < 0 && (errno == EAGAIN || errno == EINTR || errno == ENOBUFS || errno == ETOOMANYREFS)) return;
-    if (sent < 0) {  // nobody is there to read it; what it said is still done
+    if (sent < 0) {  // the client does not read any more; its earlier requests are still processed
       client.output.clear();
       client.output_bytes = 0;
       client.subscription.active = false;
@@ -390,7 +390,7 @@ void ControlSocket::flush(Client& client) {
   }
 }
 
-/// Tells epoll what there is to wait for: nothing from who may not go on.
+/// Sets the events that epoll reports for the client. No input is reported while can_process_line() is false.
 void ControlSocket::update_epoll_events(Client& client) {
   if (client.disconnected) return;
   std::uint32_t wanted = 0;
@@ -398,7 +398,8 @@ void ControlSocket::update_epoll_events(Client& client) {
     if (!client.write_side_closed) wanted |= EPOLLRDHUP;
     if (!client.has_complete_line && can_process_line(client)) wanted |= EPOLLIN;
   }
-  // No news comes of events that did not fit into this round: the next is asked for.
+  // The feed does not wake this thread for events that did not fit into this round. EPOLLOUT starts the next
+  // one.
   const bool behind = client.subscription.active && client.subscription.has_backlog;
   if (!client.output.empty() || behind) wanted |= EPOLLOUT;
   if (wanted == client.epoll_events) return;
@@ -420,9 +421,9 @@ void ControlSocket::remove_clients() {
   }
 }
 
-/// The loop has ended, or is about to: those who listen are told so as far as they read it.
+/// Sends the last events to the subscribers, as far as they read them.
 void ControlSocket::flush_before_exit() {
-  lease_.release("loses it: the daemon ends");
+  lease_.release("loses it because the daemon ends");
   feed_.drain();
   for (auto& [number, client] : clients_) {
     send_events(client);

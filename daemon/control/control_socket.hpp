@@ -21,34 +21,38 @@
 
 namespace wrenchd {
 
-// What one client may use up. Beyond its share of lines it is read more slowly, and while it does not read
-// its answers it is not read at all: who floods waits, and nobody else does.
+// Limits of one client (token bucket). The socket reads a client that exceeds its rate more slowly, and does
+// not read a client that leaves its replies unread. A client that floods delays only itself.
 
 inline constexpr std::size_t kMaxClients = 32;
-/// A second, in the long run; a line costs one, another for each KiB of it, and a read by itself some.
+/// Rate at which a client gains tokens. A line costs one token, plus one for each KiB; each read costs a
+/// quarter.
 inline constexpr double kLinesPerSecond = 500.0;
+/// Largest number of tokens of a client.
 inline constexpr double kBurst_lines = 100.0;
-/// In one round, so that the next client's turn comes soon.
+/// Lines of one client in one round. A small number keeps the latency of the other clients low.
 inline constexpr int kLinesPerRound = 8;
 inline constexpr std::size_t kReadPerRound_bytes = std::size_t{16} * 1024;
-/// Of answers that wait to be sent; events stop at half of it, and one that is lost is counted.
+/// Largest amount of unsent replies. Events stop at half of it; the feed counts events that are lost
+/// meanwhile.
 inline constexpr std::size_t kMaxUnsent_bytes = std::size_t{256} * 1024;
 
-/// Who connected, as the kernel says, or as a test wants it.
+/// Returns the peer of a socket. Tests replace peer_of().
 using IdentifyPeer = std::function<std::optional<Peer>(int socket)>;
 
-/// Serves the control socket: one thread, all clients in turns. It does nothing while nobody asks.
+/// Serves the control socket: one thread, all clients in turn. The thread sleeps while no client sends. Not
+/// RT-safe.
 ///
-/// When all places are taken a newcomer gets one of the user with the most connections: of those that have
-/// never made a good request, else of all, the one that has been silent for longest; one that holds the lease
-/// never gives way. So no user can keep another out, and anybody who may connect can stop.
+/// If kMaxClients are connected, a new client replaces one connection of the user with the most connections.
+/// Connections without a valid request come first, then the one that has been silent for longest. The holder
+/// of the lease is never replaced. So no user can lock out another, and every permitted user can always stop.
 class ControlSocket {
  public:
-  /// Serves at once. All of these must outlive this; the table may not change any more. The lease belongs to
-  /// the socket's thread from here on.
+  /// Starts to serve. All arguments must outlive this object, and the table must not change any more. From
+  /// now on only the thread of this object uses the lease.
   ControlSocket(const ListeningSocket& listening, RoleRules rules, const MethodTable& methods,
                 EventFeed& feed, Lease& lease, IdentifyPeer identify = peer_of);
-  /// Ends the lease, tells what is left to tell to those who read it, and hangs up.
+  /// Ends the lease, sends the remaining events to the clients that read them, and closes the connections.
   ~ControlSocket();
   ControlSocket(const ControlSocket&) = delete;
   ControlSocket& operator=(const ControlSocket&) = delete;
@@ -57,7 +61,7 @@ class ControlSocket {
   struct Chunk {
     std::string bytes;
     std::size_t sent = 0;
-    OwnedFd fd;  ///< goes with the first byte
+    OwnedFd fd;  ///< sent with the first byte
   };
 
   struct Client {
@@ -66,22 +70,22 @@ class ControlSocket {
     Peer peer;
     Role role = Role::observer;
     std::string input;
-    bool has_complete_line = false;  ///< a whole one, in `in`
+    bool has_complete_line = false;  ///< `input` holds a complete line
     std::deque<Chunk> output;
     std::size_t output_bytes = 0;
     double tokens =
         kBurst_lines;  ///< lines it may send now; what a long one costs too much makes it negative
     TimePoint tokens_refilled_at{};
     TimePoint last_received_at{};
-    std::uint32_t epoll_events = 0;  ///< what we wait for
-    bool readable = false;
-    bool made_valid_request = false;  ///< it has made a good request
-    bool write_side_closed = false;   ///< it has shut down its side; what it said before may not be read yet
-    bool end_of_input = false;        ///< and it is
-    bool disconnected = false;        ///< it has shut down both sides
-    bool close_after_flush = false;   ///< once everything is sent
-    bool to_remove = false;
-    int pending_methods = 0;  ///< slow methods under way
+    std::uint32_t epoll_events = 0;   ///< what we wait for
+    bool readable = false;            ///< epoll has reported input
+    bool made_valid_request = false;  ///< the client has made at least one valid request
+    bool write_side_closed = false;   ///< the client sends no more; earlier input may be unread
+    bool end_of_input = false;        ///< the client sends no more, and all input is read
+    bool disconnected = false;        ///< the client has closed both directions
+    bool close_after_flush = false;   ///< close the connection when the output is sent
+    bool to_remove = false;           ///< remove the client at the end of the round
+    int pending_methods = 0;          ///< slow methods that run or are queued
     Subscription subscription;
   };
 
@@ -93,7 +97,7 @@ class ControlSocket {
 
   void run(const std::stop_token& stop);
   int wait_ms(TimePoint now) const;
-  void handle_epoll_event(std::uint64_t who, std::uint32_t what);
+  void handle_epoll_event(std::uint64_t number, std::uint32_t events);
   void accept_clients(TimePoint now);
   void evict_client();
   void serve(Client& client, TimePoint now);
@@ -120,14 +124,14 @@ class ControlSocket {
   OwnedFd epoll_;
   OwnedFd wake_fd_;
   std::map<std::uint64_t, Client> clients_;
-  std::uint64_t last_client_number_ = 1;  ///< 0 and 1 are the listening socket and the wake-up
-  TimePoint accept_again_at_{};           ///< no descriptors were left
+  std::uint64_t last_client_number_ = 1;  ///< 0 is the listening socket, 1 the wake-up descriptor
+  TimePoint accept_again_at_{};           ///< the process had no free descriptors: accept no client before
 
   std::mutex finished_mutex_;
   std::vector<Finished> finished_;
   std::optional<WorkerQueue> worker_;
 
-  std::jthread thread_;  ///< last: it uses all of the above
+  std::jthread thread_;  ///< last member: it uses the members above
 };
 
 }  // namespace wrenchd

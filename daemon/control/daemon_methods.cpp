@@ -29,19 +29,19 @@ Json times_json(const DurationHistogram& times) {
           {"max_us", us(times.max())}};
 }
 
-Json limits_json(const RunConfig& plan) {
-  const WrenchLimits limits(plan.settings.limits, plan.profile);
-  const bool watched = !plan.profile.has_output || plan.profile.watchdog_s > 0.0;
+Json limits_json(const RunConfig& config) {
+  const WrenchLimits limits(config.settings.limits, config.profile);
+  const bool watched = !config.profile.has_output || config.profile.watchdog_s > 0.0;
   return {{"max_force_N", limits.max_force_N()},
           {"max_torque_Nm", limits.max_torque_Nm()},
-          {"force_slew_N_per_s", plan.settings.limits.force_slew_N_per_s},
-          {"torque_slew_Nm_per_s", plan.settings.limits.torque_slew_Nm_per_s},
-          {"soft_start_s", plan.settings.limits.soft_start_s},
+          {"force_slew_N_per_s", config.settings.limits.force_slew_N_per_s},
+          {"torque_slew_Nm_per_s", config.settings.limits.torque_slew_Nm_per_s},
+          {"soft_start_s", config.settings.limits.soft_start_s},
           {"authority", watched ? 1.0 : ProfileDevice::kAuthorityWithoutWatchdog}};
 }
 
-Json state_json(const DaemonContext& parts, const FeedSnapshot& now) {
-  const Lease& lease = parts.lease;
+Json state_json(const DaemonContext& context, const FeedSnapshot& now) {
+  const Lease& lease = context.lease;
   Json armed_by = nullptr;
   if (is_armed(now.state))
     armed_by = lease.armed() && lease.holder() ? lease.holder()->identity : "command line";
@@ -50,11 +50,11 @@ Json state_json(const DaemonContext& parts, const FeedSnapshot& now) {
           {"cause", fault_json(now.cause)},
           {"armed_by", armed_by},
           {"lease", lease.holder() ? Json(lease.holder()->identity) : Json(nullptr)},
-          {"placing", now.proxy_initialization}};
+          {"proxy_initialization", now.proxy_initialization}};
 }
 
-/// What a client hears first: the status, and all that happens after it.
-MethodResult subscribe(const MethodTable& table, const DaemonContext& parts, const Json& params,
+/// Returns the status, and subscribes the client to all later events.
+MethodResult subscribe(const MethodTable& table, const DaemonContext& context, const Json& params,
                        const Caller& caller) {
   std::set<std::string> names;
   if (const auto events = params.find("events"); events != params.end())
@@ -62,12 +62,12 @@ MethodResult subscribe(const MethodTable& table, const DaemonContext& parts, con
       const auto name = event.get<std::string>();
       const auto& known = table.events();
       if (std::none_of(known.begin(), known.end(), [&](const EventRow& row) { return row.name == name; }))
-        throw RpcError(RpcCode::invalid_params, "There is no event '" + printable(name) +
-                                                    "'; method 'describe' lists them. Leave 'events' out to "
-                                                    "hear all.");
+        throw RpcError(RpcCode::invalid_params,
+                       "There is no event '" + printable(name) +
+                           "'; method 'describe' lists all events. Leave 'events' out to receive all.");
       names.insert(name);
     }
-  const Json status = status_json(parts);
+  const Json status = status_json(context);
   *caller.subscription = {true, std::move(names), status["sequence"].get<std::uint64_t>() + 1};
   return status;
 }
@@ -76,219 +76,243 @@ Lease::Holder as_holder(const Caller& caller) {
   return {caller.client, caller.identity};
 }
 
-/// That the caller holds the lease, or why it cannot do what it asks for.
+RpcError lease_held(const Lease& lease, const std::string& advice) {
+  const std::string& holder = lease.holder()->identity;
+  return {RpcCode::lease_held, "The lease is held by " + holder + advice + ".", {{"holder", holder}}};
+}
+
+/// Throws RpcError unless the caller holds the lease.
 void check_holder(const Lease& lease, const Caller& caller) {
   if (lease.held_by(caller.client)) return;
-  if (lease.holder())
-    throw RpcError(RpcCode::lease_held, "The lease is held by " + lease.holder()->identity + ".",
-                   {{"holder", lease.holder()->identity}});
+  if (lease.holder()) throw lease_held(lease, "");
   throw RpcError(RpcCode::invalid_state,
-                 "You do not hold the lease: take it with 'lease.take', and say 'beat' more often than every "
-                 "0.1 s from then on.");
+                 "You do not hold the lease: acquire it with 'lease.acquire', then send 'lease.heartbeat' at "
+                 "least every 0.1 s.");
 }
 
-MethodResult take_lease(const DaemonContext& parts, const Json& params, const Caller& caller) {
-  Lease& lease = parts.lease;
+MethodResult acquire_lease(const DaemonContext& context, const Json& params, const Caller& caller) {
+  Lease& lease = context.lease;
   const auto now = std::chrono::steady_clock::now();
-  const bool from_other = params.value("from_other", false);
-  if (from_other && caller.role < Role::administrator)
+  const bool preempt = params.value("preempt", false);
+  if (preempt && caller.role < Role::administrator)
     throw RpcError(RpcCode::permission_denied,
-                   "Only administrators take the lease from another, and you are an " +
-                       std::string(name(caller.role)) + "; ask for it without 'from_other'.",
-                   {{"role", name(caller.role)}, {"needs", name(Role::administrator)}});
-  if (lease.holder() && !lease.held_by(caller.client) && !from_other)
-    throw RpcError(RpcCode::lease_held,
-                   "The lease is held by " + lease.holder()->identity +
-                       "; wait until it gives it back, or have an administrator take it with 'from_other'.",
-                   {{"holder", lease.holder()->identity}});
+                   "Only administrators may preempt the lease, and you are an " +
+                       std::string(name(caller.role)) + "; request it without 'preempt'.",
+                   {{"role", name(caller.role)}, {"min_role", name(Role::administrator)}});
+  if (lease.holder() && !lease.held_by(caller.client) && !preempt)
+    throw lease_held(
+        lease, "; wait until the holder releases it, or ask an administrator to acquire it with 'preempt'");
   lease.preempt(as_holder(caller), now);
-  return Json{{"beat_within_s", seconds(kHeartbeatTimeout)}};
+  return Json{{"heartbeat_timeout_s", seconds(kHeartbeatTimeout)}};
 }
 
-/// Whether a state allows a request, by the table of the state machine.
-void check_state(const ServoLoop& loop, Trigger trigger, const char* what) {
-  const State state = loop.state();
+/// Throws RpcError if the state machine ignores the trigger in the present state.
+void check_state(const ServoLoop& loop, Trigger trigger, const char* action) {
+  const State state = loop.telemetry().state();
   const Transition& row = transition(trigger, state);
   if (row.changes_state) return;
-  throw RpcError(RpcCode::invalid_state,
-                 "It cannot be " + std::string(what) + " in state '" + name(state) + "': " + row.reason + ".",
-                 {{"state", name(state)}, {"cause", fault_json(loop.cause())}});
+  throw RpcError(
+      RpcCode::invalid_state,
+      "The loop cannot be " + std::string(action) + " in state '" + name(state) + "': " + row.reason + ".",
+      {{"state", name(state)}, {"cause", fault_json(loop.telemetry().cause())}});
 }
 
-MethodResult arm(const DaemonContext& parts, const Caller& caller) {
-  check_holder(parts.lease, caller);
-  check_state(parts.runtime.loop(), Trigger::arm, "armed");
-  parts.lease.arm(std::chrono::steady_clock::now());
-  return Json{{"asked", "arm"}};
+MethodResult arm(const DaemonContext& context, const Caller& caller) {
+  check_holder(context.lease, caller);
+  check_state(context.runtime.loop(), Trigger::arm, "armed");
+  context.lease.arm(std::chrono::steady_clock::now());
+  return Json{{"requested", "arm"}};
 }
 
-MethodResult stop(const DaemonContext& parts, const Caller& caller) {
-  ServoLoop& loop = parts.runtime.loop();
-  const bool first = loop.state() != State::stopped;
-  loop.stop();
+MethodResult stop(const DaemonContext& context, const Caller& caller) {
+  ServoLoop& loop = context.runtime.loop();
+  const bool first = loop.telemetry().state() != State::stopped;
+  loop.requests().stop();
   if (first)
-    parts.feed.emit("log", EventLevel::warning, "stop: asked for by " + caller.identity,
-                    {{"by", caller.identity}});
-  return Json{{"asked", "stop"}};
+    context.feed.emit("log", EventLevel::warning, "stop: requested by " + caller.identity,
+                      {{"requested_by", caller.identity}});
+  return Json{{"requested", "stop"}};
 }
 
-MethodResult acknowledge(const DaemonContext& parts, const Caller& caller) {
-  ServoLoop& loop = parts.runtime.loop();
+MethodResult acknowledge(const DaemonContext& context, const Caller& caller) {
+  ServoLoop& loop = context.runtime.loop();
   check_state(loop, Trigger::acknowledge, "acknowledged");
-  loop.acknowledge();
-  parts.feed.emit("log", EventLevel::info, "acknowledged by " + caller.identity, {{"by", caller.identity}});
-  return Json{{"asked", "acknowledge"}};
+  loop.requests().acknowledge();
+  context.feed.emit("log", EventLevel::info, "acknowledged by " + caller.identity,
+                    {{"requested_by", caller.identity}});
+  return Json{{"requested", "acknowledge"}};
 }
 
-MethodResult devices() {
+MethodResult list_devices() {
   const KnownProfiles known = known_profiles(SearchPath());
-  const std::vector<UsbDevice> plugged = list_usb_devices();
-  const DeviceChoice choice = choose_device(plugged, known.profiles, {});
+  const std::vector<UsbDevice> connected = list_usb_devices();
+  const DeviceChoice choice = choose_device(connected, known.profiles, {});
   Json list = Json::array();
-  for (std::size_t i = 0; i < plugged.size(); ++i) {
-    const bool picked = choice.selection && choice.selection->device == i;
+  for (std::size_t i = 0; i < connected.size(); ++i) {
+    const bool selected = choice.selection && choice.selection->device == i;
     list.push_back(
-        {{"device", describe(plugged[i])},
-         {"product", to_printable(plugged[i].product_name)},
-         {"profile", picked ? Json(known.profiles[choice.selection->profile].name) : Json(nullptr)},
-         {"why_not", choice.rejections[i]}});
+        {{"device", describe(connected[i])},
+         {"product", to_printable(connected[i].product_name)},
+         {"profile", selected ? Json(known.profiles[choice.selection->profile].name) : Json(nullptr)},
+         {"rejection_reason", choice.rejections[i]}});
   }
-  return Json{{"devices", list}, {"refused_profiles", known.refused}};
+  return Json{{"devices", list}, {"invalid_profiles", known.refused}};
 }
 
-}  // namespace
-
-Json status_json(const DaemonContext& parts) {
-  const RunConfig& plan = parts.runtime.config();
-  const ServoLoop& loop = parts.runtime.loop();
-  const LoopTiming& timing = loop.timing();
-  parts.feed.drain();  // so that it is as of now
-  const FeedSnapshot now = parts.feed.snapshot();
-  Json status = state_json(parts, now);
-  status.update(
-      {{"version", kVersion},
-       {"tick", timing.tick.count()},
-       {"device",
-        {{"profile", plan.profile.name},
-         {"present", now.state != State::disconnected && now.state != State::shutdown},
-         {"simulated", plan.simulated}}},
-       {"scene", {{"file", plan.scene.file.string()}, {"obstacles", parts.runtime.scene().obstacle_count()}}},
-       {"rates", {{"rate_Hz", plan.settings.servo.rate_Hz}}},
-       {"limits", limits_json(plan)},
-       {"stiffness_share", now.stiffness_scale},
-       {"timing",
-        {{"tick", times_json(timing.tick)},
-         {"wake_latency", times_json(timing.wake_latency)},
-         {"overruns", timing.overruns.load()},
-         {"skipped", timing.skipped_ticks.load()}}},
-       {"dropped_events", loop.dropped_events()}});
-  for (const auto& [name, row] : parts.status_sections) status[name] = row();
-  return status;
-}
-
-void add_daemon_methods(MethodTable& table, const DaemonContext& parts) {
-  for (const EventRow& row : feed_events()) table.add(row);
-  table.add(EventRow{"lease", "Somebody has the lease now, or nobody. holder: who, or null."});
-  table.add(EventRow{"lost",
-                     "This client read too slowly. count: how many events before this one are lost, of "
-                     "any name. It comes whatever names were asked for."});
-
+void add_status_methods(MethodTable& table, const DaemonContext& context) {
   table.add(MethodRow{"describe",
                       Role::observer,
                       {},
-                      "Version and protocol, every method with its role and parameters, every event, every "
-                      "error.",
+                      "Returns version and protocol, each method with its role and parameters, each event, "
+                      "and each error.",
                       [&table](const Json&, const Caller&) { return MethodResult(table.describe()); }});
   table.add(
       MethodRow{"status",
                 Role::observer,
                 {},
-                "State and cause, device, limits, lease, and the times that ticks take. It is as of the "
-                "event with the number 'sequence'.",
-                [parts](const Json&, const Caller&) { return MethodResult(status_json(parts)); }});
+                "Returns state and cause, device, limits, lease, and tick times. The result includes all "
+                "events up to number 'sequence'.",
+                [context](const Json&, const Caller&) { return MethodResult(status_json(context)); }});
+  table.add(MethodRow{"devices",
+                      Role::observer,
+                      {},
+                      "Returns the connected devices: the profile of each device, or the reason why it has "
+                      "none.",
+                      [](const Json&, const Caller&) { return list_devices(); },
+                      true});
+}
+
+void add_event_methods(MethodTable& table, const DaemonContext& context) {
+  for (const EventRow& row : feed_events()) table.add(row);
+  table.add(EventRow{"lease", "The holder of the lease changed. holder: identity of the holder, or null."});
+  table.add(EventRow{"events_lost",
+                     "This client read too slowly. count: number of events of any name that were dropped "
+                     "before this one. Each subscriber receives this event, whatever names it chose."});
   table.add(
       MethodRow{"subscribe",
                 Role::observer,
-                {{"events", ParamType::texts, false, "names of events to hear of; without it all"}},
-                "Answers the status, then sends a notification 'event' for each event after it, without "
-                "a gap in 'sequence' where all are asked for.",
-                [&table, parts](const Json& params, const Caller& caller) {
-                  return subscribe(table, parts, params, caller);
+                {{"events", ParamType::texts, false, "names of the events to receive; default: all events"}},
+                "Returns the status, then sends a notification 'event' for each later event. If the client "
+                "receives all events, 'sequence' has no gap.",
+                [&table, context](const Json& params, const Caller& caller) {
+                  return subscribe(table, context, params, caller);
                 }});
+  table.add(MethodRow{
+      "unsubscribe", Role::observer, {}, "Ends the subscription.", [](const Json&, const Caller& caller) {
+        *caller.subscription = {};
+        return MethodResult(Json::object());
+      }});
+}
+
+void add_lease_methods(MethodTable& table, const DaemonContext& context) {
+  table.add(MethodRow{
+      "lease.acquire",
+      Role::operator_,
+      {{"preempt", ParamType::boolean, false,
+        "administrators only: takes the lease from its holder and disarms what the holder armed"}},
+      "Acquires the right to arm, which one client holds at a time. The lease ends if 'lease.heartbeat' does "
+      "not arrive within heartbeat_timeout_s, or if the connection ends; then the force fades out.",
+      [context](const Json& params, const Caller& caller) {
+        return acquire_lease(context, params, caller);
+      }});
+  table.add(MethodRow{"lease.release",
+                      Role::operator_,
+                      {},
+                      "Releases the lease, and disarms what its holder armed.",
+                      [context](const Json&, const Caller& caller) {
+                        check_holder(context.lease, caller);
+                        context.lease.release("released it");
+                        return MethodResult(Json::object());
+                      }});
+  table.add(MethodRow{"lease.heartbeat",
+                      Role::operator_,
+                      {},
+                      "Keeps the lease. Send it without an id: then there is no reply.",
+                      [context](const Json&, const Caller& caller) {
+                        check_holder(context.lease, caller);
+                        context.lease.heartbeat(std::chrono::steady_clock::now());
+                        return MethodResult(Json::object());
+                      }});
+}
+
+void add_state_machine_methods(MethodTable& table, const DaemonContext& context) {
   table.add(
-      MethodRow{"unsubscribe", Role::observer, {}, "No more events.", [](const Json&, const Caller& caller) {
-                  *caller.subscription = {};
-                  return MethodResult(Json::object());
-                }});
-  table.add(
-      MethodRow{"devices",
+      MethodRow{"stop",
                 Role::observer,
                 {},
-                "What is plugged in, the profile each device has, and for the others why they have none.",
-                [](const Json&, const Caller&) { return devices(); },
-                true});
-  table.add(MethodRow{"stop",
-                      Role::observer,
-                      {},
-                      "Emergency stop: no force in the next tick, until somebody acknowledges. Anybody may.",
-                      [parts](const Json&, const Caller& caller) { return stop(parts, caller); }});
-
-  table.add(MethodRow{
-      "lease.take",
-      Role::operator_,
-      {{"from_other", ParamType::boolean, false,
-        "administrators: whoever has it loses it, and what it armed is disarmed"}},
-      "The right to arm, for one at a time. It ends when 'beat' does not come within "
-      "beat_within_s, or the connection ends, and the force fades then.",
-      [parts](const Json& params, const Caller& caller) { return take_lease(parts, params, caller); }});
-  table.add(MethodRow{"lease.give",
-                      Role::operator_,
-                      {},
-                      "Gives the lease back; what it armed is disarmed.",
-                      [parts](const Json&, const Caller& caller) {
-                        check_holder(parts.lease, caller);
-                        parts.lease.release("gave it back");
-                        return MethodResult(Json::object());
-                      }});
-  table.add(MethodRow{"beat",
-                      Role::operator_,
-                      {},
-                      "Its holder's sign of life. Send it without an id, so that nothing is answered.",
-                      [parts](const Json&, const Caller& caller) {
-                        check_holder(parts.lease, caller);
-                        parts.lease.heartbeat(std::chrono::steady_clock::now());
-                        return MethodResult(Json::object());
-                      }});
+                "Emergency stop: zero force from the next tick until a client acknowledges. Every client "
+                "may stop.",
+                [context](const Json&, const Caller& caller) { return stop(context, caller); }});
   table.add(
       MethodRow{"arm",
                 Role::operator_,
                 {},
-                "The holder of the lease asks for force. It comes when the hand is calm: events 'state' "
-                "tell, or 'refused'.",
-                [parts](const Json&, const Caller& caller) { return arm(parts, caller); }});
-  table.add(MethodRow{"disarm",
-                      Role::operator_,
-                      {},
-                      "The force fades within 100 ms, whoever armed. The lease stays where it is.",
-                      [parts](const Json&, const Caller&) {
-                        parts.runtime.loop().disarm();
-                        return MethodResult(Json{{"asked", "disarm"}});
-                      }});
+                "Requests force; only the holder of the lease may. The force rises when the hand is calm. "
+                "Event 'state' or 'arming_refused' reports the result.",
+                [context](const Json&, const Caller& caller) { return arm(context, caller); }});
+  table.add(
+      MethodRow{"disarm",
+                Role::operator_,
+                {},
+                "The force fades out within 100 ms, whichever client armed. The lease keeps its holder.",
+                [context](const Json&, const Caller&) {
+                  context.runtime.loop().requests().disarm();
+                  return MethodResult(Json{{"requested", "disarm"}});
+                }});
   table.add(MethodRow{"acknowledge",
                       Role::operator_,
                       {},
-                      "Somebody has looked at the fault, or the stop: the device is tested anew, and is "
-                      "disarmed.",
-                      [parts](const Json&, const Caller& caller) { return acknowledge(parts, caller); }});
-  table.add(MethodRow{"start_over",
+                      "Confirms that a person has checked the fault or the stop. The self-test runs again; "
+                      "afterwards the loop "
+                      "is disarmed.",
+                      [context](const Json&, const Caller& caller) { return acknowledge(context, caller); }});
+  table.add(MethodRow{"reinitialize_proxy",
                       Role::operator_,
                       {},
-                      "The place of the tool is looked for anew; there is no force until it is found, and a "
-                      "soft start.",
-                      [parts](const Json&, const Caller&) {
-                        parts.runtime.loop().reinitialize_proxy();
-                        return MethodResult(Json{{"asked", "start_over"}});
+                      "Searches for a feasible pose of the proxy again. There is no contact force until the "
+                      "search succeeds; then a soft start follows.",
+                      [context](const Json&, const Caller&) {
+                        context.runtime.loop().requests().reinitialize_proxy();
+                        return MethodResult(Json{{"requested", "reinitialize_proxy"}});
                       }});
+}
+
+}  // namespace
+
+Json status_json(const DaemonContext& context) {
+  const RunConfig& config = context.runtime.config();
+  const ServoLoop& loop = context.runtime.loop();
+  const LoopTiming& timing = loop.telemetry().timing();
+  context.feed.drain();  // the snapshot includes all events up to now
+  const FeedSnapshot now = context.feed.snapshot();
+  Json status = state_json(context, now);
+  status.update(
+      {{"version", kVersion},
+       {"tick", timing.tick.count()},
+       {"device",
+        {{"profile", config.profile.name},
+         {"present", now.state != State::disconnected && now.state != State::shutdown},
+         {"simulated", config.simulated}}},
+       {"scene",
+        {{"file", config.scene.file.string()}, {"obstacles", context.runtime.scene().obstacle_count()}}},
+       {"rates", {{"rate_Hz", config.settings.servo.rate_Hz}}},
+       {"limits", limits_json(config)},
+       {"stiffness_scale", now.stiffness_scale},
+       {"timing",
+        {{"tick", times_json(timing.tick)},
+         {"wake_latency", times_json(timing.wake_latency)},
+         {"overruns", timing.overruns.load()},
+         {"skipped_ticks", timing.skipped_ticks.load()}}},
+       {"dropped_events", loop.telemetry().dropped_events()}});
+  for (const auto& [name, row] : context.status_sections) status[name] = row();
+  return status;
+}
+
+void add_daemon_methods(MethodTable& table, const DaemonContext& context) {
+  add_status_methods(table, context);
+  add_event_methods(table, context);
+  add_lease_methods(table, context);
+  add_state_machine_methods(table, context);
 }
 
 }  // namespace wrenchd

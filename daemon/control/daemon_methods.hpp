@@ -14,11 +14,11 @@ namespace wrenchd {
 
 class Runtime;
 
-/// What other parts of the daemon add to `status`, by its name there. Each is asked on the control thread,
-/// and must not wait.
+/// Members that other parts of the daemon add to the result of `status`, by name. The control thread calls
+/// the functions; they must not block.
 using StatusSections = std::map<std::string, std::function<Json()>>;
 
-/// What the methods of the daemon itself work on.
+/// The objects that the methods of the daemon use.
 struct DaemonContext {
   Runtime& runtime;
   EventFeed& feed;
@@ -26,11 +26,12 @@ struct DaemonContext {
   const StatusSections& status_sections;
 };
 
-/// The rows of what every daemon answers: describe, status, devices, events, lease, arming and stopping; and
-/// the rows of its events. All must outlive the table.
-void add_daemon_methods(MethodTable& table, const DaemonContext& parts);
+/// Adds the methods of every daemon: describe, status, devices, events, lease, arming and stopping; and the
+/// events. The objects of `context` must outlive the table. Not RT-safe: allocates.
+void add_daemon_methods(MethodTable& table, const DaemonContext& context);
 
-/// What `status` answers. From a method that is not slow: the lease belongs to that thread.
-Json status_json(const DaemonContext& parts);
+/// Returns the result of `status`. Call it on the control thread, which owns the lease. Not RT-safe:
+/// allocates.
+Json status_json(const DaemonContext& context);
 
 }  // namespace wrenchd

@@ -7,6 +7,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "daemon/control/event_description.hpp"
 #include "daemon/event_journal.hpp"
 #include "daemon/servo/servo_loop.hpp"
 
@@ -14,29 +15,6 @@ namespace wrenchd {
 namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(10);
-
-/// Whether a fault latches, or lets go of the hand.
-bool is_grave(Fault fault) {
-  const Trigger trigger = fault_row(fault).trigger;
-  return trigger == Trigger::hard_fault || trigger == Trigger::self_test_failed || trigger == Trigger::stop ||
-         trigger == Trigger::device_disconnected;
-}
-
-EventLevel level_of(const Event& event) {
-  switch (event.kind) {
-    case Event::Kind::fault_raised:
-      return is_grave(static_cast<Fault>(event.detail)) ? EventLevel::error : EventLevel::warning;
-    case Event::Kind::state_changed:
-    case Event::Kind::proxy_search_started:
-    case Event::Kind::proxy_found:
-    case Event::Kind::released:
-    case Event::Kind::crossfade_started:
-    case Event::Kind::rendering_changed:
-      return EventLevel::info;
-    default:
-      return EventLevel::warning;
-  }
-}
 
 spdlog::level::level_enum log_level(EventLevel level) {
   switch (level) {
@@ -50,174 +28,51 @@ spdlog::level::level_enum log_level(EventLevel level) {
   return spdlog::level::err;
 }
 
-/// What the value of a fault's event says.
-std::string measured(Fault fault, double value) {
-  switch (fault) {
-    case Fault::tick_late:
-    case Fault::loop_stalled:
-    case Fault::wrench_late:
-      return fmt::format(" ({:.1f} ms)", 1e3 * value);
-    case Fault::self_test_rate:
-      return fmt::format(" ({:.0f} a second)", value);
-    default:
-      return {};
+/// Applies an event to what clients know of the loop.
+void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& description) {
+  if (const auto* state = std::get_if<Event::StateChanged>(&event.data)) {
+    snapshot.state = state->state;
+    snapshot.cause = state->cause;
+    if (state->state == State::self_test) snapshot.stiffness_scale = 1.0;  // the self-test measures it anew
   }
-}
-
-/// The cause that came with a state.
-Fault cause_of(const Event& event) {
-  return static_cast<Fault>(static_cast<int>(event.value));
-}
-
-/// The name that programs know it by.
-std::string generated_mesh_name(Event::Kind kind) {
-  switch (kind) {
-    case Event::Kind::state_changed:
-      return "state";
-    case Event::Kind::fault_raised:
-      return "fault";
-    case Event::Kind::stiffness_scaled:
-    case Event::Kind::stability_bound_unknown:
-      return "stiffness";
-    case Event::Kind::arming_refused:
-      return "refused";
-    case Event::Kind::projection_infeasible:
-    case Event::Kind::proxy_search_started:
-    case Event::Kind::proxy_found:
-    case Event::Kind::proxy_search_failed:
-      return "placing";
-    case Event::Kind::released:
-      return "released";
-    case Event::Kind::crossfade_started:
-    case Event::Kind::rendering_changed:
-      return "scene";
-  }
-  return "log";
-}
-
-Json fields_of(const Event& event) {
-  switch (event.kind) {
-    case Event::Kind::state_changed:
-      return {{"state", name(static_cast<State>(event.detail))}, {"cause", fault_json(cause_of(event))}};
-    case Event::Kind::fault_raised:
-      return {{"fault", fault_json(static_cast<Fault>(event.detail))}, {"value", event.value}};
-    case Event::Kind::stiffness_scaled:
-      return {{"share", event.value}};
-    case Event::Kind::stability_bound_unknown:
-      return {{"share", nullptr}};
-    case Event::Kind::arming_refused:
-      return {{"state", name(static_cast<State>(event.detail))}};
-    case Event::Kind::projection_infeasible:
-      return {{"outcome", "no_admissible_pose"}};
-    case Event::Kind::proxy_search_started:
-      return {{"outcome", "seeking"}};
-    case Event::Kind::proxy_found:
-      return {{"outcome", "placed"}, {"distance_m", event.value}};
-    case Event::Kind::proxy_search_failed:
-      return {{"outcome", "nowhere"}};
-    case Event::Kind::crossfade_started:
-    case Event::Kind::rendering_changed:
-      return {{"rendering", event.detail}, {"felt", event.kind == Event::Kind::rendering_changed}};
-    case Event::Kind::released:
-      break;
-  }
-  return Json::object();
-}
-
-/// What the event changes in what is known.
-void apply(FeedSnapshot& now, const Event& event) {
-  if (event.kind == Event::Kind::state_changed) {
-    now.state = static_cast<State>(event.detail);
-    now.cause = cause_of(event);
-    if (now.state == State::self_test) now.stiffness_scale = 1.0;  // it is measured anew
-  }
-  if (event.kind == Event::Kind::stiffness_scaled) now.stiffness_scale = event.value;
-  if (generated_mesh_name(event.kind) == "placing" && event.kind != Event::Kind::projection_infeasible)
-    now.proxy_initialization = fields_of(event)["outcome"].get<std::string>();
+  if (const auto* stiffness = std::get_if<Event::StiffnessScaled>(&event.data))
+    snapshot.stiffness_scale = stiffness->scale;
+  if (description.name == "proxy_initialization" &&
+      !std::holds_alternative<Event::ProjectionInfeasible>(event.data))
+    snapshot.proxy_initialization = description.fields["outcome"].get<std::string>();
 }
 
 }  // namespace
 
-const char* name(EventLevel level) noexcept {
-  switch (level) {
-    case EventLevel::info:
-      return "info";
-    case EventLevel::warning:
-      return "warning";
-    case EventLevel::error:
-      return "error";
-  }
-  return "unknown";
-}
-
-Json fault_json(Fault fault) {
-  if (fault == Fault::none) return nullptr;
-  const FaultRow& row = fault_row(fault);
-  return {{"name", row.name}, {"sentence", row.message}, {"cure", row.cure}};
-}
-
 std::span<const EventRow> feed_events() {
   static const std::array<EventRow, 10> rows = {{
-      {"state", "The loop came to another state. state: its name; cause: the fault that led to it, or null."},
+      {"state", "The loop entered another state. state: its name; cause: the fault that led to it, or null."},
       {"fault",
-       "Something is wrong. fault: name, sentence, cure; value: how much of it, where that says "
-       "something; recording: the file of the flight recorder, where one is kept of it."},
-      {"device", "present: whether there is a device now; again: it has been there before."},
+       "A fault was raised. fault: name, message and cure; value: its measured size, or 0; recording: the "
+       "flight "
+       "recording of the ticks before it, if one was kept."},
+      {"device",
+       "A device was connected or disconnected. present: a device is connected; reconnected: one was "
+       "connected before."},
       {"stiffness",
-       "share: of the stiffness asked for that the device bears, at the rate and delay "
-       "measured; null: its profile states no damping, so nobody knows."},
-      {"refused", "It was asked to arm, and was not. state: in which it was."},
-      {"placing",
-       "outcome: seeking, placed (distance_m: how far from the hand), nowhere, "
-       "no_admissible_pose. Where the tool stands is looked for after each arming."},
+       "The self-test has derived the stiffness that stays passive. scale: share of the configured "
+       "stiffness; null: the "
+       "profile states no damping, so the stability bound is unknown."},
+      {"arming_refused", "A request to arm was refused. state: the state that does not allow it."},
+      {"proxy_initialization",
+       "The search for a feasible pose of the tool, after each arming. outcome: searching, found "
+       "(distance_m: from the "
+       "hand), failed, projection_infeasible."},
       {"released", "The hand was released: zero wrench, motors off."},
       {"scene",
-       "What is rendered changes. rendering: the number of the new one, as in the record of a tick; felt: "
-       "false where it begins to take the place of the one before, true where it has."},
-      {"reload", "The configuration was read again. applied, not_applied: keys; refused: why, or null."},
-      {"log", "What else the log has."},
+       "Another rendering replaces the active one. rendering_id: its number, as in the tick record; "
+       "crossfade_complete: "
+       "false when the crossfade begins, true when it ends."},
+      {"reload",
+       "The configuration was reloaded. applied, not_applied: keys; error: why it was refused, or null."},
+      {"log", "Any other log line."},
   }};
   return rows;
-}
-
-std::string to_text(const Event& event) {
-  switch (event.kind) {
-    case Event::Kind::state_changed:
-      return fmt::format("state: {}", name(static_cast<State>(event.detail)));
-    case Event::Kind::fault_raised: {
-      const auto fault = static_cast<Fault>(event.detail);
-      const FaultRow& row = fault_row(fault);
-      return fmt::format("{}: {}{}; {}", row.name, row.message, measured(fault, event.value), row.cure);
-    }
-    case Event::Kind::stiffness_scaled:
-      return fmt::format(
-          "the device bears {:.0f} % of the stiffness that is asked for, at the rate and delay measured: it "
-          "is "
-          "scaled; lower it in [wrench], or state more damping in the profile if it has more",
-          100.0 * event.value);
-    case Event::Kind::stability_bound_unknown:
-      return "the profile states no damping: nobody knows how stiff a wall the device bears; measure it, and "
-             "state "
-             "damping_N_s_per_m and damping_Nm_s_per_rad";
-    case Event::Kind::arming_refused:
-      return fmt::format("not armed: {}", transition(Trigger::arm, static_cast<State>(event.detail)).reason);
-    case Event::Kind::projection_infeasible:
-      return "no admissible pose near the hand: the obstacles leave no room; the proxy stays where it was";
-    case Event::Kind::proxy_search_started:
-      return "placing: the admissible pose nearest to the hand is looked for; zero wrench until it is found";
-    case Event::Kind::proxy_found:
-      return fmt::format("placed {:.1f} mm from the hand", 1e3 * event.value);
-    case Event::Kind::proxy_search_failed:
-      return "no admissible pose was found: the tool does not fit in where the hand is; zero wrench, and it "
-             "is looked for again";
-    case Event::Kind::released:
-      return "the hand is released: zero wrench, motors off";
-    case Event::Kind::crossfade_started:
-      return fmt::format("rendering {} begins to take the place of the one before", event.detail);
-    case Event::Kind::rendering_changed:
-      return fmt::format("rendering {} is felt from now on", event.detail);
-  }
-  return "unknown event";
 }
 
 EventFeed::EventFeed(ServoLoop& loop)
@@ -239,7 +94,7 @@ void EventFeed::emit(const std::string& name, EventLevel level, const std::strin
   append(std::chrono::steady_clock::now(), name, level, text, fields);
 }
 
-/// With the mutex held, so that what an event changes is known with its number and not before.
+/// Precondition: mutex_ is locked, so that snapshot and sequence number change together.
 void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
                        const Json& fields) {
   Json params = {{"sequence", ++snapshot_.sequence},
@@ -256,53 +111,50 @@ void EventFeed::append(TimePoint at, const std::string& name, EventLevel level, 
   [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof one);  // full is awake
 }
 
-void EventFeed::set_fault_recorder(RecordFault kept_in) {
+void EventFeed::set_fault_recorder(RecordFault recorded_in) {
   const std::scoped_lock draining(drain_mutex_);
-  record_fault_ = std::move(kept_in);
+  record_fault_ = std::move(recorded_in);
 }
 
 void EventFeed::publish(const Event& event) {
-  const auto fault = static_cast<Fault>(event.detail);
-  std::string kept_in;
-  if (event.kind == Event::Kind::fault_raised && is_grave(fault) && record_fault_)
-    kept_in = record_fault_(fault, event.at);
+  EventDescription description = describe(event);
+  if (const auto* raised = std::get_if<Event::FaultRaised>(&event.data);
+      raised != nullptr && is_severe(raised->fault) && record_fault_) {
+    if (const std::string recording = record_fault_(raised->fault, event.at); !recording.empty()) {
+      description.fields["recording"] = recording;
+      description.text += "; the ticks before it are in " + recording;
+    }
+  }
   const std::scoped_lock lock(mutex_);
   const JournalFields fields(journal_fields(event));
   const State from = snapshot_.state;
-  apply(snapshot_, event);
-  Json fields_told = fields_of(event);
-  std::string text = to_text(event);
-  if (!kept_in.empty()) {
-    fields_told["recording"] = kept_in;
-    text += "; what led to it: " + kept_in;
-  }
-  append(event.at, generated_mesh_name(event.kind), level_of(event), text, fields_told);
-  if (event.kind == Event::Kind::state_changed) append_device_event(event, from);
+  apply(snapshot_, event, description);
+  append(event.at, description.name, description.level, description.text, description.fields);
+  if (const auto* state = std::get_if<Event::StateChanged>(&event.data))
+    append_device_event(event.at, from, state->state);
 }
 
-/// That a device came or went is told by the states it leads to, whatever link it is on.
-void EventFeed::append_device_event(const Event& event, State from) {
-  const auto to = static_cast<State>(event.detail);
+/// The states show whether a device came or went, on every kind of link.
+void EventFeed::append_device_event(TimePoint at, State from, State to) {
   if (from == State::disconnected && to != State::shutdown) {
-    append(event.at, "device", EventLevel::info,
-           device_was_present_ ? "the device is back" : "the device is there",
-           {{"present", true}, {"again", device_was_present_}});
+    append(at, "device", EventLevel::info, device_was_present_ ? "device reconnected" : "device connected",
+           {{"present", true}, {"reconnected", device_was_present_}});
     device_was_present_ = true;
   } else if (to == State::disconnected) {
-    append(event.at, "device", EventLevel::warning, "the device is gone",
-           {{"present", false}, {"again", device_was_present_}});
+    append(at, "device", EventLevel::warning, "device disconnected",
+           {{"present", false}, {"reconnected", device_was_present_}});
   }
 }
 
 void EventFeed::drain() {
   const std::scoped_lock draining(drain_mutex_);
   Event event;
-  while (loop_.events().pop(event)) publish(event);
-  const std::uint64_t dropped = loop_.dropped_events();
+  while (loop_.telemetry().events().pop(event)) publish(event);
+  const std::uint64_t dropped = loop_.telemetry().dropped_events();
   if (dropped == dropped_reported_) return;
   const std::scoped_lock lock(mutex_);
-  snapshot_.state = loop_.state();
-  snapshot_.cause = loop_.cause();
+  snapshot_.state = loop_.telemetry().state();
+  snapshot_.cause = loop_.telemetry().cause();
   append(std::chrono::steady_clock::now(), "state", EventLevel::warning,
          fmt::format("{} events were dropped: the log fell behind; state: {}", dropped - dropped_reported_,
                      wrenchd::name(snapshot_.state)),

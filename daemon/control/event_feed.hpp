@@ -13,6 +13,7 @@
 
 #include "core/fault.hpp"
 #include "core/state.hpp"
+#include "daemon/control/event_description.hpp"
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/servo/event.hpp"
 
@@ -20,68 +21,61 @@ namespace wrenchd {
 
 class ServoLoop;
 
-/// One line of the log for an event of the servo thread.
-std::string to_text(const Event& event);
-
-enum class EventLevel : std::uint8_t { info, warning, error };
-/// "warning"
-const char* name(EventLevel level) noexcept;
-
 /// A kind of event, as `describe` tells it.
 struct EventRow {
   std::string name;
-  std::string doc;  ///< when it comes, and its fields
+  std::string doc;  ///< when the event is emitted, and its fields
 };
 
-/// What the events up to a sequence number come to: who has this and applies all later events to it knows
-/// what the daemon knows.
+/// State of the daemon after the event `sequence`. A client that applies all later events to the snapshot
+/// knows the present state.
 struct FeedSnapshot {
   std::uint64_t sequence = 0;  ///< of the last event that is in it; 0: none yet
   State state = State::disconnected;
   Fault cause = Fault::none;
-  std::string proxy_initialization = "unknown";  ///< "seeking", "placed", "nowhere"
-  double stiffness_scale = 1.0;                  ///< of the spring asked for that the device bears
+  std::string proxy_initialization = "unknown";  ///< "searching", "found" or "failed"
+  double stiffness_scale = 1.0;                  ///< stable fraction of the configured stiffness, 0 to 1
 };
 
-/// News of the daemon: each gets a sequence number, is logged, and is kept for a while for whoever listens.
-/// Takes the servo thread's from its ring, on a thread of its own, and those of any other thread but the
-/// servo's. Not RT safe.
+/// Numbers and logs the events of the daemon, and stores the newest for subscribers. A thread of its own
+/// reads the event ring of the servo thread. Every other thread calls emit(). Not RT-safe: allocates, locks,
+/// logs.
 class EventFeed {
  public:
   explicit EventFeed(ServoLoop& loop);
-  /// Logs what is still in the ring.
+  /// Publishes the events that are left in the ring.
   ~EventFeed();
   EventFeed(const EventFeed&) = delete;
   EventFeed& operator=(const EventFeed&) = delete;
 
-  /// fields: an object; its members are added to those that every event has.
+  /// Publishes an event. fields: an object, whose members are added to those of every event.
   void emit(const std::string& name, EventLevel level, const std::string& text,
             const Json& fields = Json::object());
 
-  /// Asked about each fault that latches or lets go of the hand, before it is told: the file that will show
-  /// what led to it, which the event then names; empty: none. From the feed's thread; must not come back
-  /// here.
+  /// Called for each fault that latches or releases the hand, before the fault is published. Returns the file
+  /// that will hold the ticks before the fault; empty: none. The event names this file. Runs on the thread of
+  /// the feed, and must not call the feed.
   using RecordFault = std::function<std::string(Fault fault, TimePoint at)>;
   void set_fault_recorder(RecordFault kept_in);
 
-  /// Takes what is in the servo thread's ring now. Any thread but the servo's.
+  /// Publishes the events that are in the ring of the servo thread now. Any thread except the servo thread.
   void drain();
 
   FeedSnapshot snapshot() const;
 
   struct Batch {
     std::vector<std::string> lines;  ///< notifications, each with its '\n'
-    std::uint64_t next = 0;          ///< what to ask for next time
-    std::uint64_t lost = 0;          ///< events that are kept no longer, of any name
-    bool more = false;               ///< there was no room for all
+    std::uint64_t next = 0;          ///< first sequence number of the next batch
+    std::uint64_t lost = 0;          ///< events of any name that left the history before they were read
+    bool more = false;               ///< max_bytes was too small for all events
   };
-  /// Events from that sequence number on, of these names (none given: all), until they are max_bytes long.
+  /// Returns events from this sequence number on that have one of these names (empty: all), up to max_bytes.
   Batch events_since(std::uint64_t next, const std::set<std::string>& names, std::size_t max_bytes) const;
 
-  /// An eventfd that is written to with each event; -1: nobody listens. Must stay open until it is unset.
+  /// Sets the eventfd that the feed writes to with each event; -1: none. It must stay open until it is unset.
   void set_wake_fd(int eventfd);
 
-  /// How many are kept.
+  /// Number of events in the history.
   static constexpr std::size_t kHistorySize = 1024;
 
  private:
@@ -93,26 +87,23 @@ class EventFeed {
   void publish(const Event& event);
   void append(TimePoint at, const std::string& name, EventLevel level, const std::string& text,
               const Json& fields);
-  void append_device_event(const Event& event, State from);
+  void append_device_event(TimePoint at, State from, State to);
 
   ServoLoop& loop_;
-  std::mutex drain_mutex_;  ///< the ring has one reader at a time
-  std::uint64_t dropped_reported_ = 0;
+  std::mutex drain_mutex_;              ///< the ring permits one reader at a time
+  std::uint64_t dropped_reported_ = 0;  ///< dropped events that were reported
   bool device_was_present_ = false;
   RecordFault record_fault_;
 
-  mutable std::mutex mutex_;         ///< of all that follows
-  std::deque<StoredEvent> history_;  ///< the last is the one of now_.sequence
+  mutable std::mutex mutex_;         ///< protects history_, snapshot_ and wake_fd_
+  std::deque<StoredEvent> history_;  ///< the last event has the number snapshot_.sequence
   FeedSnapshot snapshot_;
   int wake_fd_ = -1;
 
-  std::jthread thread_;  ///< last: it uses all of the above
+  std::jthread thread_;  ///< last member: it uses the members above
 };
 
-/// The events that come from here. `describe` lists them.
+/// Returns the kinds of events that the feed publishes. Not RT-safe: allocates at the first call.
 std::span<const EventRow> feed_events();
-
-/// A fault for programs: {name, sentence, cure}; null for none.
-Json fault_json(Fault fault);
 
 }  // namespace wrenchd

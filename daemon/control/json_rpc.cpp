@@ -11,11 +11,11 @@
 namespace wrenchd {
 namespace {
 
-/// Whole numbers of JSON are exact up to here in every language.
+/// JSON integers are exact up to this value in every language.
 constexpr std::int64_t kLargestId = std::int64_t{1} << 53;
 
-/// Reads a line for the sake of what is wrong with it, and stops there: what the parser itself would let
-/// pass, or would use up too much for.
+/// SAX handler that stops at the first error of a line: errors that the parser accepts, and input that costs
+/// the parser too much.
 class LineCheck final : public nlohmann::json_sax<Json> {
  public:
   const std::string& wrong() const noexcept { return wrong_; }
@@ -27,7 +27,7 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   bool number_float(number_float_t, const string_t&) override { return true; }
   bool string(string_t& text) override {
     if (text.find('\0') == string_t::npos) return true;
-    return refuse("a text in it holds the character zero, which no name and no path has");
+    return refuse("a text contains the character zero");
   }
   bool binary(binary_t&) override { return refuse("it is binary"); }
   bool start_object(std::size_t) override { return enter(); }
@@ -37,7 +37,7 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   bool key(string_t& name) override {
     if (!string(name)) return false;
     if (names_.back().insert(name).second) return true;
-    return refuse("the name '" + printable(name) + "' stands twice in one object; leave one out");
+    return refuse("the name '" + printable(name) + "' occurs twice in one object; remove one");
   }
   bool parse_error(std::size_t position, const std::string& token, const Json::exception&) override {
     return refuse("at byte " + std::to_string(position) + ", after '" + printable(token) +
@@ -52,7 +52,7 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   bool enter() {
     names_.emplace_back();
     return names_.size() <= kMaxDepth ||
-           refuse("objects and arrays in each other are deeper than " + std::to_string(kMaxDepth));
+           refuse("objects and arrays are nested deeper than " + std::to_string(kMaxDepth));
   }
   bool leave() {
     names_.pop_back();
@@ -63,11 +63,11 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   std::string wrong_;
 };
 
-/// What is wrong with the line as text, as a part of a sentence; empty: nothing.
+/// Returns the error of a line as text, as a part of a sentence; empty: no error.
 std::string wrong_with(std::string_view line) {
   if (line.size() > kMaxLineBytes)
-    return "it is longer than " + std::to_string(kMaxLineBytes) + " bytes; send less at once";
-  if (line.find('\0') != std::string_view::npos) return "it holds a zero byte";
+    return "it is longer than " + std::to_string(kMaxLineBytes) + " bytes; send shorter lines";
+  if (line.find('\0') != std::string_view::npos) return "it contains a zero byte";
   if (line.find_first_not_of(" \t\r") == std::string_view::npos) return "it is empty; send one object a line";
   LineCheck check;
   Json::sax_parse(line, &check);
@@ -90,12 +90,12 @@ std::string wrong_with(const Json& object) {
       return "A request has no member '" + printable(name) + "'; " + nearest_key(name, known).advice;
   }
   if (const auto version = object.find("jsonrpc"); version == object.end() || *version != "2.0")
-    return "This is JSON-RPC 2.0, and the request does not say so; add \"jsonrpc\":\"2.0\"";
+    return "The request does not name JSON-RPC 2.0; add \"jsonrpc\":\"2.0\"";
   if (const auto method = object.find("method"); method == object.end() || !method->is_string())
-    return "The request names no method; add \"method\":\"describe\" to see which there are";
+    return "The request names no method; method \"describe\" lists all methods";
   if (const auto id = object.find("id"); id != object.end() && !is_id(*id))
-    return "The id has to be a text of at most " + std::to_string(kMaxIdBytes) +
-           " bytes or a whole number of at most 2^53";
+    return "The id must be a text of at most " + std::to_string(kMaxIdBytes) +
+           " bytes or an integer of at most 2^53";
   return {};
 }
 
@@ -139,17 +139,13 @@ std::string reply_line(const Json& id, const Json& result) {
 }
 
 std::string error_line(const Json& id, const RpcError& error) {
-  Json told = {{"code", static_cast<int>(error.code())}, {"message", error.what()}};
-  if (!error.details().is_null()) told["data"] = error.details();
-  return line_of({{"jsonrpc", "2.0"}, {"id", id}, {"error", told}});
+  Json body = {{"code", static_cast<int>(error.code())}, {"message", error.what()}};
+  if (!error.details().is_null()) body["data"] = error.details();
+  return line_of({{"jsonrpc", "2.0"}, {"id", id}, {"error", body}});
 }
 
 std::string notification_line(const std::string& method, const Json& params) {
   return line_of({{"jsonrpc", "2.0"}, {"method", method}, {"params", params}});
-}
-
-std::string request_line(const Json& id, const std::string& method, const Json& params) {
-  return line_of({{"jsonrpc", "2.0"}, {"id", id}, {"method", method}, {"params", params}});
 }
 
 }  // namespace wrenchd

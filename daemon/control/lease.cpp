@@ -14,59 +14,59 @@ Json holder_json(const std::optional<Lease::Holder>& holder) {
 }  // namespace
 
 void Lease::acquire(const Holder& client, TimePoint now) {
-  const bool again = held_by(client.client);
+  const bool already_held = held_by(client.client);
   holder_ = client;
   heartbeat(now);
-  if (again) return;
+  if (already_held) return;
   armed_ = false;
-  feed_.emit("lease", EventLevel::info, "lease: " + client.identity + " has it", holder_json(holder_));
+  feed_.emit("lease", EventLevel::info, "lease: " + client.identity + " holds it", holder_json(holder_));
 }
 
 void Lease::preempt(const Holder& client, TimePoint now) {
   if (holder_ && !held_by(client.client)) {
-    if (armed_) loop_.disarm();
-    end(EventLevel::warning, "lease: " + client.identity + " takes it from " + holder_->identity);
+    if (armed_) loop_.requests().disarm();
+    end(EventLevel::warning, "lease: " + client.identity + " preempts " + holder_->identity);
   }
   acquire(client, now);
 }
 
 void Lease::release(const std::string& why) {
   if (!holder_) return;
-  if (armed_) loop_.disarm();
+  if (armed_) loop_.requests().disarm();
   end(EventLevel::info, "lease: " + holder_->identity + " " + why);
 }
 
 void Lease::heartbeat(TimePoint now) {
   last_heartbeat_ = now;
-  loop_.heartbeat();
+  loop_.requests().heartbeat();
 }
 
 void Lease::arm(TimePoint now) {
   last_heartbeat_ = now;
   armed_ = true;
-  loop_.arm_with_lease();
+  loop_.requests().arm_with_lease();
 }
 
 void Lease::client_lost(std::uint64_t client) {
   if (!held_by(client)) return;
-  if (armed_) loop_.client_lost();
-  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " hung up");
+  if (armed_) loop_.requests().client_lost();
+  end(armed_ ? EventLevel::warning : EventLevel::info, "lease: " + holder_->identity + " disconnected");
 }
 
 void Lease::check(TimePoint now) {
   if (!holder_ || now - last_heartbeat_ <= kHeartbeatTimeout) return;
-  if (armed_) loop_.client_lost();
-  end(EventLevel::warning, "lease: " + holder_->identity + " gives no sign of life any more");
+  if (armed_) loop_.requests().client_lost();
+  end(EventLevel::warning, "lease: " + holder_->identity + " sends no heartbeat any more");
 }
 
 TimePoint Lease::next_check_at() const noexcept {
   return holder_ ? last_heartbeat_ + kHeartbeatTimeout + std::chrono::milliseconds(1) : TimePoint::max();
 }
 
-void Lease::end(EventLevel level, const std::string& what) {
+void Lease::end(EventLevel level, const std::string& text) {
   holder_.reset();
   armed_ = false;
-  feed_.emit("lease", level, what, holder_json(holder_));
+  feed_.emit("lease", level, text, holder_json(holder_));
 }
 
 }  // namespace wrenchd

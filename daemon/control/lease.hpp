@@ -12,9 +12,9 @@ namespace wrenchd {
 
 class ServoLoop;
 
-/// The right to arm: one client has it at a time, for as long as it shows that it lives. What it says of its
-/// life goes on to the loop, which watches by itself: where this process hangs, the hand is released too.
-/// One thread, not that of the servo.
+/// The right to arm. One client holds it at a time, as long as its heartbeats arrive. The lease forwards each
+/// heartbeat to the servo loop, which monitors them too: the loop releases the hand if this thread hangs. Not
+/// RT-safe: allocates. One thread, not the servo thread.
 class Lease {
  public:
   Lease(ServoLoop& loop, EventFeed& feed) : loop_(loop), feed_(feed) {}
@@ -26,28 +26,32 @@ class Lease {
   const std::optional<Holder>& holder() const noexcept { return holder_; }
   bool held_by(std::uint64_t client) const noexcept { return holder_ && holder_->client == client; }
 
-  /// Nobody may have it, or the same client. Counts as a sign of life.
+  /// Gives the lease to the client. Counts as a heartbeat. Precondition: the lease is free, or this client
+  /// holds it.
   void acquire(const Holder& client, TimePoint now);
-  /// Takes it from whoever has it; who armed with it is disarmed.
+  /// Gives the lease to the client, whichever client holds it. Disarms the loop if the previous holder armed
+  /// it.
   void preempt(const Holder& client, TimePoint now);
-  /// Disarms what was armed with it.
-  void release(const std::string& why);
-  /// Its holder lives.
+  /// Frees the lease, and disarms the loop if the holder armed it. reason: ends the log line "lease:
+  /// <holder>".
+  void release(const std::string& reason);
+  /// The holder has sent a heartbeat.
   void heartbeat(TimePoint now);
-  /// Its holder arms. Counts as a sign of life.
+  /// The holder arms the loop. Counts as a heartbeat.
   void arm(TimePoint now);
-  /// That client's connection has ended: if it held the lease the hand is released.
+  /// The connection of this client has ended. If the client holds the lease, the lease ends, and the loop
+  /// releases the hand if the client armed it.
   void client_lost(std::uint64_t client);
-  /// Ends the lease of a holder that does not say any more that it lives, in the same way.
+  /// Ends the lease like client_lost() if the last heartbeat of its holder is older than kHeartbeatTimeout.
   void check(TimePoint now);
-  /// When to look again; the end of time where nobody holds it.
+  /// Returns when check() must run next; TimePoint::max() if the lease is free.
   TimePoint next_check_at() const noexcept;
 
-  /// What is armed now, if anything is, was armed with this lease.
+  /// True if the holder has armed the loop.
   bool armed() const noexcept { return armed_; }
 
  private:
-  void end(EventLevel level, const std::string& what);
+  void end(EventLevel level, const std::string& text);
 
   ServoLoop& loop_;
   EventFeed& feed_;

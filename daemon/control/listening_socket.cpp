@@ -21,15 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFile = "control.sock";
-/// Connections that wait to be accepted. Who comes later waits in connect().
+/// Connections that wait to be accepted. Further clients wait in connect().
 constexpr int kBacklog = 64;
 
 std::string reason() {
   return std::strerror(errno);
 }
 
-std::runtime_error rejection_text(const fs::path& path, const std::string& what) {
-  return std::runtime_error(path.string() + ": " + what);
+std::runtime_error path_error(const fs::path& path, const std::string& error) {
+  return std::runtime_error(path.string() + ": " + error);
 }
 
 std::string environment(const char* name) {
@@ -42,8 +42,8 @@ sockaddr_un address_of(const fs::path& path) {
   address.sun_family = AF_UNIX;
   const std::string& text = path.native();
   if (text.size() >= sizeof address.sun_path)
-    throw rejection_text(path, "is longer than the " + std::to_string(sizeof address.sun_path - 1) +
-                                   " bytes that a socket's path may have");
+    throw path_error(path, "is longer than the " + std::to_string(sizeof address.sun_path - 1) +
+                               " bytes that a socket's path may have");
   std::memcpy(address.sun_path, text.data(), text.size());
   return address;
 }
@@ -54,25 +54,23 @@ OwnedFd stream_socket() {
   return fd;
 }
 
-/// Whoever can write there can put another socket in the place of ours.
+/// Throws unless only this user can write to the directory. A user who can write to it can replace the
+/// socket.
 void check_directory(const fs::path& directory) {
   if (::mkdir(directory.c_str(), geteuid() == 0 ? 0755 : 0700) != 0 && errno != EEXIST)
-    throw rejection_text(directory,
-                         "cannot be made: " + reason() +
-                             "; make it and give it to the user that wrenchd runs as, or name another "
-                             "path with --control");
+    throw path_error(directory, "cannot be created: " + reason() +
+                                    "; create it for the user that runs wrenchd, or name another "
+                                    "path with --control");
   struct stat status {};
-  if (::stat(directory.c_str(), &status) != 0) throw rejection_text(directory, reason());
+  if (::stat(directory.c_str(), &status) != 0) throw path_error(directory, reason());
   if (!S_ISDIR(status.st_mode))
-    throw rejection_text(directory, "is no directory; name another path with --control");
+    throw path_error(directory, "is no directory; name another path with --control");
   if (status.st_uid != geteuid() && status.st_uid != 0)
-    throw rejection_text(directory,
-                         "belongs to uid " + std::to_string(status.st_uid) +
-                             ", who could put another socket there; name a path in a directory of your own");
+    throw path_error(directory, "belongs to uid " + std::to_string(status.st_uid) +
+                                    ", who could replace the socket; name a path in a directory of your own");
   if ((status.st_mode & 022U) != 0 && (status.st_mode & S_ISVTX) == 0)
-    throw rejection_text(
-        directory,
-        "others may write there, and put another socket in its place; run: chmod go-w " + directory.string());
+    throw path_error(directory, "other users can write there and replace the socket; run: chmod go-w " +
+                                    directory.string());
 }
 
 }  // namespace
@@ -89,7 +87,7 @@ SocketPath choose_socket_path(const std::string& command_line, const ControlSett
                                "\", found \"" + path + "\"");
     return {path, true};
   }
-  // Several directories are separated by colons; the first is the unit's own.
+  // A list separated by colons; the first directory belongs to this unit.
   if (std::string run = environment("RUNTIME_DIRECTORY"); !run.empty())
     return {fs::path(run.substr(0, run.find(':'))) / kFile, true};
   if (const std::string run = environment("XDG_RUNTIME_DIR"); !run.empty() && geteuid() != 0)
@@ -105,7 +103,7 @@ ListeningSocket::ListeningSocket(const fs::path& path, const RoleRules& rules) :
   bind_private();
   try {
     grant_access(rules);
-    if (::listen(socket_.get(), kBacklog) != 0) throw rejection_text(path_, "cannot listen: " + reason());
+    if (::listen(socket_.get(), kBacklog) != 0) throw path_error(path_, "cannot listen: " + reason());
   } catch (...) {
     ::unlink(path_.c_str());
     throw;
@@ -134,59 +132,58 @@ bool ListeningSocket::adopt_from_systemd() {
   return true;
 }
 
-/// For as long as this lives; the kernel lets go of it when the process dies, however it does. It is not
-/// removed: another daemon may be waiting to lock this very file.
+/// Locks the path while this object lives; the kernel unlocks it when the process ends. The lock file stays:
+/// another daemon may be waiting to lock it.
 void ListeningSocket::lock_path() {
   const fs::path file = path_.string() + ".lock";
   lock_ = OwnedFd(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (!lock_) throw rejection_text(file, "cannot be made: " + reason());
+  if (!lock_) throw path_error(file, "cannot be created: " + reason());
   if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0)
-    throw rejection_text(path_,
-                         "another wrenchd listens there; stop it, or name another path with --control");
+    throw path_error(path_, "another wrenchd listens there; stop it, or name another path with --control");
 }
 
-/// Nobody who locks is there any more. What is left may still be another program's.
+/// Removes the socket of a dead daemon. Throws if another program listens there. Precondition: the path is
+/// locked.
 void ListeningSocket::remove_stale_socket() {
   struct stat status {};
   if (::lstat(path_.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw rejection_text(path_,
-                         "is there, and is no socket; move it away, or name another path with --control");
+    throw path_error(path_, "is there, and is no socket; move it away, or name another path with --control");
   const sockaddr_un address = address_of(path_);
   const OwnedFd probe = stream_socket();
   const bool lives =
       ::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
-      errno == EAGAIN;  // too many wait for it already
-  if (lives) throw rejection_text(path_, "another program listens there; name another path with --control");
-  if (::unlink(path_.c_str()) != 0) throw rejection_text(path_, "cannot be removed: " + reason());
+      errno == EAGAIN;  // its backlog is full
+  if (lives) throw path_error(path_, "another program listens there; name another path with --control");
+  if (::unlink(path_.c_str()) != 0) throw path_error(path_, "cannot be removed: " + reason());
 }
 
-/// The file gets the permissions of the socket, less the umask: nobody else can connect before they are
-/// widened.
+/// Creates the socket file with mode 0600, so that no other user can connect before grant_access().
 void ListeningSocket::bind_private() {
   const sockaddr_un address = address_of(path_);
   socket_ = stream_socket();
-  if (::fchmod(socket_.get(), 0600) != 0) throw rejection_text(path_, reason());
+  if (::fchmod(socket_.get(), 0600) != 0) throw path_error(path_, reason());
   if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    throw rejection_text(path_, "cannot be made: " + reason());
+    throw path_error(path_, "cannot be created: " + reason());
   struct stat status {};
-  if (::lstat(path_.c_str(), &status) != 0) throw rejection_text(path_, reason());
+  if (::lstat(path_.c_str(), &status) != 0) throw path_error(path_, reason());
   device_ = status.st_dev;
   inode_ = status.st_ino;
 }
 
-/// The directory is ours, so that the path is still what was made.
+/// Changes group and mode of the socket file. Only this user can write to the directory, so the path still
+/// names the file of bind_private().
 void ListeningSocket::grant_access(const RoleRules& rules) {
-  // Where everybody may connect no group has to own it.
+  // If every user may connect, no group needs to own the file.
   const auto group = rules.anyone_may_observe ? std::nullopt
                      : rules.observers        ? rules.observers
                      : rules.operators        ? rules.operators
                                               : rules.administrators;
   if (group && ::chown(path_.c_str(), static_cast<uid_t>(-1), *group) != 0)
-    throw rejection_text(path_, "cannot be given to group " + std::to_string(*group) + ": " + reason() +
-                                    "; make the user that wrenchd runs as a member of it");
+    throw path_error(path_, "cannot be given to group " + std::to_string(*group) + ": " + reason() +
+                                "; add the user that runs wrenchd to that group");
   const mode_t mode = rules.anyone_may_observe ? 0666 : group ? 0660 : 0600;
-  if (::chmod(path_.c_str(), mode) != 0) throw rejection_text(path_, reason());
+  if (::chmod(path_.c_str(), mode) != 0) throw path_error(path_, reason());
 }
 
 }  // namespace wrenchd

@@ -13,34 +13,33 @@
 
 namespace wrenchd {
 
-/// Where the control socket is to be.
+/// Path of the control socket.
 struct SocketPath {
-  std::filesystem::path path;     ///< empty: nowhere, nobody wants one
-  bool explicitly_named = false;  ///< somebody named it; else it is the usual place, and may be another's
+  std::filesystem::path path;     ///< empty: no socket
+  bool explicitly_named = false;  ///< false: the default path, which another daemon may use
 };
 
-/// The first of: the command line's, $WRENCHD_SOCKET, the configuration's, and the usual place. Throws
-/// std::runtime_error where the path is not absolute.
+/// Returns the first path given by: command line, $WRENCHD_SOCKET, configuration, default path. Throws
+/// std::runtime_error if the path is not absolute. Not RT-safe: allocates.
 SocketPath choose_socket_path(const std::string& command_line, const ControlSettings& settings);
 
-/// A Unix stream socket that listens where it was told to, and nowhere else.
+/// A listening Unix stream socket. Not RT-safe: system calls.
 ///
-/// Nobody but the owner can connect before the permissions are those that were asked for. A socket that a
-/// dead daemon left is replaced; beside a living one none is made. The directory is made where its parent is
-/// there; it has to be the owner's, and writable by nobody else. What systemd passes (LISTEN_FDS) is taken as
-/// it is.
+/// Only the owner can connect until the final permissions are set. The constructor replaces the socket of a
+/// daemon that has died, and throws if another daemon listens at the path. It creates the directory if the
+/// parent exists. The directory must belong to the owner, and no other user may write to it. A socket that
+/// systemd passes (LISTEN_FDS) is used unchanged.
 class ListeningSocket {
  public:
-  /// Throws std::runtime_error, which names path and cure.
+  /// Throws std::runtime_error; the message names path and cure.
   ListeningSocket(const std::filesystem::path& path, const RoleRules& rules);
-  /// Removes what it made.
+  /// Removes the socket file, if the constructor created it.
   ~ListeningSocket();
   ListeningSocket(const ListeningSocket&) = delete;
   ListeningSocket& operator=(const ListeningSocket&) = delete;
 
   int fd() const noexcept { return socket_.get(); }
   const std::filesystem::path& path() const noexcept { return path_; }
-  bool from_systemd() const noexcept { return from_systemd_; }
 
  private:
   bool adopt_from_systemd();
@@ -53,8 +52,8 @@ class ListeningSocket {
   OwnedFd lock_;
   OwnedFd socket_;
   bool from_systemd_ = false;
-  dev_t device_ = 0;  ///< of the socket's file, to remove no other
-  ino_t inode_ = 0;
+  dev_t device_ = 0;  ///< device of the socket file: the destructor removes no other file
+  ino_t inode_ = 0;   ///< inode of the socket file
 };
 
 }  // namespace wrenchd

@@ -7,7 +7,7 @@
 
 namespace wrenchd {
 
-/// A file descriptor that is closed with this.
+/// A file descriptor that the destructor closes. Not RT-safe: system calls.
 class OwnedFd {
  public:
   OwnedFd() = default;

@@ -11,17 +11,18 @@
 #include "collision/touch.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "config/setting_table.hpp"
 #include "core/finite.hpp"
-#include "daemon/control/setting_keys.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// A rendering that comes is felt within the longest soft start; what takes longer is a search for a place.
-constexpr auto kPatience = std::chrono::seconds(2);
-/// The largest gain of a local model; what of it the device bears is another matter.
-constexpr double kMostModelStiffness = 1e5;
-constexpr auto kLook = std::chrono::milliseconds(5);
+/// Longest wait for the crossfade to the previous rendering. It covers the longest soft start. Only a search
+/// for a feasible pose takes longer.
+constexpr auto kMaxWait = std::chrono::seconds(2);
+/// Largest gain of a local model. The loop scales the gain further to what is stable.
+constexpr double kMaxModelGain = 1e5;
+constexpr auto kWaitPeriod = std::chrono::milliseconds(5);
 
 std::string contents(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -43,13 +44,13 @@ std::string names(const SceneSettings& scene) {
   throw std::invalid_argument("there is no obstacle '" + name + "' in the scene; there are: " + names(scene));
 }
 
-/// What moves by itself sets out now.
-void set_out_at(double now_s, SceneSettings& scene) {
+/// Starts all obstacle motions at this scene time.
+void start_motions(double now_s, SceneSettings& scene) {
   for (MeshObstacleSettings& obstacle : scene.meshes) obstacle.motion.start_s = now_s;
 }
 
-/// What has come to where it went stands there, and is none that moves any more.
-void settle(MeshObstacleSettings& obstacle, double now_s) {
+/// Replaces a finished motion by the pose at its end.
+void finish_motion(MeshObstacleSettings& obstacle, double now_s) {
   if (obstacle.scheduled && now_s >= obstacle.scheduled->start_s) {
     obstacle.X_WM = obstacle.scheduled->X_WO;
     obstacle.motion = obstacle.scheduled->motion;
@@ -73,31 +74,21 @@ std::vector<std::string> names_of(const Scene& scene) {
   return names;
 }
 
-double value_of(const Settings& settings, const char* name) {
-  const LimitSettings& limits = settings.limits;
-  const std::string_view key(name);
-  if (key == "limits.max_force_N") return limits.max_force_N;
-  if (key == "limits.max_torque_Nm") return limits.max_torque_Nm;
-  if (key == "limits.force_slew_N_per_s") return limits.force_slew_N_per_s;
-  if (key == "limits.torque_slew_Nm_per_s") return limits.torque_slew_Nm_per_s;
-  return limits.soft_start_s;
-}
-
 }  // namespace
 
-Reconfigurator::Reconfigurator(RunConfig plan, std::shared_ptr<const Scene> scene, ServoLoop& loop,
-                               ProxySearchMode place_in, MeshLoader loader)
-    : config_(std::move(plan)),
+Reconfigurator::Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
+                               ProxySearchMode proxy_search_mode, MeshLoader loader)
+    : config_(std::move(config)),
       file_settings_(config_.settings),
       profile_text_(contents(config_.settings.device.profile_file)),
       scene_fingerprint_(files_fingerprint(config_.scene)),
       scene_(std::move(scene)),
       loop_(loop),
-      proxy_search_mode_(place_in),
+      proxy_search_mode_(proxy_search_mode),
       loader_(std::move(loader)),
       names_{0, names_of(*scene_)} {}
 
-/// By which it is seen that one of its files was written since.
+/// Returns a text that changes if a file of the scene changes.
 std::string Reconfigurator::files_fingerprint(const SceneSettings& scene) const {
   std::string text = scene.file.string() + '\n' + contents(scene.file);
   const auto add = [&text](const std::filesystem::path& mesh) {
@@ -113,18 +104,18 @@ std::string Reconfigurator::files_fingerprint(const SceneSettings& scene) const 
 std::shared_ptr<const Scene> Reconfigurator::build_scene(const SceneSettings& scene) {
   MeshLoader loader = loader_;
   auto made = std::make_shared<const Scene>(scene, loader);
-  remarks_ = loader.changes();
-  remarks_.insert(remarks_.end(), loader.warnings().begin(), loader.warnings().end());
+  mesh_warnings_ = loader.changes();
+  mesh_warnings_.insert(mesh_warnings_.end(), loader.warnings().begin(), loader.warnings().end());
   return made;
 }
 
-/// In steps of time nothing is warmed up: how far that comes depends on the machine.
+/// Virtual time has no warm-up: its result depends on the speed of the machine.
 std::unique_ptr<Rendering> Reconfigurator::build_rendering(const Settings& settings,
                                                            std::shared_ptr<const Scene> scene) {
   auto placer = make_proxy_initializer(scene, proxy_search_mode_);
   auto rendering = std::make_unique<Rendering>(rendering_id_ + 1, settings, config_.profile, std::move(scene),
                                                std::move(placer));
-  const ServoLoop::HandlePose hand = loop_.handle_pose();
+  const HandlePose hand = loop_.telemetry().handle_pose();
   if (proxy_search_mode_ == ProxySearchMode::background) rendering->warm_up(hand.X_WH, hand.scene_time_s);
   return rendering;
 }
@@ -137,17 +128,17 @@ void Reconfigurator::offer(std::unique_ptr<Rendering> rendering, const Settings&
   rendering_id_ = rendering->id();
   checksum_ = rendering->checksum();
   {
-    const std::lock_guard told(names_mutex_);
+    const std::lock_guard names_lock(names_mutex_);
     names_ = {rendering_id_, names_of(*scene_)};
   }
-  loop_.exchange().offer(std::move(rendering));
+  loop_.requests().renderings().offer(std::move(rendering));
 }
 
 void Reconfigurator::replace_scene(const std::filesystem::path& file) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = load_scene(file);
   auto scene_built = build_scene(scene);
-  set_out_at(scene_time_s(), scene);
+  start_motions(scene_time_s(), scene);
   if (scene_built->has_moving_obstacles())
     scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
   Settings settings = config_.settings;
@@ -164,7 +155,7 @@ std::string Reconfigurator::insert_obstacle(const TomlNode& obstacle, const std:
   const bool is_half_space = scene.half_spaces.size() > half_spaces;
   const double now = scene_time_s();
   if (!is_half_space) scene.meshes.back().motion.start_s = now;
-  for (MeshObstacleSettings& mesh : scene.meshes) settle(mesh, now);
+  for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, now);
   auto scene_built = build_scene(scene);
   std::string name = is_half_space ? scene.half_spaces.back().name : scene.meshes.back().name;
   auto rendering = build_rendering(config_.settings, scene_built);
@@ -178,33 +169,36 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
     refuse_unknown(name, scene);
-  for (MeshObstacleSettings& mesh : scene.meshes) settle(mesh, scene_time_s());
+  for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
   auto scene_built = build_scene(scene);
   auto rendering = build_rendering(config_.settings, scene_built);
   offer(std::move(rendering), config_.settings, std::move(scene), std::move(scene_built));
 }
 
-/// Until nothing is on its way into the loop any more, so that an obstacle cannot have set out before it is
-/// followed. A loop that does not tick has no hand in it, and need not be waited for.
+/// Waits until the loop has taken the last rendering and finished its crossfade. Otherwise an obstacle could
+/// start to move before the loop renders it. Returns early if the loop does not tick. Throws BusyError after
+/// kMaxWait.
 void Reconfigurator::wait_until_idle() {
-  const auto quiet = [this] { return loop_.exchange().taken() && !loop_.crossfading(); };
-  if (quiet()) return;
+  const auto idle = [this] {
+    return loop_.requests().renderings().taken() && !loop_.telemetry().crossfading();
+  };
+  if (idle()) return;
   const auto busy = [] {
-    throw BusyError("another change is on its way to the hand; ask again in a moment");
+    throw BusyError("another change of the rendering is in progress; repeat the request in a moment");
   };
   if (proxy_search_mode_ == ProxySearchMode::in_tick) busy();
-  const auto end = std::chrono::steady_clock::now() + kPatience;
-  const std::uint64_t ticks = loop_.timing().tick.count();
-  while (!quiet()) {
+  const auto end = std::chrono::steady_clock::now() + kMaxWait;
+  const std::uint64_t ticks = loop_.telemetry().timing().tick.count();
+  while (!idle()) {
     if (std::chrono::steady_clock::now() > end) {
-      if (loop_.timing().tick.count() == ticks) return;
+      if (loop_.telemetry().timing().tick.count() == ticks) return;
       busy();
     }
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kWaitPeriod);
   }
 }
 
-void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, double over_s) {
+void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, double duration_s) {
   const std::lock_guard lock(mutex_);
   SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
@@ -212,25 +206,26 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
   if (mesh == scene.meshes.end()) {
     if (std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), is_it))
       throw std::invalid_argument("'" + name +
-                                  "' is a half_space, and those stand still; give what is to move as a mesh");
+                                  "' is a half_space, which cannot move; use a mesh for a moving obstacle");
     refuse_unknown(name, scene);
   }
   if (!is_finite(X_WO)) throw std::invalid_argument("the pose of '" + name + "' is not finite");
-  if (!(over_s > 0.0) || !(over_s <= 86400.0))
-    throw std::invalid_argument("over_s: expected more than 0 and at most 86400 s, found " + to_text(over_s));
+  if (!(duration_s > 0.0) || !(duration_s <= 86400.0))
+    throw std::invalid_argument("duration_s: expected more than 0 and at most 86400 s, found " +
+                                to_text(duration_s));
   wait_until_idle();
   const double now = scene_time_s(), begin = now + kMoveDelay_s;
-  for (MeshObstacleSettings& obstacle : scene.meshes) settle(obstacle, now);
+  for (MeshObstacleSettings& obstacle : scene.meshes) finish_motion(obstacle, now);
   if (mesh->scheduled)
-    throw BusyError("'" + name + "' was told to move a moment ago, and has not set out; ask again in " +
+    throw BusyError("'" + name + "' has a motion that has not started yet; repeat the request in " +
                     to_text(kMoveDelay_s) + " s");
   const Pose X_begin = mesh->motion.pose_at(mesh->X_WM, begin);
-  const ObstacleMotion motion = ObstacleMotion::between(X_begin, X_WO, begin, over_s);
-  if (const double least_s = least_time_s(motion); least_s > over_s)
-    throw std::invalid_argument("'" + name + "' would have to be faster than obstacles may be (" +
+  const ObstacleMotion motion = ObstacleMotion::between(X_begin, X_WO, begin, duration_s);
+  if (const double least_s = least_time_s(motion); least_s > duration_s)
+    throw std::invalid_argument("'" + name + "' would exceed the highest speed of an obstacle (" +
                                 to_text(ObstacleMotion::kMaxSpeed_m_per_s) + " m/s, " +
                                 to_text(ObstacleMotion::kMaxAngularSpeed_rad_per_s) +
-                                " rad/s); give it at least over_s = " + to_text(least_s));
+                                " rad/s); give it at least duration_s = " + to_text(least_s));
   mesh->scheduled = {begin, X_begin, motion};
   auto scene_built = std::make_shared<const Scene>(*scene_, scene.meshes);
   auto rendering = build_rendering(config_.settings, scene_built);
@@ -245,9 +240,9 @@ void Reconfigurator::set_rendering(const TomlNode& changes, const std::filesyste
   offer(std::move(rendering), settings, config_.scene, scene_);
 }
 
-void Reconfigurator::set_workspace(const WorkspaceRequest& wish) {
-  workspace_ = wish;
-  loop_.set_workspace(wish);
+void Reconfigurator::set_workspace(const WorkspaceRequest& request) {
+  workspace_ = request;
+  loop_.requests().set_workspace(request);
 }
 
 void Reconfigurator::set_scale(double scale) {
@@ -255,35 +250,35 @@ void Reconfigurator::set_scale(double scale) {
   if (!(scale >= WorkspaceRequest::kMinScale && scale <= WorkspaceRequest::kMaxScale))
     throw std::invalid_argument("scale: expected " + to_text(WorkspaceRequest::kMinScale) + " to " +
                                 to_text(WorkspaceRequest::kMaxScale) + ", found " + to_text(scale));
-  WorkspaceRequest wish = workspace_;
-  wish.scale = scale;
-  set_workspace(wish);
+  WorkspaceRequest request = workspace_;
+  request.scale = scale;
+  set_workspace(request);
 }
 
-void Reconfigurator::set_clutched(bool in) {
+void Reconfigurator::set_clutched(bool clutched) {
   const std::lock_guard lock(mutex_);
-  WorkspaceRequest wish = workspace_;
-  wish.clutched = in;
-  set_workspace(wish);
+  WorkspaceRequest request = workspace_;
+  request.clutched = clutched;
+  set_workspace(request);
 }
 
 void Reconfigurator::recentre() {
   const std::lock_guard lock(mutex_);
-  WorkspaceRequest wish = workspace_;
-  ++wish.recentre_count;
-  set_workspace(wish);
+  WorkspaceRequest request = workspace_;
+  ++request.recentre_count;
+  set_workspace(request);
 }
 
-/// Those that have not expired.
+/// Returns the models that have another id and have not expired.
 LocalModelSet Reconfigurator::other_models(std::uint32_t id) {
-  const TimePoint now = loop_.handle_pose().at;
+  const TimePoint now = loop_.telemetry().handle_pose().at;
   LocalModelSet others;
   for (const LocalModel& model : models_)
     if (model.id != id && model.expires > now) others.add(model);
   return others;
 }
 
-void Reconfigurator::set_model(LocalModel model, double for_s) {
+void Reconfigurator::set_model(LocalModel model, double lifetime_s) {
   const std::lock_guard lock(mutex_);
   const auto expect = [](double x, double most, const char* name) {
     if (!(x >= 0.0 && x <= most))
@@ -292,92 +287,93 @@ void Reconfigurator::set_model(LocalModel model, double for_s) {
   };
   if (config_.profile.wrench_point == WrenchPoint::world_origin)
     throw std::invalid_argument(
-        "this device's wrench is not about its handle, so that it knows no local models");
-  if (!(for_s > 0.0 && for_s <= LocalModel::kMaxLifetime_s))
-    throw std::invalid_argument("expires_s: expected more than 0 and at most " +
-                                to_text(LocalModel::kMaxLifetime_s) + ", found " + to_text(for_s) +
-                                "; a model that is to stay is sent again");
-  expect(model.stiffness_N_per_m, kMostModelStiffness, "stiffness_N_per_m");
-  expect(model.stiffness_Nm_per_rad, kMostModelStiffness, "stiffness_Nm_per_rad");
-  expect(model.damping_N_s_per_m, kMostModelStiffness, "damping_N_s_per_m");
-  expect(model.damping_Nm_s_per_rad, kMostModelStiffness, "damping_Nm_s_per_rad");
+        "local models need a wrench about the handle, and the profile of this device names the world origin");
+  if (!(lifetime_s > 0.0 && lifetime_s <= LocalModel::kMaxLifetime_s))
+    throw std::invalid_argument("lifetime_s: expected more than 0 and at most " +
+                                to_text(LocalModel::kMaxLifetime_s) + ", found " + to_text(lifetime_s) +
+                                "; to keep a model, send it again");
+  expect(model.stiffness_N_per_m, kMaxModelGain, "stiffness_N_per_m");
+  expect(model.stiffness_Nm_per_rad, kMaxModelGain, "stiffness_Nm_per_rad");
+  expect(model.damping_N_s_per_m, kMaxModelGain, "damping_N_s_per_m");
+  expect(model.damping_Nm_s_per_rad, kMaxModelGain, "damping_Nm_s_per_rad");
   if (!is_finite(model.normal_W) || !is_finite(model.offset_m) || !is_finite(model.X_WA))
-    throw std::invalid_argument("the model's place is not finite");
+    throw std::invalid_argument("the pose of the model is not finite");
   const double length = model.normal_W.norm();
   if (!(length > 1e-9)) throw std::invalid_argument("normal: must not be zero; it points out of the solid");
   model.normal_W /= length;
   model.offset_m /= length;
   model.X_WA.rotation.normalize();
-  model.expires = loop_.handle_pose().at + from_seconds(for_s);
+  model.expires = loop_.telemetry().handle_pose().at + from_seconds(lifetime_s);
   LocalModelSet models = other_models(model.id);
   if (!models.add(model))
     throw std::invalid_argument("there are " + std::to_string(kMaxLocalModels) +
                                 " local models already; remove one, or let it expire");
   models_ = models;
-  loop_.set_local_models(models_);
+  loop_.requests().set_local_models(models_);
 }
 
 void Reconfigurator::remove_model(std::uint32_t id) {
   const std::lock_guard lock(mutex_);
   models_ = other_models(id);
-  loop_.set_local_models(models_);
+  loop_.requests().set_local_models(models_);
 }
 
 ReloadResult Reconfigurator::reload(const std::function<RunConfig()>& read) {
   const std::lock_guard lock(mutex_);
   ReloadResult result;
-  const RunConfig plan = read();
-  Settings settings = config_.settings;  // that will hold
-  Settings configured = file_settings_;  // and as far as it comes from files
+  const RunConfig config = read();
+  Settings settings = config_.settings;  // present values after the reload
+  Settings configured = file_settings_;  // values from files after the reload
   bool needs_rendering = false, limits_changed = false;
-  const bool armed = loop_.state() == State::waiting || is_driving(loop_.state());
-  for (const SettingKey& key : setting_keys()) {
-    if (key.same(plan.settings, file_settings_)) continue;
-    if (key.effect == SettingKey::Effect::restart) {
-      result.not_applied.push_back(std::string(key.name) + ": takes a restart");
+  const bool armed = loop_.telemetry().state() == State::waiting || is_driving(loop_.telemetry().state());
+  for (const Setting& setting : setting_table()) {
+    if (setting.effect == Setting::Effect::scene || setting.effect == Setting::Effect::none) continue;
+    if (setting.equal(config.settings, file_settings_)) continue;
+    if (setting.effect == Setting::Effect::restart) {
+      result.not_applied.push_back(setting.name() + ": requires a restart");
       continue;
     }
     Settings wanted = settings;
-    key.copy(plan.settings, wanted);
-    if (key.effect == SettingKey::Effect::limits) {
+    setting.copy(config.settings, wanted);
+    if (setting.effect == Setting::Effect::limits) {
       Settings allowed = wanted;
       if (armed) allowed.limits = tighter(settings.limits, wanted.limits, config_.profile);
-      if (!key.same(allowed, wanted)) {
-        result.not_applied.push_back(std::string(key.name) + ": is looser than " +
-                                     to_text(value_of(settings, key.name)) +
+      if (!setting.equal(allowed, wanted)) {
+        result.not_applied.push_back(setting.name() + ": is looser than " +
+                                     to_text(setting.number(settings)) +
                                      ", which holds as long as the loop is armed; disarm, and reload again");
         continue;
       }
       limits_changed = true;
-    } else if (key.effect == SettingKey::Effect::new_rendering) {
+    } else if (setting.effect == Setting::Effect::new_rendering) {
       needs_rendering = true;
     }
     settings = wanted;
-    key.copy(plan.settings, configured);
-    result.applied.emplace_back(key.name);
+    setting.copy(config.settings, configured);
+    result.applied.push_back(setting.name());
   }
-  if (plan.settings.device.profile == file_settings_.device.profile &&
-      contents(plan.settings.device.profile_file) != profile_text_)
-    result.not_applied.emplace_back("the device profile was changed: takes a restart");
-  const std::string scene_files = files_fingerprint(plan.scene);
+  if (config.settings.device.profile == file_settings_.device.profile &&
+      contents(config.settings.device.profile_file) != profile_text_)
+    result.not_applied.emplace_back("the device profile was changed: requires a restart");
+  const std::string scene_files = files_fingerprint(config.scene);
   const bool new_scene = scene_files != scene_fingerprint_;
   SceneSettings scene = config_.scene;
   auto scene_built = scene_;
   if (new_scene) {
-    scene = plan.scene;
+    scene = config.scene;
     scene_built = build_scene(scene);
-    set_out_at(scene_time_s(), scene);
+    start_motions(scene_time_s(), scene);
     if (scene_built->has_moving_obstacles())
       scene_built = std::make_shared<const Scene>(*scene_built, scene.meshes);
-    settings.scene = configured.scene = plan.settings.scene;
+    settings.scene = configured.scene = config.settings.scene;
     result.applied.emplace_back("scene");
-    result.remarks = remarks_;
+    result.mesh_warnings = mesh_warnings_;
   }
   std::unique_ptr<Rendering> rendering;
   if (needs_rendering || new_scene) rendering = build_rendering(settings, scene_built);
 
-  // All of it is good.
-  if (limits_changed) loop_.set_limits(settings.limits);
+  // Everything is valid.
+  if (limits_changed) loop_.requests().set_limits(settings.limits);
   config_.settings = settings;
   file_settings_ = configured;
   scene_fingerprint_ = scene_files;
@@ -406,24 +402,21 @@ Reconfigurator::CurrentRendering Reconfigurator::current_rendering() const {
 }
 
 Reconfigurator::ObstacleNames Reconfigurator::obstacle_names() const {
-  const std::lock_guard told(names_mutex_);
+  const std::lock_guard names_lock(names_mutex_);
   return names_;
 }
 
 Reconfigurator::SceneView Reconfigurator::scene_view() {
   const std::lock_guard lock(mutex_);
-  const ServoLoop::HandlePose seen = loop_.handle_pose();
-  const auto pose_of = [](const PoseSettings& placed) {
-    return Pose{rotation_from(placed.rotation_vector_rad), placed.position_m};
-  };
+  const HandlePose pose = loop_.telemetry().handle_pose();
   const DeviceSettings& device = config_.settings.device;
-  // The view is of the scene that the configuration names: of one that a client has loaded nobody has said.
+  // The configured camera belongs to the configured scene. A scene that a client has loaded has no camera.
   const bool configured = config_.settings.scene == file_settings_.scene;
   return {scene_,
           rendering_id_,
-          seen.at - from_seconds(seen.scene_time_s),
-          pose_of(device.base_in_world),
-          pose_of(device.tool_in_handle) * scene_->tool().X_MT(),
+          pose.at - from_seconds(pose.scene_time_s),
+          device.base_in_world.pose(),
+          device.tool_in_handle.pose() * scene_->tool().X_MT(),
           config_.profile.wrench_point,
           configured ? config_.settings.view : ViewSettings{}};
 }

@@ -16,125 +16,131 @@
 
 namespace wrenchd {
 
-/// It cannot be done now, though it may be in a moment: the message says why, and when.
+/// The request cannot be done now, but may succeed in a moment. The message says why and when.
 class BusyError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// What became of a configuration that was read again.
+/// Result of a reload.
 struct ReloadResult {
-  std::vector<std::string> applied;      ///< "wrench.stiffness", ...
-  std::vector<std::string> not_applied;  ///< "servo.rate_Hz: takes a restart", ...
-  std::vector<std::string> remarks;      ///< of the meshes
+  std::vector<std::string> applied;        ///< "wrench.stiffness", ...
+  std::vector<std::string> not_applied;    ///< "servo.rate_Hz: requires a restart", ...
+  std::vector<std::string> mesh_warnings;  ///< repairs and warnings of the mesh loader
 };
 
-/// Changes what is rendered while the loop runs. Here it is read, checked, built and warmed up; the loop gets
-/// what is ready. Where anything is wrong nothing at all is changed, and the loop never knows of it.
+/// Changes scene, rendering, workspace, local models and limits while the loop runs.
 ///
-/// Any thread but the servo thread, one at a time; meshes may take seconds. What is refused is thrown as
-/// ConfigError (place and cure), MeshError, std::invalid_argument or BusyError.
+/// Each change is read, checked, built and warmed up on the calling thread; then the loop receives the
+/// complete rendering. A change with an error changes nothing: it throws ConfigError (file, line and cure),
+/// MeshError, std::invalid_argument or BusyError.
+///
+/// Any thread except the servo thread; calls wait for each other. Not RT-safe: reading meshes may take
+/// seconds.
 class Reconfigurator {
  public:
-  /// plan: what the loop runs with, by whatever was read. scene: what it renders now. loader: kept as it is,
-  /// and copied for each reading, so that what is read anew is read. The loop must outlive this.
-  Reconfigurator(RunConfig plan, std::shared_ptr<const Scene> scene, ServoLoop& loop,
-                 ProxySearchMode place_in, MeshLoader loader);
+  /// config: what the loop runs with. scene: what the loop renders. loader: copied for each reload, so that
+  /// every mesh file is read again. The loop must outlive this object.
+  Reconfigurator(RunConfig config, std::shared_ptr<const Scene> scene, ServoLoop& loop,
+                 ProxySearchMode proxy_search_mode, MeshLoader loader);
 
-  // --- the scene ---
+  // --- Scene ---
 
-  /// Another scene, tool included, from its file. Obstacles that move set out now.
+  /// Replaces tool and obstacles by those of a scene file. Moving obstacles start now.
   void replace_scene(const std::filesystem::path& file);
-  /// Another obstacle: the table of an [[obstacle]]. source: for messages. Returns its name.
+  /// Adds an obstacle. obstacle: an [[obstacle]] table. source: file name for error messages. Returns the
+  /// name of the obstacle.
   std::string insert_obstacle(const TomlNode& obstacle, const std::filesystem::path& source);
   void remove_obstacle(const std::string& name);
-  /// Lets an obstacle, which has to be a mesh, go to this pose of its mesh frame within so long, on the
-  /// straight way, at constant speed. It sets out kMoveDelay_s from now.
-  void move_obstacle(const std::string& name, const Pose& X_WO, double over_s);
+  /// Moves a mesh obstacle to a pose of its mesh frame O in the world, on a straight path at constant speed.
+  /// The motion starts kMoveDelay_s from now and takes duration_s.
+  void move_obstacle(const std::string& name, const Pose& X_WO, double duration_s);
 
-  /// What [rendering] and [wrench] say, or parts of them. source: for messages.
+  /// Applies keys of [rendering] and [wrench]. source: file name for error messages.
   void set_rendering(const TomlNode& changes, const std::filesystem::path& source);
 
-  // --- the workspace ---
+  // --- Workspace ---
 
-  void set_scale(double scale);  ///< metres that the tool goes for a metre of the handle
-  void set_clutched(bool in);
+  /// scale: displacement of the tool divided by displacement of the handle.
+  void set_scale(double scale);
+  /// clutched: true disconnects the tool from the handle.
+  void set_clutched(bool clutched);
+  /// Moves the tool to the pose of the handle.
   void recentre();
 
-  // --- local models ---
+  // --- Local models ---
 
-  /// What a client knows of the surroundings of the handle, for so long; one of the same id takes the place
-  /// of the last.
-  void set_model(LocalModel model, double for_s);
+  /// Sets a local model for lifetime_s. Replaces the model that has the same id.
+  void set_model(LocalModel model, double lifetime_s);
   void remove_model(std::uint32_t id);
 
-  // --- all of it ---
+  // --- Reload ---
 
-  /// Reads the configuration again: all of it is applied that can be, or, where anything in it is refused,
-  /// nothing. Limits that are tighter hold at once; those that are looser wait until the loop is disarmed.
-  /// What clients changed stays where the files say what they said before. read: the plan, as at the start.
+  /// Reads the configuration by `read` and applies it: all keys that can change at run time, or nothing if
+  /// the configuration has an error. Tighter limits apply at once; looser limits only while the loop is
+  /// disarmed. A value that a client has changed stays unless the files have changed that key.
   ReloadResult reload(const std::function<RunConfig()>& read);
 
-  // --- what holds now ---
+  // --- Present values ---
 
   Settings settings() const;
   SceneSettings scene() const;
   WorkspaceRequest workspace() const;
-  /// Of what was handed over last: its number, and what Rendering::sum() has to be in every tick.
+  /// The rendering that was offered to the loop last.
   struct CurrentRendering {
     std::uint32_t id;
-    std::uint64_t checksum;
+    std::uint64_t checksum;  ///< equals rendering_checksum of its tick records
   };
   CurrentRendering current_rendering() const;
-  /// What there is to be drawn: the scene that was handed over last, and where and when it is.
+  /// The scene that was offered to the loop last, for display.
   struct SceneView {
     std::shared_ptr<const Scene> scene;
-    std::uint32_t rendering_id;   ///< of its rendering
-    TimePoint scene_time_begins;  ///< the time of the tick that is scene time 0
+    std::uint32_t rendering_id;   ///< rendering that contains the scene
+    TimePoint scene_time_begins;  ///< time of scene time 0
     Pose X_WB;                    ///< device base in the world
     Pose X_HT;                    ///< tool body in the handle
-    WrenchPoint wrench_point;     ///< what the wrenches in records are about
-    ViewSettings viewpoint;       ///< from where it is seen best
+    WrenchPoint wrench_point;     ///< reference point of the wrenches in tick records
+    ViewSettings viewpoint;       ///< camera of the scene
   };
   SceneView scene_view();
 
-  /// Names of the obstacles, by their numbers.
+  /// Names of the obstacles, indexed by obstacle number.
   struct ObstacleNames {
-    std::uint32_t rendering_id;  ///< number of the one they are of
+    std::uint32_t rendering_id;  ///< rendering that contains the obstacles
     std::vector<std::string> names;
   };
-  /// Waits for no change that is under way.
+  /// Returns at once, even while a change is being built.
   ObstacleNames obstacle_names() const;
 
   static constexpr double kMoveDelay_s = 0.200;
 
  private:
   std::string files_fingerprint(const SceneSettings& scene) const;
-  double scene_time_s() { return loop_.handle_pose().scene_time_s; }
+  double scene_time_s() { return loop_.telemetry().handle_pose().scene_time_s; }
   void wait_until_idle();
   std::shared_ptr<const Scene> build_scene(const SceneSettings& scene);
   std::unique_ptr<Rendering> build_rendering(const Settings& settings, std::shared_ptr<const Scene> scene);
   void offer(std::unique_ptr<Rendering> rendering, const Settings& settings, SceneSettings scene,
              std::shared_ptr<const Scene> built);
-  void set_workspace(const WorkspaceRequest& wish);
+  void set_workspace(const WorkspaceRequest& request);
   LocalModelSet other_models(std::uint32_t id);
 
-  mutable std::mutex mutex_;  ///< of all of the below
-  RunConfig config_;          ///< what holds
-  Settings file_settings_;    ///< as far as it came from files
-  std::string profile_text_;
-  std::string scene_fingerprint_;  ///< what the scene's files were when the configuration was read
+  mutable std::mutex mutex_;       ///< protects all members but names_
+  RunConfig config_;               ///< present values
+  Settings file_settings_;         ///< values that came from files; a client may have changed config_ since
+  std::string profile_text_;       ///< text of the profile at the start
+  std::string scene_fingerprint_;  ///< files_fingerprint() of the scene at the last reload
   std::shared_ptr<const Scene> scene_;
   ServoLoop& loop_;
   ProxySearchMode proxy_search_mode_;
   MeshLoader loader_;
-  std::vector<std::string> remarks_;
+  std::vector<std::string> mesh_warnings_;  ///< of the scene that was built last
   std::uint32_t rendering_id_ = 0;
   std::uint64_t checksum_ = 0;
   WorkspaceRequest workspace_;
   LocalModelSet models_;
 
-  mutable std::mutex names_mutex_;  ///< of what is told while a change is under way
+  mutable std::mutex names_mutex_;  ///< protects names_
   ObstacleNames names_;
 };
 

@@ -11,7 +11,7 @@ Json written_json(const Recordings::Summary& written) {
 MethodResult start(Recordings& recordings, const Json& params, const Caller& caller) {
   if (const auto running = recordings.status().running)
     throw RpcError(RpcCode::invalid_state,
-                   "It is recorded already, into " + running->file.string() + "; 'record.stop' ends that.",
+                   "A recording runs already: " + running->file.string() + "; 'record.stop' ends it.",
                    {{"file", running->file.string()}});
   try {
     const auto file =
@@ -25,14 +25,15 @@ MethodResult start(Recordings& recordings, const Json& params, const Caller& cal
 MethodResult stop(Recordings& recordings) {
   if (const auto written = recordings.stop()) return written_json(*written);
   const std::string failed = recordings.status().failed;
-  throw RpcError(RpcCode::invalid_state, failed.empty() ? "Nothing is recorded; 'record.start' begins."
-                                                        : "Nothing is recorded any more: " + failed + ".");
+  throw RpcError(RpcCode::invalid_state,
+                 failed.empty() ? "No recording runs; 'record.start' starts one."
+                                : "No recording runs; the last one ended with an error: " + failed + ".");
 }
 
 Json list(const Recordings& recordings) {
   Json all = Json::array();
   for (const StoredRecording& one : recordings.list())
-    all.push_back({{"name", one.name}, {"bytes", one.bytes}, {"written", utc_stamp(one.modified_at)}});
+    all.push_back({{"name", one.name}, {"bytes", one.bytes}, {"modified_utc", utc_stamp(one.modified_at)}});
   return {{"directory", recordings.status().directory.string()}, {"recordings", all}};
 }
 
@@ -53,52 +54,56 @@ Json recording_json(const Recordings& recordings) {
     return path.empty() ? Json(nullptr) : Json(path.string());
   };
   return {{"running", status.running ? written_json(*status.running) : Json(nullptr)},
-          {"failed", status.failed.empty() ? Json(nullptr) : Json(status.failed)},
+          {"failure", status.failed.empty() ? Json(nullptr) : Json(status.failed)},
           {"directory", path_or_null(status.directory)},
           {"flight_s", status.flight_s},
           {"last_flight", path_or_null(status.last_flight)},
-          {"flights", status.flights}};
+          {"flight_count", status.flights}};
 }
 
 void add_record_methods(MethodTable& table, Recordings& recordings) {
-  table.add(EventRow{"recording",
-                     "what: started, ended (ticks, lost: how many are missing), failed (why), flight (fault: "
-                     "the flight recorder has written what led to it). file: which."});
+  table.add(
+      EventRow{"recording",
+               "A recording changed. phase: started, ended (ticks; lost: number of missing ticks), failed "
+               "(reason), flight (fault: the fault that the flight recorder has recorded). file: the "
+               "recording."});
   table.add(MethodRow{
       "record.start",
       Role::operator_,
       {{"file", ParamType::text, false,
-        "a plain name, which goes into the directory that record.status names; without it "
-        "one of the time. Administrators may give an absolute path"}},
-      "Writes every tick from now on to an HDF5 file. Answers file. One at a time.",
+        "a plain name in the directory of record.status; default: a name with the present time. "
+        "Administrators "
+        "may give an absolute path"}},
+      "Starts to write every tick to an HDF5 file. Returns the file. One recording at a time.",
       [&recordings](const Json& params, const Caller& caller) { return start(recordings, params, caller); },
       true});
   table.add(MethodRow{"record.stop",
                       Role::operator_,
                       {},
-                      "Ends what record.start began: answers file, ticks, and lost, how many are missing.",
+                      "Ends the recording. Returns file, ticks, and lost: the number of missing ticks.",
                       [&recordings](const Json&, const Caller&) { return stop(recordings); },
                       true});
   table.add(MethodRow{
       "record.status",
       Role::observer,
       {},
-      "running: file, ticks and lost so far, or null; failed: why the last one ended by "
-      "itself; directory; flight_s: what the flight recorder holds; last_flight: its newest "
-      "file since the start; flights: how many.",
+      "running: file, ticks and lost of the running recording, or null; failure: why the last "
+      "recording ended early, or null; directory; flight_s: duration that the flight recorder stores; "
+      "last_flight: its newest file since the start; flight_count: number of its files since the "
+      "start.",
       [&recordings](const Json&, const Caller&) { return MethodResult(recording_json(recordings)); }});
-  table.add(
-      MethodRow{"record.list",
-                Role::observer,
-                {},
-                "The recordings of the directory that record.status names, the oldest first: name, bytes, "
-                "and when they were written (UTC). What is being written is not among them.",
-                [&recordings](const Json&, const Caller&) { return MethodResult(list(recordings)); },
-                true});
+  table.add(MethodRow{
+      "record.list",
+      Role::observer,
+      {},
+      "Returns the recordings in the directory of record.status, the oldest first: name, bytes, and "
+      "modified_utc. Unfinished recordings are left out.",
+      [&recordings](const Json&, const Caller&) { return MethodResult(list(recordings)); },
+      true});
   table.add(MethodRow{"record.open",
                       Role::observer,
-                      {{"name", ParamType::text, true, "as record.list names it"}},
-                      "Hands over the descriptor of a recording, to be read, beside the answer (SCM_RIGHTS).",
+                      {{"name", ParamType::text, true, "a name from record.list"}},
+                      "Opens a recording for reading. The reply carries its descriptor (SCM_RIGHTS).",
                       [&recordings](const Json& params, const Caller&) { return open(recordings, params); },
                       true});
 }

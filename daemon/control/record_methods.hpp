@@ -6,11 +6,12 @@
 
 namespace wrenchd {
 
-/// The rows of record.start, record.stop, record.status, and of the event `recording`. Both must outlive the
-/// table.
+/// Adds the methods record.* and the event `recording`. The recordings must outlive the table. Not RT-safe:
+/// allocates.
 void add_record_methods(MethodTable& table, Recordings& recordings);
 
-/// What `record.status` answers, and `status` has as `recording`. Waits for nothing.
+/// Returns the result of `record.status`, which is also the member `recording` of `status`. Does not block.
+/// Not RT-safe: allocates.
 Json recording_json(const Recordings& recordings);
 
 }  // namespace wrenchd

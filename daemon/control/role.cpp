@@ -17,10 +17,10 @@ constexpr std::size_t kMostGroups = 65536;
 
 std::optional<gid_t> group_of(const char* key, const std::string& group, const std::string& file) {
   if (group.empty()) return {};
-  // The thread-safe form wants a buffer of no known size; nobody else asks while the daemon starts.
+  // getgrnam_r() needs a buffer of unknown size. No other thread calls getgrnam() while the daemon starts.
   if (const struct group* found = getgrnam(group.c_str())) return found->gr_gid;
   throw std::runtime_error(file + ": key 'control." + key + "': this machine has no group '" + group +
-                           "'; make it with: groupadd --system " + group);
+                           "'; create it with: groupadd --system " + group);
 }
 
 bool is_member(const Peer& peer, const std::optional<gid_t>& group) noexcept {
@@ -88,9 +88,9 @@ std::string role_group_text(Role role, const ControlSettings& settings) {
                              : role == Role::operator_   ? settings.operators
                                                          : settings.observers;
   const std::string key = std::string(name(role)) + "s";
-  if (group.empty()) return "root; set '" + key + "' under [control] to a group to let others";
+  if (group.empty()) return "root; set '" + key + "' under [control] to a group to permit other users";
   if (group == kEverybody) return "everybody";
-  return "members of group '" + group + "'; after adding a user to it, log in anew";
+  return "members of group '" + group + "'; after adding a user to it, log in again";
 }
 
 }  // namespace wrenchd

@@ -12,18 +12,18 @@
 
 namespace wrenchd {
 
-/// What somebody at the control socket may do; each may do what those before it may.
+/// Permissions of a client of the control socket. Each role includes the permissions of the roles before it.
 enum class Role : std::uint8_t {
-  observer,       ///< sees everything, and may stop
-  operator_,      ///< takes the lease, arms, disarms, acknowledges
-  administrator,  ///< reconfigures, and takes the lease from another
+  observer,       ///< reads everything, and may stop
+  operator_,      ///< acquires the lease, arms, disarms, acknowledges
+  administrator,  ///< reconfigures, and preempts the lease
 };
 
 /// "operator"
 const char* name(Role role) noexcept;
 
-/// Who is at the other end of a socket, as the kernel says: as of the moment at which it connected. The
-/// number of its process is for people; nothing is decided by it, for numbers are given again.
+/// The process at the other end of a socket when it connected, from the kernel. The process id is for people
+/// only: the kernel reuses ids, so no permission depends on it.
 struct Peer {
   uid_t uid = 0;
   gid_t gid = 0;
@@ -34,25 +34,26 @@ struct Peer {
   std::string description() const;
 };
 
-/// Of a connected Unix socket. Nothing where the kernel does not say.
+/// Returns the peer of a connected Unix socket; nothing if the kernel gives no credentials. Not RT-safe:
+/// system calls.
 std::optional<Peer> peer_of(int socket);
 
-/// Which groups may do what. root and the daemon's own user may do everything.
+/// The group of each role. root and the user of the daemon are administrators.
 struct RoleRules {
   uid_t own_uid = 0;
   bool anyone_may_observe = false;
   std::optional<gid_t> observers, operators, administrators;
 };
 
-/// Looks the groups up. Throws std::runtime_error, which names the setting and the cure, where there is no
-/// such group. May ask the network, as name services do: not from a thread that others wait for.
+/// Looks up the configured groups. Throws std::runtime_error if a group does not exist; the message names the
+/// setting and the cure. Not RT-safe: a name service may query the network and take seconds.
 RoleRules load_role_rules(const ControlSettings& settings, const std::string& file);
 
-/// The highest role of that peer; nothing: it may not even look.
+/// Returns the highest role of the peer; nothing: the peer may not connect.
 std::optional<Role> role_of(const Peer& peer, const RoleRules& rules) noexcept;
 
-/// The group whose members have a role, as settings name it, for messages: "group 'wrenchd-operators'", or
-/// what to set where none does.
+/// Returns for messages which users have the role: "members of group 'wrenchd-operators'; ...", or the
+/// setting to change if no group has it. Not RT-safe: allocates.
 std::string role_group_text(Role role, const ControlSettings& settings);
 
 }  // namespace wrenchd

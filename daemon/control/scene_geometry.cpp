@@ -20,7 +20,7 @@ namespace {
 
 [[noreturn]] void refuse(const char* what) {
   throw std::system_error(errno, std::generic_category(),
-                          std::string("the memory that shows the scene to other programs: ") + what);
+                          std::string("the shared memory of the scene geometry: ") + what);
 }
 
 void write(const TriangleMesh& mesh, std::byte* vertices, std::byte* triangles) {
@@ -41,9 +41,9 @@ Json json_of(const Vector3d& v) {
 Json json_of(const ObstacleMotion& motion) {
   return {{"linear_m_per_s", json_of(motion.linear_m_per_s)},
           {"angular_rad_per_s", json_of(motion.angular_rad_per_s)},
-          {"turn_back_s", motion.reverse_after_s},
-          {"begin_s", motion.start_s},
-          {"last_s", motion.duration_s}};
+          {"reverse_after_s", motion.reverse_after_s},
+          {"start_s", motion.start_s},
+          {"duration_s", motion.duration_s}};
 }
 
 bool same(const TriangleMesh& a, const TriangleMesh& b) {
@@ -90,7 +90,7 @@ SceneGeometry::SceneGeometry(std::shared_ptr<const Scene> scene) : scene_(std::m
   memory_ = static_cast<std::byte*>(memory);
   for (std::size_t i = 0; i < all.size(); ++i)
     write(*all[i], memory_ + layouts_[i].vertices_offset, memory_ + layouts_[i].triangles_offset);
-  // Nothing is written any more: a mapping that could would keep the seal off.
+  // A writable mapping would prevent the write seal.
   munmap(memory_, bytes_);
   if (fcntl(descriptor_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0)
     give_up("seals");
@@ -111,7 +111,7 @@ bool SceneGeometry::matches(const Scene& scene) const {
          same(scene.tool().mesh, scene_->tool().mesh);
 }
 
-/// 0: it is none of these. The tool's comes first.
+/// Returns the number of an obstacle mesh, starting at 1; 0: unknown mesh. Mesh 0 is the tool.
 std::size_t SceneGeometry::mesh_number(const MeshBvh* mesh) const {
   const auto found = std::find(meshes_.begin(), meshes_.end(), mesh);
   return found == meshes_.end() ? 0 : static_cast<std::size_t>(found - meshes_.begin()) + 1;
@@ -136,9 +136,9 @@ Json SceneGeometry::description(const Scene& scene) const {
                      {"X_WO", pose_json(one.X_WO)}};
     if (one.motion.moves()) obstacle["motion"] = json_of(one.motion);
     if (one.scheduled)
-      obstacle["later"] = {{"from_s", one.scheduled->start_s},
-                           {"X_WO", pose_json(one.scheduled->X_WO)},
-                           {"motion", json_of(one.scheduled->motion)}};
+      obstacle["scheduled"] = {{"start_s", one.scheduled->start_s},
+                               {"X_WO", pose_json(one.scheduled->X_WO)},
+                               {"motion", json_of(one.scheduled->motion)}};
     obstacles.push_back(std::move(obstacle));
   }
   return {{"bytes", bytes_}, {"meshes", meshes}, {"tool", {{"mesh", 0}}}, {"obstacles", obstacles}};

@@ -12,28 +12,28 @@
 
 namespace wrenchd {
 
-/// What the bodies of a scene look like, in memory that other processes may map: sealed, so that whoever has
-/// the descriptor can only read it. Each mesh is there once, however many obstacles it is.
+/// The meshes of a scene in a sealed memory, which other processes map and can only read. A mesh that several
+/// obstacles use is stored once.
 ///
-///   vertices    three floats each [m], in the mesh's own frame (O; T for the tool's)
-///   triangles   three vertex numbers of 32 bits each, counter-clockwise seen from outside
+///   vertices    three floats each [m], in the frame of the mesh (O for an obstacle, T for the tool)
+///   triangles   three vertex numbers of 32 bits each, counter-clockwise from outside
 ///
-/// Not RT safe; a million triangles take some tens of milliseconds.
+/// Not RT-safe: a million triangles take some tens of milliseconds.
 class SceneGeometry {
  public:
-  /// Throws std::system_error where the kernel gives no such memory.
+  /// Throws std::system_error if the kernel denies the memory.
   explicit SceneGeometry(std::shared_ptr<const Scene> scene);
   ~SceneGeometry();
   SceneGeometry(const SceneGeometry&) = delete;
   SceneGeometry& operator=(const SceneGeometry&) = delete;
 
-  /// Whether another scene has the same meshes, wherever its obstacles stand: then these shapes are its too.
+  /// Returns true if the scene has the same meshes. The poses of its obstacles may differ.
   bool matches(const Scene& scene) const;
-  /// Which mesh is whose, where it stands and how it moves: {bytes, meshes, tool, obstacles}. The scene has
-  /// to be one that fits(). Obstacles are in the order of their numbers.
+  /// Returns {bytes, meshes, tool, obstacles}: the offsets of each mesh, and for each body its mesh, pose and
+  /// motion. Obstacles are in the order of their numbers. Precondition: matches(scene).
   Json description(const Scene& scene) const;
 
-  int descriptor() const noexcept { return descriptor_; }  ///< stays open for as long as this is
+  int descriptor() const noexcept { return descriptor_; }  ///< open while this object lives
   std::span<const std::byte> bytes() const noexcept { return {memory_, bytes_}; }
 
  private:
@@ -42,7 +42,7 @@ class SceneGeometry {
   };
   std::size_t mesh_number(const MeshBvh* mesh) const;
 
-  std::shared_ptr<const Scene> scene_;  ///< keeps the meshes, by which others are told to be the same
+  std::shared_ptr<const Scene> scene_;  ///< owns the meshes, which matches() compares by address
   std::vector<const MeshBvh*> meshes_;
   std::vector<MeshLayout> layouts_;  ///< of the tool, then of each of meshes_
   std::size_t bytes_ = 0;
@@ -50,10 +50,10 @@ class SceneGeometry {
   std::byte* memory_ = nullptr;
 };
 
-/// {eye_m, target_m}, or null where nobody has said from where a scene is seen best.
+/// Returns {eye_m, target_m}, or null if the configuration has no camera. Not RT-safe: allocates.
 Json view_json(const ViewSettings& view);
 
-/// A pose as records have it: x y z [m], qx qy qz qw.
+/// Returns a pose as in tick records: x y z [m], qx qy qz qw. Not RT-safe: allocates.
 Json pose_json(const Pose& X);
 
 }  // namespace wrenchd

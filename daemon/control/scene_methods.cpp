@@ -29,11 +29,11 @@ Json json_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// What the workbench refuses, in the words of the protocol.
-template <class Act>
-MethodResult answered(const Act& act) {
+/// Calls the function, and turns the errors of the reconfigurator into RpcError.
+template <class Call>
+MethodResult with_rpc_errors(const Call& call) {
   try {
-    return act();
+    return call();
   } catch (const BusyError& error) {
     throw RpcError(RpcCode::invalid_state, error.what());
   } catch (const ConfigError& error) {
@@ -45,37 +45,37 @@ MethodResult answered(const Act& act) {
   }
 }
 
-Json handed_over(const Reconfigurator& workbench) {
-  return {{"rendering", workbench.current_rendering().id}};
+Json current_rendering(const Reconfigurator& reconfigurator) {
+  return {{"rendering_id", reconfigurator.current_rendering().id}};
 }
 
-/// What the bodies look like, in memory of its own; the same memory for as long as the meshes are the same.
-class ShapesKept {
+/// Keeps the geometry memory of the scene while its meshes stay the same.
+class GeometryCache {
  public:
-  MethodResult answer(Reconfigurator& bench) {
-    const Reconfigurator::SceneView shown = bench.scene_view();
-    if (!shapes_ || !shapes_->matches(*shown.scene)) {
-      shapes_ = std::make_unique<SceneGeometry>(shown.scene);
-      ++number_;
+  MethodResult result(Reconfigurator& reconfigurator) {
+    const Reconfigurator::SceneView view = reconfigurator.scene_view();
+    if (!geometry_ || !geometry_->matches(*view.scene)) {
+      geometry_ = std::make_unique<SceneGeometry>(view.scene);
+      ++geometry_id_;
     }
-    Json result = shapes_->description(*shown.scene);
-    result["shapes"] = number_;
-    result["rendering"] = shown.rendering_id;
-    result["scene_time_begins_ns"] = shown.scene_time_begins.time_since_epoch().count();
-    result["X_WB"] = pose_json(shown.X_WB);
-    result["X_HT"] = pose_json(shown.X_HT);
-    result["wrench_about"] = shown.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
-    result["view"] = view_json(shown.viewpoint);
-    return {std::move(result), shapes_->descriptor()};
+    Json result = geometry_->description(*view.scene);
+    result["geometry_id"] = geometry_id_;
+    result["rendering_id"] = view.rendering_id;
+    result["scene_time_begins_ns"] = view.scene_time_begins.time_since_epoch().count();
+    result["X_WB"] = pose_json(view.X_WB);
+    result["X_HT"] = pose_json(view.X_HT);
+    result["wrench_about"] = view.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
+    result["view"] = view_json(view.viewpoint);
+    return {std::move(result), geometry_->descriptor()};
   }
 
  private:
-  std::unique_ptr<SceneGeometry> shapes_;
-  std::uint64_t number_ = 0;
+  std::unique_ptr<SceneGeometry> geometry_;
+  std::uint64_t geometry_id_ = 0;
 };
 
-Json scene_json(const Reconfigurator& workbench) {
-  const SceneSettings scene = workbench.scene();
+Json scene_json(const Reconfigurator& reconfigurator) {
+  const SceneSettings scene = reconfigurator.scene();
   Json obstacles = Json::array();
   for (const HalfSpaceSettings& obstacle : scene.half_spaces)
     obstacles.push_back(
@@ -92,13 +92,13 @@ Json scene_json(const Reconfigurator& workbench) {
           {"tool",
            {{"mesh", scene.tool.mesh.string()}, {"scale", scene.tool.scale}, {"mass", scene.tool.mass_kg}}},
           {"obstacles", obstacles},
-          {"rendering", workbench.current_rendering().id}};
+          {"rendering_id", reconfigurator.current_rendering().id}};
 }
 
 std::uint32_t id_of(const Json& params) {
   const auto id = params["id"].get<std::int64_t>();
   if (id < 0 || id > std::numeric_limits<std::uint32_t>::max())
-    throw RpcError(RpcCode::invalid_params, "'id' is 0 to 4294967295.");
+    throw RpcError(RpcCode::invalid_params, "'id' must be 0 to 4294967295.");
   return static_cast<std::uint32_t>(id);
 }
 
@@ -114,11 +114,10 @@ LocalModel model_of(const Json& params) {
   } else if (kind == "spring") {
     model.kind = LocalModel::Kind::spring;
     if (!params.contains("position_m"))
-      throw RpcError(RpcCode::invalid_params,
-                     "A spring needs 'position_m', the place in the world that it draws the handle to.");
+      throw RpcError(RpcCode::invalid_params, "A spring needs 'position_m', its rest position in the world.");
   } else if (kind != "damping") {
     throw RpcError(RpcCode::invalid_params,
-                   "There is no local model '" + kind + "'; there are plane, spring, damping.");
+                   "There is no kind '" + kind + "' of local models; there are plane, spring, damping.");
   }
   model.normal_W = vector_of(params, "normal", Vector3d::UnitZ());
   model.offset_m = parse_number(params, "offset_m", 0.0);
@@ -131,22 +130,23 @@ LocalModel model_of(const Json& params) {
   return model;
 }
 
-Json workspace_json(const Reconfigurator& workbench) {
-  const WorkspaceRequest wish = workbench.workspace();
-  return {{"scale", wish.scale}, {"clutched", wish.clutched}};
+Json workspace_json(const Reconfigurator& reconfigurator) {
+  const WorkspaceRequest request = reconfigurator.workspace();
+  return {{"scale", request.scale}, {"clutched", request.clutched}};
 }
 
-std::string listed(const std::vector<std::string>& what) {
+std::string listed(const std::vector<std::string>& keys) {
   std::string text;
-  for (const std::string& one : what) text += (text.empty() ? "" : ", ") + one;
+  for (const std::string& key : keys) text += (text.empty() ? "" : ", ") + key;
   return text.empty() ? "nothing" : text;
 }
 
-MethodResult reloaded(const std::function<ReloadResult()>& reload_all) {
-  return answered([&] {
+MethodResult reload_result(const std::function<ReloadResult()>& reload_all) {
+  return with_rpc_errors([&] {
     const ReloadResult result = reload_all();
-    return MethodResult(
-        Json{{"applied", result.applied}, {"not_applied", result.not_applied}, {"remarks", result.remarks}});
+    return MethodResult(Json{{"applied", result.applied},
+                             {"not_applied", result.not_applied},
+                             {"mesh_warnings", result.mesh_warnings}});
   });
 }
 
@@ -169,76 +169,79 @@ TomlNode toml_of(const Json& json) {
   } else if (json.is_object()) {
     TomlNode::Table table;
     for (const auto& [key, value] : json.items()) {
-      TomlEntry entry;  // not in one: the compiler takes a moved place for one that was never set
+      TomlEntry entry;  // separate steps: gcc warns of an uninitialized value if one statement does all
       entry.key = key;
       entry.node = toml_of(value);
       table.push_back(std::move(entry));
     }
     node.value = std::move(table);
   } else {
-    throw RpcError(RpcCode::invalid_params,
-                   "There is no null in a configuration; leave the key out instead.");
+    throw RpcError(RpcCode::invalid_params, "A configuration has no null; leave the key out instead.");
   }
   return node;
 }
 
-ReloadResult reload_config(Reconfigurator& workbench, EventFeed& feed,
+ReloadResult reload_config(Reconfigurator& reconfigurator, EventFeed& feed,
                            const std::function<RunConfig()>& read) try {
-  ReloadResult result = workbench.reload(read);
+  ReloadResult result = reconfigurator.reload(read);
   feed.emit("reload", result.not_applied.empty() ? EventLevel::info : EventLevel::warning,
             "reload: applied: " + listed(result.applied) + "; not applied: " + listed(result.not_applied),
-            {{"applied", result.applied}, {"not_applied", result.not_applied}, {"refused", nullptr}});
+            {{"applied", result.applied}, {"not_applied", result.not_applied}, {"error", nullptr}});
   return result;
 } catch (const std::exception& error) {
-  feed.emit("reload", EventLevel::error,
-            std::string("reload: refused, and everything stays as it was: ") + error.what(),
-            {{"applied", Json::array()}, {"not_applied", Json::array()}, {"refused", error.what()}});
+  feed.emit("reload", EventLevel::error, std::string("reload: rejected, nothing changes: ") + error.what(),
+            {{"applied", Json::array()}, {"not_applied", Json::array()}, {"error", error.what()}});
   throw;
 }
 
-void add_scene_methods(MethodTable& table, Reconfigurator& workbench,
-                       std::function<ReloadResult()> reload_all) {
-  Reconfigurator& bench = workbench;
-  table.add(MethodRow{"scene.get",
-                      Role::observer,
-                      {},
-                      "The tool and the obstacles, each with its name.",
-                      [&bench](const Json&, const Caller&) { return MethodResult(scene_json(bench)); },
-                      true});
-  table.add(
-      MethodRow{"scene.shapes",
-                Role::observer,
-                {},
-                "What the bodies look like: hands over the descriptor of a sealed memory with their "
-                "triangles beside the "
-                "answer (SCM_RIGHTS), and answers where in it they lie, where the bodies stand and how they "
-                "move by scene "
-                "time, which begins at scene_time_begins_ns. The memory stays the same while 'shapes' does.",
-                [&bench, kept = std::make_shared<ShapesKept>()](const Json&, const Caller&) {
-                  return kept->answer(bench);
-                },
-                true});
+namespace {
+
+void add_scene_queries(MethodTable& table, Reconfigurator& reconfigurator) {
+  table.add(MethodRow{
+      "scene.get",
+      Role::observer,
+      {},
+      "Returns the tool and the obstacles, each with its name.",
+      [&reconfigurator](const Json&, const Caller&) { return MethodResult(scene_json(reconfigurator)); },
+      true});
+  table.add(MethodRow{
+      "scene.geometry",
+      Role::observer,
+      {},
+      "Returns where the bodies stand and how they move by scene time, which begins at scene_time_begins_ns. "
+      "The reply carries the descriptor of a sealed memory with the triangles (SCM_RIGHTS); the result "
+      "states "
+      "their offsets. The memory stays the same while 'geometry_id' stays the same.",
+      [&reconfigurator, cache = std::make_shared<GeometryCache>()](const Json&, const Caller&) {
+        return cache->result(reconfigurator);
+      },
+      true});
+}
+
+void add_scene_changes(MethodTable& table, Reconfigurator& reconfigurator) {
   table.add(MethodRow{
       "scene.load",
       Role::operator_,
-      {{"file", ParamType::text, true, "a scene file; a plain name is looked for as wrenchd.toml is"}},
-      "Another scene, tool included. It is felt when its place is found, without a jump.",
-      [&bench](const Json& params, const Caller&) {
-        return answered([&] {
-          bench.replace_scene(SearchPath().require(params["file"].get<std::string>()));
-          return MethodResult(handed_over(bench));
+      {{"file", ParamType::text, true, "a scene file; a plain name is found along the search path"}},
+      "Replaces the scene, tool included. The force crosses over without a step when the proxy has a "
+      "feasible "
+      "pose in the new scene.",
+      [&reconfigurator](const Json& params, const Caller&) {
+        return with_rpc_errors([&] {
+          reconfigurator.replace_scene(SearchPath().require(params["file"].get<std::string>()));
+          return MethodResult(current_rendering(reconfigurator));
         });
       },
       true});
   table.add(MethodRow{"scene.add",
                       Role::operator_,
-                      {{"obstacle", ParamType::object, true, "what an [[obstacle]] of a scene file holds"}},
-                      "Another obstacle. Answers its name, by which it is moved and removed.",
-                      [&bench](const Json& params, const Caller&) {
-                        return answered([&] {
+                      {{"obstacle", ParamType::object, true, "the keys of an [[obstacle]] of a scene file"}},
+                      "Adds an obstacle. Returns its name, which scene.move and scene.remove use.",
+                      [&reconfigurator](const Json& params, const Caller&) {
+                        return with_rpc_errors([&] {
                           const std::string name =
-                              bench.insert_obstacle(toml_of(params["obstacle"]), "scene.add");
-                          Json result = handed_over(bench);
+                              reconfigurator.insert_obstacle(toml_of(params["obstacle"]), "scene.add");
+                          Json result = current_rendering(reconfigurator);
                           result["name"] = name;
                           return MethodResult(result);
                         });
@@ -246,102 +249,129 @@ void add_scene_methods(MethodTable& table, Reconfigurator& workbench,
                       true});
   table.add(MethodRow{"scene.remove",
                       Role::operator_,
-                      {{"name", ParamType::text, true, "of the obstacle"}},
-                      "Takes an obstacle away; what it pushed fades.",
-                      [&bench](const Json& params, const Caller&) {
-                        return answered([&] {
-                          bench.remove_obstacle(params["name"].get<std::string>());
-                          return MethodResult(handed_over(bench));
+                      {{"name", ParamType::text, true, "name of the obstacle"}},
+                      "Removes an obstacle; its contact force fades out.",
+                      [&reconfigurator](const Json& params, const Caller&) {
+                        return with_rpc_errors([&] {
+                          reconfigurator.remove_obstacle(params["name"].get<std::string>());
+                          return MethodResult(current_rendering(reconfigurator));
                         });
                       },
                       true});
   table.add(MethodRow{
       "scene.move",
       Role::operator_,
-      {{"name", ParamType::text, true, "of the obstacle, which has to be a mesh"},
-       {"position_m", ParamType::vector, true, "where its mesh frame goes, in the world"},
-       {"rotation_vector_rad", ParamType::vector, false, "and how it is turned there; else not at all"},
-       {"over_s", ParamType::number, true, "how long it takes, at constant speed"}},
-      "Lets an obstacle go to a pose; it sets out 0.2 s from now and pushes what is in its way.",
-      [&bench](const Json& params, const Caller&) {
-        return answered([&] {
+      {{"name", ParamType::text, true, "name of the obstacle, which must be a mesh"},
+       {"position_m", ParamType::vector, true, "target position of its mesh frame in the world"},
+       {"rotation_vector_rad", ParamType::vector, false, "target rotation in the world; default: none"},
+       {"duration_s", ParamType::number, true, "duration of the motion, which has constant speed"}},
+      "Moves an obstacle to a pose. The motion starts 0.2 s from now and pushes the proxy.",
+      [&reconfigurator](const Json& params, const Caller&) {
+        return with_rpc_errors([&] {
           const Pose X_WO = {rotation_from(vector_of(params, "rotation_vector_rad", Vector3d::Zero())),
                              vector_of(params, "position_m", Vector3d::Zero())};
-          bench.move_obstacle(params["name"].get<std::string>(), X_WO, params["over_s"].get<double>());
-          return MethodResult(handed_over(bench));
+          reconfigurator.move_obstacle(params["name"].get<std::string>(), X_WO,
+                                       params["duration_s"].get<double>());
+          return MethodResult(current_rendering(reconfigurator));
         });
       },
       true});
+}
+
+void add_rendering_methods(MethodTable& table, Reconfigurator& reconfigurator) {
   table.add(MethodRow{
       "rendering.set",
       Role::operator_,
       {{"rendering", ParamType::object, false, "keys of [rendering] in wrenchd.toml: method, friction, ..."},
        {"wrench", ParamType::object, false, "keys of [wrench]: law, stiffness, damping, ..."}},
-      "Changes how contact is computed and how stiff it feels; what is not given stays.",
-      [&bench](const Json& params, const Caller&) {
-        return answered([&] {
-          bench.set_rendering(toml_of(params), "rendering.set");
-          return MethodResult(handed_over(bench));
+      "Changes the contact method and the wrench law. Other keys keep their values.",
+      [&reconfigurator](const Json& params, const Caller&) {
+        return with_rpc_errors([&] {
+          reconfigurator.set_rendering(toml_of(params), "rendering.set");
+          return MethodResult(current_rendering(reconfigurator));
         });
       },
       true});
-  table.add(MethodRow{
-      "workspace.set",
-      Role::operator_,
-      {{"scale", ParamType::number, false, "metres that the tool goes for a metre of the handle, 0.1 to 10"},
-       {"clutched", ParamType::boolean, false,
-        "the tool stands, and no contact is felt, while the handle goes elsewhere"},
-       {"recentre", ParamType::boolean, false, "true: the tool comes to where the handle is"}},
-      "Changes how the handle moves the tool, without a jump. Answers what holds then.",
-      [&bench](const Json& params, const Caller&) {
-        return answered([&] {
-          if (params.contains("scale")) bench.set_scale(params["scale"].get<double>());
-          if (params.contains("clutched")) bench.set_clutched(params["clutched"].get<bool>());
-          if (params.value("recentre", false)) bench.recentre();
-          return MethodResult(workspace_json(bench));
-        });
-      },
-      true});
+}
+
+void add_workspace_methods(MethodTable& table, Reconfigurator& reconfigurator) {
   table.add(
-      MethodRow{"model.set",
+      MethodRow{"workspace.set",
                 Role::operator_,
-                {{"id", ParamType::integer, true, "one of the same id takes the place of the last"},
-                 {"kind", ParamType::text, true, "plane, spring or damping, of the handle point"},
-                 {"expires_s", ParamType::number, true, "it fades out by then; at most 10"},
-                 {"normal", ParamType::vector, false, "of a plane, out of the solid"},
-                 {"offset_m", ParamType::number, false, "of a plane: solid where normal . x < offset_m"},
-                 {"position_m", ParamType::vector, false, "where a spring draws the handle to, in the world"},
-                 {"rotation_vector_rad", ParamType::vector, false, "and how it turns it"},
-                 {"stiffness_N_per_m", ParamType::number, false, "of a plane or a spring"},
-                 {"stiffness_Nm_per_rad", ParamType::number, false, "of a spring"},
-                 {"damping_N_s_per_m", ParamType::number, false, "of any"},
-                 {"damping_Nm_s_per_rad", ParamType::number, false, "of a spring or a damping field"}},
-                "What the client knows of the surroundings of the handle, felt at the loop's rate until it "
-                "expires. Send it again before that.",
-                [&bench](const Json& params, const Caller&) {
-                  return answered([&] {
-                    bench.set_model(model_of(params), params["expires_s"].get<double>());
-                    return MethodResult(Json::object());
+                {{"scale", ParamType::number, false,
+                  "displacement of the tool divided by displacement of the handle, 0.1 to 10"},
+                 {"clutched", ParamType::boolean, false,
+                  "true: the tool stays in place without contact force while the handle moves"},
+                 {"recentre", ParamType::boolean, false, "true: the tool moves to the pose of the handle"}},
+                "Changes how the handle moves the tool, without a step. Returns the new values.",
+                [&reconfigurator](const Json& params, const Caller&) {
+                  return with_rpc_errors([&] {
+                    if (params.contains("scale")) reconfigurator.set_scale(params["scale"].get<double>());
+                    if (params.contains("clutched"))
+                      reconfigurator.set_clutched(params["clutched"].get<bool>());
+                    if (params.value("recentre", false)) reconfigurator.recentre();
+                    return MethodResult(workspace_json(reconfigurator));
                   });
                 },
                 true});
+}
+
+void add_model_methods(MethodTable& table, Reconfigurator& reconfigurator) {
+  table.add(MethodRow{
+      "model.set",
+      Role::operator_,
+      {{"id", ParamType::integer, true, "replaces the model that has the same id"},
+       {"kind", ParamType::text, true, "plane, spring or damping; acts on the handle point"},
+       {"lifetime_s", ParamType::number, true, "the model fades out after this time; at most 10"},
+       {"normal", ParamType::vector, false, "plane: normal out of the solid"},
+       {"offset_m", ParamType::number, false, "plane: solid where normal . x < offset_m"},
+       {"position_m", ParamType::vector, false, "spring: rest position in the world"},
+       {"rotation_vector_rad", ParamType::vector, false, "spring: rest rotation in the world"},
+       {"stiffness_N_per_m", ParamType::number, false, "plane or spring"},
+       {"stiffness_Nm_per_rad", ParamType::number, false, "spring"},
+       {"damping_N_s_per_m", ParamType::number, false, "every kind"},
+       {"damping_Nm_s_per_rad", ParamType::number, false, "spring or damping"}},
+      "Sets a local model of the surroundings of the handle, which the loop renders at its own rate. "
+      "Send the model again before its lifetime ends.",
+      [&reconfigurator](const Json& params, const Caller&) {
+        return with_rpc_errors([&] {
+          reconfigurator.set_model(model_of(params), params["lifetime_s"].get<double>());
+          return MethodResult(Json::object());
+        });
+      },
+      true});
   table.add(MethodRow{"model.remove",
                       Role::operator_,
-                      {{"id", ParamType::integer, true, "of the model"}},
-                      "Lets a local model fade out now.",
-                      [&bench](const Json& params, const Caller&) {
-                        bench.remove_model(id_of(params));
+                      {{"id", ParamType::integer, true, "id of the model"}},
+                      "Removes a local model; its force fades out now.",
+                      [&reconfigurator](const Json& params, const Caller&) {
+                        reconfigurator.remove_model(id_of(params));
                         return MethodResult(Json::object());
                       },
                       true});
+}
+
+void add_reload_method(MethodTable& table, std::function<ReloadResult()> reload_all) {
   table.add(MethodRow{
       "reload",
       Role::administrator,
       {},
-      "Reads the configuration again, all of it or nothing. Answers what was applied, and what "
-      "was not and why.",
-      [reload_all = std::move(reload_all)](const Json&, const Caller&) { return reloaded(reload_all); },
+      "Reads the configuration again, and applies all of it, or nothing if it has an error. Returns the keys "
+      "that were applied, and the keys that were not, with the reason.",
+      [reload_all = std::move(reload_all)](const Json&, const Caller&) { return reload_result(reload_all); },
       true});
+}
+
+}  // namespace
+
+void add_scene_methods(MethodTable& table, Reconfigurator& reconfigurator,
+                       std::function<ReloadResult()> reload_all) {
+  add_scene_queries(table, reconfigurator);
+  add_scene_changes(table, reconfigurator);
+  add_rendering_methods(table, reconfigurator);
+  add_workspace_methods(table, reconfigurator);
+  add_model_methods(table, reconfigurator);
+  add_reload_method(table, std::move(reload_all));
 }
 
 }  // namespace wrenchd

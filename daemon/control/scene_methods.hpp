@@ -9,18 +9,19 @@
 
 namespace wrenchd {
 
-/// The rows of what is rendered: scene, rendering, workspace, local models, reload. Both must outlive the
-/// table. reload_all: what `reload` does; it throws as Workbench::reload().
-void add_scene_methods(MethodTable& table, Reconfigurator& workbench,
+/// Adds the methods for scene, rendering, workspace, local models and reload. The reconfigurator must outlive
+/// the table. reload_all: implements `reload`, and throws as Reconfigurator::reload(). Not RT-safe:
+/// allocates.
+void add_scene_methods(MethodTable& table, Reconfigurator& reconfigurator,
                        std::function<ReloadResult()> reload_all);
 
-/// Reads the configuration again, and tells what became of it. Throws as Workbench::reload(), when that is
-/// told.
-ReloadResult reload_config(Reconfigurator& workbench, EventFeed& feed,
+/// Reads the configuration again, applies it, and emits the event `reload`. Throws as
+/// Reconfigurator::reload(), after the event. Not RT-safe: reads files, may take seconds.
+ReloadResult reload_config(Reconfigurator& reconfigurator, EventFeed& feed,
                            const std::function<RunConfig()>& read);
 
-/// What a client gave in JSON as a table of a configuration file, to be read and refused in the same words.
-/// Throws RpcError where it holds a null, which no such file knows.
+/// Returns JSON as a table of a configuration file, so that both have the same checks and messages. Throws
+/// RpcError for a null, which TOML does not have. Not RT-safe: allocates.
 TomlNode toml_of(const Json& json);
 
 }  // namespace wrenchd

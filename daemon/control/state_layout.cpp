@@ -13,7 +13,18 @@ namespace {
 
 using nlohmann::json;
 
-json described(const RecordField& field, std::size_t base) {
+/// The only field of StateRecord besides the tick and the contacts.
+constexpr RecordField kContactCount = {
+    "contact_count",
+    FieldType::u64,
+    1,
+    offsetof(StateRecord, contact_count),
+    "1",
+    "",
+    "contacts in this record, those with the largest multipliers; `contacts` counts all contacts",
+    ValueNames::none};
+
+json field_json(const RecordField& field, std::size_t base) {
   json out = {{"name", field.name},       {"offset", base + field.offset},
               {"type", name(field.type)}, {"count", field.count},
               {"unit", field.unit},       {"frame", field.frame},
@@ -23,24 +34,17 @@ json described(const RecordField& field, std::size_t base) {
   return out;
 }
 
-json described(std::span<const RecordField> fields, std::size_t base) {
+json fields_json(std::span<const RecordField> fields, std::size_t base) {
   json out = json::array();
-  for (const RecordField& field : fields) out.push_back(described(field, base));
+  for (const RecordField& field : fields) out.push_back(field_json(field, base));
   return out;
 }
 
 }  // namespace
 
 json state_layout(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles) {
-  json fields = described(tick_fields(), offsetof(StateRecord, tick));
-  fields.push_back(
-      {{"name", "touch_count"},
-       {"offset", offsetof(StateRecord, contact_count)},
-       {"type", "u64"},
-       {"count", 1},
-       {"unit", "1"},
-       {"frame", ""},
-       {"doc", "contacts told of in this record, those that carry most; `contacts` counts all"}});
+  json fields = fields_json(tick_fields(), offsetof(StateRecord, tick));
+  fields.push_back(field_json(kContactCount, 0));
   return {{"version", SharedState::kVersion},
           {"magic", std::string(SharedState::kMagic.begin(), SharedState::kMagic.end())},
           {"bytes", state.bytes()},
@@ -53,13 +57,13 @@ json state_layout(const SharedState& state, const Reconfigurator::ObstacleNames&
           {"rate_Hz", state.rate_Hz()},
           {"byte_order", std::endian::native == std::endian::little ? "little" : "big"},
           {"fields", fields},
-          {"touches",
+          {"contacts",
            {{"offset", offsetof(StateRecord, contacts)},
             {"bytes", sizeof(Touch)},
-            {"most", kMaxTouches},
-            {"fields", described(contact_fields(), 0)}}},
+            {"max_count", kMaxTouches},
+            {"fields", fields_json(contact_fields(), 0)}}},
           {"obstacles", obstacles.names},
-          {"rendering", obstacles.rendering_id}};
+          {"rendering_id", obstacles.rendering_id}};
 }
 
 void open_state(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles,

@@ -10,15 +10,15 @@
 
 namespace wrenchd {
 
-/// What a program has to know to read the shared memory: every field with its place, type, unit, frame,
-/// names of its values and meaning. The obstacles' names are those of one rendering. Not RT safe.
+/// Returns the layout of the shared memory: offset, type, unit, frame, meaning and value names of every
+/// field, and the names of the obstacles in one rendering. Not RT-safe: allocates.
 nlohmann::json state_layout(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles);
 
-/// Sends a reply with a file descriptor beside it.
+/// Sends a result together with a file descriptor.
 using SendWithDescriptor = std::function<void(const nlohmann::json& result, int descriptor)>;
 
-/// The method `state.open`: answers {"layout": ...} with the memory's descriptor as ancillary data
-/// (SCM_RIGHTS) of that line's first byte. Not RT safe.
+/// The method `state.open`. Sends {"layout": ...}, with the descriptor of the memory as ancillary data
+/// (SCM_RIGHTS) of the first byte. Not RT-safe: allocates.
 void open_state(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles,
                 const SendWithDescriptor& send);
 

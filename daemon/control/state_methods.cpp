@@ -8,19 +8,20 @@
 
 namespace wrenchd {
 
-void add_state_methods(MethodTable& table, Runtime& station) {
-  const SharedState& state = station.enable_shared_state();
+void add_state_methods(MethodTable& table, Runtime& runtime) {
+  const SharedState& state = runtime.enable_shared_state();
   table.add(
       {"state.open",
        Role::observer,
        {},
-       "hands over the descriptor of the memory in which the state of every tick can be read, beside the "
-       "answer (SCM_RIGHTS), and answers its layout: where each field lies, its type, unit, frame and "
-       "meaning, and the names of obstacles in one rendering",
+       "Returns the layout of the shared memory with the record of every tick: offset, type, unit, frame and "
+       "meaning of each field, and the names of the obstacles. The reply carries the descriptor of the "
+       "memory "
+       "(SCM_RIGHTS).",
        [&](const Json&, const Caller&) {
          Json result;
          int fd = -1;
-         open_state(state, station.reconfigurator().obstacle_names(),
+         open_state(state, runtime.reconfigurator().obstacle_names(),
                     [&](const Json& layout, int descriptor) {
                       result = layout;
                       fd = descriptor;
@@ -28,14 +29,15 @@ void add_state_methods(MethodTable& table, Runtime& station) {
          return MethodResult(std::move(result), fd);
        }});
   table.add(
-      {"state.names",
+      {"state.obstacles",
        Role::observer,
        {},
-       "obstacles: the names by number, as they are in the rendering of that number: contacts of ticks of "
-       "another rendering are with other obstacles",
+       "Returns the names of the obstacles by number, and the rendering_id that they belong to. Tick records "
+       "with "
+       "another rendering_id number other obstacles.",
        [&](const Json&, const Caller&) {
-         const Reconfigurator::ObstacleNames obstacles = station.reconfigurator().obstacle_names();
-         return MethodResult(Json{{"obstacles", obstacles.names}, {"rendering", obstacles.rendering_id}});
+         const Reconfigurator::ObstacleNames obstacles = runtime.reconfigurator().obstacle_names();
+         return MethodResult(Json{{"obstacles", obstacles.names}, {"rendering_id", obstacles.rendering_id}});
        }});
 }
 

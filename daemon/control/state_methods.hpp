@@ -7,8 +7,9 @@ namespace wrenchd {
 
 class Runtime;
 
-/// The row of `state.open`. The station shows its state from here on, so its loop may not run yet; it must
-/// outlive the table. Throws std::system_error where there is no memory to show it in.
-void add_state_methods(MethodTable& table, Runtime& station);
+/// Adds state.open and state.obstacles, and creates the shared memory of the runtime. Precondition: the loop
+/// does not run yet. The runtime must outlive the table. Throws std::system_error if the kernel denies the
+/// memory. Not RT-safe: allocates.
+void add_state_methods(MethodTable& table, Runtime& runtime);
 
 }  // namespace wrenchd

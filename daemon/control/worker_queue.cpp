@@ -6,7 +6,7 @@
 namespace wrenchd {
 
 WorkerQueue::WorkerQueue() : thread_([this](const std::stop_token& stop) { run(stop); }) {
-  pthread_setname_np(thread_.native_handle(), "slow work");
+  pthread_setname_np(thread_.native_handle(), "worker");
 }
 
 WorkerQueue::~WorkerQueue() {
@@ -14,11 +14,11 @@ WorkerQueue::~WorkerQueue() {
   thread_.join();
 }
 
-bool WorkerQueue::post(std::function<void()> piece) {
+bool WorkerQueue::post(std::function<void()> task) {
   {
     const std::scoped_lock lock(mutex_);
     if (queue_.size() >= kMaxQueued) return false;
-    queue_.push_back(std::move(piece));
+    queue_.push_back(std::move(task));
   }
   changed_.notify_one();
   return true;
@@ -29,10 +29,10 @@ void WorkerQueue::run(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, stop, [this] { return !queue_.empty(); });
     if (stop.stop_requested()) return;
-    const std::function<void()> piece = std::move(queue_.front());
+    const std::function<void()> task = std::move(queue_.front());
     queue_.pop_front();
     lock.unlock();
-    piece();
+    task();
   }
 }
 

@@ -9,16 +9,16 @@
 
 namespace wrenchd {
 
-/// Does what takes long, one piece after the other, beside the thread that may not wait. What pieces throw
-/// ends the process: they have to answer for themselves.
+/// Runs tasks in order on a thread of its own, so that the control thread does not block. A task must not
+/// throw: an exception ends the process. Not RT-safe: allocates.
 class WorkerQueue {
  public:
   WorkerQueue();
-  /// Waits for the piece that is under way; the others are dropped.
+  /// Waits for the running task, and drops the queued tasks.
   ~WorkerQueue();
 
-  /// False: too much waits already. Any thread; never waits for a piece.
-  bool post(std::function<void()> piece);
+  /// Queues a task. Returns false if kMaxQueued tasks are queued. Any thread; does not wait for a task.
+  bool post(std::function<void()> task);
 
   static constexpr std::size_t kMaxQueued = 8;
 
@@ -28,7 +28,7 @@ class WorkerQueue {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::function<void()>> queue_;
-  std::jthread thread_;  ///< last: it uses all of the above
+  std::jthread thread_;  ///< last member: it uses the members above
 };
 
 }  // namespace wrenchd

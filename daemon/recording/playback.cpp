@@ -14,10 +14,6 @@
 namespace wrenchd {
 namespace {
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 bool is_good(const TickRecord& tick) {
   return tick.fresh != 0 && tick.sample_fault == 0 && tick.released == 0;
 }
@@ -42,13 +38,10 @@ std::vector<TimedPose> of_recording(const std::filesystem::path& file) {
     if (!poses.empty() && time_s - poses.back().time_s > kMaxTableGap_s)
       throw RecordingError(file.string() + ": before tick " + std::to_string(tick.tick) +
                            " there is a gap of " + to_text(time_s - poses.back().time_s) +
-                           " s without a pose, which nobody can play; export what is wanted of it, with "
-                           "--from and --to");
-    poses.push_back({time_s, pose_of(tick.X_BH)});
+                           " s without a pose; export a part without gaps, with --from and --to");
+    poses.push_back({time_s, pose_from_numbers(tick.X_BH)});
   }
-  if (poses.empty())
-    throw RecordingError(file.string() +
-                         ": has no good sample of the device, so there is nothing to play back");
+  if (poses.empty()) throw RecordingError(file.string() + ": has no valid sample of the device");
   const double start_s = poses.front().time_s;
   for (TimedPose& pose : poses) pose.time_s -= start_s;
   return poses;

@@ -8,11 +8,11 @@
 
 namespace wrenchd {
 
-/// Where a handle was, X_BH over time, for the simulated hand to do again: the good new samples of a
-/// recording, by the device's clock, or by that of the host where the device's does not rise; or a CSV file
-/// (config/pose_table.hpp). Times count from the first. Throws RecordingError, PoseTableError or ConfigError,
-/// each with the file, the place and the cure: also where a recording has a gap of more than kMaxTableGap_s,
-/// or no sample.
+/// Reads handle poses X_BH over time for the playback by a simulated device. The file is a recording or a CSV
+/// file (config/pose_table.hpp). Of a recording, the function returns all fresh samples without a fault.
+/// Their times are those of the device clock, or of the host clock if the device clock does not increase. The
+/// first time is 0. Throws RecordingError, PoseTableError or ConfigError with file, place and cure, also if a
+/// recording has no sample or a gap longer than kMaxTableGap_s. Not RT-safe: reads a file.
 std::vector<TimedPose> read_playback(const std::filesystem::path& file);
 
 }  // namespace wrenchd

@@ -9,23 +9,25 @@
 
 namespace wrenchd {
 
+/// Type of one number of a field.
 enum class FieldType : std::uint8_t { u8, u16, u32, u64, i64, f64 };
 
-/// "u8", "f64"
+/// Returns "u8", "u16", "u32", "u64", "i64" or "f64". RT-safe.
 const char* name(FieldType type) noexcept;
-std::size_t size_of(FieldType type) noexcept;  ///< [bytes]
+/// Returns the size of a number in bytes. RT-safe.
+std::size_t size_of(FieldType type) noexcept;
 
-/// What the numbers of a field stand for, where they stand for names.
+/// The names that the values of a field stand for.
 enum class ValueNames : std::uint8_t {
-  none,
-  flag,  ///< 0 or 1
+  none,  ///< The field is a plain number.
+  flag,  ///< The field is 0 or 1.
   state,
   fault,
   projection_status,
-  placing,
+  proxy_initialization,
   contact_kind,
   feature_kind,
-  fault_bits,  ///< from here on a name a bit, the lowest first
+  fault_bits,  ///< From here on each bit has a name.
   command_bits,
   limit_bits,
   dof_bits,
@@ -34,27 +36,35 @@ constexpr bool is_bits(ValueNames names) noexcept {
   return names >= ValueNames::fault_bits;
 }
 
-/// The names, that of 0 or of bit 0 first. Empty for none and flag.
+/// Returns the names; the first is that of value 0, or of bit 0. Returns an empty list for `none` and `flag`.
+/// Not RT-safe: allocates.
 std::vector<std::string> value_names(ValueNames names);
 
-/// One field of a record: the one place that ties its name, unit, frame and meaning to where it stands.
-/// Recordings have a column of each, shared memory describes itself with them.
+/// Name and unit of one component of an array field, for example "fx" and "N".
+struct FieldComponent {
+  const char* name;
+  const char* unit;
+};
+
+/// One field of a record: where it is, and what it means. Recordings, shared memory, export and view are
+/// driven by these descriptions.
 struct RecordField {
   const char* name;
   FieldType type;
-  std::uint16_t count;  ///< of numbers
-  std::size_t offset;   ///< [bytes]
-  const char* unit;
-  const char* frame;  ///< "" where none is meant
-  const char* doc;
+  std::uint16_t count;  ///< Number of components.
+  std::size_t offset;   ///< Offset in the record [bytes].
+  const char* unit;     ///< Unit of a scalar; units of all components of an array.
+  const char* frame;    ///< Frame of reference; empty if the field has none.
+  const char* doc;      ///< Meaning.
   ValueNames values;
+  std::span<const FieldComponent> components = {};  ///< Components of an array; empty if they have no names.
 
-  std::size_t bytes() const noexcept { return size_of(type) * count; }
+  std::size_t bytes() const noexcept { return size_of(type) * count; }  ///< Size of the field. RT-safe.
 };
 
-/// Those of TickRecord, all of them, in order.
+/// Returns all fields of TickRecord in order, from daemon/servo/tick_fields.def. RT-safe.
 std::span<const RecordField> tick_fields() noexcept;
-/// Those of Touch, likewise.
+/// Returns all fields of Touch in order. RT-safe.
 std::span<const RecordField> contact_fields() noexcept;
 
 }  // namespace wrenchd

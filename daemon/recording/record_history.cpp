@@ -9,16 +9,17 @@
 
 namespace wrenchd {
 
-/// Where memory is locked a limit may refuse what a machine would have.
+/// With locked memory a limit may reject an allocation although the machine has enough memory.
 RecordHistory::RecordHistory(std::size_t ticks) try
     : ticks_(std::max<std::size_t>(ticks, 1)),
       contact_ranges_(ticks_.size()),
       contacts_(std::max(kContactsPerTick * ticks_.size(), kMaxTouches)) {
 } catch (const std::bad_alloc&) {
-  throw std::runtime_error("the last " + std::to_string(ticks) + " ticks take " +
-                           std::to_string(ticks * kBytesPerTick / 1'000'000) +
-                           " MB of memory, and there is not so much; lower flight_s in [recording], or raise "
-                           "the limit of locked memory (ulimit -l, LimitMEMLOCK=)");
+  throw std::runtime_error(
+      "the last " + std::to_string(ticks) + " ticks need " +
+      std::to_string(ticks * kBytesPerTick / 1'000'000) +
+      " MB of memory, which are not available; lower flight_s in [recording], or raise the "
+      "limit of locked memory (ulimit -l, LimitMEMLOCK=)");
 }
 
 void RecordHistory::append(const StateRecord& record) {
@@ -44,7 +45,7 @@ std::int64_t RecordHistory::newest_ns() const {
 
 std::uint64_t RecordHistory::first_at_or_after(std::int64_t now_ns) const {
   const std::scoped_lock lock(mutex_);
-  std::uint64_t low = begin(), high = end_;  // the times of ticks rise
+  std::uint64_t low = begin(), high = end_;  // binary search: the times of ticks increase
   while (low < high) {
     const std::uint64_t middle = low + (high - low) / 2;
     if (tick(middle).now_ns < now_ns)

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Nothing where it cannot be read.
+/// Returns the bytes of a file; nothing if it cannot be read.
 std::optional<std::string> contents(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return {};
@@ -47,12 +47,12 @@ std::string sha256(const std::string& bytes) {
   return text;
 }
 
-/// The profiles that the profile inherits, the nearest first.
+/// Returns the profiles that a profile inherits, the nearest first.
 std::vector<fs::path> parents_of(const fs::path& profile) {
   std::vector<fs::path> chain;
   try {
     read_inherited(profile, SearchPath(), &chain);
-  } catch (const ConfigError&) {  // it was read before; what became of it since is told when it is replayed
+  } catch (const ConfigError&) {  // the file has changed since the start; a replay reports the missing parent
     return {};
   }
   chain.erase(chain.begin());
@@ -82,17 +82,16 @@ void write(const fs::path& file, const std::string& bytes) {
   std::ofstream out(file, std::ios::binary);
   out << bytes;
   out.close();
-  if (!out)
-    throw RecordingError(file.string() + ": what is in the recording cannot be put there; is the disk full?");
+  if (!out) throw RecordingError(file.string() + ": cannot write a file of the recording; is the disk full?");
 }
 
-/// Where a mesh can be read from now.
+/// Returns the path of a mesh: of the unpacked copy, or the original path. Throws RecordingError.
 fs::path mesh_at(const RecordingHeader& header, const std::string& role, const fs::path& directory) {
   const RecordedFile* const mesh = find(header, role);
   if (mesh == nullptr)
-    throw RecordingError("the recording has no mesh '" + role +
-                         "', which its scene names: it cannot be replayed from itself; name the scene with "
-                         "--scene and the configuration with --config");
+    throw RecordingError("the recording does not contain the mesh '" + role +
+                         "', which its scene names; name the scene with --scene and the configuration with "
+                         "--config");
   if (mesh->embedded) {
     const fs::path file = directory / "meshes" / (role + mesh->path.extension().string());
     write(file, mesh->bytes);
@@ -100,9 +99,10 @@ fs::path mesh_at(const RecordingHeader& header, const std::string& role, const f
   }
   const auto bytes = contents(mesh->path);
   if (!bytes || sha256(*bytes) != mesh->sha256)
-    throw RecordingError(mesh->path.string() + ": " + (bytes ? "is another file" : "is not there") +
-                         " than when this was recorded (SHA-256 " + mesh->sha256 +
-                         "), and was too large to be in the recording; put it back");
+    throw RecordingError(mesh->path.string() + ": " +
+                         (bytes ? "has changed since it was recorded" : "does not exist any more") +
+                         " (SHA-256 " + mesh->sha256 +
+                         "), and the recording does not contain it; restore the file");
   return mesh->path;
 }
 
@@ -119,7 +119,7 @@ TomlNode& add(TomlNode::Table& table, const std::string& key) {
   return table.back().node;
 }
 
-/// key = value in a table, in the place of what stood there. Where `table` is none there is nothing to set.
+/// Sets key = value in a table, and replaces a previous value. Does nothing if `table` is null.
 void set(TomlNode* table, const std::string& key, const std::string& value) {
   if (table == nullptr) return;
   if (TomlEntry* const entry = find(*table, key)) {
@@ -129,7 +129,7 @@ void set(TomlNode* table, const std::string& key, const std::string& value) {
   if (auto* entries = std::get_if<TomlNode::Table>(&table->value)) add(*entries, key).value = value;
 }
 
-/// A table in a table; made where there is none.
+/// Returns the table `key` of a table, and creates it if it is missing.
 TomlNode* table_in(TomlNode& root, const std::string& key) {
   if (TomlEntry* const entry = find(root, key)) return &entry->node;
   auto* entries = std::get_if<TomlNode::Table>(&root.value);
@@ -139,7 +139,7 @@ TomlNode* table_in(TomlNode& root, const std::string& key) {
   return &made;
 }
 
-/// The mesh that a body of the scene names is where it was unpacked. One that is made is made again.
+/// Replaces the mesh path of a body by the path of the unpacked file. Leaves a generated mesh unchanged.
 void put_mesh(TomlNode& body, const RecordingHeader& header, const std::string& role,
               const fs::path& directory) {
   TomlEntry* const mesh = find(body, "mesh");
@@ -159,7 +159,8 @@ SceneSettings scene_of(const RecordingHeader& header, const fs::path& directory)
   return load_scene(tree, header.scene_file);
 }
 
-/// A directory for each profile of the chain: two of them may have the same name.
+/// Unpacks each profile of the chain into a directory of its own, because two profiles may have the same
+/// name.
 DeviceProfile profile_of(const RecordingHeader& header, const fs::path& directory) {
   std::vector<fs::path> places;
   const auto put = [&](const fs::path& at, const std::string& text) {
@@ -179,12 +180,12 @@ DeviceProfile profile_of(const RecordingHeader& header, const fs::path& director
 
 }  // namespace
 
-RecordingHeader read_recorded_texts(const RunConfig& plan) {
+RecordingHeader read_recorded_texts(const RunConfig& config) {
   RecordingHeader header;
   header.version = kVersion;
-  header.settings_file = plan.settings.file;
-  header.scene_file = plan.scene.file;
-  header.profile_file = plan.settings.device.profile_file;
+  header.settings_file = config.settings.file;
+  header.scene_file = config.scene.file;
+  header.profile_file = config.settings.device.profile_file;
   header.settings = contents(header.settings_file).value_or("");
   header.scene = contents(header.scene_file).value_or("");
   header.profile = contents(header.profile_file).value_or("");
@@ -192,9 +193,9 @@ RecordingHeader read_recorded_texts(const RunConfig& plan) {
   for (const fs::path& parent : parents_of(header.profile_file))
     header.files.push_back(
         {"profile_" + std::to_string(++number), parent, {}, true, contents(parent).value_or("")});
-  const fs::path& script = plan.settings.simulation.hand_script;
+  const fs::path& script = config.settings.simulation.hand_script;
   header.files.push_back({"hand_script", script, {}, true, contents(script).value_or("")});
-  header.realtime = word(plan.settings.servo.realtime);
+  header.realtime = word(config.settings.servo.realtime);
   utsname system{};
   if (uname(&system) == 0) header.kernel = std::string(system.sysname) + " " + system.release;
   return header;
@@ -233,9 +234,9 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   const RecordedFile* const script = find(header, "hand_script");
   const fs::path hand = directory / "hand.toml";
   write(hand, script == nullptr ? "" : script->bytes);
-  RunConfig plan;
-  plan.profile = profile_of(header, directory);
-  plan.scene = scene_of(header, directory);
+  RunConfig config;
+  config.profile = profile_of(header, directory);
+  config.scene = scene_of(header, directory);
   TomlNode tree = read_toml_text(header.settings, header.settings_file);
   write(directory / "scene.toml", header.scene);
   set(&tree, "scene", (directory / "scene.toml").string());
@@ -245,9 +246,9 @@ RunConfig unpack_run_config(const RecordingHeader& header, const fs::path& direc
   set(simulation, "hand_script", hand.string());
   set(simulation, "playback", "");
   set(table_in(tree, "servo"), "realtime", header.realtime.empty() ? "required" : header.realtime);
-  plan.settings = load_settings(tree, header.settings_file, SearchPath({directory}));
-  plan.simulated = plan.profile.transport == Transport::loopback;
-  return plan;
+  config.settings = load_settings(tree, header.settings_file, SearchPath({directory}));
+  config.simulated = config.profile.transport == Transport::loopback;
+  return config;
 }
 
 }  // namespace wrenchd

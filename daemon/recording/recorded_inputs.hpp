@@ -10,26 +10,27 @@
 
 namespace wrenchd {
 
-// What goes into a recording besides its ticks, so that it can be shown and replayed without the files it ran
-// with: they change, and the machine that replays may have others.
+// The input files of a run, which a recording contains beside its ticks. With them it can be shown and
+// replayed after the files have changed, and on another machine. Not RT-safe: reads and writes files.
 
-/// Meshes up to so many bytes together are inside, the tool's first; larger ones are named with their
-/// SHA-256, so that a recording of seconds does not weigh as much as a scene of a million triangles.
+/// Total size of the meshes that a recording contains, the tool first. A recording names the remaining meshes
+/// with their SHA-256 only, so that a short recording stays small.
 inline constexpr std::size_t kMaxEmbeddedMesh_bytes = std::size_t{32} << 20;
 
-/// Versions, and the texts of settings, scene, profile with its parents, and hand script. What cannot be read
-/// any more is empty. Not RT safe.
-RecordingHeader read_recorded_texts(const RunConfig& plan);
+/// Returns a header with the versions and the texts of settings, scene, profile with its parents, and hand
+/// script. The text of a file that cannot be read is empty.
+RecordingHeader read_recorded_texts(const RunConfig& config);
 
-/// The mesh files of the scene, as they are now. Meshes that are made stand in the scene's text.
+/// Adds the present mesh files of the scene. Generated meshes need no file: the text of the scene defines
+/// them.
 void add_meshes(const SceneSettings& scene, RecordingHeader& header);
 
-/// That the recording begins now: by that clock, and by UTC.
+/// Sets the start time to now, by `clock` and by UTC.
 void set_start_time(const Clock& clock, RecordingHeader& header);
 
-/// What a recording ran with, made of what is in it. Writes its files into the directory, which has to be
-/// there for as long as the plan is used. Throws RecordingError where it lacks something: a mesh that is too
-/// large to be inside is taken from where it was, if it is still the same.
+/// Returns the run configuration that a recording contains. Writes its files into `directory`, which must
+/// exist as long as the configuration is used. Reads a mesh that is not in the recording from its original
+/// path. Throws RecordingError if a file is missing or has another SHA-256.
 RunConfig unpack_run_config(const RecordingHeader& header, const std::filesystem::path& directory);
 
 }  // namespace wrenchd

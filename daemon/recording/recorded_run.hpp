@@ -8,11 +8,11 @@
 
 namespace wrenchd {
 
-/// What a recording ran with, made of what is in it. Its files are unpacked into a directory of their own,
-/// which goes with this.
+/// The run configuration of a recording. The constructor unpacks the files of the recording into a temporary
+/// directory, and the destructor removes it. Not RT-safe: writes files.
 class RecordedRun {
  public:
-  /// Throws RecordingError as unpack_run_config(), and std::system_error where nothing can be unpacked.
+  /// Throws RecordingError as unpack_run_config(), and std::system_error if the directory cannot be created.
   explicit RecordedRun(const RecordingHeader& header);
   ~RecordedRun();
   RecordedRun(const RecordedRun&) = delete;

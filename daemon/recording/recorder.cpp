@@ -6,7 +6,7 @@
 namespace wrenchd {
 namespace {
 
-/// At most so many chunks in a piece: between two the disk is looked at, and other files have their turn.
+/// Largest number of chunks in a piece. Between two pieces the writer checks the disk and serves other files.
 constexpr std::size_t kMostChunks = 8;
 
 }  // namespace
@@ -19,7 +19,7 @@ bool Recorder::write_next(std::uint64_t end, bool rest) {
   const std::uint64_t begin = std::max(next_, history_.stored_range().begin);
   const std::uint64_t there = end - std::min(begin, end);
   std::size_t most = std::min<std::uint64_t>(there, kMostChunks * RecordingWriter::kChunkTicks);
-  // A chunk that is begun is written again when it goes on: only the last one is.
+  // An incomplete chunk is compressed again when it grows, so only the last chunk may be incomplete.
   if (!rest || most < there) most -= (written_ + most) % RecordingWriter::kChunkTicks;
   if (most == 0 || most > there) return false;
   const std::uint64_t first = history_.copy(next_, end, most, batch_);

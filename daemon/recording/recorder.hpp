@@ -9,21 +9,22 @@
 
 namespace wrenchd {
 
-/// Carries records from the history to one file, a piece at a time. One thread at a time.
+/// Copies records from the history to one file, in pieces. One thread at a time. Not RT-safe: writes a file.
 class Recorder {
  public:
   /// first: number of the first record to write. Throws RecordingError.
   Recorder(const RecordHistory& history, const std::filesystem::path& file, const RecordingHeader& header,
            std::uint64_t first);
 
-  /// Writes the next piece of what is held before that number: whole chunks, which cost least, or, where
-  /// `rest` is set, what is left too. False: there is nothing to write now. Throws RecordingError.
+  /// Writes the next piece of the stored records whose number is below `end`. A piece has whole chunks, which
+  /// cost least; with `rest` set it also includes an incomplete last chunk. Returns false if there is nothing
+  /// to write now. Throws RecordingError.
   bool write_next(std::uint64_t end, bool rest);
 
   const std::filesystem::path& file() const noexcept { return file_; }
   std::uint64_t next() const noexcept { return next_; }        ///< number of the next record to write
   std::uint64_t written() const noexcept { return written_; }  ///< ticks
-  std::uint64_t lost() const noexcept { return lost_; }  ///< that were held no more when their turn came
+  std::uint64_t lost() const noexcept { return lost_; }        ///< ticks that left the history unwritten
 
  private:
   const RecordHistory& history_;

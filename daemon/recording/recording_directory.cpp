@@ -48,14 +48,14 @@ fs::path recordings_directory(const RecordingSettings& settings) {
 void make_recordings_directory(const fs::path& directory) {
   if (directory.empty())
     throw RecordingError(
-        "there is no place for recordings: neither STATE_DIRECTORY nor HOME is set; set directory in "
+        "there is no directory for recordings: neither STATE_DIRECTORY nor HOME is set; set directory in "
         "[recording]");
   std::error_code error;
   if (fs::is_directory(directory, error)) return;
   fs::create_directories(directory, error);
   if (!fs::is_directory(directory))
-    throw RecordingError(directory.string() + ": cannot be made (" + error.message() +
-                         "); make it, or set directory in [recording] to one that may be written to");
+    throw RecordingError(directory.string() + ": cannot be created (" + error.message() +
+                         "); create it, or set directory in [recording] to a writable one");
   fs::permissions(directory, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec, error);
 }
 
@@ -70,10 +70,10 @@ fs::path recording_path(const std::string& asked, const fs::path& directory, boo
   fs::path name = asked;
   if (anywhere && name.is_absolute()) return name.lexically_normal();
   if (!is_plain(asked))
-    throw RecordingError("'" + printable(asked, 60) +
-                         "' is no name for a recording: give letters, digits, -, _ " +
-                         "and dots, and no directory; it goes into " + directory.string() +
-                         (anywhere ? "; or give an absolute path" : "; only administrators name another"));
+    throw RecordingError(
+        "'" + printable(asked, 60) + "' is no valid name of a recording: use letters, digits, -, _ " +
+        "and dots, without a directory; recordings are stored in " + directory.string() +
+        (anywhere ? "; or use an absolute path" : "; only administrators may use another directory"));
   if (name.extension() != ".h5") name += ".h5";
   return directory / name;
 }
@@ -82,8 +82,7 @@ double free_MB(const fs::path& directory) {
   std::error_code error;
   const fs::space_info space = fs::space(directory, error);
   if (error)
-    throw RecordingError(directory.string() + ": how much room is left cannot be told (" + error.message() +
-                         ")");
+    throw RecordingError(directory.string() + ": cannot read the free space (" + error.message() + ")");
   return 1e-6 * static_cast<double>(space.available);
 }
 
@@ -91,8 +90,8 @@ void check_free_space(const fs::path& directory, const RecordingSettings& settin
   const double left_MB = free_MB(directory);
   if (left_MB > settings.keep_free_MB) return;
   throw RecordingError(directory.string() + ": " + std::to_string(static_cast<long>(left_MB)) +
-                       " MB are left, and " + to_text(settings.keep_free_MB) +
-                       " MB are to stay free; remove old recordings, or lower keep_free_MB in [recording]");
+                       " MB are free, and " + to_text(settings.keep_free_MB) +
+                       " MB must stay free; remove old recordings, or lower keep_free_MB in [recording]");
 }
 
 std::vector<StoredRecording> stored_recordings(const fs::path& directory) {
@@ -113,7 +112,7 @@ std::vector<StoredRecording> stored_recordings(const fs::path& directory) {
 
 OwnedFd open_recording(const fs::path& directory, const std::string& name) {
   const fs::path file = recording_path(name, directory, false);
-  // What somebody may have put there in a file's place is not followed, nor waited for.
+  // The flags avoid following a symbolic link and blocking on a FIFO.
   OwnedFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat status {};
   if (fd && ::fstat(fd.get(), &status) == 0 && S_ISREG(status.st_mode)) return fd;
@@ -121,7 +120,7 @@ OwnedFd open_recording(const fs::path& directory, const std::string& name) {
   for (const StoredRecording& one : stored_recordings(directory))
     there += (there.empty() ? "" : ", ") + one.name;
   throw RecordingError(file.string() +
-                       ": is no recording that can be read; there are: " + (there.empty() ? "none" : there));
+                       ": is no readable recording; there are: " + (there.empty() ? "none" : there));
 }
 
 fs::path flight_path(const fs::path& directory, std::time_t utc, std::string_view fault) {
@@ -140,7 +139,7 @@ void prune_flights(const fs::path& directory, std::size_t most) {
     if (name.starts_with(kFlight) && name.ends_with(".h5") && at->is_regular_file(error))
       flights.push_back(at->path());
   }
-  std::sort(flights.begin(), flights.end());  // their names begin with the time
+  std::sort(flights.begin(), flights.end());  // the names sort by time
   for (std::size_t i = 0; i + most < flights.size(); ++i) fs::remove(flights[i], error);
 }
 

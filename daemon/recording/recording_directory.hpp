@@ -13,43 +13,45 @@
 
 namespace wrenchd {
 
-// Where recordings go. Not RT safe.
+// The directory of recordings. Not RT-safe: accesses files.
 
-/// The settings' directory; else recordings/ in $STATE_DIRECTORY, which systemd gives a service; else
-/// wrenchd/recordings in $XDG_STATE_HOME, or in ~/.local/state. Empty where there is none of these.
+/// Returns the configured directory; else recordings/ in $STATE_DIRECTORY, which systemd sets for a service;
+/// else wrenchd/recordings in $XDG_STATE_HOME or ~/.local/state. Returns an empty path if none of these is
+/// set.
 std::filesystem::path recordings_directory(const RecordingSettings& settings);
 
-/// Makes it where it is missing, for its owner and group alone. Throws RecordingError, with the cure.
+/// Creates the directory if it is missing, accessible by owner and group only. Throws RecordingError with the
+/// cure.
 void make_recordings_directory(const std::filesystem::path& directory);
 
-/// "20261122T141501Z", which sorts by time
+/// Returns a time as "20261122T141501Z". The texts sort by time.
 std::string utc_stamp(std::time_t utc);
 
-/// The file that somebody asks for: a plain name in the directory, with .h5 at its end; or, where `anywhere`
-/// is set, an absolute path. Throws RecordingError, which says what a name may be.
+/// Returns the path for a requested name: in the directory, with .h5 at its end. If `anywhere` is set, an
+/// absolute path is permitted too. Throws RecordingError, which says what a name may be.
 std::filesystem::path recording_path(const std::string& asked, const std::filesystem::path& directory,
                                      bool anywhere);
 
-/// Room that is left on the disk [MB]. Throws RecordingError where it cannot be told.
+/// Returns the free space on the disk [MB]. Throws RecordingError if the system does not report it.
 double free_MB(const std::filesystem::path& directory);
-/// Throws RecordingError where there is less room than the settings keep free.
+/// Throws RecordingError if there is less free space than keep_free_MB.
 void check_free_space(const std::filesystem::path& directory, const RecordingSettings& settings);
 
-/// A recording that is there.
+/// A recording on disk.
 struct StoredRecording {
   std::string name;  ///< "run.h5"
   std::uint64_t bytes;
-  std::time_t modified_at;  ///< when it was last written to
+  std::time_t modified_at;  ///< time of the last write
 };
-/// Those of a directory, the oldest first. None where there is no such directory.
+/// Returns the recordings in a directory, the oldest first. Returns none if the directory does not exist.
 std::vector<StoredRecording> stored_recordings(const std::filesystem::path& directory);
-/// One of them, to be read. Throws RecordingError.
+/// Opens a recording for reading. Throws RecordingError.
 OwnedFd open_recording(const std::filesystem::path& directory, const std::string& name);
 
-/// A name for the flight recorder's file, "flight-20261122T141501Z-overspeed.h5", that is not taken.
+/// Returns an unused path for a file of the flight recorder: "flight-20261122T141501Z-overspeed.h5".
 std::filesystem::path flight_path(const std::filesystem::path& directory, std::time_t utc,
                                   std::string_view fault);
-/// Removes the oldest files of the flight recorder until no more than so many are left. Other files stay.
+/// Removes the oldest files of the flight recorder until at most `most` are left. Keeps all other files.
 void prune_flights(const std::filesystem::path& directory, std::size_t most);
 
 }  // namespace wrenchd

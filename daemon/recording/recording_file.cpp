@@ -14,38 +14,37 @@
 namespace wrenchd {
 namespace {
 
-/// Of the columns and of what they say. 1 (without the attribute): the first q was computed in the tick, and
-/// is not the placer's; 2: `placing` and `reinitialize_proxy`; 3: `dropped`; 4: states and faults; 5: what
-/// was changed while the loop ran; 6: contacts, texts and meshes in places of their own.
-constexpr const char* kFormat = "6";
-constexpr hsize_t kChunkTouches = 1024;
+/// Version of the columns and their meaning. A reader of another version refuses the file.
+constexpr const char* kFormat = "7";
+constexpr hsize_t kChunkContacts = 1024;
 constexpr unsigned kDeflateLevel = 1;
-/// The most that DEFLATE makes of a byte: a table that says it holds more than its file could is a bad one.
-constexpr std::uint64_t kMostDeflated = 1032;
-/// Of any one text or mesh.
-constexpr hsize_t kMostBytes = hsize_t{1} << 31;
+/// Largest expansion of DEFLATE. A table that claims more rows than its file can hold is damaged.
+constexpr std::uint64_t kMaxExpansion = 1032;
+/// Maximum size of a text or a mesh.
+constexpr hsize_t kMaxBytes = hsize_t{1} << 31;
 
 /// A row of /ticks.
 struct TickRow {
   TickRecord tick;
-  std::uint64_t first_touch = 0;
-  std::uint32_t touch_count = 0;
+  std::uint64_t first_contact = 0;
+  std::uint32_t contact_count = 0;
   std::uint32_t padding = 0;
 };
 static_assert(std::is_trivially_copyable_v<TickRow> && std::is_trivially_copyable_v<Touch>);
 
-constexpr std::array kRangeFields = {
-    RecordField{"first_touch", FieldType::u64, 1, offsetof(TickRow, first_touch), "1", "",
-                "row of /touches with the first contact of the tick", ValueNames::none},
-    RecordField{"touch_count", FieldType::u32, 1, offsetof(TickRow, touch_count), "1", "",
-                "contacts of the tick in /touches: at most 16, those that carry most; `contacts` counts all",
-                ValueNames::none},
+constexpr std::array kContactRangeFields = {
+    RecordField{"first_contact", FieldType::u64, 1, offsetof(TickRow, first_contact), "1", "",
+                "row of /contacts with the first contact of the tick", ValueNames::none},
+    RecordField{
+        "contact_count", FieldType::u32, 1, offsetof(TickRow, contact_count), "1", "",
+        "rows of /contacts for the tick, at most 16 with the largest multipliers; `contacts` counts all",
+        ValueNames::none},
 };
 
-/// One of the two tables.
+/// Description of one of the two tables.
 struct TableKind {
   const char* path;
-  const char* word;  ///< for messages
+  const char* name;  ///< Name in messages and in /fields.
   std::size_t row_bytes;
   std::vector<RecordField> fields;
   hsize_t chunk_rows;
@@ -56,16 +55,16 @@ const TableKind& tick_table() {
     const auto fields = tick_fields();
     TableKind made{
         "/ticks", "ticks", sizeof(TickRow), {fields.begin(), fields.end()}, RecordingWriter::kChunkTicks};
-    made.fields.insert(made.fields.end(), kRangeFields.begin(), kRangeFields.end());
+    made.fields.insert(made.fields.end(), kContactRangeFields.begin(), kContactRangeFields.end());
     return made;
   }();
   return kind;
 }
 
-const TableKind& touch_table() {
+const TableKind& contact_table() {
   static const TableKind kind = [] {
     const auto fields = contact_fields();
-    TableKind made{"/touches", "touches", sizeof(Touch), {}, kChunkTouches};
+    TableKind made{"/contacts", "contacts", sizeof(Touch), {}, kChunkContacts};
     for (const RecordField& field : fields)
       if (std::string(field.name) != "padding") made.fields.push_back(field);
     return made;
@@ -109,8 +108,8 @@ class Handle {
   Close close_;
 };
 
-/// HDF5 prints its error stack unless told not to; our errors say what matters.
-void quiet() {
+/// Stops HDF5 from printing its error stack. RecordingError carries the message instead.
+void silence_hdf5() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
@@ -137,7 +136,7 @@ hid_t text_type(std::size_t bytes) {
   return type;
 }
 
-/// Of variable length, for what is of fixed length comes to Python as bytes.
+/// Uses a type of variable length, because Python reads texts of fixed length as bytes.
 void write_text(hid_t object, const char* name, const std::string& text) {
   const Handle type(text_type(H5T_VARIABLE), H5Tclose);
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
@@ -180,7 +179,7 @@ hid_t create_table(hid_t file, const TableKind& table, hid_t row) {
   return made;
 }
 
-/// The same again as a table, for whoever would rather read it so.
+/// A row of /fields, which repeats the attributes of all columns as a table.
 struct FieldRow {
   const char *table, *name, *type;
   std::uint32_t count;
@@ -191,12 +190,12 @@ void write_fields(hid_t file) {
   std::vector<std::string> values;
   std::vector<FieldRow> rows;
   std::size_t all = 0;
-  for (const TableKind* table : {&tick_table(), &touch_table()}) all += table->fields.size();
-  values.reserve(all);  // rows point into it
-  for (const TableKind* table : {&tick_table(), &touch_table()})
+  for (const TableKind* table : {&tick_table(), &contact_table()}) all += table->fields.size();
+  values.reserve(all);  // no reallocation, because rows point to the elements
+  for (const TableKind* table : {&tick_table(), &contact_table()})
     for (const RecordField& field : table->fields) {
       values.push_back(values_of(field));
-      rows.push_back({table->word, field.name, name(field.type), field.count, field.unit, field.frame,
+      rows.push_back({table->name, field.name, name(field.type), field.count, field.unit, field.frame,
                       field.doc, values.back().c_str()});
     }
   const Handle text(text_type(H5T_VARIABLE), H5Tclose);
@@ -216,15 +215,15 @@ void write_fields(hid_t file) {
   H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data());
 }
 
-/// A text of a file that it ran with.
-void write_config(hid_t group, const std::string& name, const std::filesystem::path& at,
+/// Writes the text of a configuration file, with its path as an attribute.
+void write_config(hid_t group, const std::string& name, const std::filesystem::path& path,
                   const std::string& text) {
   const Handle type(text_type(text.size()), H5Tclose);
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   const Handle made(H5Dcreate2(group, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                     H5Dclose);
   H5Dwrite(made, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str());
-  write_text(made, "file", at.string());
+  write_text(made, "file", path.string());
 }
 
 void write_mesh(hid_t group, const RecordedFile& mesh) {
@@ -243,8 +242,8 @@ void write_mesh(hid_t group, const RecordedFile& mesh) {
   if (count > 0) H5Dwrite(made, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data());
   write_text(made, "file", mesh.path.string());
   write_text(made, "sha256", mesh.sha256);
-  const std::uint8_t inside = mesh.embedded ? 1 : 0;
-  write_number(made, "inside", H5T_NATIVE_UINT8, &inside);
+  const std::uint8_t embedded = mesh.embedded ? 1 : 0;
+  write_number(made, "embedded", H5T_NATIVE_UINT8, &embedded);
 }
 
 bool is_mesh(const std::string& role) {
@@ -272,7 +271,7 @@ void write_header(hid_t file, const RecordingHeader& header) {
   write_text(file, "started_utc", utc(header.started_unix_ns));
   write_number(file, "started_unix_ns", H5T_NATIVE_INT64, &header.started_unix_ns);
   write_number(file, "started_ns", H5T_NATIVE_INT64, &header.started_ns);
-  write_text(file, "time", "UTC of a tick, as ns since 1970: started_unix_ns + (now_ns - started_ns)");
+  write_text(file, "time", "UTC of a tick in ns since 1970: started_unix_ns + (now_ns - started_ns)");
   const Handle config(H5Gcreate2(file, "/config", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
   write_config(config, "settings", header.settings_file, header.settings);
   write_config(config, "scene", header.scene_file, header.scene);
@@ -294,21 +293,21 @@ void RecordBatch::clear() {
   contacts.clear();
 }
 
-void RecordBatch::add(const TickRecord& tick, std::span<const Touch> its) {
+void RecordBatch::add(const TickRecord& tick, std::span<const Touch> tick_contacts) {
   ticks.push_back(tick);
-  contact_ranges.push_back({contacts.size(), static_cast<std::uint32_t>(its.size())});
-  contacts.insert(contacts.end(), its.begin(), its.end());
+  contact_ranges.push_back({contacts.size(), static_cast<std::uint32_t>(tick_contacts.size())});
+  contacts.insert(contacts.end(), tick_contacts.begin(), tick_contacts.end());
 }
 
 struct RecordingWriter::File {
   std::filesystem::path path;
   Handle file;
   Handle tick_row;
-  Handle touch_row;
+  Handle contact_row;
   Handle ticks;
-  Handle touches;
+  Handle contacts;
   hsize_t tick_rows = 0;
-  hsize_t touch_rows = 0;
+  hsize_t contact_rows = 0;
   std::vector<TickRow> rows = {};
 
   void append(const Handle& table, const Handle& row, hsize_t& rows_so_far, const void* from, hsize_t count) {
@@ -319,32 +318,32 @@ struct RecordingWriter::File {
     const Handle in_file(H5Dget_space(table), H5Sclose);
     H5Sselect_hyperslab(in_file, H5S_SELECT_SET, &start, nullptr, &count, nullptr);
     const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
-    if (!grown || H5Dwrite(table, row, in_memory, in_file, H5P_DEFAULT, from) < 0) refuse();
+    if (!grown || H5Dwrite(table, row, in_memory, in_file, H5P_DEFAULT, from) < 0) fail();
     rows_so_far = total;
   }
-  [[noreturn]] void refuse() const {
+  [[noreturn]] void fail() const {
     throw RecordingError(path.string() +
-                         ": the recording cannot be written; is the disk full, or was it taken away?");
+                         ": the recording cannot be written; check that the disk is connected and not full");
   }
 };
 
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header) {
-  quiet();
+  silence_hdf5();
   std::error_code ignored;
   if (std::filesystem::exists(std::filesystem::symlink_status(file, ignored)))
     throw RecordingError(file.string() +
-                         ": exists already, and a recording is never overwritten; choose another name");
+                         ": already exists, and wrenchd never overwrites a recording; choose another name");
   const hid_t id = H5Fcreate(file.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT);
   if (id < 0)
     throw RecordingError(file.string() +
-                         ": cannot be created; check that the directory exists and may be written to");
+                         ": cannot be created; check that the directory exists and is writable");
   const hid_t tick_row = row_type(tick_table());
-  const hid_t touch_row = row_type(touch_table());
-  file_.reset(new File{file, Handle(id, H5Fclose), Handle(tick_row, H5Tclose), Handle(touch_row, H5Tclose),
+  const hid_t contact_row = row_type(contact_table());
+  file_.reset(new File{file, Handle(id, H5Fclose), Handle(tick_row, H5Tclose), Handle(contact_row, H5Tclose),
                        Handle(create_table(id, tick_table(), tick_row), H5Dclose),
-                       Handle(create_table(id, touch_table(), touch_row), H5Dclose)});
-  if (!file_->ticks.ok() || !file_->touches.ok())
-    throw RecordingError(file.string() + ": the tables cannot be created; is the disk full?");
+                       Handle(create_table(id, contact_table(), contact_row), H5Dclose)});
+  if (!file_->ticks.ok() || !file_->contacts.ok())
+    throw RecordingError(file.string() + ": the tables cannot be created; check that the disk is not full");
   write_fields(id);
   write_header(id, header);
   flush();
@@ -356,39 +355,39 @@ void RecordingWriter::append(std::span<const TickRecord> records) {
   append(records, {}, {});
 }
 
-/// The contacts first: no row of /ticks ever names one that is not there.
+/// Writes the contacts first, so that a row of /ticks never refers to a missing row of /contacts.
 void RecordingWriter::append(std::span<const TickRecord> ticks, std::span<const ContactRange> ranges,
-                             std::span<const Touch> touches) {
-  const hsize_t first = file_->touch_rows;
+                             std::span<const Touch> contacts) {
+  const hsize_t first = file_->contact_rows;
   file_->rows.assign(ticks.size(), TickRow{});
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     file_->rows[i].tick = ticks[i];
-    file_->rows[i].first_touch = first;
+    file_->rows[i].first_contact = first;
     if (ranges.empty()) continue;
-    file_->rows[i].first_touch = first + ranges[i].first;
-    file_->rows[i].touch_count = ranges[i].count;
+    file_->rows[i].first_contact = first + ranges[i].first;
+    file_->rows[i].contact_count = ranges[i].count;
   }
-  file_->append(file_->touches, file_->touch_row, file_->touch_rows, touches.data(), touches.size());
+  file_->append(file_->contacts, file_->contact_row, file_->contact_rows, contacts.data(), contacts.size());
   file_->append(file_->ticks, file_->tick_row, file_->tick_rows, file_->rows.data(), ticks.size());
 }
 
 void RecordingWriter::flush() {
-  if (H5Fflush(file_->file, H5F_SCOPE_LOCAL) < 0) file_->refuse();
+  if (H5Fflush(file_->file, H5F_SCOPE_LOCAL) < 0) file_->fail();
 }
 
 // ------------------------------------------------------------------------------------------------ Reading
 
 namespace {
 
-/// What stands in an attribute or data set of a text; empty where there is none.
+/// Returns the text of an attribute or data set; returns an empty text if there is none.
 template <class Read>
 std::string text_of(const Handle& type, const Read& read) {
   if (!type.ok() || H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) return {};
   const std::size_t size = H5Tget_size(type);
-  if (size > kMostBytes) return {};
+  if (size > kMaxBytes) return {};
   std::string text(size, '\0');
   if (read(text.data()) < 0) return {};
-  text.resize(std::min(text.size(), text.find('\0')));  // a text of no bytes takes one, a zero
+  text.resize(std::min(text.size(), text.find('\0')));  // an empty text is stored as one zero byte
   return text;
 }
 
@@ -417,22 +416,22 @@ T read_number(hid_t object, const char* name, hid_t type, T otherwise) {
   return number;
 }
 
-std::string read_config(hid_t set, std::filesystem::path& at) {
+std::string read_config(hid_t set, std::filesystem::path& path) {
   const Handle space(H5Dget_space(set), H5Sclose);
   if (H5Sget_simple_extent_npoints(space) != 1) return {};
   const Handle type(H5Dget_type(set), H5Tclose);
-  at = read_text(set, "file");
+  path = read_text(set, "file");
   return text_of(type, [&](char* to) { return H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, to); });
 }
 
-/// A file that is open, and what is said of it.
-struct Opened {
+/// An open recording, and how to report an error in it.
+struct OpenFile {
   const std::filesystem::path& path;
   hid_t file;
-  std::uint64_t bytes;  ///< of the file
+  std::uint64_t bytes;  ///< Size of the file.
 
-  [[noreturn]] void refuse(const std::string& what) const {
-    throw RecordingError(path.string() + ": " + what);
+  [[noreturn]] void reject(const std::string& reason) const {
+    throw RecordingError(path.string() + ": " + reason);
   }
 };
 
@@ -448,109 +447,111 @@ std::vector<std::string> names_in(hid_t group) {
   return names;
 }
 
-RecordedFile read_mesh(const Opened& opened, hid_t set, const std::string& role) {
+RecordedFile read_mesh(const OpenFile& open_file, hid_t set, const std::string& role) {
   RecordedFile mesh{role,
                     read_text(set, "file"),
                     read_text(set, "sha256"),
-                    read_number<std::uint8_t>(set, "inside", H5T_NATIVE_UINT8, 0) != 0,
+                    read_number<std::uint8_t>(set, "embedded", H5T_NATIVE_UINT8, 0) != 0,
                     {}};
   const Handle space(H5Dget_space(set), H5Sclose);
   const hssize_t count = H5Sget_simple_extent_npoints(space);
   if (!mesh.embedded || count <= 0) return mesh;
-  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMostBytes, opened.bytes * kMostDeflated))
-    opened.refuse("the mesh '" + role + "' in it cannot be as large as it says; the file is damaged");
+  if (static_cast<std::uint64_t>(count) > std::min<std::uint64_t>(kMaxBytes, open_file.bytes * kMaxExpansion))
+    open_file.reject("the mesh '" + role + "' claims more bytes than the file can hold; the file is damaged");
   mesh.bytes.resize(static_cast<std::size_t>(count));
   if (H5Dread(set, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, mesh.bytes.data()) < 0)
-    opened.refuse("the mesh '" + role + "' in it cannot be read; the file is damaged");
+    open_file.reject("the mesh '" + role + "' cannot be read; the file is damaged");
   return mesh;
 }
 
-void read_files(const Opened& opened, RecordingHeader& header) {
-  for (const char* place : {"/config", "/meshes"}) {
-    const Handle group(H5Gopen2(opened.file, place, H5P_DEFAULT), H5Gclose);
+void read_files(const OpenFile& open_file, RecordingHeader& header) {
+  for (const char* group_path : {"/config", "/meshes"}) {
+    const Handle group(H5Gopen2(open_file.file, group_path, H5P_DEFAULT), H5Gclose);
     if (!group.ok()) continue;
     for (const std::string& name : names_in(group)) {
       const Handle set(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose);
       if (!set.ok()) continue;
       if (is_mesh(name)) {
-        header.files.push_back(read_mesh(opened, set, name));
+        header.files.push_back(read_mesh(open_file, set, name));
         continue;
       }
-      std::filesystem::path at;
-      std::string text = read_config(set, at);
+      std::filesystem::path path;
+      std::string text = read_config(set, path);
       if (name == "settings")
-        header.settings = text, header.settings_file = at;
+        header.settings = text, header.settings_file = path;
       else if (name == "scene")
-        header.scene = text, header.scene_file = at;
+        header.scene = text, header.scene_file = path;
       else if (name == "profile")
-        header.profile = text, header.profile_file = at;
+        header.profile = text, header.profile_file = path;
       else
-        header.files.push_back({name, at, {}, true, text});
+        header.files.push_back({name, path, {}, true, text});
     }
   }
 }
 
-RecordingHeader read_header(const Opened& opened) {
+RecordingHeader read_header(const OpenFile& open_file) {
   RecordingHeader header;
-  header.version = read_text(opened.file, "wrenchd_version");
-  header.kernel = read_text(opened.file, "kernel");
-  header.realtime = read_text(opened.file, "realtime");
-  header.virtual_time = read_text(opened.file, "clock") == "virtual";
-  header.rate_Hz = read_number(opened.file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
-  header.started_ns = read_number<std::int64_t>(opened.file, "started_ns", H5T_NATIVE_INT64, 0);
-  header.started_unix_ns = read_number<std::int64_t>(opened.file, "started_unix_ns", H5T_NATIVE_INT64, 0);
-  read_files(opened, header);
+  header.version = read_text(open_file.file, "wrenchd_version");
+  header.kernel = read_text(open_file.file, "kernel");
+  header.realtime = read_text(open_file.file, "realtime");
+  header.virtual_time = read_text(open_file.file, "clock") == "virtual";
+  header.rate_Hz = read_number(open_file.file, "rate_Hz", H5T_NATIVE_DOUBLE, 0.0);
+  header.started_ns = read_number<std::int64_t>(open_file.file, "started_ns", H5T_NATIVE_INT64, 0);
+  header.started_unix_ns = read_number<std::int64_t>(open_file.file, "started_unix_ns", H5T_NATIVE_INT64, 0);
+  read_files(open_file, header);
   return header;
 }
 
-/// Before anything is read by it: older formats have other columns.
-void check_format(const Opened& opened) {
-  std::string format = read_text(opened.file, "format");
-  std::string version = read_text(opened.file, "wrenchd_version");
-  if (format.empty()) {  // up to 5 it stood at the table
-    const Handle table(H5Dopen2(opened.file, "/ticks", H5P_DEFAULT), H5Dclose);
-    if (!table.ok()) opened.refuse("has no table 'ticks'; name a recording of wrenchd");
+/// Rejects a file of another format before anything is read, because its columns differ in name or meaning.
+void check_format(const OpenFile& open_file) {
+  std::string format = read_text(open_file.file, "format");
+  std::string version = read_text(open_file.file, "wrenchd_version");
+  if (format.empty()) {  // formats up to 5 have these attributes at the table
+    const Handle table(H5Dopen2(open_file.file, "/ticks", H5P_DEFAULT), H5Dclose);
+    if (!table.ok()) open_file.reject("has no table 'ticks'; name a recording of wrenchd");
     format = read_text(table, "format");
     version = read_text(table, "wrenchd_version");
     if (format.empty()) format = "1";
   }
   if (format != kFormat)
-    opened.refuse("is of format " + format + ", and format " + kFormat +
-                  " is what can be read; replay it with the wrenchd that wrote it (" + version + ")");
+    open_file.reject("was written by wrenchd " + (version.empty() ? "of an unknown version" : version) +
+                     " in recording format " + format + ", and this wrenchd reads format " + kFormat +
+                     "; replay or export it with the version that wrote it");
 }
 
-/// That the columns are those that we know, of a class that converts.
-void check_columns(const Opened& opened, const TableKind& table, hid_t set) {
+/// Rejects a table that lacks a column.
+void check_columns(const OpenFile& open_file, const TableKind& table, hid_t set) {
   const Handle type(H5Dget_type(set), H5Tclose);
   if (H5Tget_class(type) != H5T_COMPOUND)
-    opened.refuse("its table '" + std::string(table.word) + "' has no columns; name a recording of wrenchd");
+    open_file.reject("table '" + std::string(table.name) + "' has no columns; name a recording of wrenchd");
   for (const RecordField& field : table.fields)
     if (H5Tget_member_index(type, field.name) < 0)
-      opened.refuse("column '" + std::string(field.name) + "' of its table '" + table.word +
-                    "' is missing; the file was changed, take it as it was recorded");
+      open_file.reject("column '" + std::string(field.name) + "' of table '" + table.name +
+                       "' is missing; the file was changed, take it as it was recorded");
 }
 
 template <class Row>
-std::vector<Row> read_table(const Opened& opened, const TableKind& table) {
-  const Handle set(H5Dopen2(opened.file, table.path, H5P_DEFAULT), H5Dclose);
-  if (!set.ok()) opened.refuse("has no table '" + std::string(table.word) + "'; name a recording of wrenchd");
-  check_columns(opened, table, set);
+std::vector<Row> read_table(const OpenFile& open_file, const TableKind& table) {
+  const Handle set(H5Dopen2(open_file.file, table.path, H5P_DEFAULT), H5Dclose);
+  if (!set.ok())
+    open_file.reject("has no table '" + std::string(table.name) + "'; name a recording of wrenchd");
+  check_columns(open_file, table, set);
   const Handle space(H5Dget_space(set), H5Sclose);
   hsize_t rows = 0;
   if (H5Sget_simple_extent_ndims(space) != 1 || H5Sget_simple_extent_dims(space, &rows, nullptr) != 1)
-    opened.refuse("its table '" + std::string(table.word) + "' is no list of rows; the file is damaged");
-  if (rows > opened.bytes * kMostDeflated / table.row_bytes + 1)
-    opened.refuse("its table '" + std::string(table.word) + "' cannot have the " + std::to_string(rows) +
-                  " rows that it says; the file is damaged");
+    open_file.reject("table '" + std::string(table.name) + "' is not one-dimensional; the file is damaged");
+  if (rows > open_file.bytes * kMaxExpansion / table.row_bytes + 1)
+    open_file.reject("table '" + std::string(table.name) + "' cannot have the " + std::to_string(rows) +
+                     " rows that it says; the file is damaged");
   std::vector<Row> read(rows);
   const Handle row(row_type(table), H5Tclose);
   if (rows > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()) < 0)
-    opened.refuse("its table '" + std::string(table.word) +
-                  "' cannot be read; the file is damaged, or cut short");
+    open_file.reject("table '" + std::string(table.name) +
+                     "' cannot be read; the file is damaged or truncated");
   return read;
 }
 
-/// Rows whose numbers were not written yet when the process died: HDF5 reads them as zeros.
+/// Returns true for a row that was allocated but not written when the process died. HDF5 reads it as zeros.
 bool is_unwritten(const TickRow& row) {
   return row.tick.now_ns == 0 && row.tick.wrench_ready_ns == 0 && row.tick.tick == 0 && row.tick.state == 0;
 }
@@ -558,30 +559,28 @@ bool is_unwritten(const TickRow& row) {
 }  // namespace
 
 Recording read_recording(const std::filesystem::path& file) {
-  quiet();
+  silence_hdf5();
   std::error_code error;
   const std::uint64_t bytes = std::filesystem::file_size(file, error);
-  if (error) throw RecordingError(file.string() + ": is not there; name a recording of wrenchd");
+  if (error) throw RecordingError(file.string() + ": does not exist; name a recording of wrenchd");
   const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  const Opened opened{file, id, bytes};
+  const OpenFile open_file{file, id, bytes};
   if (!id.ok())
-    opened.refuse(
-        H5Fis_hdf5(file.c_str()) > 0
-            ? "is cut short or damaged; take a whole copy, or name a recording of wrenchd that is whole"
-            : "is not an HDF5 file; name a recording of wrenchd");
-  check_format(opened);
+    open_file.reject(H5Fis_hdf5(file.c_str()) > 0 ? "is truncated or damaged; use a complete copy"
+                                                  : "is not an HDF5 file; name a recording of wrenchd");
+  check_format(open_file);
   Recording recording;
-  recording.header = read_header(opened);
-  std::vector<TickRow> rows = read_table<TickRow>(opened, tick_table());
-  recording.contacts = read_table<Touch>(opened, touch_table());
+  recording.header = read_header(open_file);
+  std::vector<TickRow> rows = read_table<TickRow>(open_file, tick_table());
+  recording.contacts = read_table<Touch>(open_file, contact_table());
   while (rows.size() > 1 && is_unwritten(rows.back())) rows.pop_back();
   recording.ticks.reserve(rows.size());
   recording.contact_ranges.reserve(rows.size());
-  const std::uint64_t touches = recording.contacts.size();
+  const std::uint64_t contacts = recording.contacts.size();
   for (const TickRow& row : rows) {
-    const bool there = row.first_touch <= touches && row.touch_count <= touches - row.first_touch;
+    const bool valid = row.first_contact <= contacts && row.contact_count <= contacts - row.first_contact;
     recording.ticks.push_back(row.tick);
-    recording.contact_ranges.push_back(there ? ContactRange{row.first_touch, row.touch_count}
+    recording.contact_ranges.push_back(valid ? ContactRange{row.first_contact, row.contact_count}
                                              : ContactRange{});
   }
   return recording;

@@ -14,107 +14,113 @@
 
 namespace wrenchd {
 
-/// A recording that cannot be written or read: which file, why, and what to do.
+/// A recording cannot be written or read. The message names the file, the reason and the remedy.
 class RecordingError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A file that a run was made of.
+/// A file that the run used as input.
 struct RecordedFile {
-  std::string role;  ///< "hand_script", "profile_1" (a parent), "tool", "obstacle_0": what it was to the run
-  std::filesystem::path path;  ///< where it was read from
-  std::string sha256;          ///< of its bytes, in hexadecimal
-  bool embedded = true;        ///< else its bytes are not in the recording: it is too large
-  std::string bytes;
+  std::string role;  ///< "hand_script", "profile_1" (a parent of the profile), "tool", "obstacle_0".
+  std::filesystem::path path;  ///< Path from which the file was read.
+  std::string sha256;          ///< SHA-256 of the contents, in hexadecimal.
+  bool embedded = true;        ///< False if the contents are too large for the recording.
+  std::string bytes;           ///< Contents; empty if not embedded.
 };
 
-/// What a recording must know besides its ticks, so that it can be understood and replayed on its own.
+/// Everything but ticks that is needed to understand and replay a recording on its own.
 struct RecordingHeader {
-  std::string version;   ///< of wrenchd
-  std::string settings;  ///< text of the files it ran with
-  std::string scene;
-  std::string profile;
-  std::filesystem::path settings_file;  ///< where those texts are from
+  std::string version;   ///< Version of wrenchd.
+  std::string settings;  ///< Text of the configuration file.
+  std::string scene;     ///< Text of the scene file.
+  std::string profile;   ///< Text of the profile.
+  std::filesystem::path settings_file;
   std::filesystem::path scene_file;
   std::filesystem::path profile_file;
-  std::vector<RecordedFile> files;  ///< the others: parents of the profile, hand script, meshes
-  std::string realtime;             ///< as it ran: "required", "best_effort", "off"
-  double rate_Hz = 0.0;
-  std::string kernel;  ///< name and release
-  bool virtual_time = false;
-  // One moment by two clocks: unix_ns = started_unix_ns + (now_ns - started_ns).
-  std::int64_t started_ns = 0;       ///< by the clock of the ticks
-  std::int64_t started_unix_ns = 0;  ///< since 1970, UTC
+  std::vector<RecordedFile> files;  ///< Other inputs: parents of the profile, hand script, meshes.
+  std::string realtime;             ///< Real-time setting of the run: "required", "best_effort" or "off".
+  double rate_Hz = 0.0;             ///< Configured rate of the servo loop.
+  std::string kernel;               ///< Name and release of the kernel.
+  bool virtual_time = false;        ///< True if the run used virtual time.
+  // One moment on two clocks: unix_ns = started_unix_ns + (now_ns - started_ns).
+  std::int64_t started_ns = 0;       ///< Start of the recording, on the clock of the ticks.
+  std::int64_t started_unix_ns = 0;  ///< Start of the recording, UTC since 1970.
 };
 
-/// The rows of /touches that belong to a tick.
+/// Rows of /contacts that belong to one tick.
 struct ContactRange {
   std::uint64_t first = 0;
   std::uint32_t count = 0;
 };
 
-/// Ticks one after the other, each with the contacts that hold it.
+/// Consecutive ticks with their contacts.
 struct RecordBatch {
   std::vector<TickRecord> ticks;
-  std::vector<ContactRange> contact_ranges;  ///< one a tick, into touches
+  std::vector<ContactRange> contact_ranges;  ///< Range in `contacts` for each tick.
   std::vector<Touch> contacts;
 
+  /// Removes all ticks. Not RT-safe.
   void clear();
-  void add(const TickRecord& tick, std::span<const Touch> its);
+  /// Appends one tick with its contacts. Not RT-safe: allocates.
+  void add(const TickRecord& tick, std::span<const Touch> tick_contacts);
 };
 
-/// An HDF5 file that any reader opens: h5dump, h5py, MATLAB.
+/// Writes an HDF5 file that any HDF5 reader can open: h5dump, h5py, MATLAB.
 ///
-///   /ticks      one row a tick, one named column a field, and first_touch, touch_count: its rows of /touches
-///   /touches    one row a contact, likewise
-///   /fields     of both tables: name, type, count, unit, frame, doc, names of values
-///   /config     settings, scene, profile: texts; hand_script and parents of the profile where there are any
-///   /meshes     tool, obstacle_0, ...: the bytes of the mesh files, with name and SHA-256
+///   /ticks      one row per tick, one column per field; columns first_contact and contact_count refer to
+///               rows of /contacts
+///   /contacts   one row per contact, one column per field
+///   /fields     description of the columns of both tables: name, type, count, unit, frame, meaning, value
+///   names /config     texts: settings, scene, profile, hand_script, parents of the profile /meshes contents
+///   of the mesh files tool, obstacle_0, ..., with path and SHA-256
 ///
-/// The unit, frame and meaning of column X are also the attributes "X.unit", "X.frame", "X.doc" of its table.
-/// Attributes of the file: format, versions, rate, and when it began, by the clock of the ticks and by UTC.
+/// Unit, frame and meaning of column X are also the attributes "X.unit", "X.frame" and "X.doc" of its table.
+/// Attributes of the file: format, versions, rate, and start time on the clock of the ticks and in UTC.
 ///
-/// What was flushed is there when the process dies. Not RT safe; one thread at a time.
+/// Flushed data survive if the process dies. For one thread at a time. Not RT-safe: writes a file.
 class RecordingWriter {
  public:
-  /// Throws RecordingError. An existing file is refused: a recording is never overwritten.
+  /// Creates the file. Throws RecordingError, also if the file exists: a recording is never overwritten.
   RecordingWriter(const std::filesystem::path& file, const RecordingHeader& header);
   ~RecordingWriter();
   RecordingWriter(const RecordingWriter&) = delete;
   RecordingWriter& operator=(const RecordingWriter&) = delete;
 
-  /// Ticks without contacts.
+  /// Appends ticks without contacts. Throws RecordingError.
   void append(std::span<const TickRecord> records);
+  /// Appends ticks with contacts. Throws RecordingError.
   void append(const RecordBatch& batch) { append(batch.ticks, batch.contact_ranges, batch.contacts); }
-  /// Brings what was appended to where it outlives this process. Throws RecordingError.
+  /// Passes all appended data to the operating system. Throws RecordingError.
   void flush();
 
-  /// Rows that are compressed and written at once.
+  /// Number of rows that HDF5 compresses and writes together.
   static constexpr std::size_t kChunkTicks = 512;
 
  private:
   void append(std::span<const TickRecord> ticks, std::span<const ContactRange> ranges,
-              std::span<const Touch> touches);
+              std::span<const Touch> contacts);
 
   struct File;
   std::unique_ptr<File> file_;
 };
 
+/// A complete recording in memory.
 struct Recording {
   RecordingHeader header;
   std::vector<TickRecord> ticks;
-  std::vector<ContactRange> contact_ranges;  ///< one a tick, into touches
+  std::vector<ContactRange> contact_ranges;  ///< Range in `contacts` for each tick.
   std::vector<Touch> contacts;
 
-  /// The contacts of the tick in that row.
+  /// Returns the contacts of the tick in this row. RT-safe.
   std::span<const Touch> contacts_of(std::size_t row) const {
     return std::span(contacts).subspan(contact_ranges[row].first, contact_ranges[row].count);
   }
 };
 
-/// Reads a recording back, bit for bit. Rows at the end that a process which died had not finished are left
-/// out. Throws RecordingError, also for a recording of another format: what it leaves out would be made up.
+/// Reads a recording bit for bit. Drops unfinished rows at the end, which a dying process leaves. Throws
+/// RecordingError; a recording of another format is rejected with the version that wrote it. Not RT-safe:
+/// reads a file.
 Recording read_recording(const std::filesystem::path& file);
 
 }  // namespace wrenchd

@@ -15,20 +15,20 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// The shared memory holds two seconds.
-constexpr auto kTakeEvery = 20ms;
-constexpr auto kWriteEvery = 100ms;
-/// What the flight recorder writes of the time after a fault.
-constexpr Duration kAfter = 1s;
-/// A loop that has ended, or stands still, gives no more: then what is there is written.
-constexpr Duration kPatience = 2500ms;
-/// The history is longer than a flight by that second, and by what the writer may be late.
+/// Time between two readings of the shared memory, which stores the last two seconds.
+constexpr auto kCollectPeriod = 20ms;
+constexpr auto kWritePeriod = 100ms;
+/// Duration after a fault that the flight recorder writes.
+constexpr Duration kAfterFault = 1s;
+/// Longest wait for the ticks after a fault. A loop that has ended or stalled produces none.
+constexpr Duration kMaxWait = 2500ms;
+/// The history exceeds flight_s by kAfterFault and by the largest delay of the writer.
 constexpr double kMargin_s = 4.0;
-/// Without a flight recorder: what a disk may stand still.
-constexpr double kLeast_s = 10.0;
+/// Shortest history: the longest pause of the disk that loses no tick.
+constexpr double kMinHistory_s = 10.0;
 
-std::size_t room_for(double flight_s, double rate_Hz) {
-  return static_cast<std::size_t>(std::ceil(std::max(flight_s + kMargin_s, kLeast_s) * rate_Hz));
+std::size_t history_ticks(double flight_s, double rate_Hz) {
+  return static_cast<std::size_t>(std::ceil(std::max(flight_s + kMargin_s, kMinHistory_s) * rate_Hz));
 }
 
 std::time_t utc_now() {
@@ -37,15 +37,15 @@ std::time_t utc_now() {
 
 }  // namespace
 
-Recordings::Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pace pace)
-    : runtime_(station),
+Recordings::Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pace pace)
+    : runtime_(runtime),
       feed_(feed),
       clock_(clock),
-      settings_(station.config().settings.recording),
+      settings_(runtime.config().settings.recording),
       directory_(recordings_directory(settings_)),
       flight_s_(pace == Pace::threads ? settings_.flight_s : 0.0),
-      state_(station.enable_shared_state()),
-      history_(room_for(flight_s_, state_.rate_Hz())) {
+      state_(runtime.enable_shared_state()),
+      history_(history_ticks(flight_s_, state_.rate_Hz())) {
   status_.directory = directory_;
   status_.flight_s = flight_s_;
   if (pace == Pace::manual) return;
@@ -53,11 +53,11 @@ Recordings::Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pa
     feed_.set_fault_recorder([this](Fault fault, TimePoint at) { return begin_flight(fault, at); });
   collector_ = std::jthread([this](const std::stop_token& stop) {
     pthread_setname_np(pthread_self(), "record take");
-    for (; !stop.stop_requested(); std::this_thread::sleep_for(kTakeEvery)) collect_ticks();
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(kCollectPeriod)) collect_ticks();
   });
   writer_ = std::jthread([this](const std::stop_token& stop) {
     pthread_setname_np(pthread_self(), "record write");
-    for (; !stop.stop_requested(); std::this_thread::sleep_for(kWriteEvery))
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(kWritePeriod))
       while (write(false) && !stop.stop_requested()) {
       }
   });
@@ -76,8 +76,8 @@ Recordings::~Recordings() {
   stop();
 }
 
-std::filesystem::path Recordings::start(const std::string& asked, bool anywhere) {
-  const std::string name = asked.empty() ? "run-" + utc_stamp(utc_now()) : asked;
+std::filesystem::path Recordings::start(const std::string& requested, bool anywhere) {
+  const std::string name = requested.empty() ? "run-" + utc_stamp(utc_now()) : requested;
   const std::filesystem::path file = recording_path(name, directory_, anywhere);
   if (file.parent_path() == directory_) make_recordings_directory(directory_);
   begin(file, file.parent_path());
@@ -92,18 +92,18 @@ void Recordings::begin(const std::filesystem::path& file, const std::filesystem:
   const RecordingHeader header = runtime_.recording_header();
   collect_ticks();
   const std::scoped_lock lock(write_mutex_);
-  if (running_) throw RecordingError(running_->file().string() + ": is being recorded already; end it first");
+  if (running_) throw RecordingError(running_->file().string() + ": a recording runs already; end it first");
   std::error_code ignored;
   if (std::filesystem::is_directory(directory, ignored)) check_free_space(directory, settings_);
   running_ = std::make_unique<Recorder>(history_, file, header, history_.stored_range().end);
   missed_at_start_ = missed_total_.load();
   {
-    const std::scoped_lock told(status_mutex_);
+    const std::scoped_lock status(status_mutex_);
     status_.failed.clear();
   }
   publish();
   feed_.emit("recording", EventLevel::info, "recording: " + file.string(),
-             {{"what", "started"}, {"file", file.string()}});
+             {{"phase", "started"}, {"file", file.string()}});
 }
 
 std::optional<Recordings::Summary> Recordings::stop() {
@@ -120,7 +120,7 @@ std::optional<Recordings::Summary> Recordings::stop() {
   return finish();
 }
 
-/// With writing_ held.
+/// Precondition: write_mutex_ is locked.
 Recordings::Summary Recordings::finish() {
   const Summary written{running_->file(), running_->written(),
                         running_->lost() + missed_total_.load() - missed_at_start_};
@@ -128,34 +128,36 @@ Recordings::Summary Recordings::finish() {
   publish();
   std::string text = "recorded: " + written.file.string() + ", " + std::to_string(written.ticks) + " ticks";
   if (written.lost > 0) text += "; " + std::to_string(written.lost) + " are missing: the disk fell behind";
-  feed_.emit(
-      "recording", written.lost > 0 ? EventLevel::warning : EventLevel::info, text,
-      {{"what", "ended"}, {"file", written.file.string()}, {"ticks", written.ticks}, {"lost", written.lost}});
+  feed_.emit("recording", written.lost > 0 ? EventLevel::warning : EventLevel::info, text,
+             {{"phase", "ended"},
+              {"file", written.file.string()},
+              {"ticks", written.ticks},
+              {"lost", written.lost}});
   return written;
 }
 
-/// The recording ends by itself; what is in the file stays. With writing_ held.
+/// Ends the recording after an error, and keeps its file. Precondition: write_mutex_ is locked.
 void Recordings::fail(const std::string& why) {
   const std::filesystem::path file = running_->file();
   const std::uint64_t ticks = running_->written();
   running_.reset();
   {
-    const std::scoped_lock told(status_mutex_);
+    const std::scoped_lock status(status_mutex_);
     status_.failed = why;
   }
   publish();
   feed_.emit("recording", EventLevel::error,
              "the recording has ended after " + std::to_string(ticks) + " ticks: " + why,
-             {{"what", "failed"}, {"file", file.string()}, {"ticks", ticks}, {"why", why}});
+             {{"phase", "failed"}, {"file", file.string()}, {"ticks", ticks}, {"reason", why}});
 }
 
 Recordings::Status Recordings::status() const {
-  const std::scoped_lock told(status_mutex_);
+  const std::scoped_lock status(status_mutex_);
   return status_;
 }
 
 bool Recordings::is_being_written(const std::filesystem::path& file) const {
-  const std::scoped_lock told(status_mutex_);
+  const std::scoped_lock status(status_mutex_);
   return (status_.running && status_.running->file == file) || (flight_ && flight_->file == file);
 }
 
@@ -170,14 +172,14 @@ OwnedFd Recordings::open(const std::string& name) const {
   const std::filesystem::path file = recording_path(name, directory_, false);
   if (is_being_written(file))
     throw RecordingError(file.string() +
-                         ": is being written; 'record.stop' ends a recording, and a flight is "
-                         "complete when its event says so");
+                         ": is incomplete; 'record.stop' ends a recording, and an event 'recording' reports "
+                         "when a flight is complete");
   return open_recording(directory_, name);
 }
 
-/// With writing_ held.
+/// Precondition: write_mutex_ is locked.
 void Recordings::publish() {
-  const std::scoped_lock told(status_mutex_);
+  const std::scoped_lock status(status_mutex_);
   status_.running.reset();
   if (running_)
     status_.running = Summary{running_->file(), running_->written(),
@@ -190,7 +192,7 @@ void Recordings::pump() {
   }
 }
 
-/// From the shared memory into the history.
+/// Copies the new ticks from the shared memory to the history.
 void Recordings::collect_ticks() {
   const std::scoped_lock lock(collect_mutex_);
   const std::uint64_t written = state_.written();
@@ -201,15 +203,15 @@ void Recordings::collect_ticks() {
       continue;
     }
     const std::uint64_t oldest = state_.written() - std::min(state_.written(), state_.slots() / 2);
-    const std::uint64_t from =
-        std::max(oldest, next_record_ + 1);  // with room, so as not to be overrun at once
+    // Skip half of the ring, so that the writer does not overtake the reader again at once.
+    const std::uint64_t from = std::max(oldest, next_record_ + 1);
     missed_ += from - next_record_;
     next_record_ = from;
     missed_total_.store(missed_);
   }
 }
 
-/// True: there may be more to write at once.
+/// Returns true if there may be more to write at once.
 bool Recordings::write(bool rest) {
   const bool more = write_running(rest);
   check_disk_space();
@@ -229,8 +231,8 @@ bool Recordings::write_running(bool rest) {
   return false;
 }
 
-/// A recording ends before it takes the last room that there is. After each piece: a disk may fill up in less
-/// than any time one would wait.
+/// Ends the recording if the free space falls below keep_free_MB. Runs after each piece, because other
+/// programs may fill the disk at any time.
 void Recordings::check_disk_space() {
   const std::scoped_lock lock(write_mutex_);
   if (!running_) return;
@@ -241,31 +243,31 @@ void Recordings::check_disk_space() {
   }
 }
 
-/// From the feed's thread: names the file, which the writer makes when the second after the fault is over.
-/// What else goes wrong until then is in the same one.
+/// Returns the file for a fault. The writer creates it when kAfterFault has passed. Faults until then are
+/// recorded in the same file. Called on the thread of the event feed.
 std::string Recordings::begin_flight(Fault fault, TimePoint at) {
   if (directory_.empty()) return {};
-  const std::scoped_lock told(status_mutex_);
+  const std::scoped_lock status(status_mutex_);
   if (flight_) return flight_->recorder ? std::string() : flight_->file.string();
   const auto ago = std::chrono::duration_cast<std::chrono::seconds>(clock_.now() - at);
   Flight flight;
   flight.file = flight_path(directory_, utc_now() - ago.count(), fault_row(fault).name);
   flight.fault = fault;
   flight.from_ns = (at - from_seconds(flight_s_)).time_since_epoch().count();
-  flight.until_ns = (at + kAfter).time_since_epoch().count();
+  flight.until_ns = (at + kAfterFault).time_since_epoch().count();
   flight.requested_at = std::chrono::steady_clock::now();
   flight_ = std::move(flight);
   return flight_->file.string();
 }
 
-/// `rest`: no more ticks come.
+/// Writes a piece of the flight. rest: no more ticks will arrive. Returns true if there is more to write.
 bool Recordings::write_flight(bool rest) {
-  std::unique_lock told(status_mutex_);
+  std::unique_lock status(status_mutex_);
   if (!flight_) return false;
   Flight& flight = *flight_;
-  const bool over = rest || std::chrono::steady_clock::now() - flight.requested_at > kPatience;
+  const bool over = rest || std::chrono::steady_clock::now() - flight.requested_at > kMaxWait;
   if (!flight.recorder && !over && history_.newest_ns() < flight.until_ns) return false;
-  told.unlock();  // only this thread changes what is begun, and keep() leaves it alone
+  status.unlock();  // only this thread changes a flight that has begun
   try {
     if (!flight.recorder) {
       make_recordings_directory(directory_);
@@ -275,9 +277,9 @@ bool Recordings::write_flight(bool rest) {
       const std::uint64_t first = history_.first_at_or_after(flight.from_ns);
       flight.end = history_.first_at_or_after(flight.until_ns + 1);
       auto recorder = std::make_unique<Recorder>(history_, flight.file, header, first);
-      told.lock();
+      status.lock();
       flight.recorder = std::move(recorder);
-      told.unlock();
+      status.unlock();
     }
     if (flight.recorder->write_next(flight.end, true)) return true;
     end_flight({});
@@ -291,13 +293,13 @@ void Recordings::end_flight(const std::string& why) {
   const std::filesystem::path file = flight_->file;
   const Fault fault = flight_->fault;
   const std::uint64_t ticks = flight_->recorder ? flight_->recorder->written() : 0;
-  if (flight_->recorder && !why.empty()) {  // what is cut short would pass for the whole
+  if (flight_->recorder && !why.empty()) {  // a reader would take an incomplete file for a complete one
     flight_->recorder.reset();
     std::error_code ignored;
     std::filesystem::remove(file, ignored);
   }
   {
-    const std::scoped_lock told(status_mutex_);
+    const std::scoped_lock status(status_mutex_);
     flight_.reset();
     if (why.empty()) {
       status_.last_flight = file;
@@ -307,11 +309,13 @@ void Recordings::end_flight(const std::string& why) {
   const std::string name(fault_row(fault).name);
   if (why.empty())
     feed_.emit("recording", EventLevel::info,
-               "what led to " + name + " is in " + file.string() + ", " + std::to_string(ticks) + " ticks",
-               {{"what", "flight"}, {"file", file.string()}, {"ticks", ticks}, {"fault", name}});
+               "flight recorder: the ticks before " + name + " are in " + file.string() + ", " +
+                   std::to_string(ticks) + " ticks",
+               {{"phase", "flight"}, {"file", file.string()}, {"ticks", ticks}, {"fault", name}});
   else
-    feed_.emit("recording", EventLevel::error, "what led to " + name + " could not be kept: " + why,
-               {{"what", "failed"}, {"file", file.string()}, {"why", why}, {"fault", name}});
+    feed_.emit("recording", EventLevel::error,
+               "flight recorder: the ticks before " + name + " are lost: " + why,
+               {{"phase", "failed"}, {"file", file.string()}, {"reason", why}, {"fault", name}});
 }
 
 }  // namespace wrenchd

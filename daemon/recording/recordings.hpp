@@ -23,59 +23,62 @@ namespace wrenchd {
 
 class Runtime;
 
-/// All recordings of a running daemon: the one that somebody asked for, and those of the flight recorder,
-/// which holds the last seconds in memory and writes them, and the second after, for each fault that latches
-/// or lets go of the hand.
+/// The recordings of a running daemon: the requested recording, and those of the flight recorder. The flight
+/// recorder stores the last seconds in memory. For each fault that latches or releases the hand it writes
+/// them to a file, together with the second after the fault.
 ///
-/// Ticks are taken from the shared memory (daemon/servo/shared_state.hpp), which the loop writes whether
-/// anybody reads it or not: it does not know of recordings, and never waits for one. A thread brings them
-/// into the history, another from there to files; a disk may stand still for as long as the history is. Tells
-/// events `recording`. Not RT safe; any thread but the servo's.
+/// The servo loop writes every tick to the shared memory (daemon/servo/shared_state.hpp) and never waits for
+/// a recording. A collector thread copies the ticks to the history; a writer thread copies them from there to
+/// files. No tick is lost if the disk pauses for less than the length of the history. Emits the events
+/// `recording`. Not RT-safe: locks. Any thread except the servo thread.
 class Recordings {
  public:
   enum class Pace : std::uint8_t {
-    threads,  ///< threads of its own: wall time
-    manual,   ///< pump() is called at least every second of the loop's time; there is no flight recorder
+    threads,  ///< wall time: collector and writer have threads
+    manual,   ///< virtual time: the caller calls pump() at least once a second of loop time; no flight
+              ///< recorder
   };
 
-  /// Before the loop runs. Station and feed must outlive this. Throws std::system_error.
-  Recordings(Runtime& station, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
-  /// What is there is written, and files are closed.
+  /// Precondition: the loop does not run yet. Runtime and feed must outlive this object. Throws
+  /// std::system_error.
+  Recordings(Runtime& runtime, EventFeed& feed, const Clock& clock, Pace pace = Pace::threads);
+  /// Writes the stored ticks, and closes the files.
   ~Recordings();
   Recordings(const Recordings&) = delete;
   Recordings& operator=(const Recordings&) = delete;
 
-  /// Writes every tick from now on to this file; `anywhere` lets it be an absolute path, else it is a name in
-  /// directory(), and empty a name of the time. Returns the file. Throws RecordingError, also where one is
-  /// written already.
-  std::filesystem::path start(const std::string& asked, bool anywhere);
-  /// The same to the very file, relative to the working directory, as the command line names it.
+  /// Starts to write every tick to a file, and returns the file. requested: a name in the recordings
+  /// directory; empty: a name with the present time. If `anywhere` is set, an absolute path is permitted too.
+  /// Throws RecordingError, also if a recording runs already.
+  std::filesystem::path start(const std::string& requested, bool anywhere);
+  /// Starts to write every tick to this file. A relative path starts at the working directory.
   void start_file(const std::filesystem::path& file);
 
   struct Summary {
     std::filesystem::path file;
     std::uint64_t ticks = 0;
-    std::uint64_t lost = 0;  ///< ticks that are missing in it
+    std::uint64_t lost = 0;  ///< number of ticks missing in the file
   };
-  /// Writes the rest and closes it. Nothing: none was written.
+  /// Writes the remaining ticks and closes the file. Returns nothing if no recording runs.
   std::optional<Summary> stop();
 
-  /// What is in directory(), the oldest first; those that are being written are not.
+  /// Returns the complete recordings in the recordings directory, the oldest first.
   std::vector<StoredRecording> list() const;
-  /// One of them, to be read. Throws RecordingError, also for one that is being written.
+  /// Opens a complete recording for reading. Throws RecordingError.
   OwnedFd open(const std::string& name) const;
 
   struct Status {
-    std::optional<Summary> running;  ///< so far
-    std::string failed;              ///< why the last one ended by itself; empty: it did not
+    std::optional<Summary> running;  ///< the running recording so far
+    std::string failed;              ///< why the last recording ended early; empty: it did not
     std::filesystem::path directory;
-    double flight_s = 0.0;  ///< what the flight recorder holds; 0: there is none
+    double flight_s = 0.0;  ///< duration that the flight recorder stores; 0: no flight recorder
     std::filesystem::path last_flight;
-    std::uint64_t flights = 0;  ///< written since the start
+    std::uint64_t flights = 0;  ///< number of flights written since the start
   };
-  /// Waits for nothing.
+  /// Does not wait for the disk.
   Status status() const;
 
+  /// Collects and writes the ticks that are there (Pace::manual).
   void pump();
 
  private:
@@ -85,8 +88,8 @@ class Recordings {
     std::int64_t from_ns = 0;
     std::int64_t until_ns = 0;
     TimePoint requested_at{};
-    std::unique_ptr<Recorder> recorder;  ///< once it is written
-    std::uint64_t end = 0;               ///< likewise: number of the first record beyond
+    std::unique_ptr<Recorder> recorder;  ///< null before the writer begins
+    std::uint64_t end = 0;               ///< number of the first record after the flight; valid with recorder
   };
 
   void begin(const std::filesystem::path& file, const std::filesystem::path& directory);
@@ -111,21 +114,21 @@ class Recordings {
   SharedState& state_;
   RecordHistory history_;
 
-  std::mutex collect_mutex_;       ///< of what follows
-  std::uint64_t next_record_ = 0;  ///< record of the shared memory to take
-  std::uint64_t missed_ = 0;       ///< that were overwritten before they were taken
+  std::mutex collect_mutex_;       ///< protects next_record_, missed_ and record_
+  std::uint64_t next_record_ = 0;  ///< next record of the shared memory to collect
+  std::uint64_t missed_ = 0;       ///< records that were overwritten before they were collected
   StateRecord record_;
 
-  std::mutex write_mutex_;  ///< of what follows
+  std::mutex write_mutex_;  ///< protects running_ and missed_at_start_
   std::unique_ptr<Recorder> running_;
-  std::uint64_t missed_at_start_ = 0;  ///< as of its start
+  std::uint64_t missed_at_start_ = 0;  ///< missed_total_ at the start of the running recording
 
-  mutable std::mutex status_mutex_;  ///< of what follows
+  mutable std::mutex status_mutex_;  ///< protects flight_ and status_
   std::optional<Flight> flight_;
   Status status_;
 
   std::atomic<std::uint64_t> missed_total_{0};
-  std::jthread collector_, writer_;  ///< last: they use all of the above
+  std::jthread collector_, writer_;  ///< last members: they use the members above
 };
 
 }  // namespace wrenchd

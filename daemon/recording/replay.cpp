@@ -8,14 +8,7 @@
 namespace wrenchd {
 namespace {
 
-Pose pose_of(const std::array<double, 7>& x) noexcept {
-  Pose X;
-  X.translation_m = {x[0], x[1], x[2]};
-  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
-  return X;
-}
-
-/// A device whose samples come out of a recording, one a tick.
+/// A device that returns the samples of a recording, one for each tick.
 class RecordedDevice final : public Device {
  public:
   void play(const TickRecord& record) noexcept { record_ = &record; }
@@ -34,7 +27,8 @@ class RecordedDevice final : public Device {
   const TickRecord* record_ = nullptr;
 };
 
-/// The clock of a recording: when a wrench was ready, and how long the machine had slept.
+/// A clock that returns the times of a recording: when the wrench was ready, and how long the machine was
+/// suspended.
 class RecordedClock final : public Clock {
  public:
   void play(const TickRecord& record) noexcept { record_ = &record; }
@@ -49,28 +43,28 @@ class RecordedClock final : public Clock {
   const TickRecord* record_ = nullptr;
 };
 
-/// A placer whose answers come out of a recording, at the ticks at which they came then.
-class RecordedPlacer final : public ProxyInitializer {
+/// A proxy initializer that returns the results of a recording, each at its recorded tick.
+class RecordedProxyInitializer final : public ProxyInitializer {
  public:
   void play(const TickRecord& record) noexcept { record_ = &record; }
 
-  void request(const ProxyInitializationRequest& question) noexcept override { question_ = question; }
-  bool take_result(ProxyInitializationResult& answer) noexcept override {
-    const auto placing = static_cast<ProxyInitialization>(record_->proxy_initialization);
-    answer = {question_.id, placing == ProxyInitialization::found, pose_of(record_->X_WQ),
-              question_.scene_time_s};
-    return placing == ProxyInitialization::found || placing == ProxyInitialization::failed;
+  void request(const ProxyInitializationRequest& request) noexcept override { request_ = request; }
+  bool take_result(ProxyInitializationResult& result) noexcept override {
+    const auto initialization = static_cast<ProxyInitialization>(record_->proxy_initialization);
+    result = {request_.id, initialization == ProxyInitialization::found, pose_from_numbers(record_->X_WQ),
+              request_.scene_time_s};
+    return initialization == ProxyInitialization::found || initialization == ProxyInitialization::failed;
   }
 
  private:
   const TickRecord* record_ = nullptr;
-  ProxyInitializationRequest question_;
+  ProxyInitializationRequest request_;
 };
 
 DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   const TickRecord& r = *record_;
   DeviceSample sample;
-  sample.X_BH = pose_of(r.X_BH);
+  sample.X_BH = pose_from_numbers(r.X_BH);
   sample.V_BH.linear_m_per_s = {r.V_BH[0], r.V_BH[1], r.V_BH[2]};
   sample.V_BH.angular_rad_per_s = {r.V_BH[3], r.V_BH[4], r.V_BH[5]};
   sample.device_time_s = r.device_time_s;
@@ -90,7 +84,7 @@ DeviceSample RecordedDevice::read_newest(TimePoint) noexcept {
   return sample;
 }
 
-/// Compares two runs of numbers by their bits, so that NaN equals itself and -0 is not 0.
+/// Compares two arrays bit by bit: NaN equals itself, and -0 differs from 0.
 std::optional<Difference> compare(std::uint64_t tick, const char* field, std::span<const double> recorded,
                                   std::span<const double> replayed) {
   for (std::size_t i = 0; i < recorded.size(); ++i)
@@ -104,8 +98,8 @@ struct Compared {
   double (*of)(const TickRecord&);
 };
 
-/// One number each. What is no double is exact as one, but for a set of faults, of which there are less
-/// than 53.
+/// Compared scalars, as double. Every integer is exact as a double. So is the set of faults: it has less than
+/// 53 bits.
 #define WRENCHD_COMPARED(member)                                               \
   Compared {                                                                   \
 #member, [](const TickRecord& r) { return static_cast<double>(r.member); } \
@@ -160,45 +154,46 @@ const char* compared_fields() {
   return names.c_str();
 }
 
-std::optional<Difference> replay(const Recording& recording, const RunConfig& plan) {
+std::optional<Difference> replay(const Recording& recording, const RunConfig& config) {
   if (!recording.ticks.empty() && recording.ticks.front().tick != 0)
-    throw RecordingError("the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
-                         ": what the loop had in mind by then (the stiffness it had measured, how warm the "
-                         "motors were, what was "
-                         "wrong before, where obstacles that move stood) is not in it, and arming does not "
-                         "begin it anew; what is "
-                         "replayed is a recording from the start on, as by wrenchd --record");
-  const Scene scene(plan.scene);
+    throw RecordingError(
+        "the recording begins at tick " + std::to_string(recording.ticks.front().tick) +
+        ": a replay needs the state of the loop at its first tick (measured stiffness, motor "
+        "temperature, earlier faults, obstacle poses); replay a recording from the start of a "
+        "run, as wrenchd --record writes it");
+  const auto scene = std::make_shared<const Scene>(config.scene);
+  const auto proxy_initializer = std::make_shared<RecordedProxyInitializer>();
   RecordedClock clock;
   RecordedDevice device;
-  RecordedPlacer placer;
-  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
-  std::uint64_t last = 0;  // a release from outside has the number of the tick before
+  ServoLoop loop(config.settings, config.profile, device,
+                 std::make_unique<Rendering>(0, config.settings, config.profile, scene, proxy_initializer),
+                 clock);
+  std::uint64_t last = 0;  // an external release has the number of the previous tick
   for (const TickRecord& then : recording.ticks) {
     if (then.tick != last && then.tick != last + 1)
-      throw RecordingError("ticks " + std::to_string(last + 1) + " to " + std::to_string(then.tick - 1) +
-                           " are missing in the recording, and it is the same bits up to there; record to a "
-                           "disk that keeps up to replay all of it");
+      throw RecordingError(
+          "ticks " + std::to_string(last + 1) + " to " + std::to_string(then.tick - 1) +
+          " are missing in the recording; all ticks before them agree. Record to a faster disk to replay the "
+          "whole run");
     last = then.tick;
     if (then.change_count > 0)
       throw RecordingError(
           "at tick " + std::to_string(then.tick) +
-          " the scene, the workspace or a limit was changed while the loop ran, and to what is not in the "
-          "recording: it can be replayed up to there, and is the same bits so far; record a run without "
-          "changes to replay all of it");
+          " a client changed the scene, the workspace or a limit, and the recording does not contain the "
+          "change; all ticks before it agree. Record a run without changes to replay the whole run");
     clock.play(then);
     device.play(then);
-    placer.play(then);
+    proxy_initializer->play(then);
     const TimePoint now{Duration(then.now_ns)};
-    // The record of a release from outside is the last tick's, with zero wrench and `released` set.
+    // An external release repeats the record of the previous tick with zero wrench and `released` set.
     if ((then.commands & kReleasedExternally) != 0) {
       loop.release(now);
     } else {
-      loop.request(then.commands);
+      loop.requests().request(then.commands);
       loop.tick(now, now);
     }
     TickRecord replayed;
-    loop.latest_record().read(replayed);
+    loop.telemetry().latest_record().read(replayed);
     if (auto difference = compare(then, replayed)) return difference;
   }
   return {};

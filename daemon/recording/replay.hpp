@@ -10,7 +10,7 @@
 
 namespace wrenchd {
 
-/// The first place where a replay and its recording part.
+/// The first number that differs between a replay and its recording.
 struct Difference {
   std::uint64_t tick = 0;
   std::string field;
@@ -18,13 +18,14 @@ struct Difference {
   double replayed = 0.0;
 };
 
-/// Feeds the recorded samples through a servo loop of the same plan, offline and at once, and compares what
-/// came out then with what comes out now, bit for bit. Nothing: all ticks agree. Times are not compared.
-/// Scene time is that of the ticks, so obstacles move as they did. Throws RecordingError where the recording
-/// does not begin at the loop's first tick, or where ticks are missing in it.
-std::optional<Difference> replay(const Recording& recording, const RunConfig& plan);
+/// Feeds the recorded samples through a servo loop with the same configuration, offline, and compares the
+/// recorded outputs with the new outputs bit for bit. Returns nothing if all ticks agree. Does not compare
+/// times. Scene time is that of the recorded ticks, so obstacles move as recorded. Throws RecordingError if
+/// the recording does not begin at the first tick of the loop, or if ticks are missing. Not RT-safe: takes as
+/// long as the ticks need.
+std::optional<Difference> replay(const Recording& recording, const RunConfig& config);
 
-/// The columns that are compared, for people.
+/// Returns the names of the compared columns.
 const char* compared_fields();
 
 }  // namespace wrenchd

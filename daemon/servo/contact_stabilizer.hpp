@@ -3,92 +3,68 @@
 
 #include "core/fault.hpp"
 #include "core/oscillation.hpp"
-#include "daemon/servo/stability_analysis.hpp"
+#include "core/passivity.hpp"
+#include "core/state.hpp"
 #include "devices/device.hpp"
 
 namespace wrenchd {
 
-/// Keeps a contact from giving what nobody put into it: measures the loop, takes from that how stiff its
-/// walls may be, gives less where the handle buzzes all the same, and guards the energy. RT safe.
+/// What the contact stage tells the stabilizer in one tick.
+struct ContactInput {
+  State state = State::disarmed;
+  bool sample_usable = false;  ///< The sample is new and may be used.
+  bool in_contact = false;
+  double stored_energy_J = 0.0;  ///< Energy that the contact springs hold.
+  double crossfade_work_J =
+      0.0;  ///< Work that fading between renderings did on the springs since the last tick.
+  double obstacle_work_J =
+      0.0;  ///< Work that moving obstacles did on the springs, negative if they took some.
+  double local_model_work_J = 0.0;  ///< Work that fading local models did on their springs.
+};
+
+/// A contact wrench that gives the hand no energy of its own.
+struct Stabilized {
+  Wrench F;                 ///< About the handle point in B.
+  FaultSet faults = 0;      ///< Oscillation, or energy that the guard could not hold back.
+  bool intervened = false;  ///< The passivity guard changed the wrench.
+};
+
+/// Keeps a contact from giving energy that nobody put into it: lowers the stiffness if the handle oscillates,
+/// and limits the energy that goes out to what came in (core/METHOD.md, section 11). All members are RT-safe.
 class ContactStabilizer {
  public:
-  /// stability: of what is rendered first.
-  ContactStabilizer(const Settings& settings, const DeviceProfile& profile,
-                    const StabilityAnalysis& stability);
+  ContactStabilizer(const DeviceProfile& profile, const PassivityGuard& guard) noexcept;
 
-  // --- the loop as it is, once a tick ---
-  void start_measurement() noexcept { measurement_.reset(); }
-  /// commanded: number of the last command sent before this tick.
-  void update_measurement(const DeviceSample& sample, std::uint64_t commanded, TimePoint now) noexcept;
-  /// How stiff the walls may be by what was measured since start_measurement(); the guard goes by that too.
-  const StiffnessScale& derive_stiffness() noexcept;
-  const StiffnessScale& stiffness_scale() const noexcept { return stiffness_scale_; }
-  /// How stiff other walls may be, by what was measured when settle() was called last: as stiff as they are
-  /// where that was never.
-  StiffnessScale max_stable_scale(const StabilityAnalysis& stability) const noexcept;
-  /// Likewise of springs and brakes about the handle.
-  double max_stable_scale(const LocalModels::TotalGains& load) const noexcept {
-    return stability_.max_stable_scale_at_handle(stiffness_derived_ ? derivation_measurement_ : measurement_,
-                                                 load);
-  }
-  /// These are the walls from here on.
-  void set_stability(const StabilityAnalysis& stability) noexcept;
-  /// Metres that the tool goes for a metre of the handle, from here on. Whether that is another than before:
-  /// then it bears another share().
-  bool set_workspace_scale(double scale) noexcept;
+  /// Replaces the guard, after the delay of the loop was measured anew.
+  void set_guard(const PassivityGuard& guard) noexcept { guard_ = guard; }
 
-  // --- the contact ---
-  struct ContactInput {
-    State state = State::disarmed;
-    bool sample_usable = false;  ///< the sample is new, and may be used
-    bool in_contact = false;
-    double stored_energy_J = 0.0;  ///< what the spring holds
-  };
-  /// What may go out of the contact's wrench, about the handle point in B. While the force rises the wall is
-  /// wound up around a hand that may be in it, so the guard begins when it has risen, and lends what the
-  /// spring holds by then. What holds the handle's weight is none of its business: a hand that lifts it is
-  /// given work.
-  Wrench stabilize(const Wrench& asked, const DeviceSample& sample, const ContactInput& moment) noexcept;
-  /// The spring was wound up from outside by so much, and not by the hand: it may give that back.
-  void credit(double energy_J) noexcept {
-    if (guard_active_) guard_.credit(energy_J);
-  }
-  /// Obstacles that move wound it up by so much in this tick, or took so much out of it (below 0).
-  void credit_obstacle_work(double energy_J) noexcept {
-    if (guard_active_) guard_.credit_obstacle_work(oscillation_gain_ * energy_J);
-  }
-  /// What went out of it, after the limits.
-  void record_sent(const Wrench& sent) noexcept { guard_.record_sent(sent); }
+  /// Share of the requested wrench that may go out. While the force rises after arming, the springs are
+  /// loaded around a hand that may be inside a wall; the guard therefore starts when the force has risen,
+  /// with the energy that the springs hold then as its budget. The wrench that compensates the handle's
+  /// weight must not be in `requested`: a hand that lifts the handle receives work.
+  Stabilized stabilize(const Wrench& requested, const DeviceSample& sample,
+                       const ContactInput& contact) noexcept;
+  /// Records the contact wrench that was sent, after the limits; zero if the motors are off.
+  void record_sent(const Wrench& F) noexcept { guard_.record_sent(F); }
 
-  /// What steadied() found in this tick.
-  FaultSet faults() const noexcept { return faults_; }
-  /// Did the guard change the wrench in this tick?
-  bool guard_intervened() const noexcept { return guard_active_ && guard_.intervened(); }
-  /// Of the spring that the configuration asks for, with what oscillations have left of it.
-  double effective_stiffness_scale() const noexcept { return oscillation_gain_ * stiffness_scale_.spring; }
+  /// Factor on the stiffness, lowered by each oscillation since arming; 1 if there was none.
+  double oscillation_gain() const noexcept { return oscillation_gain_; }
   const PassivityGuard& guard() const noexcept { return guard_; }
 
  private:
+  void credit(const ContactInput& contact) noexcept;
   void reset_guard(State state) noexcept;
-  void detect_oscillation(const Wrench& asked, const DeviceSample& sample, double dt_s,
-                          bool in_contact) noexcept;
+  FaultSet detect_oscillation(const Wrench& requested, const DeviceSample& sample, double dt_s,
+                              bool in_contact) noexcept;
 
-  StabilityAnalysis stability_;
-  LoopMeasurement measurement_;
-  LoopMeasurement derivation_measurement_;  ///< what was measured by then
-  bool stiffness_derived_ = false;
-  double workspace_scale_ = 1.0;
   PassivityGuard guard_;
   OscillationDetector oscillation_;
-  bool wrench_about_handle_;  ///< wrenches are about the handle: of others the guard knows nothing
-  bool device_acknowledges_;  ///< the device says which commands it took
-  StiffnessScale stiffness_scale_;
-  FaultSet faults_ = 0;
-  State last_state_ = State::disconnected;  ///< of the last tick
-  double oscillation_gain_ = 1.0;           ///< what oscillations have left, since the loop was armed
-  int oscillation_count_ = 0;               ///< since then
+  bool wrench_about_handle_;                ///< The guard only understands wrenches about the handle point.
+  State last_state_ = State::disconnected;  ///< State in the previous call of stabilize().
+  double oscillation_gain_ = 1.0;
+  int oscillation_count_ = 0;  ///< Oscillations since the loop was armed.
   bool guard_active_ = false;
-  double guard_sample_time_s_ = 0.0;  ///< device time of the guard's last sample
+  double guard_sample_time_s_ = 0.0;  ///< Device time of the sample that the guard saw last.
 };
 
 }  // namespace wrenchd

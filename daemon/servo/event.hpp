@@ -1,39 +1,82 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <type_traits>
+#include <variant>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
 #include "core/clock.hpp"
+#include "core/fault.hpp"
+#include "core/state.hpp"
 
 namespace wrenchd {
 
-/// Something worth a line in the log, as the servo thread says it: no text, no allocation.
+/// Something that happened in a tick and is worth a line in the log. It holds no text, so that the servo
+/// thread can make one without allocating. daemon/control/event_description.cpp turns events into text and
+/// JSON.
 struct Event {
-  enum class Kind : std::uint8_t {
-    state_changed,     ///< detail: the new State; value: the Fault that led to it, as a number
-    fault_raised,      ///< detail: the Fault; value: how much of it, where that says something
-    stiffness_scaled,  ///< value: the share of the spring that stays passive on this device, where less than
-                       ///< 1
-    stability_bound_unknown,  ///< the profile states no damping, so nobody knows how stiff a wall may be
-    arming_refused,           ///< detail: the State in which it was asked to arm, and was not
-    projection_infeasible,    ///< the obstacles contradict each other where the hand is; the proxy stays
-    proxy_search_started,     ///< no admissible pose is known; zero wrench while one is looked for
-    proxy_found,              ///< value: how far from the hand it was found [m]
-    proxy_search_failed,      ///< none was found; zero wrench, and it is looked for again
-    released,                 ///< the hand was released
-    crossfade_started,        ///< detail: number of a rendering that begins to take the place of another
-    rendering_changed,        ///< detail: number of the rendering that is felt from now on
+  struct StateChanged {
+    State state;  ///< State that the loop entered.
+    Fault cause;  ///< Fault that led to it, or none.
   };
-  Kind kind = Kind::state_changed;
-  TimePoint at{};
-  std::uint32_t detail = 0;
-  double value = 0.0;
-};
+  struct FaultRaised {
+    Fault fault;
+    double value;  ///< Measured size of the fault, in SI units; 0 if the fault has no size.
+  };
+  struct StiffnessScaled {
+    double scale;  ///< Share of the configured stiffness that stays passive on this device, below 1.
+  };
+  /// The profile states no damping, so no stiffness bound can be computed.
+  struct StabilityBoundUnknown {};
+  struct ArmingRefused {
+    State state;  ///< State in which the request to arm came.
+  };
+  /// No admissible pose exists near the proxy; the proxy stays where it was.
+  struct ProjectionInfeasible {};
+  /// The proxy is invalid; the wrench is zero until a feasible pose is found.
+  struct ProxySearchStarted {};
+  struct ProxyFound {
+    double distance_m;  ///< Distance from the commanded pose p to the feasible pose that was found.
+  };
+  /// No feasible pose was found; the search is repeated.
+  struct ProxySearchFailed {};
+  /// The hand was released: zero wrench, motors off.
+  struct Released {};
+  struct CrossfadeStarted {
+    std::uint32_t rendering_id;  ///< Rendering that replaces the active one.
+  };
+  struct RenderingChanged {
+    std::uint32_t rendering_id;  ///< Rendering that is active from now on.
+  };
+  using Data = std::variant<StateChanged, FaultRaised, StiffnessScaled, StabilityBoundUnknown, ArmingRefused,
+                            ProjectionInfeasible, ProxySearchStarted, ProxyFound, ProxySearchFailed, Released,
+                            CrossfadeStarted, RenderingChanged>;
 
-/// From the servo thread to the log thread. When it is full, events are counted and dropped: the loop never
-/// waits.
-using EventRing = boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<1024>>;
+  TimePoint at{};  ///< Start of the tick in which it happened, on the monotonic clock.
+  Data data;
+};
+static_assert(std::is_trivially_copyable_v<Event>);
+
+/// Carries events from the servo thread to one reader. When it is full, it drops events and counts them: the
+/// loop never waits for the reader.
+class EventQueue {
+ public:
+  /// By the servo thread. RT-safe.
+  void emit(TimePoint at, const Event::Data& data) noexcept {
+    if (!ring_.push(Event{at, data})) dropped_.fetch_add(1, std::memory_order_relaxed);
+  }
+
+  /// By the reader: takes the oldest event. Returns false if there is none. RT-safe.
+  bool pop(Event& event) noexcept { return ring_.pop(event); }
+  /// Number of events that were dropped so far. Any thread. RT-safe.
+  std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+
+ private:
+  boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<1024>> ring_;
+  std::atomic<std::uint64_t> dropped_{0};
+};
 
 }  // namespace wrenchd

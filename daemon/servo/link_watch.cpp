@@ -8,15 +8,15 @@
 namespace wrenchd {
 namespace {
 
-/// 20 ms of nothing but bad reports, or more than one in three for long: by time, so that it is the same at
-/// every rate.
+/// The bucket fills after 20 ms of bad reports only, or if more than one report in three is bad for long. The
+/// capacity is a time, so that the reaction is the same at every report rate.
 constexpr double kBucketFull_s = 0.040;
-constexpr double kSlowest_Hz = 1000.0;
-constexpr double kBad = 2.0;
-constexpr double kGood = 1.0;
-/// A device that reports seldom may be silent for as many of its periods.
+constexpr double kMinBucketRate_Hz = 1000.0;
+constexpr double kBadWeight = 2.0;
+constexpr double kGoodWeight = 1.0;
+/// A device with slow reports is late after this number of report periods.
 constexpr double kLatePeriods = 3.0;
-/// Two clocks may differ by so much: that is no lag.
+/// Relative rate difference of two clocks that does not count as lag.
 constexpr double kClockDrift = 5e-4;
 
 double lag_s(const DeviceSample& sample) noexcept {
@@ -28,33 +28,33 @@ double lag_s(const DeviceSample& sample) noexcept {
 LinkWatch::LinkWatch(double report_rate_Hz) noexcept
     : late_after_(report_rate_Hz > 0.0 ? std::max(kLateSample, from_seconds(kLatePeriods / report_rate_Hz))
                                        : kLateSample),
-      bucket_capacity_(kBucketFull_s * (report_rate_Hz > kSlowest_Hz ? report_rate_Hz : kSlowest_Hz)) {}
+      bucket_capacity_(kBucketFull_s *
+                       (report_rate_Hz > kMinBucketRate_Hz ? report_rate_Hz : kMinBucketRate_Hz)) {}
 
 FaultSet LinkWatch::check(const DeviceSample& sample, TimePoint now) noexcept {
-  FaultSet found = 0;
-  if (sample.rejected > sample.repeated) found |= bit(Fault::report_malformed);
-  if (sample.repeated > 0) found |= bit(Fault::report_repeated);
-  if (sample.missing > 0) found |= bit(Fault::report_missing);
+  FaultSet faults = 0;
+  if (sample.rejected > sample.repeated) faults |= bit(Fault::report_malformed);
+  if (sample.repeated > 0) faults |= bit(Fault::report_repeated);
+  if (sample.missing > 0) faults |= bit(Fault::report_missing);
   const bool first = !report_received_ && sample.fresh;
   report_received_ = report_received_ || sample.fresh;
-  if (!report_received_) return found;
+  if (!report_received_) return faults;
   if (first) {
     min_lag_s_ = lag_s(sample);
     min_lag_updated_ = sample.arrived;
   }
   const double bad = static_cast<double>(sample.rejected) + static_cast<double>(sample.missing);
   const double good = static_cast<double>(sample.superseded) + (sample.fresh ? 1.0 : 0.0);
-  bucket_ = std::max(bucket_ + kBad * bad - kGood * good, 0.0);
+  bucket_ = std::max(bucket_ + kBadWeight * bad - kGoodWeight * good, 0.0);
   if (bucket_ > bucket_capacity_) {
-    found |= bit(Fault::link_lossy);
-    bucket_ = 0.0;  // told; what comes after somebody has looked counts anew
+    faults |= bit(Fault::link_lossy);
+    bucket_ = 0.0;  // the fault is raised once; later losses count anew
   }
-  if (now - sample.arrived > late_after_ || lag_exceeded(sample)) found |= bit(Fault::sample_late);
-  return found;
+  if (now - sample.arrived > late_after_ || lag_exceeded(sample)) faults |= bit(Fault::sample_late);
+  return faults;
 }
 
-/// Reports that wait somewhere are old, however evenly they come. The shortest lag that was seen counts as
-/// none.
+/// Reports that wait in a queue arrive evenly but are old. The smallest lag so far is the reference.
 bool LinkWatch::lag_exceeded(const DeviceSample& sample) noexcept {
   const double lag = lag_s(sample);
   min_lag_s_ = std::min(lag, min_lag_s_ + kClockDrift * seconds(sample.arrived - min_lag_updated_));

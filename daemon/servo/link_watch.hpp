@@ -7,25 +7,27 @@
 
 namespace wrenchd {
 
-/// Looks at how reports come: bad, missing, late by our clock and by the device's. RT safe.
+/// Detects rejected, repeated and missing reports, and samples that are late by the host's or the device's
+/// clock.
 class LinkWatch {
  public:
-  /// report_rate_Hz: the profile's; not a number where it states none.
+  /// report_rate_Hz: rate of the profile; NaN if not stated. RT-safe.
   explicit LinkWatch(double report_rate_Hz) noexcept;
 
+  /// Returns the faults of this sample. Call once per tick. RT-safe.
   FaultSet check(const DeviceSample& sample, TimePoint now) noexcept;
-  /// The next report is the first one.
+  /// Resets the detector; the next report counts as the first one. RT-safe.
   void reset() noexcept;
 
  private:
   bool lag_exceeded(const DeviceSample& sample) noexcept;
 
-  Duration late_after_;
-  double bucket_capacity_;
-  double bucket_ = 0.0;  ///< 2 in for a bad or missing report, 1 out for a good one
-  bool report_received_ = false;
-  double min_lag_s_ = 0.0;  ///< of arrival behind the device's own clock
-  TimePoint min_lag_updated_{};
+  Duration late_after_;           ///< Age from which a sample is late.
+  double bucket_capacity_;        ///< Level from which the link is lossy.
+  double bucket_ = 0.0;           ///< Leaky bucket: +2 for a bad or missing report, -1 for a good report.
+  bool report_received_ = false;  ///< True after the first report.
+  double min_lag_s_ = 0.0;        ///< Smallest lag of arrival time behind device time, plus clock drift.
+  TimePoint min_lag_updated_{};   ///< Arrival time of the sample that last updated min_lag_s_.
 };
 
 }  // namespace wrenchd

@@ -6,58 +6,62 @@
 namespace wrenchd {
 namespace {
 
-/// Of the way to a model that was changed, gone within kFade_s but for 2 %.
-constexpr double kFadeLags = 4.0;
+/// Number of time constants in kFade_s. After kFade_s, 2 % of a parameter change is left.
+constexpr double kTimeConstantsPerFade = 4.0;
 
-double between(double a, double b, double share) noexcept {
-  return a + share * (b - a);
+double interpolate(double a, double b, double fraction) noexcept {
+  return a + fraction * (b - a);
 }
 
-/// A share of the way from one model to another of the same kind.
-void approach(LocalModel& felt, const LocalModel& told, double share) noexcept {
-  const Vector3d normal_W = felt.normal_W + share * (told.normal_W - felt.normal_W);
-  felt.normal_W = normal_W.norm() > 0.1 ? Vector3d(normal_W.normalized()) : told.normal_W;
-  felt.offset_m = between(felt.offset_m, told.offset_m, share);
-  felt.X_WA.translation_m += share * (told.X_WA.translation_m - felt.X_WA.translation_m);
-  felt.X_WA.rotation = felt.X_WA.rotation.slerp(share, told.X_WA.rotation).normalized();
-  felt.stiffness_N_per_m = between(felt.stiffness_N_per_m, told.stiffness_N_per_m, share);
-  felt.stiffness_Nm_per_rad = between(felt.stiffness_Nm_per_rad, told.stiffness_Nm_per_rad, share);
-  felt.damping_N_s_per_m = between(felt.damping_N_s_per_m, told.damping_N_s_per_m, share);
-  felt.damping_Nm_s_per_rad = between(felt.damping_Nm_s_per_rad, told.damping_Nm_s_per_rad, share);
+/// Moves the parameters of `current` by `fraction` of the difference to `target`, a model of the same kind.
+void approach(LocalModel& current, const LocalModel& target, double fraction) noexcept {
+  const Vector3d normal_W = current.normal_W + fraction * (target.normal_W - current.normal_W);
+  current.normal_W = normal_W.norm() > 0.1 ? Vector3d(normal_W.normalized()) : target.normal_W;
+  current.offset_m = interpolate(current.offset_m, target.offset_m, fraction);
+  current.X_WA.translation_m += fraction * (target.X_WA.translation_m - current.X_WA.translation_m);
+  current.X_WA.rotation = current.X_WA.rotation.slerp(fraction, target.X_WA.rotation).normalized();
+  current.stiffness_N_per_m = interpolate(current.stiffness_N_per_m, target.stiffness_N_per_m, fraction);
+  current.stiffness_Nm_per_rad =
+      interpolate(current.stiffness_Nm_per_rad, target.stiffness_Nm_per_rad, fraction);
+  current.damping_N_s_per_m = interpolate(current.damping_N_s_per_m, target.damping_N_s_per_m, fraction);
+  current.damping_Nm_s_per_rad =
+      interpolate(current.damping_Nm_s_per_rad, target.damping_Nm_s_per_rad, fraction);
 }
 
-/// The spring of a model at this pose, and what it holds.
+/// Elastic part of a model at one handle pose.
 struct Spring {
   Wrench F;
-  double wound_up_J = 0.0;
-  bool touches = true;
+  double stored_energy_J = 0.0;
+  bool in_contact = true;
 };
 
-Spring spring_of(const LocalModel& m, const Pose& X_WH) noexcept {
+Spring spring_at(const LocalModel& m, const Pose& X_WH) noexcept {
   Spring spring;
   if (m.kind == LocalModel::Kind::plane) {
     const double depth_m = m.offset_m - m.normal_W.dot(X_WH.translation_m);
-    spring.touches = depth_m > 0.0;
-    if (!spring.touches) return spring;
+    spring.in_contact = depth_m > 0.0;
+    if (!spring.in_contact) return spring;
     spring.F.force_N = m.stiffness_N_per_m * depth_m * m.normal_W;
-    spring.wound_up_J = 0.5 * m.stiffness_N_per_m * depth_m * depth_m;
+    spring.stored_energy_J = 0.5 * m.stiffness_N_per_m * depth_m * depth_m;
   } else if (m.kind == LocalModel::Kind::spring) {
-    const Vector3d way_m = m.X_WA.translation_m - X_WH.translation_m;
-    const Vector3d turn_rad = rotation_vector(m.X_WA.rotation * X_WH.rotation.conjugate());
-    spring.F = {m.stiffness_N_per_m * way_m, m.stiffness_Nm_per_rad * turn_rad};
-    spring.wound_up_J = 0.5 * (spring.F.force_N.dot(way_m) + spring.F.torque_Nm.dot(turn_rad));
+    const Vector3d displacement_m = m.X_WA.translation_m - X_WH.translation_m;
+    const Vector3d rotation_rad = rotation_vector(m.X_WA.rotation * X_WH.rotation.conjugate());
+    spring.F = {m.stiffness_N_per_m * displacement_m, m.stiffness_Nm_per_rad * rotation_rad};
+    spring.stored_energy_J =
+        0.5 * (spring.F.force_N.dot(displacement_m) + spring.F.torque_Nm.dot(rotation_rad));
   }
   return spring;
 }
 
-/// With its brake. A wall brakes along its normal, and does not pull at a hand that leaves it.
-Wrench braked(const LocalModel& m, const Spring& spring, const Twist& V_H_W) noexcept {
-  if (!spring.touches) return {};
-  const Vector3d brake_N = -m.damping_N_s_per_m * V_H_W.linear_m_per_s;
+/// Returns spring plus damper. A plane damps along its normal only, and never pulls the handle towards
+/// itself.
+Wrench damped(const LocalModel& m, const Spring& spring, const Twist& V_H_W) noexcept {
+  if (!spring.in_contact) return {};
+  const Vector3d damping_N = -m.damping_N_s_per_m * V_H_W.linear_m_per_s;
   if (m.kind == LocalModel::Kind::plane)
-    return {std::max(spring.F.force_N.dot(m.normal_W) + brake_N.dot(m.normal_W), 0.0) * m.normal_W,
+    return {std::max(spring.F.force_N.dot(m.normal_W) + damping_N.dot(m.normal_W), 0.0) * m.normal_W,
             Vector3d::Zero()};
-  return spring.F + Wrench{brake_N, -m.damping_Nm_s_per_rad * V_H_W.angular_rad_per_s};
+  return spring.F + Wrench{damping_N, -m.damping_Nm_s_per_rad * V_H_W.angular_rad_per_s};
 }
 
 }  // namespace
@@ -73,7 +77,7 @@ void LocalModels::set_models(const LocalModelSet& models) noexcept {
       known->requested = true;
       continue;
     }
-    // One that is not felt, or that is least on its way out.
+    // A free slot has weight 0. If no slot is free, the one that faded out furthest is reused.
     const auto least = std::min_element(slots_.begin(), slots_.end(), [](const Slot& a, const Slot& b) {
       return (a.requested ? 2.0 : a.weight) < (b.requested ? 2.0 : b.weight);
     });
@@ -82,36 +86,36 @@ void LocalModels::set_models(const LocalModelSet& models) noexcept {
 }
 
 LocalModels::Evaluation LocalModels::evaluate(const Pose& X_WH, const Twist& V_H_W, TimePoint now,
-                                              double dt_s, double share) noexcept {
-  Evaluation felt;
+                                              double dt_s, double scale) noexcept {
+  Evaluation sum;
   const double step = std::max(dt_s, 0.0) / kFade_s;
   for (Slot& slot : slots_) {
     if (!slot.requested && slot.weight <= 0.0) continue;
     if (slot.requested && seconds(slot.target.expires - now) <= slot.weight * kFade_s) slot.requested = false;
-    const double before_J = slot.weight * spring_of(slot.current, X_WH).wound_up_J;
+    const double before_J = slot.weight * spring_at(slot.current, X_WH).stored_energy_J;
     slot.weight = std::clamp(slot.weight + (slot.requested ? step : -step), 0.0, 1.0);
-    approach(slot.current, slot.target, std::min(kFadeLags * step, 1.0));
-    const Spring spring = spring_of(slot.current, X_WH);
-    const double now_J = slot.weight * spring.wound_up_J;
-    felt.F_H_W = felt.F_H_W + (share * slot.weight) * braked(slot.current, spring, V_H_W);
-    felt.stored_energy_J += share * now_J;
-    felt.crossfade_work_J += share * (now_J - before_J);
-    felt.any_active = true;
+    approach(slot.current, slot.target, std::min(kTimeConstantsPerFade * step, 1.0));
+    const Spring spring = spring_at(slot.current, X_WH);
+    const double after_J = slot.weight * spring.stored_energy_J;
+    sum.F_H_W = sum.F_H_W + (scale * slot.weight) * damped(slot.current, spring, V_H_W);
+    sum.stored_energy_J += scale * after_J;
+    sum.crossfade_work_J += scale * (after_J - before_J);
+    sum.any_active = true;
   }
-  return felt;
+  return sum;
 }
 
 LocalModels::TotalGains LocalModels::total_gains() const noexcept {
-  TotalGains load;
+  TotalGains total;
   for (const Slot& slot : slots_) {
     if (!slot.requested && slot.weight <= 0.0) continue;
     const LocalModel& m = slot.target;
-    load.stiffness_N_per_m += m.stiffness_N_per_m;
-    load.stiffness_Nm_per_rad += m.stiffness_Nm_per_rad;
-    load.damping_N_s_per_m += m.damping_N_s_per_m;
-    load.damping_Nm_s_per_rad += m.damping_Nm_s_per_rad;
+    total.stiffness_N_per_m += m.stiffness_N_per_m;
+    total.stiffness_Nm_per_rad += m.stiffness_Nm_per_rad;
+    total.damping_N_s_per_m += m.damping_N_s_per_m;
+    total.damping_Nm_s_per_rad += m.damping_Nm_s_per_rad;
   }
-  return load;
+  return total;
 }
 
 void LocalModels::clear() noexcept {

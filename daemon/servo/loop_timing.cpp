@@ -7,8 +7,8 @@
 
 namespace wrenchd {
 
-// Up to 32 ns one bucket a nanosecond; above, the five bits below the leading one choose the bucket in its
-// octave.
+// Below 32 ns each nanosecond has a bucket. Above, the five bits after the leading bit select the bucket
+// within the octave.
 std::size_t DurationHistogram::bucket_of(std::uint64_t ns) noexcept {
   if (ns < kBucketsPerOctave) return ns;
   const unsigned shift = static_cast<unsigned>(std::bit_width(ns)) - 1 - kBucketBits;
@@ -29,13 +29,13 @@ void DurationHistogram::add(Duration duration) noexcept {
   if (ns > max_ns_.load(std::memory_order_relaxed)) max_ns_.store(ns, std::memory_order_relaxed);
 }
 
-Duration DurationHistogram::quantile(double share) const noexcept {
+Duration DurationHistogram::quantile(double fraction) const noexcept {
   const std::uint64_t total = count();
-  const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(total)));
-  std::uint64_t seen = 0;
+  const auto target = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(total)));
+  std::uint64_t counted = 0;
   for (std::size_t b = 0; b < buckets_.size(); ++b) {
-    seen += buckets_[b].load(std::memory_order_relaxed);
-    if (seen >= wanted && seen > 0)
+    counted += buckets_[b].load(std::memory_order_relaxed);
+    if (counted >= target && counted > 0)
       return std::min(Duration(static_cast<std::int64_t>(upper_end_ns(b))), max());
   }
   return max();

@@ -10,20 +10,22 @@
 
 namespace wrenchd {
 
-/// Counts durations in fixed buckets, 32 to each power of two: any quantile is right within 3 %, the maximum
-/// exactly. One thread adds, any thread reads; nobody waits. RT safe.
+/// Histogram of durations with 32 buckets per octave. Quantiles are accurate to 3 %, the maximum is exact.
+/// One thread adds, any thread reads, without locks. All members are RT-safe.
 class DurationHistogram {
  public:
+  /// Counts one duration. Negative durations count as 0.
   void add(Duration duration) noexcept;
-  /// The duration below which this share (0 to 1) of all lies: the upper end of its bucket. Zero while empty.
-  Duration quantile(double share) const noexcept;
+  /// Returns the duration that a `fraction` (0 to 1) of all durations does not exceed: the upper end of its
+  /// bucket. Returns 0 if the histogram is empty.
+  Duration quantile(double fraction) const noexcept;
   Duration max() const noexcept { return Duration(max_ns_.load(std::memory_order_relaxed)); }
   std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
 
  private:
   static constexpr unsigned kBucketBits = 5;
   static constexpr std::size_t kBucketsPerOctave = std::size_t{1} << kBucketBits;
-  static constexpr std::size_t kOctaves = 36;  ///< the last bucket starts above a quarter of an hour
+  static constexpr std::size_t kOctaves = 36;  ///< The last bucket begins above 15 minutes.
   static std::size_t bucket_of(std::uint64_t ns) noexcept;
   static std::uint64_t upper_end_ns(std::size_t bucket) noexcept;
 
@@ -32,18 +34,19 @@ class DurationHistogram {
   std::atomic<std::int64_t> max_ns_{0};
 };
 
-/// The stages of a tick, in order, as servo_loop.cpp calls them.
+/// The timed stages of a tick, in the order in which servo_loop.cpp calls them.
 enum class Stage : std::uint8_t { read, projection, wrench, limits, write };
 inline constexpr std::size_t kStageCount = 5;
+/// Returns "read", "projection", "wrench", "limits" or "write". RT-safe.
 const char* name(Stage stage) noexcept;
 
-/// What the loop's time goes into. One per loop; written by the servo thread, read by anybody.
+/// Durations of the loop and its stages. The servo thread writes, any thread reads. All members are RT-safe.
 struct LoopTiming {
-  DurationHistogram wake_latency;  ///< from the time a tick was due to its start
-  DurationHistogram tick;          ///< from its start to the end of its last stage
+  DurationHistogram wake_latency;  ///< Time from the due time of a tick to its start.
+  DurationHistogram tick;          ///< Time from the start of a tick to the end of its last stage.
   std::array<DurationHistogram, kStageCount> stage;
-  std::atomic<std::uint64_t> overruns{0};       ///< ticks that were not over when the next was due
-  std::atomic<std::uint64_t> skipped_ticks{0};  ///< ticks left out because of them; they are never caught up
+  std::atomic<std::uint64_t> overruns{0};       ///< Ticks that ended after the next tick was due.
+  std::atomic<std::uint64_t> skipped_ticks{0};  ///< Ticks that the loop skipped because of overruns.
 };
 
 }  // namespace wrenchd

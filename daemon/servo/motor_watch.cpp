@@ -5,8 +5,8 @@
 
 namespace wrenchd {
 
-/// A flag from before the motors were driven says nothing, so the way of the first command there and of its
-/// answer back is waited for.
+/// A report sent before the first enabling command still shows motors off. The check therefore waits for one
+/// round trip.
 FaultSet MotorWatch::check(const DeviceSample& sample, bool driven, TimePoint now) noexcept {
   if (!driven || !driven_) {
     driven_ = driven;
@@ -20,9 +20,9 @@ FaultSet MotorWatch::check(const DeviceSample& sample, bool driven, TimePoint no
     off_since_ = now;
     return 0;
   }
-  const bool long_off = now - off_since_ > kMotorsOff;
-  if (sample.watchdog_tripped) return seen_on_ || long_off ? bit(Fault::watchdog_tripped) : 0;
-  return long_off ? bit(Fault::motors_off) : 0;
+  const bool off_too_long = now - off_since_ > kMotorsOff;
+  if (sample.watchdog_tripped) return seen_on_ || off_too_long ? bit(Fault::watchdog_tripped) : 0;
+  return off_too_long ? bit(Fault::motors_off) : 0;
 }
 
 }  // namespace wrenchd

@@ -7,17 +7,18 @@
 
 namespace wrenchd {
 
-/// Looks whether the motors do as they are told: the device's own word of its watchdog and its motors, while
-/// it is driven. RT safe.
+/// Detects motors that are off although the last command enabled them, from the motor and watchdog flags in
+/// the device's reports.
 class MotorWatch {
  public:
-  /// driven: the last command said "motors on".
+  /// Returns motors_off, watchdog_tripped or no fault. driven: true if the last command enabled the motors. A
+  /// flag counts after kMotorsOff at the earliest, unless the motors have been on since. RT-safe.
   FaultSet check(const DeviceSample& sample, bool driven, TimePoint now) noexcept;
 
  private:
-  bool driven_ = false;
-  bool seen_on_ = false;   ///< they have been on since they were driven
-  TimePoint off_since_{};  ///< driven, and not seen on
+  bool driven_ = false;    ///< Value of `driven` in the previous tick.
+  bool seen_on_ = false;   ///< True if a report showed the motors on since they were enabled.
+  TimePoint off_since_{};  ///< Time of enabling, or of the last report with the motors on.
 };
 
 }  // namespace wrenchd

@@ -3,40 +3,47 @@
 
 #include <optional>
 
+#include "config/settings.hpp"
 #include "core/clock.hpp"
 #include "core/fault.hpp"
 #include "core/watch_limits.hpp"
 
 namespace wrenchd {
 
-/// Looks at the times of the ticks: late, stopped, back, and a machine that slept in between. RT safe.
+/// Detects ticks that come late, a loop that stalls, a clock that runs backwards, and a machine that was
+/// suspended. All members are RT-safe.
 class PaceWatch {
  public:
-  /// stopped_after: how late a tick has to be to be a loop that stood still, and not a late one any more.
-  PaceWatch(Duration period, Duration stopped_after) noexcept
-      : period_(period), stopped_after_(stopped_after) {}
+  /// stalled_after: a tick that is later than this is a stalled loop, not a late tick.
+  PaceWatch(Duration period, Duration stalled_after) noexcept
+      : period_(period), stalled_after_(stalled_after) {}
 
-  /// slept: how long the machine has slept since it was switched on.
-  FaultSet check(TimePoint now, Duration slept) noexcept;
+  /// Faults of a tick that starts at `now`. suspended: how long the machine has been suspended since it was
+  /// switched on.
+  FaultSet check(TimePoint now, Duration suspended) noexcept;
 
-  /// Since the last tick [s]: never less than nothing, and after a gap no more than two periods, so that
-  /// nothing that grows with time leaps.
+  /// Time since the previous tick: at least 0, and at most two periods, so that nothing that integrates over
+  /// time jumps after a gap.
   double dt_s() const noexcept { return dt_s_; }
-  /// How late this tick is; nothing where it is not.
+  /// How late this tick is; 0 if it is on time.
   Duration lateness() const noexcept { return lateness_; }
-  /// Did a tick come late so short a time ago that old reports are nobody's fault but ours?
+  /// True if a tick was late so recently that old reports are the fault of the loop and not of the device.
   bool recently_late(TimePoint now) const noexcept {
     return last_late_tick_ && now - *last_late_tick_ <= kStaleSample;
   }
 
  private:
   Duration period_;
-  Duration stopped_after_;
-  std::optional<TimePoint> last_tick_;
-  std::optional<TimePoint> last_late_tick_;  ///< the last late one
-  Duration suspended_{};
+  Duration stalled_after_;
+  std::optional<TimePoint> last_tick_;       ///< Start of the previous tick.
+  std::optional<TimePoint> last_late_tick_;  ///< Start of the last tick that was late.
+  Duration suspended_{};                     ///< Time suspended, as of the previous tick.
   double dt_s_ = 0.0;
   Duration lateness_{};
 };
+
+/// Watch for the pace of these settings. Without real-time priority a loop may stall for a moment: its ticks
+/// are late then, and nothing more. RT-safe.
+PaceWatch make_pace_watch(const ServoSettings& settings) noexcept;
 
 }  // namespace wrenchd

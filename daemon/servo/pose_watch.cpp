@@ -9,13 +9,12 @@
 namespace wrenchd {
 namespace {
 
-constexpr int kNoRotations = 3;
-constexpr double kFarOutside = 1.5;
-/// What a twist may have gone without a bit of the pose changing: ten steps of the coarsest encoder that is
-/// of use.
-constexpr double kUnseenWay_m = 1e-3;
-constexpr double kUnseenTurn_rad = 2e-2;
-/// A twist below this is noise, or rest.
+constexpr int kMaxInvalidRotations = 3;
+constexpr double kOutsideFactor = 1.5;  ///< in workspace radii
+/// Motion that the twist may predict while the pose is constant: ten steps of the coarsest usable encoder.
+constexpr double kUndetected_m = 1e-3;
+constexpr double kUndetected_rad = 2e-2;
+/// A twist below these values is noise or rest.
 constexpr double kRest_m_per_s = 0.02;
 constexpr double kRest_rad_per_s = 0.2;
 
@@ -23,27 +22,27 @@ constexpr double kRest_rad_per_s = 0.2;
 
 PoseWatch::PoseWatch(const DeviceProfile& profile) noexcept
     : centre_m_(profile.workspace_centre_m),
-      max_distance_m_(is_finite(profile.workspace_radius_m) ? kFarOutside * profile.workspace_radius_m
+      max_distance_m_(is_finite(profile.workspace_radius_m) ? kOutsideFactor * profile.workspace_radius_m
                                                             : std::numeric_limits<double>::infinity()) {}
 
 FaultSet PoseWatch::check(const DeviceSample& sample) noexcept {
   if (!sample.fresh) return 0;
-  FaultSet found = 0;
+  FaultSet faults = 0;
   invalid_rotations_ = sample.fault == Fault::pose_not_a_rotation ? invalid_rotations_ + 1 : 0;
-  if (invalid_rotations_ >= kNoRotations) found |= bit(Fault::pose_not_a_rotation);
-  if (sample.fault != Fault::none) return found;
+  if (invalid_rotations_ >= kMaxInvalidRotations) faults |= bit(Fault::pose_not_a_rotation);
+  if (sample.fault != Fault::none) return faults;
   if ((sample.X_BH.translation_m - centre_m_).norm() > max_distance_m_)
-    found |= bit(Fault::pose_outside_workspace);
-  if (pose_stuck(sample)) found |= bit(Fault::pose_stuck);
-  return found;
+    faults |= bit(Fault::pose_outside_workspace);
+  if (pose_stuck(sample)) faults |= bit(Fault::pose_stuck);
+  return faults;
 }
 
 bool PoseWatch::pose_stuck(const DeviceSample& sample) noexcept {
   const double now_s = sample.device_time_s;
   const double v_m_per_s = sample.V_BH.linear_m_per_s.norm(),
                w_rad_per_s = sample.V_BH.angular_rad_per_s.norm();
-  const bool rests = v_m_per_s < kRest_m_per_s && w_rad_per_s < kRest_rad_per_s;
-  if (!has_reference_ || rests || !same_bits(sample.X_BH, X_BH_reference_) || now_s < last_sample_time_s_) {
+  const bool at_rest = v_m_per_s < kRest_m_per_s && w_rad_per_s < kRest_rad_per_s;
+  if (!has_reference_ || at_rest || !same_bits(sample.X_BH, X_BH_reference_) || now_s < last_sample_time_s_) {
     X_BH_reference_ = sample.X_BH;
     has_reference_ = true;
     reference_time_s_ = now_s;
@@ -54,7 +53,7 @@ bool PoseWatch::pose_stuck(const DeviceSample& sample) noexcept {
   }
   last_sample_time_s_ = now_s;
   return now_s - reference_time_s_ >= seconds(kStuckPose) &&
-         (expected_path_m_ > kUnseenWay_m || expected_rotation_rad_ > kUnseenTurn_rad);
+         (expected_path_m_ > kUndetected_m || expected_rotation_rad_ > kUndetected_rad);
 }
 
 void PoseWatch::reset() noexcept {

@@ -8,27 +8,30 @@
 
 namespace wrenchd {
 
-/// Looks at what the reports say of the pose: no rotation, outside of the workspace, stuck. RT safe.
+/// Detects implausible poses: no valid rotation, far outside the workspace, or constant while the twist is
+/// not.
 class PoseWatch {
  public:
+  /// RT-safe.
   explicit PoseWatch(const DeviceProfile& profile) noexcept;
 
+  /// Returns the faults of this sample; samples that are not fresh give none. RT-safe.
   FaultSet check(const DeviceSample& sample) noexcept;
-  /// The next pose is the first one.
+  /// Resets the detector; the next pose counts as the first one. RT-safe.
   void reset() noexcept;
 
  private:
   bool pose_stuck(const DeviceSample& sample) noexcept;
 
-  Vector3d centre_m_;
-  double max_distance_m_;  ///< infinite where the profile has no workspace
-  int invalid_rotations_ = 0;
-  Pose X_BH_reference_;            ///< the last one that moved
-  bool has_reference_ = false;     ///< there is one
-  double reference_time_s_ = 0.0;  ///< device time at which it did
-  double last_sample_time_s_ = 0.0;
-  double expected_path_m_ = 0.0;  ///< that the twist would have gone since
-  double expected_rotation_rad_ = 0.0;
+  Vector3d centre_m_;                ///< Centre of the workspace in B.
+  double max_distance_m_;            ///< Largest plausible distance from centre_m_; infinite if not stated.
+  int invalid_rotations_ = 0;        ///< Poses without a valid rotation in a row.
+  Pose X_BH_reference_;              ///< Last pose that differed from its predecessor.
+  bool has_reference_ = false;       ///< True if X_BH_reference_ is set.
+  double reference_time_s_ = 0.0;    ///< Device time of X_BH_reference_.
+  double last_sample_time_s_ = 0.0;  ///< Device time of the previous sample.
+  double expected_path_m_ = 0.0;     ///< Integral of the speed since reference_time_s_.
+  double expected_rotation_rad_ = 0.0;  ///< Integral of the angular speed since reference_time_s_.
 };
 
 }  // namespace wrenchd

@@ -6,72 +6,73 @@
 namespace wrenchd {
 namespace {
 
-/// How often the thread looks for a question. To wake it the servo thread would have to call the kernel; and
-/// beside the tenth of a second of calm that goes before any force, nobody feels this.
-constexpr auto kPause = std::chrono::milliseconds(5);
+/// Polling interval of the search thread. Polling avoids a system call in the servo thread. The delay is
+/// small against the 100 ms of calm that precede any force.
+constexpr auto kPollInterval = std::chrono::milliseconds(5);
 
-/// Whatever the method of rendering is, the way back is the exact one; and it is clear of what it touches, so
-/// that a proxy can follow from it.
-constexpr PenetrationDepth::Options kNearest = {Method::exact, 47, Proxy::kClearance_m};
+/// The search always uses the exact method, whatever the method of the rendering. The clearance keeps the
+/// result strictly feasible, so that a proxy can follow from it.
+constexpr PenetrationDepth::Options kSearchOptions = {Method::exact, 47, Proxy::kClearance_m};
 
-ProxyInitializationResult sought(PenetrationDepth& penetration, const ProxyInitializationRequest& question,
-                                 const std::stop_token& stop) noexcept {
-  const Projection q = penetration.query(question.X_WP, stop, question.scene_time_s).projection;
-  return {question.id, q.status != ProjectionStatus::infeasible, q.X_WQ, question.scene_time_s};
+ProxyInitializationResult find_feasible_pose(PenetrationDepth& penetration,
+                                             const ProxyInitializationRequest& request,
+                                             const std::stop_token& stop) noexcept {
+  const Projection q = penetration.query(request.X_WP, stop, request.scene_time_s).projection;
+  return {request.id, q.status != ProjectionStatus::infeasible, q.X_WQ, request.scene_time_s};
 }
 
 }  // namespace
 
-const char* name(ProxyInitialization placing) noexcept {
-  switch (placing) {
+const char* name(ProxyInitialization progress) noexcept {
+  switch (progress) {
     case ProxyInitialization::complete:
-      return "following";
+      return "complete";
     case ProxyInitialization::searching:
-      return "placing";
+      return "searching";
     case ProxyInitialization::found:
-      return "placed";
+      return "found";
     case ProxyInitialization::failed:
-      return "no place";
+      return "failed";
   }
   return "unknown";
 }
 
 BackgroundProxyInitializer::BackgroundProxyInitializer(const Scene& scene)
-    : penetration_(scene, kNearest), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+    : penetration_(scene, kSearchOptions), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void BackgroundProxyInitializer::run(const std::stop_token& stop) noexcept {
-  ProxyInitializationRequest question;
+  ProxyInitializationRequest request;
   while (!stop.stop_requested()) {
-    if (request_.read(question))
-      result_.write(sought(penetration_, question, stop));
+    if (request_.read(request))
+      result_.write(find_feasible_pose(penetration_, request, stop));
     else
-      std::this_thread::sleep_for(kPause);
+      std::this_thread::sleep_for(kPollInterval);
   }
 }
 
 std::shared_ptr<ProxyInitializer> make_proxy_initializer(std::shared_ptr<const Scene> scene,
-                                                         ProxySearchMode place_in) {
-  const Scene& its = *scene;
-  const auto with_scene = [&scene](auto placer) {
-    // The scene goes after the placer that uses it.
-    return std::shared_ptr<ProxyInitializer>(placer.release(),
+                                                         ProxySearchMode mode) {
+  const Scene& borrowed = *scene;
+  // The deleter owns the scene, so that the scene outlives the initializer that refers to it.
+  const auto with_scene = [&scene](auto initializer) {
+    return std::shared_ptr<ProxyInitializer>(initializer.release(),
                                              [scene = std::move(scene)](ProxyInitializer* p) { delete p; });
   };
-  if (place_in == ProxySearchMode::in_tick) return with_scene(std::make_unique<InTickProxyInitializer>(its));
-  return with_scene(std::make_unique<BackgroundProxyInitializer>(its));
+  if (mode == ProxySearchMode::in_tick) return with_scene(std::make_unique<InTickProxyInitializer>(borrowed));
+  return with_scene(std::make_unique<BackgroundProxyInitializer>(borrowed));
 }
 
-InTickProxyInitializer::InTickProxyInitializer(const Scene& scene) : penetration_(scene, kNearest) {}
+InTickProxyInitializer::InTickProxyInitializer(const Scene& scene) : penetration_(scene, kSearchOptions) {}
 
-void InTickProxyInitializer::request(const ProxyInitializationRequest& question) noexcept {
-  request_ = question;
+void InTickProxyInitializer::request(const ProxyInitializationRequest& request) noexcept {
+  request_ = request;
   request_pending_ = true;
 }
 
-bool InTickProxyInitializer::take_result(ProxyInitializationResult& answer) noexcept {
+bool InTickProxyInitializer::take_result(ProxyInitializationResult& result) noexcept {
   if (!request_pending_) return false;
   request_pending_ = false;
-  answer = sought(penetration_, request_, {});
+  result = find_feasible_pose(penetration_, request_, {});
   return true;
 }
 

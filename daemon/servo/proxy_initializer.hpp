@@ -12,79 +12,85 @@
 
 namespace wrenchd {
 
-/// Where the proxy stands, as the servo loop knows it. While it is not following there is no contact force.
+/// Progress of the proxy's initialization (core/METHOD.md, section 14.7). The contact force is zero unless
+/// the value is `complete`.
 enum class ProxyInitialization : std::uint8_t {
-  complete,   ///< q is this tick's, and follows the hand
-  searching,  ///< there is no q: the admissible pose nearest to p is being looked for
-  found,      ///< it was found and is q; the next fresh sample is followed from there
-  failed,     ///< there is no q, and none was found: asked for again in a moment
+  complete,   ///< The proxy pose q follows the hand.
+  searching,  ///< q is not valid. A search for the feasible pose nearest to p is under way.
+  found,   ///< The search returned a feasible pose, which is q. Tracking starts with the next fresh sample.
+  failed,  ///< q is not valid. The search found no feasible pose; the rendering retries after 100 ms.
 };
 
-/// "following", "placing", "placed", "no place".
-const char* name(ProxyInitialization placing) noexcept;
+/// Returns "complete", "searching", "found" or "failed". RT-safe.
+const char* name(ProxyInitialization progress) noexcept;
 
-/// Which admissible pose is nearest to p, with the obstacles where they stand at that scene time?
+/// Request for the feasible pose nearest to p.
 struct ProxyInitializationRequest {
-  std::uint32_t id = 0;  ///< comes back with the answer
-  Pose X_WP;
-  double scene_time_s = 0.0;  ///< comes back as well: obstacles that move have gone on meanwhile
+  std::uint32_t id = 0;       ///< Number of the request; the result repeats it.
+  Pose X_WP;                  ///< Commanded pose p of the tool body.
+  double scene_time_s = 0.0;  ///< Scene time at which the search places the obstacles.
 };
 
+/// Result of one request.
 struct ProxyInitializationResult {
-  std::uint32_t id = 0;
-  bool found = false;         ///< false: no admissible pose was found, and X_WQ is not set
-  Pose X_WQ;                  ///< admissible
-  double scene_time_s = 0.0;  ///< at this scene time: the question's
+  std::uint32_t id = 0;       ///< Number of the request that this result answers.
+  bool found = false;         ///< False if no feasible pose was found; X_WQ is then not set.
+  Pose X_WQ;                  ///< Feasible pose of the tool body.
+  double scene_time_s = 0.0;  ///< Scene time at which X_WQ is feasible; equals that of the request.
 };
 
-/// Looks for the admissible pose from which the proxy may follow the hand, where there is no last one: at the
-/// start, after arming, after the tool or the scene was changed. One question at a time; a new one takes the
-/// place of the last.
+/// Searches for a feasible pose from which the proxy can follow the hand. The rendering uses it after start,
+/// after arming and after a change of tool or scene. Handles one request at a time; a new request replaces
+/// the previous one.
 class ProxyInitializer {
  public:
   virtual ~ProxyInitializer() = default;
 
-  /// Hands the question over. RT safe: never waits.
-  virtual void request(const ProxyInitializationRequest& question) noexcept = 0;
-  /// Takes the newest answer, if there is one that was not taken yet. RT safe: never waits.
-  virtual bool take_result(ProxyInitializationResult& answer) noexcept = 0;
+  /// Submits a request and returns at once. RT-safe.
+  virtual void request(const ProxyInitializationRequest& request) noexcept = 0;
+  /// Copies the newest result to `result` and returns true, if a result arrived since the last call. RT-safe
+  /// unless a derived class states otherwise.
+  virtual bool take_result(ProxyInitializationResult& result) noexcept = 0;
 };
 
-/// Where the proxy's place is looked for when it is not known.
+/// Where the search for a feasible pose runs.
 enum class ProxySearchMode : std::uint8_t {
-  background,  ///< beside the servo loop
-  in_tick,     ///< in the tick: virtual time, every run the same
+  background,  ///< In a thread beside the servo loop.
+  in_tick,     ///< In the tick that takes the result: for virtual time, so that every run is equal.
 };
 
-/// Looks on a thread of its own, with the priority of the thread that makes it. For a search of any length.
+/// Runs the search in its own thread, which inherits the priority of the constructing thread.
 class BackgroundProxyInitializer final : public ProxyInitializer {
  public:
-  /// Starts at once. The scene is kept by reference and must outlive this.
+  /// Starts the thread. Keeps a reference to `scene`, which must outlive this object. Not RT-safe: allocates.
   explicit BackgroundProxyInitializer(const Scene& scene);
-  /// Ends a search that is under way, which takes a few milliseconds (Placement::nearest()), and joins.
+  /// Stops a running search and joins the thread. Not RT-safe: takes a few milliseconds.
   ~BackgroundProxyInitializer() override = default;
 
-  void request(const ProxyInitializationRequest& question) noexcept override { request_.write(question); }
-  bool take_result(ProxyInitializationResult& answer) noexcept override { return result_.read(answer); }
+  /// RT-safe.
+  void request(const ProxyInitializationRequest& request) noexcept override { request_.write(request); }
+  /// RT-safe.
+  bool take_result(ProxyInitializationResult& result) noexcept override { return result_.read(result); }
 
  private:
   void run(const std::stop_token& stop) noexcept;
 
-  PenetrationDepth penetration_;  ///< belongs to the thread
+  PenetrationDepth penetration_;  ///< Used by the search thread only.
   LatestValue<ProxyInitializationRequest> request_;
   LatestValue<ProxyInitializationResult> result_;
-  std::jthread thread_;  ///< the last: it uses all of the above
+  std::jthread thread_;  ///< Declared last, because the thread uses all other members.
 };
 
-/// Looks when the answer is asked for: in virtual time, where a search takes none and every run is to be the
-/// same. Neither allocates nor locks, but takes its time.
+/// Runs the search inside take_result(). For virtual time, where the duration of a search does not count.
 class InTickProxyInitializer final : public ProxyInitializer {
  public:
-  /// The scene is kept by reference and must outlive this.
+  /// Keeps a reference to `scene`, which must outlive this object. Not RT-safe: allocates.
   explicit InTickProxyInitializer(const Scene& scene);
 
-  void request(const ProxyInitializationRequest& question) noexcept override;
-  bool take_result(ProxyInitializationResult& answer) noexcept override;
+  /// RT-safe.
+  void request(const ProxyInitializationRequest& request) noexcept override;
+  /// Neither allocates nor locks. Not RT-safe: takes milliseconds, and seconds inside a fine mesh.
+  bool take_result(ProxyInitializationResult& result) noexcept override;
 
  private:
   PenetrationDepth penetration_;
@@ -92,8 +98,8 @@ class InTickProxyInitializer final : public ProxyInitializer {
   bool request_pending_ = false;
 };
 
-/// One that keeps its scene.
+/// Returns an initializer for `mode` that shares ownership of `scene`. Not RT-safe: allocates.
 std::shared_ptr<ProxyInitializer> make_proxy_initializer(std::shared_ptr<const Scene> scene,
-                                                         ProxySearchMode place_in);
+                                                         ProxySearchMode mode);
 
 }  // namespace wrenchd

@@ -6,8 +6,8 @@
 namespace wrenchd {
 namespace {
 
-/// SCHED_FIFO priority of a thread, 0 under another policy; nothing: there is no such thread. Asked of the
-/// kernel: pthread_getschedparam() tells what the process itself set last.
+/// Returns the SCHED_FIFO priority of a thread, 0 for another policy, nothing if the thread does not exist.
+/// Asks the kernel, because pthread_getschedparam() returns the value that this process set last.
 std::optional<int> fifo_priority(pid_t thread) noexcept {
   const int policy = sched_getscheduler(thread);
   sched_param param{};
@@ -21,16 +21,15 @@ RealtimeWatch::RealtimeWatch(pid_t thread) noexcept
     : thread_(thread), granted_priority_(fifo_priority(thread).value_or(0)) {}
 
 std::optional<RealtimeWatch::Change> RealtimeWatch::check() {
-  const std::optional<int> now = fifo_priority(thread_);
-  if (!now || (*now < granted_priority_) == lost_) return {};
+  const std::optional<int> priority = fifo_priority(thread_);
+  if (!priority || (*priority < granted_priority_) == lost_) return {};
   lost_ = !lost_;
   const std::string granted = "SCHED_FIFO priority " + std::to_string(granted_priority_);
-  if (!lost_) return Change{false, "the servo thread has its " + granted + " again"};
-  return Change{true,
-                "somebody took the servo thread's " + granted + " (" +
-                    (*now > 0 ? "it is " + std::to_string(*now) + " now" : "it is an ordinary thread now") +
-                    "); give it back with: chrt -f -p " + std::to_string(granted_priority_) + " " +
-                    std::to_string(thread_)};
+  if (!lost_) return Change{false, "the servo thread has " + granted + " again"};
+  return Change{true, "another process lowered the servo thread from " + granted + " to " +
+                          (*priority > 0 ? "priority " + std::to_string(*priority) : "an ordinary thread") +
+                          "; restore it with: chrt -f -p " + std::to_string(granted_priority_) + " " +
+                          std::to_string(thread_)};
 }
 
 }  // namespace wrenchd

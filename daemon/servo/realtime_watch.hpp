@@ -9,26 +9,26 @@
 
 namespace wrenchd {
 
-/// Looks whether the servo thread still has the priority that it was granted. Whoever may can take it away
-/// while the loop runs (chrt, a daemon that demotes what it finds too greedy), and the loop itself would only
-/// see later and later ticks. For an ordinary thread; not RT safe.
+/// Detects that another process lowered the real-time priority of the servo thread, for example with chrt.
+/// The loop itself would only see late ticks. For an ordinary thread.
 class RealtimeWatch {
  public:
-  /// thread: the kernel's number of it. What it has now is what it was granted.
+  /// thread: kernel thread id of the servo thread. Takes its present priority as the granted one. Not
+  /// RT-safe: system calls.
   explicit RealtimeWatch(pid_t thread) noexcept;
 
   struct Change {
-    bool lost;            ///< else it is back
-    std::string message;  ///< what happened, and the cure
+    bool lost;            ///< True if the priority was lowered, false if it was restored.
+    std::string message;  ///< What happened, and the command that restores the priority.
   };
-  /// What became of it since the last look; nothing: nothing, also where there is no such thread any more, or
-  /// where it never had a priority to lose.
+  /// Returns the change since the last check. Returns nothing if nothing changed, if the thread ended, or if
+  /// it never had a real-time priority. Not RT-safe: system calls, allocates.
   std::optional<Change> check();
 
  private:
   pid_t thread_;
-  int granted_priority_;  ///< SCHED_FIFO priority; 0: none
-  bool lost_ = false;
+  int granted_priority_;  ///< SCHED_FIFO priority at construction; 0 if the thread had none.
+  bool lost_ = false;     ///< True while the priority is below granted_priority_.
 };
 
 }  // namespace wrenchd

@@ -14,19 +14,15 @@
 namespace wrenchd {
 namespace {
 
-/// Where the placer found no room it is asked again after so long: a search without end would keep a
-/// processor busy, and a hand does not go far in that time.
-constexpr Duration kAskAgainAfter = std::chrono::milliseconds(100);
-/// What a warm-up may take, and how many ticks it tries.
-constexpr auto kWarmUp = std::chrono::milliseconds(50);
-constexpr int kWarmTicks = 30;
+/// Delay between a failed search for a feasible pose and the next search. It bounds the processor load, and
+/// the hand moves little in this time.
+constexpr Duration kRetryDelay = std::chrono::milliseconds(100);
+/// Time limit of a warm-up, and the number of ticks that it executes.
+constexpr auto kWarmUpLimit = std::chrono::milliseconds(50);
+constexpr int kWarmUpTicks = 30;
 
-Pose pose_of(const PoseSettings& placement) noexcept {
-  return {rotation_from(placement.rotation_vector_rad), placement.position_m};
-}
-
-/// FNV-1a, a word at a time.
-class Sum {
+/// FNV-1a over 64-bit words.
+class Checksum64 {
  public:
   void add(std::uint64_t word) noexcept { sum_ = (sum_ ^ word) * 0x100000001b3U; }
   void add(double x) noexcept { add(std::bit_cast<std::uint64_t>(x)); }
@@ -45,12 +41,12 @@ class Sum {
 
 }  // namespace
 
-Rendering::Rendering(std::uint32_t number, const Settings& settings, const DeviceProfile& profile,
-                     std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> placer)
-    : id_(number),
+Rendering::Rendering(std::uint32_t id, const Settings& settings, const DeviceProfile& profile,
+                     std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer)
+    : id_(id),
       scene_(std::move(scene)),
-      proxy_initializer_(std::move(placer)),
-      X_HT_(pose_of(settings.device.tool_in_handle) * scene_->tool().X_MT()),
+      proxy_initializer_(std::move(proxy_initializer)),
+      X_HT_(settings.device.tool_in_handle.pose() * scene_->tool().X_MT()),
       M_(scene_->tool().solid.inertia),
       spring_law_(settings.wrench.law),
       energy_stiffness_per_s2_(settings.wrench.energy_stiffness_per_s2),
@@ -64,8 +60,8 @@ Rendering::Rendering(std::uint32_t number, const Settings& settings, const Devic
 
 void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
   std::stop_source stop;
-  const std::jthread patience([&stop](const std::stop_token& done) {
-    const auto end = std::chrono::steady_clock::now() + kWarmUp;
+  const std::jthread time_limit([&stop](const std::stop_token& done) {
+    const auto end = std::chrono::steady_clock::now() + kWarmUpLimit;
     while (!done.stop_requested() && std::chrono::steady_clock::now() < end)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     stop.request_stop();
@@ -73,7 +69,7 @@ void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
   const Pose X_WP = X_WH * X_HT_;
   Pose X_WQ = penetration_.query(X_WP, stop.get_token(), scene_time_s).projection.X_WQ;
   penetration_.clear_history(scene_time_s);
-  for (int tick = 0; tick < kWarmTicks && !stop.stop_requested(); ++tick) {
+  for (int tick = 0; tick < kWarmUpTicks && !stop.stop_requested(); ++tick) {
     const Penetration depth = penetration_.follow(X_WP, X_WQ, scene_time_s);
     X_WQ = depth.projection.X_WQ;
     law_.update(depth.spring_displacement, depth.contacts > 0, 1e-3);
@@ -82,6 +78,8 @@ void Rendering::warm_up(const Pose& X_WH, double scene_time_s) {
   invalidate_proxy();
 }
 
+/// The work of moving obstacles is the mean of its values at the beginning and at the end of the tick,
+/// METHOD (69).
 bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept {
   X_WP_ = X_WH * X_HT_;
   if (!proxy_valid()) {
@@ -101,9 +99,9 @@ bool Rendering::project(const Pose& X_WH, TimePoint now, double scene_time_s) no
   return true;
 }
 
-/// There is no q to follow from. The search for one may take seconds, so another thread does it, whatever the
-/// scene: asked at one tick, it answers at a later one, with a pose near to where the hand was then. That is
-/// this tick's q, and the next follows from it, and makes up for what obstacles have moved since.
+/// Sends a request, or takes its result in a later tick. The result is near the hand pose at the time of the
+/// request. It becomes q of this tick, and the next tick follows from it. The proxy then also makes up for
+/// the obstacle motion since the request.
 void Rendering::initialize_proxy(TimePoint now, double scene_time_s) noexcept {
   if (!request_pending_) {
     if (proxy_initialization_ == ProxyInitialization::failed && now < retry_at_) return;
@@ -112,22 +110,24 @@ void Rendering::initialize_proxy(TimePoint now, double scene_time_s) noexcept {
     request_pending_ = true;
     return;
   }
-  ProxyInitializationResult answer;
-  if (!proxy_initializer_->take_result(answer) || answer.id != request_id_)
-    return;  // one that was asked before we started over
+  ProxyInitializationResult result;
+  if (!proxy_initializer_->take_result(result) || result.id != request_id_)
+    return;  // drops a result whose request invalidate_proxy() cancelled
   request_pending_ = false;
   starts_in_contact_ = has_initial_guess_;
   has_initial_guess_ = false;
-  proxy_initialization_ = answer.found ? ProxyInitialization::found : ProxyInitialization::failed;
-  X_WQ_ = answer.X_WQ;
-  penetration_.clear_history(answer.scene_time_s);
-  retry_at_ = now + kAskAgainAfter;
+  proxy_initialization_ = result.found ? ProxyInitialization::found : ProxyInitialization::failed;
+  X_WQ_ = result.X_WQ;
+  penetration_.clear_history(result.scene_time_s);
+  retry_at_ = now + kRetryDelay;
 }
 
+/// A proxy that was initialised from a guess may begin deep in contact. One update with a very long time step
+/// then sets the derivative to zero, so that the initial depth does not count as velocity.
 void Rendering::compute_wrench(double dt_s) noexcept {
-  constexpr double kLongAgo_s = 1e9;
+  constexpr double kLongTime_s = 1e9;
   if (proxy_initialization_ == ProxyInitialization::complete && std::exchange(starts_in_contact_, false))
-    law_.update_damping({}, depth_.spring_displacement, in_contact(), kLongAgo_s);
+    law_.update_damping({}, depth_.spring_displacement, in_contact(), kLongTime_s);
   F_T_ = spring_law_ == SpringLaw::pid
              ? law_.update(depth_.spring_displacement, in_contact(), dt_s)
              : law_.update_damping(energy_wrench(M_, spring_scale_ * energy_stiffness_per_s2_, X_WP_, X_WQ_),
@@ -150,23 +150,23 @@ void Rendering::initialize_near(const Pose& X_WT) noexcept {
   X_WT_guess_ = X_WT;
 }
 
-void Rendering::set_stiffness_scale(const StiffnessScale& share) noexcept {
-  law_.scale(share.spring, share.damper);
-  spring_scale_ = share.spring;
+void Rendering::set_stiffness_scale(const StiffnessScale& scale) noexcept {
+  law_.scale(scale.spring, scale.damper);
+  spring_scale_ = scale.spring;
 }
 
 Touches Rendering::contacts() const noexcept {
-  return in_contact() ? wrenchd::touches(depth_.projection, *scene_, penetration_.uses_mesh_features())
-                      : Touches{};
+  return in_contact() ? touches(depth_.projection, *scene_, penetration_.uses_mesh_features()) : Touches{};
 }
 
+/// Half of force times displacement plus half of torque times rotation, METHOD (68).
 double Rendering::stored_energy_J() const noexcept {
   if (!in_contact()) return 0.0;
   return 0.5 * (F_T_.force_N.dot(depth_.spring_displacement.head<3>()) +
                 F_T_.torque_Nm.dot(depth_.spring_displacement.tail<3>()));
 }
 
-/// Half of force times way is wound_up_J() where T is what it is: the spring is that many J for a kg m^2.
+/// The ratio of stored energy to T converts the change of T [kg m^2] to work [J].
 double Rendering::obstacle_work_J() const noexcept {
   const double T = depth_.projection.energy;
   return proxy_initialization_ == ProxyInitialization::complete && T > 0.0
@@ -175,8 +175,8 @@ double Rendering::obstacle_work_J() const noexcept {
 }
 
 std::uint64_t Rendering::checksum() const noexcept {
-  constexpr std::size_t kObstacles = 16;  // of each kind: a tick must not take longer for more
-  Sum sum;
+  constexpr std::size_t kMaxObstacles = 16;  // of each kind; bounds the time in a tick
+  Checksum64 sum;
   sum.add(std::uint64_t{id_});
   sum.add(X_HT_);
   sum.add(M_.mass_kg);
@@ -185,13 +185,13 @@ std::uint64_t Rendering::checksum() const noexcept {
   sum.add(gains_.damping);
   const auto& half_spaces = scene_->half_spaces();
   sum.add(std::uint64_t{half_spaces.size()});
-  for (std::size_t i = 0; i < std::min(kObstacles, half_spaces.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kMaxObstacles, half_spaces.size()); ++i) {
     sum.add(half_spaces[i].normal_W);
     sum.add(half_spaces[i].offset_m);
   }
   const auto& meshes = scene_->meshes();
   sum.add(std::uint64_t{meshes.size()});
-  for (std::size_t i = 0; i < std::min(kObstacles, meshes.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kMaxObstacles, meshes.size()); ++i) {
     sum.add(meshes[i].X_WO);
     sum.add(meshes[i].motion.linear_m_per_s);
     sum.add(meshes[i].radius_m);

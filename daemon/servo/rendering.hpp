@@ -16,63 +16,68 @@
 
 namespace wrenchd {
 
-/// What the tool touches, and how that feels: a scene, the proxy that follows the hand in it, and the law
-/// that makes a wrench of the two. Lines 2 to 7 of Algorithm 1.
+/// One haptic rendering: a scene, the proxy that follows the hand in it, and the wrench law between hand and
+/// proxy. Implements lines 2 to 7 of the paper, Algorithm 1. daemon/servo/README.md, section "Renderings".
 ///
-/// Made by any thread, which takes its time; then it belongs to the servo thread until that gives it back.
-/// Frames as in ServoLoop. What is noexcept here is RT safe.
+/// Any thread builds a rendering. RenderingExchange then passes it to the servo thread and back. Frames:
+/// core/README.md, section "Conventions".
 class Rendering {
  public:
-  /// number: which one this is, for records; 0 is that of the start. Throws std::invalid_argument where the
-  /// method cannot work with the scene, or the gains make no spring.
-  Rendering(std::uint32_t number, const Settings& settings, const DeviceProfile& profile,
-            std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> placer);
+  /// id: number of the rendering in records; 0 is the rendering of the start. Throws std::invalid_argument if
+  /// the method does not support the scene or if the gains give no valid spring. Not RT-safe: allocates.
+  Rendering(std::uint32_t id, const Settings& settings, const DeviceProfile& profile,
+            std::shared_ptr<const Scene> scene, std::shared_ptr<ProxyInitializer> proxy_initializer);
 
-  /// Goes once through what the ticks will use, near this pose of the handle, so that no memory is touched
-  /// and no code is fetched there for the first time. Milliseconds. Not RT safe.
+  /// Executes all code of a tick near handle pose X_WH, which loads memory and caches, then invalidates the
+  /// proxy. Not RT-safe: takes up to 50 ms and starts a thread.
   void warm_up(const Pose& X_WH, double scene_time_s);
 
-  /// One tick: p from the pose of the handle, and its projection q, which follows p from last tick's as a
-  /// proxy; where there is no place to follow from, that is looked for. False where it was caught between
-  /// obstacles that move: then its place is lost.
+  /// Computes p from the handle pose, then moves the proxy q from its last pose towards p. If no valid q
+  /// exists, requests or takes a proxy initialization instead. Returns false if moving obstacles trap the
+  /// proxy; the caller must then call invalidate_proxy(). RT-safe.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
-  /// The body wrench of last project(). dt_s: of the device's clock since the last call.
+  /// Computes the body wrench for the poses of the last project(). dt_s: device time since the last call.
+  /// RT-safe.
   void compute_wrench(double dt_s) noexcept;
 
-  /// Nothing is known of q: no contact, no wrench, and a place is looked for from the next tick on.
+  /// Discards q, sets the wrench to zero and starts a proxy initialization in the next tick. RT-safe.
   void invalidate_proxy() noexcept;
-  /// The law begins anew: nobody knows how much time has passed.
+  /// Resets integral and derivative of the wrench law, for use after a gap of unknown length. RT-safe.
   void reset_law() noexcept { law_.reset(); }
-  /// Where to look for it: near this pose of the tool instead of p, until it is found. For a tool that has
-  /// to be on the side of a wall on which another rendering has it.
+  /// Starts the next proxy initialization near tool pose X_WT instead of p. Use it to keep the tool on that
+  /// side of a wall on which another rendering has it. RT-safe.
   void initialize_near(const Pose& X_WT) noexcept;
+  /// Returns true if X_WQ() holds a feasible pose. RT-safe.
   bool proxy_valid() const noexcept {
     return proxy_initialization_ == ProxyInitialization::complete ||
            proxy_initialization_ == ProxyInitialization::found;
   }
-  ProxyInitialization proxy_initialization() const noexcept { return proxy_initialization_; }
+  ProxyInitialization proxy_initialization() const noexcept { return proxy_initialization_; }  ///< RT-safe.
 
-  /// As much of the spring and the damper it was made with.
-  void set_stiffness_scale(const StiffnessScale& share) noexcept;
+  /// Sets the factors on the configured spring and damper. RT-safe.
+  void set_stiffness_scale(const StiffnessScale& scale) noexcept;
 
-  const Pose& X_WP() const noexcept { return X_WP_; }
-  const Pose& X_WQ() const noexcept { return X_WQ_; }  ///< means nothing unless proxy_valid()
-  const Penetration& depth() const noexcept { return depth_; }
-  bool in_contact() const noexcept { return depth_.contacts > 0; }
+  const Pose& X_WP() const noexcept { return X_WP_; }  ///< Commanded pose p of the tool body. RT-safe.
+  /// Returns the proxy pose q of the tool body. Precondition: proxy_valid(). RT-safe.
+  const Pose& X_WQ() const noexcept { return X_WQ_; }
+  const Penetration& depth() const noexcept { return depth_; }      ///< Result of project(). RT-safe.
+  bool in_contact() const noexcept { return depth_.contacts > 0; }  ///< RT-safe.
+  /// Returns the contacts that hold the proxy, at most kMaxTouches. RT-safe.
   Touches contacts() const noexcept;
-  const Wrench& F_T() const noexcept { return F_T_; }  ///< body frame
-  /// What the spring holds now: half of force times way, and of torque times turn [J].
+  const Wrench& F_T() const noexcept { return F_T_; }  ///< Body wrench in axes of T at its origin. RT-safe.
+  /// Returns the energy stored in the spring [J], METHOD (68). RT-safe.
   double stored_energy_J() const noexcept;
-  /// What obstacles that move put into it in this tick, and not the hand; below 0 where they took it [J].
+  /// Returns the work of moving obstacles on the spring in this tick [J], METHOD (69). It is negative if the
+  /// obstacles unload the spring. RT-safe.
   double obstacle_work_J() const noexcept;
 
-  std::uint32_t id() const noexcept { return id_; }
-  const Scene& scene() const noexcept { return *scene_; }
-  const Pose& X_HT() const noexcept { return X_HT_; }
-  const StabilityAnalysis& stability() const noexcept { return stability_; }
+  std::uint32_t id() const noexcept { return id_; }                           ///< RT-safe.
+  const Scene& scene() const noexcept { return *scene_; }                     ///< RT-safe.
+  const Pose& X_HT() const noexcept { return X_HT_; }                         ///< RT-safe.
+  const StabilityAnalysis& stability() const noexcept { return stability_; }  ///< RT-safe.
 
-  /// Of all that it was made with and that no tick may change: what a tick computes from has to have the sum
-  /// that it was handed over with.
+  /// Returns a checksum of the constant inputs: id, tool, gains and the first obstacles of the scene. A tick
+  /// that computes from other memory contents shows a different value. RT-safe.
   std::uint64_t checksum() const noexcept;
 
  private:
@@ -98,14 +103,14 @@ class Rendering {
   Pose X_WP_;
   Penetration depth_;
   Wrench F_T_;
-  double scene_time_s_ = 0.0;         ///< of depth_
-  double obstacle_work_kg_m2_ = 0.0;  ///< of what obstacles moved since the tick before [kg m^2]
-  bool has_initial_guess_ = false;
-  Pose X_WT_guess_;
-  bool starts_in_contact_ = false;  ///< pressed, and not at its first touch: what it comes with is no speed
-  std::uint32_t request_id_ = 0;    ///< number of the last one to the placer
-  bool request_pending_ = false;    ///< and it is not answered yet
-  TimePoint retry_at_{};            ///< not before then
+  double scene_time_s_ = 0.0;         ///< Scene time at which depth_ was computed.
+  double obstacle_work_kg_m2_ = 0.0;  ///< Change of T by moving obstacles in the last tick [kg m^2].
+  bool has_initial_guess_ = false;    ///< True while X_WT_guess_ replaces p in the next request.
+  Pose X_WT_guess_;                   ///< Tool pose near which the next search starts.
+  bool starts_in_contact_ = false;    ///< True until the first wrench of a proxy that begins in contact.
+  std::uint32_t request_id_ = 0;      ///< Number of the last request to proxy_initializer_.
+  bool request_pending_ = false;      ///< True while the last request has no result.
+  TimePoint retry_at_{};              ///< Earliest time of the next request after a failed search.
 };
 
 }  // namespace wrenchd

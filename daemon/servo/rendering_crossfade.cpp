@@ -5,22 +5,22 @@
 
 namespace wrenchd {
 
-RenderingCrossfade::Change RenderingCrossfade::update(bool force) noexcept {
+RenderingCrossfade::Change RenderingCrossfade::update(bool driving) noexcept {
   if (!next_) {
     next_.reset(exchange_.take());
     if (!next_) return Change::none;
     next_weight_ = weight_rate_per_s_ = 0.0;
-    // Where the handle is the same, and the tool on the side of each wall where it was.
+    // With the same pose of the handle, so that the tool stays on its side of each wall.
     if (active_->proxy_valid())
       next_->initialize_near(active_->X_WQ() * inverse(active_->X_HT()) * next_->X_HT());
-    if (force) return Change::next_arrived;
+    if (driving) return Change::next_arrived;
   }
-  if (force && next_weight_ < 1.0) return Change::none;
+  if (driving && next_weight_ < 1.0) return Change::none;
   switch_to_next();
   return Change::switched;
 }
 
-/// What goes is never destroyed here: the other side of the exchange does that.
+/// The exchange destroys the retired rendering on another thread.
 void RenderingCrossfade::switch_to_next() noexcept {
   exchange_.retire(active_.release());
   active_ = std::move(next_);
@@ -37,28 +37,28 @@ void RenderingCrossfade::compute_wrench(double dt_s) noexcept {
   if (next_) next_->compute_wrench(dt_s);
 }
 
-/// Is there something to fade to: the proxy follows, or there is no room for it?
+/// A fade needs a result of the new rendering: its proxy follows, or the search for it has failed.
 bool RenderingCrossfade::fading() const noexcept {
   return next_ &&
          (weight_rate_per_s_ > 0.0 || next_->proxy_initialization() == ProxyInitialization::complete ||
           next_->proxy_initialization() == ProxyInitialization::failed);
 }
 
-Wrench RenderingCrossfade::blend(const Wrench& F_felt, const Wrench& F_next, const FadeLimits& pace,
+Wrench RenderingCrossfade::blend(const Wrench& F_active, const Wrench& F_next, const FadeLimits& limits,
                                  double dt_s) noexcept {
   crossfade_work_J_ = 0.0;
-  if (!fading()) return F_felt;
+  if (!fading()) return F_active;
   if (weight_rate_per_s_ == 0.0) {
-    const auto share_of = [](double part, double whole) { return whole > 0.0 ? part / whole : 0.0; };
-    const Wrench change = F_next - F_felt;
-    const double far = std::max(share_of(change.force_N.norm(), pace.max_force_N),
-                                share_of(change.torque_Nm.norm(), pace.max_torque_Nm));
-    weight_rate_per_s_ = 1.0 / std::max(kMinFade_s, std::min(far, 1.0) * pace.rise_time_s);
+    const auto fraction = [](double part, double whole) { return whole > 0.0 ? part / whole : 0.0; };
+    const Wrench change = F_next - F_active;
+    const double size = std::max(fraction(change.force_N.norm(), limits.max_force_N),
+                                 fraction(change.torque_Nm.norm(), limits.max_torque_Nm));
+    weight_rate_per_s_ = 1.0 / std::max(kMinFade_s, std::min(size, 1.0) * limits.rise_time_s);
   }
-  const double last = next_weight_;
+  const double previous = next_weight_;
   next_weight_ = std::min(next_weight_ + weight_rate_per_s_ * std::max(dt_s, 0.0), 1.0);
-  crossfade_work_J_ = (next_weight_ - last) * (next_->stored_energy_J() - active_->stored_energy_J());
-  return (1.0 - next_weight_) * F_felt + next_weight_ * F_next;
+  crossfade_work_J_ = (next_weight_ - previous) * (next_->stored_energy_J() - active_->stored_energy_J());
+  return (1.0 - next_weight_) * F_active + next_weight_ * F_next;
 }
 
 double RenderingCrossfade::stored_energy_J() const noexcept {
@@ -81,10 +81,10 @@ void RenderingCrossfade::reset_law() noexcept {
 }
 
 bool RenderingCrossfade::invalidate_proxy() noexcept {
-  const bool comes = next_ != nullptr;
-  if (comes) switch_to_next();
+  const bool switches = next_ != nullptr;
+  if (switches) switch_to_next();
   active_->invalidate_proxy();
-  return comes;
+  return switches;
 }
 
 }  // namespace wrenchd

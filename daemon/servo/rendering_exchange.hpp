@@ -10,8 +10,8 @@
 
 namespace wrenchd {
 
-/// Hands renderings to the servo thread, and takes back those that it is done with: what is built and
-/// destroyed elsewhere it only ever borrows. Between one thread that offers and one that takes.
+/// Passes renderings to the servo thread and back, so that the servo thread neither allocates nor destroys
+/// them. One thread offers, the servo thread takes.
 class RenderingExchange {
  public:
   RenderingExchange() = default;
@@ -22,36 +22,38 @@ class RenderingExchange {
   RenderingExchange(const RenderingExchange&) = delete;
   RenderingExchange& operator=(const RenderingExchange&) = delete;
 
-  // --- the thread that builds ---
+  // --- the thread that builds renderings ---
 
-  /// Offers this one, in the place of one that was not taken yet. True where there was one.
+  /// Offers a rendering. It replaces one that was offered before and not taken yet; returns true if there was
+  /// one. Not RT-safe: destroys.
   bool offer(std::unique_ptr<Rendering> rendering) noexcept {
     destroy_retired();
-    const std::unique_ptr<Rendering> forgone(
+    const std::unique_ptr<Rendering> replaced(
         offered_.exchange(rendering.release(), std::memory_order_acq_rel));
-    return forgone != nullptr;
+    return replaced != nullptr;
   }
-  /// Was what was offered last taken?
+  /// True if the servo thread took the last offer. RT-safe.
   bool taken() const noexcept { return offered_.load(std::memory_order_acquire) == nullptr; }
-  /// Destroys what was given back.
+  /// Destroys the renderings that the servo thread retired. Not RT-safe: destroys.
   void destroy_retired() noexcept {
     retired_.consume_all([](Rendering* rendering) { delete rendering; });
   }
 
-  // --- the servo thread: RT safe ---
+  // --- the servo thread ---
 
-  /// What is offered, if anything is. It has to be given back.
+  /// Takes the offer; null if there is none. The taker must retire() it in the end. RT-safe.
   Rendering* take() noexcept {
     if (offered_.load(std::memory_order_relaxed) == nullptr) return nullptr;
     return offered_.exchange(nullptr, std::memory_order_acq_rel);
   }
-  /// There is always room: one is given back for one that was taken, and each offer() has cleaned up before.
+  /// Returns a rendering for destruction. There is always room: each retired rendering makes place for one
+  /// that was taken, and offer() destroys the retired ones first. RT-safe.
   void retire(Rendering* rendering) noexcept { retired_.push(rendering); }
 
  private:
   std::atomic<Rendering*> offered_{nullptr};
   static_assert(std::atomic<Rendering*>::is_always_lock_free);
-  /// Since the last clean-up one may have been offered and taken, and another been on its way in.
+  /// Between two offers, at most two renderings are retired.
   boost::lockfree::spsc_queue<Rendering*, boost::lockfree::capacity<8>> retired_;
 };
 

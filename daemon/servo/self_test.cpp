@@ -6,15 +6,15 @@
 namespace wrenchd {
 namespace {
 
-constexpr double kSlowest = 0.9;
-constexpr double kFastest = 1.1;
-/// For the first command to reach the device, and for its report to come back.
-constexpr Duration kThereAndBack = std::chrono::milliseconds(20);
-/// All that can be wrong with what the device sends.
-constexpr FaultSet kUnclean = bit(Fault::report_malformed) | bit(Fault::report_repeated) |
-                              bit(Fault::report_missing) | bit(Fault::sample_late) |
-                              bit(Fault::pose_not_a_rotation) | bit(Fault::pose_jumped) |
-                              bit(Fault::pose_outside_workspace) | bit(Fault::pose_stuck);
+constexpr double kMinRateFactor = 0.9;
+constexpr double kMaxRateFactor = 1.1;
+/// Longest time from the first command until a report shows its effect.
+constexpr Duration kRoundTrip = std::chrono::milliseconds(20);
+/// Faults that end a series of faultless reports.
+constexpr FaultSet kReportFaults = bit(Fault::report_malformed) | bit(Fault::report_repeated) |
+                                   bit(Fault::report_missing) | bit(Fault::sample_late) |
+                                   bit(Fault::pose_not_a_rotation) | bit(Fault::pose_jumped) |
+                                   bit(Fault::pose_outside_workspace) | bit(Fault::pose_stuck);
 
 }  // namespace
 
@@ -23,7 +23,7 @@ SelfTest::SelfTest(const DeviceProfile& profile, double clean_for_s) noexcept
       nominal_rate_Hz_(profile.stream == StreamStyle::free_running && profile.pose_report.sequence.present
                            ? profile.report_rate_Hz
                            : 0.0),
-      watchdog_timeout_(from_seconds(profile.watchdog_s > 0.0 ? profile.watchdog_s : 0.0) + kThereAndBack),
+      watchdog_timeout_(from_seconds(profile.watchdog_s > 0.0 ? profile.watchdog_s : 0.0) + kRoundTrip),
       reports_watchdog_(profile.has_output && profile.watchdog_s > 0.0 &&
                         profile.pose_report.motors_on.present &&
                         profile.pose_report.watchdog_tripped.present) {}
@@ -48,7 +48,7 @@ Fault SelfTest::check(const DeviceSample& sample, FaultSet found, TimePoint now)
     case Phase::enabling_motors:
       if (sample.fresh && sample.motors_on)
         enter_phase(Phase::awaiting_watchdog, now);
-      else if (in_phase > kThereAndBack)
+      else if (in_phase > kRoundTrip)
         return Fault::self_test_watchdog;
       return Fault::none;
     case Phase::awaiting_watchdog:
@@ -63,11 +63,11 @@ Fault SelfTest::check(const DeviceSample& sample, FaultSet found, TimePoint now)
   return Fault::none;
 }
 
-/// A bad report, and the time of good ones begins anew.
+/// A faulty report restarts the series.
 Fault SelfTest::check_reports(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept {
-  if (!sample.homed) started_ = now;  // somebody has to move it first
+  if (!sample.homed) started_ = now;  // the timeout starts when a person has homed the device
   if (now - started_ > kSelfTestTimeout) return Fault::self_test_reports;
-  if (!sample.homed || (found & kUnclean) != 0 || sample.fault != Fault::none) {
+  if (!sample.homed || (found & kReportFaults) != 0 || sample.fault != Fault::none) {
     counting_reports_ = false;
     return Fault::none;
   }
@@ -83,7 +83,7 @@ Fault SelfTest::check_reports(const DeviceSample& sample, FaultSet found, TimePo
   rate_Hz_ =
       static_cast<double>(sample.sequence - first_sequence_) / seconds(sample.arrived - first_arrived_);
   if (nominal_rate_Hz_ > 0.0 &&
-      !(rate_Hz_ >= kSlowest * nominal_rate_Hz_ && rate_Hz_ <= kFastest * nominal_rate_Hz_))
+      !(rate_Hz_ >= kMinRateFactor * nominal_rate_Hz_ && rate_Hz_ <= kMaxRateFactor * nominal_rate_Hz_))
     return Fault::self_test_rate;
   enter_phase(reports_watchdog_ ? Phase::enabling_motors : Phase::passed, now);
   return Fault::none;

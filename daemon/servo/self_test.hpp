@@ -11,25 +11,28 @@
 
 namespace wrenchd {
 
-/// What a device has to show before anybody may arm: clean reports for a while, at the rate of its profile,
-/// and that its own watchdog frees the hand when the host falls silent. For the last the motors are switched
-/// on with zero wrench, then nothing is sent; where a device has no way to tell, it is not asked. RT safe.
+/// Test that a device must pass before it may be armed: faultless reports for a time, the report rate of the
+/// profile, and a device watchdog that disables the motors when the host stops sending. For the watchdog test
+/// the loop enables the motors with zero wrench and then sends nothing. A device whose reports lack the
+/// watchdog and motor flags skips that part.
 class SelfTest {
  public:
-  /// clean_for_s: how long the reports have to be good; 0: the whole test is left out.
+  /// clean_for_s: time for which the reports must be faultless; 0 skips the whole test. RT-safe.
   SelfTest(const DeviceProfile& profile, double clean_for_s) noexcept;
 
+  /// Starts the test. RT-safe.
   void start(TimePoint now) noexcept;
-  /// Once a tick, from the first one on. found: what the others found in it. Fault::none while it runs, and
-  /// when it has passed.
+  /// Advances the test. found: faults that the detectors found in this tick. Returns the fault that failed
+  /// the test; Fault::none while it runs and after it passed. Call once per tick after start(). RT-safe.
   Fault check(const DeviceSample& sample, FaultSet found, TimePoint now) noexcept;
-  bool passed() const noexcept { return phase_ == Phase::passed; }
+  bool passed() const noexcept { return phase_ == Phase::passed; }  ///< RT-safe.
 
-  /// What the test wants of the device in this tick.
+  /// Returns true if the loop must send a command in this tick. RT-safe.
   bool sends_commands() const noexcept { return phase_ != Phase::awaiting_watchdog; }
+  /// Returns true if the command of this tick must enable the motors. RT-safe.
   bool motors_on() const noexcept { return phase_ == Phase::enabling_motors; }
 
-  /// Reports a second, as measured; 0 before that.
+  /// Returns the measured report rate; 0 before the measurement is complete. RT-safe.
   double report_rate_Hz() const noexcept { return rate_Hz_; }
 
  private:
@@ -39,16 +42,16 @@ class SelfTest {
   void enter_phase(Phase phase, TimePoint now) noexcept;
 
   Duration required_clean_;
-  double nominal_rate_Hz_;  ///< 0: any will do
-  Duration watchdog_timeout_;
-  bool reports_watchdog_;  ///< the reports say whether the watchdog tripped
+  double nominal_rate_Hz_;     ///< Report rate that the device must reach; 0 accepts every rate.
+  Duration watchdog_timeout_;  ///< Time within which the device watchdog must trip.
+  bool reports_watchdog_;      ///< True if the reports contain the motor and watchdog flags.
   Phase phase_ = Phase::checking_reports;
   TimePoint started_{};
   TimePoint phase_since_{};
-  bool counting_reports_ = false;  ///< clean_since_ and what follows are set
-  TimePoint clean_since_{};
-  TimePoint first_arrived_{};
-  std::uint64_t first_sequence_ = 0;
+  bool counting_reports_ = false;     ///< True if clean_since_, first_arrived_ and first_sequence_ are set.
+  TimePoint clean_since_{};           ///< Start of the current series of faultless reports.
+  TimePoint first_arrived_{};         ///< Arrival time of the first report in the series.
+  std::uint64_t first_sequence_ = 0;  ///< Sequence number of the first report in the series.
   double rate_Hz_ = 0.0;
 };
 

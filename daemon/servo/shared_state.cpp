@@ -23,15 +23,15 @@ namespace {
 static_assert(sizeof(Touch) % 8 == 0 && offsetof(StateRecord, contacts) % 8 == 0);
 constexpr std::size_t kWordsPerSlot = SharedState::kSlotBytes / 8;
 
-[[noreturn]] void refuse(const char* what) {
+[[noreturn]] void fail(const char* call) {
   throw std::system_error(errno, std::generic_category(),
-                          std::string("the memory that shows the state to other programs: ") + what);
+                          std::string("cannot create the shared memory for tick records: ") + call);
 }
 
-/// Closes what a constructor that throws leaves open.
-struct Opened {
+/// Closes the descriptor if the constructor throws.
+struct DescriptorGuard {
   int descriptor = -1;
-  ~Opened() {
+  ~DescriptorGuard() {
     if (descriptor >= 0) close(descriptor);
   }
 };
@@ -46,16 +46,16 @@ void copy_fields(std::span<const RecordField> fields, const void* from, std::byt
 SharedState::SharedState(double rate_Hz)
     : rate_Hz_(rate_Hz),
       slots_(std::bit_ceil(static_cast<std::uint64_t>(std::ceil(kRetention_s * rate_Hz)))) {
-  Opened opened{memfd_create("wrenchd-state", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
-  if (opened.descriptor < 0) refuse("memfd_create");
-  if (ftruncate(opened.descriptor, static_cast<off_t>(bytes())) != 0) refuse("ftruncate");
+  DescriptorGuard opened{memfd_create("wrenchd-state", MFD_CLOEXEC | MFD_ALLOW_SEALING)};
+  if (opened.descriptor < 0) fail("memfd_create");
+  if (ftruncate(opened.descriptor, static_cast<off_t>(bytes())) != 0) fail("ftruncate");
   memory_ = mmap(nullptr, bytes(), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, opened.descriptor, 0);
-  if (memory_ == MAP_FAILED) refuse("mmap; is the limit of locked memory (LimitMEMLOCK) too small?");
-  // Seals last: the mapping that is there already remains writable, and no other will be.
+  if (memory_ == MAP_FAILED) fail("mmap; the limit of locked memory (LimitMEMLOCK) may be too small");
+  // The seals come last: the existing mapping stays writable, and new mappings are read-only.
   if (fcntl(opened.descriptor, F_ADD_SEALS,
             F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) != 0) {
     munmap(memory_, bytes());
-    refuse("seals, which need Linux 5.1");
+    fail("F_ADD_SEALS; needs Linux 5.1");
   }
   std::memset(memory_, 0, bytes());
   header_ = new (memory_) Header;
@@ -70,16 +70,17 @@ SharedState::~SharedState() {
   close(descriptor_);
 }
 
-void SharedState::write(const TickRecord& tick, const Touches& touches) noexcept {
+void SharedState::write(const TickRecord& tick, const Touches& contacts) noexcept {
   copy_fields(tick_fields(), &tick, record_buffer_.data() + offsetof(StateRecord, tick));
-  const std::uint64_t count = touches.size();
+  const std::uint64_t count = contacts.size();
   std::memcpy(record_buffer_.data() + offsetof(StateRecord, contact_count), &count, sizeof(count));
-  std::byte* const told = record_buffer_.data() + offsetof(StateRecord, contacts);
-  for (std::size_t i = 0; i < touches.size(); ++i)
-    std::memcpy(told + i * sizeof(Touch), &touches[i], sizeof(Touch));
-  if (touches.size() < contact_count_)
-    std::memset(told + touches.size() * sizeof(Touch), 0, (contact_count_ - touches.size()) * sizeof(Touch));
-  contact_count_ = touches.size();
+  std::byte* const destination = record_buffer_.data() + offsetof(StateRecord, contacts);
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    std::memcpy(destination + i * sizeof(Touch), &contacts[i], sizeof(Touch));
+  if (contacts.size() < contact_count_)
+    std::memset(destination + contacts.size() * sizeof(Touch), 0,
+                (contact_count_ - contacts.size()) * sizeof(Touch));
+  contact_count_ = contacts.size();
 
   const std::uint64_t i = header_->written.load(std::memory_order_relaxed);
   std::atomic<std::uint64_t>* const slot = words_ + (i % slots_) * kWordsPerSlot;

@@ -9,8 +9,8 @@
 namespace wrenchd {
 namespace {
 
-/// The translational method's torque is the lever of its force, and no spring of its own: the angular gain
-/// stands for that too.
+/// Returns the linearised spring and damper of the configured law. The torque of the translational method is
+/// the moment of its force. The angular gain covers that moment too.
 Coupling coupling_of(const Settings& settings, const Inertia& M) {
   const WrenchGains& gains = settings.wrench.gains;
   const bool pid = settings.wrench.law == SpringLaw::pid;
@@ -18,55 +18,57 @@ Coupling coupling_of(const Settings& settings, const Inertia& M) {
           gains.damping};
 }
 
-double share_of(double most, double asked) {
-  return is_finite(most) && asked > most ? most / asked : 1.0;
+/// Returns max / value, at most 1; returns 1 if there is no maximum.
+double scale_to(double max, double value) {
+  return is_finite(max) && value > max ? max / value : 1.0;
 }
 
-/// Nothing is assumed of a device that states nothing.
-DeviceDamping stated(const DeviceProfile& profile) {
+DeviceDamping stated_damping(const DeviceProfile& profile) {
   return {profile.damping_N_s_per_m, profile.damping_Nm_s_per_rad};
 }
 
-EncoderStep step_of(const DeviceProfile& profile) {
-  const auto stated_or_none = [](double step) { return is_finite(step) ? step : 0.0; };
-  return {stated_or_none(profile.encoder_step_m), stated_or_none(profile.encoder_step_rad)};
+/// A step that the profile does not state counts as 0.
+EncoderStep stated_encoder_step(const DeviceProfile& profile) {
+  const auto stated_or_zero = [](double step) { return is_finite(step) ? step : 0.0; };
+  return {stated_or_zero(profile.encoder_step_m), stated_or_zero(profile.encoder_step_rad)};
 }
 
 }  // namespace
 
 StabilityAnalysis::StabilityAnalysis(const Settings& settings, const DeviceProfile& profile, const Inertia& M,
                                      const Pose& X_HT)
-    : damping_(stated(profile)),
-      encoder_step_(step_of(profile)),
+    : damping_(stated_damping(profile)),
+      encoder_step_(stated_encoder_step(profile)),
       coupling_(coupling_of(settings, M)),
       X_HT_(X_HT),
       driven_(driven_dofs(profile)),
       period_s_(1.0 / settings.servo.rate_Hz),
       max_linear_N_per_m_(profile.max_stiffness_N_per_m),
       max_angular_Nm_per_rad_(profile.max_stiffness_Nm_per_rad) {
-  compute_scale({period_s_, period_s_}, 1.0);  // what cannot be computed is refused here, and not in the loop
+  compute_scale({period_s_, period_s_}, 1.0);  // throws here, before the loop runs, if the gains are invalid
 }
 
-/// x_W = s x_H makes K at the handle s K s for translations: as if the device had the 1 / s^2 of its damping.
+/// With x_W = s x_H the linear stiffness at the handle is s^2 K. That equals a device with 1 / s^2 of its
+/// damping, METHOD (83).
 StiffnessScale StabilityAnalysis::compute_scale(const LoopDelay& loop, double workspace_scale) const {
   const double square = workspace_scale * workspace_scale;
   const Matrix6d& K = coupling_.stiffness;
-  StiffnessScale share{
-      std::min(share_of(max_linear_N_per_m_ / square, K.topLeftCorner<3, 3>().diagonal().maxCoeff()),
-               share_of(max_angular_Nm_per_rad_, K.bottomRightCorner<3, 3>().diagonal().maxCoeff())),
+  StiffnessScale scale{
+      std::min(scale_to(max_linear_N_per_m_ / square, K.topLeftCorner<3, 3>().diagonal().maxCoeff()),
+               scale_to(max_angular_Nm_per_rad_, K.bottomRightCorner<3, 3>().diagonal().maxCoeff())),
       1.0, false};
   const bool linear = (driven_ & kLinearDofs) == 0 || is_finite(damping_.linear_N_s_per_m);
   const bool angular = (driven_ & kAngularDofs) == 0 || is_finite(damping_.angular_Nm_s_per_rad);
-  if (!linear || !angular) return share;
+  if (!linear || !angular) return scale;
   const DeviceDamping damping = {damping_.linear_N_s_per_m / square, damping_.angular_Nm_s_per_rad};
   const EncoderStep step = {workspace_scale * encoder_step_.linear_m, encoder_step_.angular_rad};
   const StabilityBound bound = stability_bound(damping, loop, coupling_, X_HT_, driven_, step);
-  share.bound_known = true;
-  if (bound.scale >= 1.0) return share;
-  const bool without = bound.scale_undamped > bound.scale;
-  share.damper = without ? 0.0 : bound.scale;
-  share.spring = std::min(share.spring, without ? bound.scale_undamped : bound.scale);
-  return share;
+  scale.bound_known = true;
+  if (bound.scale >= 1.0) return scale;
+  const bool omit_damper = bound.scale_undamped > bound.scale;
+  scale.damper = omit_damper ? 0.0 : bound.scale;
+  scale.spring = std::min(scale.spring, omit_damper ? bound.scale_undamped : bound.scale);
+  return scale;
 }
 
 StiffnessScale StabilityAnalysis::max_stable_scale(const LoopMeasurement& measured,
@@ -74,30 +76,31 @@ StiffnessScale StabilityAnalysis::max_stable_scale(const LoopMeasurement& measur
   const double period_s = std::max(measured.longest_period_s(), period_s_);
   try {
     return compute_scale({period_s, measured.delay_s()}, workspace_scale);
-  } catch (...) {  // the constructor has seen that only the times could do this
+  } catch (
+      ...) {  // only an invalid period or delay can throw here, because the constructor checked the gains
     return {0.0, 0.0, true};
   }
 }
 
 double StabilityAnalysis::max_stable_scale_at_handle(const LoopMeasurement& measured,
-                                                     const LocalModels::TotalGains& load) const noexcept {
-  const double late_s = 0.5 * std::max(measured.longest_period_s(), period_s_) + measured.delay_s();
-  const auto share_of = [late_s](double b, double k, double d) {
-    const double takes = late_s * k + d;
-    return is_finite(b) && takes > b ? b / takes : 1.0;
+                                                     const LocalModels::TotalGains& gains) const noexcept {
+  const double lag_s = 0.5 * std::max(measured.longest_period_s(), period_s_) + measured.delay_s();
+  const auto passive_scale = [lag_s](double b, double k, double d) {
+    const double required = lag_s * k + d;
+    return is_finite(b) && required > b ? b / required : 1.0;
   };
   return std::min(
-      share_of(damping_.linear_N_s_per_m, load.stiffness_N_per_m, load.damping_N_s_per_m),
-      share_of(damping_.angular_Nm_s_per_rad, load.stiffness_Nm_per_rad, load.damping_Nm_s_per_rad));
+      passive_scale(damping_.linear_N_s_per_m, gains.stiffness_N_per_m, gains.damping_N_s_per_m),
+      passive_scale(damping_.angular_Nm_s_per_rad, gains.stiffness_Nm_per_rad, gains.damping_Nm_s_per_rad));
 }
 
 PassivityGuard StabilityAnalysis::make_passivity_guard(const LoopMeasurement& measured) const noexcept {
-  PassivityLimits caps;
+  PassivityLimits limits;
   const double ticks = std::round(measured.typical_delay_s() / period_s_);
-  const auto most = static_cast<double>(PassivityGuard::kMaxDelay_ticks);
-  caps.delay_ticks = is_finite(ticks) ? static_cast<std::size_t>(std::clamp(ticks, 1.0, most))
-                                      : PassivityGuard::kMaxDelay_ticks;
-  return PassivityGuard(damping_, caps);
+  const auto max_ticks = static_cast<double>(PassivityGuard::kMaxDelay_ticks);
+  limits.delay_ticks = is_finite(ticks) ? static_cast<std::size_t>(std::clamp(ticks, 1.0, max_ticks))
+                                        : PassivityGuard::kMaxDelay_ticks;
+  return PassivityGuard(damping_, limits);
 }
 
 }  // namespace wrenchd

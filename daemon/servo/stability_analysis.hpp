@@ -10,32 +10,34 @@
 
 namespace wrenchd {
 
-/// How much of the spring and the damper that the configuration asks for a device can bear.
+/// Factors on the configured spring and damper that keep the loop passive on a device.
 struct StiffnessScale {
-  double spring = 1.0;
-  double damper = 1.0;
-  bool bound_known = false;  ///< the profile states the damping by which it could be computed
+  double spring = 1.0;       ///< Factor on the spring, 0 to 1.
+  double damper = 1.0;       ///< Factor on the damper, 0 to 1.
+  bool bound_known = false;  ///< True if the profile states the damping that the bound needs.
 };
 
-/// Holds the stiffness of the configuration against what stays passive, with the rate and the delay that were
-/// measured, and against the most that the profile states.
+/// Computes how much stiffness stays passive with the measured rate and delay of the loop, and with the
+/// maximum stiffness of the profile. core/METHOD.md, section 10.
 class StabilityAnalysis {
  public:
-  /// X_HT: the tool's body frame in the handle. Throws std::invalid_argument where the gains make no spring.
+  /// M: inertia of the tool. X_HT: body frame of the tool in the handle. Throws std::invalid_argument if the
+  /// gains give no valid spring. Not RT-safe: throws.
   StabilityAnalysis(const Settings& settings, const DeviceProfile& profile, const Inertia& M,
                     const Pose& X_HT);
 
-  /// Where the damper costs more stiffness than it gives steadiness, it is left out. workspace_scale: metres
-  /// that the tool goes for a metre of the handle, which feels the scale's square of the stiffness. RT safe.
+  /// Returns the largest passive scale of spring and damper, METHOD (78). If a loop without damper allows
+  /// more stiffness, the damper factor is 0. workspace_scale: metres of tool motion per metre of handle
+  /// motion; the stiffness at the handle grows with its square. RT-safe.
   StiffnessScale max_stable_scale(const LoopMeasurement& measured,
                                   double workspace_scale = 1.0) const noexcept;
 
-  /// How much of springs and brakes about the handle, each alike in all directions, stays passive: 0 to 1; 1
-  /// where the profile states no damping. RT safe.
+  /// Returns the largest passive scale of isotropic springs and dampers about the handle, METHOD (83), 0
+  /// to 1. Returns 1 if the profile states no damping. RT-safe.
   double max_stable_scale_at_handle(const LoopMeasurement& measured,
-                                    const LocalModels::TotalGains& load) const noexcept;
+                                    const LocalModels::TotalGains& gains) const noexcept;
 
-  /// The guard that goes with it. RT safe.
+  /// Returns a passivity guard for this device and the measured delay. RT-safe.
   PassivityGuard make_passivity_guard(const LoopMeasurement& measured) const noexcept;
 
  private:
@@ -47,8 +49,8 @@ class StabilityAnalysis {
   Pose X_HT_;
   DofMask driven_;
   double period_s_;
-  double max_linear_N_per_m_;  ///< the profile's own maxima
-  double max_angular_Nm_per_rad_;
+  double max_linear_N_per_m_;      ///< Maximum linear stiffness of the profile; NaN if not stated.
+  double max_angular_Nm_per_rad_;  ///< Maximum angular stiffness of the profile; NaN if not stated.
 };
 
 }  // namespace wrenchd

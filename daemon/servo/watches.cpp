@@ -4,66 +4,55 @@
 #include "core/finite.hpp"
 
 namespace wrenchd {
-namespace {
 
-/// Without real-time priority a loop that stands still for a moment is nothing to look at: it is late.
-Duration stopped_after(const ServoSettings& servo) noexcept {
-  return servo.realtime == Realtime::required ? from_seconds(servo.late_limit_s) : Duration::max();
-}
-
-}  // namespace
-
-Watches::Watches(const Settings& settings, const DeviceProfile& profile, double max_force_N,
-                 double max_torque_Nm)
-    : pace(from_seconds(1.0 / settings.servo.rate_Hz), stopped_after(settings.servo)),
-      link(profile.report_rate_Hz),
+Watches::Watches(const DeviceProfile& profile, double max_force_N, double max_torque_Nm)
+    : link(profile.report_rate_Hz),
       pose(profile),
       motor_stall(max_force_N, max_torque_Nm),
       deadman_button(button_bit(profile.deadman_button)),
       stop_button(button_bit(profile.stop_button)),
       has_motors(profile.has_output) {}
 
-FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, TimePoint now) noexcept {
-  FaultSet found = link.check(sample, now) | pose.check(sample) | motors.check(sample, driven, now);
-  found |= classify_sample_fault(sample.fault, state, now);
-  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) found |= bit(Fault::pose_not_finite);
-  if (was_homed_ && !sample.homed) found |= bit(Fault::not_homed);
-  if (sample.arrived != TimePoint{})
-    was_homed_ = sample.homed;  // before the first report it is anybody's guess
-  return found | check_buttons(sample, state) | client.check(now);
+FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, const TickTime& t) noexcept {
+  FaultSet faults = link.check(sample, t.now) | pose.check(sample) | motors.check(sample, driven, t.now);
+  faults |= classify_sample_fault(sample.fault, state, t.recently_late);
+  if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) faults |= bit(Fault::pose_not_finite);
+  if (was_homed_ && !sample.homed) faults |= bit(Fault::not_homed);
+  const bool report_received = sample.arrived != TimePoint{};  // before that `homed` says nothing
+  if (report_received) was_homed_ = sample.homed;
+  return faults | check_buttons(sample, state) | client.check(t.now);
 }
 
-/// What the device found in its reports, as far as it counts here.
-FaultSet Watches::classify_sample_fault(Fault fault, State state, TimePoint now) const noexcept {
+/// Which fault of the loop follows from the fault that the device found in its reports.
+FaultSet Watches::classify_sample_fault(Fault fault, State state, bool recently_late) const noexcept {
   switch (fault) {
     case Fault::none:
-    case Fault::pose_not_a_rotation:  // three one after the other are one fault, which pose.look() finds
+    case Fault::pose_not_a_rotation:  // PoseWatch::check() raises it after three samples in a row
       return 0;
-    case Fault::overspeed:  // a hand that is fast while it feels nothing does no harm
+    case Fault::overspeed:  // a fast handle is harmless while no force is on it
       return is_driving(state) ? bit(fault) : 0;
-    // A queue that ran over while we were late is no silence of the device's; and one that pushes nobody is
-    // no danger: the pose stands still by now, and goes on when it is heard again.
+    // If the loop itself was late, the report queue overflowed and the device was not silent. A device
+    // without motors cannot push: its pose stays where it was, and continues with the next report.
     case Fault::sample_stale:
-      return bit(pace.recently_late(now) || !has_motors ? Fault::sample_late : fault);
+      return bit(recently_late || !has_motors ? Fault::sample_late : fault);
     default:
       return bit(fault);
   }
 }
 
 FaultSet Watches::check_buttons(const DeviceSample& sample, State state) const noexcept {
-  FaultSet found = 0;
-  if ((sample.buttons & stop_button) != 0) found |= bit(Fault::stop_button);
-  const bool wanted = is_driving(state) || state == State::waiting;
-  if (wanted && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
-    found |= bit(Fault::deadman_released);
-  return found;
+  FaultSet faults = 0;
+  if ((sample.buttons & stop_button) != 0) faults |= bit(Fault::stop_button);
+  const bool armed = is_driving(state) || state == State::waiting;
+  if (armed && deadman_button != 0 && (sample.buttons & deadman_button) == 0)
+    faults |= bit(Fault::deadman_released);
+  return faults;
 }
 
 void Watches::reset() noexcept {
   link.reset();
   pose.reset();
   motors = MotorWatch();
-  writes.reset();
   was_homed_ = false;
 }
 

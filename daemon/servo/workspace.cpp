@@ -32,7 +32,7 @@ void Workspace::set_scale(double scale) noexcept {
   scale_rate_per_s_ = std::abs(scale - scale_) / kScaleRamp_s;
 }
 
-/// Puts the base where the handle at X_BH is at X_WH.
+/// Chooses X_WB so that the handle at X_BH maps to X_WH.
 void Workspace::update_base(const Pose& X_WH, const Pose& X_BH) noexcept {
   X_WB_.rotation = (X_WH.rotation * X_BH.rotation.conjugate()).normalized();
   X_WB_.translation_m = X_WH.translation_m - scale_ * (X_WB_.rotation * X_BH.translation_m);

@@ -8,72 +8,72 @@
 namespace wrenchd {
 namespace {
 
-/// One plugged-in device, while it is looked at.
+/// A connected device during selection.
 struct Candidate {
   std::optional<std::size_t> profile;
-  std::string why_not;  ///< empty: it may be the one
+  std::string rejection;  ///< empty: the device qualifies
 };
 
 std::string serial_text(const UsbDevice& device) {
   return device.serial.empty() ? "no serial number" : "serial number " + device.serial;
 }
 
-std::string why_not_by_device(const UsbDevice& device, const DeviceCriteria& wanted) {
-  if (!wanted.serial.empty() && device.serial != wanted.serial)
-    return "the configuration wants serial number " + wanted.serial + ", it has " + serial_text(device);
-  if (wanted.previous && !device.is_same_device(*wanted.previous))
-    return "it is not the device that was unplugged, " + describe(*wanted.previous) +
-           "; plug that one in again, or start wrenchd anew to use this one (wrong_device)";
+std::string rejection_by_criteria(const UsbDevice& device, const DeviceCriteria& criteria) {
+  if (!criteria.serial.empty() && device.serial != criteria.serial)
+    return "the configuration requires serial number " + criteria.serial + ", it has " + serial_text(device);
+  if (criteria.previous && !device.is_same_device(*criteria.previous))
+    return "it is not the device that was unplugged, " + describe(*criteria.previous) +
+           "; connect that device again, or restart wrenchd to use this one (wrong_device)";
   return {};
 }
 
-std::string why_not_by_descriptor(const InspectedDevice& facts, const DeviceProfile& profile) {
-  if (!facts.descriptor_error.empty())
-    return "its report descriptor is refused, so the profile " + profile.name +
-           " cannot be held against it: " + facts.descriptor_error;
-  if (!facts.descriptor) return {};  // it is not HID, and has none
+std::string rejection_by_descriptor(const InspectedDevice& inspected, const DeviceProfile& profile) {
+  if (!inspected.descriptor_error.empty())
+    return "its report descriptor is invalid, so the profile " + profile.name +
+           " cannot be checked against it: " + inspected.descriptor_error;
+  if (!inspected.descriptor) return {};  // no HID device, so it has no descriptor
   std::string text;
-  for (const std::string& line : find_differences(*facts.descriptor, expected_reports(profile)))
+  for (const std::string& line : find_differences(*inspected.descriptor, expected_reports(profile)))
     text += (text.empty() ? "" : "; ") + line;
   if (text.empty()) return {};
-  return "its report descriptor disagrees with the profile " + profile.name + ": " + text;
+  return "its report descriptor differs from the profile " + profile.name + ": " + text;
 }
 
-Candidate look_at(const UsbDevice& device, std::span<const DeviceProfile> profiles,
-                  const DeviceCriteria& wanted) {
-  const InspectedDevice facts = inspect_device(device);
-  const MatchResult match = match_profile(facts.identity, profiles, wanted.profile);
+Candidate evaluate(const UsbDevice& device, std::span<const DeviceProfile> profiles,
+                   const DeviceCriteria& criteria) {
+  const InspectedDevice inspected = inspect_device(device);
+  const MatchResult match = match_profile(inspected.identity, profiles, criteria.profile);
   if (!match.refusal.empty()) return {{}, match.refusal};
   if (!match.profile) {
-    for (std::size_t i = 0; i < profiles.size() && !wanted.profile.empty(); ++i)
-      if (profiles[i].name == wanted.profile)
-        return {{}, "profile " + wanted.profile + ": " + match.rejections[i]};
-    return {{}, "no profile is for it; wrenchctl devices tells why of each"};
+    for (std::size_t i = 0; i < profiles.size() && !criteria.profile.empty(); ++i)
+      if (profiles[i].name == criteria.profile)
+        return {{}, "profile " + criteria.profile + ": " + match.rejections[i]};
+    return {{}, "no profile matches; wrenchctl devices prints the reason for each profile"};
   }
   const DeviceProfile& profile = profiles[*match.profile];
-  std::string why = why_not_by_device(device, wanted);
-  if (why.empty()) why = why_not_by_descriptor(facts, profile);
+  std::string why = rejection_by_criteria(device, criteria);
+  if (why.empty()) why = rejection_by_descriptor(inspected, profile);
   return {match.profile, why};
 }
 
 }  // namespace
 
-DeviceChoice choose_device(std::span<const UsbDevice> plugged, std::span<const DeviceProfile> profiles,
-                           const DeviceCriteria& wanted) {
+DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const DeviceProfile> profiles,
+                           const DeviceCriteria& criteria) {
   DeviceChoice choice;
-  std::vector<DeviceChoice::Selection> fitting;
-  for (std::size_t i = 0; i < plugged.size(); ++i) {
-    const Candidate candidate = look_at(plugged[i], profiles, wanted);
-    choice.rejections.push_back(candidate.why_not);
-    if (candidate.profile && candidate.why_not.empty()) fitting.push_back({i, *candidate.profile});
+  std::vector<DeviceChoice::Selection> candidates;
+  for (std::size_t i = 0; i < connected.size(); ++i) {
+    const Candidate candidate = evaluate(connected[i], profiles, criteria);
+    choice.rejections.push_back(candidate.rejection);
+    if (candidate.profile && candidate.rejection.empty()) candidates.push_back({i, *candidate.profile});
   }
-  if (fitting.size() == 1) choice.selection = fitting.front();
-  if (fitting.size() < 2) return choice;
-  for (const DeviceChoice::Selection& pick : fitting)
+  if (candidates.size() == 1) choice.selection = candidates.front();
+  if (candidates.size() < 2) return choice;
+  for (const DeviceChoice::Selection& pick : candidates)
     choice.rejections[pick.device] =
-        "it fits, with the profile " + profiles[pick.profile].name + ", and is not alone: this is " +
-        serial_text(plugged[pick.device]) +
-        "; name the profile and the serial number in [device], or unplug the others";
+        "it matches the profile " + profiles[pick.profile].name + ", and other devices match too: this is " +
+        serial_text(connected[pick.device]) +
+        "; set the profile and the serial number in [device], or unplug the others";
   return choice;
 }
 

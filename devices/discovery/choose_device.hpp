@@ -12,29 +12,31 @@
 
 namespace wrenchd {
 
-/// The device that is to be driven, as far as it is settled.
+/// Criteria by which the configuration selects a device.
 struct DeviceCriteria {
-  std::string profile = {};                ///< its name; empty: any that is for a device
-  std::string serial = {};                 ///< empty: any
-  std::optional<UsbDevice> previous = {};  ///< the one that was driven, and was unplugged: no other will do
+  std::string profile = {};  ///< name of the profile; empty: any profile for a real device
+  std::string serial = {};   ///< serial number of the device; empty: any
+  /// The device that was driven and then unplugged: only this device is selected again.
+  std::optional<UsbDevice> previous = {};
 };
 
-/// Which of the plugged-in devices it is, and why the others are not.
+/// The selected device, and the reasons why the others are rejected.
 struct DeviceChoice {
   struct Selection {
-    std::size_t device = 0;   ///< index into the plugged-in ones
+    std::size_t device = 0;   ///< index into the connected devices
     std::size_t profile = 0;  ///< index into the profiles
   };
   std::optional<Selection> selection;
-  /// One for each plugged-in device, in their order; empty for the one that was picked.
+  /// One entry per connected device, in their order: the reason for its rejection; empty for the selected
+  /// device.
   std::vector<std::string> rejections;
 };
 
-/// Picks the one device that is wanted. A device has to have one of the profiles (match_profile()), to be the
-/// serial number and the interface that is asked for, and its own report descriptor has to agree with the
-/// profile. Of several such devices none is picked, and each is told what tells it from the others. Not RT
-/// safe; speaks to no device.
-DeviceChoice choose_device(std::span<const UsbDevice> plugged, std::span<const DeviceProfile> profiles,
-                           const DeviceCriteria& wanted);
+/// Selects the one device that meets the criteria. The device must match one of the profiles
+/// (match_profile()), have the requested serial number and interface, and have a report descriptor that
+/// agrees with the profile. If several devices qualify, selects none, and each rejection states how to
+/// distinguish the device. Opens no device. Not RT-safe: allocates.
+DeviceChoice choose_device(std::span<const UsbDevice> connected, std::span<const DeviceProfile> profiles,
+                           const DeviceCriteria& criteria);
 
 }  // namespace wrenchd

@@ -17,7 +17,7 @@
 namespace wrenchd {
 namespace {
 
-/// udev's own sign of life: its control socket.
+/// udev is running if its control socket exists.
 bool udev_runs() {
   std::error_code ignored;
   return std::filesystem::exists("/run/udev/control", ignored);
@@ -45,7 +45,7 @@ struct HotplugMonitor::Watch {
         udev_monitor_enable_receiving(monitor) < 0) {
       release();
       throw std::runtime_error(
-          "cannot hear of devices that are plugged in (udev monitor); allow AF_NETLINK sockets "
+          "cannot monitor connected devices (udev monitor); allow AF_NETLINK sockets "
           "(RestrictAddressFamilies=)");
     }
   }
@@ -65,13 +65,13 @@ struct HotplugMonitor::Watch {
       if (poll(files.data(), files.size(), -1) < 0) continue;
       if (files[1].revents != 0) return;
       if (udev_device* const device = udev_monitor_receive_device(monitor); device != nullptr) {
-        tell(device);
+        notify(device);
         udev_device_unref(device);
       }
     }
   }
 
-  void tell(udev_device* device) noexcept {
+  void notify(udev_device* device) noexcept {
     const std::string_view action = udev_device_get_action(device);
     if (action != "add" && action != "remove") return;
     listener({action == "add" ? HotplugEvent::Kind::connected : HotplugEvent::Kind::disconnected,

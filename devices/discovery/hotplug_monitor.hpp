@@ -9,29 +9,30 @@
 
 namespace wrenchd {
 
-/// Something was plugged in or taken out.
+/// A device was connected or disconnected.
 struct HotplugEvent {
   enum class Kind : std::uint8_t { connected, disconnected };
   Kind kind = Kind::connected;
-  std::string subsystem;  ///< "hidraw", or "usb": the device as a whole, not each of its interfaces
+  std::string subsystem;  ///< "hidraw", or "usb" for a whole device (not each interface)
   std::string node;       ///< "/dev/hidraw3", "/dev/bus/usb/003/002"
-  std::string port_path;  ///< bus and ports, "3-1.2"; empty where not on USB
+  std::string port_path;  ///< bus and ports, "3-1.2"; empty if the device is not on USB
 };
 
-/// Tells what is plugged in and taken out, on an ordinary thread of its own. What was plugged in before it
-/// was made is not told: make it first, then list_usb_devices(), and nothing is missed between the two.
+/// Notifies a listener when a device is connected or disconnected, on a thread of its own. It does not report
+/// devices that were connected before its construction. Construct it first and then call list_usb_devices(),
+/// so that no device is missed in between. Not RT-safe.
 class HotplugMonitor {
  public:
-  /// Called on the monitor's thread; must not throw.
+  /// The monitor's thread calls it. It must not throw.
   using Listener = std::function<void(const HotplugEvent&)>;
 
-  /// Whose word is heard. udev tells of a device when its rules have run and its node has its permissions;
-  /// the kernel tells of it before that. Where no udev runs only the kernel does.
+  /// Source of the notifications. udev notifies after its rules have set the permissions of the node; the
+  /// kernel notifies before. On a system without udev, only the kernel notifies.
   enum class Source : std::uint8_t { automatic, udev, kernel };
 
-  /// Throws std::runtime_error where the system has no monitor to give.
+  /// Throws std::runtime_error if the system cannot create a monitor.
   explicit HotplugMonitor(Listener listener, Source source = Source::automatic);
-  /// Ends the thread; the listener is not called after that.
+  /// Ends the thread. The listener is not called after the destructor.
   ~HotplugMonitor();
   HotplugMonitor(const HotplugMonitor&) = delete;
   HotplugMonitor& operator=(const HotplugMonitor&) = delete;

@@ -10,16 +10,15 @@
 
 namespace wrenchd {
 
-/// What the system knows of a plugged-in device, read so that profiles can be held against it.
+/// A connected device and its report descriptor, for comparison with the profiles.
 struct InspectedDevice {
   DeviceIdentity identity;
-  std::optional<ReportDescriptor> descriptor;  ///< none: it is not HID, or what it says cannot be read
-  std::string
-      descriptor_error;  ///< the byte of the descriptor and what is wrong there; empty where all is well
+  std::optional<ReportDescriptor> descriptor;  ///< empty: the device is not HID, or its descriptor is invalid
+  std::string descriptor_error;  ///< byte and reason of the error in the descriptor; empty if there is none
 };
 
-/// Reads the device's report descriptor, with which something may be wrong: where it is refused the device
-/// has its ids, serial number and usage still. Not RT safe; speaks to no device.
+/// Reads the identity and the report descriptor of a device. If the descriptor is invalid, the result still
+/// has ids, serial number and usage. Does not communicate with the device. Not RT-safe: allocates.
 InspectedDevice inspect_device(const UsbDevice& device);
 
 }  // namespace wrenchd

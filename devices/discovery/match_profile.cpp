@@ -16,62 +16,63 @@ std::string hex(unsigned number) {
   return text.data();
 }
 
-bool holds(const std::vector<UsbId>& ids, UsbId id) {
+bool contains(const std::vector<UsbId>& ids, UsbId id) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }
 
-/// Empty where the device's descriptor shows this report.
-std::string why_not(const PoseReportLayout& report, const std::vector<InputReportSize>& facts) {
-  const std::string name = report.has_id ? "in-report " + std::to_string(report.id) : "the in-report";
-  const std::size_t least = report.min_length == 0 ? report.length : report.min_length;
-  for (const InputReportSize& fact : facts) {
-    if (fact.id != (report.has_id ? report.id : 0)) continue;
-    if (fact.length >= least && fact.length <= report.length) return {};
-    return name + " of the device has " + std::to_string(fact.length) + " bytes, that of the profile " +
+/// Returns why the report is not in the device's descriptor; empty if it is.
+std::string rejection(const PoseReportLayout& report, const std::vector<InputReportSize>& device_reports) {
+  const std::string name = report.has_id ? "input report " + std::to_string(report.id) : "the input report";
+  const std::size_t min_length = report.min_length == 0 ? report.length : report.min_length;
+  for (const InputReportSize& device_report : device_reports) {
+    if (device_report.id != (report.has_id ? report.id : 0)) continue;
+    if (device_report.length >= min_length && device_report.length <= report.length) return {};
+    return name + " of the device has " + std::to_string(device_report.length) + " bytes, in the profile " +
            std::to_string(report.length);
   }
   return name + " of the profile is not in the device's report descriptor";
 }
 
-std::string why_not_by_reports(const DeviceProfile& profile, const std::vector<InputReportSize>& facts) {
-  std::string why = why_not(profile.pose_report, facts);
+std::string rejection_by_reports(const DeviceProfile& profile,
+                                 const std::vector<InputReportSize>& device_reports) {
+  std::string why = rejection(profile.pose_report, device_reports);
   for (const PoseReportLayout& report : profile.more_reports)
-    if (why.empty() && carries_pose(report)) why = why_not(report, facts);
+    if (why.empty() && carries_pose(report)) why = rejection(report, device_reports);
   return why;
 }
 
-std::string why_not_by_usage(const char* name, std::optional<std::uint16_t> wanted,
-                             std::optional<std::uint16_t> found) {
+std::string rejection_by_usage(const char* name, std::optional<std::uint16_t> wanted,
+                               std::optional<std::uint16_t> found) {
   if (!wanted || wanted == found) return {};
-  return std::string(name) + " is " + (found ? hex(*found) : "not known") + ", the profile is for " +
+  return std::string(name) + " is " + (found ? hex(*found) : "not known") + ", the profile requires " +
          hex(*wanted);
 }
 
-std::string why_not(const DeviceIdentity& device, const DeviceProfile& profile, std::string_view named) {
+std::string rejection(const DeviceIdentity& device, const DeviceProfile& profile, std::string_view named) {
   const DeviceMatch& match = profile.match;
   if (!named.empty() && profile.name != named)
-    return "the configuration names the profile " + std::string(named);
-  if (named.empty() && match.only_when_named) return "it is used only where the configuration names it";
+    return "the configuration selects the profile " + std::string(named);
+  if (named.empty() && match.only_when_named) return "it is used only if the configuration names it";
   if (profile.transport == Transport::loopback) return "it is for the simulated device";
-  const bool by_layout = holds(match.usb_by_layout, device.id);
-  if (!holds(match.usb, device.id) && !by_layout) return "its ids do not include " + text(device.id);
+  const bool by_layout = contains(match.usb_by_layout, device.id);
+  if (!contains(match.usb, device.id) && !by_layout) return "its ids do not include " + text(device.id);
   if (!match.serial.empty() && match.serial != device.serial)
     return "it is for serial number " + match.serial + ", not " +
            (device.serial.empty() ? "a device without one" : device.serial);
   if (profile.transport == Transport::libusb && device.interface &&
       *device.interface != profile.endpoints.interface)
-    return "it speaks over interface " + std::to_string(profile.endpoints.interface) +
-           " of the device, this is " + std::to_string(*device.interface);
-  std::string why = why_not_by_usage("the usage page", match.usage_page, device.usage_page);
-  if (why.empty()) why = why_not_by_usage("the usage", match.usage, device.usage);
+    return "it uses interface " + std::to_string(profile.endpoints.interface) + " of the device, this is " +
+           std::to_string(*device.interface);
+  std::string why = rejection_by_usage("the usage page", match.usage_page, device.usage_page);
+  if (why.empty()) why = rejection_by_usage("the usage", match.usage, device.usage);
   if (!why.empty()) return why;
-  if (!device.input_reports.empty()) return why_not_by_reports(profile, device.input_reports);
-  return by_layout ? "devices of this id differ, and the report descriptor has not been read" : "";
+  if (!device.input_reports.empty()) return rejection_by_reports(profile, device.input_reports);
+  return by_layout ? "devices with this id differ, and the report descriptor has not been read" : "";
 }
 
-/// How closely a matching profile names the device.
+/// Priority of a matching profile: a named serial number before a named id.
 int rank(const DeviceIdentity& device, const DeviceProfile& profile) {
-  return (profile.match.serial.empty() ? 0 : 2) + (holds(profile.match.usb, device.id) ? 1 : 0);
+  return (profile.match.serial.empty() ? 0 : 2) + (contains(profile.match.usb, device.id) ? 1 : 0);
 }
 
 }  // namespace
@@ -88,26 +89,26 @@ std::string text(UsbId id) {
 MatchResult match_profile(const DeviceIdentity& device, std::span<const DeviceProfile> profiles,
                           std::string_view named) {
   MatchResult result;
-  if (const UnusableDevice* known = find_unusable_device(device.id)) {
-    result.refusal = std::string(known->name) + " (" + text(device.id) + "): " + std::string(known->reason);
+  if (const UnusableDevice* unusable = find_unusable_device(device.id)) {
+    result.refusal =
+        std::string(unusable->name) + " (" + text(device.id) + "): " + std::string(unusable->reason);
     result.rejections.assign(profiles.size(), "the device cannot be used");
     return result;
   }
   int best = -1;
   for (std::size_t i = 0; i < profiles.size(); ++i) {
-    result.rejections.push_back(why_not(device, profiles[i], named));
+    result.rejections.push_back(rejection(device, profiles[i], named));
     if (!result.rejections.back().empty()) continue;
-    const int closeness = rank(device, profiles[i]);
-    if (closeness > best) {
+    const int priority = rank(device, profiles[i]);
+    if (priority > best) {
       result.profile = i;
       result.refusal.clear();
-    } else if (closeness == best) {
+    } else if (priority == best) {
       result.profile.reset();
       result.refusal = "several profiles match " + text(device.id) + ", the last of them " +
-                       profiles[i].name +
-                       "; name one in the configuration, or state the serial number in one";
+                       profiles[i].name + "; name one in the configuration, or add the serial number to one";
     }
-    best = std::max(best, closeness);
+    best = std::max(best, priority);
   }
   return result;
 }

@@ -12,41 +12,43 @@
 
 namespace wrenchd {
 
-/// An in-report as the device's own descriptor has it.
+/// Length of an input report, from the device's report descriptor.
 struct InputReportSize {
-  std::uint8_t id = 0;     ///< 0: the device uses no ids
-  std::size_t length = 0;  ///< bytes, the id included where there is one
+  std::uint8_t id = 0;     ///< report id; 0: the device has no report ids
+  std::size_t length = 0;  ///< length in bytes, including the id if there is one
 };
 
-/// What can be known of a plugged-in device without speaking to it.
+/// Identity of a connected device, known without communicating with it.
 struct DeviceIdentity {
   UsbId id;
-  std::string serial;   ///< empty: it has none
-  std::string product;  ///< as it calls itself; for people only
+  std::string serial;   ///< serial number; empty: the device has none
+  std::string product;  ///< product name, for display only
   std::optional<std::uint16_t> usage_page;
   std::optional<std::uint16_t> usage;
-  std::optional<unsigned> interface;           ///< of the device, which this is; where it is known
+  std::optional<unsigned> interface;           ///< interface of the device, if known
   std::vector<InputReportSize> input_reports;  ///< empty: the descriptor has not been read
 };
 
-/// Which profile a device has, and why not another.
+/// Matching profile of a device, and why the others do not match.
 struct MatchResult {
   std::optional<std::size_t> profile;  ///< index into the profiles
-  std::string refusal;  ///< why none at all: a known device that cannot be used, or several profiles
-  std::vector<std::string> rejections;  ///< one for each profile, in their order; empty for those that match
+  std::string refusal;  ///< why no profile is used: an unusable device, or several matching profiles
+  /// One entry per profile, in their order: why it does not match; empty if it matches.
+  std::vector<std::string> rejections;
 };
 
-/// Tells which of the profiles is for this device. Of several that match, one that names the serial number
-/// goes before one that does not, and one that names the id for itself before one that goes by the reports;
-/// where two are left, neither is taken. The profile `named` by the configuration is alone in being asked,
-/// and may be one that is only used when named. Not RT safe.
+/// Finds the profile of a device. If several match, a profile that names the serial number has priority, then
+/// one that names the id in `usb` over one in `usb_by_layout`. If two profiles have equal priority, no
+/// profile is used. If the configuration names a profile (`named`), only that profile is considered, even if
+/// it is marked only_when_named. Not RT-safe: allocates.
 MatchResult match_profile(const DeviceIdentity& device, std::span<const DeviceProfile> profiles,
                           std::string_view named = {});
 
-/// Whether the report holds anything that a pose is made of: a device without it is another device.
+/// Returns true if the report carries a part of the pose. A device without such a report does not match the
+/// profile. RT-safe.
 bool carries_pose(const PoseReportLayout& report) noexcept;
 
-/// Vendor and product as "046d:c626".
+/// Returns vendor and product id as "046d:c626". Not RT-safe: allocates.
 std::string text(UsbId id);
 
 }  // namespace wrenchd

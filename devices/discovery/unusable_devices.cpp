@@ -7,20 +7,22 @@ namespace wrenchd {
 namespace {
 
 constexpr std::string_view kClosed =
-    "its protocol is not public; use it with its maker's driver, or ask the maker to publish the reports";
+    "its protocol is not public; use the manufacturer's driver, or ask the manufacturer to publish the "
+    "protocol";
 constexpr std::string_view kNotSixAxes =
-    "it is no six-axis device, though its maker's id is that of the SpaceMouse family; nothing to do";
+    "it is no six-axis device, although its vendor id is that of the SpaceMouse family; no action needed";
 constexpr std::string_view kUnclear =
-    "sources disagree on whether it has six axes; if yours has, send its report descriptor to wrenchd";
+    "sources disagree on whether it has six axes; if yours has, send its report descriptor to the wrenchd "
+    "project";
 
-/// Ids from udev rules and drivers in public repositories: spacenavd (src/dev.c), jhu-saw/sawSensablePhantom,
-/// MXHsj/ros_geomagic_touch_hid, libdhd's rules.
+/// Sources of the ids, udev rules and drivers in public repositories: spacenavd (src/dev.c),
+/// jhu-saw/sawSensablePhantom, MXHsj/ros_geomagic_touch_hid, the rules of libdhd.
 constexpr std::array kKnown = {
     UnusableDevice{0x2988, 0x0302, 0x0302, "3D Systems Touch (USB)", kClosed},
     UnusableDevice{0x0301, 0x2988, 0x2988, "3D Systems Touch (USB)", kClosed},
     UnusableDevice{0x2988, 0x0304, 0x0304, "3D Systems Touch (HID)", kClosed},
     UnusableDevice{0x1451, 0x0000, 0xffff, "a Force Dimension device", kClosed},
-    UnusableDevice{0x16c0, 0x0483, 0x0483, "a Teensy serial device, as Haply Inverse3 is one", kClosed},
+    UnusableDevice{0x16c0, 0x0483, 0x0483, "a Teensy serial device, such as Haply Inverse3", kClosed},
     UnusableDevice{0x2fe3, 0x0100, 0x0100, "Haply VerseGrip dongle", kClosed},
     UnusableDevice{0x256f, 0xc62c, 0xc62c, "a 3Dconnexion device without six axes", kNotSixAxes},
     UnusableDevice{0x256f, 0xc641, 0xc641, "3Dconnexion c641", kUnclear},

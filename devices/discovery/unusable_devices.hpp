@@ -7,17 +7,17 @@
 
 namespace wrenchd {
 
-/// A device that wrenchd knows and cannot use, and why.
+/// A device that wrenchd knows and cannot use, with the reason.
 struct UnusableDevice {
   std::uint16_t vendor = 0;
-  std::uint16_t first_product = 0;  ///< both ends of a range belong to it
+  std::uint16_t first_product = 0;  ///< range of product ids, both ends included
   std::uint16_t last_product = 0;
   std::string_view name;
-  std::string_view reason;  ///< a sentence, with the way out where there is one
+  std::string_view reason;  ///< one sentence, with an alternative if there is one
 };
 
-/// The entry for this id, or nullptr: nothing speaks against it. Such a device is never opened, whatever a
-/// profile says.
+/// Returns the entry of this id; nullptr if the device may be used. wrenchd never opens a device with an
+/// entry, whatever the profiles contain. Not RT-safe: intended for set-up.
 const UnusableDevice* find_unusable_device(UsbId id) noexcept;
 
 }  // namespace wrenchd

@@ -46,7 +46,7 @@ int number(std::string_view digits, int base) {
   return value;
 }
 
-/// All devices of a subsystem, in no order.
+/// Returns all devices of a subsystem, in arbitrary order.
 std::vector<Device> devices_of(udev* context, const char* subsystem) {
   const std::unique_ptr<udev_enumerate, Release> found(udev_enumerate_new(context));
   udev_enumerate_add_match_subsystem(found.get(), subsystem);
@@ -56,7 +56,7 @@ std::vector<Device> devices_of(udev* context, const char* subsystem) {
   std::vector<Device> devices;
   for (udev_list_entry* entry = udev_enumerate_get_list_entry(found.get()); entry != nullptr;
        entry = udev_list_entry_get_next(entry)) {
-    // One that was unplugged in the meantime is no longer there to be asked.
+    // skips a device that was unplugged in the meantime
     if (Device device(udev_device_new_from_syspath(context, udev_list_entry_get_name(entry))); device)
       devices.push_back(std::move(device));
   }
@@ -65,7 +65,7 @@ std::vector<Device> devices_of(udev* context, const char* subsystem) {
 
 // --- report descriptor ------------------------------------------------------------------------------------
 
-/// What the list needs of a report descriptor; whoever needs more parses it.
+/// Reads the usages and the presence of report ids; report_descriptor.hpp has the full parser.
 ///
 /// HID 1.11, section 6.2.2: an item is a prefix byte - size in bits 0 and 1, type in 2 and 3, tag in 4 to 7 -
 /// and 0, 1, 2 or 4 bytes of data. Prefix 0xFE begins a long item: its size follows, then its tag.
@@ -73,18 +73,18 @@ void read_descriptor(UsbDevice& device) {
   constexpr std::uint8_t usage_page = 0x04, report_id = 0x84, usage = 0x08, collection = 0xA0,
                          long_item = 0xFE;
   bool in_collection = false;
-  std::span<const std::uint8_t> rest(device.report_descriptor);
-  while (!rest.empty()) {
-    const std::uint8_t prefix = rest[0];
+  std::span<const std::uint8_t> remaining(device.report_descriptor);
+  while (!remaining.empty()) {
+    const std::uint8_t prefix = remaining[0];
     const bool is_long = prefix == long_item;
     const std::size_t head = is_long ? 3 : 1;
-    if (rest.size() < head) return;
+    if (remaining.size() < head) return;
     constexpr std::array<std::size_t, 4> sizes{0, 1, 2, 4};
-    const std::size_t size = is_long ? rest[1] : sizes[prefix & 3U];
-    if (rest.size() < head + size) return;
+    const std::size_t size = is_long ? remaining[1] : sizes[prefix & 3U];
+    if (remaining.size() < head + size) return;
     std::uint32_t value = 0;
     for (std::size_t i = 0; i < std::min<std::size_t>(size, 4); ++i)
-      value |= static_cast<std::uint32_t>(rest[head + i]) << (8 * i);
+      value |= static_cast<std::uint32_t>(remaining[head + i]) << (8 * i);
     const std::uint8_t item = is_long ? std::uint8_t{0} : static_cast<std::uint8_t>(prefix & 0xFCU);
     if (item == report_id) device.numbered_reports = true;
     if (item == collection) in_collection = true;
@@ -93,18 +93,18 @@ void read_descriptor(UsbDevice& device) {
       device.usage = static_cast<std::uint16_t>(value);
       if (size == 4) device.usage_page = static_cast<std::uint16_t>(value >> 16U);
     }
-    rest = rest.subspan(head + size);
+    remaining = remaining.subspan(head + size);
   }
 }
 
-std::vector<std::uint8_t> bytes_of(const std::string& file) {
+std::vector<std::uint8_t> read_bytes(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
 // --- one device -------------------------------------------------------------------------------------------
 
-void take_usb_strings(UsbDevice& device, udev_device* usb) {
+void read_usb_properties(UsbDevice& device, udev_device* usb) {
   device.port_path = text(udev_device_get_sysname(usb));
   device.usb_node = text(udev_device_get_devnode(usb));
   device.vendor = static_cast<std::uint16_t>(number(attribute(usb, "idVendor"), 16));
@@ -114,8 +114,8 @@ void take_usb_strings(UsbDevice& device, udev_device* usb) {
   device.product_name = attribute(usb, "product");
 }
 
-/// A HID device that is not on USB says who it is in its uevent: HID_ID=0005:00001209:00006D0F.
-void take_hid_strings(UsbDevice& device, udev_device* hid) {
+/// The uevent of a HID device that is not on USB contains its ids: HID_ID=0005:00001209:00006D0F.
+void read_hid_properties(UsbDevice& device, udev_device* hid) {
   const std::string id = text(udev_device_get_property_value(hid, "HID_ID"));
   const std::size_t first = id.find(':');
   const std::size_t second = first == std::string::npos ? first : id.find(':', first + 1);
@@ -130,12 +130,12 @@ void take_hid_strings(UsbDevice& device, udev_device* hid) {
 UsbDevice from_hidraw(udev_device* hidraw, udev_device* hid) {
   UsbDevice device;
   device.hidraw_node = text(udev_device_get_devnode(hidraw));
-  device.report_descriptor = bytes_of(text(udev_device_get_syspath(hid)) + "/report_descriptor");
+  device.report_descriptor = read_bytes(text(udev_device_get_syspath(hid)) + "/report_descriptor");
   read_descriptor(device);
   return device;
 }
 
-/// The numbers in "/dev/hidraw12" or "3-1.10", to sort by.
+/// Returns the numbers in "/dev/hidraw12" or "3-1.10", as a sort key.
 std::vector<int> numbers_in(std::string_view s) {
   std::vector<int> numbers;
   for (std::size_t i = 0; i < s.size();) {
@@ -173,10 +173,10 @@ bool UsbDevice::is_same_device(const UsbDevice& other) const {
 
 std::vector<UsbDevice> list_usb_devices() {
   const Udev context(udev_new());
-  if (!context) throw std::runtime_error("udev cannot be asked what is plugged in: out of memory");
+  if (!context) throw std::runtime_error("cannot list connected devices through udev: out of memory");
   std::vector<UsbDevice> found;
 
-  // HID interfaces first: what is known of them by the path of their USB interface.
+  // First the HID interfaces, by the path of their USB interface.
   std::map<std::string, std::vector<UsbDevice>> on_usb;
   for (const Device& hidraw : devices_of(context.get(), "hidraw")) {
     udev_device* const hid = udev_device_get_parent_with_subsystem_devtype(hidraw.get(), "hid", nullptr);
@@ -187,7 +187,7 @@ std::vector<UsbDevice> list_usb_devices() {
     if (interface != nullptr) {
       on_usb[text(udev_device_get_syspath(interface))].push_back(std::move(device));
     } else {
-      take_hid_strings(device, hid);
+      read_hid_properties(device, hid);
       found.push_back(std::move(device));
     }
   }
@@ -202,7 +202,7 @@ std::vector<UsbDevice> list_usb_devices() {
     if (here.empty()) here.emplace_back();
     for (UsbDevice& device : here) {
       device.interface = number(attribute(interface.get(), "bInterfaceNumber"), 16);
-      take_usb_strings(device, usb);
+      read_usb_properties(device, usb);
       found.push_back(std::move(device));
     }
   }
@@ -238,21 +238,21 @@ std::string open_error(const UsbDevice& device, const std::string& node, int err
   switch (error) {
     case EACCES:
     case EPERM:
-      return what + "; add to /etc/udev/rules.d/70-wrenchd.rules the line\n  " + udev_rule(device, node) +
-             "\nand be in the group wrenchd; then unplug it and plug it in again";
+      return what + "; add this line to /etc/udev/rules.d/70-wrenchd.rules\n  " + udev_rule(device, node) +
+             "\nand join the group wrenchd; then unplug the device and connect it again";
     case ENOENT:
     case ENODEV:
     case ENXIO:
-      return what + "; it is not plugged in any more";
+      return what + "; the device is no longer connected";
     case EBUSY:
-      return what + "; another program holds it: end that one";
+      return what + "; another program uses it: end that program";
     default:
-      return what + "; unplug it and plug it in again, and look at what the kernel says (dmesg)";
+      return what + "; unplug the device and connect it again, and check the kernel log (dmesg)";
   }
 }
 
 std::string port_path_in(std::string_view sys_path) {
-  std::string place;
+  std::string port_path;
   while (!sys_path.empty()) {
     const std::size_t end = std::min(sys_path.find('/'), sys_path.size());
     const std::string_view part = sys_path.substr(0, end);
@@ -264,10 +264,10 @@ std::string port_path_in(std::string_view sys_path) {
     };
     if (dash != std::string_view::npos && digits(part.substr(0, dash), "") &&
         digits(part.substr(dash + 1), "."))
-      place = part;
+      port_path = part;
     sys_path.remove_prefix(std::min(end + 1, sys_path.size()));
   }
-  return place;
+  return port_path;
 }
 
 }  // namespace wrenchd

@@ -8,46 +8,50 @@
 
 namespace wrenchd {
 
-/// One interface of something that is plugged in. A HID interface has a hidraw node; what hidapi and libusb
-/// call a device is this.
+/// One interface of a connected device. A HID interface has a hidraw node. hidapi and libusb call it a
+/// device.
 struct UsbDevice {
-  std::string hidraw_node;  ///< "/dev/hidraw3"; empty where the interface is not HID or has no driver
-  std::string usb_node;     ///< "/dev/bus/usb/003/002"; empty where it is not on USB (Bluetooth, uhid)
-  std::string port_path;    ///< bus and ports, "3-1.2": the socket it is in; empty where not on USB
-  int interface = -1;       ///< bInterfaceNumber; -1 where not on USB
+  std::string hidraw_node;  ///< "/dev/hidraw3"; empty if the interface is not HID or has no driver
+  std::string usb_node;     ///< "/dev/bus/usb/003/002"; empty if the device is not on USB (Bluetooth, uhid)
+  std::string port_path;    ///< bus and ports, "3-1.2"; empty if the device is not on USB
+  int interface = -1;       ///< bInterfaceNumber; -1 if the device is not on USB
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
-  std::string serial;  ///< empty where the device tells none
+  std::string serial;  ///< empty if the device has no serial number
   std::string manufacturer;
   std::string product_name;
-  std::vector<std::uint8_t> report_descriptor;  ///< raw, as the kernel keeps it; empty where not HID
-  std::uint16_t usage_page = 0;                 ///< of the first collection; 0 where not HID
+  /// Raw bytes from the kernel; empty if the interface is not HID.
+  std::vector<std::uint8_t> report_descriptor;
+  std::uint16_t usage_page = 0;  ///< of the first collection; 0 if the interface is not HID
   std::uint16_t usage = 0;
-  bool numbered_reports = false;  ///< reports begin with their id
+  bool numbered_reports = false;  ///< true if reports begin with their id
 
-  /// The same device as far as it can tell: ids, serial number, interface and report descriptor. Not the
-  /// place and not the nodes.
+  /// Returns true if both have the same ids, serial number, interface and report descriptor. Ignores port and
+  /// nodes.
   bool is_same_device(const UsbDevice& other) const;
 };
 
-/// Everything plugged in, but hubs: by place, then interface, then hidraw number, numbers as numbers. Throws
-/// std::runtime_error where udev cannot be asked. Not RT safe; takes milliseconds.
+/// Returns all connected devices except hubs, sorted by port path, interface and hidraw number, numerically.
+/// Throws std::runtime_error if udev is not available. Not RT-safe: may take milliseconds.
 std::vector<UsbDevice> list_usb_devices();
 
-/// What a device says of itself, fit for a terminal and a log: no character that moves a cursor or begins a
-/// line.
+/// Returns text from a device with all control characters replaced, safe for terminals and logs. Not RT-safe:
+/// allocates.
 std::string to_printable(std::string text);
 
-/// "1209:6d0f serial 42 in 3-1.2, interface 0", for messages; its serial number made plain.
+/// Returns "1209:6d0f serial 42 in 3-1.2, interface 0", for messages, without control characters. Not
+/// RT-safe: allocates.
 std::string describe(const UsbDevice& device);
 
-/// Why a node cannot be opened for reading and writing, and the cure; empty where it can. Asks the system,
-/// opens nothing.
+/// Returns why a node cannot be opened for reading and writing, and the remedy; empty if it can. Checks the
+/// permissions and does not open the node. Not RT-safe: system calls.
 std::string open_error(const UsbDevice& device, const std::string& node);
-/// The same for a given errno. Where it is a matter of permission the cure is the udev rule, word for word.
+/// Returns the error text for a given errno. For a permission error the remedy is the required udev rule. Not
+/// RT-safe: allocates.
 std::string open_error(const UsbDevice& device, const std::string& node, int error);
 
-/// The bus and ports in a path below /sys: the last part like "3-1.2", or nothing.
+/// Returns bus and ports of a path below /sys: its last component of the form "3-1.2"; empty if there is
+/// none. Not RT-safe: allocates.
 std::string port_path_in(std::string_view sys_path);
 
 }  // namespace wrenchd

@@ -12,11 +12,11 @@ struct libusb_device_handle;
 
 namespace wrenchd {
 
-/// An FTDI serial chip with one port, over libusb: requests of type 0x40 to the device, two bulk endpoints,
-/// and two bytes of modem status at the start of each packet in, which are taken off. The interface must be
-/// claimed, and nobody else may read meanwhile. Waits, at most a second a call, and throws
-/// std::runtime_error. Not RT safe. Facts: libftdi (ftdi.h, ftdi.c), and drivers/usb/serial/ftdi_sio.h of
-/// Linux.
+/// FTDI serial chip with one port, over libusb: vendor requests of type 0x40 to the device, two bulk
+/// endpoints, and two bytes of modem status at the start of each IN packet, which read() removes. The
+/// interface must be claimed, and no other thread may read. Not RT-safe: each call may take a second, and
+/// throws std::runtime_error on failure. Sources: libftdi (ftdi.h, ftdi.c), and drivers/usb/serial/ftdi_sio.h
+/// of Linux.
 class FtdiSerial final : public SerialChip {
  public:
   static constexpr std::size_t kStatusBytes = 2;
@@ -32,8 +32,8 @@ class FtdiSerial final : public SerialChip {
  private:
   libusb_device_handle* handle_;
   std::uint8_t in_, out_;
-  std::vector<std::uint8_t> packet_;    ///< room for one
-  std::vector<std::uint8_t> buffered_;  ///< arrived, and not asked for yet
+  std::vector<std::uint8_t> packet_;    ///< buffer of one USB packet
+  std::vector<std::uint8_t> buffered_;  ///< received bytes that have not been read yet
 };
 
 }  // namespace wrenchd

@@ -22,44 +22,46 @@
 namespace wrenchd {
 namespace {
 
-/// hidapi is not made for several threads where it opens and closes: its error text is one for all.
+/// The open and close functions of hidapi are not thread-safe: they share one error text.
 std::mutex& hidapi_mutex() {
   static std::mutex mutex;
   return mutex;
 }
 
-std::set<int> open_files() {
+std::set<int> open_fds() {
   std::set<int> files;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
     files.insert(std::atoi(entry.path().filename().c_str()));
-  std::erase_if(files, [](int file) { return fcntl(file, F_GETFD) < 0; });  // the directory's own
+  std::erase_if(files, [](int file) {
+    return fcntl(file, F_GETFD) < 0;
+  });  // removes the descriptor of the directory itself
   return files;
 }
 
-/// The file descriptor that hidapi opened on the node and keeps to itself: one that was not there before and
-/// is the node. -1 where there is none.
-int file_opened(const std::string& node, const std::set<int>& before) {
-  struct stat wanted {};
-  if (stat(node.c_str(), &wanted) != 0) return -1;
-  for (const int file : open_files()) {
+/// Returns the file descriptor that hidapi opened for the node and does not expose: one that was not open
+/// before and refers to the node. -1 if there is none.
+int find_opened_fd(const std::string& node, const std::set<int>& before) {
+  struct stat expected {};
+  if (stat(node.c_str(), &expected) != 0) return -1;
+  for (const int file : open_fds()) {
     struct stat found {};
-    if (before.count(file) == 0 && fstat(file, &found) == 0 && found.st_dev == wanted.st_dev &&
-        found.st_ino == wanted.st_ino)
+    if (before.count(file) == 0 && fstat(file, &found) == 0 && found.st_dev == expected.st_dev &&
+        found.st_ino == expected.st_ino)
       return file;
   }
   return -1;
 }
 
-/// Refuses where another device than the wanted one is behind the node now. To be asked while the node is
-/// open: the kernel gives its number to no other device until it is closed.
-void check_identity(const UsbDevice& wanted) {
+/// Throws if another device is behind the node now. The node must be open: the kernel does not reassign its
+/// number until it is closed.
+void check_identity(const UsbDevice& expected) {
   for (const UsbDevice& found : list_usb_devices()) {
-    if (found.hidraw_node != wanted.hidraw_node) continue;
-    if (found.is_same_device(wanted)) return;
-    throw std::runtime_error(wanted.hidraw_node + " is " + describe(found) + ", not " + describe(wanted) +
-                             ": nothing was written to it; look for the device anew");
+    if (found.hidraw_node != expected.hidraw_node) continue;
+    if (found.is_same_device(expected)) return;
+    throw std::runtime_error(expected.hidraw_node + " is " + describe(found) + ", not " + describe(expected) +
+                             ": nothing was written to it; search for the device again");
   }
-  throw std::runtime_error(open_error(wanted, wanted.hidraw_node, ENODEV));
+  throw std::runtime_error(open_error(expected, expected.hidraw_node, ENODEV));
 }
 
 }  // namespace
@@ -86,18 +88,19 @@ void HidrawLink::open() {
     }
     return hid;
   };
-  // One for each thread: hidapi keeps an error text with each, which reader and writer would race for.
+  // One handle per thread: hidapi stores an error text in each handle, so reader and writer must not share
+  // one.
   Hid writing;
   {
     std::unique_lock lock(hidapi_mutex());
     Hid reading;
     try {
-      const std::set<int> before = open_files();
+      const std::set<int> before = open_fds();
       reading = open_node();
-      fd_ = file_opened(node, before);
+      fd_ = find_opened_fd(node, before);
       writing = open_node();
     } catch (...) {
-      lock.unlock();  // closing takes it
+      lock.unlock();  // the destructor of Hid takes the lock
       throw;
     }
     reader_ = std::move(reading);
@@ -106,7 +109,8 @@ void HidrawLink::open() {
     reader_.reset();
     throw std::runtime_error("cannot find the file that hidapi opened for " + node + "; is /proc mounted?");
   }
-  // The kernel lets any number of programs write to a HID device; two hosts on one hand must not be.
+  // The kernel lets several programs write to a HID device. The lock prevents two hosts from driving one
+  // device.
   if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno == EWOULDBLOCK ? EBUSY : errno;
     reader_.reset();
@@ -131,8 +135,8 @@ void HidrawLink::open() {
 
 LinkRead HidrawLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
   if (!reader_ || disconnected_) return {LinkStatus::disconnected, 0, now};
-  // hidapi polls, too, but makes a text on the heap of what it finds wrong, and after unplugging the kernel
-  // still gives out what waited.
+  // hidapi also polls, but allocates an error text on failure. After unplugging, the kernel still delivers
+  // the waiting reports.
   pollfd ready{fd_, POLLIN, 0};
   if (poll(&ready, 1, 0) > 0 && (ready.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0)
     return mark_disconnected(now);
@@ -161,7 +165,7 @@ LinkStatus HidrawLink::write(TimePoint now, std::span<const std::uint8_t> report
   return writer_->submit(now, report);
 }
 
-/// On the writer's thread.
+/// Runs on the writer thread.
 LinkStatus HidrawLink::write_blocking(hid_device_* hid, bool numbered, std::span<const std::uint8_t> report) {
   std::array<std::uint8_t, kMaxReportBytes + 1> framed{};
   const std::size_t head = numbered ? 0 : 1;

@@ -14,49 +14,50 @@
 #include "devices/links/link_settings.hpp"
 #include "devices/links/report_link.hpp"
 
-struct hid_device_;  // hidapi's
+struct hid_device_;  // type of hidapi
 
 namespace wrenchd {
 
-/// A USB HID device through the kernel's own driver: hidapi, hidraw backend. The default transport.
+/// USB HID device through the kernel driver: hidapi, hidraw backend. The default transport.
 ///
-/// Reports stand as they do on the wire: their id first where the device numbers its reports, without one
-/// where it does not (hidapi wants a 0 there on writing; that is done here).
+/// Reports have the format of the wire: the id comes first if the device numbers its reports, and there is no
+/// id otherwise. hidapi needs a 0 in its place on writing; the link adds it.
 ///
-/// Reading is done on the servo thread: a poll and a read, which neither wait, lock nor allocate. Writing is
-/// not: a device that takes nothing keeps a write in the kernel for 5 s, so a LatestWriter does it.
+/// The servo thread reads: a poll and a read, which do not wait, lock or allocate. If a device accepts no
+/// data, a write stays in the kernel for 5 s. A LatestWriter therefore writes.
 class HidrawLink final : public ReportLink {
  public:
-  /// `device`: as list_usb_devices() tells it.
+  /// `device`: an entry of list_usb_devices().
   explicit HidrawLink(UsbDevice device, LinkSettings settings = {});
   ~HidrawLink() override { close(); }
   HidrawLink(const HidrawLink&) = delete;
   HidrawLink& operator=(const HidrawLink&) = delete;
 
-  /// Throws where the node cannot be opened, or is another device by now: ids, serial number, interface and
-  /// report descriptor are compared, and nothing is ever written to one that differs. Throws where another
-  /// HidrawLink has it, in this process or another: the node is locked while this is open.
+  /// Opens and locks the node. Throws std::runtime_error if the node cannot be opened, if another HidrawLink
+  /// of any process has locked it, or if another device is behind the node now. For the last check it
+  /// compares ids, serial number, interface and report descriptor, before any write. Not RT-safe: may take
+  /// milliseconds.
   void open() override;
-  /// hidraw does not say when a report arrived, so that is taken to be now; a report is never older than one
-  /// tick but in one case: the kernel's ring was full and dropped what came later. Then it is said to have
-  /// arrived when the ring was last seen empty. An unplugged device is gone at once, whatever still waits.
+  /// hidraw has no arrival times, so the arrival time is `now` and at most one tick late. Exception: if the
+  /// kernel ring was full, it dropped later reports; then the arrival time is the time at which the ring was
+  /// last empty. After unplugging the link is disconnected at once, even if reports still wait. RT-safe.
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
-  /// Hands the report to the writer. `empty` where the writer is overdue or the write before it failed; the
-  /// report is in the slot then all the same.
+  /// Submits the report to the writer. Returns `not_ready` if the writer is overdue or the previous write
+  /// failed; the report is then submitted nevertheless. RT-safe.
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
-  /// Writes the last report handed over, waiting for it as long as the settings say. Where a write is stuck
-  /// in the kernel that holds on to closing, too: up to 5 s more.
+  /// Writes the last submitted report and waits for it at most for the close_timeout of the settings. If a
+  /// write is stuck in the kernel, closing takes up to 5 s more. Not RT-safe: waits.
   void close() noexcept override;
 
   const UsbDevice& device() const noexcept { return device_; }
-  /// Of the writer, while open; nullptr before.
+  /// Returns the writer while the link is open; nullptr otherwise.
   const LatestWriter* writer() const noexcept { return writer_ ? &*writer_ : nullptr; }
 
  private:
-  /// The most the kernel's HID core passes on in one report.
+  /// Longest report that the HID core of the kernel delivers.
   static constexpr std::size_t kMaxHidReportBytes = 16384;
-  /// What the kernel keeps for one reader: a ring of 64, of which one stays free.
+  /// Capacity of the kernel ring of one reader: 64 entries, of which one stays free.
   static constexpr int kKernelRingCapacity = 63;
 
   struct CloseHid {
@@ -70,9 +71,10 @@ class HidrawLink final : public ReportLink {
   UsbDevice device_;
   LinkSettings settings_;
   Hid reader_;
-  int fd_ = -1;  ///< hidapi's, of reading_: to wait with the precision that hidapi does not offer
+  int fd_ = -1;  ///< file descriptor that hidapi opened for reader_; ppoll on it waits with a precision that
+                 ///< hidapi does not offer
   bool disconnected_ = false;
-  std::optional<TimePoint> last_seen_empty_;  ///< when nothing waited
+  std::optional<TimePoint> last_seen_empty_;  ///< last time at which no report was waiting
   int taken_since_empty_ = 0;
   std::array<std::uint8_t, kMaxHidReportBytes> bytes_{};
   std::optional<LatestWriter> writer_;

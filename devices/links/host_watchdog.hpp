@@ -11,40 +11,42 @@
 
 namespace wrenchd {
 
-/// What the writer of a link says in the place of a servo loop that has fallen silent while it pushed: zero
-/// wrench, motors off. A loop that is stuck while its process lives cannot release the hand itself, and the
-/// device's own watchdog may take half a second.
+/// Watchdog of the servo loop, run by the writer thread of a link. If the loop hangs while the device applies
+/// a wrench, the watchdog sends a zero wrench with the motors off. A hanging loop cannot release the device,
+/// and the device's own watchdog may take half a second.
 ///
-/// It speaks of nothing but wrenches that push: a loop that is silent on purpose, as in the self-test that
-/// wants to see the watchdog trip, sends zeros before. Once it has spoken it is silent until the loop pushes
-/// anew. Its commands have the numbers that the loop's next ones will have, so a loop that comes back loses
-/// as many of its own; it comes back with zeros (core/transitions.hpp: a late tick).
+/// The watchdog is active only timeout a nonzero wrench. The loop sends zeros before an intended silence, for
+/// example in the self-test of the device's watchdog. After its zero commands the watchdog is inactive until
+/// the loop sends a nonzero wrench again. Its commands use the next sequence numbers of the loop. A loop that
+/// resumes therefore loses the same number of its own commands; these are zero too (core/transitions.hpp: a
+/// late tick).
 ///
-/// Belongs to the writer's thread. Neither allocates, locks nor throws.
+/// Used only by the writer thread. All members except the constructors are RT-safe.
 class HostWatchdog {
  public:
-  /// Never speaks.
+  /// Makes a watchdog that never sends.
   HostWatchdog() noexcept = default;
-  /// after: silence of the loop until it is spoken for. Of a device without motors: never speaks.
-  HostWatchdog(const DeviceProfile& profile, Duration after);
+  /// timeout: timeout since the last command of the loop. For a device without motors the watchdog never
+  /// sends. Not RT-safe: allocates.
+  HostWatchdog(const DeviceProfile& profile, Duration timeout);
 
-  /// The loop said that, now.
+  /// Processes a report that the loop sent at `now`. RT-safe.
   void feed(TimePoint now, const Packet& packet) noexcept;
-  /// When it is time to speak for the loop, if it says nothing until then; TimePoint::max() where there is
-  /// nothing to say.
+  /// Returns the time at which the watchdog sends next if the loop sends nothing before; TimePoint::max() if
+  /// it will not send. RT-safe.
   TimePoint due() const noexcept { return due_; }
-  /// What to say now, if it is time.
+  /// Writes the zero command to `packet` if it is due, and returns true. Returns false otherwise. RT-safe.
   bool send_zero(TimePoint now, Packet& packet) noexcept;
 
-  /// Said so often, so that a lost one does not matter.
+  /// Number of zero commands, so that the loss of one has no effect.
   static constexpr unsigned kZeroReports = 3;
   static constexpr Duration kZeroInterval = std::chrono::milliseconds(1);
 
  private:
   std::optional<WrenchReportLayout> layout_;
   Duration timeout_{};
-  WrenchReport last_report_;  ///< the loop's
-  unsigned zeros_sent_ = 0;   ///< since then
+  WrenchReport last_report_;  ///< last command of the loop
+  unsigned zeros_sent_ = 0;   ///< zero commands sent since last_report_
   TimePoint due_ = TimePoint::max();
 };
 

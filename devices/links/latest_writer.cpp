@@ -15,7 +15,7 @@ namespace wrenchd {
 
 struct LatestWriter::SharedState {
   SharedState(Write how, const LinkSettings& settings)
-      : write(std::move(how)), slot(settings.write_deadline), last_word(settings.host_watchdog) {}
+      : write(std::move(how)), slot(settings.write_deadline), host_watchdog(settings.host_watchdog) {}
 
   void run() noexcept;
   bool next(Packet& packet) noexcept;
@@ -23,18 +23,18 @@ struct LatestWriter::SharedState {
 
   Write write;
   WriteSlot slot;
-  HostWatchdog last_word;
+  HostWatchdog host_watchdog;
   WakeUp wake;
   std::atomic<bool> closing{false};
 
   std::mutex mutex;
   std::condition_variable changed;
-  bool over = false;    ///< under the mutex
-  bool last_ok = true;  ///< the last write succeeded; the thread's, to be read when it is over
+  bool ended = false;   ///< guarded by the mutex
+  bool last_ok = true;  ///< result of the last write; written by the thread, read after it has ended
 };
 
 void LatestWriter::SharedState::run() noexcept {
-  // Whether it is the end is asked before the slot is: what was handed over before the end is then seen.
+  // Reads `closing` before the slot, so that every report submitted before close() is written.
   for (bool last_round = false; !slot.disconnected() && !last_round;) {
     last_round = closing.load(std::memory_order_acquire);
     Packet packet;
@@ -42,27 +42,27 @@ void LatestWriter::SharedState::run() noexcept {
       write_one(packet);
       last_round = false;
     } else if (!last_round) {
-      wake.wait_until(last_word.due());
+      wake.wait_until(host_watchdog.due());
     }
   }
   const std::lock_guard lock(mutex);
-  over = true;
+  ended = true;
   changed.notify_all();
 }
 
-/// What the loop handed over, or what is said in its place.
+/// Returns the next report: of the servo loop, or of the host watchdog.
 bool LatestWriter::SharedState::next(Packet& packet) noexcept {
-  const bool heard = slot.take(packet);
+  const bool has_report = slot.take(packet);
   const TimePoint now = std::chrono::steady_clock::now();
-  if (heard) last_word.feed(now, packet);
-  return heard || last_word.send_zero(now, packet);
+  if (has_report) host_watchdog.feed(now, packet);
+  return has_report || host_watchdog.send_zero(now, packet);
 }
 
 void LatestWriter::SharedState::write_one(const Packet& packet) noexcept {
   LinkStatus status = LinkStatus::not_ready;
   try {
     status = write(packet.report());
-  } catch (...) {  // a write that throws is a write that failed
+  } catch (...) {  // a write that throws counts as failed
   }
   last_ok = status == LinkStatus::ok;
   slot.complete(status);
@@ -90,10 +90,10 @@ bool LatestWriter::close() noexcept {
   shared_->closing.store(true, std::memory_order_release);
   shared_->wake.wake();
   std::unique_lock lock(shared_->mutex);
-  const bool over = shared_->changed.wait_for(lock, close_timeout_, [this] { return shared_->over; });
+  const bool ended = shared_->changed.wait_for(lock, close_timeout_, [this] { return shared_->ended; });
   lock.unlock();
-  if (thread_.joinable()) over ? thread_.join() : thread_.detach();
-  return over && shared_->last_ok;
+  if (thread_.joinable()) ended ? thread_.join() : thread_.detach();
+  return ended && shared_->last_ok;
 }
 
 const WriteSlot& LatestWriter::slot() const noexcept {

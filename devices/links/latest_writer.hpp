@@ -14,43 +14,43 @@
 
 namespace wrenchd {
 
-/// A thread that writes reports for one that must not wait. The kernel may keep a write for seconds where the
-/// device takes nothing (5 s on hidraw), so it is done here; the servo thread leaves the newest report in a
-/// slot and goes on.
+/// Thread that writes reports for a thread that must not wait. The kernel may block a write for seconds if
+/// the device accepts no data (5 s on hidraw). The servo thread stores the newest report in a slot and
+/// continues.
 ///
-/// A loop that falls silent while it pushes is spoken for, as LinkSettings::last_word says: this thread lives
-/// on where that one is stuck.
+/// If the servo loop hangs, this thread sends zero commands (LinkSettings::host_watchdog).
 ///
-/// Every end is the same: the report handed over last is written last, and nothing after it. Who releases the
-/// hand before it closes can rely on zeros being the last word.
+/// On every kind of close, the last submitted report is also the last one written. A caller that releases the
+/// device before closing can rely on zeros being the last command.
 class LatestWriter {
  public:
-  /// Writes one report and says how it went. May block; called on the writer's thread only, and destroyed
-  /// when the last write is over, which may be after the writer itself (see close()).
+  /// Writes one report and returns the result. May block. Only the writer thread calls it. It is destroyed
+  /// after the last write, which may be after the destruction of the LatestWriter (see close()).
   using Write = std::function<LinkStatus(std::span<const std::uint8_t>)>;
 
-  /// Starts the thread. Throws std::system_error where the system has none left.
+  /// Starts the thread. Throws std::system_error if the system cannot create a thread.
   LatestWriter(Write write, const LinkSettings& settings);
-  /// As close().
+  /// Calls close(). Not RT-safe: waits.
   ~LatestWriter();
   LatestWriter(const LatestWriter&) = delete;
   LatestWriter& operator=(const LatestWriter&) = delete;
 
-  /// See WriteSlot::hand_over(). RT safe.
+  /// Submits a report, see WriteSlot::submit(). RT-safe.
   LinkStatus submit(TimePoint now, std::span<const std::uint8_t> report) noexcept;
-  /// Writes what waits and ends the thread, in `close_within` at most. True where all was written.
+  /// Writes the waiting report and ends the thread. Takes at most `close_timeout`. Returns true if all
+  /// reports were written.
   ///
-  /// Where the kernel does not give a write back in that time the thread is left alone with it: it still
-  /// writes the last report once it can, then ends by itself. False then, and where the write failed. Not RT
-  /// safe; to be called when nobody hands over any more.
+  /// If the kernel does not return from a write in this time, close() detaches the thread. The thread writes
+  /// the last report as soon as it can and then ends. close() then returns false, and also if the last write
+  /// failed. No other thread may call submit() any more. Not RT-safe: waits.
   bool close() noexcept;
 
-  /// False where a real-time priority was asked for and the kernel refused: raise the rtprio limit.
+  /// False if the kernel refused the requested real-time priority; then raise the rtprio limit.
   bool priority_granted() const noexcept { return priority_granted_; }
   const WriteSlot& slot() const noexcept;
 
  private:
-  struct SharedState;  ///< what the thread needs, kept by it until it ends
+  struct SharedState;  ///< state of the thread, which the thread keeps alive until it ends
 
   std::shared_ptr<SharedState> shared_;
   std::thread thread_;
@@ -58,8 +58,8 @@ class LatestWriter {
   bool priority_granted_ = true;
 };
 
-/// Makes a thread SCHED_FIFO of that priority, or leaves it as it is where that is 0. False where the kernel
-/// refuses.
+/// Sets a thread to SCHED_FIFO with this priority; 0 leaves the thread unchanged. Returns false if the kernel
+/// refuses. Not RT-safe: system call.
 bool raise_priority(std::thread& thread, int priority) noexcept;
 
 }  // namespace wrenchd

@@ -7,7 +7,7 @@
 namespace wrenchd {
 namespace {
 
-/// The byte that a report always has there; 0 where it has none.
+/// Returns the constant at a byte of a report; 0 if there is none.
 std::uint8_t constant_at(const ReportFrame& report, std::size_t byte) {
   for (const ReportConstant& constant : report.constants)
     if (constant.byte == byte) return constant.value;

@@ -14,39 +14,41 @@
 
 namespace wrenchd {
 
-/// A loop of 1 kHz that is later than that is a late one by its own rules, too (core/watch_limits.hpp).
+/// Default timeout of the host watchdog. A 1 kHz loop this late is also late by its own limits
+/// (core/watch_limits.hpp).
 inline constexpr Duration kHostWatchdogTimeout = std::chrono::milliseconds(6);
 
-/// What a USB link is told beside the device.
+/// Settings of a link to a device.
 struct LinkSettings {
-  /// A write that makes no progress for this long is told to the servo thread as a failed one. Writes end
-  /// within a frame or two of 1 ms on a device that works; one that is longer than a few is stuck.
+  /// If a write makes no progress for this time, the link reports it to the servo thread as failed. A working
+  /// device completes a write within one or two frames of 1 ms, so a write that takes a few frames is stuck.
   Duration write_deadline = std::chrono::milliseconds(4);
-  /// How long close() waits at most for the last report to be written.
+  /// Maximum time that close() waits for the last write.
   Duration close_timeout = std::chrono::milliseconds(500);
-  /// SCHED_FIFO priority of the link's own thread; 0: an ordinary thread. That of the servo thread is best:
-  /// the command goes out as soon as the servo thread sleeps, and neither cuts the other short.
+  /// SCHED_FIFO priority of the link's thread; 0: a normal thread. Use the priority of the servo thread: the
+  /// command then leaves as soon as the servo thread sleeps, and neither thread preempts the other.
   int priority = 0;
-  /// Speaks for a loop that is stuck.
+  /// Sends zero commands if the servo loop hangs.
   HostWatchdog host_watchdog = {};
-  /// Bytes of the longest input report, where it is longer than one packet. Only libusb must know it.
+  /// Length of the longest input report in bytes, if it exceeds one USB packet. Only UsbLink uses it.
   std::size_t max_report_bytes = 0;
 
-  // What follows only libusb must know.
+  // Only UsbLink uses the following settings.
 
-  /// Endpoints; 0: the first of the interface.
+  /// Endpoint addresses; 0: the first endpoint of the interface.
   std::uint8_t in_endpoint = 0, out_endpoint = 0;
-  /// At the start of each packet in, not part of a report: a serial chip's modem status.
+  /// Bytes at the start of each IN packet that are not part of a report: modem status of a serial chip.
   std::size_t prefix_bytes = 0;
-  /// Where the device is a serial chip: what is done with it when it is opened, before reports flow. It may
-  /// wait and throw.
+  /// Starts a device behind a serial chip. UsbLink calls it when it opens the device, before any report. It
+  /// may wait and throw.
   std::function<void(SerialChip&)> start_serial = {};
-  /// How reports are found in what a serial chip sends.
+  /// Format of the reports in the byte stream of a serial chip.
   StreamFramer::Frame frame = {};
 };
 
-/// What the profile says of a link; the rest as above. silent_after: from when on a loop that pushes and says
-/// nothing is spoken for; it has to be longer than the loop ever is silent. Not RT safe.
+/// Returns the link settings of a profile; the other settings keep their defaults. silent_after: timeout of
+/// the host watchdog; it must exceed the longest normal pause between two commands of the loop. Not RT-safe:
+/// allocates.
 LinkSettings link_settings(const DeviceProfile& profile, Duration silent_after = kHostWatchdogTimeout);
 
 }  // namespace wrenchd

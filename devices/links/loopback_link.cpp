@@ -28,8 +28,7 @@ void LoopbackLink::open() {
   const TimePoint now = clock_.now();
   advance_to(now);
   if (device_.fault_active_during(Kind::unplug, now, now))
-    throw std::runtime_error(
-        "simulated device: unplugged by its fault plan; wait until it is plugged in again");
+    throw std::runtime_error("simulated device: unplugged by an injected fault; wait until the fault ends");
   reports_.clear();
   swapped_report_.length = 0;
   last_arrival_ = now;
@@ -69,7 +68,7 @@ void LoopbackLink::wait_readable(TimePoint deadline) noexcept {
 
 void LoopbackLink::close() noexcept {
   state_ = State::closed;
-  reports_.clear();  // commands in flight still arrive
+  reports_.clear();  // commands in transit still arrive
 }
 
 void LoopbackLink::advance_to(TimePoint now) noexcept {
@@ -120,20 +119,20 @@ void LoopbackLink::take_report(TimePoint sent, std::span<const std::uint8_t> rep
   swapped_report_.length = 0;
 }
 
-/// Nothing overtakes on a wire: what was late keeps back what follows it.
+/// Reports stay in order: a delayed report delays its successors.
 void LoopbackLink::enqueue(TimePoint arrives, const Packet& packet) noexcept {
   last_arrival_ = std::max(last_arrival_, arrives);
   if (!reports_.push(last_arrival_, packet.report())) ++dropped_;
 }
 
-/// A driver that does not come back: time passes, and nobody can do anything about it.
+/// Blocks until the stall fault ends, as a driver that does not return.
 void LoopbackLink::block_if_stalled() noexcept {
   const FaultPlan& faults = device_.faults();
   if (const SimulatedFault* stalled = faults.active_at(Kind::stall, clock_.now()))
     clock_.sleep_until(faults.end_of(*stalled));
 }
 
-/// When the next report can be read. Later than now wherever none is waiting.
+/// Returns when the next report can be read. The result is after `now` unless a report is waiting.
 TimePoint LoopbackLink::next_arrival(TimePoint now) const noexcept {
   if (!reports_.empty()) return reports_.next_arrival();
   return std::max(device_.next_event() + report_delay_, now + Duration{1});

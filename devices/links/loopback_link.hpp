@@ -11,28 +11,28 @@
 
 namespace wrenchd {
 
-/// The wire to an emulated device: a delay and a queue in each direction, and the faults that a wire has.
-/// Reports wait in a ring like that of hidraw: 64 of them, and a newer one is dropped when it is full.
+/// Link to an emulated device: a delay and a queue in each direction, and transport faults. Reports wait in a
+/// ring of 64, as with hidraw; if the ring is full, the link drops the newest report.
 ///
-/// Time passes for the device only in these calls, up to the `now` they are given; nothing runs in between
-/// and there is no thread.
+/// The time of the device advances only in calls of this link, up to their `now`. The link has no thread.
 class LoopbackLink final : public ReportLink, private ReportSink {
  public:
-  /// The delays are those of the settings. Device and clock must outlive the link.
+  /// Uses the delays of the settings. Device and clock must outlive the link.
   LoopbackLink(EmulatedDevice& device, Clock& clock, const SimulationSettings& settings);
-  /// No delay: what is written has arrived when write() returns.
+  /// Uses no delay: a command has arrived when write() returns.
   LoopbackLink(EmulatedDevice& device, Clock& clock) : device_(device), clock_(clock) {}
 
-  /// Throws std::runtime_error while the device is unplugged.
+  /// Throws std::runtime_error while the device is unplugged. Not RT-safe: may throw.
   void open() override;
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
   void close() noexcept override;
 
-  /// Lets time pass without a read or write, open or not: commands arrive, reports queue up. RT safe.
+  /// Advances the time without a read or write, also while the link is closed: commands arrive and reports
+  /// enter the queue. RT-safe.
   void advance_to(TimePoint now) noexcept;
-  /// Reports lost because the host did not read them in time.
+  /// Number of reports lost because the host did not read them in time. RT-safe.
   std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
@@ -48,11 +48,11 @@ class LoopbackLink final : public ReportLink, private ReportSink {
   Duration report_delay_{};
   Duration command_delay_{};
   State state_ = State::closed;
-  TimePoint unplug_checked_until_{};  ///< time up to which unplugging has been looked for
-  PacketQueue reports_;               ///< device to host
-  PacketQueue commands_;              ///< host to device
-  Packet last_report_;                ///< that left the device and was not frozen
-  Packet swapped_report_;             ///< that waits for the one which follows it
+  TimePoint unplug_checked_until_{};  ///< time up to which unplug faults have been checked
+  PacketQueue reports_;               ///< reports from device to host
+  PacketQueue commands_;              ///< commands from host to device
+  Packet last_report_;                ///< last report that the device sent outside a freeze fault
+  Packet swapped_report_;             ///< report that a swap fault sends after its successor
   std::uint64_t reports_sent_ = 0;
   TimePoint last_arrival_{};
   std::uint64_t dropped_ = 0;

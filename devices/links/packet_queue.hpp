@@ -8,13 +8,13 @@
 #include <span>
 
 #include "core/clock.hpp"
-#include "devices/report_codec.hpp"
+#include "devices/report_frame.hpp"
 
 namespace wrenchd {
 
-/// One report on its way.
+/// One report in transit.
 struct Packet {
-  /// A byte more than a report may have, for one that is too long.
+  /// Capacity in bytes: one more than the longest valid report, so that a too long report is detectable.
   static constexpr std::size_t kMaxBytes = kMaxReportBytes + 1;
   std::array<std::uint8_t, kMaxBytes> bytes{};
   std::size_t length = 0;
@@ -23,13 +23,14 @@ struct Packet {
   std::span<const std::uint8_t> report() const noexcept { return std::span(bytes).first(length); }
 };
 
-/// Reports in flight or waiting, oldest first. Holds as many as the ring of a Linux hidraw reader, and like
-/// it refuses the newest when it is full. RT safe.
+/// Queue of reports in transit or waiting, oldest first. Its capacity is that of a Linux hidraw reader; when
+/// it is full, it rejects the newest report. All members are RT-safe.
 class PacketQueue {
  public:
   static constexpr std::size_t kCapacity = 64;
 
-  /// False, and nothing changes, where the queue is full or the report too long.
+  /// Adds a report. Returns false and changes nothing if the queue is full or the report is too long.
+  /// RT-safe.
   bool push(TimePoint arrives, std::span<const std::uint8_t> report) noexcept {
     if (count_ == kCapacity || report.size() > Packet::kMaxBytes) return false;
     Packet& packet = packets_[(first_ + count_++) % kCapacity];
@@ -39,7 +40,8 @@ class PacketQueue {
     return true;
   }
 
-  /// The oldest packet if it has arrived by now, or nullptr. Valid until the next pop() or push().
+  /// Returns the oldest packet if it has arrived at `now`, else nullptr. The pointer is valid until the next
+  /// pop() or push(). RT-safe.
   const Packet* front_if_arrived(TimePoint now) const noexcept {
     return count_ > 0 && packets_[first_].arrives <= now ? &packets_[first_] : nullptr;
   }
@@ -49,7 +51,7 @@ class PacketQueue {
   }
   void clear() noexcept { count_ = 0; }
   bool empty() const noexcept { return count_ == 0; }
-  /// When the oldest packet arrives; ask only where there is one.
+  /// Returns the arrival time of the oldest packet. The queue must not be empty. RT-safe.
   TimePoint next_arrival() const noexcept { return packets_[first_].arrives; }
 
  private:

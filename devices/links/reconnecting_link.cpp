@@ -15,14 +15,14 @@ ReconnectingLink::ReconnectingLink(DeviceProfile profile, std::string serial, Li
 
 void ReconnectingLink::open() {
   close();
-  const std::vector<UsbDevice> plugged = list_usb_devices();
-  const DeviceChoice choice = choose_device(plugged, {&profile_, 1}, criteria_);
+  const std::vector<UsbDevice> connected = list_usb_devices();
+  const DeviceChoice choice = choose_device(connected, {&profile_, 1}, criteria_);
   if (!choice.selection)
     throw DeviceNotFound("no device of profile " + profile_.name +
                              (criteria_.serial.empty() ? "" : " with serial number " + criteria_.serial) +
-                             " is plugged in",
-                         describe_rejected(plugged, choice));
-  const UsbDevice& device = plugged[choice.selection->device];
+                             " is connected",
+                         describe_rejected(connected, choice));
+  const UsbDevice& device = connected[choice.selection->device];
   std::unique_ptr<ReportLink> link;
   if (profile_.transport == Transport::libusb)
     link = std::make_unique<UsbLink>(device, settings_);
@@ -49,11 +49,12 @@ void ReconnectingLink::close() noexcept {
   link_.reset();
 }
 
-std::vector<std::string> describe_rejected(std::span<const UsbDevice> plugged, const DeviceChoice& choice) {
-  std::vector<std::string> seen;
-  for (std::size_t i = 0; i < plugged.size(); ++i)
-    if (!choice.rejections[i].empty()) seen.push_back(describe(plugged[i]) + ": " + choice.rejections[i]);
-  return seen;
+std::vector<std::string> describe_rejected(std::span<const UsbDevice> connected, const DeviceChoice& choice) {
+  std::vector<std::string> rejected;
+  for (std::size_t i = 0; i < connected.size(); ++i)
+    if (!choice.rejections[i].empty())
+      rejected.push_back(describe(connected[i]) + ": " + choice.rejections[i]);
+  return rejected;
 }
 
 }  // namespace wrenchd

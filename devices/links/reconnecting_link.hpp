@@ -12,47 +12,47 @@
 
 namespace wrenchd {
 
-/// The device that is wanted is not plugged in.
+/// Error: the requested device is not connected.
 class DeviceNotFound : public std::runtime_error {
  public:
-  DeviceNotFound(const std::string& what, std::vector<std::string> seen)
-      : std::runtime_error(what), rejected_devices_(std::move(seen)) {}
+  DeviceNotFound(const std::string& what, std::vector<std::string> rejected)
+      : std::runtime_error(what), rejected_devices_(std::move(rejected)) {}
 
-  /// What is plugged in instead, a line each: the device, and why it is not the one.
+  /// Returns the connected devices and why each was rejected, one line each.
   const std::vector<std::string>& rejected_devices() const noexcept { return rejected_devices_; }
 
  private:
   std::vector<std::string> rejected_devices_;
 };
 
-/// The link to the plugged-in device of a profile, by the transport that the profile names. Each open() looks
-/// for the device anew, wherever it is plugged in by then. From the first one on it is that device, by ids,
-/// serial number, interface and report descriptor, and no other is ever written to.
+/// Link to the connected device of a profile, over the transport that the profile names. Each open() searches
+/// for the device again, in any USB port. After the first open(), only the same device is accepted: same ids,
+/// serial number, interface and report descriptor. The link never writes to another device.
 class ReconnectingLink final : public ReportLink {
  public:
-  /// serial: empty for any. The profile has to be one for a device: not transport loopback. settings: those
-  /// of link_settings(), and what the caller wants else.
+  /// serial: serial number; empty: any. The profile must be for a real device: not transport loopback.
+  /// settings: result of link_settings(), possibly with changes of the caller.
   ReconnectingLink(DeviceProfile profile, std::string serial, LinkSettings settings);
 
-  /// Throws DeviceNotFound where it is not plugged in, and as HidrawLink and UsbLink do where it cannot be
-  /// opened.
+  /// Throws DeviceNotFound if the device is not connected, and std::runtime_error like HidrawLink and UsbLink
+  /// if it cannot be opened. Not RT-safe: may take seconds.
   void open() override;
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
   void close() noexcept override;
 
-  /// The device of the last open(), while nothing else is known.
+  /// Returns the device of the last open(); empty before.
   const std::optional<UsbDevice>& device() const noexcept { return criteria_.previous; }
 
  private:
   DeviceProfile profile_;
   DeviceCriteria criteria_;
   LinkSettings settings_;
-  std::unique_ptr<ReportLink> link_;  ///< none while closed
+  std::unique_ptr<ReportLink> link_;  ///< null while closed
 };
 
-/// What is plugged in, a line each: the device, and why it was not picked. The one that was has none.
-std::vector<std::string> describe_rejected(std::span<const UsbDevice> plugged, const DeviceChoice& choice);
+/// Returns the rejected devices with their reasons, one line each. Not RT-safe: allocates.
+std::vector<std::string> describe_rejected(std::span<const UsbDevice> connected, const DeviceChoice& choice);
 
 }  // namespace wrenchd

@@ -18,47 +18,47 @@
 namespace wrenchd {
 namespace {
 
-/// Longer than any emulator takes to say what it has to say.
-constexpr Duration kTalk = std::chrono::milliseconds(50);
+/// Longer than any emulator needs to send all its reports.
+constexpr Duration kReportTime = std::chrono::milliseconds(50);
 
-/// What a device says, as the profile understands it.
-class Listener final : public ReportSink {
+/// Collects the reports of a device, decoded with its profile.
+class ReportCollector final : public ReportSink {
  public:
-  explicit Listener(const DeviceProfile& profile) : profile_(profile) {}
+  explicit ReportCollector(const DeviceProfile& profile) : profile_(profile) {}
 
   void take_report(TimePoint, std::span<const std::uint8_t> bytes) noexcept override {
-    bool known = decode_into(profile_.pose_report, bytes, heard_) == Decoding::ok;
+    bool decoded_one = decode_into(profile_.pose_report, bytes, decoded_) == Decoding::ok;
     for (const PoseReportLayout& report : profile_.more_reports)
-      known = known || decode_into(report, bytes, heard_) == Decoding::ok;
-    understood_ = understood_ && known;
+      decoded_one = decoded_one || decode_into(report, bytes, decoded_) == Decoding::ok;
+    all_decoded_ = all_decoded_ && decoded_one;
     ++reports_;
   }
-  bool understood() const noexcept { return understood_ && reports_ > 0; }
-  const PoseReport& heard() const noexcept { return heard_; }
+  bool all_decoded() const noexcept { return all_decoded_ && reports_ > 0; }
+  const PoseReport& decoded() const noexcept { return decoded_; }
 
  private:
   const DeviceProfile& profile_;
-  PoseReport heard_;
-  bool understood_ = true;
+  PoseReport decoded_;
+  bool all_decoded_ = true;
   int reports_ = 0;
 };
 
 [[noreturn]] void refuse_layout(const DeviceProfile& profile, const char* emulator, const char* inherits) {
   throw std::invalid_argument("device profile " + profile.name +
-                              " cannot be simulated: its reports are not those of " + emulator +
-                              ", which would stand in for it; simulate a profile that inherits " + inherits);
+                              " cannot be simulated: its reports differ from those of " + emulator +
+                              ", which would emulate it; simulate a profile that inherits " + inherits);
 }
 
-/// Whether the profile finds in the arm's reports what its encoders count, and the arm in the profile's
-/// commands what its motors shall do. The arm is used up by it.
-bool speaks(EmulatedArm& arm, const DeviceProfile& profile) {
+/// Returns true if the profile decodes the encoder counts from the reports of the arm, and the arm decodes
+/// the motor efforts from the commands of the profile. Changes the state of the arm.
+bool supports_profile(EmulatedArm& arm, const DeviceProfile& profile) {
   constexpr TimePoint kStart{};
   constexpr JointCounts kCounts = {11, -22, 33, -44, 55, -66};
   constexpr std::array<double, kMaxMotors> kEfforts = {250, -500, 1000};
-  Listener listener(profile);
+  ReportCollector collector(profile);
   arm.start();
   arm.set_counts(kCounts);
-  arm.advance_to(kStart, listener);
+  arm.advance_to(kStart, collector);
   WrenchReport command;
   const double step = std::abs(profile.wrench_report.efforts.step);
   for (std::size_t i = 0; i < kMaxMotors; ++i) command.efforts[i] = step * kEfforts[i];
@@ -69,11 +69,11 @@ bool speaks(EmulatedArm& arm, const DeviceProfile& profile) {
   const MotorEfforts motors = arm.motor_efforts();
   for (std::size_t i = 0; i < kMaxMotors; ++i)
     if (!(std::abs(motors[i] - command.efforts[i]) < 1e-9)) return false;
-  arm.advance_to(kStart + kTalk, listener);
-  if (!listener.understood()) return false;
+  arm.advance_to(kStart + kReportTime, collector);
+  if (!collector.all_decoded()) return false;
   for (std::size_t i = 0; i < profile.kinematics.joints; ++i) {
-    const std::size_t slot = profile.kinematics.report_index[i];
-    if (listener.heard().joints[slot] != kCounts[slot]) return false;
+    const std::size_t index = profile.kinematics.report_index[i];
+    if (collector.decoded().joints[index] != kCounts[index]) return false;
   }
   return true;
 }
@@ -83,34 +83,36 @@ std::unique_ptr<EmulatedArm> emulated_arm(const DeviceProfile& profile) {
   return std::make_unique<EmulatedPolhem>(profile.pose_report.length);
 }
 
-std::unique_ptr<DeviceInHand> held_arm(const DeviceProfile& profile, const SimulationSettings& settings) {
+std::unique_ptr<DeviceInHand> make_simulated_arm(const DeviceProfile& profile,
+                                                 const SimulationSettings& settings) {
   const bool delta = profile.kinematics.kind == Kinematics::Kind::delta;
-  if (!profile.wrench_report.efforts.present || !speaks(*emulated_arm(profile), profile))
+  if (!profile.wrench_report.efforts.present || !supports_profile(*emulated_arm(profile), profile))
     refuse_layout(profile, delta ? "the Falcon" : "Polhem", delta ? "falcon" : "polhem");
   return std::make_unique<SimulatedArm>(profile, settings, emulated_arm(profile));
 }
 
-/// Whether the profile finds in the reports how far the cap is pushed.
-bool speaks(const PuckCoding& cap, const DeviceProfile& profile) {
+/// Returns true if the profile decodes the deflection from the reports of the puck.
+bool supports_profile(const PuckCoding& coding, const DeviceProfile& profile) {
   constexpr TimePoint kStart{};
   constexpr std::array<int, 6> kCounts = {11, -22, 33, -44, 55, -66};
-  Listener listener(profile);
-  EmulatedSpaceMouse mouse(cap.format);
-  mouse.advance_to(kStart, listener);
+  ReportCollector collector(profile);
+  EmulatedSpaceMouse mouse(coding.format);
+  mouse.advance_to(kStart, collector);
   mouse.set_deflection(kCounts);
-  mouse.advance_to(kStart + kTalk, listener);
-  const PoseReport& heard = listener.heard();
-  bool same = listener.understood();
+  mouse.advance_to(kStart + kReportTime, collector);
+  const PoseReport& decoded = collector.decoded();
+  bool same = collector.all_decoded();
   for (int i = 0; i < 3; ++i) {
     const auto n = static_cast<std::size_t>(i);
-    same = same && std::lround(heard.translation_m[i] / cap.translation_step_m) == kCounts[n] &&
-           std::lround(heard.rotation_rad[i] / cap.rotation_step_rad) == kCounts[n + 3];
+    same = same && std::lround(decoded.translation_m[i] / coding.translation_step_m) == kCounts[n] &&
+           std::lround(decoded.rotation_rad[i] / coding.rotation_step_rad) == kCounts[n + 3];
   }
   return same;
 }
 
-std::unique_ptr<DeviceInHand> held_cap(const DeviceProfile& profile, const SimulationSettings& settings) {
-  if (!speaks(puck_coding(profile), profile))
+std::unique_ptr<DeviceInHand> make_simulated_puck(const DeviceProfile& profile,
+                                                  const SimulationSettings& settings) {
+  if (!supports_profile(puck_coding(profile), profile))
     refuse_layout(profile, "a SpaceMouse", "spacemouse_split or spacemouse_combined");
   return std::make_unique<SimulatedPuck>(profile, settings);
 }
@@ -125,10 +127,10 @@ std::unique_ptr<SimulatedLink> make_simulated_link(const DeviceProfile& profile,
       device = std::make_unique<SimulatedDevice>(profile, settings);
       break;
     case PoseSource::joints:
-      device = held_arm(profile, settings);
+      device = make_simulated_arm(profile, settings);
       break;
     case PoseSource::deflection:
-      device = held_cap(profile, settings);
+      device = make_simulated_puck(profile, settings);
       break;
   }
   return std::make_unique<SimulatedLink>(std::move(device), clock, settings);

@@ -9,18 +9,20 @@
 #include "core/simulation_settings.hpp"
 #include "devices/links/loopback_link.hpp"
 #include "devices/links/report_link.hpp"
+#include "devices/pose_observer.hpp"
 #include "devices/simulation/device_in_hand.hpp"
 
 namespace wrenchd {
 
-/// A link with an emulated device in a simulated hand at its other end, and nothing plugged in.
-class SimulatedLink final : public ReportLink {
+/// Link to an emulated device in a simulated hand, without hardware. All members except the constructor,
+/// open() and device() are RT-safe.
+class SimulatedLink final : public ReportLink, public PoseObserver {
  public:
   /// The clock must outlive the link.
   SimulatedLink(std::unique_ptr<DeviceInHand> device, Clock& clock, const SimulationSettings& settings)
       : device_(std::move(device)), clock_(clock), loopback_(*device_, clock, settings) {}
 
-  /// Throws std::runtime_error while the device is unplugged.
+  /// Throws std::runtime_error while the device is unplugged. Not RT-safe: may allocate.
   void open() override {
     loopback_.open();
     device_->open(clock_.now());
@@ -32,10 +34,11 @@ class SimulatedLink final : public ReportLink {
     return loopback_.write(now, report);
   }
   void wait_readable(TimePoint deadline) noexcept override { loopback_.wait_readable(deadline); }
-  void show_pose(TimePoint now, const Pose& X_BH) noexcept override { device_->observe_pose(now, X_BH); }
+  /// Shows the pose of the device to the simulated hand. RT-safe.
+  void observe_pose(TimePoint now, const Pose& X_BH) noexcept override { device_->observe_pose(now, X_BH); }
   void close() noexcept override { loopback_.close(); }
 
-  /// For faults on request, and for the truth.
+  /// The simulated device, for fault injection and its true state.
   DeviceInHand& device() noexcept { return *device_; }
   std::uint64_t dropped() const noexcept { return loopback_.dropped(); }
 
@@ -45,10 +48,10 @@ class SimulatedLink final : public ReportLink {
   LoopbackLink loopback_;
 };
 
-/// The device that a profile describes, emulated and held by the hand of the settings: whole poses by the
-/// simulated device, encoder counts by a Polhem or a Falcon, the deflection of a cap by a SpaceMouse. Throws
-/// std::invalid_argument, with the cure, where the settings make no sense or no emulator speaks as the
-/// profile says. The clock must outlive the link. Not RT safe; the link is, but for open().
+/// Returns a link to the emulated device of a profile, held by the hand of the settings: a SimulatedDevice
+/// for whole poses, a Polhem or a Falcon for encoder counts, a SpaceMouse for the deflection of a puck.
+/// Throws std::invalid_argument with the remedy if the settings are invalid or no emulator supports the
+/// report layout of the profile. The clock must outlive the link. Not RT-safe: allocates.
 std::unique_ptr<SimulatedLink> make_simulated_link(const DeviceProfile& profile,
                                                    const SimulationSettings& settings, Clock& clock);
 

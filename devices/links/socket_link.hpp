@@ -11,30 +11,32 @@
 
 namespace wrenchd {
 
-/// A device in another process: reports come and go over a connected local socket that keeps their bounds
-/// (SOCK_SEQPACKET), one report a packet, its id first where the device numbers its reports. What is at the
-/// other end outlives this process, as hardware does: an emulator, a bridge to a transport of one's own.
+/// Device in another process. Reports travel over a connected local socket that keeps their boundaries
+/// (SOCK_SEQPACKET): one report per packet, its id first if the device numbers its reports. The other process
+/// may outlive this one, as hardware does: an emulator, or a bridge to another transport.
 ///
-/// The socket is inherited, so nobody else can come to it. It stays with the link through close() and open():
-/// when the other end is gone it is gone for good.
+/// The socket is inherited, so no other process can access it. The link keeps the socket through close() and
+/// open(). After the other end has closed the socket, the link cannot be used again.
 class SocketLink final : public ReportLink {
  public:
-  /// Takes the descriptor over, whatever it is; open() looks at it. -1: none.
+  /// Takes ownership of the file descriptor without a check; open() checks it. -1: none.
   explicit SocketLink(int socket, LinkSettings settings = {})
       : socket_(socket), settings_(std::move(settings)) {}
   ~SocketLink() override;
   SocketLink(const SocketLink&) = delete;
   SocketLink& operator=(const SocketLink&) = delete;
 
-  /// Throws std::runtime_error where the descriptor is no connected socket of that kind, or nobody is at its
-  /// other end any more. What waits in it stays: the device's first read throws that away.
+  /// Throws std::runtime_error if the descriptor is not a connected socket of this type, or its other end is
+  /// closed. Waiting reports stay in the socket; the first read of the device discards them. Not RT-safe:
+  /// starts a thread.
   void open() override;
-  /// A report is taken to have arrived now. What waits is read to its end after the other end is gone.
+  /// Reads a report; its arrival time is `now`. After the other end is closed, reads the remaining reports
+  /// first. RT-safe.
   LinkRead read(TimePoint now, std::span<std::uint8_t> buffer) noexcept override;
-  /// By a thread of the link's own, as with other links: it lives on where the loop is stuck.
+  /// Submits the report to the writer thread of the link, which also runs the host watchdog. RT-safe.
   LinkStatus write(TimePoint now, std::span<const std::uint8_t> report) noexcept override;
   void wait_readable(TimePoint deadline) noexcept override;
-  /// Nothing is read or written until it is opened again.
+  /// Stops reading and writing until the next open(). Not RT-safe: waits for the writer thread.
   void close() noexcept override { writer_.reset(); }
 
  private:

@@ -6,24 +6,24 @@
 #include <cstdint>
 #include <span>
 
-#include "devices/report_codec.hpp"
+#include "devices/report_frame.hpp"
 
 namespace wrenchd {
 
-/// Reports cut out of a stream of bytes, as a serial chip hands them over: two in one packet, or one in two.
-/// What does not begin and end as a report does is skipped, byte by byte. RT safe.
+/// Separates reports in a byte stream of a serial chip, whose packets may hold two reports or a part of one.
+/// Skips bytes that do not belong to a report. All members are RT-safe.
 class StreamFramer {
  public:
-  /// How a report is found: by its length, at most kMaxReportBytes, and its first and last byte.
+  /// Format of a report: its length, at most kMaxReportBytes, and its first and last byte.
   struct Frame {
-    std::size_t length = 0;  ///< 0: packets are reports, nothing is to be cut
+    std::size_t length = 0;  ///< 0: each packet is a report, no framing
     std::uint8_t first = 0;
     std::uint8_t last = 0;
   };
 
   explicit StreamFramer(const Frame& frame) : frame_(frame) {}
 
-  /// Takes bytes, and calls `report` with each that is whole now.
+  /// Appends bytes and calls `report` with each completed report. RT-safe.
   template <class Report>
   void feed(std::span<const std::uint8_t> bytes, Report&& report) noexcept {
     for (const std::uint8_t byte : bytes) {

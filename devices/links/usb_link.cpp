@@ -24,38 +24,36 @@
 namespace wrenchd {
 namespace {
 
-/// IN transfers that wait at the device: at 8 kHz the link's thread may be 1 ms late before a frame is
-/// missed.
+/// IN transfers in flight. At 8 kHz the link's thread may be 1 ms late before a frame is missed.
 constexpr std::size_t kTransfersInFlight = 8;
-/// Reports between the link's thread and the servo thread, as many as hidraw has.
+/// Capacity of the ring between the link's thread and the servo thread, as in hidraw.
 constexpr std::size_t kRing = 64;
-/// Between an endpoint's error and the next attempt, so that a device that always fails does not keep a
-/// processor busy.
+/// Time between an endpoint error and the next attempt, so that a permanently failing device does not occupy
+/// a processor.
 constexpr Duration kRetryAfter = std::chrono::milliseconds(5);
 
-std::runtime_error rejection_text(const UsbDevice& device, const std::string& doing, int error) {
+std::runtime_error open_failure(const UsbDevice& device, const std::string& doing, int error) {
   if (error == LIBUSB_ERROR_ACCESS || error == LIBUSB_ERROR_NO_DEVICE || error == LIBUSB_ERROR_BUSY) {
     const int number = error == LIBUSB_ERROR_ACCESS ? EACCES : error == LIBUSB_ERROR_BUSY ? EBUSY : ENODEV;
     return std::runtime_error(open_error(device, device.usb_node, number));
   }
   return std::runtime_error(describe(device) + ": " + doing + ": " + libusb_strerror(error) +
-                            "; unplug it and plug it in again");
+                            "; unplug the device and connect it again");
 }
 
-/// Bus and ports as the kernel names them: "3-1.2".
-std::string recording_path(libusb_device* device) {
+/// Returns bus and ports in the format of the kernel: "3-1.2".
+std::string port_path_of(libusb_device* device) {
   std::array<std::uint8_t, 8> ports{};
   const int n = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
-  std::string place = std::to_string(libusb_get_bus_number(device));
+  std::string port_path = std::to_string(libusb_get_bus_number(device));
   for (int i = 0; i < n; ++i)
-    place += (i == 0 ? "-" : ".") + std::to_string(ports[static_cast<std::size_t>(i)]);
-  return place;
+    port_path += (i == 0 ? "-" : ".") + std::to_string(ports[static_cast<std::size_t>(i)]);
+  return port_path;
 }
 
-/// The kernel hangs up when the device leaves its socket, and says so by an error only when it has forgotten
-/// it. It needs an ordinary thread in between, which a real-time one that asks again and again keeps from
-/// running.
-bool is_cut_off(const pollfd& file) noexcept {
+/// After unplugging, the kernel sets POLLHUP at once, but returns an error only after its own cleanup. This
+/// cleanup needs a normal thread, which a real-time thread that polls without pause keeps from running.
+bool has_hung_up(const pollfd& file) noexcept {
   return (file.revents & (POLLHUP | POLLERR)) != 0;
 }
 
@@ -65,7 +63,8 @@ struct Endpoint {
   std::size_t packet_bytes = 0;
 };
 
-/// The first interrupt endpoint of that direction, else the first bulk one. `address`: only that one; 0: any.
+/// Returns the first interrupt endpoint of this direction, else the first bulk endpoint. `address`: only this
+/// endpoint; 0: any.
 std::optional<Endpoint> find_endpoint(const libusb_interface_descriptor& setting, std::uint8_t direction,
                                       std::uint8_t address) {
   for (const std::uint8_t type : {LIBUSB_TRANSFER_TYPE_INTERRUPT, LIBUSB_TRANSFER_TYPE_BULK})
@@ -81,7 +80,7 @@ std::optional<Endpoint> find_endpoint(const libusb_interface_descriptor& setting
 
 }  // namespace
 
-/// Everything that speaks with libusb. Built and destroyed by an ordinary thread, run by the link's own.
+/// State of all libusb calls. A normal thread constructs and destroys it; the link's own thread runs it.
 struct UsbLink::TransferThread {
   TransferThread(const UsbDevice& device, const LinkSettings& settings);
   ~TransferThread();
@@ -93,7 +92,7 @@ struct UsbLink::TransferThread {
     TransferThread* engine = nullptr;
     libusb_transfer* transfer = nullptr;
     std::vector<std::uint8_t> bytes;
-    bool flying = false;
+    bool in_flight = false;
   };
 
   void find_and_open(const UsbDevice& device);
@@ -106,18 +105,18 @@ struct UsbLink::TransferThread {
   void release() noexcept;
 
   void run() noexcept;
-  void gather_files();
+  void collect_fds();
   void sleep() noexcept;
-  bool flying() const noexcept;
+  bool in_flight() const noexcept;
   void submit(In& in) noexcept;
-  void take_packet(const libusb_transfer& transfer) noexcept;
-  void take_report(std::span<const std::uint8_t> bytes) noexcept;
+  void receive_packet(const libusb_transfer& transfer) noexcept;
+  void receive_report(std::span<const std::uint8_t> bytes) noexcept;
   void retry_failed() noexcept;
   void write_newest() noexcept;
   void write_request() noexcept;
   void cancel_overdue() noexcept;
   bool finish() noexcept;
-  void lose() noexcept;
+  void mark_disconnected() noexcept;
 
   static void LIBUSB_CALL on_in(libusb_transfer* transfer);
   static void LIBUSB_CALL on_out(libusb_transfer* transfer);
@@ -132,34 +131,34 @@ struct UsbLink::TransferThread {
   Endpoint in_endpoint;
   std::optional<Endpoint> out_endpoint;
 
-  // Between the two threads.
+  // Shared by both threads.
   boost::lockfree::spsc_queue<Packet, boost::lockfree::capacity<kRing>> ring;
   WriteSlot slot;
-  WakeUp readable;  ///< a report waits, or the device is gone
-  WakeUp writable;  ///< a command waits, or it is the end
-  std::atomic<bool> gone{false};
+  WakeUp readable;  ///< a report waits, or the device is disconnected
+  WakeUp writable;  ///< a command waits, or the link is closing
+  std::atomic<bool> disconnected{false};
   std::atomic<bool> closing{false};
   std::atomic<std::uint64_t> dropped{0}, stalls{0}, errors{0};
 
-  // The link's thread only.
-  std::array<In, kTransfersInFlight> ins;
+  // Used by the link's thread only.
+  std::array<In, kTransfersInFlight> in_transfers;
   std::size_t prefix_bytes;
-  bool cut;  ///< packets are a stream of bytes, out of which reports are cut
+  bool is_byte_stream;  ///< the packets form a byte stream that the framer separates into reports
   StreamFramer framer;
-  HostWatchdog last_word;
+  HostWatchdog host_watchdog;
   libusb_transfer* out = nullptr;
   Packet out_packet;
   std::array<std::uint8_t, LIBUSB_CONTROL_SETUP_SIZE + kMaxReportBytes> out_request{};
-  bool out_flying = false, out_cancelled = false;
-  TimePoint out_until{};  ///< when a command that is not taken is called back
+  bool out_in_flight = false, out_cancelled = false;
+  TimePoint out_deadline{};  ///< time at which a pending OUT transfer is cancelled
   bool in_halted = false, out_halted = false;
   bool in_failed = false;
-  TimePoint retry_at{};  ///< not before
+  TimePoint next_retry{};  ///< earliest time of the next attempt
   Duration write_deadline;
   Duration close_within;
-  std::optional<TimePoint> close_at;
-  bool ending = false;  ///< transfers are cancelled, none is submitted any more
-  std::vector<pollfd> files;
+  std::optional<TimePoint> close_deadline;
+  bool cancelling = false;  ///< all transfers are cancelled and no new one is submitted
+  std::vector<pollfd> poll_fds;
 
   std::thread thread;
 };
@@ -171,13 +170,13 @@ UsbLink::TransferThread::TransferThread(const UsbDevice& device, const LinkSetti
       numbered_reports(device.numbered_reports),
       slot(settings.write_deadline),
       prefix_bytes(settings.prefix_bytes),
-      cut(settings.frame.length > 0),
+      is_byte_stream(settings.frame.length > 0),
       framer(settings.frame),
-      last_word(settings.host_watchdog),
+      host_watchdog(settings.host_watchdog),
       write_deadline(settings.write_deadline),
       close_within(settings.close_timeout) {
   try {
-    if (const int error = libusb_init(&context); error != 0) throw rejection_text(device, "libusb", error);
+    if (const int error = libusb_init(&context); error != 0) throw open_failure(device, "libusb", error);
     find_and_open(device);
     check_identity(device);
     find_endpoints(device, settings);
@@ -185,7 +184,7 @@ UsbLink::TransferThread::TransferThread(const UsbDevice& device, const LinkSetti
     start_serial(device, settings);
     prepare_in(settings);
     prepare_out();
-    gather_files();
+    collect_fds();
     thread = std::thread([this] { run(); });
     priority_granted = raise_priority(thread, settings.priority);
   } catch (...) {
@@ -197,12 +196,12 @@ UsbLink::TransferThread::TransferThread(const UsbDevice& device, const LinkSetti
 void UsbLink::TransferThread::find_and_open(const UsbDevice& device) {
   libusb_device** list = nullptr;
   const ssize_t n = libusb_get_device_list(context, &list);
-  if (n < 0) throw rejection_text(device, "list of devices", static_cast<int>(n));
+  if (n < 0) throw open_failure(device, "list of devices", static_cast<int>(n));
   int error = LIBUSB_ERROR_NO_DEVICE;
   for (ssize_t i = 0; i < n; ++i)
-    if (recording_path(list[i]) == device.port_path) error = libusb_open(list[i], &handle);
+    if (port_path_of(list[i]) == device.port_path) error = libusb_open(list[i], &handle);
   libusb_free_device_list(list, 1);
-  if (error != 0) throw rejection_text(device, "open", error);
+  if (error != 0) throw open_failure(device, "open", error);
 }
 
 void UsbLink::TransferThread::check_identity(const UsbDevice& device) const {
@@ -219,14 +218,14 @@ void UsbLink::TransferThread::check_identity(const UsbDevice& device) const {
   }
   if (!found.is_same_device(device))
     throw std::runtime_error("in " + device.port_path + " is " + describe(found) + ", not " +
-                             describe(device) + ": nothing was written to it; look for the device anew");
+                             describe(device) + ": nothing was written to it; search for the device again");
 }
 
 void UsbLink::TransferThread::find_endpoints(const UsbDevice& device, const LinkSettings& settings) {
   libusb_config_descriptor* configuration = nullptr;
   if (const int error = libusb_get_active_config_descriptor(libusb_get_device(handle), &configuration);
       error != 0)
-    throw rejection_text(device, "configuration", error);
+    throw open_failure(device, "configuration", error);
   std::optional<Endpoint> in;
   for (int i = 0; i < configuration->bNumInterfaces; ++i) {
     const libusb_interface& candidate = configuration->interface[i];
@@ -245,7 +244,7 @@ void UsbLink::TransferThread::find_endpoints(const UsbDevice& device, const Link
 void UsbLink::TransferThread::claim(const UsbDevice& device) {
   libusb_set_auto_detach_kernel_driver(handle, 1);
   if (const int error = libusb_claim_interface(handle, interface); error != 0)
-    throw rejection_text(device, "claim of the interface", error);
+    throw open_failure(device, "claim of the interface", error);
   claimed = true;
 }
 
@@ -257,13 +256,13 @@ void UsbLink::TransferThread::start_serial(const UsbDevice& device, const LinkSe
   settings.start_serial(chip);
 }
 
-/// A transfer is as long as the longest report, in whole packets: a shorter packet ends it, a longer one
-/// could not be told from the next report.
+/// A transfer has the length of the longest report, rounded up to whole packets. A shorter packet ends the
+/// transfer; a longer report would merge with the next one.
 void UsbLink::TransferThread::prepare_in(const LinkSettings& settings) {
   const std::size_t packet = in_endpoint.packet_bytes;
   const std::size_t longest = std::max(settings.max_report_bytes, packet);
   const std::size_t bytes = (longest + packet - 1) / packet * packet;
-  for (In& in : ins) {
+  for (In& in : in_transfers) {
     in.engine = this;
     in.bytes.resize(bytes);
     in.transfer = libusb_alloc_transfer(0);
@@ -274,8 +273,8 @@ void UsbLink::TransferThread::prepare_in(const LinkSettings& settings) {
   }
 }
 
-/// A HID device without an OUT endpoint takes its reports as SET_REPORT requests (HID 1.11 section 7.2.2):
-/// slower, and as good for what comes once in a while.
+/// A HID device without an OUT endpoint receives its reports as SET_REPORT requests (HID 1.11 section 7.2.2).
+/// They are slower and sufficient for rare commands.
 void UsbLink::TransferThread::prepare_out() {
   if (!out_endpoint && !is_hid) return;
   out = libusb_alloc_transfer(0);
@@ -289,7 +288,7 @@ void UsbLink::TransferThread::prepare_out() {
   }
 }
 
-/// The request that carries the report in out_packet.
+/// Builds the request with the report in out_packet.
 void UsbLink::TransferThread::write_request() noexcept {
   constexpr std::uint8_t kToInterface = 0x21, kSetReport = 9;
   constexpr unsigned kOutput = 2;
@@ -308,9 +307,9 @@ UsbLink::TransferThread::~TransferThread() {
 }
 
 void UsbLink::TransferThread::release() noexcept {
-  for (In& in : ins) libusb_free_transfer(in.transfer);
+  for (In& in : in_transfers) libusb_free_transfer(in.transfer);
   libusb_free_transfer(out);
-  if (claimed) libusb_release_interface(handle, interface);  // the kernel's driver is attached again
+  if (claimed) libusb_release_interface(handle, interface);  // the kernel driver is attached again
   if (handle != nullptr) libusb_close(handle);
   if (context != nullptr) libusb_exit(context);
 }
@@ -318,7 +317,7 @@ void UsbLink::TransferThread::release() noexcept {
 // --- the link's thread ------------------------------------------------------------------------------------
 
 void UsbLink::TransferThread::run() noexcept {
-  for (In& in : ins) submit(in);
+  for (In& in : in_transfers) submit(in);
   while (!finish()) {
     sleep();
     retry_failed();
@@ -327,66 +326,68 @@ void UsbLink::TransferThread::run() noexcept {
   }
 }
 
-/// The files to sleep on: the servo thread's wake-ups first, then libusb's. They stay the same while the
-/// device is open.
-void UsbLink::TransferThread::gather_files() {
-  files.push_back({writable.fd(), POLLIN, 0});
+/// Collects the file descriptors for ppoll: first the wake-up of the servo thread, then those of libusb. They
+/// do not change while the device is open.
+void UsbLink::TransferThread::collect_fds() {
+  poll_fds.push_back({writable.fd(), POLLIN, 0});
   const libusb_pollfd** const of_libusb = libusb_get_pollfds(context);
   for (const libusb_pollfd** file = of_libusb; file != nullptr && *file != nullptr; ++file)
-    files.push_back({(*file)->fd, (*file)->events, 0});
+    poll_fds.push_back({(*file)->fd, (*file)->events, 0});
   libusb_free_pollfds(of_libusb);
 }
 
-/// Until libusb has something to do, a command waits, or something is due.
+/// Sleeps until libusb has an event, a command waits, or a deadline passes.
 void UsbLink::TransferThread::sleep() noexcept {
-  constexpr Duration kUnasked = std::chrono::milliseconds(100);  // if all else fails
-  constexpr Duration kLookAgainAfter = std::chrono::milliseconds(2);
+  constexpr Duration kMaxSleep = std::chrono::milliseconds(100);  // upper bound of the sleep, as a fallback
+  constexpr Duration kPollInterval = std::chrono::milliseconds(2);
   const TimePoint now = std::chrono::steady_clock::now();
-  Duration wait = kUnasked;
-  if (in_failed || in_halted || out_halted) wait = std::min<Duration>(wait, retry_at - now);
-  if (out_flying && !out_cancelled) wait = std::min<Duration>(wait, out_until - now);
-  if (close_at) wait = std::min<Duration>(wait, *close_at - now);
-  if (last_word.due() != TimePoint::max()) wait = std::min<Duration>(wait, last_word.due() - now);
+  Duration wait = kMaxSleep;
+  if (in_failed || in_halted || out_halted) wait = std::min<Duration>(wait, next_retry - now);
+  if (out_in_flight && !out_cancelled) wait = std::min<Duration>(wait, out_deadline - now);
+  if (close_deadline) wait = std::min<Duration>(wait, *close_deadline - now);
+  if (host_watchdog.due() != TimePoint::max()) wait = std::min<Duration>(wait, host_watchdog.due() - now);
   wait = std::max(wait, Duration::zero());
   timespec timeout{};
   timeout.tv_nsec = wait.count();
-  // libusb's files of a device that is gone are always ready, so they are looked at now and then only.
-  const bool lost = gone.load(std::memory_order_relaxed);
-  if (lost) timeout.tv_nsec = std::min<long>(timeout.tv_nsec, Duration(kLookAgainAfter).count());
-  const int ready = ppoll(files.data(), lost ? 1 : files.size(), &timeout, nullptr);
-  const bool written = ready > 0 && files[0].revents != 0;
+  // After disconnection libusb's descriptors are always ready, so they are polled only at intervals.
+  const bool is_disconnected = disconnected.load(std::memory_order_relaxed);
+  if (is_disconnected) timeout.tv_nsec = std::min<long>(timeout.tv_nsec, Duration(kPollInterval).count());
+  const int ready = ppoll(poll_fds.data(), is_disconnected ? 1 : poll_fds.size(), &timeout, nullptr);
+  const bool written = ready > 0 && poll_fds[0].revents != 0;
   if (written) writable.wait();
-  if (ready > 0 && !lost && std::any_of(files.begin() + 1, files.end(), is_cut_off)) lose();
+  if (ready > 0 && !is_disconnected && std::any_of(poll_fds.begin() + 1, poll_fds.end(), has_hung_up))
+    mark_disconnected();
   if (ready == (written ? 1 : 0) && ready > 0) return;
-  timeval none{0, 0};
-  libusb_handle_events_timeout_completed(context, &none, nullptr);
+  timeval no_wait{0, 0};
+  libusb_handle_events_timeout_completed(context, &no_wait, nullptr);
 }
 
-bool UsbLink::TransferThread::flying() const noexcept {
-  return out_flying || std::any_of(ins.begin(), ins.end(), [](const In& in) { return in.flying; });
+bool UsbLink::TransferThread::in_flight() const noexcept {
+  return out_in_flight ||
+         std::any_of(in_transfers.begin(), in_transfers.end(), [](const In& in) { return in.in_flight; });
 }
 
 void UsbLink::TransferThread::submit(In& in) noexcept {
-  if (ending || gone.load(std::memory_order_relaxed)) return;
+  if (cancelling || disconnected.load(std::memory_order_relaxed)) return;
   const int error = libusb_submit_transfer(in.transfer);
-  in.flying = error == 0;
-  if (error == LIBUSB_ERROR_NO_DEVICE) lose();
+  in.in_flight = error == 0;
+  if (error == LIBUSB_ERROR_NO_DEVICE) mark_disconnected();
   if (error != 0) in_failed = true;
 }
 
 void UsbLink::TransferThread::on_in(libusb_transfer* transfer) {
   In& in = *static_cast<In*>(transfer->user_data);
   TransferThread& engine = *in.engine;
-  in.flying = false;
+  in.in_flight = false;
   switch (transfer->status) {
     case LIBUSB_TRANSFER_COMPLETED:
-      engine.take_packet(*transfer);
+      engine.receive_packet(*transfer);
       engine.submit(in);
       return;
     case LIBUSB_TRANSFER_CANCELLED:
       return;
     case LIBUSB_TRANSFER_NO_DEVICE:
-      engine.lose();
+      engine.mark_disconnected();
       return;
     case LIBUSB_TRANSFER_STALL:
       engine.in_halted = true;
@@ -397,18 +398,18 @@ void UsbLink::TransferThread::on_in(libusb_transfer* transfer) {
   engine.in_failed = true;
 }
 
-void UsbLink::TransferThread::take_packet(const libusb_transfer& transfer) noexcept {
+void UsbLink::TransferThread::receive_packet(const libusb_transfer& transfer) noexcept {
   if (transfer.actual_length <= static_cast<int>(prefix_bytes)) return;
   const auto bytes =
       std::span<const std::uint8_t>(transfer.buffer, static_cast<std::size_t>(transfer.actual_length))
           .subspan(prefix_bytes);
-  if (cut)
-    framer.feed(bytes, [this](auto report) { take_report(report); });
+  if (is_byte_stream)
+    framer.feed(bytes, [this](auto report) { receive_report(report); });
   else
-    take_report(bytes);
+    receive_report(bytes);
 }
 
-void UsbLink::TransferThread::take_report(std::span<const std::uint8_t> bytes) noexcept {
+void UsbLink::TransferThread::receive_report(std::span<const std::uint8_t> bytes) noexcept {
   Packet packet;
   packet.length = bytes.size();
   std::copy_n(bytes.begin(), std::min(packet.length, packet.bytes.size()), packet.bytes.begin());
@@ -417,85 +418,87 @@ void UsbLink::TransferThread::take_report(std::span<const std::uint8_t> bytes) n
   readable.wake();
 }
 
-/// Endpoints that were halted are cleared, and transfers that failed are sent again: the first time at once,
-/// but not for ever at full speed.
+/// Clears halted endpoints and submits failed transfers again: the first time at once, then at most every
+/// kRetryAfter.
 void UsbLink::TransferThread::retry_failed() noexcept {
   const TimePoint now = std::chrono::steady_clock::now();
-  if (ending || !(in_failed || out_halted) || now < retry_at) return;
-  retry_at = now + kRetryAfter;
+  if (cancelling || !(in_failed || out_halted) || now < next_retry) return;
+  next_retry = now + kRetryAfter;
   for (bool* const halted : {&in_halted, &out_halted}) {
     if (!*halted) continue;
     *halted = false;
     stalls.fetch_add(1, std::memory_order_relaxed);
     const std::uint8_t address = halted == &in_halted ? in_endpoint.address : out_endpoint->address;
-    if (libusb_clear_halt(handle, address) == LIBUSB_ERROR_NO_DEVICE) lose();
+    if (libusb_clear_halt(handle, address) == LIBUSB_ERROR_NO_DEVICE) mark_disconnected();
   }
   in_failed = false;
-  for (In& in : ins)
-    if (!in.flying) submit(in);
+  for (In& in : in_transfers)
+    if (!in.in_flight) submit(in);
 }
 
 void UsbLink::TransferThread::write_newest() noexcept {
-  if (out == nullptr || out_flying || out_halted || ending || gone.load(std::memory_order_relaxed)) return;
-  const bool heard = slot.take(out_packet);
+  if (out == nullptr || out_in_flight || out_halted || cancelling ||
+      disconnected.load(std::memory_order_relaxed))
+    return;
+  const bool has_report = slot.take(out_packet);
   const TimePoint now = std::chrono::steady_clock::now();
-  if (heard) last_word.feed(now, out_packet);
-  if (!heard && !last_word.send_zero(now, out_packet)) return;
+  if (has_report) host_watchdog.feed(now, out_packet);
+  if (!has_report && !host_watchdog.send_zero(now, out_packet)) return;
   out->length = static_cast<int>(out_packet.length);
   if (!out_endpoint) {
     write_request();
     out->length += LIBUSB_CONTROL_SETUP_SIZE;
   }
   const int error = libusb_submit_transfer(out);
-  out_flying = error == 0;
+  out_in_flight = error == 0;
   out_cancelled = false;
-  out_until = now + write_deadline;
-  if (error == LIBUSB_ERROR_NO_DEVICE) lose();
+  out_deadline = now + write_deadline;
+  if (error == LIBUSB_ERROR_NO_DEVICE) mark_disconnected();
   if (error != 0)
     slot.complete(error == LIBUSB_ERROR_NO_DEVICE ? LinkStatus::disconnected : LinkStatus::not_ready);
 }
 
-/// A command that the device does not take is old by then: the newest goes in its place. libusb's own
-/// timeouts would do the same, for two more system calls with each command.
+/// Cancels an OUT transfer that the device does not accept; the newest command replaces it. The timeouts of
+/// libusb would do the same at the cost of two more system calls per command.
 void UsbLink::TransferThread::cancel_overdue() noexcept {
-  if (!out_flying || out_cancelled || std::chrono::steady_clock::now() < out_until) return;
+  if (!out_in_flight || out_cancelled || std::chrono::steady_clock::now() < out_deadline) return;
   libusb_cancel_transfer(out);
   out_cancelled = true;
 }
 
 void UsbLink::TransferThread::on_out(libusb_transfer* transfer) {
   TransferThread& engine = *static_cast<TransferThread*>(transfer->user_data);
-  engine.out_flying = false;
-  const bool whole = transfer->status == LIBUSB_TRANSFER_COMPLETED &&
-                     transfer->actual_length == static_cast<int>(engine.out_packet.length);
-  if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) engine.lose();
+  engine.out_in_flight = false;
+  const bool completed = transfer->status == LIBUSB_TRANSFER_COMPLETED &&
+                         transfer->actual_length == static_cast<int>(engine.out_packet.length);
+  if (transfer->status == LIBUSB_TRANSFER_NO_DEVICE) engine.mark_disconnected();
   if (transfer->status == LIBUSB_TRANSFER_STALL)
-    engine.out_halted = engine.out_endpoint.has_value();  // a request that is refused halts nothing
-  engine.slot.complete(whole                                           ? LinkStatus::ok
+    engine.out_halted = engine.out_endpoint.has_value();  // a rejected request does not halt the endpoint
+  engine.slot.complete(completed                                       ? LinkStatus::ok
                        : transfer->status == LIBUSB_TRANSFER_NO_DEVICE ? LinkStatus::disconnected
                                                                        : LinkStatus::not_ready);
 }
 
-/// The end, step by step: what waits is written, in its time; then all transfers are called back. True when
-/// none is left.
+/// Closes in two steps: writes the waiting command within close_timeout, then cancels all transfers. Returns
+/// true when no transfer is left.
 bool UsbLink::TransferThread::finish() noexcept {
   if (!closing.load(std::memory_order_acquire)) return false;
   const TimePoint now = std::chrono::steady_clock::now();
-  if (!ending) {
-    if (!close_at) close_at = now + close_within;
+  if (!cancelling) {
+    if (!close_deadline) close_deadline = now + close_within;
     write_newest();
-    if (out_flying && now < *close_at) return false;
-    ending = true;
-    if (out_flying) libusb_cancel_transfer(out);
-    for (In& in : ins)
-      if (in.flying) libusb_cancel_transfer(in.transfer);
-    close_at.reset();
+    if (out_in_flight && now < *close_deadline) return false;
+    cancelling = true;
+    if (out_in_flight) libusb_cancel_transfer(out);
+    for (In& in : in_transfers)
+      if (in.in_flight) libusb_cancel_transfer(in.transfer);
+    close_deadline.reset();
   }
-  return !flying();
+  return !in_flight();
 }
 
-void UsbLink::TransferThread::lose() noexcept {
-  gone.store(true, std::memory_order_release);
+void UsbLink::TransferThread::mark_disconnected() noexcept {
+  disconnected.store(true, std::memory_order_release);
   readable.wake();
 }
 
@@ -515,7 +518,7 @@ void UsbLink::open() {
 }
 
 LinkRead UsbLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
-  if (!transfers_ || transfers_->gone.load(std::memory_order_acquire))
+  if (!transfers_ || transfers_->disconnected.load(std::memory_order_acquire))
     return {LinkStatus::disconnected, 0, now};
   Packet packet;
   if (!transfers_->ring.pop(packet)) return {LinkStatus::not_ready, 0, now};
@@ -525,7 +528,8 @@ LinkRead UsbLink::read(TimePoint now, std::span<std::uint8_t> buffer) noexcept {
 }
 
 LinkStatus UsbLink::write(TimePoint now, std::span<const std::uint8_t> report) noexcept {
-  if (!transfers_ || transfers_->gone.load(std::memory_order_relaxed)) return LinkStatus::disconnected;
+  if (!transfers_ || transfers_->disconnected.load(std::memory_order_relaxed))
+    return LinkStatus::disconnected;
   if (transfers_->out == nullptr) return LinkStatus::not_ready;
   const LinkStatus status = transfers_->slot.submit(now, report);
   if (status != LinkStatus::disconnected) transfers_->writable.wake();
@@ -533,10 +537,10 @@ LinkStatus UsbLink::write(TimePoint now, std::span<const std::uint8_t> report) n
 }
 
 void UsbLink::wait_readable(TimePoint deadline) noexcept {
-  while (transfers_ && !transfers_->gone.load(std::memory_order_acquire) &&
+  while (transfers_ && !transfers_->disconnected.load(std::memory_order_acquire) &&
          transfers_->ring.read_available() == 0) {
     if (wait_for_fd(transfers_->readable.fd(), POLLIN, deadline) == 0) return;
-    transfers_->readable.wait();  // before the ring is looked at again, so that no wake-up is lost
+    transfers_->readable.wait();  // consumed before the ring is checked again, so that no wake-up is lost
   }
 }
 

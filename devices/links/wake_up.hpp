@@ -14,9 +14,9 @@
 
 namespace wrenchd {
 
-/// Sleeps until the file is ready for `events` (POLLIN, ...), has an error, or the deadline has passed, to
-/// the nanosecond as far as the kernel's timers go. Returns what the file is ready for, 0 for nothing. RT
-/// safe but for the sleep.
+/// Sleeps until the file descriptor is ready for `events` (POLLIN, ...), has an error, or the deadline has
+/// passed, with the resolution of the kernel timers. Returns the events that are ready; 0 on timeout. RT-safe
+/// except for the intended sleep.
 inline short wait_for_fd(int file, short events, TimePoint deadline) noexcept {
   for (;;) {
     const Duration left = deadline - std::chrono::steady_clock::now();
@@ -31,11 +31,11 @@ inline short wait_for_fd(int file, short events, TimePoint deadline) noexcept {
   }
 }
 
-/// Wakes a thread from another that must not wait or lock: an eventfd. Wake-ups before the sleep are kept,
-/// any number of them as one.
+/// Wakes one thread from another thread that must not wait or lock: an eventfd. Wake-ups before the sleep are
+/// kept; several count as one.
 class WakeUp {
  public:
-  /// Throws std::system_error where the system has no file descriptor left.
+  /// Throws std::system_error if no file descriptor is available. Not RT-safe: system call.
   WakeUp() : fd_(eventfd(0, EFD_CLOEXEC)) {
     if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   }
@@ -43,18 +43,18 @@ class WakeUp {
   WakeUp(const WakeUp&) = delete;
   WakeUp& operator=(const WakeUp&) = delete;
 
-  /// RT safe.
+  /// Wakes the waiting thread. RT-safe.
   void wake() noexcept { eventfd_write(fd_, 1); }
-  /// Sleeps until the next wake-up and takes it; at once where one waits.
+  /// Sleeps until the next wake-up and consumes it. Returns at once if one is pending.
   void wait() noexcept {
     eventfd_t ignored = 0;
     eventfd_read(fd_, &ignored);
   }
-  /// The same, until the deadline at most.
+  /// Sleeps until the next wake-up, at most until the deadline, and consumes the wake-up.
   void wait_until(TimePoint deadline) noexcept {
     if (deadline == TimePoint::max() || wait_for_fd(fd_, POLLIN, deadline) != 0) wait();
   }
-  /// Readable while a wake-up waits.
+  /// File descriptor that is readable while a wake-up is pending.
   int fd() const noexcept { return fd_; }
 
  private:

@@ -12,40 +12,45 @@
 
 namespace wrenchd {
 
-/// Room for one report between the servo thread and a writer that may be slow. A newer report takes the place
-/// of one that is not yet being written; none waits behind another. Whether the writer is stuck is found by
-/// the clock on the servo thread's side, so that a writer that never comes back is found as well.
+/// Slot for one report between the servo thread and a writer that may be slow. A newer report replaces one
+/// that is not yet being written; reports never queue. The servo thread detects a stuck writer by the clock,
+/// also if the writer never returns.
 ///
-/// Nothing here waits, locks or allocates: RT safe on both sides.
+/// All members are RT-safe on both sides: they do not wait, lock or allocate.
 class WriteSlot {
  public:
-  /// `deadline`: how long a report may wait without any write coming to its end.
+  /// `deadline`: maximum time that a report may wait without the completion of any write.
   explicit WriteSlot(Duration deadline) noexcept : deadline_(deadline) {}
 
-  // --- by the servo thread ---
+  // --- called by the servo thread ---
 
   /// Puts the report into the slot.
-  ///   ok     it is the next one to be written
-  ///   empty  likewise, but the writer is overdue, or a write failed since the last report; or the report is
-  ///          longer than any report may be, and was not taken
-  ///   gone   the device is not there any more; the report was not taken
+  ///
+  ///   ok             the report is the next one to be written
+  ///   not_ready      the report is in the slot, but the writer is overdue or a write failed since the last
+  ///                  report; or the report is too long and was rejected
+  ///   disconnected   the device is disconnected; the report was rejected
+  ///
+  /// RT-safe.
   LinkStatus submit(TimePoint now, std::span<const std::uint8_t> report) noexcept;
-  /// A report waits, and no write ended for longer than the deadline.
+  /// Returns true if a report waits and no write has completed for longer than the deadline. RT-safe.
   bool overdue(TimePoint now) const noexcept;
 
-  // --- by the writer ---
+  // --- called by the writer ---
 
-  /// The newest report, if there is one that was not taken yet. Each one taken must be ended.
+  /// Takes the newest report, if there is one that was not taken yet. Call complete() after each take().
+  /// RT-safe.
   bool take(Packet& packet) noexcept;
-  /// The report taken last was written (ok), could not be (empty), or there is nobody to write to (gone).
+  /// Reports the result of the last taken report: written (ok), failed (not_ready), or no device
+  /// (disconnected). RT-safe.
   void complete(LinkStatus status) noexcept;
 
-  // --- by anybody ---
+  // --- called by any thread ---
 
   bool disconnected() const noexcept { return disconnected_.load(std::memory_order_relaxed); }
   std::uint64_t written() const noexcept { return written_.load(std::memory_order_relaxed); }
   std::uint64_t failed() const noexcept { return failed_.load(std::memory_order_relaxed); }
-  /// Reports that a newer one took the place of.
+  /// Number of reports that were replaced by a newer one.
   std::uint64_t replaced() const noexcept { return replaced_.load(std::memory_order_relaxed); }
 
  private:
@@ -57,16 +62,16 @@ class WriteSlot {
   Duration deadline_;
   LatestValue<Numbered> slot_;
 
-  // The servo thread's.
-  std::uint64_t submitted_ = 0;       ///< number of the last report handed over
-  std::uint64_t completed_seen_ = 0;  ///< what completed_ was when progress was last seen
-  std::uint64_t failed_seen_ = 0;     ///< failures already told
-  TimePoint waiting_since_{};         ///< when there was last progress, or nothing waiting
+  // Used by the servo thread only.
+  std::uint64_t submitted_ = 0;       ///< number of the last submitted report
+  std::uint64_t completed_seen_ = 0;  ///< value of completed_ when progress was last observed
+  std::uint64_t failed_seen_ = 0;     ///< failures already reported
+  TimePoint waiting_since_{};  ///< time of the last progress, or of the last time with no report waiting
 
-  // The writer's.
+  // Used by the writer only.
   std::uint64_t taken_ = 0;
 
-  std::atomic<std::uint64_t> completed_{0};  ///< number of the last report whose write came to an end
+  std::atomic<std::uint64_t> completed_{0};  ///< number of the last report whose write completed
   std::atomic<std::uint64_t> written_{0};
   std::atomic<std::uint64_t> failed_{0};
   std::atomic<std::uint64_t> replaced_{0};

@@ -7,19 +7,20 @@
 
 namespace wrenchd {
 
-/// An emulated device in a simulated hand. What the hand feels and where the device then is decide each
-/// other, so nobody has to turn its encoders. B = device base, H = handle point.
+/// Emulated device in a simulated hand. The motion of the hand and the state of the device depend on each
+/// other, so the encoders are not set from outside. B = device base, H = handle frame. All members are
+/// RT-safe unless stated otherwise.
 class DeviceInHand : public EmulatedDevice {
  public:
-  /// A host begins to speak with it. Not RT safe.
+  /// Notifies the device that a host starts to communicate with it. Not RT-safe: allocates.
   virtual void open(TimePoint /*now*/) {}
 
-  /// Where a pose that is steered has come to, in B: the hand looks at it. RT safe.
+  /// Sets the displayed handle pose in B, for a device with a steered pose. The hand observes it. RT-safe.
   virtual void observe_pose(TimePoint /*now*/, const Pose& /*X_BH*/) noexcept {}
 
-  // The truth, for tests: not what the encoders see.
+  // True state of the handle, for tests; the encoders may report a different one.
   virtual const Pose& X_BH() const noexcept = 0;
-  virtual const Wrench& motor_wrench() const noexcept = 0;  ///< on the hand, about H, in B
+  virtual const Wrench& motor_wrench() const noexcept = 0;  ///< wrench on the hand, about H, in B
   virtual HandTarget hand_target() const noexcept = 0;
 };
 

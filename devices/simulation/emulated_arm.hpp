@@ -6,18 +6,19 @@
 
 namespace wrenchd {
 
-/// A device that sends what its encoders count and takes what its motors shall do, and leaves all else to the
-/// host. RT safe but for start().
+/// Emulated device that sends encoder counts and accepts motor efforts; the host computes the kinematics. All
+/// members except start() are RT-safe.
 class EmulatedArm : public EmulatedDevice {
  public:
-  /// The handle is moved: where the encoders stand, to the nearest count, in the order of the report.
+  /// Sets the encoders to these counts, rounded to the nearest integer, in the order of the report. RT-safe.
   virtual void set_counts(const JointCounts& counts) noexcept = 0;
-  /// What the motors do, in the unit that a profile's efforts have.
+  /// Returns the motor efforts, in the unit of the efforts of the profile. RT-safe.
   virtual MotorEfforts motor_efforts() const noexcept = 0;
 
-  /// What a driver does with it before the first report. Not RT safe.
+  /// Performs the start-up that a driver performs before the first report. Not RT-safe: allocates.
   virtual void start() {}
-  /// Whether the person shall do now what tells the encoders where they are; home() is that.
+  /// Returns true while the host requests that the operator homes the encoders. perform_homing() performs the
+  /// homing motion. RT-safe.
   virtual bool homing_requested() const noexcept { return false; }
   virtual void perform_homing() noexcept {}
 };

@@ -9,40 +9,40 @@
 
 namespace wrenchd {
 
-/// Takes the reports of an emulated device at the moment they leave it.
+/// Receives the reports of an emulated device at the time at which it sends them.
 class ReportSink {
  public:
-  /// RT safe.
+  /// Receives a report that the device sent at `sent`. RT-safe.
   virtual void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept = 0;
 
  protected:
   ~ReportSink() = default;
 };
 
-/// The far end of a device's protocol: what its firmware does, as far as a host can see it. It knows no
-/// wrenchd: only bytes, time, and what a hand does with it. All but the planning of faults is RT safe.
+/// Emulated firmware of a device, as far as a host can observe it. It depends only on report bytes, time and
+/// the motion of the hand, and not on wrenchd. All members except inject() are RT-safe.
 class EmulatedDevice {
  public:
   virtual ~EmulatedDevice() = default;
 
-  /// Lets time pass, up to t. The first call switches the power on.
+  /// Advances the device to time t. The first call switches the power on. RT-safe.
   virtual void advance_to(TimePoint t, ReportSink& host) noexcept = 0;
-  /// A report of the host arrives, now. False where the firmware ignores it.
+  /// Receives a command report of the host at time `now`. Returns false if the firmware ignores it. RT-safe.
   virtual bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept = 0;
-  /// When there is something to do next, as far as that is known.
+  /// Returns the time of the next event, as far as it is known. RT-safe.
   virtual TimePoint next_event() const noexcept = 0;
 
-  /// Plans a fault. Those of the wire (all but what a pose says) are shown by LoopbackLink. Throws
-  /// std::invalid_argument where a device of this kind cannot have it. Not RT safe.
+  /// Schedules a fault. LoopbackLink applies the transport faults; the device applies faults of the pose.
+  /// Throws std::invalid_argument if this kind of device does not support the fault. Not RT-safe: allocates.
   virtual void inject(const SimulatedFault& fault) { faults_.add(fault); }
-  /// Whether a fault of this kind shows at any moment from..to.
+  /// Returns true if a fault of this kind is active at any time in from..to. RT-safe.
   bool fault_active_during(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
     return faults_.active_during(kind, from, to);
   }
   const FaultPlan& faults() const noexcept { return faults_; }
 
  protected:
-  FaultPlan faults_;  ///< whoever is switched on tells it when
+  FaultPlan faults_;  ///< the derived class sets the power-on time
 };
 
 }  // namespace wrenchd

@@ -10,13 +10,12 @@ namespace {
 constexpr Duration kFrame = std::chrono::milliseconds(1);
 constexpr std::size_t kPacket = 16;
 constexpr std::size_t kShortPacket = 14;
-constexpr std::uint8_t kBegin = '<', kEnd = '>', kNibble = 'A';
-constexpr std::array<std::uint8_t, 3> kHello = {0x0a, 0x43, 0x0d};
-constexpr std::array<std::uint8_t, 4> kHelloBack = {0x0a, 0x44, 0x2c, 0x0d};
+constexpr std::uint8_t kStartMarker = '<', kEndMarker = '>', kNibble = 'A';
+constexpr std::array<std::uint8_t, 3> kHandshake = {0x0a, 0x43, 0x0d};
+constexpr std::array<std::uint8_t, 4> kHandshakeReply = {0x0a, 0x44, 0x2c, 0x0d};
 constexpr unsigned kHomingBit = 1;
-constexpr unsigned kLights = 0b1110;
 
-int word(std::span<const std::uint8_t> nibbles) noexcept {
+int decode_word(std::span<const std::uint8_t> nibbles) noexcept {
   unsigned value = 0;
   for (unsigned i = 0; i < 4; ++i) value |= ((nibbles[i] - unsigned{kNibble}) & 0xfu) << (4 * i);
   return static_cast<std::int16_t>(value);
@@ -34,7 +33,7 @@ void put_word(std::span<std::uint8_t> nibbles, int value) noexcept {
 void EmulatedFalcon::control(std::uint8_t request, std::uint16_t value) {
   if (request == kFtdiModemControl && (value & 0x0100u) != 0) {
     const bool up = (value & 1u) != 0;
-    if (up && !dtr_) {  // the rising edge resets the processor into its loader
+    if (up && !dtr_) {  // the rising edge resets the processor into its boot loader
       state_ = State::awaiting_handshake;
       homed_ = homing_ = false;
       firmware_.clear();
@@ -65,18 +64,19 @@ void EmulatedFalcon::write(std::span<const std::uint8_t> bytes) {
   for (const std::uint8_t byte : bytes) take_serial(byte);
 }
 
-/// Three bytes at 9600 baud are the greeting; at the loader's speed an 'A' asks whether it is ready, and what
-/// follows is firmware, each byte echoed.
+/// At 9600 baud three bytes are the handshake. At the baud rate of the loader an 'A' asks whether it is
+/// ready; then the firmware follows, and the loader echoes each byte.
 void EmulatedFalcon::take_serial(std::uint8_t byte) {
   if (state_ == State::awaiting_handshake && dtr_ && divisor_ == kFtdi9600Baud) {
     handshake_bytes_.push_back(byte);
-    if (handshake_bytes_.size() > kHello.size()) handshake_bytes_.erase(handshake_bytes_.begin());
-    if (!std::equal(handshake_bytes_.begin(), handshake_bytes_.end(), kHello.begin(), kHello.end())) return;
+    if (handshake_bytes_.size() > kHandshake.size()) handshake_bytes_.erase(handshake_bytes_.begin());
+    if (!std::equal(handshake_bytes_.begin(), handshake_bytes_.end(), kHandshake.begin(), kHandshake.end()))
+      return;
     handshake_bytes_.clear();
     if (handshakes_to_ignore_ > 0)
       --handshakes_to_ignore_;
     else
-      reply_bytes_.assign(kHelloBack.begin(), kHelloBack.end());
+      reply_bytes_.assign(kHandshakeReply.begin(), kHandshakeReply.end());
     return;
   }
   if (divisor_ != kFtdiLoaderSpeed || dtr_) return;
@@ -89,8 +89,8 @@ void EmulatedFalcon::take_serial(std::uint8_t byte) {
   }
 }
 
-std::vector<std::uint8_t> EmulatedFalcon::read(std::size_t most) {
-  const auto count = static_cast<std::ptrdiff_t>(std::min(most, reply_bytes_.size()));
+std::vector<std::uint8_t> EmulatedFalcon::read(std::size_t max_bytes) {
+  const auto count = static_cast<std::ptrdiff_t>(std::min(max_bytes, reply_bytes_.size()));
   std::vector<std::uint8_t> bytes(reply_bytes_.begin(), reply_bytes_.begin() + count);
   reply_bytes_.erase(reply_bytes_.begin(), reply_bytes_.begin() + count);
   return bytes;
@@ -113,19 +113,19 @@ MotorEfforts EmulatedFalcon::motor_efforts() const noexcept {
 }
 
 void EmulatedFalcon::start() {
-  constexpr std::array<std::uint8_t, 256> kStandIn{};
-  if (state_ != State::running) falcon_start(*this, kStandIn);
+  constexpr std::array<std::uint8_t, 256> kPlaceholder{};
+  if (state_ != State::running) falcon_start(*this, kPlaceholder);
 }
 
 bool EmulatedFalcon::take_command(TimePoint, std::span<const std::uint8_t> bytes) noexcept {
-  if (state_ != State::running || bytes.size() != kPacket || bytes.front() != kBegin || bytes.back() != kEnd)
+  if (state_ != State::running || bytes.size() != kPacket || bytes.front() != kStartMarker ||
+      bytes.back() != kEndMarker)
     return false;
   for (std::size_t i = 0; i < 3; ++i)
-    efforts_[i] = std::clamp(word(bytes.subspan(1 + 4 * i, 4)), -kMaxEffort, kMaxEffort);
+    efforts_[i] = std::clamp(decode_word(bytes.subspan(1 + 4 * i, 4)), -kMaxEffort, kMaxEffort);
   const unsigned bits = bytes[13] - unsigned{kNibble};
-  lights_ = bits & kLights;
   homing_ = (bits & kHomingBit) != 0;
-  homed_ = homed_ && homing_;  // it stays homed only while it is asked to
+  homed_ = homed_ && homing_;  // homing ends when the host leaves homing mode
   reply_due_ = true;
   return true;
 }
@@ -143,8 +143,8 @@ void EmulatedFalcon::advance_to(TimePoint t, ReportSink& host) noexcept {
 std::array<std::uint8_t, 16> EmulatedFalcon::packet() const noexcept {
   std::array<std::uint8_t, kPacket> packet;
   packet.fill(kNibble);
-  packet.front() = kBegin;
-  packet.back() = kEnd;
+  packet.front() = kStartMarker;
+  packet.back() = kEndMarker;
   for (std::size_t i = 0; i < 3; ++i)
     put_word(std::span(packet).subspan(1 + 4 * i, 4), true_counts_[i] - (homed_ ? 0 : power_on_counts_[i]));
   packet[13] = static_cast<std::uint8_t>(kNibble + buttons_ + (homed_ ? 0x70u : 0u));
@@ -153,10 +153,10 @@ std::array<std::uint8_t, 16> EmulatedFalcon::packet() const noexcept {
 
 void EmulatedFalcon::send(ReportSink& host) noexcept {
   reply_due_ = false;
-  const bool cut = packets_to_truncate_ > 0;
-  if (cut) --packets_to_truncate_;
-  const std::array<std::uint8_t, kPacket> whole = packet();
-  host.take_report(next_frame_, std::span(whole).first(cut ? kShortPacket : kPacket));
+  const bool truncate = packets_to_truncate_ > 0;
+  if (truncate) --packets_to_truncate_;
+  const std::array<std::uint8_t, kPacket> bytes = packet();
+  host.take_report(next_frame_, std::span(bytes).first(truncate ? kShortPacket : kPacket));
 }
 
 }  // namespace wrenchd

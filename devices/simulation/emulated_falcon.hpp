@@ -10,37 +10,38 @@
 
 namespace wrenchd {
 
-/// A Novint Falcon: an FTDI serial chip with a loader behind it, which answers a handshake, echoes a firmware
-/// as it takes it, and then runs it. Running, it sends 16 bytes at the next USB frame for every 16 it takes:
-/// encoders, buttons and homing as nibbles from 'A' on. Its encoders count from wherever the handle was,
-/// until homing mode is asked for and the handle is pulled out and pushed in. Packets are RT safe; starting
-/// is not.
+/// Emulated Novint Falcon: an FTDI serial chip and a boot loader that answers a handshake, echoes the
+/// firmware as it receives it, and then runs it. The running firmware answers each packet of 16 bytes with 16
+/// bytes at the next USB frame: encoders, buttons and homing state, as nibbles from 'A' on. The encoders are
+/// incremental: they start at the power-on pose until the host requests homing mode and the user pulls the
+/// handle out and pushes it in. The packet functions are RT-safe. The functions of the serial chip and
+/// start() are not: they allocate.
 class EmulatedFalcon final : public EmulatedArm, public SerialChip {
  public:
   enum class State : std::uint8_t { off, awaiting_handshake, loading, running };
-  /// What a motor takes at most, in its own counts.
+  /// Maximum motor effort [motor counts].
   static constexpr int kMaxEffort = 4096;
 
-  // The serial chip, as falcon_start() speaks to it.
+  // Serial chip, as used by falcon_start().
   void control(std::uint8_t request, std::uint16_t value) override;
   void write(std::span<const std::uint8_t> bytes) override;
   std::vector<std::uint8_t> read(std::size_t most) override;
 
-  /// As after a start that went well.
+  /// Puts the device into the state after a successful start.
   void run() noexcept { state_ = State::running; }
-  /// What the encoders would count from the zero of the kinematics.
+  /// Sets the counts from the zero of the kinematics.
   void set_true_counts(const std::array<int, 3>& counts) noexcept { true_counts_ = counts; }
-  /// Where the counting began: they say so much less until they are homed.
+  /// Sets the true counts at power-on. The encoders report counts relative to them until they are homed.
   void set_power_on_counts(const std::array<int, 3>& counts) noexcept { power_on_counts_ = counts; }
-  /// The hand pulls the handle out and pushes it in: in homing mode the encoders then know where they are.
+  /// Pulls the handle out and pushes it in. In homing mode this homes the encoders.
   void perform_homing_motion() noexcept;
   void set_buttons(unsigned buttons) noexcept { buttons_ = buttons & 0x0fu; }
 
-  // Faults, of the next so many:
-  void truncate_packets(int packets) noexcept { packets_to_truncate_ = packets; }  ///< packets of 14 bytes
-  void corrupt_firmware_echoes(int blocks) noexcept {
-    echoes_to_corrupt_ = blocks;
-  }  ///< echoes with a wrong byte
+  // Faults; the argument is the number of affected packets, blocks or handshakes.
+  /// Truncates packets to 14 bytes.
+  void truncate_packets(int packets) noexcept { packets_to_truncate_ = packets; }
+  /// Inverts a bit in the echoes of firmware blocks.
+  void corrupt_firmware_echoes(int blocks) noexcept { echoes_to_corrupt_ = blocks; }
   void ignore_handshakes(int times) noexcept { handshakes_to_ignore_ = times; }
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
@@ -48,16 +49,15 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   TimePoint next_event() const noexcept override { return next_frame_; }
 
   void set_counts(const JointCounts& counts) noexcept override;
-  MotorEfforts motor_efforts() const noexcept override;  ///< [motor counts]
-  /// Handshake and loading, with something in place of the firmware, which is its maker's. Nothing where one
-  /// runs already.
+  MotorEfforts motor_efforts() const noexcept override;  ///< motor efforts [motor counts]
+  /// Performs the handshake and loads a placeholder, because the real firmware belongs to the manufacturer.
+  /// Does nothing if a firmware already runs.
   void start() override;
   bool homing_requested() const noexcept override { return homing_ && !homed_; }
   void perform_homing() noexcept override { perform_homing_motion(); }
 
   State state() const noexcept { return state_; }
   bool homed() const noexcept { return homed_; }
-  unsigned lights() const noexcept { return lights_; }  ///< bits 1 to 3: green, blue, red
   const std::array<int, 3>& efforts() const noexcept { return efforts_; }
   const std::vector<std::uint8_t>& firmware() const noexcept { return firmware_; }
 
@@ -70,8 +70,8 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   std::uint16_t divisor_ = 0;
   bool dtr_ = false;
   std::vector<std::uint8_t> firmware_;
-  std::vector<std::uint8_t> handshake_bytes_;  ///< of the handshake
-  std::vector<std::uint8_t> reply_bytes_;      ///< waiting to be read
+  std::vector<std::uint8_t> handshake_bytes_;  ///< received bytes of the handshake
+  std::vector<std::uint8_t> reply_bytes_;      ///< bytes that the host has not read yet
   int echoes_to_corrupt_ = 0, handshakes_to_ignore_ = 0, packets_to_truncate_ = 0;
 
   bool powered_ = false;
@@ -79,7 +79,7 @@ class EmulatedFalcon final : public EmulatedArm, public SerialChip {
   bool reply_due_ = false;
   std::array<int, 3> true_counts_{}, power_on_counts_{}, efforts_{};
   bool homing_ = false, homed_ = false;
-  unsigned buttons_ = 0, lights_ = 0;
+  unsigned buttons_ = 0;
 };
 
 }  // namespace wrenchd

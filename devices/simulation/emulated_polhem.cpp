@@ -62,7 +62,8 @@ bool EmulatedPolhem::take_command(TimePoint now, std::span<const std::uint8_t> b
   last_command_at_ = now;
   amplifiers_on_ = true;
   currents_mA_ = {};
-  if (word(bytes, 3) == 1) {  // attributes are counters a, b, c; where currents stand, d, e, f
+  if (word(bytes, 3) ==
+      1) {  // the attributes are counters a, b, c; the bytes of the currents are counters d, e, f
     for (std::size_t i = 0; i < 3; ++i) {
       counter_offsets_[i] = word(bytes, 4 + i) - encoder_counts_[i];
       counter_offsets_[3 + i] = word(bytes, i) - encoder_counts_[3 + i];

@@ -9,20 +9,21 @@
 
 namespace wrenchd {
 
-/// The board of Polhem and WoodenHaptics (haptikfabrikenapi, firmware/main.cpp): six encoder counters out,
-/// three currents in, nothing of what they move. It sends one report when it is switched on, and then one for
-/// each that it takes, at the next USB frame. Half a second after the last one its amplifiers are disabled.
-/// RT safe.
+/// Emulated controller board of Polhem and WoodenHaptics (haptikfabrikenapi, firmware/main.cpp). It sends six
+/// encoder counts and accepts three motor currents; it does not know the kinematics. It sends one report at
+/// power-on and one for each accepted report, at the next USB frame. It disables its amplifiers half a second
+/// after the last report. All members are RT-safe.
 class EmulatedPolhem final : public EmulatedArm {
  public:
   static constexpr Duration kWatchdog = std::chrono::milliseconds(500);
 
-  /// report_bytes: 64 for the Teensy build, 14 for that of the LPC1768.
+  /// report_bytes: 64 for the Teensy build, 14 for the LPC1768 build.
   explicit EmulatedPolhem(std::size_t report_bytes) : report_bytes_(report_bytes) {}
 
-  /// The hand turns the encoders: what they count since power-on, a to f.
+  /// Sets the counts of the encoders a to f since power-on.
   void set_encoder_counts(const std::array<int, 6>& counts) noexcept { encoder_counts_ = counts; }
-  /// The button on the handle, which the host finds in encoder d, and the one on the board.
+  /// Sets the handle button, which the host reads in encoder d. press_calibration_button() presses the button
+  /// on the board.
   void set_handle_button(bool pressed) noexcept { handle_button_ = pressed; }
   void press_calibration_button() noexcept { calibration_button_ = true; }
 
@@ -31,10 +32,11 @@ class EmulatedPolhem final : public EmulatedArm {
   TimePoint next_event() const noexcept override { return next_frame_; }
 
   void set_counts(const JointCounts& counts) noexcept override;
-  MotorEfforts motor_efforts() const noexcept override;  ///< [A]
+  MotorEfforts motor_efforts() const noexcept override;  ///< motor currents [A]
 
   bool amplifiers_on() const noexcept { return amplifiers_on_; }
-  const std::array<int, 3>& currents_mA() const noexcept { return currents_mA_; }  ///< 0 while they are off
+  /// Commanded currents; 0 while the amplifiers are off.
+  const std::array<int, 3>& currents_mA() const noexcept { return currents_mA_; }
   std::uint64_t reports_sent() const noexcept { return reports_sent_; }
 
  private:
@@ -42,11 +44,11 @@ class EmulatedPolhem final : public EmulatedArm {
 
   std::size_t report_bytes_;
   bool powered_ = false;
-  bool reply_due_ = false;  ///< it has been spoken to since the last report
-  TimePoint next_frame_{};  ///< USB asks once a millisecond
+  bool reply_due_ = false;  ///< true if a command arrived since the last report
+  TimePoint next_frame_{};  ///< next USB frame; one per millisecond
   TimePoint last_command_at_{};
   std::array<int, 6> encoder_counts_{};
-  std::array<int, 6> counter_offsets_{};  ///< counters are set by command 1
+  std::array<int, 6> counter_offsets_{};  ///< offsets of the counters, set by command 1
   std::array<int, 3> currents_mA_{};
   bool amplifiers_on_ = false;
   bool handle_button_ = false, calibration_button_ = false;

@@ -8,21 +8,23 @@
 
 namespace wrenchd {
 
-/// A 3Dconnexion SpaceMouse: a cap that springs back. While it is pushed a packet leaves every 8 ms,
-/// translation and rotation in turn, or every 16 ms with both (combined format). Let go, it sends three
-/// packets of zeros and is silent. Buttons are sent when they change. Out-report 4 is the LED. RT safe.
+/// Emulated 3Dconnexion SpaceMouse: a spring-loaded puck. While it is deflected it sends a packet every 8 ms,
+/// translation and rotation in turn, or both every 16 ms in the combined format. After its release it sends
+/// three packets of zeros and then nothing. It sends buttons when they change. Output report 4 sets the LED.
+/// All members are RT-safe except inject().
 class EmulatedSpaceMouse final : public EmulatedDevice {
  public:
   enum class Format : std::uint8_t { split, combined };
-  /// Counts at the end of the cap's way.
+  /// Counts at full deflection.
   static constexpr int kFullScale = 350;
 
   explicit EmulatedSpaceMouse(Format format) : format_(format) {}
 
-  /// The hand pushes the cap this far, in counts: x right, y toward the user, z down; rotations about them.
+  /// Sets the deflection of the puck in counts: x right, y toward the user, z down, and rotations about these
+  /// axes. Clamps it to kFullScale.
   void set_deflection(const std::array<int, 6>& counts) noexcept;
   void set_buttons(std::uint32_t buttons) noexcept { buttons_ = buttons; }
-  /// A fault: nothing is sent any more, zeros neither.
+  /// Fault: the device sends nothing any more, not even zeros.
   void stop_sending() noexcept { sending_stopped_ = true; }
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
@@ -36,9 +38,9 @@ class EmulatedSpaceMouse final : public EmulatedDevice {
 
   Format format_;
   bool powered_ = false, sending_stopped_ = false;
-  TimePoint next_packet_at_{};  ///< when the next packet may leave
+  TimePoint next_packet_at_{};  ///< earliest time of the next packet
   std::array<int, 6> counts_{};
-  int zeros_left_ = 0;  ///< packets of zeros still to be sent
+  int zeros_left_ = 0;  ///< packets of zeros that are still to be sent
   bool rotation_next_ = false;
   std::uint32_t buttons_ = 0, buttons_sent_ = 0;
   bool led_ = false;

@@ -8,22 +8,22 @@
 
 namespace wrenchd {
 
-/// What shall go wrong, and when. Any number of faults may overlap.
+/// Scheduled faults of an emulated device. Faults may overlap.
 class FaultPlan {
  public:
-  /// Not RT safe.
+  /// Adds a fault. Not RT-safe: allocates.
   void add(const SimulatedFault& fault) { faults_.push_back(fault); }
-  /// From here times count. RT safe.
+  /// Sets the time from which the start times of the faults count. RT-safe.
   void power_on(TimePoint now) noexcept { power_on_ = now; }
-  /// Whether a fault of this kind shows at any moment from..to. RT safe.
+  /// Returns true if a fault of this kind is active at any time in from..to. RT-safe.
   bool active_during(SimulatedFault::Kind kind, TimePoint from, TimePoint to) const noexcept {
     return find(kind, from, to) != nullptr;
   }
-  /// The first fault of this kind that shows now; null where there is none. RT safe.
+  /// Returns the first active fault of this kind; null if there is none. RT-safe.
   const SimulatedFault* active_at(SimulatedFault::Kind kind, TimePoint now) const noexcept {
     return find(kind, now, now);
   }
-  /// When a fault began, and when it is over.
+  /// Return the start time and the end time of a fault. RT-safe.
   TimePoint start_of(const SimulatedFault& fault) const noexcept { return power_on_ + fault.start; }
   TimePoint end_of(const SimulatedFault& fault) const noexcept { return start_of(fault) + fault.duration; }
 

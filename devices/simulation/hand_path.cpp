@@ -11,8 +11,8 @@
 namespace wrenchd {
 namespace {
 
-/// How well the two ends of a repeating path must meet, in each coordinate [m, rad]. Wide enough for decimal
-/// fractions, far below what an encoder sees.
+/// Maximum distance between the ends of a repeating path, in each coordinate [m, rad]. Above the rounding of
+/// decimal fractions, far below an encoder step.
 constexpr double kClosure = 1e-9;
 
 Pose pose_of(const Waypoint& w) {
@@ -31,7 +31,7 @@ void check_each(const std::vector<Waypoint>& waypoints) {
       refuse(i, "a number is not finite");
     if (i == 0 && w.time_s != 0.0) refuse(i, "the first waypoint must be at time 0");
     if (i > 0 && from_seconds(w.time_s) <= from_seconds(waypoints[i - 1].time_s))
-      refuse(i, "its time must be later than that of the waypoint before it");
+      refuse(i, "its time must be later than that of the previous waypoint");
   }
 }
 
@@ -42,7 +42,7 @@ void check_closed(const std::vector<Waypoint>& waypoints) {
                               (last.rotation_vector_rad - first.rotation_vector_rad).cwiseAbs().maxCoeff());
   if (gap > kClosure)
     refuse(waypoints.size() - 1,
-           "a path that repeats must end where it began; repeat the first position and rotation here");
+           "a repeating path must end at its start; repeat the first position and rotation here");
 }
 
 }  // namespace

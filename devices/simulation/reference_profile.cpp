@@ -52,7 +52,7 @@ WrenchReportLayout wrench_report() {
 DeviceProfile reference_profile() {
   DeviceProfile profile;
   profile.name = "loopback";
-  profile.description = "Simulated 6-DOF device that speaks the wrenchd reference report layout, version 1";
+  profile.description = "Simulated 6-DOF device with the wrenchd reference report layout, version 1";
   profile.transport = Transport::loopback;
   profile.report_rate_Hz = 1000.0;
   profile.max_force_N = 10.0;

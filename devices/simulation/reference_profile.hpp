@@ -5,8 +5,9 @@
 
 namespace wrenchd {
 
-/// The wrenchd reference report layout, version 1 (devices/README.md), with the limits of the loopback
-/// device: config/profiles/loopback.toml in C++, for tests and tools that have no file at hand. Not RT safe.
+/// Returns the profile of the wrenchd reference report layout, version 1 (devices/README.md), with the limits
+/// of the loopback device: config/profiles/loopback.toml in C++, for tests and tools without the file. Not
+/// RT-safe: allocates.
 DeviceProfile reference_profile();
 
 }  // namespace wrenchd

@@ -12,11 +12,11 @@
 namespace wrenchd {
 namespace {
 
-/// As of the simulated device: a tenth of the fastest time constant of a stiff hand on a light handle.
+/// Substep of the simulated device: a tenth of the fastest time constant of a stiff hand on a light handle.
 constexpr Duration kSubstep = std::chrono::nanoseconds(62'500);
-constexpr double kTeleport_m = 0.1;
-constexpr double kLeastTeleport_m = 0.01;
-/// Of the way from home to a first waypoint that is out of reach.
+constexpr double kJump_m = 0.1;
+constexpr double kMinJump_m = 0.01;
+/// Number of steps from the home position to a first waypoint out of reach.
 constexpr int kStartSteps = 100;
 
 }  // namespace
@@ -37,20 +37,20 @@ SimulatedArm::SimulatedArm(const DeviceProfile& profile, const SimulationSetting
   set_encoders(handle_.X_BH());
 }
 
-/// The last place within reach on the way from home to the first waypoint.
+/// Returns the last reachable pose on the way from the home position to the first waypoint.
 Pose SimulatedArm::start_pose(const std::string& profile) const {
   const std::optional<Pose> X_DE_home = home_pose(kinematics_);
   if (!X_DE_home)
     throw std::invalid_argument(
         "device profile " + profile +
-        " cannot be simulated: no pose belongs to its home_counts; check [kinematics]");
+        " cannot be simulated: its home_counts correspond to no pose; check [kinematics]");
   const Pose X_BH_home = X_BD_ * *X_DE_home * X_EH_;
-  const Pose wanted = target_at(Duration{0}).X_BG;
+  const Pose goal = target_at(Duration{0}).X_BG;
   Pose reached = X_BH_home;
   for (int i = 0; i <= kStartSteps; ++i) {
     const double s = static_cast<double>(i) / kStartSteps;
-    const Pose X_BH{X_BH_home.rotation.slerp(s, wanted.rotation),
-                    (1.0 - s) * X_BH_home.translation_m + s * wanted.translation_m};
+    const Pose X_BH{X_BH_home.rotation.slerp(s, goal.rotation),
+                    (1.0 - s) * X_BH_home.translation_m + s * goal.translation_m};
     if (!find_configuration(X_BH)) break;
     reached = X_BH;
   }
@@ -59,9 +59,9 @@ Pose SimulatedArm::start_pose(const std::string& profile) const {
 
 void SimulatedArm::inject(const SimulatedFault& fault) {
   if (fault.kind == SimulatedFault::Kind::bad_quaternion)
-    throw std::invalid_argument("an arm sends encoder counts, and no quaternion that could be bad");
+    throw std::invalid_argument("an arm sends encoder counts and no quaternion; choose another fault");
   if (!affects_link(fault.kind) && fault.kind != SimulatedFault::Kind::jump)
-    throw std::invalid_argument("an emulated arm has no such fault; the loopback device has");
+    throw std::invalid_argument("an emulated arm does not support this fault; the loopback device does");
   faults_.add(fault);
 }
 
@@ -80,7 +80,7 @@ std::optional<SimulatedArm::Configuration> SimulatedArm::find_configuration(cons
   return Configuration{X_DE, *angles};
 }
 
-/// About the handle point, in the base. Where the arm is stretched out its motors hold nothing.
+/// Returns the wrench of the motors about the handle point, in B. Zero in a singular configuration.
 Wrench SimulatedArm::motor_demand() const noexcept {
   const Matrix3d J = jacobian(kinematics_, configuration_.angles, configuration_.X_DE);
   Matrix3d J_inverse;
@@ -91,20 +91,20 @@ Wrench SimulatedArm::motor_demand() const noexcept {
   const Wrench F_D = shifted(Wrench{J_inverse.transpose() * tau_Nm, Vector3d::Zero()},
                              configuration_.X_DE.rotation * X_EH_.translation_m);
   Wrench F_B = expressed(X_BD_.rotation, F_D);
-  if (!has_wrist_) F_B.torque_Nm.setZero();  // its bearings take it
+  if (!has_wrist_) F_B.torque_Nm.setZero();  // the bearings of the handle take the torque
   return F_B;
 }
 
-/// Turns the encoders. What a fault adds is halved until the arm could be there.
+/// Sets the encoders. A jump fault is halved until its pose is reachable.
 void SimulatedArm::set_encoders(const Pose& X_BH) noexcept {
-  Configuration seen = configuration_;
+  Configuration reported = configuration_;
   if (fault_active_during(SimulatedFault::Kind::jump, now_, now_)) {
-    std::optional<Configuration> elsewhere;
-    for (double off_m = kTeleport_m; !elsewhere && off_m > kLeastTeleport_m; off_m *= 0.5)
-      elsewhere = find_configuration({X_BH.rotation, X_BH.translation_m + off_m * Vector3d::UnitX()});
-    seen = elsewhere.value_or(seen);
+    std::optional<Configuration> displaced;
+    for (double offset_m = kJump_m; !displaced && offset_m > kMinJump_m; offset_m *= 0.5)
+      displaced = find_configuration({X_BH.rotation, X_BH.translation_m + offset_m * Vector3d::UnitX()});
+    reported = displaced.value_or(reported);
   }
-  arm_->set_counts(joint_counts(kinematics_, seen.angles));
+  arm_->set_counts(joint_counts(kinematics_, reported.angles));
 }
 
 void SimulatedArm::advance_to(TimePoint t, ReportSink& host) noexcept {

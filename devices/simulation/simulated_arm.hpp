@@ -14,27 +14,29 @@
 
 namespace wrenchd {
 
-/// An emulated arm in a simulated hand. In each substep, D being the device's own base axes, E its end, and J
-/// and the angles those of the kinematics the profile names:
+/// Emulated arm in a simulated hand. D = the device's own frame, E = its end frame; J and the joint angles
+/// follow from the kinematics of the profile. Each substep computes:
 ///
-///   f_D = J^-T tau,   tau from what the motors do        pushes the handle at E
-///   counts of the angles that hold E at X_DB X_BH X_HE   are where the encoders stand
+///   f_D = J^-T tau,   tau from the motor efforts              force on the handle at E
+///   encoder counts of the angles that reach E at X_DB X_BH X_HE
 ///
-/// An arm without a wrist does not turn its handle. Out of reach there is an end stop: the handle stays where
-/// it was. It starts at the first waypoint of the hand path, or as near to it as it comes from home.
+/// An arm without a wrist does not rotate its handle. At the boundary of the workspace there is an end stop:
+/// the handle keeps its pose. The handle starts at the first waypoint of the hand path, or at the nearest
+/// reachable pose between the home position and this waypoint.
 class SimulatedArm final : public DeviceInHand {
  public:
-  /// How far advance_to() catches up in one call: after a longer gap the handle rests where it was.
+  /// Maximum catch-up of advance_to() in one call. After a longer gap the handle rests at its pose.
   static constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
-  /// How long a person takes to do what homing asks for.
+  /// Time that the operator needs to home the device.
   static constexpr Duration kHomingDelay = std::chrono::milliseconds(500);
 
-  /// Throws std::invalid_argument where the settings or the kinematics make no sense.
+  /// Throws std::invalid_argument if the settings or the kinematics are invalid.
   SimulatedArm(const DeviceProfile& profile, const SimulationSettings& settings,
                std::unique_ptr<EmulatedArm> arm);
 
   void open(TimePoint) override { arm_->start(); }
-  /// An orientation of half the length is not among what an arm can say.
+  /// Throws std::invalid_argument for faults that an arm cannot have, such as bad_quaternion. Not RT-safe:
+  /// allocates.
   void inject(const SimulatedFault& fault) override;
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
@@ -62,17 +64,17 @@ class SimulatedArm final : public DeviceInHand {
 
   Kinematics kinematics_;
   Pose X_BD_, X_DB_, X_EH_, X_HE_;
-  bool has_wrist_;  ///< has a wrist
+  bool has_wrist_;  ///< true if the arm has a wrist
   HandPath path_;
-  bool prescribed_motion_;  ///< the handle is on the path, whatever pushes
+  bool prescribed_motion_;  ///< true if the handle follows the path exactly
   std::unique_ptr<EmulatedArm> arm_;
   SimulatedHandle handle_;
-  Configuration configuration_;  ///< of the handle
+  Configuration configuration_;  ///< configuration at the pose of the handle
 
   bool powered_ = false;
   TimePoint power_on_{};
   TimePoint now_{};
-  Duration homing_requested_for_{};  ///< for how long
+  Duration homing_requested_for_{};  ///< time since the host requested homing
 };
 
 }  // namespace wrenchd

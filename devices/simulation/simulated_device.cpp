@@ -9,19 +9,20 @@
 #include <string>
 
 #include "core/finite.hpp"
+#include "devices/layout_validation.hpp"
 
 namespace wrenchd {
 namespace {
 
-/// Encoder samples a report: enough for the velocity filter to smooth over quanta.
+/// Encoder samples per report: enough for the velocity filter to smooth over quanta.
 constexpr std::uint64_t kSamplesPerReport = 8;
 /// Longest substep [s]: a tenth of the fastest time constant of a stiff hand on a light handle.
 constexpr double kMaxSubstep_s = 1.0 / 16000.0;
 
-constexpr double kTeleport_m = 0.1;
-constexpr double kRunAway_m_per_s = 3.0;
-constexpr double kShake_m = 1e-3;
-constexpr double kShake_Hz = 80.0;
+constexpr double kJump_m = 0.1;
+constexpr double kDriftSpeed_m_per_s = 3.0;
+constexpr double kVibration_m = 1e-3;
+constexpr double kVibration_Hz = 80.0;
 constexpr double kBadQuaternionLength = 0.5;
 
 double report_period(const DeviceProfile& profile) {
@@ -35,29 +36,29 @@ std::uint64_t substeps_per_sample(const DeviceProfile& profile) {
   return static_cast<std::uint64_t>(std::ceil(sample_period_s / kMaxSubstep_s - 1e-9));
 }
 
-/// Whole nanoseconds, so a report period may be off by half a nanosecond a substep.
+/// Rounded to whole nanoseconds, so a report period may differ by half a nanosecond per substep.
 Duration substep_of(const DeviceProfile& profile) {
   const double substeps = static_cast<double>(kSamplesPerReport * substeps_per_sample(profile));
   return Duration{std::max(std::llround(1e9 * report_period(profile) / substeps), 1LL)};
 }
 
-/// It has a handle with six degrees of freedom, and a firmware that sends whole poses and takes wrenches.
-const PoseReportLayout& checked(const DeviceProfile& profile) {
+/// Checks that the device has six degrees of freedom, sends whole poses and accepts wrenches.
+const PoseReportLayout& checked_layout(const DeviceProfile& profile) {
   if (pose_source(profile) != PoseSource::pose || sensed_dofs(profile) != kAllDofs ||
       driven_dofs(profile) != kAllDofs)
     throw std::invalid_argument(
         "device profile " + profile.name +
-        ": the simulated device sends whole poses and takes wrenches, this one does not; "
+        ": the simulated device sends whole poses and accepts wrenches, this one does not; "
         "choose a profile that inherits loopback");
-  check(profile.pose_report);
-  check(profile.wrench_report);
+  validate(profile.pose_report);
+  validate(profile.wrench_report);
   return profile.pose_report;
 }
 
 }  // namespace
 
 SimulatedDevice::SimulatedDevice(const DeviceProfile& profile, const SimulationSettings& settings)
-    : pose_layout_(checked(profile)),
+    : pose_layout_(checked_layout(profile)),
       wrench_point_(profile.wrench_point),
       X_BD_(profile.X_BD),
       X_HE_(inverse(profile.X_EH)),
@@ -105,7 +106,7 @@ void SimulatedDevice::substep(ReportSink& host) noexcept {
   if (substeps_ % substeps_per_report_ == 0) send_report(host);
 }
 
-/// What the firmware tells the motors, about the handle point.
+/// Returns the wrench of the motors about the handle point, in B.
 Wrench SimulatedDevice::motor_demand() noexcept {
   Wrench F = firmware_.motor_wrench(now_);
   const Pose& X_BH = handle_.X_BH();
@@ -113,7 +114,7 @@ Wrench SimulatedDevice::motor_demand() noexcept {
   return wrench_point_ == WrenchPoint::handle ? F : shifted(F, X_BH.translation_m);
 }
 
-/// From the handle in the base to the device's end in its own axes.
+/// Converts from the handle in the base to the device's end frame in its own base frame.
 void SimulatedDevice::express_in_device_frames(PoseReport& report) const noexcept {
   const Twist V_BE = shifted(report.V_BH, report.X_BH.rotation * X_HE_.translation_m);
   report.V_BH = expressed(X_BD_.rotation.conjugate(), V_BE);
@@ -135,23 +136,23 @@ bool SimulatedDevice::take_command(TimePoint, std::span<const std::uint8_t> byte
   return firmware_.take_command(now_, bytes);
 }
 
-/// What is wrong with what the device says.
+/// Applies the active faults to a report.
 void SimulatedDevice::apply_report_faults(PoseReport& report) noexcept {
   using Kind = SimulatedFault::Kind;
-  const auto value = [](const SimulatedFault& fault, double usual) {
-    return fault.value > 0.0 ? fault.value : usual;
+  const auto value = [](const SimulatedFault& fault, double fallback) {
+    return fault.value > 0.0 ? fault.value : fallback;
   };
   Vector3d& p_m = report.X_BH.translation_m;
-  if (const SimulatedFault* f = faults_.active_at(Kind::jump, now_)) p_m.x() += value(*f, kTeleport_m);
+  if (const SimulatedFault* f = faults_.active_at(Kind::jump, now_)) p_m.x() += value(*f, kJump_m);
   if (const SimulatedFault* f = faults_.active_at(Kind::drift, now_)) {
-    const double way_m = value(*f, kRunAway_m_per_s) * seconds(now_ - faults_.start_of(*f));
-    p_m.x() += kTeleport_m - std::abs(std::fmod(way_m, 2.0 * kTeleport_m) - kTeleport_m);
+    const double distance_m = value(*f, kDriftSpeed_m_per_s) * seconds(now_ - faults_.start_of(*f));
+    p_m.x() += kJump_m - std::abs(std::fmod(distance_m, 2.0 * kJump_m) - kJump_m);
   }
   if (const SimulatedFault* f = faults_.active_at(Kind::vibrate, now_)) {
-    const double swing_m = value(*f, kShake_m), w_per_s = 2.0 * std::numbers::pi * kShake_Hz;
+    const double amplitude_m = value(*f, kVibration_m), w_per_s = 2.0 * std::numbers::pi * kVibration_Hz;
     const double phase = w_per_s * seconds(now_ - faults_.start_of(*f));
-    p_m.z() += swing_m * std::sin(phase);
-    report.V_BH.linear_m_per_s.z() += swing_m * w_per_s * std::cos(phase);
+    p_m.z() += amplitude_m * std::sin(phase);
+    report.V_BH.linear_m_per_s.z() += amplitude_m * w_per_s * std::cos(phase);
   }
   if (const SimulatedFault* f = faults_.active_at(Kind::press_button, now_))
     report.buttons |= std::uint32_t{1} << (static_cast<unsigned>(f->value) & 31U);
@@ -159,7 +160,7 @@ void SimulatedDevice::apply_report_faults(PoseReport& report) noexcept {
   report.X_BH = last_unstuck_pose_;
 }
 
-/// What is wrong with the firmware, from before a command or a look at its motors.
+/// Applies the active faults to the firmware, before commands and motors are processed.
 void SimulatedDevice::apply_firmware_faults() noexcept {
   using Kind = SimulatedFault::Kind;
   firmware_.set_watchdog_enabled(!fault_active_during(Kind::disable_watchdog, now_, now_));
@@ -168,8 +169,8 @@ void SimulatedDevice::apply_firmware_faults() noexcept {
 }
 
 TimePoint SimulatedDevice::next_event() const noexcept {
-  const std::uint64_t left = substeps_per_report_ - substeps_ % substeps_per_report_;
-  return now_ + substep_ * static_cast<std::int64_t>(left);
+  const std::uint64_t remaining = substeps_per_report_ - substeps_ % substeps_per_report_;
+  return now_ + substep_ * static_cast<std::int64_t>(remaining);
 }
 
 }  // namespace wrenchd

@@ -15,29 +15,30 @@
 
 namespace wrenchd {
 
-/// The far side of a transport: a handle in a hand, motors, encoders and firmware. A pure function of
-/// profile, settings, faults and the commands with their times: the same in, the same bits out, however the
-/// time in between was cut into calls. Where the profile has [frames], it says where its own end is in its
-/// own axes, and takes wrenches about that in those. It starts at rest at the first waypoint of the hand
-/// path. Where the profile's wrench point is the world origin, the simulated device stands in it.
+/// Simulated reference device: a handle in a hand, motors, encoders and firmware. Its output is a pure
+/// function of profile, settings, faults and the commands with their times. Equal inputs give equal bits,
+/// independent of how calls divide the time. If the profile has [frames], the device reports its own end
+/// frame in its own base frame, and accepts wrenches there. It starts at rest at the first waypoint of the
+/// hand path. If the wrench point of the profile is the world origin, the device base is at the world origin.
 class SimulatedDevice final : public DeviceInHand {
  public:
-  /// How far advance_to() catches up in one call, see there.
+  /// Maximum catch-up of advance_to() in one call.
   static constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
 
-  /// Throws std::invalid_argument where the profile's layouts or the settings make no sense.
+  /// Throws std::invalid_argument if the layouts of the profile or the settings are invalid. Not RT-safe:
+  /// allocates.
   SimulatedDevice(const DeviceProfile& profile, const SimulationSettings& settings);
 
-  /// Lets time pass up to t in fixed substeps: 1/16 ms, or an eighth of the report period where that is less.
-  /// The first call switches the power on at t. After a gap of more than kMaxCatchUp the device does not live
-  /// through it: clock, hand path and sequence jump by whole report periods, the handle rests where it was
-  /// and the watchdog has tripped. RT safe.
+  /// Advances the device to time t in fixed substeps: 1/16 ms, or an eighth of the report period if that is
+  /// less. The first call switches the power on at t. The device does not simulate a gap longer than
+  /// kMaxCatchUp: clock, hand path and sequence advance by whole report periods, the handle rests at its
+  /// pose, and the watchdog trips. RT-safe.
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept override;
-  /// When the next report leaves, silent or not.
+  /// Returns the time of the next report, also while a silence fault is active. RT-safe.
   TimePoint next_event() const noexcept override;
 
-  // The truth, for tests: not what the encoders see.
+  // True state of the handle, for tests; the encoders may report a different one.
   TimePoint now() const noexcept { return now_; }
   const Pose& X_BH() const noexcept override { return handle_.X_BH(); }
   const Twist& V_BH() const noexcept { return handle_.V_BH(); }
@@ -58,16 +59,16 @@ class SimulatedDevice final : public DeviceInHand {
   PoseReportLayout pose_layout_;
   WrenchPoint wrench_point_;
   Pose X_BD_, X_HE_;
-  bool same_frames_;                   ///< D is B and E is H
-  std::uint64_t substeps_per_sample_;  ///< of the encoders
+  bool same_frames_;                   ///< true if D = B and E = H
+  std::uint64_t substeps_per_sample_;  ///< substeps per encoder sample
   std::uint64_t substeps_per_report_;
   Duration substep_;
 
   HandPath path_;
-  bool prescribed_motion_;  ///< the handle is on the path, whatever pushes
+  bool prescribed_motion_;  ///< true if the handle follows the path exactly
   SimulatedHandle handle_;
   SimulatedFirmware firmware_;
-  Pose last_unstuck_pose_;  ///< what the encoders said before they got stuck
+  Pose last_unstuck_pose_;  ///< last reported pose before a freeze_pose fault
 
   bool powered_ = false;
   TimePoint power_on_{};

@@ -8,8 +8,8 @@
 namespace wrenchd {
 namespace {
 
-/// Of the first-order low pass on encoder differences. One quantum of 10 um at 8 kHz is a spike of 80 mm/s;
-/// 100 Hz leaves 6 mm/s of it and costs 1.6 ms of delay.
+/// Cut-off frequency of the first-order low pass on encoder differences. One quantum of 10 um at 8 kHz is a
+/// spike of 80 mm/s; 100 Hz reduces it to 6 mm/s at a delay of 1.6 ms.
 constexpr double kVelocityCutoff_Hz = 100.0;
 
 Vector3d quantised(const Vector3d& v, double quantum) noexcept {
@@ -67,8 +67,8 @@ PoseReport SimulatedFirmware::make_report(Duration since_power_on) noexcept {
   return report;
 }
 
-/// A repetition is never taken: a host that is stuck must not keep the motors on. A step back is taken only
-/// while the motors are off: that is a host that started anew.
+/// A repeated command is never accepted: a hanging host must not keep the motors on. A decreasing sequence is
+/// accepted only while the motors are off, after a restart of the host.
 bool SimulatedFirmware::in_order(std::uint64_t sequence) const noexcept {
   if (!wrench_layout_.sequence.present || !last_command_) return true;
   const unsigned bits = wrench_layout_.sequence.bits;

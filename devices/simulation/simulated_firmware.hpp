@@ -12,41 +12,41 @@
 
 namespace wrenchd {
 
-/// What runs inside a device that follows devices/README.md: encoders, velocity estimate, command checks and
-/// the watchdog. It is the reference for firmware written elsewhere, so it knows only what a firmware knows.
-/// Everything but construction is RT safe.
+/// Firmware of a device that follows devices/README.md: encoders, velocity estimate, command checks and
+/// watchdog. It is the reference for other firmware, so it uses only information that a firmware has. All
+/// members except the constructor are RT-safe.
 class SimulatedFirmware {
  public:
-  /// No command may be held longer, whatever it asks for [s].
+  /// Maximum time for which the firmware applies a command, whatever hold time it requests [s].
   static constexpr double kMaxHold_s = 0.032;
 
-  /// `sample_period`: between two calls of sample().
+  /// `sample_period`: time between two calls of sample().
   SimulatedFirmware(const DeviceProfile& profile, const SimulationSettings& settings, Duration sample_period);
 
-  /// Reads the encoders with the handle at rest: where the velocity estimate starts.
+  /// Reads the encoders with the handle at rest, and resets the velocity estimate to zero. RT-safe.
   void initialize_encoders(const Pose& X_BH) noexcept;
-  /// Reads the encoders and updates the velocity estimate. The position is rounded to its quantum in each
-  /// coordinate, the rotation in each coordinate of its rotation vector from the base.
+  /// Reads the encoders and updates the velocity estimate. Rounds each coordinate of the position, and each
+  /// coordinate of the rotation vector from the base, to its quantum. RT-safe.
   void sample(const Pose& X_BH) noexcept;
 
-  /// The next pose report, from the last sample. Counts the sequence.
+  /// Makes the next pose report from the last sample and increments the sequence. RT-safe.
   PoseReport make_report(Duration since_power_on) noexcept;
-  /// Reports that were due and never made: the sequence goes on as if they had been sent.
+  /// Skips reports that were due and not made. The sequence continues as if they had been sent. RT-safe.
   void skip_reports(std::uint32_t count) noexcept { sequence_ += count; }
 
-  /// Takes a command that arrived now. False where it is not one, or is a repetition, or is out of order:
-  /// then it has no effect and does not feed the watchdog.
+  /// Processes a command that arrives at `now`. Returns false if it is invalid, repeated or out of order;
+  /// such a command has no effect and does not feed the watchdog. RT-safe.
   bool take_command(TimePoint now, std::span<const std::uint8_t> bytes) noexcept;
-  /// What the motors are told until the given time. Trips the watchdog if the command may not be held so
-  /// long.
+  /// Returns the wrench that the motors apply until the given time. Trips the watchdog if the hold time of
+  /// the command ends before. RT-safe.
   Wrench motor_wrench(TimePoint until) noexcept;
-  /// Motors off, and the host is told why.
+  /// Switches the motors off and sets watchdog_tripped. RT-safe.
   void trip_watchdog() noexcept;
 
-  // What may be wrong with a firmware, for tests.
-  /// False: the watchdog never trips.
+  // Faults of a firmware, for tests.
+  /// If false, the watchdog never trips. RT-safe.
   void set_watchdog_enabled(bool awake) noexcept { watchdog_enabled_ = awake; }
-  /// Motors off, and the watchdog has nothing to do with it.
+  /// Switches the motors off without tripping the watchdog. RT-safe.
   void switch_motors_off() noexcept {
     motors_on_ = false;
     command_ = {};
@@ -70,15 +70,15 @@ class SimulatedFirmware {
   double rotation_quantum_rad_;
   double default_hold_s_;
   double sample_period_s_;
-  double filter_gain_;  ///< share of a new difference in the velocity estimate
+  double filter_gain_;  ///< weight of a new difference in the velocity estimate
 
   Encoder encoder_{};
-  Twist V_BH_;  ///< estimate
+  Twist V_BH_;  ///< velocity estimate
   std::uint64_t sequence_ = 0;
 
   Wrench command_;
   TimePoint hold_until_{};
-  std::optional<std::uint64_t> last_command_;  ///< its sequence
+  std::optional<std::uint64_t> last_command_;  ///< sequence of the last accepted command
   bool motors_on_ = false;
   bool watchdog_tripped_ = false;
   bool watchdog_enabled_ = true;

@@ -10,8 +10,9 @@
 namespace wrenchd {
 namespace {
 
-/// Largest h^2 K/m of the semi-implicit step. It is stable below 4; below 0.25 a period has twelve substeps.
-constexpr double kMostStiffness = 0.25;
+/// Maximum h^2 K/m of the semi-implicit step. It is stable below 4; below 0.25 a period has at least twelve
+/// substeps.
+constexpr double kMaxStiffnessNumber = 0.25;
 
 void check(const char* which, double inertia, double stiffness, std::initializer_list<double> others,
            double step_s) {
@@ -22,26 +23,26 @@ void check(const char* which, double inertia, double stiffness, std::initializer
   for (const double x : others)
     if (!is_finite(x) || x < 0.0)
       throw std::invalid_argument(axis + "friction, damping and actuator limits must be 0 or more");
-  if (step_s * step_s * stiffness / inertia > kMostStiffness)
+  if (step_s * step_s * stiffness / inertia > kMaxStiffnessNumber)
     throw std::invalid_argument(axis + "the hand is too stiff for the inertia at a substep of " +
                                 std::to_string(step_s) + " s; lower the stiffness or raise the inertia");
 }
 
-/// Cut to a length, direction kept.
-Vector3d within(const Vector3d& v, double most) noexcept {
+/// Scales a vector to a maximum length.
+Vector3d clamp_norm(const Vector3d& v, double max_norm) noexcept {
   const double length = v.norm();
-  return length > most ? Vector3d(v * (most / length)) : v;
+  return length > max_norm ? Vector3d(v * (max_norm / length)) : v;
 }
 
-/// Turn that leads from one rotation to another, as axis times 2 sin(angle/2).
+/// Returns the rotation from one orientation to another, as axis times 2 sin(angle/2).
 Vector3d chord(const Quaterniond& from, const Quaterniond& to) noexcept {
-  const Quaterniond turn = to * from.conjugate();
-  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
+  const Quaterniond rotation = to * from.conjugate();
+  return (rotation.w() < 0.0 ? -2.0 : 2.0) * rotation.vec();
 }
 
-/// R turned by a small rotation in base axes, Cayley's map: dq ~ [1; phi/2]. Off by |phi|^3 / 12, which is
-/// 4e-11 rad at 12 rad/s and 1/16 ms.
-Quaterniond turned(const Quaterniond& R, const Vector3d& phi) noexcept {
+/// Rotates R by a small rotation vector in base axes, with Cayley's map: dq ~ [1; phi/2]. The error |phi|^3 /
+/// 12 is 4e-11 rad at 12 rad/s and 1/16 ms.
+Quaterniond rotated(const Quaterniond& R, const Vector3d& phi) noexcept {
   Quaterniond dq;
   dq.w() = 1.0;
   dq.vec() = 0.5 * phi;
@@ -65,26 +66,27 @@ SimulatedHandle::SimulatedHandle(const SimulationSettings& s, const Pose& X_BH, 
           step_s);
 }
 
-//   (m + h (D + b)) v' = m v + h (F + K offset + D v_G),  then Coulomb takes at most h c / (m + h (D + b))
+//   (m + h (D + b)) v' = m v + h (F + K offset + D v_G),  then Coulomb friction removes at most h c / (m + h
+//   (D + b))
 SimulatedHandle::AppliedForces SimulatedHandle::integrate(const MotionParameters& motion,
                                                           const Vector3d& demand, const Vector3d& offset,
                                                           const Vector3d& goal_velocity,
                                                           Vector3d& velocity) noexcept {
   const double h = step_s_;
-  const Vector3d motors = within(demand, motion.actuator_max);
+  const Vector3d motors = clamp_norm(demand, motion.actuator_max);
   const Vector3d spring = motion.hand_stiffness * offset;
   const double inertia = motion.inertia + h * (motion.hand_damping + motion.viscous_friction);
-  const Vector3d free =
+  const Vector3d unbraked =
       (motion.inertia * velocity + h * (motors + spring + motion.hand_damping * goal_velocity)) / inertia;
-  const double speed = free.norm();
+  const double speed = unbraked.norm();
   const double brake = h * motion.coulomb_friction / inertia;
-  velocity = speed > brake ? Vector3d(free * (1.0 - brake / speed)) : Vector3d(Vector3d::Zero());
+  velocity = speed > brake ? Vector3d(unbraked * (1.0 - brake / speed)) : Vector3d(Vector3d::Zero());
 
   const Vector3d hand = spring + motion.hand_damping * (goal_velocity - velocity);
-  const double slid = velocity.norm();
+  const double final_speed = velocity.norm();
   energy_.motors_J += h * motors.dot(velocity);
   energy_.hand_J += h * hand.dot(velocity);
-  energy_.friction_J += h * slid * (motion.viscous_friction * slid + motion.coulomb_friction);
+  energy_.friction_J += h * final_speed * (motion.viscous_friction * final_speed + motion.coulomb_friction);
   return {motors, hand};
 }
 
@@ -98,18 +100,18 @@ void SimulatedHandle::step(const HandTarget& target, const Wrench& F_motors) noe
   F_motors_ = {force.motors, torque.motors};
   F_hand_ = {force.hand, torque.hand};
   X_BH_.translation_m += step_s_ * V_BH_.linear_m_per_s;
-  X_BH_.rotation = turned(X_BH_.rotation, step_s_ * V_BH_.angular_rad_per_s);
+  X_BH_.rotation = rotated(X_BH_.rotation, step_s_ * V_BH_.angular_rad_per_s);
 }
 
-/// The hand gives what is missing: its work is the change of the kinetic energy, and what friction took, and
-/// what the motors did against it.
+/// The work of the hand is the change of the kinetic energy, plus the friction loss, minus the work of the
+/// motors.
 void SimulatedHandle::step_prescribed(const HandTarget& target, const Wrench& F_motors) noexcept {
   const double before_J = kinetic_energy_J();
   const SimulatedEnergy sums = energy_;
   X_BH_ = target.X_BG;
   V_BH_ = target.V_BG;
-  F_motors_ = {within(F_motors.force_N, translation_.actuator_max),
-               within(F_motors.torque_Nm, rotation_.actuator_max)};
+  F_motors_ = {clamp_norm(F_motors.force_N, translation_.actuator_max),
+               clamp_norm(F_motors.torque_Nm, rotation_.actuator_max)};
   F_hand_ = -1.0 * F_motors_;
   const auto rubbed_W = [](const MotionParameters& motion, double speed) {
     return speed * (motion.viscous_friction * speed + motion.coulomb_friction);

@@ -7,39 +7,41 @@
 
 namespace wrenchd {
 
-/// Work done on the handle since the start [J]. Each is force times the way truly moved, so at every moment
+/// Work done on the handle since the start [J]: force times actual displacement. At each time
 ///
-///   motors_J + hand_J - friction_J = kinetic energy now - kinetic energy at the start
+///   motors_J + hand_J - friction_J = present kinetic energy - initial kinetic energy
 ///
-/// up to what the integrator itself loses: (h/2m) |net force|^2 of power, h being the substep.
+/// except for the loss of the integrator, whose power is (h/2m) |net force|^2 with the substep h.
 struct SimulatedEnergy {
-  double motors_J = 0.0;    ///< > 0: the device pushed the hand
-  double hand_J = 0.0;      ///< > 0: the hand moved the handle
-  double friction_J = 0.0;  ///< >= 0: lost in the mechanism
+  double motors_J = 0.0;    ///< > 0: the motors did work on the hand
+  double hand_J = 0.0;      ///< > 0: the hand did work on the handle
+  double friction_J = 0.0;  ///< >= 0: dissipated in the mechanism
 };
 
-/// The handle of the simulated device as a rigid body on bearings, in a hand. B = base, H = handle point.
+/// Handle of the simulated device: a rigid body on bearings, held by a hand. B = base, H = handle frame.
 ///
 ///   m dv/dt = F_motors + K (p_G - p) + D (v_G - v) - b v - c v/|v|            and the same in rotation
 ///
-/// The inertia is isotropic about the handle point, so there is no gyroscopic term; gravity is balanced. The
-/// hand's torque is K 2 sin(angle/2) about the axis that leads to the goal: within 2 % of K times the angle
-/// up to 0.7 rad, smooth and passive beyond.
+/// The inertia is isotropic about the handle point, so there is no gyroscopic term. Gravity is balanced. The
+/// torque of the hand is K 2 sin(angle/2) about the axis to the goal. Up to 0.7 rad it is within 2 % of K
+/// times the angle; beyond, it remains smooth and passive.
 class SimulatedHandle {
  public:
-  /// Throws std::invalid_argument where a mass, friction, stiffness or damping cannot be, or where the hand
-  /// is too stiff for the handle's mass at this step. `step_s` is the fixed substep.
+  /// `step_s`: fixed substep. Throws std::invalid_argument if a mass, friction, stiffness or damping is
+  /// invalid, or if the hand is too stiff for the mass of the handle at this step. Not RT-safe: allocates on
+  /// errors.
   SimulatedHandle(const SimulationSettings& settings, const Pose& X_BH, double step_s);
 
-  /// One substep, semi-implicit: velocities first, friction and damping taken at their end, then the pose.
-  /// F_motors: on the hand, about the handle point, in base axes; cut to what the actuators can do. RT safe.
+  /// Advances one semi-implicit substep: first the velocities, with friction and damping at the end of the
+  /// step, then the pose. F_motors: on the hand, about the handle point, in B; clamped to the actuator
+  /// limits. RT-safe.
   void step(const HandTarget& target, const Wrench& F_motors) noexcept;
-  /// One substep of a handle that is led: it is where the target is, whatever pushes. What that takes of the
-  /// hand is in the sums of energy. RT safe.
+  /// Advances one substep of a handle with prescribed motion: it takes the pose of the target, whatever the
+  /// forces are. The energy sums include the work of the hand. RT-safe.
   void step_prescribed(const HandTarget& target, const Wrench& F_motors) noexcept;
-  /// Stops the handle where it is. RT safe.
+  /// Stops the handle at its pose. RT-safe.
   void stop() noexcept { V_BH_ = {}; }
-  /// Puts the handle there, at rest: an end stop. What it takes is in no sum of energy. RT safe.
+  /// Sets the pose, at rest, as at an end stop. The energy sums do not include the lost energy. RT-safe.
   void reset_to(const Pose& X_BH) noexcept {
     X_BH_ = X_BH;
     stop();
@@ -47,17 +49,19 @@ class SimulatedHandle {
 
   const Pose& X_BH() const noexcept { return X_BH_; }
   const Twist& V_BH() const noexcept { return V_BH_; }
-  const Wrench& motor_wrench() const noexcept { return F_motors_; }  ///< really applied in the last substep
-  const Wrench& hand_wrench() const noexcept { return F_hand_; }     ///< of the hand on the handle, likewise
+  /// Wrench applied in the last substep, after the actuator limits.
+  const Wrench& motor_wrench() const noexcept { return F_motors_; }
+  /// Wrench of the hand on the handle in the last substep.
+  const Wrench& hand_wrench() const noexcept { return F_hand_; }
   const SimulatedEnergy& energy() const noexcept { return energy_; }
   double kinetic_energy_J() const noexcept;
 
  private:
-  /// One of the two halves of the motion: translation or rotation.
+  /// Parameters of translation or of rotation.
   struct MotionParameters {
     double inertia;         ///< [kg] or [kg m^2]
     double hand_stiffness;  ///< [N/m] or [N.m/rad]
-    double hand_damping;    ///< per second of it
+    double hand_damping;    ///< [N.s/m] or [N.m.s/rad]
     double viscous_friction;
     double coulomb_friction;  ///< [N] or [N.m]
     double actuator_max;      ///< [N] or [N.m]

@@ -9,19 +9,20 @@ namespace wrenchd {
 namespace {
 
 constexpr Duration kStep = std::chrono::milliseconds(1);
-/// As SimulatedArm::kMaxCatchUp: after a longer gap the hand takes the cap anew.
+/// As SimulatedArm::kMaxCatchUp. After a longer gap the hand grasps the puck again.
 constexpr Duration kMaxCatchUp = std::chrono::seconds(1);
 
 const PoseReportLayout& layout(const DeviceProfile& profile, std::size_t index) noexcept {
   return index == 0 ? profile.pose_report : profile.more_reports[index - 1];
 }
 
-/// Three counts, cut to how far the cap goes with their direction kept.
-void put(const Vector3d& wanted, std::span<int> counts) noexcept {
-  const double most = wanted.cwiseAbs().maxCoeff();
-  const double cut = most > EmulatedSpaceMouse::kFullScale ? EmulatedSpaceMouse::kFullScale / most : 1.0;
+/// Rounds to three counts, scaled to the full deflection.
+void round_to_counts(const Vector3d& exact, std::span<int> counts) noexcept {
+  const double largest = exact.cwiseAbs().maxCoeff();
+  const double scale =
+      largest > EmulatedSpaceMouse::kFullScale ? EmulatedSpaceMouse::kFullScale / largest : 1.0;
   for (std::size_t i = 0; i < counts.size(); ++i)
-    counts[i] = static_cast<int>(std::lround(cut * wanted[static_cast<Eigen::Index>(i)]));
+    counts[i] = static_cast<int>(std::lround(scale * exact[static_cast<Eigen::Index>(i)]));
 }
 
 }  // namespace
@@ -37,7 +38,7 @@ PuckCoding puck_coding(const DeviceProfile& profile) {
   if (!profile.deflection || coding.translation_step_m == 0.0 || coding.rotation_step_rad == 0.0)
     throw std::invalid_argument("device profile " + profile.name +
                                 " cannot be simulated: its reports do not carry both the translation and the "
-                                "rotation of a cap; simulate a profile that inherits spacemouse_split");
+                                "rotation of a puck; simulate a profile that inherits spacemouse_split");
   return coding;
 }
 
@@ -66,9 +67,9 @@ void SimulatedPuck::open(TimePoint now) {
 void SimulatedPuck::inject(const SimulatedFault& fault) {
   using Kind = SimulatedFault::Kind;
   if (fault.kind == Kind::bad_quaternion || fault.kind == Kind::jump)
-    throw std::invalid_argument("a cap sends how far it is pushed, and no pose that could be bad");
+    throw std::invalid_argument("a puck sends its deflection and no pose; choose another fault");
   if (!affects_link(fault.kind))
-    throw std::invalid_argument("an emulated cap has no such fault; the loopback device has");
+    throw std::invalid_argument("an emulated puck does not support this fault; the loopback device does");
   faults_.add(fault);
 }
 
@@ -92,12 +93,12 @@ void SimulatedPuck::advance_to(TimePoint t, ReportSink& host) noexcept {
   }
 }
 
-/// What the device says moves the tool, and goes on to the host.
+/// Integrates the displayed pose with the report of the device, and passes the report to the host.
 void SimulatedPuck::take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept {
   for (std::size_t i = 0; i <= profile_.more_reports.size(); ++i) {
-    const PoseReportLayout& known = layout(profile_, i);
-    if (decode_into(known, report, reported_) != Decoding::ok) continue;
-    if (!known.translation.present && !known.rotation.present) break;
+    const PoseReportLayout& report_layout = layout(profile_, i);
+    if (decode_into(report_layout, report, reported_) != Decoding::ok) continue;
+    if (!report_layout.translation.present && !report_layout.rotation.present) break;
     integrate_displayed_pose(sent);
     const Quaterniond& R_BD = profile_.X_BD.rotation;
     displayed_pose_.set_deflection(R_BD * reported_.translation_m, R_BD * reported_.rotation_rad);
@@ -118,12 +119,12 @@ void SimulatedPuck::integrate_displayed_pose(TimePoint now) noexcept {
 
 void SimulatedPuck::update_deflection() noexcept {
   integrate_displayed_pose(now_);
-  const Deflection& how = *profile_.deflection;
+  const Deflection& settings = *profile_.deflection;
   const HandTarget target = hand_target();
   const Pose& X_BH = displayed_pose_.X_BH();
   Vector3d linear = target.X_BG.translation_m;
   Vector3d angular = rotation_vector(target.X_BG.rotation);
-  if (how.mode == Deflection::Mode::rate) {
+  if (settings.mode == Deflection::Mode::rate) {
     linear = target.V_BG.linear_m_per_s + kCorrection_per_s * (linear - X_BH.translation_m);
     angular = target.V_BG.angular_rad_per_s +
               kCorrection_per_s * rotation_vector(target.X_BG.rotation * X_BH.rotation.conjugate());
@@ -131,15 +132,15 @@ void SimulatedPuck::update_deflection() noexcept {
   if (now_ < grasped_at_) linear = angular = Vector3d::Zero();
   const Quaterniond R_DB = profile_.X_BD.rotation.conjugate();
   std::array<int, 6> counts{};
-  if (how.mode == Deflection::Mode::rate) {
+  if (settings.mode == Deflection::Mode::rate) {
     linear = linear_.deflection(linear);
     angular = angular_.deflection(angular);
   } else {
-    linear /= how.linear_gain;
-    angular /= how.angular_gain;
+    linear /= settings.linear_gain;
+    angular /= settings.angular_gain;
   }
-  put(R_DB * linear / coding_.translation_step_m, std::span(counts).first(3));
-  put(R_DB * angular / coding_.rotation_step_rad, std::span(counts).last(3));
+  round_to_counts(R_DB * linear / coding_.translation_step_m, std::span(counts).first(3));
+  round_to_counts(R_DB * angular / coding_.rotation_step_rad, std::span(counts).last(3));
   if (counts == counts_) return;
   counts_ = counts;
   mouse_.set_deflection(counts);

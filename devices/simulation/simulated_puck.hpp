@@ -14,37 +14,39 @@
 
 namespace wrenchd {
 
-/// How the reports of a profile say how far a cap is pushed.
+/// Coding of the puck deflection in the reports of a profile.
 struct PuckCoding {
   EmulatedSpaceMouse::Format format;
-  double translation_step_m = 0.0;  ///< of a count
+  double translation_step_m = 0.0;  ///< translation of one count
   double rotation_step_rad = 0.0;
 };
 
-/// Throws std::invalid_argument where they do not.
+/// Returns the coding of a profile. Throws std::invalid_argument if the reports do not carry the deflection.
+/// Not RT-safe: allocates.
 PuckCoding puck_coding(const DeviceProfile& profile);
 
-/// An emulated SpaceMouse in a simulated hand, which steers a tool by it along the hand path. It feels
-/// nothing, but it sees where the handle is: where see() was told, and what the reports have made of it
-/// since. Every millisecond it pushes the cap by, in the base B,
+/// Emulated SpaceMouse in a simulated hand. The hand steers a tool along the hand path. It receives no force,
+/// but it observes the pose of the handle: the displayed pose (observe_pose()), integrated with the reports
+/// sent since. Every millisecond it sets the deflection of the puck, in the base B, from
 ///
 ///   rate       v(t) = v_G + k (p_G - p_H),             v(r) = w_G + k log(R_G R_H')
 ///   position   linear_gain t = p_G,                    angular_gain r = log(R_G)
 ///
-/// as far as the cap goes, to the nearest count. Where the path rests and the tool is there the cap is let
-/// go.
+/// limited to the full deflection and rounded to the nearest count. When the path rests and the tool is at
+/// its goal, the hand releases the puck.
 class SimulatedPuck final : public DeviceInHand, private ReportSink {
  public:
-  /// How much of a deviation the hand takes back in a second. Slow beside the 16 ms between two reports.
+  /// Feedback gain k of the hand. Slow compared to the 16 ms between two reports.
   static constexpr double kCorrection_per_s = 5.0;
-  /// After a host has opened the device, until the hand has taken the cap.
+  /// Time from the opening of the device until the hand grasps the puck.
   static constexpr Duration kGraspDelay = std::chrono::milliseconds(500);
 
-  /// Throws std::invalid_argument where the settings make no sense.
+  /// Throws std::invalid_argument if the settings are invalid.
   SimulatedPuck(const DeviceProfile& profile, const SimulationSettings& settings);
 
   void open(TimePoint now) override;
-  /// What a pose says cannot be wrong: the device sends none.
+  /// Throws std::invalid_argument for faults of a pose, because the device sends none. Not RT-safe:
+  /// allocates.
   void inject(const SimulatedFault& fault) override;
 
   void advance_to(TimePoint t, ReportSink& host) noexcept override;
@@ -54,7 +56,7 @@ class SimulatedPuck final : public DeviceInHand, private ReportSink {
   TimePoint next_event() const noexcept override { return mouse_.next_event(); }
   void observe_pose(TimePoint now, const Pose& X_BH) noexcept override;
 
-  /// Of the tool, as the hand sees it.
+  /// Pose of the handle as observed by the hand. RT-safe.
   const Pose& X_BH() const noexcept override { return displayed_pose_.X_BH(); }
   const Wrench& motor_wrench() const noexcept override { return zero_wrench_; }
   HandTarget hand_target() const noexcept override { return path_.at(now_ - power_on_); }
@@ -72,7 +74,7 @@ class SimulatedPuck final : public DeviceInHand, private ReportSink {
   EmulatedSpaceMouse mouse_;
   DeflectionPose displayed_pose_;
   TimePoint displayed_at_{};
-  PoseReport reported_;  ///< by the reports, together
+  PoseReport reported_;  ///< content of the last reports, merged
   std::array<int, 6> counts_{};
   ReportSink* host_ = nullptr;
 

@@ -18,26 +18,24 @@ struct Options {
   std::filesystem::path csv;
 };
 
-/// What is compared with what: times mean nothing without it.
+/// Prints what the tables compare, so that their times can be interpreted.
 void explain(const Effort& effort, const CounterScale& scale) {
   std::cout
-      << "Every pose is timed on its own, " << effort.poses
-      << " of them a millisecond apart; its time is the "
-      << "least of " << effort.passes << " passes.\n"
-      << "Methods take turns pass by pass. p50 to max are over the poses. spread: of the passes' p50.\n"
-      << "A reading of the clock takes "
+      << "Each of " << effort.poses << " poses, 1 ms apart, is timed separately; its time is the minimum of "
+      << effort.passes << " passes.\n"
+      << "The methods alternate by pass. p50 to max: quantiles over the poses. spread: of the p50 of the "
+         "passes.\n"
+      << "The cost of a clock reading, "
       << fixed(static_cast<double>(scale.overhead_counts) * scale.ns_per_count, 0)
-      << " ns, which is taken off; one core only: " << (pinned_to_one_core() ? "yes" : "NO, so expect noise")
-      << ".\n\n"
-      << "all pairs: every pair of triangles that meets at p, found anew. whole tick: from last tick's proxy "
-         "to\n"
-      << "this one's: contacts, projection, verification and wrench. The peers list contacts at p, and know\n"
-      << "nothing of projections; they are the packaged binaries as shipped, without a broad phase; Bullet "
-         "in\n"
-      << "centimetres; CGAL stops at the first pair. wrong at: poses where the number of pairs is not that "
-         "of\n"
-      << "exact arithmetic; peers may report one contact for several pairs. overlapping at q: likewise "
-         "exact.\n";
+      << " ns, is subtracted; one core only: "
+      << (pinned_to_one_core() ? "yes" : "NO, so the times are noisy") << ".\n\n"
+      << "all pairs: all triangle pairs that intersect at p, without history. whole tick: from the previous\n"
+      << "proxy pose to the next: contacts, projection, verification and wrench. The peers list contacts at "
+         "p\n"
+      << "and have no projection. They are the packaged binaries without a broad phase; Bullet works in\n"
+      << "centimetres; CGAL stops at the first pair. wrong at: number of poses with a number of pairs that\n"
+      << "differs from exact arithmetic; peers may report one contact for several pairs. overlapping at q:\n"
+      << "also in exact arithmetic.\n";
 }
 
 }  // namespace
@@ -46,11 +44,11 @@ int main(int argc, char** argv) {
   Options options;
   bool quick = false;
   CLI::App app{"Times contacts between meshes, and the whole tick, beside other libraries."};
-  app.add_option("--poses", options.effort.poses, "poses of each path")->check(CLI::Range(10, 100000));
-  app.add_option("--passes", options.effort.passes, "timed passes")->check(CLI::Range(1, 1000));
-  app.add_option("--csv", options.csv, "write the tables to this file too");
-  app.add_flag("--growth", options.growth_only, "only how the cost grows with the number of triangles");
-  app.add_flag("--quick", quick, "a few poses of the small cases: does it run? The times mean nothing");
+  app.add_option("--poses", options.effort.poses, "number of poses per path")->check(CLI::Range(10, 100000));
+  app.add_option("--passes", options.effort.passes, "number of timed passes")->check(CLI::Range(1, 1000));
+  app.add_option("--csv", options.csv, "also write the tables to this file");
+  app.add_flag("--growth", options.growth_only, "only the cost by the number of triangles");
+  app.add_flag("--quick", quick, "smoke test with a few poses of the small cases; the times are meaningless");
   CLI11_PARSE(app, argc, argv);
   if (quick) options.effort = {20, 1, true};
   try {
@@ -61,7 +59,7 @@ int main(int argc, char** argv) {
       std::vector<std::string> missing;
       const std::vector<PeerModule> peers = load_peers(mesh_peers(), missing);
       for (const std::string& name : missing)
-        std::cout << "\nno rows of " << name << ": its package was not found when this was built\n";
+        std::cout << "\nno rows of " << name << ": the build did not find its package\n";
       tables = bench_meshes(options.effort, scale, peers);
     }
     tables.push_back(bench_growth(options.effort, scale));

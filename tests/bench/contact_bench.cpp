@@ -13,12 +13,12 @@
 namespace wrenchd::bench {
 namespace {
 
-/// Poses whose pairs are held against exact arithmetic: it takes its time.
+/// Number of poses whose pairs the benchmark also checks in exact arithmetic, which is slow.
 constexpr std::size_t kExactPoses = 10;
 
 constexpr int kTicksAtRest = 20;
 
-/// The value is the number of pairs of triangles that meet.
+/// The value is the number of intersecting triangle pairs.
 TimedMethod pairs_runner(const MeshPair& pair) {
   const auto pairs = std::make_shared<IntersectingPairs>();
   return {"wrenchd all pairs", [] {},
@@ -27,7 +27,7 @@ TimedMethod pairs_runner(const MeshPair& pair) {
           }};
 }
 
-/// The whole tick: contacts, projection, verification and wrench. The value is the energy.
+/// Times the whole tick: contacts, projection, verification and wrench. The value is the energy.
 TimedMethod tick_runner(const MeshPair& pair) {
   struct State {
     explicit State(const MeshPair& pair) : proxy(pair.scene), X_WQ(pair.X_start) {}
@@ -38,7 +38,7 @@ TimedMethod tick_runner(const MeshPair& pair) {
   return {"wrenchd whole tick",
           [state, &pair] {
             state->proxy.clear_history();
-            // Comes to the first pose untimed: a hand was somewhere before, at rest, and does not jump.
+            // Untimed. The hand starts at rest and moves to the first pose without a jump.
             state->X_WQ = pair.X_start;
             for (int i = 0; i < kTicksAtRest; ++i)
               state->X_WQ = state->proxy.follow(pair.X_WP_before.front(), state->X_WQ).X_WQ;
@@ -79,11 +79,11 @@ double mean(const MethodTiming& result) {
 struct Tables {
   Table times{"meshes: time of one pose [us]",
               {"p50", "p99", "p99.9", "max", "p99 / p50", "max / p50", "spread %", "verdict"}};
-  Table ratios{"meshes: peer's p50 / ours",
+  Table ratios{"meshes: peer's p50 / wrenchd's",
                {"to all pairs", "to the whole tick", "p99 to the whole tick", "verdict"}};
   Table answers{
-      "meshes: what is found",
-      {"poses", "contacts a pose", "wrong at", "of", "overlapping at q", "unconverged", "worst KKT"}};
+      "meshes: results",
+      {"poses", "contacts per pose", "wrong at", "of", "overlapping at q", "unconverged", "worst KKT"}};
 };
 
 std::string us(double ns) {
@@ -113,7 +113,7 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& 
                        fixed(result.ns.p99 / tick.ns.p99, 2), clear ? "" : "inconclusive"});
   }
 
-  // Accuracy before speed.
+  // Accuracy is checked before speed is measured.
   const test::ExactIntersection exact(pair.scene.tool_mesh()->surface.mesh(),
                                       pair.scene.meshes()[0].mesh->surface.mesh());
   const std::size_t looked_at = std::min(kExactPoses, pair.X_WP.size());
@@ -170,7 +170,7 @@ std::vector<Table> bench_meshes(const Effort& effort, const CounterScale& scale,
 }
 
 Table bench_growth(const Effort& effort, const CounterScale& scale) {
-  Table table("growth: a tool of 10k triangles on a boulder of so many [us]",
+  Table table("growth: a tool of 10k triangles on a boulder with N triangles [us]",
               {"triangles", "p50", "p99", "max"});
   for (const std::size_t triangles : {2000, 6000, 20000, 60000, 200000, 600000, 2000000}) {
     if (effort.quick && triangles > 6000) break;

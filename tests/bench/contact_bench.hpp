@@ -10,11 +10,12 @@
 
 namespace wrenchd::bench {
 
-/// Meshes against meshes: our list of all pairs that meet, our whole tick, and the peers' lists of contacts.
+/// Times mesh against mesh: wrenchd's list of all intersecting pairs, wrenchd's whole tick, and each peer's
+/// contact list.
 std::vector<Table> bench_meshes(const Effort& effort, const CounterScale& scale,
                                 std::span<const PeerModule> peers);
 
-/// How the cost grows with the number of triangles, from two thousand to two million.
+/// Times the whole tick for 2,000 to 2,000,000 triangles.
 Table bench_growth(const Effort& effort, const CounterScale& scale);
 
 }  // namespace wrenchd::bench

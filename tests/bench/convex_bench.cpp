@@ -16,21 +16,23 @@ namespace wrenchd::bench {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDouble = 1e-6;  ///< relative error of a depth that is right in double precision
-constexpr double kFloat = 1e-3;   ///< and in single precision
-/// A method whose depth is wrong more often than at one pose in a hundred cannot set the pace for others.
+/// Relative error up to which a depth counts as correct in double precision.
+constexpr double kDouble = 1e-6;
+constexpr double kFloat = 1e-3;  ///< relative error up to which a depth counts as correct in single precision
+/// A method whose depth is wrong at more than 1 % of the poses is not eligible as the fastest method.
 constexpr double kRightOften = 0.99;
-/// Depths nearer than this share are the same.
+/// Depths with a relative difference below this value count as equal.
 constexpr double kSameDepth = 1e-9;
-/// An overlap that is left at q: well above rounding, well below what a hand or a display can tell.
+/// Overlap that may remain at q: well above rounding error, well below what a hand or a display resolves.
 constexpr double kStillOverlapping_m = 1e-9;
 
-/// wrenchd, warm: it knows the answer of the pose before.
+/// The proxy of wrenchd, warm started with the result of the previous pose.
 class Follower {
  public:
   Follower(const ConvexPair& pair, Method method) : pair_(pair) { options_.method = method; }
 
-  /// As if it had been there before: the object that follows must have seen how it came to touch.
+  /// Resets the proxy as if it had been at the first pose before; the proxy needs its approach to the
+  /// contact.
   void restart() {
     depth_ = std::make_unique<PenetrationDepth>(pair_.scene, options_);
     X_last_ = depth_->query(pair_.X_WP.front()).projection.X_WQ;
@@ -48,8 +50,8 @@ class Follower {
   Pose X_last_;
 };
 
-/// The value is the depth that the energy is worth as a translation, T = m depth^2: for the translational
-/// method the penetration depth itself.
+/// The value is the depth that corresponds to the energy as a translation, T = m depth^2. For the
+/// translational method this is the penetration depth.
 TimedMethod wrenchd_runner(std::string name, const ConvexPair& pair, Method method) {
   const auto follower = std::make_shared<Follower>(pair, method);
   const double mass_kg = pair.scene.tool().solid.inertia.mass_kg;
@@ -76,11 +78,12 @@ std::vector<TimedMethod> peer_runners(const ConvexPair& pair, const PeerModule& 
   return runners;
 }
 
-/// How the depths of a method compare with the exact ones.
+/// Errors of one method's depths against the exact depths.
 struct Depths {
-  std::size_t missed = 0;                     ///< overlaps it did not see
-  std::size_t off_double = 0, off_float = 0;  ///< wrong by more than kDouble, kFloat
-  double shallowest = 0.0, deepest = 0.0;     ///< relative errors, the worst on either side
+  std::size_t missed = 0;  ///< number of overlaps that the method did not detect
+  /// Number of depths with a relative error above kDouble, and above kFloat.
+  std::size_t off_double = 0, off_float = 0;
+  double shallowest = 0.0, deepest = 0.0;  ///< extreme relative errors: most negative, most positive
 };
 
 Depths compare(const MethodTiming& result, const std::vector<double>& exact_m) {
@@ -99,17 +102,17 @@ Depths compare(const MethodTiming& result, const std::vector<double>& exact_m) {
   return depths;
 }
 
-/// May it be called a method that answers the question?
+/// Returns true if the method is accurate enough to count as a penetration query.
 bool right(const Depths& depths, std::size_t poses) {
   const std::size_t wrong = depths.missed + depths.off_float;
   return static_cast<double>(poses - wrong) >= kRightOften * static_cast<double>(poses);
 }
 
-/// How the exact method's answers stand: out of the obstacle, and no worse than the best translation? A proxy
-/// that keeps to its side of an edge may be.
+/// Checks of the exact method's answers: outside the obstacle, and not worse than the best translation. A
+/// proxy that stays on its side of an edge may be worse.
 struct Soundness {
   std::size_t above_translation = 0;
-  double worst_above = 0.0;  ///< of the depth its energy is worth, relative
+  double worst_above = 0.0;  ///< largest relative excess of the depth that corresponds to the energy
   std::size_t overlapping = 0;
   std::size_t unconverged = 0;
   double worst_residual = 0.0;
@@ -144,7 +147,7 @@ struct Tables {
                {"p50 ratio", "p99 ratio", "p50 ratio to translational", "verdict"}};
 };
 
-/// The fastest by p50 among those that may be; null where there is none.
+/// Returns the fastest result by p50 among those for which `allowed` is true; null if there is none.
 template <class Allowed>
 const MethodTiming* fastest(std::span<const MethodTiming> results, const Allowed& allowed) {
   const MethodTiming* best = nullptr;
@@ -181,7 +184,7 @@ void bench_pair(const ConvexPair& pair, const Effort& effort, const CounterScale
         {fixed(result.ns.p50, 0), fixed(result.ns.p99, 0), fixed(result.ns.p999, 0), fixed(result.ns.max, 0),
          fixed(result.ns.p50 / exact.ns.p50, 2), fixed(result.ns.p99 / exact.ns.p99, 2),
          fixed(100.0 * result.relative_spread, 1), verdict(result)});
-    if (&result == &exact) continue;  // its depth is another one: rotations make it less
+    if (&result == &exact) continue;  // the exact method also rotates, so its depth is smaller
     const Depths depths = compare(result, pair.depth_m);
     tables.depths.add(
         pair.name, result.name,

@@ -10,7 +10,7 @@
 
 namespace wrenchd::bench {
 
-/// A convex body on another: wrenchd against the penetration query of each peer.
+/// Times a convex body on another: wrenchd against the penetration query of each peer.
 std::vector<Table> bench_convex(const Effort& effort, const CounterScale& scale,
                                 std::span<const PeerModule> peers);
 

@@ -23,7 +23,7 @@ ToolBody body_with(std::size_t vertices, double cube_edge_m, double ellipsoid_m,
   return test::tool_of(points, 0.2);
 }
 
-/// Where the tool stands, seen from the obstacle.
+/// Direction of the tool from the obstacle at time t.
 Vector3d direction(double t) {
   const double around = t + 0.3;
   return Vector3d(std::cos(around), std::sin(around) * std::cos(0.7 * t), 0.4 * std::sin(1.7 * t) + 0.2)
@@ -35,9 +35,9 @@ Quaterniond attitude(double t) {
   return rotation_from((t + 0.15 * std::sin(9.0 * t)) * axis.normalized());
 }
 
-/// Moves the tool along u until it is this deep: Newton's method on the depth, which is concave and piecewise
-/// linear in the distance, within what is known to be too deep and too far. distance_m: where to begin, and
-/// the answer. Returns the depth there.
+/// Moves the tool along u until its depth is the requested one. Uses Newton's method within a bracket; the
+/// depth is concave and piecewise linear in the distance. distance_m: initial distance on input, solution on
+/// output. Returns the depth at the solution.
 double put_at_depth(const ConvexPair& pair, const Vector3d& u, double target_m, Pose& X_WP,
                     double& distance_m) {
   double deep = 0.0;
@@ -53,8 +53,8 @@ double put_at_depth(const ConvexPair& pair, const Vector3d& u, double target_m, 
   throw std::logic_error(pair.name + ": no pose of the depth wanted");
 }
 
-/// The reference itself, held against every axis there is and every vertex on each: that takes seconds for
-/// large bodies, so they are left out, and one pose in a hundred is looked at.
+/// Checks the reference against all separating axes and all vertices on 1 % of the poses. Skips large bodies,
+/// which would take seconds.
 void check_reference(const ConvexPair& pair) {
   const ConvexBody& tool = pair.scene.tool().hull;
   if (tool.vertices_T_m.size() > 42) return;

@@ -11,19 +11,20 @@
 
 namespace wrenchd::bench {
 
-/// A convex tool that slides and turns on a larger convex obstacle, and the poses p of its body frame, a
-/// millisecond apart: it goes around at about 0.1 m/s, turns at 1 to 2.4 rad/s, and is 0.1 to 0.9 mm deep.
+/// A convex tool that slides and rotates on a larger convex obstacle, with the commanded poses p of its body
+/// frame, 1 ms apart. The tool circles at about 0.1 m/s, rotates at 1 to 2.4 rad/s, and is 0.1 to 0.9 mm
+/// deep.
 struct ConvexPair {
   std::string name;
   Scene scene;
-  TriangleMesh tool_T, obstacle_W;  ///< the same solids, as the peers want them
+  TriangleMesh tool_T, obstacle_W;  ///< surfaces of the same solids, as input for the peers
   ConvexSurface tool_surface_T, obstacle_surface_W;
   std::vector<Pose> X_WP;
-  std::vector<double> depth_m;  ///< exact, for translations
+  std::vector<double> depth_m;  ///< exact translational penetration depth at each pose
 };
 
-/// vertices of each body: 8 are cubes of 60 and 96 mm, more are points strewn over ellipsoids of
-/// (1, 0.8, 0.6) times 35 and 55 mm.
+/// vertices: number per body. 8 gives cubes of 60 and 96 mm. Larger numbers give points on ellipsoids with
+/// half-axes (1, 0.8, 0.6) times 35 and 55 mm.
 ConvexPair sliding_pair(std::size_t vertices, std::size_t poses);
 
 }  // namespace wrenchd::bench

@@ -14,11 +14,12 @@
 namespace wrenchd::bench {
 namespace {
 
-constexpr int kPlanes = 47;  // the paper's
+constexpr int kPlanes = 47;  // number of planes in the paper
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-/// An energy above another by less than this share is the same energy: well above the rounding of either.
+/// Energies with a relative difference below this value count as equal. The value is well above rounding
+/// error.
 constexpr double kSameEnergy = 1e-9;
-/// The order of the methods; those up to kFollow are exact.
+/// The order of the methods. The methods up to kFollow are exact.
 enum Row : std::size_t { kCold, kWarm, kFollow, kPlanar };
 
 Answer answer_of(const Projection& q) {
@@ -26,7 +27,7 @@ Answer answer_of(const Projection& q) {
   return {q.energy, q.kkt_residual, q.active.size(), q.status == ProjectionStatus::converged};
 }
 
-/// The exact method on its own, from p and knowing nothing.
+/// The exact method alone, started at p without history.
 TimedMethod exact_cold(const PressedBody& body) {
   struct State {
     explicit State(const Scene& scene) : contacts(scene), exact(scene.tool().solid.inertia) {}
@@ -41,7 +42,7 @@ TimedMethod exact_cold(const PressedBody& body) {
           }};
 }
 
-/// The exact method on its own, with the rotation and the contacts that carried a tick before.
+/// The exact method alone, warm started with the rotation and the active contacts of the previous pose.
 TimedMethod exact_warm(const PressedBody& body) {
   struct State {
     explicit State(const Scene& scene) : contacts(scene), exact(scene.tool().solid.inertia) {}
@@ -69,7 +70,7 @@ TimedMethod exact_warm(const PressedBody& body) {
           [solve, &body](std::size_t i) { return solve(body.X_WP[i]); }};
 }
 
-/// A method as the servo loop calls it: follow(), with everything around the solve itself.
+/// A method as the servo loop calls it: follow(), including all work around the solve.
 TimedMethod followed(std::string name, const PressedBody& body, Method method) {
   struct State {
     std::unique_ptr<PenetrationDepth> depth;
@@ -89,7 +90,7 @@ TimedMethod followed(std::string name, const PressedBody& body, Method method) {
           }};
 }
 
-/// The least energy at each pose, whatever came before.
+/// Returns the minimum energy at each pose, independent of the previous poses.
 std::vector<double> optima(const PressedBody& body) {
   PenetrationDepth depth(body.scene, {Method::exact, kPlanes});
   std::vector<double> energies;
@@ -104,7 +105,7 @@ std::vector<double> excess(const MethodTiming& result, const std::vector<double>
   return shares;
 }
 
-/// Poses at which one method found a higher energy than another, or nothing.
+/// Returns the number of poses at which `one` found a higher energy than `other`, or no solution.
 std::size_t above(const MethodTiming& one, const MethodTiming& other) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < one.answers.size(); ++i)

@@ -8,10 +8,10 @@
 
 namespace wrenchd::bench {
 
-/// A body in a half-space, by each method.
+/// Times a body in a half-space with each projection method.
 std::vector<Table> bench_half_space(const Effort& effort, const CounterScale& scale);
 
-/// The planar family at one contact, on its own: what one plane costs.
+/// Times the planar family at one contact, which gives the cost per plane.
 Table bench_planar_family(const Effort& effort, const CounterScale& scale);
 
 }  // namespace wrenchd::bench

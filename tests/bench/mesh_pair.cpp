@@ -15,7 +15,7 @@ Scene scene_of(const GeneratedMesh& tool, const GeneratedMesh& obstacle) {
   return Scene(test::mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
 }
 
-/// Where on a line the bodies begin to overlap, between a free place and one where they do.
+/// Bisects between a free and an overlapping distance. Returns the largest free distance found.
 template <class Overlap>
 double touching(double free, double overlapping, const Overlap& overlap) {
   constexpr int kHalvings = 40;
@@ -28,7 +28,8 @@ double touching(double free, double overlapping, const Overlap& overlap) {
 
 constexpr int kTicksBefore = 100;
 
-/// The parameter of a path at pose i, in seconds: from rest, evenly faster until pose 0, and even from there.
+/// Returns the path parameter of pose i in seconds. The path accelerates uniformly from rest until pose 0 and
+/// is uniform after it.
 double path_s(int i) {
   const double before = std::max(0.0, 1.0 + static_cast<double>(i) / kTicksBefore);
   return i >= 0 ? i / 1000.0 : 0.5 * kTicksBefore / 1000.0 * (before * before - 1.0);

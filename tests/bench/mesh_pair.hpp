@@ -10,24 +10,24 @@
 
 namespace wrenchd::bench {
 
-/// A tool that moves in contact with an obstacle, a millisecond from pose to pose.
+/// A tool that moves in contact with an obstacle; consecutive poses are 1 ms apart.
 struct MeshPair {
   std::string name;
   Scene scene;
-  std::vector<Pose> X_WP;         ///< overlapping by some tenths of a millimetre
-  std::vector<Pose> X_WP_before;  ///< leading there: a hand comes to speed in a tenth of a second
-  Pose X_start;                   ///< admissible, near the first of these
+  std::vector<Pose> X_WP;         ///< commanded poses, overlapping by some tenths of a millimetre
+  std::vector<Pose> X_WP_before;  ///< approach to X_WP: the hand accelerates from rest within 0.1 s
+  Pose X_start;                   ///< admissible pose near the first pose of the approach
 };
 
-/// A bumpy body of 40 mm slides and turns on a boulder of 60 mm, about 100 mm/s and 1 rad/s, 0.05 to 0.45 mm
-/// deep.
+/// A bumpy body of 40 mm slides and rotates on a boulder of 60 mm at about 100 mm/s and 1 rad/s, 0.05 to 0.45
+/// mm deep.
 MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses);
 
-/// A rod of 9.8 mm radius in a tube of 10 mm: it tilts, spins, slides along and is pushed against the wall,
-/// 20 to 80 um deep. Tens of thousands of triangles are near each other all the time.
+/// A rod of 9.8 mm radius in a tube of 10 mm radius. The rod tilts, spins, slides along the tube and presses
+/// on its wall, 20 to 80 um deep. Tens of thousands of triangles stay close to each other.
 MeshPair peg_in_hole(std::size_t tool_triangles, std::size_t obstacle_triangles, std::size_t poses);
 
-/// How many pairs of triangles of tool and obstacle meet, found anew at each pose.
+/// Returns the number of intersecting triangle pairs of tool and obstacle. Searches without history.
 std::size_t intersecting_pair_count(IntersectingPairs& pairs, const Scene& scene, const Pose& X_WT);
 
 }  // namespace wrenchd::bench

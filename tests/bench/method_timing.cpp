@@ -8,12 +8,12 @@
 namespace wrenchd::bench {
 namespace {
 
-/// Undisturbed, the passes of one method differ by a few per cent.
+/// On an idle machine the passes of one method differ by a few per cent.
 constexpr double kInconclusive = 0.1;
 
 std::vector<double> timed_pass(const TimedMethod& runner, std::size_t poses, const CounterScale& scale) {
   std::vector<double> ns(poses);
-  volatile double answer = 0.0;  // so that no answer can be left out
+  volatile double answer = 0.0;  // keeps the compiler from removing the solve
   runner.restart();
   for (std::size_t i = 0; i < poses; ++i) {
     const std::int64_t before = counter();

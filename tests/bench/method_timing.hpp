@@ -11,42 +11,43 @@
 
 namespace wrenchd::bench {
 
-/// How much is measured.
+/// The number of poses and passes of a benchmark.
 struct Effort {
   std::size_t poses = 2000;
   int passes = 5;
-  bool quick = false;  ///< small cases only
+  bool quick = false;  ///< only small cases
 };
 
-/// What a method says of one pose, as far as it says it.
+/// The result of one method at one pose. A method fills the fields that it computes.
 struct Answer {
-  double value = 0.0;  ///< energy or depth, as the race has it; NaN where nothing was found
+  double value = 0.0;  ///< energy or depth, depending on the table; NaN if the method found nothing
   double kkt_residual = 0.0;
-  std::size_t active = 0;  ///< contacts that touch at q
+  std::size_t active = 0;  ///< number of active contacts at q
   bool converged = true;
 };
 
-/// One method, to be timed on a row of poses.
+/// A method to be timed on a sequence of poses.
 struct TimedMethod {
   std::string name;
-  std::function<void()> restart;             ///< back to the state before the first pose; not timed
-  std::function<Answer(std::size_t)> solve;  ///< the pose with this number; they come in order
+  std::function<void()> restart;             ///< restores the state before the first pose; not timed
+  std::function<Answer(std::size_t)> solve;  ///< solves the pose with this index; poses come in order
 };
 
 struct MethodTiming {
   std::string name;
   std::vector<Answer> answers;
-  Quantiles ns;            ///< over the poses, of the least time of each over the passes
-  double relative_spread;  ///< of the p50 of the single passes
+  Quantiles ns;            ///< quantiles over the poses of the minimum time over the passes
+  double relative_spread;  ///< relative spread of the p50 of the single passes
 };
 
-/// Times the methods in turn, pass after pass, so that what disturbs the machine disturbs all of them; one
-/// pass more goes before, untimed, for the answers and to warm the caches. A pose's time is the least over
-/// the passes: what the code costs, not what the neighbours cost.
+/// Times the methods in alternating passes, so that a disturbance of the machine affects all methods. One
+/// untimed pass runs first, to collect the answers and to warm the caches. The time of a pose is the minimum
+/// over the passes, which excludes the cost of other programs.
 std::vector<MethodTiming> time_methods(const std::vector<TimedMethod>& runners, std::size_t poses, int passes,
                                        const CounterScale& scale);
 
-/// "inconclusive" where the passes differ by too much for the times to be compared with others.
+/// Returns "inconclusive" if the passes differ too much for a comparison with other methods; otherwise an
+/// empty text.
 std::string verdict(const MethodTiming& result);
 
 }  // namespace wrenchd::bench

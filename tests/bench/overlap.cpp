@@ -10,7 +10,7 @@ namespace wrenchd::bench {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Faces and edges nearer to parallel than this [rad] make no edge, and no axis, of their own.
+/// Faces and edges whose directions differ by less than this angle [rad] create no edge and no axis.
 constexpr double kParallel = 1e-9;
 
 double lowest(const std::vector<Vector3d>& points, const Vector3d& n) {
@@ -19,14 +19,14 @@ double lowest(const std::vector<Vector3d>& points, const Vector3d& n) {
   return low;
 }
 
-/// Does a plane with this outward normal, along the edge, touch the body there: is m on the arc between the
-/// normals of its faces?
+/// Returns true if m lies on the arc between the normals of the edge's two faces. A plane along the edge with
+/// outward normal m then supports the body at this edge.
 bool on_arc(const ConvexSurface::Edge& edge, const Vector3d& m) {
   const Vector3d across = edge.n[0].cross(edge.n[1]);
   return edge.n[0].cross(m).dot(across) >= 0.0 && m.cross(edge.n[1]).dot(across) >= 0.0;
 }
 
-/// The edges that come below a height along n.
+/// Returns the edges that reach below a height along n.
 std::vector<const ConvexSurface::Edge*> edges_below(const ConvexSurface& body, const Vector3d& n,
                                                     double height) {
   std::vector<const ConvexSurface::Edge*> below;
@@ -49,7 +49,8 @@ Overlap least_by_faces(const ConvexSurface& A, const ConvexSurface& B) {
 }  // namespace
 
 ConvexSurface::ConvexSurface(const TriangleMesh& mesh) : vertices_(mesh.vertices_m) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Vector3d> normal_at;  // of the triangle on an edge's left
+  // Normal of the triangle to the left of each directed edge.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Vector3d> normal_at;
   for (const auto& t : mesh.triangles) {
     const Vector3d& a = vertices_[t[0]];
     const Vector3d n = (vertices_[t[1]] - a).cross(vertices_[t[2]] - a).normalized();
@@ -80,14 +81,15 @@ ConvexSurface ConvexSurface::transformed(const Pose& X) const {
   return out;
 }
 
-// The depth is the distance from the origin to the nearest facet of the set of translations that collide: a
-// face of one body against a vertex of the other, or an edge against an edge where the arcs of their normals
-// cross. The faces are tried first. Let d0 be the least depth they give, along n0. Edges that do better touch
-// after a translation by d < d0, so a point a of one is d from a point b of the other; then
+// The depth is the distance from the origin to the nearest facet of the set of colliding translations. A
+// facet is either a face of one body with a vertex of the other, or two edges whose normal arcs cross. The
+// function tests the faces first. Let d0 be the smallest depth of the faces, along n0. Edges with a smaller
+// depth d < d0 touch after a translation by d, so a point a of one edge is d away from a point b of the
+// other; then
 //
-//   n0 . a <= n0 . b + d <= top of B + d = bottom of A + d0 + d        and likewise for b
+//   n0 . a <= n0 . b + d <= top of B + d = bottom of A + d0 + d        and the same for b
 //
-// and only the few edges within 2 d0 of the bottom of A and of the top of B need be paired.
+// Therefore only the few edges within 2 d0 of the bottom of A and of the top of B form pairs.
 Overlap overlap(const ConvexSurface& A, const ConvexSurface& B) {
   Overlap least = least_by_faces(A, B);
   if (least.depth_m <= 0.0) return least;

@@ -9,20 +9,20 @@
 
 namespace wrenchd::bench {
 
-/// A convex polyhedron as the test of separating axes wants it.
+/// A convex polyhedron with the vertices, faces and edges that the separating-axis test needs.
 class ConvexSurface {
  public:
   struct Face {
-    Vector3d n;  ///< unit, outward
+    Vector3d n;  ///< unit outward normal
     double offset_m;
   };
-  /// Between two faces that are not in one plane.
+  /// An edge between two faces that are not coplanar.
   struct Edge {
     Vector3d from, to;
-    std::array<Vector3d, 2> n;  ///< of the faces
+    std::array<Vector3d, 2> n;  ///< unit outward normals of the two faces
   };
 
-  /// mesh: closed, convex and outward-oriented.
+  /// Precondition: mesh is closed, convex and outward-oriented.
   explicit ConvexSurface(const TriangleMesh& mesh);
 
   const std::vector<Vector3d>& vertices() const { return vertices_; }
@@ -37,14 +37,15 @@ class ConvexSurface {
   std::vector<Edge> edges_;
 };
 
-/// The shortest translation that takes A out of B is depth_m along n.
+/// The shortest translation that separates A from B is depth_m along n.
 struct Overlap {
-  double depth_m;  ///< negative where they are apart, and then no more than a sign
-  Vector3d n;      ///< unit, from B to A
+  double depth_m;  ///< penetration depth; if negative, the bodies are apart and only the sign is valid
+  Vector3d n;      ///< unit direction from B to A
 };
 
-/// The exact translational penetration depth, to rounding: no iteration and no tolerance. What all others are
-/// held against, and nothing of wrenchd's own queries is in it. Slow.
+/// Returns the exact translational penetration depth, up to rounding, without iteration and tolerance. The
+/// benchmark checks all methods against it; it uses none of wrenchd's queries. Not RT-safe: allocates, and
+/// may take seconds for large bodies.
 Overlap overlap(const ConvexSurface& A, const ConvexSurface& B);
 
 }  // namespace wrenchd::bench

@@ -9,7 +9,7 @@
 namespace wrenchd::bench {
 
 PeerModule::PeerModule(const std::filesystem::path& file) : file_(file) {
-  // Never closed: some of these libraries do not survive it.
+  // The library stays loaded; some peers crash when they are unloaded.
   library_ = std::shared_ptr<void>(dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL), [](void*) {});
   if (library_ == nullptr) throw std::runtime_error(dlerror());
   find(query_name_, "peer_query_name");
@@ -27,7 +27,7 @@ void PeerModule::find(Function*& function, const char* name) {
 
 PeerModule::Pair::Pair(const PeerModule& module, const TriangleMesh& A, const TriangleMesh& B)
     : module_(module) {
-  static_assert(sizeof(Vector3d) == 3 * sizeof(double));  // a row of vectors is a row of numbers
+  static_assert(sizeof(Vector3d) == 3 * sizeof(double));  // an array of vectors is then an array of numbers
   const auto as_peer = [](const TriangleMesh& mesh) {
     return PeerMesh{mesh.vertices_m.front().data(), mesh.vertices_m.size(), mesh.triangles.front().data(),
                     mesh.triangles.size()};

@@ -12,20 +12,20 @@
 
 namespace wrenchd::bench {
 
-/// A peer's shared module. Its symbols stay its own.
+/// The shared module of a peer library. Its symbols are local to the module.
 class PeerModule {
  public:
-  /// Throws std::runtime_error that says why it cannot be loaded.
+  /// Throws std::runtime_error with the reason if the module cannot be loaded.
   explicit PeerModule(const std::filesystem::path& file);
 
   const std::vector<std::string>& queries() const { return queries_; }
 
-  /// A pair of bodies in this peer. Must not outlive the module.
+  /// Two bodies in the peer's own representation. Must not outlive the module.
   class Pair {
    public:
-    /// Depth of query q at a pose [m]; NaN where the peer sees no overlap.
+    /// Returns the depth of query q at a pose [m]; NaN if the peer detects no overlap.
     double depth_m(int q, const PeerPose& X_BA) const;
-    /// How many contacts query q lists.
+    /// Returns the number of contacts that query q lists.
     int contacts(int q, const PeerPose& X_BA) const;
 
    private:
@@ -52,10 +52,10 @@ class PeerModule {
 
 PeerPose peer_pose(const Pose& X_BA);
 
-/// The peers of these names whose modules were built, out of the directory of the running program. missing:
-/// the names of the others.
+/// Loads the peers with these names from the directory of the running program. missing: receives the names of
+/// the peers that were not built.
 std::vector<PeerModule> load_peers(const std::vector<std::string>& names, std::vector<std::string>& missing);
-/// For convex bodies, and for meshes of any shape.
+/// Names of the peers for convex bodies, and of those for arbitrary meshes.
 const std::vector<std::string>& convex_peers();
 const std::vector<std::string>& mesh_peers();
 

@@ -14,13 +14,13 @@ namespace {
 
 constexpr double kTick_s = 1e-3;
 constexpr double kBaseRadius_m = 0.03;
-/// Over the base the bowl rises by less than a millimetre: the tilt of the path changes which vertex is the
+/// Over the base the bowl rises by less than 1 mm, so the tilt of the path changes which vertex is the
 /// lowest.
 constexpr double kBowlRadius_m = 0.5;
 constexpr double kBowlTilt_rad = 0.05;
 constexpr double kFaceTilt_rad = 0.002;
 
-/// Corners of a regular polygon that looks along z.
+/// Appends the corners of a regular polygon with its normal along z.
 void add_polygon(std::size_t corners, double radius_m, double height_m, std::vector<Vector3d>& points) {
   for (std::size_t i = 0; i < corners; ++i) {
     const double angle = 2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(corners);
@@ -28,7 +28,8 @@ void add_polygon(std::size_t corners, double radius_m, double height_m, std::vec
   }
 }
 
-/// The golden angle spreads any number of points evenly over a disc, each at a radius of its own.
+/// Appends points spaced by the golden angle, which distributes any number of points evenly over a disc. Each
+/// point has a different radius.
 void add_bowl(std::size_t count, std::vector<Vector3d>& points) {
   const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
   for (std::size_t i = 0; i < count; ++i) {
@@ -40,7 +41,8 @@ void add_bowl(std::size_t count, std::vector<Vector3d>& points) {
   }
 }
 
-/// The hand slides in circles at 0.2 m/s while it spins and, on the bowl, tilts: 1 rad/s in all.
+/// Returns the hand's pose at time t. The hand moves in circles at 0.2 m/s, spins and, on the bowl, tilts at
+/// 1 rad/s in total.
 Pose sliding(double t, double tilt_rad) {
   const double speed_m_per_s = 0.2;
   const double around = 4.0 * t;
@@ -52,7 +54,8 @@ Pose sliding(double t, double tilt_rad) {
   return X_WP;
 }
 
-/// The count-th lowest vertex of the tool, above the plane z = 0 [m]; infinite where it has fewer.
+/// Returns the height of the count-th lowest vertex of the tool above the plane z = 0 [m]; infinity if the
+/// tool has fewer vertices.
 double height_of_lowest_m(const ToolBody& tool, const Pose& X_WP, std::size_t count) {
   std::vector<double> heights;
   for (const Vector3d& p : tool.hull.vertices_T_m) heights.push_back((X_WP * p).z());
@@ -61,7 +64,8 @@ double height_of_lowest_m(const ToolBody& tool, const Pose& X_WP, std::size_t co
   return heights[count - 1];
 }
 
-/// base: the vertices below the plane. Above them the body widens to 90 mm and ends 100 mm up.
+/// Returns a pressed body. base: the vertices below the plane. Above the plane the body widens to 90 mm and
+/// ends at a height of 100 mm.
 PressedBody pressed(std::string name, std::vector<Vector3d> base, double tilt_rad, std::size_t poses) {
   const std::size_t contacts = base.size();
   add_polygon(8, 1.5 * kBaseRadius_m, 0.04, base);
@@ -72,7 +76,8 @@ PressedBody pressed(std::string name, std::vector<Vector3d> base, double tilt_ra
   std::vector<Pose> X_WP;
   for (std::size_t i = 0; i < poses; ++i) {
     const double t = kTick_s * static_cast<double>(i);
-    const double cover_m = 1e-3 * (0.5 + 0.4 * std::sin(25.0 * t));  // of the base's highest vertex
+    // Depth of the highest vertex of the base.
+    const double cover_m = 1e-3 * (0.5 + 0.4 * std::sin(25.0 * t));
     Pose X = sliding(t, tilt_rad);
     X.translation_m.z() -= height_of_lowest_m(tool, X, contacts) + cover_m;
     if (height_of_lowest_m(tool, X, contacts + 1) <= 0.0)

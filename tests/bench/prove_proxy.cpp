@@ -15,8 +15,9 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-// Twenty scenes handled roughly, every pose of the proxy looked at in exact arithmetic. Minutes to hours; a
-// test does the same for a few hundred poses. With --moving the obstacles move too, as fast as hands do.
+// Twenty scenes with rough manipulation. The program checks every pose of the proxy in exact arithmetic,
+// which takes minutes to hours; a test does the same for a few hundred poses. With --moving the obstacles
+// also move, as fast as hands do.
 
 namespace {
 
@@ -26,14 +27,14 @@ using namespace wrenchd::test;
 struct Tally {
   long overlaps = 0, caught = 0, free = 0, converged = 0, budget_spent = 0, jumps = 0;
   std::uint32_t most_visits = 0;
-  double latest_s = 0.0;  ///< that obstacles were seen
+  double latest_s = 0.0;  ///< scene time at which the obstacles were last updated
   double worst_residual = 0.0;
   std::vector<double> tick_us;
 };
 
 constexpr double kTick_s = 1e-3;
 
-/// To and fro, turning, or both, at random.
+/// Returns a random translation, rotation or both, which reverses periodically.
 ObstacleMotion random_motion(std::uint64_t seed) {
   RandomValues random(seed);
   ObstacleMotion motion;
@@ -44,7 +45,8 @@ ObstacleMotion random_motion(std::uint64_t seed) {
   return motion;
 }
 
-/// Did the tool come to the other side of the plate between two ticks? The plate is wider than the stabs.
+/// Returns true if the tool passed to the other side of the plate between two ticks. The plate is wider than
+/// the stabs.
 bool jumped(const ManipulationCase& handling, const Pose& X_OT_before, const Pose& X_OT_after) {
   const double wide_m = 0.03;
   const Vector3d &before = X_OT_before.translation_m, &after = X_OT_after.translation_m;
@@ -69,7 +71,7 @@ Tally handle(const ManipulationCase& handling, long poses, std::uint64_t seed, c
     tally.tick_us.push_back(
         std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
     tally.most_visits = std::max(tally.most_visits, proxy.node_visits());
-    if (q.status == ProjectionStatus::infeasible) {  // as the loop does: it is put elsewhere
+    if (q.status == ProjectionStatus::infeasible) {  // the servo loop reinitializes the proxy in this case
       ++tally.caught;
       X_OQ = X_OT_start;
       X_WQ = obstacle.X_WO_at(time_s) * X_OQ;
@@ -95,14 +97,15 @@ Tally handle(const ManipulationCase& handling, long poses, std::uint64_t seed, c
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
-      "prove_proxy: does the proxy ever overlap anything? Every pose is looked at in exact arithmetic.");
+  CLI::App app("prove_proxy: checks in exact arithmetic that the proxy overlaps no obstacle.");
   long poses = 1000;
   std::uint64_t seed = 1;
   std::string only;
-  app.add_option("--poses", poses, "in each scene")->check(CLI::Range(1L, 100000000L))->capture_default_str();
-  app.add_option("--seed", seed, "of the hand")->capture_default_str();
-  app.add_option("--only", only, "scenes with this in their name");
+  app.add_option("--poses", poses, "number of poses per scene")
+      ->check(CLI::Range(1L, 100000000L))
+      ->capture_default_str();
+  app.add_option("--seed", seed, "seed of the hand's motion")->capture_default_str();
+  app.add_option("--only", only, "runs only scenes whose name contains this text");
   bool moving = false;
   app.add_flag("--moving", moving, "the obstacles move too, at random");
   CLI11_PARSE(app, argc, argv);

@@ -5,16 +5,17 @@
 
 namespace wrenchd::bench {
 
-/// The value that a share of the values lie at or below: the nearest rank, no interpolation. NaN of none.
+/// Returns the smallest value that at least this share of the values do not exceed (nearest rank, no
+/// interpolation). NaN if there are no values.
 double quantile(std::vector<double> values, double share);
 
-/// How times are reported. Never the mean: a tick that is late is late.
+/// Quantiles of a time. Reports show quantiles and never the mean, because a single late tick matters.
 struct Quantiles {
   double p50, p99, p999, max;
 };
 Quantiles quantiles(const std::vector<double>& values);
 
-/// How far the largest is above the smallest, as a share of the smallest.
+/// Returns (largest - smallest) / smallest.
 double relative_spread(const std::vector<double>& values);
 
 }  // namespace wrenchd::bench

@@ -11,8 +11,8 @@
 
 namespace wrenchd::bench {
 
-/// A clock that is cheap enough for calls of a tenth of a microsecond: the time-stamp counter where there is
-/// one. The fences keep what is timed from running across a reading.
+/// Reads a clock that is cheap enough to time 0.1 us: the time-stamp counter where the processor has one. The
+/// fences keep the timed instructions between the two readings.
 inline std::int64_t counter() noexcept {
 #if defined(__x86_64__)
   _mm_lfence();
@@ -24,12 +24,12 @@ inline std::int64_t counter() noexcept {
 #endif
 }
 
-/// What ticks() counts, found out once.
+/// Conversion of counter() to time, measured once.
 struct CounterScale {
   double ns_per_count = 1.0;
-  std::int64_t overhead_counts = 0;  ///< least that two readings with nothing between them are apart
+  std::int64_t overhead_counts = 0;  ///< minimum difference of two consecutive readings
 
-  /// Of the time between two readings, less what the readings themselves take.
+  /// Returns the time between two readings [ns], less the cost of the readings themselves.
   double ns(std::int64_t elapsed_ticks) const noexcept {
     return elapsed_ticks <= overhead_counts
                ? 0.0
@@ -37,10 +37,10 @@ struct CounterScale {
   }
 };
 
-/// Takes a tenth of a second.
+/// Measures the scale. Takes 0.1 s.
 CounterScale calibrate_counter();
 
-/// Is this process kept to one core? Times are calmer then.
+/// Returns true if the process may use only one core. Times are steadier then.
 bool pinned_to_one_core();
 
 }  // namespace wrenchd::bench

@@ -9,13 +9,13 @@
 
 namespace wrenchd::bench {
 
-/// A number for people: as many decimals as asked for, "-" for NaN.
+/// Formats a number with this many decimals; "-" for NaN.
 std::string fixed(double value, int decimals);
-/// The same with two significant digits and an exponent; "0" for zero.
+/// Formats a number with two significant digits and an exponent; "0" for zero.
 std::string scientific(double value);
 std::string whole(std::size_t value);
 
-/// Rows that say of which case and which method they are, and then one cell a column.
+/// A table whose rows start with a case and a method, followed by one cell per column.
 class Table {
  public:
   Table(std::string name, std::vector<std::string> columns)
@@ -23,9 +23,9 @@ class Table {
 
   void add(std::string of_case, std::string method, std::vector<std::string> cells);
 
-  /// Aligned columns; an empty line before each new case.
+  /// Prints aligned columns, with an empty line before each new case.
   void print(std::ostream& out) const;
-  /// One line a cell: table,case,method,column,value; all but the value in quotes.
+  /// Writes one line per cell: table,case,method,column,value. All fields except the value are quoted.
   void write_csv(std::ostream& out) const;
 
  private:
@@ -39,7 +39,7 @@ class Table {
   std::vector<Row> rows_;
 };
 
-/// All of them in one file, under a header. Throws std::runtime_error where it cannot be written.
+/// Writes all tables to one file with a header. Throws std::runtime_error if the file cannot be written.
 void write_csv(const std::filesystem::path& file, const std::vector<Table>& tables);
 
 }  // namespace wrenchd::bench

@@ -27,11 +27,11 @@ MeshContacts::SweepResult add_sample(const Scene& scene, const Pose& from, const
   return contacts.sweep(to, kClearance_m, budget);
 }
 
-Pose at(double x, double y, double z, const Vector3d& turn = Vector3d::Zero()) {
-  return {rotation_from(turn), {x, y, z}};
+Pose at(double x, double y, double z, const Vector3d& rotation = Vector3d::Zero()) {
+  return {rotation_from(rotation), {x, y, z}};
 }
 
-TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_contacts]") {
+TEST_CASE("a sweep of a cube meets a vertex, a face or an edge first", "[mesh_contacts]") {
   const Scene scene = two(make_mesh({"cube", 12}), make_mesh({"table", 12}));
   const Vector3d on_corner(0.6, 0.5, 0.0), on_edge(0.785398163, 0.0, 0.0);
   SECTION("a corner on a face") {
@@ -44,7 +44,7 @@ TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_c
     CHECK(gap_m(found.contacts[0], at(0, 0, 0.04, on_corner)) < 0.0);
   }
   SECTION("an edge over the table's edge") {
-    const Vector3d across(0.785398163, 0.0, 0.0);  // its lowest edge runs along x
+    const Vector3d across(0.785398163, 0.0, 0.0);  // the lowest edge runs along x
     const auto found = add_sample(scene, at(0.15, 0, 0.06, across), at(0.15, 0, 0.04, across));
     REQUIRE(found.contacts.size() >= 1);
     bool edges = false;
@@ -72,8 +72,8 @@ TEST_CASE("what a cube meets first tells a corner, a face and an edge", "[mesh_c
   }
 }
 
-// No ghost: a cube that slides over a table meets nothing, however finely the table is cut.
-TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
+// No ghost contact: a cube that slides over a table meets nothing, at every triangulation of the table.
+TEST_CASE("a sweep along a flat face meets nothing", "[mesh_contacts]") {
   for (const std::size_t triangles : {12, 1000, 20000}) {
     const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));
     const double z = 0.035 + kClearance_m;
@@ -85,14 +85,14 @@ TEST_CASE("sliding over a flat face meets nothing on it", "[mesh_contacts]") {
   }
 }
 
-TEST_CASE("what touches at the end is told, by the names of its features", "[mesh_contacts]") {
+TEST_CASE("the touching contacts at the end of a sweep name their features", "[mesh_contacts]") {
   const Scene scene = two(make_mesh({"cube", 300}), make_mesh({"table", 300}));
   MeshContacts contacts(scene);
   VisitBudget budget = {1000000};
   contacts.set_start(at(0, 0, 0.036));
   const auto found = contacts.sweep(at(0, 0, 0.035 + kClearance_m), kClearance_m, budget);
   CHECK(found.contacts.empty());
-  CHECK(contacts.touching().size() == 4);  // the corners, and nothing of the cuts
+  CHECK(contacts.touching().size() == 4);  // the corners, and no vertex inside the face
   for (const Contact& c : contacts.touching()) {
     CHECK(c.kind == ContactKind::vertex_face);
     CHECK(scene.tool_mesh()->surface.vertices_m()[c.tool_feature] == c.p_TCa_m);
@@ -101,7 +101,7 @@ TEST_CASE("what touches at the end is told, by the names of its features", "[mes
   }
 }
 
-TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
+TEST_CASE("a sheet has two sides and stops the tool on both", "[mesh_contacts]") {
   TriangleMesh sheet;
   sheet.vertices_m = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
@@ -115,8 +115,8 @@ TEST_CASE("a sheet has two sides, and is met from either", "[mesh_contacts]") {
   }
 }
 
-// From where a hand leaves the tool, touching or not, steps in any direction.
-TEST_CASE("a step that ends in an obstacle is never seen as free", "[mesh_contacts]") {
+// Steps in any direction from poses that the proxy reached, with and without contact.
+TEST_CASE("a path that ends in an obstacle is never free", "[mesh_contacts]") {
   RandomValues random(12);
   for (const std::size_t i : {1, 5, 6, 8, 11, 13}) {
     const ManipulationCase& handling = manipulation_cases()[i];
@@ -145,9 +145,9 @@ TEST_CASE("a step that ends in an obstacle is never seen as free", "[mesh_contac
   }
 }
 
-// Turned by 0.05 rad, an edge that was held dips by 13 um and slides off the corner it lay on; no other
-// feature is met first. A shaken hand found it once in a million poses.
-TEST_CASE("a way that turns far is not free where its end overlaps", "[mesh_contacts]") {
+// After a rotation by 0.05 rad an edge that was held dips by 13 um and leaves the corner on which it lay. No
+// other feature is met first. A shaken hand met this case once in a million poses.
+TEST_CASE("a path with a large rotation is not free if its end overlaps", "[mesh_contacts]") {
   const Scene scene = scene_of(manipulation_cases()[9]);
   const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
   const Pose from = {{-0.68298246087346626, -0.19239706033389406, 0.68845117377531961, 0.15017759700263147},
@@ -161,17 +161,17 @@ TEST_CASE("a way that turns far is not free where its end overlaps", "[mesh_cont
   CHECK((found.overlaps || !found.contacts.empty()));
 }
 
-TEST_CASE("ends within reach of one another need no second walk", "[mesh_contacts]") {
+TEST_CASE("sweeps within the reach of one list need no second traversal", "[mesh_contacts]") {
   const Scene scene = scene_of(manipulation_cases()[7]);
   MeshContacts contacts(scene);
   VisitBudget budget = {1000000};
   contacts.set_start(at(0.11, 0, 0));
   contacts.sweep(at(0.10, 0, 0), kClearance_m, budget);
   const auto walks = [&](const Pose& X_WT) {
-    const std::uint32_t before = budget.remaining, looking = contacts.sweep_visits();
+    const std::uint32_t before = budget.remaining, visits_before = contacts.sweep_visits();
     contacts.sweep(X_WT, kClearance_m, budget);
     return before - budget.remaining >
-           contacts.sweep_visits() - looking;  // the pairs listed are looked at anew
+           contacts.sweep_visits() - visits_before;  // the candidate pairs are tested again
   };
   CHECK_FALSE(walks(at(0.10, 0.0002, 0)));
   CHECK(walks(at(0.10, 0.01, 0)));

@@ -12,7 +12,7 @@
 #include "tests/support/manipulation_case.hpp"
 #include "tests/support/no_allocation.hpp"
 
-// Obstacles that move push the proxy, which stays admissible and passes through none of them.
+// Moving obstacles displace the proxy, which stays admissible and passes through none of them.
 
 namespace wrenchd {
 namespace {
@@ -34,8 +34,8 @@ Scene scene_with(const GeneratedMesh& tool, const std::vector<Part>& parts) {
   return Scene(mesh_tool(make_mesh(tool)), {}, {}, std::move(obstacles));
 }
 
-/// A proxy that is watched by exact arithmetic: where it stands, with the obstacles as it sees them. Their
-/// pose relative to the tool is rounded, by far less than the clearance.
+/// A proxy that exact arithmetic checks, with the obstacles at the proxy's scene time. Their poses relative
+/// to the tool are rounded by far less than the clearance.
 class Watched {
  public:
   Watched(const Scene& scene, const Pose& X_WT) : X_WQ(X_WT), proxy(scene), scene_(scene) {
@@ -78,7 +78,7 @@ ObstacleMotion turning(const Vector3d& w_rad_per_s) {
   return motion;
 }
 
-TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exactly outside", "[moving]") {
+TEST_CASE("a plate that flies through a hand at rest carries the proxy along, exactly outside", "[moving]") {
   const double speed_m_per_s = GENERATE(0.05, 0.5, 5.0);
   const GeneratedMesh tool =
       GENERATE(GeneratedMesh{"cube", 12}, GeneratedMesh{"bumpy", 2000}, GeneratedMesh{"plate", 100});
@@ -95,7 +95,7 @@ TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exac
   const int ticks = case_count(std::min(2000, static_cast<int>(2.0 * turn_back_s / kTick_s)));
   for (int i = 1; i <= ticks; ++i) {
     const Projection q = watched.follow(X_WP, i * kTick_s);
-    INFO("tick " << i << ", looks " << watched.proxy.sweeps());
+    INFO("tick " << i << ", sweeps " << watched.proxy.sweeps());
     REQUIRE(q.status != ProjectionStatus::infeasible);
     REQUIRE_FALSE(watched.overlaps());
     const double plate_z_m = scene.meshes()[0].X_WO_at(watched.proxy.admissible_time_s()).translation_m.z();
@@ -107,7 +107,7 @@ TEST_CASE("a plate that flies through a hand at rest takes the proxy along, exac
   CHECK(latest_s <= 0.02);
 }
 
-TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactly outside", "[moving]") {
+TEST_CASE("a rotating gear and a tumbling block displace a tool that stays exactly outside", "[moving]") {
   const bool gear = GENERATE(true, false);
   const Scene scene =
       gear ? scene_with({"bumpy", 500}, {{{"gear", 1000}, {}, turning({0, 0, 20.0})}})
@@ -125,9 +125,9 @@ TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactl
   const int ticks = case_count(1500);
   for (int i = 1; i <= ticks; ++i) {
     X_WP = hand.next();
-    X_WP.translation_m += std::max(0.0, 1.0 - i / 300.0) * offset_m;  // comes in
+    X_WP.translation_m += std::max(0.0, 1.0 - i / 300.0) * offset_m;  // approach
     const Projection q = watched.follow(X_WP, i * kTick_s);
-    INFO("tick " << i << ", looks " << watched.proxy.sweeps());
+    INFO("tick " << i << ", sweeps " << watched.proxy.sweeps());
     REQUIRE_FALSE(watched.overlaps());
     REQUIRE(q.status != ProjectionStatus::infeasible);
     pushed += q.energy > 0.0 ? 1 : 0;
@@ -137,8 +137,8 @@ TEST_CASE("a gear that turns and a block that tumbles shove a tool about, exactl
   CHECK(late <= ticks / 20);
 }
 
-// The energy knows only p^-1 q: what rides on an obstacle feels nothing of it.
-TEST_CASE("a hand that rides with a lift feels what it feels on the ground", "[moving]") {
+// The energy depends on p^-1 q only, so a common motion has no effect.
+TEST_CASE("a hand on a moving lift gets the same contact as on the ground", "[moving]") {
   const GeneratedMesh tool = {"cube", 300};
   const Vector3d v_m_per_s(0.02, 0.01, 0.1);
   const Scene ground = scene_with(tool, {{{"table", 1200}, {}, {}}});
@@ -166,7 +166,7 @@ TEST_CASE("a hand that rides with a lift feels what it feels on the ground", "[m
   if (case_count(600) == 600) CHECK(most > 1e-8);
 }
 
-TEST_CASE("what is caught in a vice says so, and was outside until then", "[moving]") {
+TEST_CASE("a tool trapped in a vice is reported, and was outside until then", "[moving]") {
   const Scene scene =
       scene_with({"cube", 12},
                  {{{"table", 12}, {Quaterniond::Identity(), {0, 0, -0.07}}, to_and_fro({0, 0, 0.2}, 0.0)},
@@ -184,14 +184,14 @@ TEST_CASE("what is caught in a vice says so, and was outside until then", "[movi
   CHECK(watched.proxy.admissible_time_s() > 0.17);
   CHECK(watched.proxy.admissible_time_s() < 0.176);
   CHECK(i < 400);
-  // Put elsewhere it follows again.
+  // After a reset the proxy follows again.
   const Pose beside = {Quaterniond::Identity(), {0.5, 0, 0}};
   watched.proxy.clear_history(i * kTick_s);
   watched.X_WQ = beside;
   CHECK(watched.follow(beside, (i + 1) * kTick_s).status == ProjectionStatus::free);
 }
 
-TEST_CASE("a place that was found for an earlier time is caught up with", "[moving]") {
+TEST_CASE("a proxy pose found for an earlier scene time catches up with the obstacles", "[moving]") {
   const Scene scene =
       scene_with({"cube", 12},
                  {{{"table", 12}, {Quaterniond::Identity(), {0, 0, -0.05}}, to_and_fro({0, 0, 0.1}, 0.0)}});
@@ -202,7 +202,7 @@ TEST_CASE("a place that was found for an earlier time is caught up with", "[movi
   depth.clear_history(0.0);
   Pose X_WQ = placed.projection.X_WQ;
   Penetration now;
-  for (int i = 0; i < 20; ++i) {  // the table has risen by 100 mm meanwhile
+  for (int i = 0; i < 20; ++i) {  // the table has risen by 100 mm in the meantime
     now = depth.follow(X_WP, X_WQ, 1.0 + i * kTick_s);
     X_WQ = now.projection.X_WQ;
   }
@@ -211,17 +211,17 @@ TEST_CASE("a place that was found for an earlier time is caught up with", "[movi
   CHECK(X_WQ.translation_m.z() == Approx(table_m + 0.035).margin(1e-6));
 }
 
-TEST_CASE("with friction a tool rides on what moves, without friction it does not", "[moving][friction]") {
+TEST_CASE("a moving obstacle carries the tool with friction, and not without", "[moving][friction]") {
   const ObstacleMotion motion = GENERATE(to_and_fro({0.015, 0.0, 0.02}, 0.0), turning({0.0, 0.0, 0.6}));
   const Scene scene = scene_with({"cube", 12}, {{{"table", 12}, {}, motion}});
   const double mu = GENERATE(0.0, 0.8);
   PenetrationDepth depth(scene, {Method::exact, 47, 0.0, {mu, mu}});
   const Vector3d above_m(0.02, 0.01, 0.036);
   Pose X_WQ = {Quaterniond::Identity(), above_m};
-  Pose X_ride = X_WQ;  // of the tool as it would stand on the table
+  Pose X_ride = X_WQ;  // pose of the tool if it moved with the table
   for (int i = 1; i <= 100; ++i) {
     const double t_s = i * kTick_s;
-    // A hand that presses by two millimetres, and would rather stay where it is: friction gives 1.6 of them.
+    // A hand that presses by 2 mm and stays where it is. Friction provides 1.6 mm of them.
     const double table_m = scene.meshes()[0].X_WO_at(t_s).translation_m.z();
     const Pose X_WP = {Quaterniond::Identity(),
                        above_m + Vector3d(0, 0, table_m - 0.001 - 0.002 * std::min(1.0, i / 10.0))};
@@ -242,7 +242,7 @@ TEST_CASE("with friction a tool rides on what moves, without friction it does no
     CHECK(behind_m > 0.5 * way_m);
 }
 
-TEST_CASE("obstacles that move neither allocate nor lock", "[moving][realtime]") {
+TEST_CASE("following moving obstacles neither allocates nor locks", "[moving][realtime]") {
   const Scene scene = scene_with({"bumpy", 2000}, {{{"gear", 1000}, {}, turning({0, 0, 5.0})}});
   Proxy proxy(scene);
   Pose X_WP = {Quaterniond::Identity(), {0.10, 0, 0}};

@@ -7,7 +7,7 @@
 #include "collision/penetration.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-// What obstacles that move put into the spring is what T rises by around a hand that stands still.
+// The work of moving obstacles on the spring is the rise of T while the hand is at rest.
 
 namespace wrenchd {
 namespace {
@@ -24,11 +24,11 @@ Scene over_a_block(const ObstacleMotion& motion, const Pose& X_WO) {
 
 struct Sums {
   double most_T = 0.0, last_T = 0.0;
-  double worst = 0.0;  ///< difference of T and of what was summed up
+  double worst = 0.0;  ///< difference between T and the sum
   double sum = 0.0;
 };
 
-/// A hand that stands still at p for so long, from a place that is admissible.
+/// A hand at rest at p for this time, from an admissible pose.
 Sums hold_still(const Scene& scene, const Pose& X_WP, double for_s) {
   PenetrationDepth depth(scene, {});
   Pose X_WQ = X_WP;
@@ -47,12 +47,11 @@ Sums hold_still(const Scene& scene, const Pose& X_WP, double for_s) {
   return sums;
 }
 
-TEST_CASE("a block that rises into a hand at rest puts into T what T rises by, and takes it back",
-          "[obstacle_work]") {
+TEST_CASE("the work of a rising block equals the rise of T, and its descent returns it", "[obstacle_work]") {
   ObstacleMotion motion;
   motion.linear_m_per_s = {0.0, 0.0, 0.04};
   motion.reverse_after_s = 0.2;
-  const Pose X_WO{Quaterniond::Identity(), {0.012, 0.004, -0.054}};  // meets the cube's face off its middle
+  const Pose X_WO{Quaterniond::Identity(), {0.012, 0.004, -0.054}};  // meets the cube's face off its centre
   const Scene scene = over_a_block(motion, X_WO);
   const Sums there = hold_still(scene, Pose{}, 0.2);
   CHECK(there.last_T > 1e-6);
@@ -63,7 +62,7 @@ TEST_CASE("a block that rises into a hand at rest puts into T what T rises by, a
   CHECK(std::abs(and_back.sum) < 0.01 * there.most_T);
 }
 
-TEST_CASE("a block that turns does work by its lever", "[obstacle_work]") {
+TEST_CASE("a rotating block does work in proportion to its lever", "[obstacle_work]") {
   ObstacleMotion motion;
   motion.angular_rad_per_s = {0.0, 2.0, 0.0};
   motion.reverse_after_s = 0.15;
@@ -73,7 +72,7 @@ TEST_CASE("a block that turns does work by its lever", "[obstacle_work]") {
   CHECK(sums.worst < 0.01 * sums.most_T);
 }
 
-TEST_CASE("what stands still does no work, however hard it is pressed", "[obstacle_work]") {
+TEST_CASE("an obstacle at rest does no work, however large the contact force", "[obstacle_work]") {
   const Scene scene = over_a_block({}, {Quaterniond::Identity(), {0.0, 0.0, -0.051}});
   PenetrationDepth depth(scene, {});
   const Pose X_WP{Quaterniond::Identity(), {0.0, 0.0, -0.01}};

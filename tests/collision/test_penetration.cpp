@@ -43,8 +43,9 @@ TEST_CASE("every method's pose is admissible, and exact is never above the other
     CHECK(planar.projection.energy <= translational.projection.energy * (1.0 + 1e-9));
     most_excess = std::max(most_excess, planar.projection.energy / T - 1.0);
   }
-  CHECK(most_excess >
-        0.01);  // the paper's family is not optimal for a general inertia: its axis stays in the plane
+  CHECK(
+      most_excess >
+      0.01);  // the paper's family is not optimal for a general inertia, because its axis stays in the plane
 }
 
 TEST_CASE("planar solves example 4.1 exactly: the rotation lies in one of its planes", "[penetration]") {
@@ -78,7 +79,7 @@ TEST_CASE("translational is the depth along the normal, with the torque of its l
   }
 }
 
-TEST_CASE("descent comes down to the optimum where one contact holds it, and stops above it at kinks",
+TEST_CASE("descent reaches the optimum with one contact, and stops above it at kinks",
           "[penetration][descent]") {
   RandomValues random(6);
   int met = 0;
@@ -112,7 +113,7 @@ TEST_CASE("an edge that lies flat gives translational no torque along itself", "
   CHECK(std::abs(p.spring_displacement[5]) > 0.01);
 }
 
-TEST_CASE("where there is no room the proxy stays, and draws the hand back", "[penetration]") {
+TEST_CASE("without an admissible pose the proxy stays and pulls the hand back", "[penetration]") {
   const Scene scene(box({1.0, 1.0, 1.0}),
                     {half_space(Vector3d::UnitZ(), 0.0), half_space(-Vector3d::UnitZ(), -0.5)});
   PenetrationDepth exact = depth_by(Method::exact, scene);
@@ -275,7 +276,7 @@ TEST_CASE("a proxy among several bodies and walls stays out of all of them", "[p
   CHECK(touching_many > 500);
 }
 
-TEST_CASE("the whole pipeline knows no frame: world, mesh axes, unit of length, mass",
+TEST_CASE("the pipeline is invariant to world frame, mesh axes, unit of length and mass",
           "[penetration][convex]") {
   RandomValues random(24);
   for (int i = 0; i < case_count(30); ++i) {
@@ -328,7 +329,8 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
                    {convex_obstacle("table", convex_hull(split(9, {2.0, 3.0, 1.0})))});
   for (int i = 0; i < case_count(60); ++i) {
     const Pose X_WP{random.rotation(), 0.9 * random.unit<3>()};
-    if (separation_m(coarse, X_WP) < -0.4) continue;  // so deep that answers of equal merit lie far apart
+    if (separation_m(coarse, X_WP) < -0.4)
+      continue;  // at large depth several answers of equal energy are far apart
     const Penetration a = depth_by(Method::exact, coarse).query(X_WP);
     const Penetration b = depth_by(Method::exact, fine).query(X_WP);
     INFO("case " << i << ", T " << a.projection.energy << " and " << b.projection.energy);
@@ -336,8 +338,7 @@ TEST_CASE("splitting the faces of tool and obstacle changes nothing", "[penetrat
   }
 }
 
-TEST_CASE("where an obstacle moves only method exact will do, and the refusal says so",
-          "[penetration][moving]") {
+TEST_CASE("with moving obstacles all methods but exact are rejected with a remedy", "[penetration][moving]") {
   const ToolBody cube = tool_body(make_mesh({"cube", 12}), 1.0, 0.1);
   const auto mesh = std::make_shared<const MeshBvh>(make_mesh({"cube", 12}));
   std::vector<MeshObstacle> meshes;
@@ -352,8 +353,9 @@ TEST_CASE("where an obstacle moves only method exact will do, and the refusal sa
       why = error.what();
     }
     CHECK(why ==
-          "the obstacle 'plunger' moves, which only method exact can deal with; choose it, or let all "
-          "obstacles stand still");
+          "the obstacle 'plunger' moves, and only method exact supports moving obstacles; choose it, or keep "
+          "all "
+          "obstacles at rest");
   }
   PenetrationDepth depth(scene, {});
   const Pose X_WP = {Quaterniond::Identity(), {0, 0, 0.2}};
@@ -362,7 +364,7 @@ TEST_CASE("where an obstacle moves only method exact will do, and the refusal sa
   CHECK(depth.follow(X_WP, q.X_WQ, 0.501).projection.status == ProjectionStatus::free);
 }
 
-TEST_CASE("where nothing moves the scene time does not matter", "[penetration][moving]") {
+TEST_CASE("without moving obstacles the scene time does not matter", "[penetration][moving]") {
   RandomValues random(26);
   for (int i = 0; i < 20; ++i) {
     const OverlappingScene c = overlap_half_space(random, 0.05, 0.3);

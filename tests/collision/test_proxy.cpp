@@ -25,7 +25,7 @@ bool in_contact(const Projection& q) {
   return q.status == ProjectionStatus::converged || q.status == ProjectionStatus::budget_spent;
 }
 
-/// p of the hand, followed from the start.
+/// The commanded pose, followed from the start.
 struct Followed {
   explicit Followed(const ManipulationCase& handling)
       : scene(scene_of(handling)), proxy(scene), X_WQ{Quaterniond::Identity(), handling.start_m} {}
@@ -47,7 +47,7 @@ Scene two(TriangleMesh tool, TriangleMesh obstacle) {
   return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
 }
 
-TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]") {
+TEST_CASE("a proxy overlaps nothing for any motion of the hand, by exact arithmetic", "[proxy]") {
   const auto i = GENERATE(range<std::size_t>(0, 20));
   const ManipulationCase& handling = manipulation_cases()[i];
   INFO(handling.name);
@@ -60,14 +60,14 @@ TEST_CASE("a proxy overlaps nothing, whatever the hand does: exactly", "[proxy]"
   for (int tick = 0; tick < case_count(600); ++tick) {
     const Projection q = f.follow(hand.next());
     REQUIRE(q.status != ProjectionStatus::infeasible);
-    INFO("tick " << tick << ", looks " << f.proxy.sweeps());
+    INFO("tick " << tick << ", sweeps " << f.proxy.sweeps());
     REQUIRE_FALSE(exact.intersect(q.X_WQ));
     contacts += in_contact(q) ? 1 : 0;
   }
-  if (case_count(600) == 600) CHECK(contacts > 10);  // a tenth of the ticks may not come so far
+  if (case_count(600) == 600) CHECK(contacts > 10);  // up to a tenth of the ticks may not reach a contact
 }
 
-TEST_CASE("a plate of a millimetre holds a stab of five metres a second", "[proxy]") {
+TEST_CASE("a plate of 1 mm stops a stab at 5 m/s", "[proxy]") {
   for (const std::size_t i : {0, 1, 2, 3, 5}) {
     const ManipulationCase& handling = manipulation_cases()[i];
     INFO(handling.name);
@@ -78,7 +78,8 @@ TEST_CASE("a plate of a millimetre holds a stab of five metres a second", "[prox
       const Pose X_WP = hand.next();
       f.follow(X_WP);
       deepest_m = std::max(deepest_m, -X_WP.translation_m.z());
-      REQUIRE(f.X_WQ.translation_m.z() > 0.0);  // the plate's middle is at zero, and wider than the stabs
+      REQUIRE(f.X_WQ.translation_m.z() >
+              0.0);  // the plate's middle is at zero, and the plate is wider than the stabs
     }
     CHECK(deepest_m > 0.03);
   }
@@ -91,7 +92,7 @@ TEST_CASE("at rest a proxy is a local optimum, and most often the nearest of all
   for (int n = 0; n < 40; ++n) {
     const bool round = random.chance(0.5);
     const Scene scene = two(round ? ball : cube, cube);
-    // The same as convex bodies, whose global optimum is known.
+    // The same bodies as convex bodies, whose global optimum is known.
     ToolBody tool = tool_body(round ? ball : cube, 1.0, 0.1);
     const Scene convex(std::move(tool), {}, {convex_obstacle("cube", convex_hull(cube.vertices_m))});
     PenetrationDepth depth(convex, {});
@@ -100,7 +101,7 @@ TEST_CASE("at rest a proxy is a local optimum, and most often the nearest of all
     Proxy proxy(scene);
     Projection q = proxy.follow(X_WP, X_WP);
     REQUIRE(q.status == ProjectionStatus::free);
-    // In along a straight line, a millimetre or so deep, and there at rest.
+    // Moves in along a straight line by about a millimetre, then rests.
     double from_m = 0.2, depth_m = 0.0;
     while (depth_m < 1e-3 && from_m > 0.0) {
       from_m -= 1e-4;
@@ -129,7 +130,7 @@ TEST_CASE("at rest a proxy is a local optimum, and most often the nearest of all
   CHECK(nearest >= 36);
 }
 
-/// A sheet of 0.2 m square in z = 0, in n x n cells, every other one of them looking down.
+/// A sheet of 0.2 m square in z = 0, in n x n cells; every second one faces down.
 TriangleMesh sheet(std::uint32_t n) {
   TriangleMesh mesh;
   for (std::uint32_t i = 0; i <= n; ++i)
@@ -166,7 +167,7 @@ TEST_CASE("an open surface stops a tool on the side where it is", "[proxy]") {
         RandomValues random(cells);
         Pose X_WQ = {Quaterniond::Identity(), {0, 0, 0.06 * side}};
         Penetration last;
-        for (int tick = 0; tick < 150; ++tick) {  // a millimetre each, and then at rest
+        for (int tick = 0; tick < 150; ++tick) {  // a millimetre per tick, then rest
           const Pose X_WP = {rotation_from(tick < 120 ? Vector3d(0.02 * random.unit<3>()) : Vector3d::Zero()),
                              {0.01, 0.02, side * (0.06 - 1e-3 * std::min(tick, 120))}};
           last = depth.follow(X_WP, X_WQ);
@@ -178,12 +179,12 @@ TEST_CASE("an open surface stops a tool on the side where it is", "[proxy]") {
         }
         CHECK(last.contacts > 0);
         CHECK(side * X_WQ.translation_m.z() < 0.0301);
-        CHECK(side * last.eps[2] > 0.08);  // drawn back
+        CHECK(side * last.eps[2] > 0.08);  // pulled back
       }
 }
 
-TEST_CASE("the border of a surface and where it cuts through itself hold, too", "[proxy]") {
-  TriangleMesh cross = sheet(2);  // and another, upright, through its middle
+TEST_CASE("the border and the self-intersections of a surface hold the tool", "[proxy]") {
+  TriangleMesh cross = sheet(2);  // a second, upright sheet through its middle
   const auto first = static_cast<std::uint32_t>(cross.vertices_m.size());
   for (const Vector3d& p : sheet(2).vertices_m) cross.vertices_m.emplace_back(p.x(), 0.003, p.y());
   for (auto corners : sheet(2).triangles) {
@@ -212,7 +213,7 @@ TEST_CASE("the border of a surface and where it cuts through itself hold, too", 
   }
 }
 
-/// A cube slides and rocks on a table, both cut into so many triangles.
+/// A cube slides and rocks on a table. Both have this number of triangles.
 std::vector<Vector6d> wrenches(std::size_t triangles, int ticks) {
   const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));
   Proxy proxy(scene);
@@ -231,7 +232,7 @@ std::vector<Vector6d> wrenches(std::size_t triangles, int ticks) {
   return out;
 }
 
-TEST_CASE("a cube on a table feels the same however both are cut, and does not chatter", "[proxy]") {
+TEST_CASE("a cube on a table has the same contact at every triangulation, without chatter", "[proxy]") {
   const int ticks = 1500;
   const std::vector<Vector6d> coarse = wrenches(12, ticks);
   double largest = 0.0, jolt = 0.0;
@@ -271,7 +272,7 @@ TEST_CASE("a proxy slides along a wall made of flush blocks without catching on 
   }
 }
 
-TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as those do", "[proxy]") {
+TEST_CASE("thousands of obstacles cost as much as the near ones, and yield the same result", "[proxy]") {
   const auto cube = std::make_shared<const MeshBvh>(make_mesh({"cube", 12}));
   std::vector<MeshObstacle> few, many;
   for (int i = 0; i < 60; ++i)
@@ -298,7 +299,7 @@ TEST_CASE("thousands of obstacles cost what the near ones cost, and hold as thos
   CHECK(contacts > 300);
 }
 
-TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
+TEST_CASE("half-spaces and meshes hold a proxy together", "[proxy]") {
   std::vector<MeshObstacle> obstacles;
   obstacles.push_back({"wall", MeshBvh(make_mesh({"cube", 12})), Pose{Quaterniond::Identity(), {0.1, 0, 0}}});
   const Scene scene(tool_body(make_mesh({"cube", 12}), 1.0, 0.1), {{"floor", Vector3d::UnitZ(), -0.03}}, {},
@@ -316,7 +317,7 @@ TEST_CASE("half-spaces hold a proxy together with meshes", "[proxy]") {
   CHECK(wall);
 }
 
-TEST_CASE("a proxy that is given no time stays where it is admissible, and says so", "[proxy]") {
+TEST_CASE("a proxy without budget stays at an admissible pose and reports it", "[proxy]") {
   const ManipulationCase& handling = manipulation_cases()[7];
   const Scene scene = scene_of(handling);
   const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
@@ -340,13 +341,13 @@ TEST_CASE("a proxy that is given no time stays where it is admissible, and says 
   CHECK(spent > 5);
 }
 
-// In visits, not in time. Among fine bodies that the hand has just begun to move, or turns back, a list of
-// pairs is missing: ticks that make it at once take tens of times what the others take.
-TEST_CASE("no tick takes far more work than most, and what is late is caught up with", "[proxy]") {
+// The unit is node visits, not time. If the hand starts to move or reverses among fine bodies, a candidate
+// list is missing. A tick that builds it immediately needs tens of times the usual work.
+TEST_CASE("no tick needs far more work than most, and the proxy catches up after deferral", "[proxy]") {
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 20'000}, {"boulder", 20'000}, HandMotion::slide, {}});
   const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), scene.meshes()[0].mesh->surface.mesh());
-  // To and fro along the boulder, pressed into it, with stops of 20 ticks: each sets out anew.
+  // Back and forth along the boulder, pressed into it, with rests of 20 ticks. Each movement starts anew.
   const auto hand = [](int tick) -> Pose {
     const int phase = tick / 60, within = std::min(tick % 60, 40);
     const double s = 1e-4 * (phase % 2 == 0 ? within : 40 - within);
@@ -365,7 +366,7 @@ TEST_CASE("no tick takes far more work than most, and what is late is caught up 
     Pose X_WQ = {Quaterniond::Identity(), {0.12, 0, 0}};
     for (int tick = -40; tick < 600; ++tick) {
       Pose X_WP = hand(std::max(tick, 0));
-      X_WP.translation_m.x() += 5e-4 * std::max(-tick - 20, 0);  // down onto it
+      X_WP.translation_m.x() += 5e-4 * std::max(-tick - 20, 0);  // down onto the boulder
       const Projection q = proxy.follow(X_WP, X_WQ);
       X_WQ = q.X_WQ;
       REQUIRE(q.status != ProjectionStatus::infeasible);
@@ -385,7 +386,7 @@ TEST_CASE("no tick takes far more work than most, and what is late is caught up 
     cut += late;
     run = late ? run + 1 : 0;
     CHECK(run <= 4);
-    if (i % 60 == 59) {  // it has rested
+    if (i % 60 == 59) {  // the tool has rested
       CHECK(even.q[i].status == ProjectionStatus::converged);
       CHECK(even.q[i].kkt_residual < 1e-6);
     }
@@ -416,8 +417,8 @@ std::vector<Projection> slid_along(double away_m, std::vector<std::uint32_t>& vi
   return all;
 }
 
-// In visits: contacts come and go along the way, and a tick that meets one looks several times.
-TEST_CASE("along a path ticks take much the same work", "[proxy]") {
+// Unit: node visits. Contacts begin and end along the path, and a tick that meets one sweeps several times.
+TEST_CASE("ticks along a path need similar work", "[proxy]") {
   std::vector<std::uint32_t> visits;
   slid_along(0.1, visits);
   std::sort(visits.begin(), visits.end());
@@ -426,8 +427,8 @@ TEST_CASE("along a path ticks take much the same work", "[proxy]") {
   CHECK(visits.back() <= 3 * usual);
 }
 
-// Far inside, a little of the hand's way is much of the tool's: where that is cannot be told beforehand.
-TEST_CASE("a tool that is not where it was expected is late now and then, not all the time", "[proxy]") {
+// Far inside, a small motion of the hand is a large motion of the tool, which cannot be predicted.
+TEST_CASE("wrong predictions defer some ticks, not all", "[proxy]") {
   std::vector<std::uint32_t> visits;
   const std::vector<Projection> all = slid_along(0.096, visits);
   const auto late = std::count_if(

@@ -20,7 +20,7 @@ SceneSettings box_above_floor(const TemporaryDirectory& dir) {
   return settings;
 }
 
-TEST_CASE("a scene is built from its settings, and refuses a bad mesh") {
+TEST_CASE("a scene is built from its settings, and rejects an invalid mesh") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   const Scene scene(settings);
@@ -31,7 +31,7 @@ TEST_CASE("a scene is built from its settings, and refuses a bad mesh") {
   CHECK_THROWS_AS(Scene(settings), MeshError);
 }
 
-TEST_CASE("a mesh obstacle stands where it was put, at its scale") {
+TEST_CASE("a mesh obstacle has its pose and scale") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   settings.half_spaces.clear();
@@ -52,12 +52,12 @@ TEST_CASE("a mesh obstacle stands where it was put, at its scale") {
 TEST_CASE("convex bodies are held as such, all others as meshes only", "[scene]") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
-  // A box with a notch in its top: the middle of the upper face pushed down.
+  // A box with a notch in its top: the middle of the upper face is lowered.
   const auto notched = dir.write("notched.off",
                                  "OFF\n9 14 0\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n0 0 2\n2 0 2\n2 2 2\n0 2 2\n"
                                  "1 1 1\n3 0 2 1\n3 0 3 2\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n"
                                  "3 2 7 6\n3 3 0 4\n3 3 4 7\n3 4 5 8\n3 5 6 8\n3 6 7 8\n3 7 4 8\n");
-  CHECK(Scene(settings).tool_mesh() == nullptr);  // half-spaces feel the hull alone
+  CHECK(Scene(settings).tool_mesh() == nullptr);  // half-spaces use the hull only
   MeshObstacleSettings post;
   post.name = "post";
   post.mesh = settings.tool.mesh;
@@ -76,7 +76,7 @@ TEST_CASE("convex bodies are held as such, all others as meshes only", "[scene]"
   CHECK(forms() == std::pair<std::size_t, std::size_t>(0, 1));
 }
 
-TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodies to the proxy", "[scene]") {
+TEST_CASE("a moving obstacle follows its motion, and disables the convex bodies", "[scene]") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   MeshObstacleSettings post;
@@ -95,15 +95,15 @@ TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodie
   REQUIRE(scene.meshes().size() == 2);
   CHECK(scene.obstacle_count() == 3);
   const MeshObstacle& moving = scene.meshes()[1];
-  CHECK(moving.mesh == scene.meshes()[0].mesh);  // made once
+  CHECK(moving.mesh == scene.meshes()[0].mesh);  // the mesh is shared
   CHECK(moving.X_WO_at(0.0).translation_m == post.X_WM.translation_m);
   CHECK(moving.X_WO_at(0.0).rotation.coeffs() == post.X_WM.rotation.coeffs());
-  CHECK((moving.X_WO_at(3.0).translation_m - Vector3d(0.1, 0, 3)).norm() < 1e-15);  // on its way back
+  CHECK((moving.X_WO_at(3.0).translation_m - Vector3d(0.1, 0, 3)).norm() < 1e-15);  // on its return
   CHECK(moving.X_WO_at(3.0).rotation.angularDistance(rotation_from({0, 0, 1}) * post.X_WM.rotation) < 1e-15);
   CHECK((moving.centre_O_m - Vector3d(1, 1, 1)).norm() < 1e-15);
   CHECK((moving.X_WO_at(0.0) * moving.centre_O_m - moving.centre_W_m).norm() == 0.0);
 
-  // So it is with a scene put together by hand.
+  // The same holds for a scene built in code.
   std::vector<MeshObstacle> meshes = still.meshes();
   meshes[0].motion.linear_m_per_s = {0, 0, 1};
   const Scene by_hand(still.tool(), {}, still.convex(), std::move(meshes));
@@ -111,7 +111,7 @@ TEST_CASE("an obstacle that moves is where its law says, and leaves convex bodie
   CHECK(by_hand.convex().empty());
 }
 
-TEST_CASE("a scene with its meshes elsewhere shares them, and what moves later moves", "[scene][moving]") {
+TEST_CASE("a scene with new poses shares its meshes, and scheduled motions apply", "[scene][moving]") {
   const TemporaryDirectory dir;
   SceneSettings settings = box_above_floor(dir);
   MeshObstacleSettings post;

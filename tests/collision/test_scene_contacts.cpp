@@ -20,7 +20,7 @@ ToolBody cube() {
 
 const HalfSpaceSettings kFloor = half_space(Vector3d::UnitZ(), 0.0);
 
-/// Tilted, so that the eight corners stand at eight heights.
+/// Tilted, so that the eight corners have eight different heights.
 const Quaterniond kTilt(Eigen::AngleAxisd(0.3, Vector3d(1, 2, 0).normalized()));
 
 std::vector<double> heights(const Scene& scene, const Pose& X_WT) {
@@ -44,7 +44,7 @@ TEST_CASE("the deepest contacts come first, at most four of an obstacle, and non
   CHECK(contacts.size() == 8);
 }
 
-TEST_CASE("a contact tells its vertex, its face and its obstacle") {
+TEST_CASE("a contact names its vertex, its face and its obstacle") {
   const HalfSpaceSettings wall = half_space({3, 0, 4}, 0.5);
   const Scene scene(cube(), {kFloor, wall});
   const Pose X_WT{kTilt, {0.1, 0.2, 0.3}};
@@ -140,7 +140,7 @@ TEST_CASE("rounds of add_violated find every violated vertex, in order of depth"
   }
 }
 
-TEST_CASE("what touches is added at once, however much it is, and none twice") {
+TEST_CASE("all touching contacts are added at once, none twice") {
   std::vector<Vector3d> corners;
   for (int i = 0; i < 20; ++i)
     for (const double z : {0.0, 1.0})
@@ -181,7 +181,7 @@ TEST_CASE("the best plane of a survey is the separating axis of least depth") {
   }
 }
 
-TEST_CASE("what the planes held admit does not overlap, whichever they are") {
+TEST_CASE("a pose that the held planes admit never overlaps, for any planes") {
   RandomValues random(12);
   int admitted = 0;
   for (int i = 0; i < 200; ++i) {
@@ -201,9 +201,9 @@ TEST_CASE("what the planes held admit does not overlap, whichever they are") {
   CHECK(admitted > 100);
 }
 
-TEST_CASE("a gap of every kind has the slope that its contact tells") {
+TEST_CASE("a gap of every kind has the gradient of its contact") {
   RandomValues random(13);
-  int seen[3] = {};
+  int found[3] = {};
   for (int i = 0; i < 200; ++i) {
     const OverlappingScene met = overlap_body(random, 0.1);
     SceneContacts contacts(met.scene);
@@ -213,8 +213,8 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
       ContactSet violated;
       if (contacts.add_violated(met.X_WP, 0.0, violated) == 0) continue;
       const Contact& contact = violated[0];
-      ++seen[static_cast<int>(contact.kind)];
-      // J = [n ; (c - x) x n] for a pair that touches: move the tool until it does.
+      ++found[static_cast<int>(contact.kind)];
+      // J = [n ; (c - x) x n] for a touching pair: moves the tool until the pair touches.
       Pose X_WT = met.X_WP;
       X_WT.translation_m -= gap_m(contact, X_WT) * normal_W(contact, X_WT);
       const Vector3d n = normal_W(contact, X_WT);
@@ -230,10 +230,10 @@ TEST_CASE("a gap of every kind has the slope that its contact tells") {
       CHECK(difference == Approx(2.0 * J.dot(step)).margin(1e-12));
     }
   }
-  for (const int count : seen) CHECK(count > 50);
+  for (const int count : found) CHECK(count > 50);
 }
 
-TEST_CASE("an obstacle out of reach is not asked") {
+TEST_CASE("an obstacle out of reach is not queried") {
   RandomValues random(14);
   const OverlappingScene met = overlap_body(random, 0.1);
   SceneContacts contacts(met.scene);
@@ -245,7 +245,7 @@ TEST_CASE("an obstacle out of reach is not asked") {
   CHECK(contacts.add_violated(far, 0.0, violated) == 0);
 }
 
-TEST_CASE("a far obstacle takes no part in what a near one does") {
+TEST_CASE("a far obstacle does not affect a near one") {
   RandomValues random(15);
   for (int i = 0; i < 20; ++i) {
     const OverlappingScene met = overlap_body(random, 0.1);

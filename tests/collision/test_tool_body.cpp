@@ -26,7 +26,7 @@ PolygonSoup ell(double height) {
   return soup;
 }
 
-/// What the tool is refused with; empty when it loads.
+/// Returns the message with which the tool is rejected; empty if it loads.
 std::string rejection_text(const ToolSettings& settings) {
   try {
     load_tool(settings);
@@ -36,7 +36,7 @@ std::string rejection_text(const ToolSettings& settings) {
   return {};
 }
 
-/// The ring of each vertex is a cycle: each neighbour, the next one and the vertex are a face of the hull,
+/// The ring of each vertex is a cycle: each neighbour, the next one and the vertex form a face of the hull,
 /// with all other vertices behind it.
 void check_rings(const ConvexBody& body) {
   const auto& p = body.vertices_T_m;
@@ -47,7 +47,7 @@ void check_rings(const ConvexBody& body) {
     REQUIRE(ring.size() >= 3);
     CHECK(std::set<std::uint32_t>(ring.begin(), ring.end()).size() == ring.size());
     edges += ring.size();
-    int turn = 0;  // the same way around at every step
+    int orientation = 0;  // the same orientation at every step
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const std::uint32_t a = ring[i], b = ring[(i + 1) % ring.size()];
       const auto back = body.ring_of(a);
@@ -60,14 +60,14 @@ void check_rings(const ConvexBody& body) {
       }
       CHECK(std::min(-least, most) < 1e-9 * (most - least));
       const int side = most > -least ? 1 : -1;
-      CHECK((turn == 0 || turn == side));
-      turn = side;
+      CHECK((orientation == 0 || orientation == side));
+      orientation = side;
     }
   }
-  CHECK(edges / 2 == 3 * p.size() - 6);  // Euler, all faces triangles
+  CHECK(edges / 2 == 3 * p.size() - 6);  // Euler's formula; all faces are triangles
 }
 
-TEST_CASE("a tool is scaled to metres, and its mass is the whole solid's") {
+TEST_CASE("a tool is scaled to metres, and its mass is that of the whole solid") {
   const TemporaryDirectory dir;
   const auto file = dir.write("box.off", as_off(box({0, 0, 0}, {20, 30, 50})));
   const ToolBody tool = load_tool({file, 0.001, 0.3});
@@ -107,7 +107,7 @@ TEST_CASE("a body that is not convex keeps its own mass and touches with its hul
   CHECK(tool.solid.volume_m3 == Approx(6));
   // Three unit squares around (0.5, 0.5), (1.5, 0.5), (0.5, 1.5).
   CHECK((tool.solid.p_MT_m - Vector3d(5.0 / 6, 5.0 / 6, 1)).norm() < 1e-12);
-  CHECK(tool.hull.vertices_T_m.size() == 10);  // all but the two of the inner corner
+  CHECK(tool.hull.vertices_T_m.size() == 10);  // all but the two at the inner corner
   const Vector3d inner = Vector3d(1, 1, 0) - tool.solid.p_MT_m;
   for (const Vector3d& a : tool.hull.vertices_T_m) CHECK((a - inner).head<2>().norm() > 0.5);
   check_rings(tool.hull);
@@ -132,7 +132,7 @@ TEST_CASE("a flat face has its corners only, however finely it is divided") {
     p[(axis + 1) % 3] = u;
     p[(axis + 2) % 3] = v;
     p = Vector3d(2 * p.x() + p.z(), p.y() + p.z(),
-                 p.x() + p.z());  // whole numbers: flat faces, exactly, but slanted
+                 p.x() + p.z());  // integers: the faces are exactly flat, but inclined
     for (std::size_t i = 0; i < soup.vertices.size(); ++i)
       if (soup.vertices[i] == p) return i;
     soup.vertices.push_back(p);
@@ -171,7 +171,7 @@ TEST_CASE("the ring of a hull's vertex runs once around it") {
   }
 }
 
-TEST_CASE("a tool that cannot be used is refused with its file and the cure") {
+TEST_CASE("an unusable tool is rejected with its file and the remedy") {
   const TemporaryDirectory dir;
   const auto good = dir.write("box.off", as_off(box({0, 0, 0}, {2, 3, 5})));
   for (const char* text : {"1e-200", "1e-110", "1e+110", "1e+200", "0", "-1"}) {

@@ -26,7 +26,7 @@ double off_line_m(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
   return (p - a - along * d).norm();
 }
 
-/// How far a point, in the frame of a body, lies from the feature that is said to be there [m].
+/// Returns the distance of a point from a feature, in the frame of the body [m].
 double off_mesh_m(const MeshSurface& surface, FeatureKind kind, std::uint32_t first, std::uint32_t second,
                   const Vector3d& p) {
   const auto& v = surface.vertices_m();
@@ -45,7 +45,7 @@ double off_hull_m(const ConvexBody& hull, FeatureKind kind, std::uint32_t first,
   return std::abs(hull.faces[first].n.dot(p) - hull.faces[first].offset_m);
 }
 
-/// The gradient of T by the place of the tool: what the contacts carry together.
+/// The gradient of T with respect to the tool's position: the sum of the contact loads.
 Vector3d carried(const Touches& touches) {
   Vector3d sum = Vector3d::Zero();
   for (const Touch& touch : touches) sum += touch.multiplier_kg_m * vector(touch.normal_W);
@@ -54,7 +54,7 @@ Vector3d carried(const Touches& touches) {
 
 double shares(const Touches& touches) {
   double sum = 0.0;
-  for (const Touch& touch : touches) sum += touch.share;
+  for (const Touch& touch : touches) sum += touch.load_fraction;
   return sum;
 }
 
@@ -74,16 +74,16 @@ TEST_CASE("the contacts of a proxy name features of both meshes that are where i
       const Pose X_WP = hand.next();
       const Penetration depth = penetration.follow(X_WP, X_WQ);
       X_WQ = depth.projection.X_WQ;
-      const Touches told = touches(depth.projection, scene, true);
-      if (depth.projection.status != ProjectionStatus::converged || told.empty()) continue;
-      for (const Touch& touch : told) {
-        if (touch.share == 0.0) continue;
+      const Touches reported = touches(depth.projection, scene, true);
+      if (depth.projection.status != ProjectionStatus::converged || reported.empty()) continue;
+      for (const Touch& touch : reported) {
+        if (touch.load_fraction == 0.0) continue;
         const MeshObstacle& obstacle = scene.meshes()[touch.obstacle];
         const Vector3d p_W = vector(touch.point_W_m);
         const Vector3d p_T = inverse(X_WQ) * p_W;
         const Vector3d p_O = inverse(obstacle.X_WO) * p_W;
-        // What touches is held a nanometre apart; now and then a proxy ends where a feature has just slid
-        // beyond the end of another.
+        // Touching features are 1 nm apart. Sometimes a proxy ends where a feature has just slid beyond the
+        // end of another.
         const double off_tool_m = off_mesh_m(scene.tool_mesh()->surface, FeatureKind{touch.tool_feature_kind},
                                              touch.tool_first, touch.tool_second, p_T);
         const double off_obstacle_m =
@@ -95,9 +95,10 @@ TEST_CASE("the contacts of a proxy name features of both meshes that are where i
       }
       const double mass_kg = scene.tool().solid.inertia.mass_kg;
       const Vector3d pulled = 2.0 * mass_kg * (X_WQ.translation_m - X_WP.translation_m);
-      CHECK((carried(told) - pulled).norm() < 1e-6 * pulled.norm() + 1e-12);
-      CHECK(shares(told) == Approx(1.0).epsilon(1e-12));
-      for (std::size_t i = 1; i < told.size(); ++i) CHECK(told[i].share <= told[i - 1].share);
+      CHECK((carried(reported) - pulled).norm() < 1e-6 * pulled.norm() + 1e-12);
+      CHECK(shares(reported) == Approx(1.0).epsilon(1e-12));
+      for (std::size_t i = 1; i < reported.size(); ++i)
+        CHECK(reported[i].load_fraction <= reported[i - 1].load_fraction);
     }
   }
   CHECK(slid < (kinds[0] + kinds[1] + kinds[2]) / 500);
@@ -114,14 +115,14 @@ TEST_CASE("the contacts of convex bodies name features of their hulls that are w
     PenetrationDepth penetration(c.scene, {});
     REQUIRE_FALSE(penetration.uses_mesh_features());
     const Projection q = penetration.query(c.X_WP).projection;
-    const Touches told = touches(q, c.scene, false);
-    REQUIRE_FALSE(told.empty());
-    for (const Touch& touch : told) {
-      if (touch.share == 0.0) continue;
+    const Touches reported = touches(q, c.scene, false);
+    REQUIRE_FALSE(reported.empty());
+    for (const Touch& touch : reported) {
+      if (touch.load_fraction == 0.0) continue;
       const Vector3d p_W = vector(touch.point_W_m);
       CHECK(off_hull_m(c.scene.tool().hull, FeatureKind{touch.tool_feature_kind}, touch.tool_first,
                        touch.tool_second, inverse(q.X_WQ) * p_W) < 1e-9);
-      // A plane along two edges may have come to touch the tool elsewhere than the obstacle.
+      // A plane along two edges may touch tool and obstacle at different points.
       if (touch.contact_kind == 2 && FeatureKind{touch.tool_feature_kind} == FeatureKind::hull_vertex)
         continue;
       CHECK(off_hull_m(c.scene.convex()[0].body, FeatureKind{touch.obstacle_feature_kind},
@@ -134,7 +135,7 @@ TEST_CASE("the contacts of convex bodies name features of their hulls that are w
   CHECK(kinds[2] > 5);
 }
 
-TEST_CASE("of more contacts than are told, those that carry most are", "[touch]") {
+TEST_CASE("of too many contacts those with the largest multipliers are reported", "[touch]") {
   const Scene scene(box({1.0, 1.0, 1.0}), {half_space(Vector3d::UnitZ(), 0.0)});
   Projection q;
   for (std::uint32_t i = 0; i < 40; ++i) {
@@ -142,14 +143,14 @@ TEST_CASE("of more contacts than are told, those that carry most are", "[touch]"
     contact.tool_feature = i;
     q.active.add({contact, static_cast<double>((i * 7) % 40)});
   }
-  const Touches told = touches(q, scene, false);
-  REQUIRE(told.size() == kMaxTouches);
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    CHECK(told[i].multiplier_kg_m == static_cast<double>(39 - i));
-    CHECK((told[i].tool_first * 7) % 40 == 39 - i);
-    CHECK(told[i].share == Approx(static_cast<double>(39 - i) / 780.0));
-    CHECK(FeatureKind{told[i].tool_feature_kind} == FeatureKind::hull_vertex);
-    CHECK(FeatureKind{told[i].obstacle_feature_kind} == FeatureKind::plane);
+  const Touches reported = touches(q, scene, false);
+  REQUIRE(reported.size() == kMaxTouches);
+  for (std::size_t i = 0; i < reported.size(); ++i) {
+    CHECK(reported[i].multiplier_kg_m == static_cast<double>(39 - i));
+    CHECK((reported[i].tool_first * 7) % 40 == 39 - i);
+    CHECK(reported[i].load_fraction == Approx(static_cast<double>(39 - i) / 780.0));
+    CHECK(FeatureKind{reported[i].tool_feature_kind} == FeatureKind::hull_vertex);
+    CHECK(FeatureKind{reported[i].obstacle_feature_kind} == FeatureKind::plane);
   }
   CHECK(touches(Projection{}, scene, false).empty());
 }

@@ -190,7 +190,7 @@ TEST_CASE("a mesh may move, and stands still unless it is told to", "[config]") 
   CHECK_FALSE(motion("").moves());
   CHECK_FALSE(motion("velocity_m_per_s = [0, 0, 0]").moves());
   const ObstacleMotion all = motion(
-      "velocity_m_per_s = [3, 0, -4]\nangular_velocity_rad_per_s = [0, 50, 0.0]\nturn_back_after_s = 1.5");
+      "velocity_m_per_s = [3, 0, -4]\nangular_velocity_rad_per_s = [0, 50, 0.0]\nreverse_after_s = 1.5");
   CHECK(all.moves());
   CHECK(all.linear_m_per_s == Vector3d(3, 0, -4));
   CHECK(all.angular_rad_per_s == Vector3d(0, 50, 0));

@@ -10,6 +10,7 @@
 #include "config/load_profile.hpp"
 #include "config/load_scene.hpp"
 #include "config/load_settings.hpp"
+#include "tests/support/rejection.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd {
@@ -17,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::TemporaryDirectory;
+using test::with;
 
 const fs::path kConfig = fs::path(WRENCHD_SOURCE_DIR) / "config";
 
@@ -40,48 +42,26 @@ void as_hand_script(const fs::path& file) {
   load_hand_script(file, simulation);
 }
 
-/// What the file is refused with; empty when it loads.
+/// Returns the message with which the loader rejects the file; empty if the file loads.
 std::string rejection_text(Load load, const fs::path& file) {
-  try {
-    load(file);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return {};
+  return test::rejection_message<ConfigError>([&] { load(file); });
 }
 
-/// A file, where it must be refused, and what the message must say.
+/// The text of an invalid file, the location of its error, and a part of the message.
 struct Bad {
   std::string text;
   std::string place;  ///< line:column
   std::string cure;
 };
 
-/// One line of the message starts with the place and holds the cure.
-bool operator_instruction(const std::string& message, const std::string& start, const std::string& cure) {
-  for (std::size_t at = message.find(start); at != std::string::npos; at = message.find(start, at + 1)) {
-    if (message.substr(at, message.find('\n', at) - at).find(cure) != std::string::npos) return true;
-  }
-  return false;
-}
-
-void check_refused(Load load, const std::vector<Bad>& table) {
+void check_rejected(Load load, const std::vector<Bad>& table) {
   const TemporaryDirectory dir;
   dir.write("cube.off", "");
   for (const Bad& bad : table) {
     const fs::path file = dir.write("bad.toml", bad.text);
-    const std::string message = rejection_text(load, file);
-    INFO(bad.text << "\nexpected " << bad.place << " ... " << bad.cure << "\ngot " << message);
-    CHECK(operator_instruction(message, file.string() + ":" + bad.place + ": ", bad.cure));
+    test::check_rejection(rejection_text(load, file), file.string() + ":" + bad.place + ": ", bad.cure,
+                          bad.text);
   }
-}
-
-/// `text` with its only `from` replaced. A `from` that is not there would make a test say nothing.
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  REQUIRE(text.find(from, at + 1) == std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 const std::string kProfile = R"(name = "p"
@@ -146,7 +126,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"servo = 5", "1:9", "key 'servo': expected a table, found 5"},
       {"[[servo]]\nrate_Hz = 1000", "1:1", "key 'servo': expected a table, found an array of 1"},
       {"[device]\nscene = 'x.toml'", "2:1", "key 'device.scene' is not known; known keys here: 'profile'"},
-      {"scene = 'nowhere.toml'", "1:9", "no such file; looked for /"},
+      {"scene = 'nowhere.toml'", "1:9", "no such file; searched /"},
       {"scene = 7", "1:9", "expected a text between quotation marks, found 7"},
       {"scene = \"a\\u0000b\"", "1:9", "expected a file name without a zero byte"},
       {"\n[device]\nprofile = 'lopback'", "3:11", "profiles/lopback.toml"},
@@ -167,10 +147,11 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"[rendering.friction]\ndynamic = -0.1", "2:11", "expected a number from 0 to 5, found -0.1"},
       {"[rendering.friction]\nstatic = 0.2\ndynamic = 0.3", "3:11",
        "key 'rendering.friction.dynamic': expected no more than 'static', 0.2, found 0.3"},
-      {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'dynamic', 'static'"},
+      {"[rendering.friction]\nkinetic = 0.2", "2:1", "known keys here: 'static', 'dynamic'"},
       {"[rendering]\nfriction = 0.2", "2:12", "key 'rendering.friction': expected a table, found 0.2"},
       {"[rendering]\nmethod = 'planar'\n[rendering.friction]\nstatic = 0.2", "3:1",
-       "key 'rendering.friction': only method = \"exact\" knows friction; choose it, or leave friction out"},
+       "key 'rendering.friction': only method = \"exact\" supports friction; choose it, or leave friction "
+       "out"},
       {"[wrench]\nlaw = \"spring\"", "2:7", "expected \"pid\" or \"energy\""},
       {"[wrench]\nenergy_stiffness_per_s2 = -1", "2:27", "expected a number from 0 to 1e+09 1/s2"},
       {"[rendering]\nmethod = \"exakt\"", "2:10",
@@ -212,8 +193,8 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
       {"[simulation]\nplayback = 'none.csv'", "2:12", "none.csv"},
       {"[simulation]\nplayback_mode = \"exact\"", "2:17", "\"open\""},
       {"[recording]\n\"\\u0001\\n\" = 1", "2:1", "key 'recording.?\?' is not known"},
-      {"[servo]\nrate_Hz = 1000\nrate_Hz = 2000", "3:11", "a key stands once, keep one of them"},
-      {"[servo]\nrate_Hz = 1000\n[servo]\ncpu = 1", "3:1", "a key stands once, keep one of them"},
+      {"[servo]\nrate_Hz = 1000\nrate_Hz = 2000", "3:11", "a key may appear once only, keep one of them"},
+      {"[servo]\nrate_Hz = 1000\n[servo]\ncpu = 1", "3:1", "a key may appear once only, keep one of them"},
       {"[servo]\nrate_Hz =", "2:10", "is not valid TOML"},
       {"[servo\nrate_Hz = 1000", "1:7", "is not valid TOML"},
       {"scene = \"no end\n", "1:16", "is not valid TOML"},
@@ -232,7 +213,7 @@ TEST_CASE("bad settings are refused at their place, with the cure", "[config]") 
            " = 1",
        "2:1", "has more than 120 dots in one line"},
   };
-  check_refused(as_settings, table);
+  check_rejected(as_settings, table);
 }
 
 TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
@@ -241,18 +222,18 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
   const std::vector<Bad> table = {
       {"", "1:1", "key 'tool' is missing; it has no default, so state it here"},
       {"\n[tool]\nscale = 1.0", "2:1", "key 'tool.mesh' is missing; it has no default"},
-      {"[tool]\nmesh = 'missing.off'", "2:8", "no such file; looked for /"},
+      {"[tool]\nmesh = 'missing.off'", "2:8", "no such file; searched /"},
       {"[tool]\nmesh = '.'", "2:8", "name an OFF, OBJ, STL or PLY file"},
       {"[tool]\nmesh = { make = 'geer' }", "2:17",
-       "key 'tool.mesh.make': nothing of kind 'geer' can be made; did you mean 'gear'?"},
+       "key 'tool.mesh.make': no generated mesh of kind 'geer'; did you mean 'gear'?"},
       {"[tool]\nmesh = { make = 'teapot' }", "2:17",
-       "nothing of kind 'teapot' can be made; there are cube, plate, table,"},
+       "no generated mesh of kind 'teapot'; there are cube, plate, table,"},
       {"[tool]\nmesh = { make = 3 }", "2:17", "key 'tool.mesh.make': expected a text"},
       {"[tool]\nmesh = { triangles = 300 }", "2:8", "key 'tool.mesh.make' is missing"},
       {"[tool]\nmesh = { make = 'gear', triangels = 300 }", "2:25", "did you mean 'triangles'?"},
       {"[tool]\nmesh = { make = 'gear', triangles = 3 }", "2:37",
        "key 'tool.mesh.triangles': expected a whole number from 8 to 20000000, found 3"},
-      {"[tool]\nmesh = { make = 'gear', seed = 3 }", "2:32", "only bumpy and boulder are made by chance"},
+      {"[tool]\nmesh = { make = 'gear', seed = 3 }", "2:32", "only bumpy and boulder are random"},
       {"[tool]\nmesh = { make = 'gear', size_m = [1, 1, 1] }", "2:34",
        "only a box has sides that can be chosen; use 'scale', beside 'mesh'"},
       {"[tool]\nmesh = { make = 'box', size_m = [1, 1, 0] }", "2:40",
@@ -274,11 +255,11 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {plane + "{ normal = [0, 0, 1], offset = -inf }", "4:45", "found -inf"},
       {plane + "{ normal = [0, 0, 1], offset_mm = 3 }", "4:36", "give it in m as 'offset'"},
       {plane + "[0, 0, 1, 0]", "4:14", "expected a table, found an array of 4"},
-      {kTool + "[[obstacle]]\nmesh = 'none.off'", "4:8", "no such file; looked for /"},
+      {kTool + "[[obstacle]]\nmesh = 'none.off'", "4:8", "no such file; searched /"},
       {kTool + "[[obstacle]]\nmesh = 'cube.off'\nhalf_space = { normal = [0, 0, 1], offset = 0 }", "5:14",
        "the obstacle has a mesh already; give each shape an [[obstacle]] of its own"},
       {kTool + "[[obstacle]]\nscale = 2.0\nhalf_space = { normal = [0, 0, 1], offset = 0 }", "4:9",
-       "belongs to a mesh; a half_space says where it is by normal and offset"},
+       "belongs to a mesh; a half_space is defined by normal and offset"},
       {kTool + "[[obstacle]]\nmesh = 'cube.off'\nposition_m = [0, 0]", "5:14", "3 numbers"},
       {mesh + "velocity_m_per_s = [0, 1]", "5:20",
        "key 'obstacle[0].velocity_m_per_s': expected an array of 3 numbers, found an array of 2"},
@@ -295,20 +276,19 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {mesh + "angular_velocity_rad_per_s = [0, 0]", "5:30", "3 numbers"},
       {mesh + "angular_velocity_deg_per_s = [0, 0, 90]", "5:1",
        "give it in rad/s as 'angular_velocity_rad_per_s'"},
-      {mesh + "turn_back_after_s = 2.0", "5:21",
+      {mesh + "reverse_after_s = 2.0", "5:19",
        "the obstacle does not move; give it velocity_m_per_s or angular_velocity_rad_per_s"},
-      {mesh + "velocity_m_per_s = [0, 0, 0]\nturn_back_after_s = 2.0", "6:21", "the obstacle does not move"},
-      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_s = -1", "6:21",
+      {mesh + "velocity_m_per_s = [0, 0, 0]\nreverse_after_s = 2.0", "6:19", "the obstacle does not move"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_s = -1", "6:19",
        "expected a number from 0 to 86400 s, found -1"},
-      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_s = inf", "6:21", "s, found inf"},
-      {mesh + "velocity_m_per_s = [0, 0, 1]\nturn_back_after_ms = 500", "6:1",
-       "give it in s as 'turn_back_after_s'"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_s = inf", "6:19", "s, found inf"},
+      {mesh + "velocity_m_per_s = [0, 0, 1]\nreverse_after_ms = 500", "6:1",
+       "give it in s as 'reverse_after_s'"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nvelocity_m_per_s = [0, 0, 1]", "5:20",
-       "belongs to a mesh; a half_space stands still, so give what is to move as a mesh"},
+       "belongs to a mesh; a half_space cannot move; use a mesh for a moving obstacle"},
       {plane + "{ normal = [0, 0, 1], offset = 0 }\nangular_velocity_rad_per_s = [0, 0, 1]", "5:30",
-       "a half_space stands still"},
-      {plane + "{ normal = [0, 0, 1], offset = 0 }\nturn_back_after_s = 1", "5:21",
-       "a half_space stands still"},
+       "a half_space cannot move"},
+      {plane + "{ normal = [0, 0, 1], offset = 0 }\nreverse_after_s = 1", "5:19", "a half_space cannot move"},
       {kTool + "[[obstacle]]\nsphere = 1.0", "4:1",
        "key 'obstacle[0].sphere' is not known; known keys here: 'name', 'mesh', 'half_space', 'scale'"},
       {kTool + "[[obstacle]]\nname = 'x'", "3:1",
@@ -317,7 +297,7 @@ TEST_CASE("bad scenes are refused at their place, with the cure", "[config]") {
       {kTool + "[obstacle]\nname = 'x'", "3:1", "expected tables, each headed [[obstacle]], found a table"},
       {kTool + "[[obstacles]]\nname = 'x'", "3:3", "did you mean 'obstacle'?"},
   };
-  check_refused(as_scene, table);
+  check_rejected(as_scene, table);
 }
 
 TEST_CASE("a velocity that is refused does not have its turning back refused as well", "[config]") {
@@ -325,7 +305,7 @@ TEST_CASE("a velocity that is refused does not have its turning back refused as 
   dir.write("cube.off", "");
   const auto file = dir.write("s.toml", kTool +
                                             "[[obstacle]]\nmesh = 'cube.off'\nvelocity_m_per_s = [9, 0, 0]\n"
-                                            "turn_back_after_s = 1");
+                                            "reverse_after_s = 1");
   const std::string message = rejection_text(as_scene, file);
   CHECK(message.find("velocity_m_per_s[0]") != std::string::npos);
   CHECK(message.find('\n') == std::string::npos);
@@ -377,7 +357,7 @@ TEST_CASE("bad profiles are refused at their place, with the cure", "[config]") 
       {changed("enable = { byte = 1, bit = 0 }", "enable = { byte = 1, bit = 8 }"), "23:28",
        "from 0 to 7, found 8"},
   };
-  check_refused(as_profile, table);
+  check_rejected(as_profile, table);
 }
 
 TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config]") {
@@ -389,7 +369,7 @@ TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config
       {"waypoint = [3]", "1:13", "key 'waypoint[0]': expected a table, found 3"},
       {point("1", "[0, 0, 0]"), "2:10", "the first waypoint is at time 0"},
       {start + point("1", "[0, 0, 1]") + point("1", "[0, 0, 0]"), "8:10",
-       "times must rise by 0.001 s or more; the waypoint before is at 1 s"},
+       "times must ascend by 0.001 s or more; the waypoint before is at 1 s"},
       {start + point("1", "[0, 0, 1]"), "4:1",
        "ends where it starts; add such a waypoint, or set repeats = false"},
       {start + point("-1", "[0, 0, 0]"), "5:10", "from 0 to 86400 s, found -1"},
@@ -397,7 +377,7 @@ TEST_CASE("bad hand scripts are refused at their place, with the cure", "[config
       {start + "rotation_vector_deg = [0, 0, 90]", "4:1", "give it in rad as 'rotation_vector_rad'"},
       {point("0", "[0, 0, 40]"), "3:21", "from -10 to 10 m, found 40"},
   };
-  check_refused(as_hand_script, table);
+  check_rejected(as_hand_script, table);
 }
 
 TEST_CASE("everything wrong with a file is told at once, in its order", "[config]") {
@@ -424,16 +404,15 @@ TEST_CASE("a misspelt mandatory key is told once", "[config]") {
 TEST_CASE("what is not a readable file of sensible size is refused", "[config]") {
   const TemporaryDirectory dir;
   const fs::path absent = dir.path() / "absent.toml";
-  CHECK(rejection_text(as_scene, absent) ==
-        absent.string() + ": no such file; looked for " + absent.string());
-  CHECK(operator_instruction(rejection_text(as_scene, dir.path()), dir.path().string() + ": ",
-                             "is a directory; name a file in it"));
+  CHECK(rejection_text(as_scene, absent) == absent.string() + ": no such file; searched " + absent.string());
+  CHECK(test::rejects_at(rejection_text(as_scene, dir.path()), dir.path().string() + ": ",
+                         "is a directory; name a file in it"));
   const fs::path pipe = dir.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(operator_instruction(rejection_text(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
+  CHECK(test::rejects_at(rejection_text(as_scene, pipe), pipe.string() + ": ", "is not a regular file"));
   CHECK(rejection_text(as_scene, "/dev/zero").find("is not a regular file") != std::string::npos);
   const fs::path big = dir.write("big.toml", std::string((1 << 20) + 1, '#'));
-  CHECK(operator_instruction(rejection_text(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
+  CHECK(test::rejects_at(rejection_text(as_scene, big), big.string() + ": ", "is larger than 1 MiB"));
   CHECK(rejection_text(as_scene, std::string(5000, 'a')).find("cannot be read") != std::string::npos);
 }
 
@@ -453,8 +432,8 @@ TEST_CASE("deep nesting through many lines of dotted keys does not overflow the 
   text += "1";
   for (int i = 0; i < 120; ++i) text += "}\n]";
   const TemporaryDirectory dir;
-  CHECK(operator_instruction(rejection_text(as_scene, dir.write("deep.toml", text)),
-                             "deep.toml:", "is nested more than 16 deep"));
+  CHECK(test::rejects_at(rejection_text(as_scene, dir.write("deep.toml", text)),
+                         "deep.toml:", "is nested more than 16 deep"));
 }
 
 TEST_CASE("mutated files load or are refused, and nothing else", "[config]") {

@@ -35,14 +35,14 @@ kind = "silence"
 [[fault]]
 at_s = 2
 for_s = 0.5
-kind = "late"
+kind = "delay_reports"
 value = 0.008
-[[ask]]
+[[command]]
 at_s = 3.0
-what = "stop"
-[[ask]]
+command = "stop"
+[[command]]
 at_s = 0.5
-what = "arm"
+command = "arm"
 )"));
   REQUIRE(script.faults.size() == 2);
   CHECK(script.faults[0].kind == SimulatedFault::Kind::silence);
@@ -72,7 +72,7 @@ TEST_CASE("a script that cannot be is refused with its place and the cure", "[lo
   CHECK_THAT(told("[[fault]]\nat_s = 1\nkind = \"silence\"\n"), Contains("fault[0].for_s"));
   CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silence\"\nvalue = 3\n"),
              Contains("5:9") && Contains("leave it out"));
-  CHECK_THAT(told("[[ask]]\nat_s = 1\nwhat = \"jump\"\n"), Contains("3:8") && Contains("disarm"));
+  CHECK_THAT(told("[[command]]\nat_s = 1\ncommand = \"jump\"\n"), Contains("3:11") && Contains("disarm"));
   CHECK_THAT(told("[[fualt]]\nat_s = 1\n"), Contains("fualt") && Contains("fault"));
   CHECK_THAT(told("fault = 3\n"), Contains("[[fault]]"));
 }
@@ -90,13 +90,13 @@ TEST_CASE("a moment of silence degrades the loop, which comes back; the run ends
 
 TEST_CASE("a latched fault stays until it is acknowledged, and is the exit code", "[loopback_script]") {
   const TemporaryDirectory dir;
-  const std::string fault = "[[fault]]\nat_s = 2.0\nfor_s = 0.1\nkind = \"run_away\"\n";
+  const std::string fault = "[[fault]]\nat_s = 2.0\nfor_s = 0.1\nkind = \"drift\"\n";
   const auto left = run_script(dir, fault);
   INFO(left.err);
   CHECK(left.exit_code == 3);
   CHECK(says(left, "overspeed: the handle moved faster"));
   CHECK(says(left, "state: fault"));
-  const auto seen = run_script(dir, fault + "[[ask]]\nat_s = 3.0\nwhat = \"acknowledge\"\n");
+  const auto seen = run_script(dir, fault + "[[command]]\nat_s = 3.0\ncommand = \"acknowledge\"\n");
   CHECK(seen.exit_code == 0);
   const auto latched = seen.err.find("state: fault");
   const auto tested = seen.err.find("state: self-test", latched);
@@ -107,33 +107,33 @@ TEST_CASE("a latched fault stays until it is acknowledged, and is the exit code"
 
 TEST_CASE("a stop, a stall, a client that falls silent: each as it should end", "[loopback_script]") {
   const TemporaryDirectory dir;
-  CHECK(says(run_script(dir, "[[ask]]\nat_s = 2.5\nwhat = \"stop\"\n"), "state: stopped"));
+  CHECK(says(run_script(dir, "[[command]]\nat_s = 2.5\ncommand = \"stop\"\n"), "state: stopped"));
   const auto stalled = run_script(dir, "[[fault]]\nat_s = 2.5\nfor_s = 0.009\nkind = \"stall\"\n");
   INFO(stalled.err);
   CHECK(says(stalled, "state: degraded"));
   CHECK(stalled.exit_code == 0);
-  const auto sleepy = run_script(dir, "[[fault]]\nat_s = 0\nfor_s = 9\nkind = \"sleepy\"\n");
+  const auto sleepy = run_script(dir, "[[fault]]\nat_s = 0\nfor_s = 9\nkind = \"disable_watchdog\"\n");
   CHECK(sleepy.exit_code == 3);
-  CHECK(says(sleepy, "test_watchdog: the device's watchdog did not trip"));
+  CHECK(says(sleepy, "self_test_watchdog: the device's watchdog did not trip"));
   CHECK_FALSE(says(sleepy, "state: waiting"));
-  const fs::path file = dir.write("lease.toml", "[[ask]]\nat_s = 1.0\nwhat = \"arm_with_lease\"\n");
+  const fs::path file = dir.write("lease.toml", "[[command]]\nat_s = 1.0\ncommand = \"arm_with_lease\"\n");
   const auto alone =
       run_program("wrenchd", {"--virtual-time", "--seconds", "4", "--loopback-script", file.string()});
-  CHECK(says(alone, "client_silent: whoever armed never said"));
+  CHECK(says(alone, "heartbeat_missing: whoever armed never said"));
   CHECK(alone.exit_code == 0);
 }
 
 TEST_CASE("a script is for simulated devices that can do what it says", "[loopback_script]") {
   const TemporaryDirectory dir;
-  const fs::path file = dir.write("s.toml", "[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"run_away\"\n");
+  const fs::path file = dir.write("s.toml", "[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"drift\"\n");
   const auto real =
       run_program("wrenchd", {"--profile", "reference_full_speed", "--loopback-script", file.string()});
   CHECK(real.exit_code == 1);
-  CHECK(says(real, "nothing can be asked of a real device; simulate one"));
+  CHECK(says(real, "a real device cannot run a script; simulate a device"));
   const auto arm = run_program("wrenchd", {"--simulate", "polhem", "--virtual-time", "--seconds", "1",
                                            "--loopback-script", file.string()});
   CHECK(arm.exit_code == 1);
-  CHECK(says(arm, "s.toml: an emulated arm has no such fault; the loopback device has"));
+  CHECK(says(arm, "s.toml: an emulated arm does not support this fault; the loopback device does"));
 }
 
 }  // namespace

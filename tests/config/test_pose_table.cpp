@@ -146,7 +146,7 @@ TEST_CASE("a bad table is refused at its line and column, with the cure") {
 TEST_CASE("poses with times come back as counted from the first", "[playback]") {
   std::istringstream in(
       "time_s,px,py,pz,qx,qy,qz,qw\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,1,0\n");
-  CHECK_THROWS_WITH(read_timed_poses(in, "t.csv"), Catch::Contains("t.csv:5:1: a turn of 3.14"));
+  CHECK_THROWS_WITH(read_timed_poses(in, "t.csv"), Catch::Contains("t.csv:5:1: a rotation of 3.14"));
   std::istringstream good(
       "time_s, "
       "px,py,pz,qx,qy,qz,qw\r\n5,0,0,0,0,0,0,1\n5.01,0.001,0,0,0,0,0,1.0005\n\n5.5,0.02,0,0,0,0,0.5,0."
@@ -167,7 +167,7 @@ TEST_CASE("what a hand cannot do, and what is no table of times, is refused with
       {header, "t.csv:1:1: has no poses"},
       {"px,py,pz,qx,qy,qz,qw\n", "t.csv:1:1: expected the header 'time_s,px,py,pz,qx,qy,qz,qw'"},
       {header + first + "0,0,0,0,0,0,0,1\n",
-       "t.csv:3:1: time_s is 0, and 0 in the line before; times must rise"},
+       "t.csv:3:1: time_s is 0, and 0 in the line before; times must ascend"},
       {header + first + "-1,0,0,0,0,0,0,1\n", "t.csv:3:1: time_s is -1, and 0 in the line before"},
       {header + first + "1.5,0,0,0,0,0,0,1\n", "t.csv:3:1: a gap of 1.5 s; give a pose at least every 1 s"},
       {header + first + "0.001,0.5,0,0,0,0,0,1\n", "t.csv:3:1: a jump of 0.5 m in 0.001 s"},

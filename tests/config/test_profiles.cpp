@@ -10,6 +10,7 @@
 #include "config/load_hand_script.hpp"
 #include "config/load_profile.hpp"
 #include "core/finite.hpp"
+#include "devices/layout_validation.hpp"
 #include "devices/profile_device.hpp"
 #include "devices/report_codec.hpp"
 #include "devices/simulation/reference_profile.hpp"
@@ -54,7 +55,7 @@ TEST_CASE("every shipped profile loads, has the name of its file, and reports th
   CHECK(profiles.size() == 10);
   for (const DeviceProfile& p : profiles) {
     INFO(p.name);
-    CHECK_NOTHROW(check_reports(p));
+    CHECK_NOTHROW(validate_reports(p));
     CHECK_FALSE(p.description.empty());
     CHECK(p.max_linear_speed_m_per_s > 0);
     CHECK(p.max_angular_speed_rad_per_s > 0);
@@ -116,7 +117,7 @@ TEST_CASE("the example's other devices are good profiles as well", "[profiles]")
   for (const std::string& block : blocks) {
     INFO(block);
     const DeviceProfile profile = load_profile(dir.write("block.toml", block), kShipped);
-    CHECK_NOTHROW(check_reports(profile));
+    CHECK_NOTHROW(validate_reports(profile));
   }
 }
 

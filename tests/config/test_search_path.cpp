@@ -40,7 +40,7 @@ TEST_CASE("what is not found lists every place looked at", "[search_path]") {
   CHECK_THROWS_AS(search.require("wrenchd.toml"), ConfigError);
   CHECK_THROWS_WITH(
       search.require("wrenchd.toml"),
-      "wrenchd.toml: no such file; looked for /nowhere/etc/wrenchd.toml, /nowhere/usr/wrenchd.toml");
+      "wrenchd.toml: no such file; searched /nowhere/etc/wrenchd.toml, /nowhere/usr/wrenchd.toml");
 }
 
 TEST_CASE("wrenchd's own directories hold the shipped files", "[search_path]") {

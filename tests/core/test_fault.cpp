@@ -43,7 +43,7 @@ TEST_CASE("names that stand in records", "[fault]") {
   CHECK(fault_row(Fault::device_lost).name == "device_lost");
   CHECK(fault_row(Fault::pose_not_finite).name == "pose_not_finite");
   CHECK(fault_row(Fault::sample_stale).name == "sample_stale");
-  CHECK(fault_row(Fault::self_test_watchdog).name == "test_watchdog");
+  CHECK(fault_row(Fault::self_test_watchdog).name == "self_test_watchdog");
 }
 
 TEST_CASE("a value that is no fault reads unknown", "[fault]") {

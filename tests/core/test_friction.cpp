@@ -475,7 +475,7 @@ TEST_CASE("only method exact knows friction, and the others say so", "[friction]
   const Scene scene = cube_on(Ground::half_space);
   for (const Method method : {Method::planar, Method::descent, Method::translational})
     CHECK_THROWS_WITH(PenetrationDepth(scene, {method, 47, 0.0, {0.5, 0.3}}),
-                      Catch::Contains("only method exact knows friction; choose it") &&
+                      Catch::Contains("only method exact supports friction; choose it") &&
                           Catch::Contains("[rendering.friction]"));
 }
 

@@ -113,7 +113,7 @@ void require_least_of_free(const Pressed& c, const PlanarFamily& family) {
   }
 }
 
-/// The directions in which a plane cuts the faces around the vertex are above the obstacle at q (Eq. 21).
+/// The directions in which a plane cuts the faces around the vertex are above the obstacle at q, Eq. (21).
 void require_section_free(const Pressed& c, const PlanarFamily::InPlane& solution) {
   const Pose X_WQ = PlanarFamily::pose(c.X_WP, c.contact, solution);
   const auto edge = [&c](std::uint32_t neighbour) -> Vector3d {
@@ -295,7 +295,7 @@ TEST_CASE("the pose of every plane puts the vertex on the face, and has the ener
       REQUIRE(std::abs(solution.axis_W.dot(c.contact.n_W)) <= 1e-15);  // the axis lies in the obstacle plane
       REQUIRE(std::abs(gap_m(c.contact, X_WQ)) <= 1e-14);
       REQUIRE(energy(M, c.X_WP, X_WQ) == Approx(solution.minimum.T).epsilon(1e-12));
-      // Only the height changes (line above Eq. 19): the rest of the translation costs energy and frees
+      // Only the height changes (line above Eq. (19)): the rest of the translation costs energy and frees
       // nothing.
       const Vector3d s = X_WQ.translation_m - c.X_WP.translation_m;
       REQUIRE(s.cross(c.contact.n_W).norm() <= 1e-15 * (1.0 + s.norm()));

@@ -120,7 +120,7 @@ TEST_CASE("wrenches add up about any point", "[spatial]") {
   }
 }
 
-TEST_CASE("shifting and turning are the adjoint transformation of section 2.4", "[spatial]") {
+TEST_CASE("shifting and turning are the adjoint transformation, METHOD (4)", "[spatial]") {
   RandomValues random(8);
   for (int i = 0; i < 2'000; ++i) {
     const Pose X_AB = random.pose();

@@ -276,7 +276,7 @@ TEST_CASE("the translational method's torque takes the gain of its force", "[wre
   }
 }
 
-TEST_CASE("the spatial wrench is Ad_(p^-1)' W_T of section 2.4", "[wrench_law]") {
+TEST_CASE("the spatial wrench is Ad_(p^-1)' W_T, METHOD (66)", "[wrench_law]") {
   RandomValues random(10);
   for (int i = 0; i < 5'000; ++i) {
     const Pose p = random.pose();

@@ -54,22 +54,20 @@ TEST_CASE("fields hold for what is logged while they live, the innermost alone",
 TEST_CASE("an event can be asked for by its state, its fault and its time", "[journal]") {
   Event event;
   event.at = TimePoint(std::chrono::nanoseconds(1234));
-  event.kind = Event::Kind::fault_raised;
-  event.detail = static_cast<std::uint32_t>(Fault::overspeed);
+  event.data = Event::FaultRaised{Fault::overspeed, 0.0};
   JournalFieldList fields = journal_fields(event);
   CHECK(field(fields, "MESSAGE_ID") == kFaultMessageId);
   CHECK(field(fields, "WRENCHD_FAULT") == "overspeed");
   CHECK(field(fields, "WRENCHD_CURE") == std::string(fault_row(Fault::overspeed).cure));
   CHECK(field(fields, "WRENCHD_TIME_NS") == "1234");
 
-  event.kind = Event::Kind::state_changed;
-  event.detail = static_cast<std::uint32_t>(State::active);
+  event.data = Event::StateChanged{State::active, Fault::none};
   fields = journal_fields(event);
   CHECK(field(fields, "MESSAGE_ID") == kStateMessageId);
   CHECK(field(fields, "WRENCHD_STATE") == "active");
   CHECK(field(fields, "WRENCHD_FAULT") == "(none)");
 
-  event.kind = Event::Kind::proxy_found;
+  event.data = Event::ProxyFound{};
   CHECK(field(journal_fields(event), "MESSAGE_ID") == kRenderingMessageId);
 }
 

@@ -43,7 +43,7 @@ TEST_CASE("a self-test that fails makes it ready all the same, with the fault an
   report.next_message(loop(State::self_test, 10));
   const FaultRow& row = fault_row(Fault::self_test_rate);
   CHECK(report.next_message(loop(State::fault, 20, Fault::self_test_rate)) ==
-        "READY=1\nWATCHDOG=1\nSTATUS=fault: test_rate: " + std::string(row.message) + "; " +
+        "READY=1\nWATCHDOG=1\nSTATUS=fault: self_test_rate: " + std::string(row.message) + "; " +
             std::string(row.cure) + "; device loopback\n");
 }
 
@@ -190,7 +190,7 @@ TEST_CASE("wrenchd tells its manager: ready after the self-test, alive, stopping
   manager.forget();
   CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\n"));
   wrenchd.signal(SIGUSR1);
-  CHECK(manager.hears("STATUS=stopped: stop_asked: "));
+  CHECK(manager.hears("STATUS=stopped: stop_requested: "));
   wrenchd.signal(SIGUSR2);
   CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
@@ -214,7 +214,7 @@ TEST_CASE("wrenchd without a device is ready, and says what it waits for", "[ser
   RunningProgram wrenchd("wrenchd", {"--profile", "reference_full_speed", "--realtime", "best_effort"});
   CHECK(manager.hears("STATUS=waiting: "));
   CHECK_THAT(manager.all(),
-             Contains("READY=1\n") && Contains("no device of profile reference_full_speed is plugged in\n"));
+             Contains("READY=1\n") && Contains("no device of profile reference_full_speed is connected\n"));
   wrenchd.signal(SIGTERM);
   CHECK(wrenchd.wait().exit_code == 0);
 }

@@ -83,7 +83,7 @@ TEST_CASE("wrenchd simulates devices of every kind, and their hands feel what th
       "wrenchd", {"--arm", "--live", "--simulate", "spacemouse_split", "--virtual-time", "--seconds", "6"});
   CHECK(mouse.exit_code == 0);
   CHECK(mouse.out.find("in contact at 0 of") == std::string::npos);
-  CHECK(mouse.err.find("it has no motors: the tool follows it") != std::string::npos);
+  CHECK(mouse.err.find("the device has no motors") != std::string::npos);
   CHECK(mouse.out.find(" mN.m on the tool (no motors) | tick ") != std::string::npos);
   CHECK(mouse.out.find("largest force 0.00 N") == std::string::npos);
   CHECK(mouse.out.find(" on the tool, not sent: no motors\n") != std::string::npos);
@@ -223,7 +223,7 @@ TEST_CASE("wrenchd records, and never overwrites a recording") {
   const ProgramResult second = run_virtual({"--arm", "--record", file.string()});
   CHECK(second.exit_code == 1);
   CHECK(second.err.find(file.string() +
-                        ": exists already, and a recording is never overwritten; choose another name") !=
+                        ": already exists, and wrenchd never overwrites a recording; choose another name") !=
         std::string::npos);
   CHECK(contents(file) == recording);
 
@@ -262,7 +262,7 @@ TEST_CASE("wrenchd explains itself") {
   CHECK(help.err == "");
   for (const char* word :
        {"--config", "--scene", "--profile", "--simulate", "--realtime", "--record", "--seconds", "--arm",
-        "--live", "--virtual-time", "Exit codes: 0 stopped as asked; 1 refused", "the hand is released"})
+        "--live", "--virtual-time", "Exit codes: 0 stopped on request; 1 refused", "releases the hand"})
     CHECK(help.out.find(word) != std::string::npos);
   CHECK(run_program("wrenchd", {"--version"}).out.find("wrenchd ") == 0);
 }

@@ -15,7 +15,7 @@ using Catch::Contains;
 
 }  // namespace
 
-TEST_CASE("a pose's offset goes into the frames of the profile", "[calibrated_profile]") {
+TEST_CASE("apply_calibration() adds a pose offset to the frames of the profile", "[calibrated_profile]") {
   RandomValues random(61);
   for (int i = 0; i < 100; ++i) {
     DeviceProfile profile = reference_profile();
@@ -32,7 +32,7 @@ TEST_CASE("a pose's offset goes into the frames of the profile", "[calibrated_pr
   }
 }
 
-TEST_CASE("offsets of joints go into their zeros", "[calibrated_profile]") {
+TEST_CASE("apply_calibration() adds joint offsets to the joint zeros", "[calibrated_profile]") {
   const DeviceProfile profile = polhem_profile();
   const Kinematics& k = profile.kinematics;
   JointAngles reported = joint_angles(k, k.home_counts);
@@ -47,7 +47,7 @@ TEST_CASE("offsets of joints go into their zeros", "[calibrated_profile]") {
     CHECK(at_rest[i] == Approx(joint_angles(k, k.home_counts)[i]).margin(1e-12));
 }
 
-TEST_CASE("a rest that is stated goes before the home position", "[calibrated_profile]") {
+TEST_CASE("a stated reference pose takes precedence over the home position", "[calibrated_profile]") {
   DeviceProfile profile = polhem_profile();
   const Pose home = homing_plan(profile).X_BR;
   profile.has_rest_pose = true;
@@ -57,17 +57,17 @@ TEST_CASE("a rest that is stated goes before the home position", "[calibrated_pr
   for (const AxisOffset& offset : offsets_at_reference(profile, {}, angles))
     CHECK(std::abs(offset.offset) < 1e-9);
   profile.homing.X_BR.translation_m.x() = 2.0;
-  CHECK_THROWS_WITH(offsets_at_reference(profile, {}, angles), Contains("no joint angles hold the handle"));
+  CHECK_THROWS_WITH(offsets_at_reference(profile, {}, angles), Contains("no joint angles reach"));
 }
 
-TEST_CASE("an axis that the device does not have is refused", "[calibrated_profile]") {
+TEST_CASE("a calibration axis that the device does not have is rejected", "[calibrated_profile]") {
   CHECK_THROWS_WITH(apply_calibration(polhem_profile(), {{"joint_7", 0.1}}),
                     Contains("joint_7") && Contains("polhem"));
   CHECK_THROWS_WITH(apply_calibration(polhem_profile(), {{"x", 0.1}}), Contains("axis x"));
   CHECK_THROWS_WITH(apply_calibration(reference_profile(), {{"joint_1", 0.1}}), Contains("joint_1"));
 }
 
-TEST_CASE("homing asks for the axes that the device senses", "[calibrated_profile]") {
+TEST_CASE("homing asks only for the axes that the device senses", "[calibrated_profile]") {
   DeviceProfile profile = polhem_profile();
   CHECK(homing_plan(profile).sensed == std::array<bool, 6>{true, true, true, true, true, true});
   profile.kinematics.joints = 3;

@@ -26,7 +26,7 @@ constexpr double kTick_s = 0.001;
 constexpr double kFastest_m_per_s = 0.5;
 constexpr double kFastest_rad_per_s = 5.0;
 
-/// As a SpaceMouse is shipped, in round numbers: 0.1 m/s and 1 rad/s at the end of the way.
+/// Settings of a shipped SpaceMouse in round numbers: 0.1 m/s and 1 rad/s at full deflection.
 Deflection steered() {
   Deflection d;
   d.linear_gain = 100.0;
@@ -44,7 +44,7 @@ DeflectionPose pose_of(const Deflection& settings) {
   return {settings, kFastest_m_per_s, kFastest_rad_per_s};
 }
 
-/// The world of a wall: solid where x > 0, which holds the handle at x = 0.
+/// A wall that fills x > 0: the proxy stays at x = 0.
 void press(DeflectionPose& pose, const Vector3d& t, int ticks) {
   pose.set_deflection(t, Vector3d::Zero());
   for (int i = 0; i < ticks; ++i) {
@@ -59,8 +59,8 @@ Pose pose_in(const std::array<double, 7>& x) {
   return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
 }
 
-/// The shipped cube over its table, steered by hand with an emulated SpaceMouse. Counts: x right, y toward
-/// the user, z down.
+/// The shipped cube over its table, steered with an emulated SpaceMouse. Counts: x right, y toward the user,
+/// z down.
 struct Steered {
   explicit Steered(RunConfig shipped = shipped_config()) : plan(std::move(shipped)) {
     plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_combined.toml",
@@ -71,12 +71,12 @@ struct Steered {
   void tick() {
     clock.sleep_until(clock.now() + 1ms);
     fault = station->loop().tick(clock.now(), clock.now());
-    station->loop().latest_record().read(last);
+    station->loop().telemetry().latest_record().read(last);
   }
   void ticks(int count) {
     for (int i = 0; i < count; ++i) tick();
   }
-  void up_from_the_table() {  // it starts in the table
+  void up_from_the_table() {  // the cube starts in the table
     ticks(100);
     mouse.set_deflection({0, 0, -350, 0, 0, 0});
     ticks(500);
@@ -105,10 +105,9 @@ constexpr std::array<int, 6> kUp = {0, 0, -350, 0, 0, 0};
 
 }  // namespace
 
-// --- the curve --------------------------------------------------------------------------------------------
+// --- the response curve ------------------------------------------------------------------------------------
 
-TEST_CASE("nothing moves in the dead zone, and the end of the way is the greatest speed",
-          "[deflection_pose]") {
+TEST_CASE("the velocity is zero in the dead zone and maximal at full deflection", "[deflection_pose]") {
   const Deflection settings = steered();
   const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
   const Vector3d along = Vector3d(1, -2, 2) / 3.0;
@@ -116,7 +115,8 @@ TEST_CASE("nothing moves in the dead zone, and the end of the way is the greates
   CHECK(curve.velocity(0.1e-3 * along).norm() < 1e-12);
   CHECK((curve.velocity(1e-3 * along) - 0.1 * along).norm() < 1e-12);
   CHECK((curve.velocity(5e-3 * along) - 0.1 * along).norm() < 1e-12);
-  CHECK((curve.velocity(0.55e-3 * along) - 0.025 * along).norm() < 1e-12);  // half of what is left, squared
+  CHECK((curve.velocity(0.55e-3 * along) - 0.025 * along).norm() <
+        1e-12);  // half of the remaining range, squared
   double last = 0.0;
   for (double t = 0.11e-3; t < 1e-3; t += 1e-5) {
     CHECK(curve.velocity(t * along).norm() > last);
@@ -124,7 +124,7 @@ TEST_CASE("nothing moves in the dead zone, and the end of the way is the greates
   }
 }
 
-TEST_CASE("a velocity and its deflection belong together", "[deflection_pose]") {
+TEST_CASE("velocity() and deflection() are inverse to each other", "[deflection_pose]") {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1.0, 1.0), share(1e-3, 1.0);
   for (const double power : {1.0, 2.0, 3.5}) {
@@ -140,7 +140,8 @@ TEST_CASE("a velocity and its deflection belong together", "[deflection_pose]") 
   }
 }
 
-TEST_CASE("without an end of the way speed is in proportion to deflection", "[deflection_pose]") {
+TEST_CASE("without a stated full deflection the speed is proportional to the deflection",
+          "[deflection_pose]") {
   Deflection settings;
   settings.linear_gain = 71.0;
   const SteeringCurve curve(settings, settings.linear_gain, settings.full_deflection_m);
@@ -150,22 +151,22 @@ TEST_CASE("without an end of the way speed is in proportion to deflection", "[de
 
 // --- the pose ---------------------------------------------------------------------------------------------
 
-TEST_CASE("held at a wall the pose goes as far in as the push is firm, and comes back at once",
+TEST_CASE("at a wall the distance to the proxy grows with the deflection and returns to zero at once",
           "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
   press(pose, {1e-3, 0, 0}, 5000);
   CHECK(pose.X_BH().translation_m.x() == Approx(0.010).epsilon(0.02));
   press(pose, {0.55e-3, 0, 0}, 5000);
   CHECK(pose.X_BH().translation_m.x() == Approx(0.0025).epsilon(0.02));
-  press(pose, {0, 0, 0}, 50);  // let go
+  press(pose, {0, 0, 0}, 50);  // released
   CHECK(std::abs(pose.X_BH().translation_m.x()) < 1e-6);
 
   press(pose, {1e-3, 0, 0}, 5000);
-  press(pose, {-0.2e-3, 0, 0}, 40);  // hardly steered back: 0.5 m/s are 20 ticks for 10 mm
+  press(pose, {-0.2e-3, 0, 0}, 40);  // slightly reversed: at 0.5 m/s 10 mm take 20 ticks
   CHECK(pose.X_BH().translation_m.x() < 0.0);
 
   press(pose, {1e-3, 0, 0}, 5000);
-  press(pose, {0, 1e-3, 0}, 200);  // along the wall is not into it
+  press(pose, {0, 1e-3, 0}, 200);  // a deflection along the wall
   CHECK(std::abs(pose.X_BH().translation_m.x()) < 1e-6);
   CHECK(pose.X_BH().translation_m.y() > 0.01);
 
@@ -175,10 +176,11 @@ TEST_CASE("held at a wall the pose goes as far in as the push is firm, and comes
     return d;
   }());
   press(free, {1e-3, 0, 0}, 5000);
-  CHECK(free.X_BH().translation_m.x() == Approx(0.2));  // its reach
+  CHECK(free.X_BH().translation_m.x() == Approx(0.2));  // the reach of the profile
 }
 
-TEST_CASE("a tool that is not allowed to turn is turned no farther than the leash", "[deflection_pose]") {
+TEST_CASE("at a wall that blocks rotation the angle to the proxy stays within its limit",
+          "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
   pose.set_proxy_pose(Pose{});
   pose.set_deflection(Vector3d::Zero(), {0, 0, 0.1});
@@ -189,7 +191,7 @@ TEST_CASE("a tool that is not allowed to turn is turned no farther than the leas
   CHECK(rotation_vector(pose.X_BH().rotation).norm() < 1e-5);
 }
 
-TEST_CASE("whatever the cap and the world do, the pose keeps the speeds and the box", "[deflection_pose]") {
+TEST_CASE("the pose respects speed limits and box for any deflection and proxy pose", "[deflection_pose]") {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   const auto vector = [&](double size) {
@@ -219,7 +221,7 @@ TEST_CASE("whatever the cap and the world do, the pose keeps the speeds and the 
   CHECK(farthest_m > 0.02);
 }
 
-TEST_CASE("at rest in the air, where the world holds it is where it is, to the last bit",
+TEST_CASE("at rest without contact the proxy distance limit does not change a bit of the pose",
           "[deflection_pose]") {
   DeflectionPose pose = pose_of(steered());
   pose.set_deflection({0.7e-3, 0.3e-3, 0}, {0, 0.05, 0.02});
@@ -228,7 +230,7 @@ TEST_CASE("at rest in the air, where the world holds it is where it is, to the l
   const Pose left = pose.X_BH();
   const Pose X_WB{rotation_from({0.4, 1.0, -2.0}), {0.3, -0.2, 1.0}};
   for (int i = 0; i < 1000; ++i) {
-    pose.set_proxy_pose(inverse(X_WB) * (X_WB * pose.X_BH()));  // but for the rounding
+    pose.set_proxy_pose(inverse(X_WB) * (X_WB * pose.X_BH()));  // equal except for rounding
     pose.advance(kTick_s);
   }
   CHECK(same_bits(pose.X_BH(), left));
@@ -236,7 +238,7 @@ TEST_CASE("at rest in the air, where the world holds it is where it is, to the l
 
 // --- in the loop ------------------------------------------------------------------------------------------
 
-TEST_CASE("steered into a table the tool is pressed no deeper than the leash, and lifts off at once",
+TEST_CASE("a tool steered into a table stays within the distance limit and lifts off at once",
           "[deflection_pose][servo]") {
   Steered s;
   s.up_from_the_table();
@@ -266,10 +268,10 @@ TEST_CASE("steered into a table the tool is pressed no deeper than the leash, an
   s.mouse.set_deflection(kUp);
   int ticks = 0;
   for (; s.last.contacts > 0 && ticks < 1000; ++ticks) s.tick();
-  CHECK(ticks < 50);  // 16 ms to the next report, 20 for the way out
+  CHECK(ticks < 50);  // 16 ms to the next report, 20 ms for the return
 }
 
-TEST_CASE("a device without motors needs no arming, and its silence is no lasting fault",
+TEST_CASE("a device without motors needs no arming, and its silence is no permanent fault",
           "[deflection_pose][servo]") {
   Steered s;
   s.up_from_the_table();
@@ -278,7 +280,7 @@ TEST_CASE("a device without motors needs no arming, and its silence is no lastin
   CHECK(s.state() == State::disarmed);
   CHECK(s.push_up_N() > 5.0);
 
-  s.station->loop().arm();
+  s.station->loop().requests().arm();
   s.ticks(3000);
   CHECK(s.state() == State::active);
   s.mouse.stop_sending();
@@ -290,13 +292,13 @@ TEST_CASE("a device without motors needs no arming, and its silence is no lastin
   }
   CHECK(told);
   CHECK(s.state() == State::active);
-  CHECK(s.depth_m() < 1e-6);  // nobody pushes any more
+  CHECK(s.depth_m() < 1e-6);  // the puck is released
 }
 
-TEST_CASE("the recentre button brings the tool back through whatever is in between",
+TEST_CASE("the recentre button returns the tool to its initial pose through obstacles",
           "[deflection_pose][servo]") {
   RunConfig plan = shipped_config();
-  plan.settings.device.base_in_world.position_m = {0, 0, 0.05};  // half of the cube over the table
+  plan.settings.device.base_in_world.position_m = {0, 0, 0.05};  // half of the cube above the table
   Steered s(plan);
   s.ticks(100);
   const Pose start = pose_in(s.last.X_WQ);
@@ -308,7 +310,7 @@ TEST_CASE("the recentre button brings the tool back through whatever is in betwe
   s.ticks(50);
   REQUIRE((pose_in(s.last.X_WQ).translation_m - start.translation_m).norm() > 0.05);
   s.mouse.set_buttons(1);
-  bool placed = false;  // and not led there, around what it meets
+  bool placed = false;  // and did not move along a path around obstacles
   for (int i = 0; i < 50; ++i) {
     s.tick();
     placed =
@@ -320,7 +322,7 @@ TEST_CASE("the recentre button brings the tool back through whatever is in betwe
   CHECK(s.fault == Fault::none);
 }
 
-TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay]") {
+TEST_CASE("a steered session replays with the same bits", "[deflection_pose][replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   Steered s;
@@ -328,7 +330,7 @@ TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay
     RunRecorder recorder(*s.station, file);
     s.ticks(300);
     recorder.append_new_ticks();
-    s.station->loop().arm();
+    s.station->loop().requests().arm();
     for (const std::array<int, 6>& push :
          {kUp, kDown, {200, 40, 350, 90, 0, -200}, {}, {0, 300, 0, 350, 0, 0}}) {
       s.mouse.set_deflection(push);
@@ -349,7 +351,7 @@ TEST_CASE("what was steered replays to the same bits", "[deflection_pose][replay
   if (difference) FAIL("tick " << difference->tick << ' ' << difference->field);
 }
 
-TEST_CASE("to steer allocates nothing and takes no lock", "[deflection_pose][realtime]") {
+TEST_CASE("steering does not allocate or lock", "[deflection_pose][realtime]") {
   Steered s;
   s.up_from_the_table();
   std::uint64_t allocations = 0, locks = 0;
@@ -367,7 +369,7 @@ TEST_CASE("to steer allocates nothing and takes no lock", "[deflection_pose][rea
   CHECK(locks == 0);
 }
 
-TEST_CASE("the simulated hand sees where the tool has come to, and steers it along its path",
+TEST_CASE("the simulated hand observes the displayed tool and steers it along its path",
           "[deflection_pose][simulation]") {
   RunConfig plan = shipped_config();
   plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/spacemouse_split.toml",
@@ -378,11 +380,11 @@ TEST_CASE("the simulated hand sees where the tool has come to, and steers it alo
   station.open();
   TickRecord last;
   double pressed_m = 0.0, farthest_m = 0.0;
-  for (int i = 0; i < 36000; ++i) {  // three times along the path: what is pressed in does not add up
+  for (int i = 0; i < 36000; ++i) {  // three times along the path: the penetration does not accumulate
     clock.sleep_until(clock.now() + 1ms);
     REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().latest_record().read(last);
-    if (i < 2000) continue;  // it begins in the table
+    station.loop().telemetry().latest_record().read(last);
+    if (i < 2000) continue;  // it starts in the table
     const Pose p = pose_in(last.X_WP), q = pose_in(last.X_WQ);
     pressed_m = std::max(pressed_m, (p.translation_m - q.translation_m).norm());
     const Pose G = link->device().hand_target().X_BG;

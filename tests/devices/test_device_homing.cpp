@@ -9,7 +9,7 @@ namespace {
 
 using namespace test;
 
-/// Steps until it has ended, and half a minute at most.
+/// Steps until homing has ended, at most half a minute.
 HomingState home_pose(PolhemInHand& polhem, DeviceHoming& homing, bool confirming = true) {
   for (int ms = 0; ms < 30000; ++ms) {
     polhem.clock.sleep_until(polhem.clock.now() + std::chrono::milliseconds(1));
@@ -23,7 +23,7 @@ HomingState home_pose(PolhemInHand& polhem, DeviceHoming& homing, bool confirmin
   return homing.state();
 }
 
-/// How far the device's pose is from the true one: [m] and [rad].
+/// Error of the device's pose: [m] and [rad].
 Eigen::Vector2d error(PolhemInHand& polhem) {
   DeviceSample sample;
   for (int ms = 0; ms < 50; ++ms) {
@@ -36,14 +36,14 @@ Eigen::Vector2d error(PolhemInHand& polhem) {
           sample.X_BH.rotation.angularDistance(polhem.X_BH.rotation)};
 }
 
-/// A count of the coarsest encoder is 2 pi / 1024 rad, one of the arm 0.02 mm or so; the rest and the pose
-/// each are off by half of it, in several joints.
+/// One count of the coarsest encoder is 2 pi / 1024 rad, of the arm about 0.02 mm. The reference and the pose
+/// each have an error of half a count, in several joints.
 constexpr double kResolution_m = 2e-4;
 constexpr double kResolution_rad = 0.02;
 
 }  // namespace
 
-TEST_CASE("encoders that count from anywhere are told where they are by the rest", "[device_homing]") {
+TEST_CASE("the reference pose gives the offsets of incremental encoders", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   CHECK(error(polhem)[0] > 0.01);
@@ -52,13 +52,14 @@ TEST_CASE("encoders that count from anywhere are told where they are by the rest
   CHECK(homing.offsets().size() == 6);
   polhem.target.translation_m += Vector3d(-0.05, 0.03, 0.02);
   for (int ms = 0; ms < 1000; ++ms) polhem.step();
-  polhem.device.recalibrate(apply_calibration(polhem.profile, homing.offsets()));  // the way was no motion
+  polhem.device.recalibrate(
+      apply_calibration(polhem.profile, homing.offsets()));  // the displacement was no motion
   CHECK(error(polhem)[0] < kResolution_m);
   CHECK(error(polhem)[1] < kResolution_rad);
   CHECK(polhem.board.currents_mA() == std::array<int, 3>{});
 }
 
-TEST_CASE("a device that was homed before is homed anew, and not on top of that", "[device_homing]") {
+TEST_CASE("homing a homed device replaces its offsets", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   for (int time = 0; time < 2; ++time) {
@@ -68,7 +69,7 @@ TEST_CASE("a device that was homed before is homed anew, and not on top of that"
   }
 }
 
-TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[device_homing]") {
+TEST_CASE("a calibration checks the axes after it has applied the reference offsets", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::full);
@@ -76,7 +77,7 @@ TEST_CASE("a calibration goes on to the axes, as they are after the rest", "[dev
   CHECK(error(polhem)[0] < kResolution_m);
 }
 
-TEST_CASE("an axis that goes another way ends a calibration", "[device_homing]") {
+TEST_CASE("a wrong axis direction fails a calibration", "[device_homing]") {
   PolhemInHand polhem;
   polhem.swapped_axis = 1;
   polhem.device.open();
@@ -86,7 +87,7 @@ TEST_CASE("an axis that goes another way ends a calibration", "[device_homing]")
   CHECK(state.problem == HomingProblem::wrong_axis);
 }
 
-TEST_CASE("without a confirmation there is no rest", "[device_homing]") {
+TEST_CASE("without a confirmation the reference pose is not measured", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
@@ -94,7 +95,7 @@ TEST_CASE("without a confirmation there is no rest", "[device_homing]") {
   CHECK(homing.offsets().empty());
 }
 
-TEST_CASE("the button of the profile confirms the rest", "[device_homing]") {
+TEST_CASE("the button of the profile confirms the reference pose", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   polhem.board.set_handle_button(true);
@@ -102,7 +103,7 @@ TEST_CASE("the button of the profile confirms the rest", "[device_homing]") {
   CHECK(home_pose(polhem, homing, false).step == HomingStep::done);
 }
 
-TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
+TEST_CASE("an unplugged device is reported during homing", "[device_homing]") {
   PolhemInHand polhem;
   polhem.device.open();
   DeviceHoming homing(polhem.device, polhem.profile, DeviceHoming::Extent::reference_only);
@@ -114,7 +115,7 @@ TEST_CASE("a device that is unplugged on the way is told", "[device_homing]") {
   CHECK(homing.device_lost());
 }
 
-TEST_CASE("a device that knows where it is has nothing to be shown at a start", "[device_homing]") {
+TEST_CASE("a device with absolute encoders needs no reference pose at the start", "[device_homing]") {
   PolhemInHand polhem;
   polhem.profile.homing.reference = ReferenceSchedule::never;
   polhem.device.open();

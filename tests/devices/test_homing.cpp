@@ -19,17 +19,17 @@ namespace {
 
 using namespace test;
 
-/// A device with a handle in a person's hand, 1000 samples a second, and what is wrong with it.
+/// A device in an operator's hand, 1000 samples per second, with optional errors.
 struct Bench {
   explicit Bench(const HomingPlan& plan = {}) : homing(plan) {}
   Bench(const HomingPlan& plan, const PoseOffset& stored) : homing(plan, stored) {}
 
   Homing homing;
-  Pose X_BH;  ///< where the handle truly is
+  Pose X_BH;  ///< true pose of the handle
   std::function<void(DeviceSample&)> spoil = [](DeviceSample&) {};
   TimePoint now{};
   double time_s = 0.0;
-  std::vector<std::string> heard;  ///< what the person was told, each once in a row
+  std::vector<std::string> instructions;  ///< instructions received, without consecutive repetitions
 
   const HomingState& state() const { return homing.state(); }
 
@@ -48,12 +48,12 @@ struct Bench {
     spoil(next);
     homing.advance(next, now);
     const std::string words = operator_instruction(state());
-    if (heard.empty() || heard.back() != words) heard.push_back(words);
+    if (instructions.empty() || instructions.back() != words) instructions.push_back(words);
   }
   void hold(double for_s) {
     for (int i = 0; i < static_cast<int>(1000 * for_s); ++i) tick();
   }
-  /// Along or about an axis, within 0.2 s, or until something else is asked.
+  /// Moves along or about an axis within 0.2 s, or until the instruction changes.
   void move(std::size_t axis, double way) {
     const auto k = static_cast<Eigen::Index>(axis % 3);
     Twist V;
@@ -64,15 +64,16 @@ struct Bench {
       tick(V);
     }
   }
-  /// As the person is told, a bit farther than needed.
-  void obey() {
+  /// Follows the instruction, slightly farther than needed.
+  void follow_instruction() {
     if (state().step == HomingStep::moving) return move(state().axis, state().axis < 3 ? 0.03 : 0.35);
     hold(0.05);
     if (state().step == HomingStep::reference && state().progress == 1.0) homing.confirm();
   }
-  /// For as long as there is anything to do, and at most a minute of theirs.
-  void obey_all() {
-    while (time_s < 60.0 && state().step != HomingStep::done && state().step != HomingStep::failed) obey();
+  /// Follows instructions until homing ends, at most one simulated minute.
+  void follow_all_instructions() {
+    while (time_s < 60.0 && state().step != HomingStep::done && state().step != HomingStep::failed)
+      follow_instruction();
   }
 };
 
@@ -87,10 +88,10 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("a sound device is homed when a person does what is asked", "[homing]") {
+TEST_CASE("a correct device is homed when the operator follows the instructions", "[homing]") {
   Bench bench;
   CHECK(operator_instruction(bench.state()) == "Waiting for the device to report.");
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
   const std::vector<std::string> expected = {
       "Hold the handle still.", "Push the handle straight away from you.",
@@ -101,19 +102,20 @@ TEST_CASE("a sound device is homed when a person does what is asked", "[homing]"
       "Hold the handle still.", "Turn the handle to the left, counterclockwise as seen from above.",
       "Hold the handle still.", "Homed: the device may be armed.",
   };
-  CHECK(bench.heard == expected);
+  CHECK(bench.instructions == expected);
 }
 
-TEST_CASE("what the person is asked is the positive direction of the axes", "[homing]") {
+TEST_CASE("the instructions describe the positive directions of the axes", "[homing]") {
   const auto top_goes = [](const Vector3d& axis) {
-    return Vector3d(Eigen::AngleAxisd(0.1, axis) * Vector3d::UnitZ());  // of the handle, x forward, y left
+    return Vector3d(Eigen::AngleAxisd(0.1, axis) *
+                    Vector3d::UnitZ());  // top of the handle, x forward, y left
   };
   CHECK(top_goes(Vector3d::UnitX()).y() < 0);                                      // to the right
-  CHECK(top_goes(Vector3d::UnitY()).x() > 0);                                      // away
+  CHECK(top_goes(Vector3d::UnitY()).x() > 0);                                      // away from the user
   CHECK((Eigen::AngleAxisd(0.1, Vector3d::UnitZ()) * Vector3d::UnitX()).y() > 0);  // its front to the left
 }
 
-TEST_CASE("nothing is homed before every axis was seen, whatever the time", "[homing]") {
+TEST_CASE("homing is not done before every axis has moved", "[homing]") {
   for (std::size_t stuck = 0; stuck < 6; ++stuck) {
     Bench bench;
     bench.spoil = [stuck](DeviceSample& sample) {
@@ -121,8 +123,8 @@ TEST_CASE("nothing is homed before every axis was seen, whatever the time", "[ho
       (stuck < 3 ? sample.X_BH.translation_m : turn)[static_cast<Eigen::Index>(stuck % 3)] = 0.0;
       sample.X_BH.rotation = rotation_from(turn);
     };
-    // As long as it takes for the stuck one to be asked for, and then some.
-    for (int i = 0; i < 200; ++i) bench.obey();
+    // Long enough for the request of the stuck axis, and some more.
+    for (int i = 0; i < 200; ++i) bench.follow_instruction();
     INFO("axis " << stuck);
     CHECK_FALSE(bench.homing.may_arm());
   }
@@ -132,106 +134,108 @@ TEST_CASE("nothing is homed before every axis was seen, whatever the time", "[ho
   CHECK(idle.state().axis == 0);
 }
 
-TEST_CASE("a person who errs is asked once more", "[homing]") {
+TEST_CASE("after an operator error homing asks once more", "[homing]") {
   Bench bench;
   bench.hold(0.5);
   REQUIRE(bench.state().step == HomingStep::moving);
   bench.move(0, -0.03);
-  CHECK(operator_instruction(bench.state()) == "That moved x the other way. Hold the handle still.");
+  CHECK(operator_instruction(bench.state()) ==
+        "That moved x in the opposite direction. Hold the handle still.");
   bench.hold(0.5);
   CHECK(operator_instruction(bench.state()) ==
-        "That moved x the other way. Push the handle straight away from you.");
+        "That moved x in the opposite direction. Push the handle straight away from you.");
   bench.move(0, 0.03);
   bench.hold(0.5);
   REQUIRE(bench.state().axis == 1);
   bench.move(2, 0.03);
   CHECK(operator_instruction(bench.state()) == "That moved z, not y. Hold the handle still.");
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
 }
 
-TEST_CASE("the way back to the middle is not taken for the next axis", "[homing]") {
+TEST_CASE("the return to the centre does not count as the next axis", "[homing]") {
   Bench bench;
   bench.hold(0.5);
   bench.move(0, 0.03);
   REQUIRE(bench.state().step == HomingStep::holding_still);
-  for (int i = 0; i < 300; ++i) {  // while the person brings the handle back
+  for (int i = 0; i < 300; ++i) {  // while the operator moves the handle back
     bench.X_BH.translation_m.x() -= 0.0001;
     bench.tick();
   }
   CHECK(bench.state().step == HomingStep::holding_still);
   CHECK(bench.state().problem == HomingProblem::none);
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
 }
 
-TEST_CASE("a sign that is wrong in the profile is found", "[homing]") {
+TEST_CASE("homing detects a wrong sign in the profile", "[homing]") {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     Bench bench;
     bench.spoil = [axis](DeviceSample& s) {
       s.X_BH.translation_m[axis] *= -1.0;
       s.V_BH.linear_m_per_s[axis] *= -1.0;
     };
-    bench.obey_all();
+    bench.follow_all_instructions();
     CHECK(bench.state().step == HomingStep::failed);
     CHECK(bench.state().problem == HomingProblem::wrong_direction);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
-    CHECK(holds(operator_instruction(bench.state()), "Its sign is wrong: look at it in the profile"));
+    CHECK(holds(operator_instruction(bench.state()), "The sign is wrong: check it in the profile"));
   }
-  Bench mirrored;  // a quaternion with its y of the other sign
+  Bench mirrored;  // a quaternion with inverted y
   mirrored.spoil = [](DeviceSample& s) { s.X_BH.rotation.y() *= -1.0; };
-  mirrored.obey_all();
+  mirrored.follow_all_instructions();
   CHECK(mirrored.state().problem == HomingProblem::wrong_direction);
   CHECK(mirrored.state().axis == 4);
 }
 
-TEST_CASE("axes that are exchanged are found", "[homing]") {
+TEST_CASE("homing detects exchanged axes", "[homing]") {
   Bench bench;
   bench.spoil = [](DeviceSample& s) { std::swap(s.X_BH.translation_m.y(), s.X_BH.translation_m.z()); };
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.state().step == HomingStep::failed);
   CHECK(bench.state().problem == HomingProblem::wrong_axis);
   CHECK(operator_instruction(bench.state()) ==
-        "Homing failed. That moved z, not y. Axes are exchanged: look at their order in the profile, and at "
-        "the encoders' plugs.");
+        "Homing failed. That moved z, not y. Axes are exchanged: check their order in the profile, and the "
+        "plugs of the encoders.");
   CHECK_FALSE(bench.homing.may_arm());
 
-  Bench turns;  // y and z of the quaternion
+  Bench turns;  // y and z of the quaternion exchanged
   turns.spoil = [](DeviceSample& s) { std::swap(s.X_BH.rotation.y(), s.X_BH.rotation.z()); };
-  turns.obey_all();
+  turns.follow_all_instructions();
   CHECK(turns.state().problem == HomingProblem::wrong_axis);
   CHECK(turns.state().moved_axis == 5);
 }
 
-TEST_CASE("a velocity of the wrong sign is found, and one that is not reported is no fault", "[homing]") {
+TEST_CASE("homing detects a velocity with the wrong sign and accepts a device without velocities",
+          "[homing]") {
   for (Eigen::Index axis = 0; axis < 6; ++axis) {
     Bench bench;
     bench.spoil = [axis](DeviceSample& s) {
       (axis < 3 ? s.V_BH.linear_m_per_s : s.V_BH.angular_rad_per_s)[axis % 3] *= -1.0;
     };
-    bench.obey_all();
+    bench.follow_all_instructions();
     CHECK(bench.state().step == HomingStep::failed);
     CHECK(bench.state().problem == HomingProblem::velocity_sign_mismatch);
     CHECK(bench.state().axis == static_cast<std::size_t>(axis));
   }
   Bench silent;
   silent.spoil = [](DeviceSample& s) { s.V_BH = {}; };
-  silent.obey_all();
+  silent.follow_all_instructions();
   CHECK(silent.homing.may_arm());
 }
 
-TEST_CASE("in its rest a device is told where it is", "[homing]") {
+TEST_CASE("the reference pose gives the offset of the device", "[homing]") {
   const HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   RandomValues random(11);
   for (int i = 0; i < 20; ++i) {
     Bench bench(plan);
     const PoseOffset off{random.vector<3>(0.02), random.vector<3>(0.1)};
     bench.X_BH = plan.X_BR;
-    bench.spoil = [&](DeviceSample& s) {  // it counts from elsewhere, and its last digit flickers
+    bench.spoil = [&](DeviceSample& s) {  // arbitrary zero, and noise in the last digit
       s.X_BH = {s.X_BH.rotation * rotation_from(off.rotation_rad), s.X_BH.translation_m + off.position_m};
       s.X_BH.translation_m += random.vector<3>(2e-5);
     };
-    bench.obey_all();
+    bench.follow_all_instructions();
     REQUIRE(bench.homing.may_arm());
     CHECK((bench.homing.offset().position_m - off.position_m).norm() < 1e-5);
     CHECK((bench.homing.offset().rotation_rad - off.rotation_rad).norm() < 1e-9);
@@ -243,26 +247,27 @@ TEST_CASE("in its rest a device is told where it is", "[homing]") {
   }
 }
 
-TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[homing]") {
+TEST_CASE("the reference pose must be confirmed, still and within the maximum offset", "[homing]") {
   HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   plan.confirm_buttons = 0x4;
   Bench bench(plan);
   bench.X_BH = plan.X_BR;
   bench.X_BH.translation_m.x() += 0.2;
   bench.hold(5.0);
-  CHECK(bench.state().step == HomingStep::reference);  // lying still is not enough
-  CHECK(operator_instruction(bench.state()) == "Put the handle into its rest, let go of it, and confirm.");
+  CHECK(bench.state().step == HomingStep::reference);  // stillness alone is not enough
+  CHECK(operator_instruction(bench.state()) ==
+        "Put the handle into its reference pose, release it, and confirm.");
 
   std::uint32_t buttons = 0x3;
   bench.spoil = [&](DeviceSample& s) { s.buttons = buttons; };
   bench.hold(0.1);
-  CHECK(bench.state().problem == HomingProblem::none);  // other buttons say nothing
+  CHECK(bench.state().problem == HomingProblem::none);  // other buttons have no effect
   buttons = 0x4;
   bench.hold(0.1);
   buttons = 0;
   CHECK(bench.state().step == HomingStep::reference);
   CHECK(bench.state().problem == HomingProblem::not_at_reference);
-  CHECK(holds(operator_instruction(bench.state()), "too far from its rest"));
+  CHECK(holds(operator_instruction(bench.state()), "too far from the reference pose"));
 
   for (int i = 0; i < 1000; ++i) {
     bench.X_BH.translation_m.x() -= 0.0002;
@@ -279,7 +284,7 @@ TEST_CASE("the rest has to be confirmed, held still, and near where it is", "[ho
   CHECK(bench.homing.offset().position_m.x() == Approx(-0.002));
 }
 
-TEST_CASE("a stored offset spares the rest where the encoders remember, and only there", "[homing]") {
+TEST_CASE("a stored offset replaces the reference pose only for absolute encoders", "[homing]") {
   const PoseOffset stored{{0.01, 0, 0}, {0, 0, 0.1}};
   Bench once(with_reference(ReferenceSchedule::once), stored);
   once.tick();
@@ -301,7 +306,7 @@ TEST_CASE("a stored offset spares the rest where the encoders remember, and only
   CHECK(foreign.state().problem == HomingProblem::stored_offset_too_large);
 }
 
-TEST_CASE("an offset goes to the store and comes back", "[homing]") {
+TEST_CASE("an offset survives conversion to the calibration store and back", "[homing]") {
   const TemporaryDirectory dir;
   const CalibrationStore store(dir.path());
   const PoseOffset offset{{0.0125, -1e-7, 0.1}, {0.01, 0.02, -0.03}};
@@ -310,7 +315,7 @@ TEST_CASE("an offset goes to the store and comes back", "[homing]") {
   REQUIRE(read);
   CHECK(read->position_m == offset.position_m);
   CHECK(read->rotation_rad == offset.rotation_rad);
-  CHECK_FALSE(pose_offset({{"joint_1", 0.5}}));  // of a device that is calibrated otherwise
+  CHECK_FALSE(pose_offset({{"joint_1", 0.5}}));  // calibration of a device with joints
 
   RandomValues random(12);
   for (int i = 0; i < 100; ++i) {
@@ -321,7 +326,7 @@ TEST_CASE("an offset goes to the store and comes back", "[homing]") {
   }
 }
 
-TEST_CASE("a pose that cannot be fails", "[homing]") {
+TEST_CASE("a pose outside the workspace fails homing", "[homing]") {
   HomingPlan plan;
   plan.workspace_min_m = {-0.1, -0.2, 0.0};
   plan.workspace_max_m = {0.1, 0.2, 0.3};
@@ -346,15 +351,15 @@ TEST_CASE("a pose that cannot be fails", "[homing]") {
     CHECK(bench.state().axis == bad.axis);
     bench.X_BH = {};
     bench.hold(1.0);
-    CHECK(bench.state().step == HomingStep::failed);  // until somebody has looked at it
+    CHECK(bench.state().step == HomingStep::failed);  // until the operator restarts it
     bench.homing.restart();
     bench.X_BH.translation_m.z() = 0.1;
-    bench.obey_all();
+    bench.follow_all_instructions();
     CHECK(bench.homing.may_arm());
   }
 }
 
-TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[homing]") {
+TEST_CASE("a fault pauses the step, and a lost device restarts homing", "[homing]") {
   Bench bench;
   Fault fault = Fault::none;
   bench.spoil = [&](DeviceSample& s) { s.fault = fault; };
@@ -382,9 +387,9 @@ TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[ho
   bench.tick();
   CHECK(bench.state().step == HomingStep::awaiting_sample);
   fault = Fault::none;
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
-  fault = Fault::overspeed;  // what follows of that is the servo loop's matter
+  fault = Fault::overspeed;  // the servo loop handles the consequences
   bench.tick();
   CHECK(bench.homing.may_arm());
   fault = Fault::device_lost;
@@ -392,8 +397,7 @@ TEST_CASE("a fault stops the step, and a device that was lost begins anew", "[ho
   CHECK_FALSE(bench.homing.may_arm());
 }
 
-/// The simulated device, its reports and all, in a hand that does what homing asks for, one thing after the
-/// other.
+/// The simulated device with its reports, in a hand that performs all motions that homing requests, in order.
 struct SimulatedBench {
   explicit SimulatedBench(const DeviceProfile& profile)
       : simulation(reference_profile(), obedient_hand()),
@@ -409,12 +413,12 @@ struct SimulatedBench {
     Waypoint at;
     s.hand_path = {at};
     for (Eigen::Index axis = 0; axis < 6; ++axis) {
-      at.time_s += 1.0;  // long enough to be seen holding still
+      at.time_s += 1.0;  // long enough to count as still
       s.hand_path.push_back(at);
       at.time_s += 0.8;
       (axis < 3 ? at.position_m : at.rotation_vector_rad)[axis % 3] += axis < 3 ? 0.03 : 0.35;
       s.hand_path.push_back(at);
-      at.time_s += 0.8;  // and back, so that turns are about one axis at a time
+      at.time_s += 0.8;  // and back, so that only one axis rotates at a time
       (axis < 3 ? at.position_m : at.rotation_vector_rad)[axis % 3] = 0.0;
       s.hand_path.push_back(at);
     }
@@ -451,31 +455,31 @@ TEST_CASE("the simulated device is homed through its reports, and a wrong profil
   SimulatedBench mirrored(profile);
   mirrored.run();
   CHECK(mirrored.homing.state().step == HomingStep::failed);
-  CHECK(mirrored.homing.state().axis == 0);  // x went the wrong way; this hand does not try again
+  CHECK(mirrored.homing.state().axis == 0);  // x moved in the wrong direction; this hand does not repeat it
 }
 
-TEST_CASE("samples that are not fresh are no evidence", "[homing]") {
+TEST_CASE("homing ignores samples that are not fresh", "[homing]") {
   Bench bench;
   bench.spoil = [](DeviceSample& s) { s.fresh = false; };
   bench.hold(5.0);
   CHECK(bench.state().step == HomingStep::awaiting_sample);
 }
 
-TEST_CASE("only axes that a device senses are asked for", "[homing]") {
+TEST_CASE("homing asks only for sensed axes", "[homing]") {
   HomingPlan plan;
   plan.sensed = {true, true, true, false, false, false};
   Bench bench(plan);
-  bench.obey_all();
+  bench.follow_all_instructions();
   CHECK(bench.homing.may_arm());
-  CHECK(bench.heard.size() == 8);
+  CHECK(bench.instructions.size() == 8);
   plan.sensed = {false, false, false, false, false, true};
   Bench turn(plan);
-  turn.obey_all();
+  turn.follow_all_instructions();
   CHECK(turn.homing.may_arm());
-  CHECK(turn.heard.at(1) == "Turn the handle to the left, counterclockwise as seen from above.");
+  CHECK(turn.instructions.at(1) == "Turn the handle to the left, counterclockwise as seen from above.");
 }
 
-TEST_CASE("a plan that cannot work is refused", "[homing]") {
+TEST_CASE("an invalid homing plan is rejected", "[homing]") {
   const auto refused = [](const std::function<void(HomingPlan&)>& spoil) {
     HomingPlan plan;
     spoil(plan);
@@ -499,7 +503,7 @@ TEST_CASE("a plan that cannot work is refused", "[homing]") {
   CHECK(refused([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
 }
 
-TEST_CASE("the servo thread may home, whatever the device says", "[homing]") {
+TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {
   RandomValues random(13);
   HomingPlan plan = with_reference(ReferenceSchedule::each_start);
   plan.confirm_buttons = 1;
@@ -512,7 +516,7 @@ TEST_CASE("the servo thread may home, whatever the device says", "[homing]") {
     sample.X_BH = random.pose(0.1);
     if (random.chance(0.01)) sample.X_BH.translation_m.x() = std::numeric_limits<double>::quiet_NaN();
     sample.V_BH = random.velocity();
-    sample.device_time_s = random.normal();  // even a clock that jumps
+    sample.device_time_s = random.normal();  // the clock may jump too
     sample.fresh = random.chance(0.9);
     sample.buttons = static_cast<std::uint32_t>(random.bits() & 1U);
     if (random.chance(0.001)) sample.fault = static_cast<Fault>(random.integer(0, 8));
@@ -524,7 +528,7 @@ TEST_CASE("the servo thread may home, whatever the device says", "[homing]") {
     armed += homing.may_arm();
   }
   CHECK(forbidden == 0);
-  CHECK(armed == 0);  // noise is no hand
+  CHECK(armed == 0);  // noise is no motion of the hand
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ double distance(const Pose& a, const Pose& b) {
   return std::max((a.translation_m - b.translation_m).norm(), a.rotation.angularDistance(b.rotation));
 }
 
-/// Joint angles all over the workspace, the arm bent the way it is built.
+/// Joint angles throughout the workspace, with the elbow of the real device.
 struct Angles {
   std::mt19937_64 random{7};
 
@@ -33,7 +33,7 @@ struct Angles {
   }
   JointAngles arm() {
     const double tB = between(-0.6, 0.8);
-    // With body c folded onto b the arm is straight, and both elbows are one: keep 0.3 rad away from both
+    // With body c folded onto b the arm is straight and both elbows coincide: keep 0.3 rad away from both
     // ends.
     return {between(-1.0, 1.0), tB, between(0.9, 2.2), between(-1.5, 1.5), between(0.3, 1.3),
             between(-2.0, 2.0)};
@@ -58,7 +58,7 @@ Matrix3d differenced(const Kinematics& k, const JointAngles& at, const Pose& nea
 
 }  // namespace
 
-TEST_CASE("an arm's pose leads back to its joint angles, and they to the pose", "[kinematics]") {
+TEST_CASE("capstan arm: forward and inverse kinematics are inverse to each other", "[kinematics]") {
   Angles angles;
   for (int i = 0; i < 20'000; ++i) {
     const JointAngles t = angles.arm();
@@ -74,7 +74,7 @@ TEST_CASE("an arm's pose leads back to its joint angles, and they to the pose", 
   }
 }
 
-TEST_CASE("a delta's position leads back from its joint angles, whatever position was known before",
+TEST_CASE("delta: forward and inverse kinematics are inverse to each other for any initial guess",
           "[kinematics]") {
   Angles angles;
   Pose near;
@@ -89,7 +89,7 @@ TEST_CASE("a delta's position leads back from its joint angles, whatever positio
   }
 }
 
-TEST_CASE("counts and angles are two names of one thing", "[kinematics]") {
+TEST_CASE("counts and angles convert into each other", "[kinematics]") {
   Angles angles;
   for (int i = 0; i < 1000; ++i) {
     JointCounts counts{};
@@ -101,7 +101,7 @@ TEST_CASE("counts and angles are two names of one thing", "[kinematics]") {
   }
 }
 
-TEST_CASE("the Jacobian is what finite differences of the position say", "[kinematics]") {
+TEST_CASE("the Jacobian agrees with finite differences of the position", "[kinematics]") {
   Angles angles;
   for (int i = 0; i < 2000; ++i) {
     const JointAngles t = angles.arm();
@@ -116,7 +116,7 @@ TEST_CASE("the Jacobian is what finite differences of the position say", "[kinem
   }
 }
 
-TEST_CASE("what the motors work at their joints is what the force works at the hand", "[kinematics]") {
+TEST_CASE("joint torques and the force on the hand do equal work", "[kinematics]") {
   Angles angles;
   const auto check = [&](const Kinematics& k, const JointAngles& t, const Pose& X_DE) {
     const Vector3d f(angles.between(-1, 1), angles.between(-1, 1), angles.between(-1, 1));
@@ -135,7 +135,7 @@ TEST_CASE("what the motors work at their joints is what the force works at the h
   }
 }
 
-TEST_CASE("efforts are cut by one factor, so the force keeps its direction", "[kinematics]") {
+TEST_CASE("one factor scales all efforts, so the force keeps its direction", "[kinematics]") {
   Angles angles;
   for (int i = 0; i < 2000; ++i) {
     const Pose X_DE{Quaterniond::Identity(), angles.in_falcon()};
@@ -150,21 +150,21 @@ TEST_CASE("efforts are cut by one factor, so the force keeps its direction", "[k
   CHECK(motor_efforts(kFalcon, Matrix3d::Identity(), {nan, 0, 0}) == MotorEfforts{});
 }
 
-TEST_CASE("the places that the sources state by number", "[kinematics]") {
-  // haptikfabrikenapi, polhem_v1: at its calibration counts body b stands upright and body c level.
+TEST_CASE("the kinematics gives the positions stated in the sources", "[kinematics]") {
+  // haptikfabrikenapi, polhem_v1: at its calibration counts body b is upright and body c is level.
   const Pose polhem = *home_pose(kPolhem);
   CHECK(polhem.translation_m.isApprox(Vector3d(0.133 - 0.140, 0.0, 0.058 + 0.174 - 0.100), 1e-12));
   CHECK(polhem.rotation.angularDistance(Quaterniond::Identity()) < 1e-7);
   CHECK(home_pose(kWood)->translation_m.isApprox(Vector3d(0.245 - 0.220, 0.0, 0.080 + 0.205 - 0.080), 1e-12));
 
-  // A quarter turn of body a: 2000 counts a turn, capstan 10 mm on 180 mm, so 18 motor turns a turn.
+  // A quarter turn of body a: 2000 counts per turn, capstan 10 mm on 180 mm, so 18 motor turns per turn.
   JointCounts counts = kPolhem.home_counts;
   counts[0] = -9000;
   const JointAngles t = joint_angles(kPolhem, counts);
   CHECK(t[0] == Approx(std::numbers::pi / 2));
   CHECK(forward_kinematics(kPolhem, t, {})->translation_m.isApprox(Vector3d(-0.140, 0.133, 0.132), 1e-12));
 
-  // libnifalcon: 35 degrees at count 0, and 360/1280 * 14.25/110 degrees a count.
+  // libnifalcon: 35 degrees at count 0, and 360/1280 * 14.25/110 degrees per count.
   CHECK(joint_angles(kFalcon, {0, 100, -100})[0] == Approx(35 * std::numbers::pi / 180));
   CHECK(joint_angles(kFalcon, {0, 100, -100})[1] ==
         Approx((35 + 100 * 360.0 / 1280 * 14.25 / 110) * std::numbers::pi / 180));
@@ -172,7 +172,7 @@ TEST_CASE("the places that the sources state by number", "[kinematics]") {
   CHECK(home_pose(kFalcon)->translation_m.z() == Approx(0.134602).margin(1e-6));
 }
 
-TEST_CASE("1 N straight up on a Polhem at home is carried by body c alone", "[kinematics]") {
+TEST_CASE("a force of 1 N upward on a Polhem at home loads body c alone", "[kinematics]") {
   // tau = c sin(pi/2) * 1 N = 0.133 N.m; motor: times -10/100 over 0.0538 N.m/A
   const JointAngles t = joint_angles(kPolhem, kPolhem.home_counts);
   const MotorEfforts up = motor_efforts(kPolhem, jacobian(kPolhem, t, *home_pose(kPolhem)), {0, 0, 1});
@@ -181,7 +181,7 @@ TEST_CASE("1 N straight up on a Polhem at home is carried by body c alone", "[ki
   CHECK(up[2] == Approx(-0.133 * 0.1 / 0.0538));
 }
 
-TEST_CASE("a place out of reach, and angles that no place has, are told", "[kinematics]") {
+TEST_CASE("an unreachable pose and impossible angles give no result", "[kinematics]") {
   CHECK_FALSE(inverse(kPolhem, {Quaterniond::Identity(), {1.0, 0.0, 0.0}}));
   CHECK_FALSE(inverse(kFalcon, {Quaterniond::Identity(), {0.0, 0.0, 0.3}}));
   CHECK_FALSE(forward_kinematics(kFalcon, {-1.5, 1.5, 1.5}, {}));
@@ -189,7 +189,7 @@ TEST_CASE("a place out of reach, and angles that no place has, are told", "[kine
   CHECK_FALSE(forward_kinematics(kFalcon, {nan, 0.5, 0.5}, {}));
 }
 
-TEST_CASE("a button that hides in a count is taken out of it", "[kinematics]") {
+TEST_CASE("the offset of a button is removed from its count", "[kinematics]") {
   std::uint32_t buttons = 0xf0;
   JointCounts counts{1, 2, 3, 10'123, 5, 6};
   CHECK(strip_count_button(kPolhem, counts, buttons) == JointCounts{1, 2, 3, 123, 5, 6});

@@ -12,51 +12,50 @@ namespace wrenchd {
 namespace {
 
 using namespace test;
-using LineReader = std::vector<std::string>;
+using Lines = std::vector<std::string>;
 
 ReportDescriptor parsed(const Bytes& bytes) {
   return parse_report_descriptor(bytes);
 }
 
-/// The descriptor that devices/README.md gives to makers.
+/// The descriptor in devices/README.md.
 const std::string kReference =
     "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0";
 ReportDescriptor reference_device() {
   return parsed(from_hex(kReference));
 }
 
-/// Six axes as a profile of a SpaceMouse would have them, with what is to be wrong.
+/// Six axes as in a SpaceMouse profile, with the differences of the test.
 ExpectedReport combined(std::vector<ExpectedField> fields, std::size_t length = 13) {
   return {ReportKind::input, 1, length, std::move(fields)};
 }
 
-TEST_CASE("the reference layout agrees with the descriptor its page gives", "[layout_check]") {
+TEST_CASE("the reference layout agrees with the descriptor in devices/README.md", "[layout_check]") {
   const auto expected = expected_reports(reference_profile());
   REQUIRE(expected.size() == 2);
   CHECK(expected[0].fields.size() == 11);
   CHECK(expected[1].fields.size() == 6);
-  CHECK(find_differences(reference_device(), expected) == LineReader{});
+  CHECK(find_differences(reference_device(), expected) == Lines{});
 }
 
-TEST_CASE("a profile for another device is told apart, line by line", "[layout_check]") {
-  const LineReader lines =
-      find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
+TEST_CASE("a profile for another device differs, one line per difference", "[layout_check]") {
+  const Lines lines = find_differences(parsed(space_mouse_wireless()), expected_reports(reference_profile()));
   REQUIRE(lines.size() == 13);  // no field agrees
-  CHECK(lines[0] == "input report 0x01: the profile says 64 bytes, the device 13");
+  CHECK(lines[0] == "input report 0x01: the profile has 64 bytes, the device 13");
   CHECK(lines[1] ==
-        "input report 0x01, checksum: the profile says 16 bits, unsigned, from byte 62; the device's report "
+        "input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the device's report "
         "ends with byte 12");
   CHECK(lines[2] ==
-        "input report 0x01, motors_on: the profile says 1 bit, unsigned, at byte 1; there the device has "
+        "input report 0x01, motors_on: the profile has 1 bit, unsigned, at byte 1; the device has "
         "01:30 (X), 16 bits, signed, from byte 1");
   CHECK(lines[6] ==
-        "input report 0x01, position[0]: the profile says 32 bits, signed, from byte 8; there the device has "
+        "input report 0x01, position[0]: the profile has 32 bits, signed, from byte 8; the device has "
         "01:33 (Rx), 16 bits, signed, from byte 7; 01:34 (Ry), 16 bits, signed, from byte 9; 01:35 (Rz), "
         "16 bits, signed, from byte 11");
-  CHECK(lines.back() == "output report 0x02: the device has none such; its output reports: 0x04");
+  CHECK(lines.back() == "output report 0x02: the device has no such report; its output reports: 0x04");
 }
 
-TEST_CASE("fields of a device agree where they are, as wide as they are, with their sign", "[layout_check]") {
+TEST_CASE("a field agrees if position, width and sign match", "[layout_check]") {
   const ReportDescriptor device = parsed(space_mouse_wireless());
   const auto lines = [&](const ExpectedField& field) {
     return find_differences(device, {combined({field})});
@@ -73,7 +72,7 @@ TEST_CASE("fields of a device agree where they are, as wide as they are, with th
   CHECK(lines({"the report id", 0, 8, 1, false}).size() == 1);
 }
 
-TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them", "[layout_check]") {
+TEST_CASE("a button mask consists of single bits and trailing padding", "[layout_check]") {
   const ReportDescriptor device = parsed(space_navigator());
   const auto agrees = [&](std::size_t bit, unsigned bits) {
     return find_differences(device, {{ReportKind::input, 3, 3, {{"buttons", bit, bits, 1, false}}}}).empty();
@@ -87,14 +86,14 @@ TEST_CASE("a mask of buttons is made of whole bits, and of padding behind them",
   CHECK_FALSE(agrees(16, 8));
   CHECK_FALSE(agrees(8, 17));
 
-  // Two axes of a byte each are two values, not one of two bytes.
+  // Two axes of one byte each are two values, not one of two bytes.
   const ReportDescriptor mouse =
       parsed(from_hex("05 01 09 02 a1 01 15 81 25 7f 75 08 95 02 09 30 09 31 81 06 c0"));
   CHECK(find_differences(mouse, {{ReportKind::input, {}, 2, {{"axis", 0, 8, 2, true}}}}).empty());
   CHECK(find_differences(mouse, {{ReportKind::input, {}, 2, {{"both", 0, 16, 1, true}}}}).size() == 1);
 }
 
-TEST_CASE("bytes of the maker's own agree with all that lies within them", "[layout_check]") {
+TEST_CASE("vendor-defined bytes agree with any field within them", "[layout_check]") {
   const ReportDescriptor device = parsed(teensy_rawhid());
   const auto agrees = [&](const ExpectedField& field) {
     return find_differences(device, {{ReportKind::input, {}, 64, {field}}}).empty();
@@ -106,7 +105,7 @@ TEST_CASE("bytes of the maker's own agree with all that lies within them", "[lay
   CHECK_FALSE(agrees({"one more", 0, 8, 65, false}));
 }
 
-TEST_CASE("words of the maker's own may be taken by bits, but not across their ends", "[layout_check]") {
+TEST_CASE("a field may use bits of one vendor-defined word, but not cross its boundary", "[layout_check]") {
   const ReportDescriptor device =
       parsed(from_hex("06 00 ff 09 01 a1 01 16 00 80 26 ff 7f 75 10 95 04 09 02 81 02 c0"));
   const auto agrees = [&](const ExpectedField& field) {
@@ -119,35 +118,35 @@ TEST_CASE("words of the maker's own may be taken by bits, but not across their e
   CHECK_FALSE(agrees({"two", 0, 32, 1, true}));
 }
 
-TEST_CASE("report ids that the other side does not have are told", "[layout_check]") {
+TEST_CASE("report ids without a counterpart are reported", "[layout_check]") {
   const ExpectedReport with{ReportKind::input, 1, 65, {}}, without{ReportKind::input, {}, 64, {}};
   CHECK(find_differences(parsed(teensy_rawhid()), {without}).empty());
   CHECK(find_differences(parsed(teensy_rawhid()), {with}) ==
-        LineReader{"input report 0x01: the device has none such; its input reports: without an id"});
-  CHECK(find_differences(parsed(space_navigator()), {without}) ==
-        LineReader{
-            "input report without an id: the device has none such; its input reports: 0x01, 0x02, 0x03"});
+        Lines{"input report 0x01: the device has no such report; its input reports: without an id"});
+  CHECK(
+      find_differences(parsed(space_navigator()), {without}) ==
+      Lines{
+          "input report without an id: the device has no such report; its input reports: 0x01, 0x02, 0x03"});
   CHECK(find_differences(parsed(ten_bit_axes()), {{ReportKind::output, {}, 2, {}}}) ==
-        LineReader{"output report without an id: the device has none such; it has no output report"});
+        Lines{"output report without an id: the device has no such report; it has no output report"});
 }
 
-TEST_CASE("a report may be as short as is allowed, and one that need not be there may be absent",
-          "[layout_check]") {
+TEST_CASE("a report may have its minimum length, and an optional report may be absent", "[layout_check]") {
   const ReportDescriptor device = parsed(space_navigator());  // report 3 has 3 bytes, with 2 buttons
   const ExpectedField buttons{"buttons", 8, 32, 1, false};
   ExpectedReport report{ReportKind::input, 3, 7, {buttons}};
   CHECK(find_differences(device, {report}).size() == 2);  // its length, and the field beyond its end
   report.min_length = 3;
-  CHECK(find_differences(device, {report}) == LineReader{});
+  CHECK(find_differences(device, {report}) == Lines{});
   report.min_length = 4;
   CHECK(find_differences(device, {report}).size() == 2);
-  const ExpectedField axis{"axis", 8, 16, 6, false};  // what is there has to agree as ever
+  const ExpectedField axis{"axis", 8, 16, 6, false};  // an axis that is present must agree
   CHECK(find_differences(device, {{ReportKind::input, 1, 13, {axis}, 7, false}}).size() == 1);
 
   report.id = 0x17;
   CHECK(find_differences(device, {report}).size() == 1);
   report.may_be_absent = true;
-  CHECK(find_differences(device, {report}) == LineReader{});
+  CHECK(find_differences(device, {report}) == Lines{});
 }
 
 TEST_CASE("a profile without report ids expects a device without them", "[layout_check]") {
@@ -159,7 +158,7 @@ TEST_CASE("a profile without report ids expects a device without them", "[layout
   CHECK(expected[0].length == 64);
   const ReportDescriptor device =
       parsed(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 40 09 01 81 02 95 20 09 02 91 02 c0"));
-  CHECK(find_differences(device, expected) == LineReader{});
+  CHECK(find_differences(device, expected) == Lines{});
 }
 
 TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layout_check]") {
@@ -168,19 +167,19 @@ TEST_CASE("shipped profiles agree with the descriptors of their devices", "[layo
         parsed(descriptor),
         expected_reports(load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + std::string(name))));
   };
-  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == LineReader{});
-  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == LineReader{});
-  CHECK(differ("polhem.toml", teensy_rawhid()) == LineReader{});
-  // Buttons of two bytes where the profile takes up to six, no battery, and a battery where there is one.
-  CHECK(differ("spacemouse_split.toml", space_navigator()) == LineReader{});
-  CHECK(differ("spacemouse_split.toml", home_made_split()) == LineReader{});
-  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == LineReader{});
-  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == LineReader{});
+  CHECK(differ("reference_full_speed.toml", from_hex(kReference)) == Lines{});
+  CHECK(differ("reference_high_speed.toml", from_hex(kReference)) == Lines{});
+  CHECK(differ("polhem.toml", teensy_rawhid()) == Lines{});
+  // Two bytes of buttons although the profile permits six, no battery, and a battery on another model.
+  CHECK(differ("spacemouse_split.toml", space_navigator()) == Lines{});
+  CHECK(differ("spacemouse_split.toml", home_made_split()) == Lines{});
+  CHECK(differ("spacemouse_combined.toml", space_mouse_wireless()) == Lines{});
+  CHECK(differ("spacemouse_combined.toml", home_made_combined()) == Lines{});
   CHECK_FALSE(differ("spacemouse_combined.toml", space_navigator()).empty());
   CHECK_FALSE(differ("spacemouse_split.toml", space_mouse_wireless()).empty());
 }
 
-TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_check]") {
+TEST_CASE("wrenchctl check --against prints the required changes", "[layout_check]") {
   const std::string profile = WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml";
   const TemporaryDirectory dir;
   const auto check = [&](const std::string& file, const std::string& descriptor) {
@@ -198,10 +197,10 @@ TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_che
   shorter.replace(shorter.find("95 3f"), 5, "95 3e");
   const ProgramResult bad = check(profile, shorter);
   CHECK(bad.exit_code == 1);
-  CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with what " + source +
+  CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with the report descriptor of " + source +
                        " says of its reports; change the profile, or name the device it is for:\n"
-                       "  input report 0x01: the profile says 64 bytes, the device 63\n"
-                       "  input report 0x01, checksum: the profile says 16 bits, unsigned, from byte 62; the "
+                       "  input report 0x01: the profile has 64 bytes, the device 63\n"
+                       "  input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the "
                        "device's report ends with byte 62\n");
 
   const ProgramResult scene = check(WRENCHD_SOURCE_DIR "/config/scenes/cube_on_table.toml", kReference);
@@ -210,7 +209,7 @@ TEST_CASE("wrenchctl check --against tells a maker what to change", "[layout_che
   const ProgramResult broken = check(profile, "05 01 c0");
   CHECK(broken.exit_code == 1);
   CHECK(broken.err ==
-        "wrenchctl: " + source + ": report descriptor, byte 2: ends a collection, and none is open\n");
+        "wrenchctl: " + source + ": report descriptor, byte 2: ends a collection, but none is open\n");
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-/// A wild way, with steps of many lengths.
+/// An irregular trajectory with different time steps.
 std::vector<TimedPose> wild_way() {
   RandomValues random(4);
   std::vector<TimedPose> poses;
@@ -30,12 +30,12 @@ std::vector<TimedPose> wild_way() {
 
 }  // namespace
 
-TEST_CASE("a path to play back goes through its poses at their times", "[playback]") {
+TEST_CASE("a pose spline passes through its poses at their times", "[pose_spline]") {
   const auto poses = wild_way();
   const PoseSpline track(poses);
   for (const TimedPose& pose : poses) {
     const Pose X = track.at(from_seconds(pose.time_s)).X_BG;
-    CHECK((X.translation_m - pose.X.translation_m).norm() < 1e-7);  // a nanosecond of the fastest step
+    CHECK((X.translation_m - pose.X.translation_m).norm() < 1e-7);  // one nanosecond at the highest speed
     CHECK(X.rotation.angularDistance(pose.X.rotation) < 1e-6);
   }
   CHECK(same_bits(track.at(from_seconds(1e6)).X_BG, poses.back().X));
@@ -43,7 +43,7 @@ TEST_CASE("a path to play back goes through its poses at their times", "[playbac
   CHECK(same_bits(track.at(Duration{-5}).X_BG, poses.front().X));
 }
 
-TEST_CASE("its twist is the derivative of its pose, and does not jump", "[playback]") {
+TEST_CASE("the twist of a pose spline is the continuous derivative of its pose", "[pose_spline]") {
   const auto poses = wild_way();
   const PoseSpline track(poses);
   RandomValues random(5);
@@ -71,7 +71,7 @@ TEST_CASE("its twist is the derivative of its pose, and does not jump", "[playba
   CHECK(track.at(Duration{0}).V_BG.linear_m_per_s.norm() < 1e-9);
 }
 
-TEST_CASE("a steady screw is played back as such", "[playback]") {
+TEST_CASE("a pose spline reproduces a constant screw motion", "[pose_spline]") {
   std::vector<TimedPose> poses;
   for (int i = 0; i <= 20; ++i)
     poses.push_back({0.05 * i, {rotation_from({0.0, 0.0, 0.06 * i}), {0.01 * i, 0.0, 0.0}}});
@@ -84,14 +84,14 @@ TEST_CASE("a steady screw is played back as such", "[playback]") {
   }
 }
 
-TEST_CASE("a path that cannot be played back is refused", "[playback]") {
+TEST_CASE("an invalid recorded path is rejected", "[pose_spline]") {
   const auto turned = [](double time_s, double angle) {
     return TimedPose{time_s, {rotation_from({angle, 0.0, 0.0}), Vector3d::Zero()}};
   };
   CHECK_THROWS_WITH(PoseSpline({}), Contains("has no pose"));
   CHECK_THROWS_WITH(PoseSpline({turned(0.1, 0.0)}), Contains("not at time 0"));
   CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.0, 0.1)}), Contains("times must rise"));
-  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.1, 2.1)}), Contains("which way round"));
+  CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(0.1, 2.1)}), Contains("to be unambiguous"));
   CHECK_THROWS_WITH(PoseSpline({turned(0.0, 0.0), turned(std::nan(""), 0.1)}), Contains("not finite"));
   CHECK(PoseSpline({turned(0.0, 0.5)}).at(from_seconds(3.0)).X_BG.rotation.x() == Approx(std::sin(0.25)));
 }

@@ -21,7 +21,7 @@ namespace {
 
 const DeviceProfile kProfile = reference_profile();
 
-/// A link whose far side is a list: what is queued is read, what is written is kept.
+/// Link with scripted reports: reads return queued reports, writes are recorded.
 class ScriptedLink final : public ReportLink {
  public:
   void open() override { ++opened; }
@@ -47,19 +47,19 @@ class ScriptedLink final : public ReportLink {
   int opened = 0, closed = 0;
 };
 
-/// A device on a scripted link that has opened it, and a far side that counts as a good firmware does.
+/// A device opened on a scripted link. The far end counts like a correct firmware.
 struct Bench {
   ScriptedLink link;
   ProfileDevice device{kProfile, link};
-  PoseReport report;  ///< what push() sends next; its counters are at the start of the last millisecond
+  PoseReport report;  ///< next report of push(); its counters are those at the start of the last millisecond
   TimePoint now{};
 
   Bench() {
     device.open();
-    device.read_newest(now);  // the first read only empties the link
+    device.read_newest(now);  // the first read only discards waiting reports
   }
 
-  /// One more millisecond and the report at its end.
+  /// Advances one millisecond and sends a report at its end.
   void push() {
     now += 1ms;
     ++report.sequence;
@@ -83,7 +83,7 @@ Wrench last_wrench(const Bench& bench) {
 
 }  // namespace
 
-TEST_CASE("the newest of several waiting reports wins and the others are counted") {
+TEST_CASE("a read uses the newest of several waiting reports and counts the others") {
   Bench bench;
   for (int i = 0; i < 5; ++i) {
     bench.report.X_BH.translation_m.x() += 1e-4;
@@ -104,14 +104,14 @@ TEST_CASE("the newest of several waiting reports wins and the others are counted
   CHECK(none.X_BH.translation_m.x() == Approx(5e-4));
 }
 
-TEST_CASE("a flood costs no more than one ring of reports a read") {
+TEST_CASE("a read processes at most one ring of reports") {
   Bench bench;
   for (int i = 0; i < 200; ++i) bench.push();
   bench.device.read_newest(bench.now);
   CHECK(bench.link.reports.size() == 200 - ProfileDevice::kMaxReportsPerRead);
 }
 
-TEST_CASE("sequence, clock and lost reports are counted across every wrap") {
+TEST_CASE("sequence, clock and lost reports are unwrapped correctly") {
   Bench bench;
   bench.report.sequence = 65'530;
   bench.report.device_time = 0xffff'ffff - 3000;
@@ -182,7 +182,7 @@ TEST_CASE("repeated, backward and damaged reports are dropped and counted") {
   CHECK(rejects());
 }
 
-TEST_CASE("a damaged newest report leaves the one before it") {
+TEST_CASE("if the newest report is damaged, the previous one is used") {
   Bench bench;
   bench.step();
   bench.report.X_BH.translation_m.y() = 1e-4;
@@ -197,7 +197,7 @@ TEST_CASE("a damaged newest report leaves the one before it") {
   CHECK(sample.X_BH.translation_m.y() == Approx(1e-4));
 }
 
-TEST_CASE("silence is a fault after the profile's time, from the first read and from each report") {
+TEST_CASE("silence longer than stale_fault_s is a fault, from the first read and from each report") {
   Bench bench;
   CHECK(bench.device.read_newest(bench.now).fault == Fault::none);
   CHECK(bench.device.read_newest(bench.now + 20ms).fault == Fault::none);
@@ -212,7 +212,7 @@ TEST_CASE("silence is a fault after the profile's time, from the first read and 
   CHECK(stale.X_BH.translation_m.x() == Approx(0.1));
 }
 
-TEST_CASE("a stream of nothing but bad reports is silence") {
+TEST_CASE("a stream of invalid reports counts as silence") {
   Bench bench;
   bench.step();
   DeviceSample sample;
@@ -234,7 +234,7 @@ TEST_CASE("a report that waited too long is stale although it is new") {
   CHECK(sample.fault == Fault::sample_stale);
 }
 
-TEST_CASE("a link that is gone stays lost until the device is opened again") {
+TEST_CASE("a disconnected link stays lost until the device is opened again") {
   Bench bench;
   bench.step();
   bench.push();
@@ -246,7 +246,7 @@ TEST_CASE("a link that is gone stays lost until the device is opened again") {
   CHECK(bench.step().fault == Fault::none);
 }
 
-TEST_CASE("what waited in the link before the first read is thrown away") {
+TEST_CASE("the first read discards waiting reports") {
   Bench bench;
   bench.device.open();
   for (int i = 0; i < 10; ++i) bench.push();
@@ -261,7 +261,7 @@ TEST_CASE("what waited in the link before the first read is thrown away") {
   CHECK(sample.fault == Fault::none);
 }
 
-TEST_CASE("a device that starts to count anew is silent for its time, then heard again") {
+TEST_CASE("a device that restarts its counters is accepted after stale_fault_s") {
   Bench bench;
   bench.report.sequence = 5000;
   bench.report.device_time = 9'000'000;
@@ -282,7 +282,7 @@ TEST_CASE("a device that starts to count anew is silent for its time, then heard
   CHECK(sample.missing == 0);
 }
 
-TEST_CASE("a device that repeats one report is never heard again") {
+TEST_CASE("a repeated report is never accepted") {
   Bench bench;
   bench.step();
   for (int i = 1; i <= 100; ++i) {
@@ -294,7 +294,7 @@ TEST_CASE("a device that repeats one report is never heard again") {
   }
 }
 
-TEST_CASE("an orientation that is no rotation is a fault and the last good pose stays") {
+TEST_CASE("an invalid orientation is a fault, and the last valid pose stays") {
   for (const double length : {0.0, 0.5, 0.89, 1.1, 1.9}) {
     Bench bench;
     bench.report.X_BH.translation_m.z() = 0.1;
@@ -310,7 +310,7 @@ TEST_CASE("an orientation that is no rotation is a fault and the last good pose 
   }
 }
 
-TEST_CASE("an orientation that is nearly unit is made unit, whatever its sign") {
+TEST_CASE("an orientation of nearly unit norm is normalised, with either sign") {
   Bench bench;
   bench.step();
   bench.report.X_BH.rotation.coeffs() *= -1.05;
@@ -319,7 +319,7 @@ TEST_CASE("an orientation that is nearly unit is made unit, whatever its sign") 
   CHECK(sample.X_BH.rotation.norm() == Approx(1.0).epsilon(1e-12));
 }
 
-TEST_CASE("a pose that jumps farther than any hand is a fault, there and back") {
+TEST_CASE("a pose jump beyond the speed limits is a fault, in both directions") {
   Bench bench;
   bench.step();
   SECTION("position") {
@@ -337,7 +337,7 @@ TEST_CASE("a pose that jumps farther than any hand is a fault, there and back") 
   CHECK(bench.step().fault == Fault::pose_jumped);
 }
 
-TEST_CASE("a way that is long because reports were lost is no jump") {
+TEST_CASE("a large displacement after lost reports is no jump") {
   Bench bench;
   bench.step();
   for (int i = 0; i < 9; ++i) bench.push();
@@ -348,7 +348,7 @@ TEST_CASE("a way that is long because reports were lost is no jump") {
   CHECK(sample.fault == Fault::none);
 }
 
-TEST_CASE("motion during bad samples is not held against the first good one") {
+TEST_CASE("motion during invalid samples does not make the next valid sample a jump") {
   Bench bench;
   bench.step();
   bench.report.X_BH.rotation.coeffs() *= 0.5;
@@ -358,7 +358,7 @@ TEST_CASE("motion during bad samples is not held against the first good one") {
   CHECK(bench.step().fault == Fault::none);
 }
 
-TEST_CASE("two samples in a row over the profile's speed are a fault") {
+TEST_CASE("two consecutive samples above the speed limit are a fault") {
   Bench bench;
   bench.step();
   std::function<void()> move;
@@ -398,9 +398,9 @@ TEST_CASE("motion just within the speeds is no fault") {
   }
 }
 
-TEST_CASE("acknowledged names the command the device took last") {
+TEST_CASE("acknowledged is the last command that the device accepted") {
   Bench bench;
-  bench.report.acknowledged = 57;  // of a session before ours
+  bench.report.acknowledged = 57;  // of a previous session
   CHECK(bench.step().acknowledged == 0);
   for (std::uint64_t sent = 1; sent <= 1000; ++sent) {
     bench.device.write(bench.now, {}, true);
@@ -411,7 +411,7 @@ TEST_CASE("acknowledged names the command the device took last") {
   }
 }
 
-TEST_CASE("a wrench within the limits goes out as it is, with rising sequence and the profile's hold time") {
+TEST_CASE("a wrench within the limits is sent unchanged, with rising sequence and the profile's hold time") {
   Bench bench;
   for (std::uint32_t i = 1; i <= 3; ++i) {
     CHECK(bench.device.write(bench.now, {{1, -2, 3}, {0.1, 0, -0.2}}, true) == Fault::none);
@@ -425,7 +425,7 @@ TEST_CASE("a wrench within the limits goes out as it is, with rising sequence an
   }
 }
 
-TEST_CASE("no wrench beyond the limits ever reaches the bytes, and its direction stays") {
+TEST_CASE("a wrench beyond the limits is scaled to them and keeps its direction") {
   Bench bench;
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -474,7 +474,7 @@ TEST_CASE("with the motors off no wrench is sent") {
   CHECK_FALSE(bench.link.written.back().report.enable);
 }
 
-TEST_CASE("a device that does not take a wrench is a fault") {
+TEST_CASE("a rejected wrench is a fault") {
   Bench bench;
   bench.link.write_status = LinkStatus::not_ready;
   CHECK(bench.device.write(bench.now, {}, true) == Fault::write_failed);
@@ -482,7 +482,7 @@ TEST_CASE("a device that does not take a wrench is a fault") {
   CHECK(bench.device.write(bench.now, {}, true) == Fault::device_lost);
 }
 
-TEST_CASE("release sends five zeros with the motors off, and does no harm in any state") {
+TEST_CASE("release sends five zero wrenches with the motors off, in every state") {
   Bench bench;
   bench.device.write(bench.now, {{5, 0, 0}, {0, 0, 0.1}}, true);
   bench.link.written.clear();
@@ -508,7 +508,7 @@ TEST_CASE("release sends five zeros with the motors off, and does no harm in any
   CHECK(never_opened.read_newest({}).fault == Fault::device_lost);
 }
 
-TEST_CASE("a profile that cannot work is refused before the link is opened") {
+TEST_CASE("an invalid profile is rejected before the link is opened") {
   using Catch::Contains;
   const auto refuses = [](const std::function<void(DeviceProfile&)>& spoil, const std::string& word) {
     DeviceProfile profile = kProfile;
@@ -527,7 +527,7 @@ TEST_CASE("a profile that cannot work is refused before the link is opened") {
   refuses([](DeviceProfile& p) { p.wrench_report.torque.present = false; }, "torque");
 }
 
-TEST_CASE("a device that wants to be kept alive is spoken to at its period, and told when it is over") {
+TEST_CASE("a device with keep-alive gets it at its period, and its shutdown report at the end") {
   DeviceProfile profile = kProfile;
   profile.keep_alive.bytes = {0x26};
   profile.keep_alive_period_s = 0.5;
@@ -546,8 +546,7 @@ TEST_CASE("a device that wants to be kept alive is spoken to at its period, and 
   CHECK(link.written[5].outcome == Decoding::wrong_length);
 }
 
-TEST_CASE(
-    "a device that only pushes drops torques, and one without a watchdog gets a quarter of its limits") {
+TEST_CASE("a device without torque drops it, and a device without a watchdog gets a quarter of its limits") {
   DeviceProfile profile = kProfile;
   profile.wrench_report.torque.present = false;
   profile.max_torque_Nm = 0.0;
@@ -572,7 +571,7 @@ TEST_CASE(
   CHECK(other.written.back().report.F.torque_Nm.y() == Approx(0.125).epsilon(1e-4));
 }
 
-TEST_CASE("the device's own axes and its handle point are turned into ours, both ways") {
+TEST_CASE("the frames of the device convert to base and handle in both directions") {
   DeviceProfile profile = kProfile;
   Matrix3d R;  // x right, y toward the user, z down
   R << 0, -1, 0, -1, 0, 0, 0, 0, -1;

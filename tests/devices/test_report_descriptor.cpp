@@ -14,8 +14,8 @@ ReportDescriptor parsed(const std::string& hex) {
   return parse_report_descriptor(from_hex(hex));
 }
 
-/// Why it is refused; empty where it is not.
-std::string rejection_text(const Bytes& bytes) {
+/// Returns the error of a descriptor; empty if it is valid.
+std::string parse_error(const Bytes& bytes) {
   try {
     parse_report_descriptor(bytes);
   } catch (const DescriptorError& error) {
@@ -31,14 +31,14 @@ const DescribedReport& report(const ReportDescriptor& descriptor, ReportKind kin
   return *found;
 }
 
-/// A vendor's collection around items, which have fields of one byte to start from.
+/// A vendor collection around items; their fields start with one byte.
 std::string framed(const std::string& items) {
   return "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 95 01" + items + "c0";
 }
 
 TEST_CASE("a SpaceNavigator's descriptor: three axes in each of two reports", "[report_descriptor]") {
   const Bytes bytes = space_navigator();
-  REQUIRE(bytes.size() == 217);  // as Linux tells of the device
+  REQUIRE(bytes.size() == 217);  // size reported by Linux
   const ReportDescriptor d = parse_report_descriptor(bytes);
   CHECK(d.has_ids());
   CHECK(d.reports.size() == 12);
@@ -65,7 +65,7 @@ TEST_CASE("a SpaceNavigator's descriptor: three axes in each of two reports", "[
   CHECK(d.application(axes) == Usage{0x01, 0x08});
   CHECK(to_text(*axes.usage(2)) == "01:32 (Z)");
 
-  // Nothing was said of units for the rotations, so those of the translations still hold.
+  // The descriptor states no unit for the rotations, so the unit of the translations still applies.
   const DescribedReport& rotation = report(d, ReportKind::input, 2);
   CHECK(rotation.length == 7);
   CHECK(rotation.fields.at(0).unit == 0x11);
@@ -107,7 +107,7 @@ TEST_CASE("without report ids, fields begin at the first bit", "[report_descript
   CHECK(in.length == 64);
   CHECK(in.fields.at(0).bit == 0);
   CHECK(in.fields.at(0).count == 64);
-  CHECK(in.fields.at(0).usage(63) == Usage{0xFFAB, 1});  // one usage serves for all
+  CHECK(in.fields.at(0).usage(63) == Usage{0xFFAB, 1});  // one usage applies to all fields
   CHECK(teensy.application(in.fields.at(0)) == Usage{0xFFAB, 0x0200});
   CHECK(report(teensy, ReportKind::output, {}).length == 64);
 
@@ -130,7 +130,7 @@ TEST_CASE("the keyboard of the specification", "[report_descriptor]") {
   CHECK_FALSE(array.variable);
   CHECK(array.bit == 16);
   CHECK(array.count == 6);
-  REQUIRE(array.usages.size() == 1);  // 102 usages, not spread out
+  REQUIRE(array.usages.size() == 1);  // 102 usages, not expanded
   CHECK(array.usages[0].last_id == 0x65);
   CHECK(report(d, ReportKind::output, {}).length == 1);
 }
@@ -146,13 +146,13 @@ TEST_CASE("a joystick with force effects", "[report_descriptor]") {
   const DescribedReport& force = report(d, ReportKind::output, 5);
   CHECK(force.length == 8);
   REQUIRE(force.fields.size() == 3);
-  CHECK(force.fields[0].logical_min == 1);  // though its maximum was written first
+  CHECK(force.fields[0].logical_min == 1);  // although its maximum comes first in the descriptor
   CHECK(force.fields[0].logical_max == 40);
   CHECK(force.fields[1].logical_min == -32767);
   CHECK(force.fields[1].physical_min == -10000);
   const DescribedField& direction = force.fields[2];
   CHECK(direction.usage(0) == Usage{0x0A, 1});  // with its own page
-  CHECK(direction.usage(1) == Usage{0x0A, 2});  // the alternative between was passed over
+  CHECK(direction.usage(1) == Usage{0x0A, 2});  // the alternative in between was skipped
   CHECK(direction.logical_max == 36000);
   CHECK(direction.unit_exponent == -2);  // a byte, not a nibble
 
@@ -177,7 +177,7 @@ TEST_CASE("a maximum is unsigned unless the minimum is negative", "[report_descr
   CHECK(range("14 27 ff ff ff ff") == Range(0, 4294967295LL));
 }
 
-TEST_CASE("a usage takes the page that holds where its field is declared", "[report_descriptor]") {
+TEST_CASE("a usage takes the page that is current where its field is declared", "[report_descriptor]") {
   const auto usage = [](const std::string& items) {
     return *parsed(framed(items + "81 02")).reports.at(0).fields.at(0).usage(0);
   };
@@ -186,7 +186,7 @@ TEST_CASE("a usage takes the page that holds where its field is declared", "[rep
   CHECK(usage("05 09 0b 30 00 01 00") == Usage{0x01, 0x30});
 }
 
-TEST_CASE("push keeps what holds, and pop brings it back", "[report_descriptor]") {
+TEST_CASE("push saves the global state, and pop restores it", "[report_descriptor]") {
   const auto d = parsed(framed("a4 75 10 95 03 81 02 b4 81 02"));
   const DescribedReport& in = report(d, ReportKind::input, {});
   CHECK(in.fields.at(0).count == 3);
@@ -195,17 +195,17 @@ TEST_CASE("push keeps what holds, and pop brings it back", "[report_descriptor]"
   CHECK(in.fields.at(1).bit == 48);
 }
 
-TEST_CASE("a field of no bits, and a field that is not there, declare nothing", "[report_descriptor]") {
+TEST_CASE("a field without bits and a count of zero declare nothing", "[report_descriptor]") {
   CHECK(parsed(framed("95 00 81 02 95 01 81 02")).reports.at(0).fields.size() == 1);
   CHECK(parsed(framed("75 00 81 02 75 08 81 02")).reports.at(0).fields.size() == 1);
 }
 
-TEST_CASE("items of reserved types and tags are passed over, as Linux does", "[report_descriptor]") {
-  CHECK(rejection_text(from_hex(framed("0c 81 02 f9 01"))).empty());
-  CHECK(rejection_text(from_hex(framed("81 02 00 00"))).empty());
+TEST_CASE("items of reserved types and tags are skipped, as in Linux", "[report_descriptor]") {
+  CHECK(parse_error(from_hex(framed("0c 81 02 f9 01"))).empty());
+  CHECK(parse_error(from_hex(framed("81 02 00 00"))).empty());
 }
 
-TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_descriptor]") {
+TEST_CASE("an invalid descriptor is rejected with the byte and the reason", "[report_descriptor]") {
   struct Bad {
     std::string hex;
     std::string message;
@@ -237,23 +237,23 @@ TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_d
            {"05 01 fe 02 00 00 00", "byte 2: is a long item"},
            {"05 01", "byte 2: it declares no report"},
            {framed("81 02 a1 00"), "byte 21: 1 collection(s) are still open"},
-           {"05 01 c0", "byte 2: ends a collection, and none is open"},
-           {"75 08 95 01 81 02", "byte 4: declares a field outside of every collection"},
-           {"a1 01 95 01 81 02 c0", "byte 4: declares a field before any Report Size was given"},
-           {"a1 01 75 08 81 02 c0", "byte 4: declares a field before any Report Count was given"},
+           {"05 01 c0", "byte 2: ends a collection, but none is open"},
+           {"75 08 95 01 81 02", "byte 4: declares a field outside every collection"},
+           {"a1 01 95 01 81 02 c0", "byte 4: declares a field before any Report Size"},
+           {"a1 01 75 08 81 02 c0", "byte 4: declares a field before any Report Count"},
            {framed("81 02 a4"), "byte 20: 1 push(es) without a pop"},
-           {framed("b4 81 02"), "byte 16: pops what was never pushed"},
+           {framed("b4 81 02"), "byte 16: is a pop without a push"},
            {framed(pushes), "byte 32: pushes are nested more than 16 deep"},
            {framed(nested), "byte 78: collections are nested more than 32 deep"},
-           {framed("76 01 01 81 02"), "byte 16: fields of 257 bits; 256 are the most"},
+           {framed("76 01 01 81 02"), "byte 16: fields of 257 bits; 256 is the maximum"},
            {framed("77 ff ff ff ff 81 02"), "byte 16: fields of 4294967295 bits"},
            {framed("97 ff ff ff ff 81 02"), "byte 21: 4294967295 fields of 8 bits make the report longer"},
            {framed("96 00 40 81 02 81 02"), "byte 21: 16384 fields of 8 bits make the report longer"},
            {framed(fields), "byte 528: is field 257 of its report"},
-           {framed(long_one), "byte 4096: the descriptor has 4115 bytes; 4096 are the most"},
+           {framed(long_one), "byte 4096: the descriptor has 4115 bytes; 4096 is the maximum"},
            {framed("85 00 81 02"), "byte 16: report id 0; 1 to 255 are allowed"},
            {framed("86 00 01 81 02"), "byte 16: report id 256; 1 to 255 are allowed"},
-           {framed("81 02 85 01 81 02"), "byte 18: gives a report id where fields before it have none"},
+           {framed("81 02 85 01 81 02"), "byte 18: sets a report id, but previous fields have none"},
            {framed("a4 85 01 81 02 b4 81 02"), "byte 22: declares a field without a report id"},
            {framed("15 01 25 00 81 02"), "byte 20: the logical range 1 to 0 is empty"},
            {framed("55 20 81 02"), "byte 16: unit exponent 32; -8 to 7 are defined"},
@@ -261,32 +261,31 @@ TEST_CASE("a bad descriptor is refused with the byte and the reason", "[report_d
            {framed("c4 81 02"), "byte 16: global item with the reserved tag 12"},
            {framed("19 01 81 02"), "byte 16: a usage minimum without its maximum"},
            {framed("29 01 81 02"), "byte 16: a usage maximum without its minimum"},
-           {framed("19 01 19 02 29 03 81 02"), "byte 18: a second end of a usage range"},
+           {framed("19 01 19 02 29 03 81 02"), "byte 18: is a second end of a usage range"},
            {framed("19 03 29 01 81 02"), "byte 18: the usages ff00:03 (vendor defined) to ff00:01"},
-           {framed("1b 01 00 01 00 29 03 81 02"), "no range: one page, the smaller first"},
-           {framed("a9 01 09 01 81 02"), "byte 20: stands between delimiters"},
-           {framed("a9 01 a9 01 81 02"), "byte 18: opens a delimiter inside of one"},
-           {framed("a9 00 81 02"), "byte 16: closes a delimiter, and none is open"},
+           {framed("1b 01 00 01 00 29 03 81 02"), "no range: use one page, the smaller first"},
+           {framed("a9 01 09 01 81 02"), "byte 20: is between delimiters"},
+           {framed("a9 01 a9 01 81 02"), "byte 18: opens a delimiter inside another"},
+           {framed("a9 00 81 02"), "byte 16: closes a delimiter, but none is open"},
            {framed("a9 02 81 02"), "byte 16: delimiter 2; 1 opens and 0 closes"},
            {framed("81 02") + "a9 01", "byte 21: a delimiter is still open"},
        }) {
     INFO(bad.hex);
-    const std::string message = rejection_text(from_hex(bad.hex));
+    const std::string message = parse_error(from_hex(bad.hex));
     INFO(message);
     CHECK(message.find(bad.message) != std::string::npos);
   }
 }
 
-TEST_CASE("every descriptor cut short is refused", "[report_descriptor]") {
+TEST_CASE("every truncated descriptor is rejected", "[report_descriptor]") {
   for (const Bytes& whole : sample_descriptors()) {
-    REQUIRE(rejection_text(whole).empty());
+    REQUIRE(parse_error(whole).empty());
     for (std::size_t length = 0; length < whole.size(); ++length)
-      CHECK_FALSE(
-          rejection_text({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}).empty());
+      CHECK_FALSE(parse_error({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}).empty());
   }
 }
 
-/// What must hold of whatever is accepted.
+/// Invariants of every accepted descriptor.
 void check_sound(const ReportDescriptor& descriptor) {
   bool sound = !descriptor.reports.empty();
   for (const DescribedReport& r : descriptor.reports) {
@@ -303,12 +302,14 @@ void check_sound(const ReportDescriptor& descriptor) {
     }
     sound = sound && r.length == (end + 7) / 8;
   }
-  if (!sound) FAIL("what was accepted contradicts itself");  // a CHECK each would cost more than the parsing
+  if (!sound)
+    FAIL("what was accepted contradicts itself");  // one CHECK per invariant would take longer than the
+                                                   // parsing
 }
 
-TEST_CASE("a million mutated and random descriptors are accepted whole or refused", "[report_descriptor]") {
+TEST_CASE("a million mutated and random descriptors are fully accepted or rejected", "[report_descriptor]") {
   RandomValues random(20);
-  constexpr int cases = 1'000'000;  // under sanitizers too: it is memory that such bytes are after
+  constexpr int cases = 1'000'000;  // also under sanitizers, which detect memory errors
   int accepted = 0;
   for (int i = 0; i < cases; ++i) {
     const Bytes bytes = malformed_descriptor(random);
@@ -319,7 +320,7 @@ TEST_CASE("a million mutated and random descriptors are accepted whole or refuse
       if (error.at() > bytes.size()) FAIL("refused at a byte that is not there");
     }
   }
-  CHECK(accepted > cases / 20);  // both ways are walked often
+  CHECK(accepted > cases / 20);  // both outcomes are frequent
   CHECK(accepted < cases / 2);
 }
 

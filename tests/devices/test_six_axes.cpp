@@ -28,16 +28,16 @@ Bytes controller(const std::string& items) {
   return from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 01" + items + "c0");
 }
 
-TEST_CASE("split and combined layouts are told by the descriptor alone", "[six_axes]") {
+TEST_CASE("split and combined layouts are distinguished by the descriptor alone", "[six_axes]") {
   CHECK(six_axes(space_navigator()).layout == AxesLayout::split);
   CHECK(six_axes(space_mouse_wireless()).layout == AxesLayout::combined);
   CHECK(six_axes(ten_bit_axes()).layout == AxesLayout::combined);
-  // These two borrow the id of a device of the other layout.
+  // These two have the id of a device with the other layout.
   CHECK(six_axes(home_made_combined()).layout == AxesLayout::combined);
   CHECK(six_axes(home_made_split()).layout == AxesLayout::split);
 }
 
-TEST_CASE("a SpaceNavigator's axes, buttons and LED are where they are known to be", "[six_axes]") {
+TEST_CASE("axes, buttons and LED of a SpaceNavigator are found at their known positions", "[six_axes]") {
   const SixAxisController device = six_axes(space_navigator());
   for (std::size_t i = 0; i < 6; ++i) {
     const DescribedNumber& axis = device.axes[i];
@@ -49,7 +49,7 @@ TEST_CASE("a SpaceNavigator's axes, buttons and LED are where they are known to 
     CHECK(axis.relative);
   }
   CHECK(device.axes[0].step == Approx(4e-6).epsilon(1e-12));  // 1400e-4 cm are 350 counts
-  CHECK(std::isnan(device.axes[3].step));                     // a unit of length, said of a rotation
+  CHECK(std::isnan(device.axes[3].step));                     // a unit of length for a rotation
   REQUIRE(device.buttons);
   CHECK(device.buttons->report_id == 3);
   CHECK(device.buttons->bit == 8);
@@ -89,25 +89,28 @@ TEST_CASE("steps come from physical range, exponent and unit", "[six_axes]") {
   CHECK(std::isnan(steps("65 12").first));
   CHECK(std::isnan(steps("65 11").second));
   CHECK(std::isnan(steps("65 21").first));              // cm^2
-  CHECK(std::isnan(steps("65 11 35 7f 45 01").first));  // a physical range upside down
+  CHECK(std::isnan(steps("65 11 35 7f 45 01").first));  // inverted physical range
 }
 
-TEST_CASE("what has no six axes is told apart, with the reason", "[six_axes]") {
+TEST_CASE("a device without six axes is rejected with the reason", "[six_axes]") {
   struct Other {
     Bytes bytes;
     std::string why_not;
   };
   for (const Other& other : {
-           Other{boot_keyboard(), "it is no multi-axis controller (01:08); it wants to be 01:06 (keyboard)"},
-           Other{effects_joystick(), "it wants to be 01:04 (joystick)"},  // though it has all six axes
-           Other{teensy_rawhid(), "it wants to be ffab:200 (vendor defined)"},
+           Other{boot_keyboard(),
+                 "it is no multi-axis controller (01:08); its applications are 01:06 (keyboard)"},
+           Other{effects_joystick(),
+                 "its applications are 01:04 (joystick)"},  // although it has all six axes
+           Other{teensy_rawhid(), "its applications are ffab:200 (vendor defined)"},
            Other{controller("19 30 29 32 95 03 81 02"), "without Rx, Ry, Rz"},
            Other{controller("19 30 29 35 95 06 81 02 09 30 95 01 81 02"), "it has X twice"},
-           Other{controller("19 30 29 35 95 06 b1 02"), "without X, Y, Z, Rx, Ry, Rz"},  // on request only
-           Other{controller("19 30 29 35 95 06 81 03"), "without X, Y, Z, Rx, Ry, Rz"},  // all padding
-           Other{controller("75 40 19 30 29 35 95 06 81 02"), "its X has 64 bits; 32 are the most"},
+           Other{controller("19 30 29 35 95 06 b1 02"),
+                 "without X, Y, Z, Rx, Ry, Rz"},  // feature report only
+           Other{controller("19 30 29 35 95 06 81 03"), "without X, Y, Z, Rx, Ry, Rz"},  // padding only
+           Other{controller("75 40 19 30 29 35 95 06 81 02"), "its X has 64 bits; the maximum is 32"},
            Other{controller("85 01 19 30 29 31 95 02 81 02 85 02 19 32 29 35 95 04 81 02"),
-                 "its axes are spread over its reports otherwise"},
+                 "its axes are not grouped"},
        }) {
     const SixAxisResult found = found_in(other.bytes);
     INFO(found.rejection);

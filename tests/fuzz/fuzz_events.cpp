@@ -59,8 +59,8 @@ DeviceProfile profile() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Bytes bytes(data, size);
   const DeviceProfile p = profile();
-  const Settings settings;
-  Watches watches(settings, p, 10.0, 0.5);
+  Watches watches(p, 10.0, 0.5);
+  PaceWatch pace = make_pace_watch(ServoSettings{});
   SelfTest test(p, 0.02);
   StateMachine machine(0.05);
   TimePoint now{std::chrono::hours(1)};
@@ -90,28 +90,31 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
     const State was = machine.state();
     bool opens = false;
-    if (sample.fault != Fault::device_lost && transition(Trigger::device_there, was).leads)
-      machine.on(Trigger::device_there);
-    const FaultSet found =
-        watches.pace.look(now, Duration{0}) | watches.look(sample, machine.state(), driven, now);
+    if (sample.fault != Fault::device_lost && transition(Trigger::device_connected, was).changes_state)
+      machine.on(Trigger::device_connected);
+    TickTime t;
+    t.now = now;
+    t.faults = pace.check(now, Duration{0});
+    t.recently_late = pace.recently_late(now);
+    const FaultSet found = t.faults | watches.check(sample, machine.state(), driven, t);
     for (FaultSet left = found; left != 0; left &= left - 1)
       machine.on(static_cast<Fault>(std::countr_zero(left)));
     if (const Fault overdue = machine.overdue(); overdue != Fault::none) machine.on(overdue);
     if (machine.state() == State::self_test) {
-      if (!testing) test.begin(now);
+      if (!testing) test.start(now);
       testing = true;
-      machine.on(test.look(sample, found, now));
-      if (test.passed()) machine.on(Trigger::passed);
+      machine.on(test.check(sample, found, now));
+      if (test.passed()) machine.on(Trigger::self_test_passed);
     }
     testing = machine.state() == State::self_test;
     if ((what & 16) != 0) {
       const auto trigger = static_cast<Trigger>(bytes.next() % kTriggerCount);
-      opens = trigger == Trigger::acknowledge || trigger == Trigger::quit || trigger == Trigger::end;
+      opens = trigger == Trigger::acknowledge || trigger == Trigger::quit || trigger == Trigger::process_end;
       machine.on(trigger);
     }
     if (is_latched(was) && !opens) require(is_latched(machine.state()));
     const State in = machine.state();
-    const double authority = machine.advance((what & 32) != 0, watches.pace.dt_s());
+    const double authority = machine.advance((what & 32) != 0, pace.dt_s());
     require(authority >= 0.0 && authority <= 1.0);
     require(authority == 0.0 || is_driving(machine.state()));
     require(authority <= before || in == State::ramping);

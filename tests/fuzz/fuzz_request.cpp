@@ -28,7 +28,7 @@ MethodTable make_table() {
     hold(params.contains("name") && params["name"].is_string(), "what is required is there, of its type");
     hold(params["name"].get<std::string>().find('\0') == std::string::npos, "no text holds a zero");
     for (const auto& [name, value] : params.items()) {
-      if (name == "over_s")
+      if (name == "duration_s")
         hold(value.is_number() && std::isfinite(value.get<double>()), "numbers are finite");
       if (name == "position_m") {
         hold(value.is_array() && value.size() == 3, "a vector has three");
@@ -44,7 +44,7 @@ MethodTable make_table() {
                       Role::operator_,
                       {{"name", ParamType::text, true, "which"},
                        {"position_m", ParamType::vector, false, "where"},
-                       {"over_s", ParamType::number, false, "how fast"},
+                       {"duration_s", ParamType::number, false, "how fast"},
                        {"count", ParamType::integer, false, "how often"},
                        {"names", ParamType::texts, false, "others"},
                        {"at_once", ParamType::boolean, false, "at once"},

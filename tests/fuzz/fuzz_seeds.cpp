@@ -225,13 +225,14 @@ Seeds request_seeds() {
   Seeds seeds;
   const std::string head = R"({"jsonrpc":"2.0","id":1,"method":")",
                     move = head + R"(scene.move","params":{"name":"a")";
-  for (const std::string& line :
-       {head + R"(stop"})", std::string(R"({"jsonrpc":"2.0","method":"stop","params":{}})"),
-        move +
-            R"(,"position_m":[0.1,-2e-3,3],"over_s":0.5,"count":7,"names":["b"],"at_once":true,"more":{}}})",
-        move + R"(,"position_m":[1,2]}})", move + R"(,"position":1}})", "[" + head + R"(stop"}])",
-        move + R"(,"more":{"x":[[[1]]],"y":null,"y":1}}})",
-        std::string(R"({"jsonrpc":"1.0","id":"x","method":5})")})
+  for (
+      const std::string& line :
+      {head + R"(stop"})", std::string(R"({"jsonrpc":"2.0","method":"stop","params":{}})"),
+       move +
+           R"(,"position_m":[0.1,-2e-3,3],"duration_s":0.5,"count":7,"names":["b"],"at_once":true,"more":{}}})",
+       move + R"(,"position_m":[1,2]}})", move + R"(,"position":1}})", "[" + head + R"(stop"}])",
+       move + R"(,"more":{"x":[[[1]]],"y":null,"y":1}}})",
+       std::string(R"({"jsonrpc":"1.0","id":"x","method":5})")})
     for (const char role : {'\0', '\1', '\2'}) seeds.inputs.push_back(role + line + '\n' + line);
   for (const char* word : {"\"jsonrpc\":\"2.0\"",
                            "\"id\":",
@@ -241,7 +242,7 @@ Seeds request_seeds() {
                            "stop",
                            "name",
                            "position_m",
-                           "over_s",
+                           "duration_s",
                            "count",
                            "names",
                            "at_once",

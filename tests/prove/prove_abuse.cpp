@@ -32,12 +32,12 @@
 #include "daemon/recording/recording_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// What abuse of the control socket costs the servo loop. The real daemon runs, armed by a client that keeps
-// its lease, and records every tick. Slices of a second in which other processes abuse its socket by all
-// means take turns with slices in which nobody does, and with some in which they do the same to a socket of
-// somebody else: that costs the machine as much, and what is left is the daemon's. All in one run, so that
-// what else the machine does falls on all alike. The times that ticks took, and by how much they came late,
-// are taken from the recording.
+// Measures how abuse of the control socket affects the servo loop. The real daemon runs, armed by a client
+// that keeps its lease, and records every tick. Slices of one second alternate between three conditions: no
+// abuse; abuse of the daemon's socket by other processes; and the same abuse of an unrelated socket. The
+// third condition costs the machine as much, so the difference is the daemon's own cost. All conditions run
+// in one recording, so other load affects them equally. Tick durations and wake latencies come from the
+// recording.
 
 namespace {
 
@@ -58,8 +58,8 @@ OwnedFd connected(const fs::path& path) {
   return fd;
 }
 
-/// Sends as much of it as goes without waiting long. False: nobody is there any more.
-bool push(int fd, const std::string& bytes) {
+/// Sends as many bytes as possible without a long wait. Returns false if the peer is gone.
+bool send_bytes(int fd, const std::string& bytes) {
   for (std::size_t sent = 0; sent < bytes.size();) {
     const ssize_t more = ::send(fd, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (more > 0) {
@@ -80,27 +80,27 @@ void drain(int fd) {
   }
 }
 
-/// One way to misbehave, for as long as it is wanted.
+/// One kind of abuse, repeated until `stop` is set.
 using Abuse = void (*)(const fs::path& path, const std::atomic<bool>& wanted);
 
 void floods_requests(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   std::string many;
   for (int i = 0; i < 50; ++i) many += request("describe");
-  while (wanted && fd && push(fd.get(), many)) drain(fd.get());
+  while (wanted && fd && send_bytes(fd.get(), many)) drain(fd.get());
 }
 
 void never_reads(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   const std::string line = request("subscribe") + request("status") + request("describe");
-  while (wanted && fd && push(fd.get(), line)) {
+  while (wanted && fd && send_bytes(fd.get(), line)) {
   }
 }
 
 void floods_rubbish(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   const std::string rubbish = std::string(40000, '[') + "\n{\"jsonrpc\":\"2.0\",\n\xff\xfe\n";
-  while (wanted && fd && push(fd.get(), rubbish)) drain(fd.get());
+  while (wanted && fd && send_bytes(fd.get(), rubbish)) drain(fd.get());
 }
 
 void endless_line(const fs::path& path, const std::atomic<bool>& wanted) {
@@ -108,7 +108,7 @@ void endless_line(const fs::path& path, const std::atomic<bool>& wanted) {
   while (wanted) {
     const OwnedFd fd = connected(path);
     if (!fd) return;
-    for (int i = 0; i < 1600 && wanted && push(fd.get(), piece); ++i) {
+    for (int i = 0; i < 1600 && wanted && send_bytes(fd.get(), piece); ++i) {
     }
   }
 }
@@ -124,17 +124,18 @@ void connects(const fs::path& path, const std::atomic<bool>& wanted) {
 
 void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
-  const std::string line = request("devices") + request("arm") + request("beat") + request("lease.give");
+  const std::string line =
+      request("devices") + request("arm") + request("lease.heartbeat") + request("lease.release");
   while (wanted && fd && push(fd.get(), line)) drain(fd.get());
 }
 
 constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,
                                           endless_line,    connects,    asks_for_all};
 
-/// The abusers, in a process of their own.
+/// Runs the abusers in a separate process.
 class Abusers {
  public:
-  /// uid: who they are, where this process may say so.
+  /// uid: the user of the abusers, if this process may change its user.
   Abusers(const fs::path& path, int threads, uid_t uid) {
     if (::pipe2(pipe_.data(), O_CLOEXEC) != 0)
       throw std::system_error(errno, std::generic_category(), "pipe");
@@ -177,7 +178,7 @@ class Abusers {
   pid_t pid_ = -1;
 };
 
-/// Somebody else's socket: takes every connection, and reads whatever comes, in a process of its own.
+/// An unrelated socket in a separate process, which accepts every connection and reads all input.
 class Decoy {
  public:
   explicit Decoy(const fs::path& path) : listens_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -245,7 +246,7 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   bool lives() const { return ::waitpid(pid_, nullptr, WNOHANG) == 0; }
-  /// Its exit code; -1: by a signal.
+  /// Ends the process. Returns its exit code; -1 if a signal ended it.
   int end() {
     ::kill(pid_, SIGTERM);
     int status = 0;
@@ -258,19 +259,19 @@ class Daemon {
   pid_t pid_ = -1;
 };
 
-/// Keeps the lease on a connection and a thread of its own, and takes it again where it lost it.
+/// Keeps the lease on its own connection and thread. Acquires the lease again if it is lost.
 class Holder {
  public:
   explicit Holder(const std::string& path) : client_(path) {
-    client_.call("lease.take");
+    client_.call("lease.acquire");
     client_.call("arm");
     thread_ = std::jthread([this](const std::stop_token& stop) {
       for (auto last = std::chrono::steady_clock::now(); !stop.stop_requested();) {
-        if (!does("beat")) {
+        if (!does("lease.heartbeat")) {
           ++lost_;
           if (longest_ < kTooLong) ++wronged_;
-          does("acknowledge");  // what the machine may have done meanwhile
-          does("lease.take");
+          does("acknowledge");  // clears a fault that a busy machine may have caused
+          does("lease.acquire");
           does("arm");
           longest_ = {};
         }
@@ -286,15 +287,14 @@ class Holder {
     thread_.request_stop();
     thread_.join();
   }
-  /// After end(): the longest between two of its beats, answer and all [ms].
+  /// After end(): returns the longest interval between two acknowledged heartbeats [ms].
   double worst_ms() const { return 1e-6 * static_cast<double>(worst_.count()); }
   long lost() const { return lost_; }
-  /// Where it had given every beat in time, the answer included.
-  long wronged() const { return wronged_; }
+  /// Returns the number of leases lost although every heartbeat, including its answer, was in time.
+  long lost_in_time() const { return wronged_; }
 
  private:
-  static constexpr auto kTooLong =
-      80ms;  ///< the lease allows 100, and this machine has to run the daemon too
+  static constexpr auto kTooLong = 80ms;  ///< the lease allows 100 ms, and the daemon shares the machine
 
   bool does(const char* method) try {
     client_.call(method);
@@ -304,13 +304,13 @@ class Holder {
   }
 
   Client client_;
-  std::chrono::nanoseconds longest_{0};  ///< since it took the lease
+  std::chrono::nanoseconds longest_{0};  ///< longest interval since the lease was acquired
   std::chrono::nanoseconds worst_{0};
   long lost_ = 0, wronged_ = 0;
   std::jthread thread_;
 };
 
-/// What happens in a slice.
+/// The condition of a slice.
 enum Kind : std::size_t { kQuiet, kBusy, kAbused, kKinds };
 
 struct Slice {
@@ -336,28 +336,28 @@ std::int64_t now_ns() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("prove_abuse: does abuse of the control socket reach the servo loop?");
+  CLI::App app("prove_abuse: measures how abuse of the control socket affects the servo loop.");
   long slices = 10;
   double slice_s = 1.0;
   std::uint64_t seed = 1;
   int threads = 12;
   std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "wrenchd").string();
-  app.add_option("--slices", slices, "rounds of a quiet, a busy and an abused slice")
+  app.add_option("--slices", slices, "number of rounds with an idle, a busy and an abused slice each")
       ->check(CLI::Range(1L, 1000000L))
       ->capture_default_str();
-  app.add_option("--slice-s", slice_s, "how long each is")
+  app.add_option("--slice-s", slice_s, "duration of a slice [s]")
       ->check(CLI::Range(0.1, 60.0))
       ->capture_default_str();
-  app.add_option("--threads", threads, "that abuse at the same time")
+  app.add_option("--threads", threads, "number of abusing threads")
       ->check(CLI::Range(1, 200))
       ->capture_default_str();
-  app.add_option("--seed", seed, "of the order in a round")->capture_default_str();
-  app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
+  app.add_option("--seed", seed, "seed of the order within a round")->capture_default_str();
+  app.add_option("--wrenchd", program, "path of the daemon")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
     const test::TemporaryDirectory files;
     const fs::path socket = files.path() / "control.sock", recording = files.path() / "run.h5";
-    // Everybody may look, so that nobody in particular, who may nothing else, can abuse what there is.
+    // Anybody may observe, so that abusers without any role can use every method that reads.
     const fs::path config = files.write("wrenchd.toml", "[control]\nobservers = \"*\"\n");
     fs::permissions(files.path(), fs::perms::group_exec | fs::perms::others_exec, fs::perm_options::add);
     Daemon daemon(
@@ -386,7 +386,7 @@ int main(int argc, char** argv) {
       for (const Kind kind : round) {
         if (kind == kBusy) busy.begin();
         if (kind == kAbused) abusers.begin();
-        std::this_thread::sleep_for(100ms);  // until they are all at it, or all done
+        std::this_thread::sleep_for(100ms);  // until all abusers are active, or all have ended
         Slice slice{now_ns(), 0, kind};
         const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(slice_s);
         while (std::chrono::steady_clock::now() < until) {
@@ -407,17 +407,17 @@ int main(int argc, char** argv) {
       }
     }
     holder.end();
-    // Anybody's stop, in the middle of it.
+    // An emergency stop by an unprivileged user during the abuse.
     abusers.begin();
     std::this_thread::sleep_for(200ms);
-    const auto stop_asked = std::chrono::steady_clock::now();
+    const auto stop_requested = std::chrono::steady_clock::now();
     watcher.call("stop");
     const double stop_ms =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_asked).count();
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - stop_requested).count();
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");
-    if (holder.wronged() > 0) violation("a holder that beat in time lost the lease");
+    if (holder.lost_in_time() > 0) violation("a holder with timely heartbeats lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
 
     std::array<Times, kKinds> times;

@@ -8,9 +8,9 @@
 #include "tests/support/fault_rig.hpp"
 #include "tests/support/random_values.hpp"
 
-// Schedules of faults that nobody thought of: one to four of them, overlapping as they come, in any state,
-// with anything asked of the loop in between. Every tick is held against the invariants; at the end the
-// device is well again, somebody acknowledges, and the loop has to be ready to be armed.
+// Random fault schedules: one to four overlapping faults, in any state, with random commands in between. The
+// program checks every tick against the invariants. At the end the device works again, the program
+// acknowledges the fault, and the loop must become ready to arm.
 
 namespace {
 
@@ -22,7 +22,7 @@ struct Outcome {
   std::string broken;
 };
 
-/// One schedule, drawn from its number alone.
+/// Runs one schedule, which its seed determines completely.
 Outcome run(std::uint64_t seed) {
   RandomValues random(seed);
   FaultRig rig(static_cast<Phase>(random.integer(0, 2)));
@@ -31,20 +31,21 @@ Outcome run(std::uint64_t seed) {
   const State state =
       states[static_cast<std::size_t>(random.integer(0, static_cast<int>(states.size()) - 1))];
   if (!rig.bring_to(state)) {
-    outcome.broken = "does not come to its state";
+    outcome.broken = "does not reach its state";
     return outcome;
   }
   const auto ticks_of = [&](int n) {
     for (int i = 0; i < n && rig.violation().empty(); ++i) {
-      if (random.integer(0, 400) == 0) rig.loop.request(static_cast<CommandSet>(1 << random.integer(0, 7)));
-      if (random.integer(0, 40) == 0) rig.loop.heartbeat();
+      if (random.integer(0, 400) == 0)
+        rig.loop.requests().request(static_cast<CommandSet>(1 << random.integer(0, 7)));
+      if (random.integer(0, 40) == 0) rig.loop.requests().heartbeat();
       rig.tick(random.integer(0, 300) == 0 ? from_seconds(random.uniform(0.0, 0.03))
                                            : std::chrono::milliseconds(1));
-      if (rig.raised(Fault::device_lost)) {  // it is opened again, as the daemon does
+      if (rig.raised(Fault::device_lost)) {  // the daemon also opens a lost device again
         rig.faulty_device.write_result = Fault::none;
         try {
           rig.faulty_device.open();
-        } catch (const std::runtime_error&) {  // still unplugged
+        } catch (const std::runtime_error&) {  // the device is still unplugged
         }
       }
     }
@@ -60,10 +61,10 @@ Outcome run(std::uint64_t seed) {
   rig.faulty_device.write_result = Fault::none;
   rig.clock.solver_time = Duration{0};
   ticks_of(500);
-  // All planned faults are over after six seconds at most; the device may have to be opened again.
+  // All planned faults end within six seconds. The program may have to open the device again.
   for (int i = 0; i < 9000 && rig.violation().empty() && rig.state() != State::disarmed; ++i) {
-    if (i % 500 == 0) rig.loop.request(kAcknowledge);
-    rig.loop.request(kDisarm);
+    if (i % 500 == 0) rig.loop.requests().request(kAcknowledge);
+    rig.loop.requests().request(kDisarm);
     rig.tick();
     if (!rig.raised(Fault::device_lost)) continue;
     try {
@@ -73,7 +74,7 @@ Outcome run(std::uint64_t seed) {
   }
   outcome.broken = rig.violation();
   if (outcome.broken.empty() && rig.state() != State::disarmed)
-    outcome.broken = std::string("does not come back: ") + name(rig.state());
+    outcome.broken = std::string("does not recover: ") + name(rig.state());
   outcome.ticks = rig.last().tick + 1;
   return outcome;
 }
@@ -81,7 +82,7 @@ Outcome run(std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Random schedules of faults, each tick held against the invariants.");
+  CLI::App app("Random schedules of faults; checks every tick against the invariants.");
   long schedules = 1000;
   std::uint64_t seed = 1;
   app.add_option("--schedules", schedules)->check(CLI::PositiveNumber);

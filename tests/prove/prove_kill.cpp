@@ -30,15 +30,14 @@
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// A device outlives the daemon that drives it. Here the device is emulated in this process and the real
-// daemon is another one, so that it can be killed, crashed and stopped at any instant while the hand presses
-// against the table. Each time the force on the handle must end when the firmware's watchdog says so, nobody
-// may speak for the dead, a stopped daemon must not kick when it goes on, and one that is started again must
-// be disarmed. Where only the servo thread stands still, held by a tracer, the rest of the daemon lives:
-// there the link's writer has to speak for it before the watchdog does.
+// Proves that the force ends when the daemon dies. This process emulates the device; the real daemon is a
+// child process, which this program kills, crashes and stops at any instant while the hand presses against
+// the table. The force on the handle must end when the firmware's watchdog expires. No other sender may keep
+// the watchdog alive, a stopped daemon must not apply force when it continues, and a restarted daemon must be
+// disarmed. In one variant a tracer halts only the servo thread; then the link's writer thread must send zero
+// wrench before the watchdog expires.
 //
-// Times are those of the emulated device, which knows of the daemon what hardware would: commands, or
-// silence.
+// All times are those of the emulated device, which observes only what hardware would: commands, or silence.
 
 namespace {
 
@@ -55,7 +54,8 @@ double milliseconds(Duration d) {
 
 constexpr double kPath_s = 0.9;
 
-/// Down to the table, 8 mm deep, and up again, every 0.9 s; at rest above it for long enough to arm.
+/// The hand moves down, presses 8 mm deep, and moves up again every 0.9 s. It rests above the table long
+/// enough to arm.
 SimulationSettings pressing_hand() {
   const Vector3d above(0.0, 0.0, 0.065), pressed(0.0, 0.0, 0.017);
   const Vector3d none = Vector3d::Zero();
@@ -65,11 +65,11 @@ SimulationSettings pressing_hand() {
                     {0.5, pressed, none},
                     {0.7, pressed, none},
                     {kPath_s, above, none}};
-  hand.report_delay_s = hand.command_delay_s = 0.0;  // the socket has its own
+  hand.report_delay_s = hand.command_delay_s = 0.0;  // the socket has its own delay
   return hand;
 }
 
-/// The emulated device at its end of a socket: its life goes on whatever is at the other.
+/// The emulated device on its end of a socket. Its time continues while no daemon is connected.
 class FarSide final : private ReportSink {
  public:
   explicit FarSide(const DeviceProfile& profile)
@@ -80,7 +80,7 @@ class FarSide final : private ReportSink {
   FarSide(const FarSide&) = delete;
   FarSide& operator=(const FarSide&) = delete;
 
-  /// Returns the other end, for the daemon.
+  /// Returns the daemon's end of a new socket.
   int plug() {
     hang_up();
     std::array<int, 2> ends{};
@@ -93,7 +93,7 @@ class FarSide final : private ReportSink {
     return ends[1];
   }
 
-  /// Lets the time until now pass and takes what the daemon said meanwhile.
+  /// Advances the device to the present time and receives the daemon's reports.
   void live() {
     for (const TimePoint now = wall_now(); device_.now() + step_ <= now;) {
       device_.advance_to(device_.now() + step_, *this);
@@ -118,13 +118,14 @@ class FarSide final : private ReportSink {
   TimePoint now() const { return device_.now(); }
   TimePoint last_command() const { return last_command_; }
   TimePoint last_push() const { return last_push_; }
-  Duration strong_for() const { return strong_for_; }  ///< since count_above()
-  long heard() const { return heard_; }                ///< commands since plug(), good or not
-  /// There was force since plug(), and not what the one before had left to the watchdog.
+  /// Time with force above the threshold since count_above().
+  Duration strong_for() const { return strong_for_; }
+  long heard() const { return heard_; }  ///< number of commands since plug(), valid or not
+  /// Returns true if there was force since plug() that is not a remainder of the previous daemon's command.
   bool pushed() const { return pushed_; }
 
  private:
-  /// What finds no room is lost, as in any device.
+  /// Drops the report if the socket is full, as a device does.
   void take_report(TimePoint, std::span<const std::uint8_t> report) noexcept override {
     if (socket_ >= 0) send(socket_, report.data(), report.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
   }
@@ -146,7 +147,7 @@ class FarSide final : private ReportSink {
   bool pushed_ = false;
 };
 
-/// The real daemon as a child; killed when it goes out of scope.
+/// The real daemon as a child process. The destructor kills the daemon.
 class Daemon {
  public:
   Daemon(const std::string& program, std::vector<std::string> arguments, int socket, const fs::path& log) {
@@ -171,7 +172,7 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   void signal(int number) const { kill(pid_, number); }
-  /// Holds the servo thread, and no other. False where it cannot be held.
+  /// Halts only the servo thread. Returns false if the thread cannot be halted.
   bool hold_servo_thread() {
     held_ = thread_named("wrenchd-servo");
     if (held_ < 0 || ptrace(PTRACE_SEIZE, held_, nullptr, nullptr) != 0) return false;
@@ -185,7 +186,7 @@ class Daemon {
     waitpid(pid_, nullptr, 0);
     over_ = true;
   }
-  /// Looks, and does not wait.
+  /// Checks the child without waiting.
   void look() {
     int status = 0;
     if (over_ || waitpid(pid_, &status, WNOHANG | WUNTRACED) != pid_) return;
@@ -195,7 +196,7 @@ class Daemon {
   }
   bool over() const { return over_; }
   bool stopped() const { return stopped_; }
-  int exit_code() const { return exit_code_; }  ///< -1: ended by a signal
+  int exit_code() const { return exit_code_; }  ///< -1 if a signal ended the daemon
 
  private:
   pid_t thread_named(const std::string& wanted) const {
@@ -213,11 +214,11 @@ class Daemon {
 };
 
 struct Figures {
-  double worst_ms = 0.0;         ///< from the last command taken to the last moment of force
-  double after_signal_ms = 0.0;  ///< from the signal to the last moment of force
-  double stuck_ms = 0.0;         ///< from the moment the servo thread is held to the last moment of force
-  double resume_ms = 0.0;        ///< of strong force after a stopped daemon went on
-  long faults = 0;               ///< of a daemon that was not killed yet, and was started again
+  double worst_ms = 0.0;         ///< from the last accepted command to the end of the force
+  double after_signal_ms = 0.0;  ///< from the signal to the end of the force
+  double stuck_ms = 0.0;         ///< from the halt of the servo thread to the end of the force
+  double resume_ms = 0.0;        ///< duration of strong force after a stopped daemon continued
+  long faults = 0;               ///< faults of daemons that were not killed and had to be restarted
   long violations = 0;
 };
 
@@ -231,7 +232,7 @@ class Proof {
     if (!(profile_.watchdog_s > 0.0))
       throw std::runtime_error("profile " + profile_.name +
                                " has no watchdog, and nothing to prove; take another");
-    // All but the soft start is as shipped: that would only make the proof slower.
+    // All settings except the soft start are as shipped. A long soft start would only slow down the proof.
     config_ = files_.write("wrenchd.toml", "[limits]\nsoft_start_s = 0.25\n");
     bound_ = from_seconds(profile_.watchdog_s + 1.0 / profile_.report_rate_Hz);
   }
@@ -248,7 +249,7 @@ class Proof {
         return violation("the daemon ended by itself with code " + std::to_string(daemon.exit_code()));
       ++figures_.faults;
     }
-    violation("the hand never felt the table");
+    violation("the hand had no contact with the table");
   }
 
   const Figures& figures() const { return figures_; }
@@ -258,10 +259,10 @@ class Proof {
   static constexpr auto kLook = 100us;
   static constexpr double kPressing_N = 0.3;
   static constexpr int kAttempts = 10;
-  /// A daemon that does not press by then has found a fault, and waits for somebody to look at it.
+  /// A daemon that does not press within this time has raised a fault and waits for an acknowledgement.
   static constexpr auto kPatience = 6s;
-  static constexpr int kExitFault = 3;  ///< of the daemon
-  static constexpr int kHold = 0;       ///< no signal: the servo thread alone
+  static constexpr int kExitFault = 3;  ///< exit code of the daemon after a fault
+  static constexpr int kHold = 0;       ///< no signal; the tracer halts the servo thread
 
   void violation(const std::string& what) {
     ++figures_.violations;
@@ -273,7 +274,7 @@ class Proof {
     return {program_, std::move(more), device.plug(), files_.path() / "log"};
   }
 
-  /// False where it did not come to be in time.
+  /// Returns false if the condition does not become true in time.
   template <class Condition>
   bool until(FarSide& device, Daemon& daemon, Duration most, Condition condition) {
     for (const TimePoint end = wall_now() + most; !condition();) {
@@ -285,8 +286,8 @@ class Proof {
     return true;
   }
 
-  /// Lives on to a random instant at which the motors push against the hand. False where none came. This
-  /// process may itself have been kept from running, and then the daemon rightly took its silence for a
+  /// Advances the device to a random instant at which the motors press against the hand. Returns false if
+  /// there was none. If this process was not scheduled in time, the daemon correctly treats the silence as a
   /// fault.
   bool press(FarSide& device, Daemon& daemon) {
     const auto pushes = [&] { return daemon.over() || device.push_N() > kPressing_N; };
@@ -304,7 +305,7 @@ class Proof {
     daemon.signal(signal_);
     if (!until(device, daemon, 5s, [&] { return daemon.over() || daemon.stopped(); }))
       return violation("the daemon does not end");
-    device.live();  // what it said before
+    device.live();  // commands that the daemon sent before
     expect_silence(device, signalled);
     if (daemon.stopped()) goes_on(device, [&] { daemon.signal(SIGCONT); });
     daemon.end();
@@ -337,7 +338,7 @@ class Proof {
       std::this_thread::sleep_for(kLook);
       device.live();
     }
-    if (device.heard() == heard) violation("nobody speaks for a loop that is stuck");
+    if (device.heard() == heard) violation("the writer thread sends no zero wrench for a hung loop");
     if (device.push_N() != 0.0 || device.last_push() - held > bound_)
       violation("force for " + std::to_string(milliseconds(device.last_push() - held)) +
                 " ms after the loop was stuck");
@@ -347,7 +348,7 @@ class Proof {
     restart(device);
   }
 
-  /// It may still send the command it was about to send, and has to see at the next tick what happened.
+  /// The daemon may still send the command in progress. It must detect the interruption in the next tick.
   template <class Wake>
   void goes_on(FarSide& device, const Wake& wake) {
     device.count_above(0.1 * profile_.max_force_N);
@@ -364,7 +365,7 @@ class Proof {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       Daemon daemon = start(device, {});
       const bool speaks = until(device, daemon, 20s, [&] { return daemon.over() || device.heard() > 0; });
-      // Through all that the hand does: one that were armed would find it calm.
+      // The whole hand path: an armed daemon would see a calm hand within it and apply force.
       const TimePoint end = device.now() + from_seconds(kPath_s);
       until(device, daemon, 5s, [&] { return daemon.over() || device.now() > end; });
       const bool disarmed = !device.pushed();
@@ -380,7 +381,7 @@ class Proof {
         return violation("the restarted daemon does not stop when asked");
       if (disarmed && device.pushed()) violation("the restarted daemon pushes as it ends");
       if (daemon.exit_code() ==
-          kExitFault) {  // this process was kept from running, and the device was silent
+          kExitFault) {  // this process was not scheduled in time, so the device was silent
         ++figures_.faults;
         continue;
       }
@@ -402,10 +403,10 @@ class Proof {
   int signal_ = 0;
 };
 
-/// A device does not wait for other programs. Where this is refused its silences cost attempts, and nothing
-/// else.
+/// Requests a real-time priority, because a device does not wait for other programs. If the system refuses
+/// it, some attempts fail without an effect on the result.
 void ask_for_realtime() {
-  const sched_param priority{48};  // above the daemon's 45
+  const sched_param priority{48};  // above the daemon's priority of 45
   sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &priority);
 }
 
@@ -417,21 +418,22 @@ std::string beside_this_program(const char* name) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "prove_kill: is the hand free in time when the daemon is killed, crashes, is stopped or stuck? The "
-      "device "
-      "lives on in\n"
-      "this process.");
+      "prove_kill: checks that the force ends in time when the daemon is killed, crashes, is stopped or "
+      "hangs.\n"
+      "This process emulates the device.");
   long kills = 10;
   std::uint64_t seed = 1;
   std::string profile = "loopback";
   std::string program = beside_this_program("wrenchd");
-  app.add_option("--kills", kills, "how many")->check(CLI::Range(1L, 100000000L))->capture_default_str();
-  app.add_option("--seed", seed, "of the instants and the signals")->capture_default_str();
-  app.add_option("--profile", profile, "of the emulated device: one that sends whole poses")
+  app.add_option("--kills", kills, "number of kills")
+      ->check(CLI::Range(1L, 100000000L))
       ->capture_default_str();
-  app.add_option("--wrenchd", program, "the daemon")->capture_default_str();
+  app.add_option("--seed", seed, "seed of the instants and signals")->capture_default_str();
+  app.add_option("--profile", profile, "profile of the emulated device, whose reports contain complete poses")
+      ->capture_default_str();
+  app.add_option("--wrenchd", program, "path of the daemon")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const rlimit no_core{0, 0};  // crashing on purpose
+  const rlimit no_core{0, 0};  // the daemon crashes on purpose
   setrlimit(RLIMIT_CORE, &no_core);
   ask_for_realtime();
   try {

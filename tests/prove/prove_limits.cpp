@@ -16,9 +16,9 @@
 
 int main(int argc, char** argv) {
   std::uint64_t cases = 1'000'000, seed = 1;
-  CLI::App app("The limiter against its oracle");
-  app.add_option("--cases", cases, "how many");
-  app.add_option("--seed", seed, "of the stream of cases: the same again for the same seed");
+  CLI::App app("Checks the limiter against its oracle");
+  app.add_option("--cases", cases, "number of cases");
+  app.add_option("--seed", seed, "seed of the cases");
   CLI11_PARSE(app, argc, argv);
 
   constexpr std::uint64_t kShown = 5;

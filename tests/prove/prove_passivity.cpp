@@ -24,12 +24,13 @@
 #include "devices/simulation/simulated_handle.hpp"
 #include "tests/support/random_values.hpp"
 
-// Does contact ever give energy to the hand? The ledger is kept on the continuous plant, not on what the
-// encoders say: at each substep the work of the motors on the handle, less what the device's own viscous
-// friction took. Trajectories begin at the surface, so that no way through the air pays for anything.
+// Proves that contact does not supply energy to the hand. The ledger uses the continuous plant, not the
+// encoder values: in each substep it adds the work of the motors on the handle and subtracts the energy that
+// the device's own viscous friction dissipates. Trajectories start at the surface, so that free motion
+// contributes no credit.
 //
-// Each trajectory draws its own hand, delays, jitter, losses and encoder. The loop measures itself first, as
-// the daemon does, and the stiffness is a share of the bound that follows from what it measured.
+// Each trajectory draws its own hand, delays, jitter, losses and encoder resolution. The loop first measures
+// itself as the daemon does. The stiffness is a fraction of the resulting stability bound.
 
 namespace {
 
@@ -37,36 +38,36 @@ using namespace wrenchd;
 using test::RandomValues;
 
 constexpr double kViolation_J = 1e-6;
-constexpr int kSubsteps = 16;         ///< of the plant in a period of the loop
-constexpr double kMeasuring_s = 0.5;  ///< before the hand moves
-/// What the loopback's profile allows.
+constexpr int kSubsteps = 16;         ///< number of plant steps per period of the loop
+constexpr double kMeasuring_s = 0.5;  ///< duration of the loop measurement before the hand moves
+/// Returns the limits of the loopback profile.
 DeviceProfile limits_of_the_device() {
   DeviceProfile profile;
   profile.max_force_N = 10.0;
   profile.max_torque_Nm = 0.5;
   return profile;
 }
-/// A rotation encoder beside one for position: what a step of the one is at this distance.
+/// Ratio of position step to rotation step of the encoders.
 constexpr double kEncoderLever_m = 0.1;
 
 struct Options {
   long trajectories = 1000;
   std::uint64_t seed = 1;
   double seconds = 1.5;
-  double times_bound = 0.0;  ///< 0: a random share of it, half to all
+  double times_bound = 0.0;  ///< stiffness as a multiple of the bound; 0: a random fraction between 0.5 and 1
   bool guarded = false;
   bool pid = false;
-  std::vector<double> friction;  ///< of the device, viscous [N.s/m, N.m.s/rad]; empty: as it is shipped
-  double angular_share = 1.0;    ///< of pid: angular stiffness, in that of the metric
+  std::vector<double> friction;  ///< viscous friction of the device [N.s/m, N.m.s/rad]; empty: as shipped
+  double angular_share = 1.0;    ///< only for law pid: angular stiffness relative to the metric's
 };
 
-/// Everything that a trajectory draws but for the hand's way.
+/// All random parameters of a trajectory except the hand's path.
 struct Circumstances {
   double period_s, report_delay_s, command_delay_s, jitter, phase_s, loss;
   double position_quantum_m, rotation_quantum_rad;
-  double damping_share;  ///< of the law, in what spring and damper take together of the bound
-  double share;          ///< of the bound
-  bool post;             ///< a convex post to press on, not a half-space
+  double damping_share;  ///< fraction of the bound's budget for spring and damper that the damper takes
+  double share;          ///< stiffness as a fraction of the bound
+  bool post;             ///< the obstacle is a convex post; otherwise a half-space
   Pose X_HT;
   SimulationSettings hand;
 };
@@ -98,10 +99,10 @@ Circumstances draw(RandomValues& random, const Options& options) {
   return c;
 }
 
-/// The way of the hand: pushes, taps, drags and turns, and now and then it lets go.
+/// The path of the hand: pushes, taps, drags, rotations and intervals with an open hand.
 struct HandWay {
   std::vector<Waypoint> goals;
-  std::vector<std::pair<double, double>> open_hand;  ///< from, to [s]
+  std::vector<std::pair<double, double>> open_hand;  ///< intervals [from, to) with an open hand [s]
 
   bool holds(double t) const {
     return std::none_of(open_hand.begin(), open_hand.end(),
@@ -109,7 +110,7 @@ struct HandWay {
   }
 };
 
-/// X_WH: where it starts, touching; z is up and the surface below.
+/// X_WH: start of the hand, in contact with the surface below; z points up.
 HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
   HandWay way;
   const double touching_m = X_WH.translation_m.z();
@@ -130,13 +131,13 @@ HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
         p.z() = touching_m + random.uniform(0.0, 0.008);
         go(random.log_uniform(0.015, 0.1));
         break;
-      case 2:  // drag, and turn
+      case 2:  // drag and rotate
         p += Vector3d(random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), 0.0);
         p.z() = touching_m - random.uniform(-0.004, 0.012);
         turn += random.vector<3>(0.1);
         go(random.log_uniform(0.04, 0.4));
         break;
-      default:  // let go
+      default:  // open the hand
         way.open_hand.emplace_back(t, t + 0.15);
         go(0.15);
     }
@@ -144,7 +145,7 @@ HandWay hand_way(RandomValues& random, const Pose& X_WH, double seconds) {
   return way;
 }
 
-/// A line that delays, jitters, loses, and keeps the order.
+/// A connection with delay, jitter and loss that preserves the order.
 template <class T>
 class Line {
  public:
@@ -155,7 +156,7 @@ class Line {
     last_s_ = std::max(last_s_, now_s + delay_s);
     if (!lost) under_way_.emplace_back(last_s_, what);
   }
-  /// The newest that has arrived, and when.
+  /// Receives the newest packet that has arrived, and its arrival time.
   bool receive(double now_s, T& what, double& arrived_s) {
     bool any = false;
     for (; !under_way_.empty() && under_way_.front().first <= now_s; under_way_.pop_front()) {
@@ -186,7 +187,7 @@ Vector3d rounded(const Vector3d& v, double quantum) {
   return quantum * (v / quantum).array().round().matrix();
 }
 
-/// The host's side: what the servo loop does between a report and a command.
+/// The host: the part of the servo loop between a report and a command.
 class Host {
  public:
   Host(const Scene& scene, const Circumstances& c, const Options& options, const Pose& X_WP_start)
@@ -202,13 +203,15 @@ class Host {
 
   LoopMeasurement& measured() { return measured_; }
 
-  /// The stiffness that the bound allows, from what was measured. Returns that of a translation [N/m].
+  /// Sets the stiffness that the bound allows for the measured loop. Returns the translational stiffness
+  /// [N/m].
   double settle() {
     const LoopDelay loop{measured_.longest_period_s(), measured_.delay_s()};
     const SimulationSettings& s = circumstances_.hand;
     const DeviceDamping device{s.viscous_friction_N_s_per_m, s.viscous_friction_Nm_s_per_rad};
     const EncoderStep step{circumstances_.position_quantum_m, circumstances_.rotation_quantum_rad};
-    constexpr double kStiff_per_s2 = 1e6;  // beyond any bound, so that the scale says all
+    // Above any bound, so that the scale alone determines the stiffness.
+    constexpr double kStiff_per_s2 = 1e6;
     const double d = circumstances_.damping_share;
     Coupling coupling;
     coupling.stiffness = energy_stiffness(M_, kStiff_per_s2);
@@ -270,8 +273,8 @@ class Host {
   double device_s_ = 0.0;
 };
 
-/// Work of the motors on the handle, net of the device's friction. Credit is that of one contact only: while
-/// nothing touches and the motors are off the account starts again from 0.
+/// Work of the motors on the handle less the device's friction. Credit lasts for one contact only: the ledger
+/// restarts at 0 while there is neither contact nor motor force.
 class Ledger {
  public:
   void add(const SimulatedEnergy& energy, bool at_rest) {
@@ -289,7 +292,7 @@ TimePoint at(double t_s) {
   return TimePoint{} + from_seconds(t_s);
 }
 
-/// One trajectory. The device samples, the lines carry, the host ticks, the motors push.
+/// One trajectory with device, connections, host and motors.
 class Run {
  public:
   Run(const Scene& scene, const Pose& X_WT, RandomValues& random, const Circumstances& c,
@@ -336,7 +339,7 @@ class Run {
     if (now_s + 1e-12 >= next_tick_s_) tick(now_s);
   }
 
-  /// Ticks are due at their phase; a host that is not a real-time one is up to a fifth of a period late.
+  /// Ticks are due at a fixed phase. A host without real-time scheduling is up to 20 % of a period late.
   void tick(double now_s) {
     const bool fresh = reports_.receive(now_s, report_, arrived_s_);
     if (report_.sequence > 0) {
@@ -357,7 +360,7 @@ class Run {
     const bool off = motors_.force_N.isZero(0.0) && motors_.torque_Nm.isZero(0.0);
     ledger_.add(handle_.energy(), look && off && free());
   }
-  /// Of the true pose, not the one that the encoders see.
+  /// Uses the true pose, not the encoder values.
   bool free() {
     const Pose X_WT = handle_.X_BH() * c_.X_HT;
     touch_.select_admitting_planes(X_WT, 0.0);
@@ -385,7 +388,7 @@ class Run {
   std::uint64_t sequence_ = 0, number_ = 0, ticks_ = 0;
 };
 
-/// The cube just above the surface at z = 0, turned at random.
+/// Returns a pose of the cube just above the surface z = 0, with a random rotation.
 Pose resting(const Scene& scene, RandomValues& random) {
   Pose X_WT;
   X_WT.rotation = random.rotation(random.uniform(0.0, 0.8));
@@ -396,7 +399,7 @@ Pose resting(const Scene& scene, RandomValues& random) {
   return X_WT;
 }
 
-/// The shipped cube above a floor, or above a post 40 mm wide and high: a mesh, as the daemon has them.
+/// The shipped cube above a floor, or above a post 40 mm wide and high. The post is a mesh, as in the daemon.
 Scene scene_of(bool post) {
   const char* cube = WRENCHD_SOURCE_DIR "/config/meshes/cube.off";
   SceneSettings settings;
@@ -415,7 +418,7 @@ Scene scene_of(bool post) {
   return Scene(settings);
 }
 
-/// The seed of trajectory n: any of them can be run alone.
+/// Returns the seed of trajectory n, so that each trajectory can be run alone.
 std::uint64_t seed_of(std::uint64_t seed, long n) {
   return seed + static_cast<std::uint64_t>(n);
 }
@@ -423,33 +426,34 @@ std::uint64_t seed_of(std::uint64_t seed, long n) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("prove_passivity: does contact ever give energy to the hand? A ledger on the plant.");
+  CLI::App app(
+      "prove_passivity: checks on the continuous plant that contact supplies no energy to the hand.");
   Options options;
   bool tell = false;
   app.add_option("--trajectories", options.trajectories)
       ->check(CLI::Range(1L, 100000000L))
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "of the first; each of the others has the next")
+  app.add_option("--seed", options.seed,
+                 "seed of the first trajectory; each further trajectory has the next seed")
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "of each, in the hand's time")
+  app.add_option("--seconds", options.seconds, "duration of a trajectory [s]")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str();
   app.add_option("--times-bound", options.times_bound,
-                 "stiffness, in the bound's; 0: half of it to all of it")
+                 "stiffness as a multiple of the bound; 0: random from 0.5 to 1")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_flag("--guard", options.guarded, "with the passivity guard");
-  app.add_flag("--pid", options.pid, "the law of Eq. (16), not the energy law");
+  app.add_flag("--guard", options.guarded, "enables the passivity guard");
+  app.add_flag("--pid", options.pid, "law of Eq. (16) instead of the energy law");
   app.add_option("--friction", options.friction,
-                 "of the device, viscous: N.s/m and N.m.s/rad; without it that of the simulated device as it "
-                 "is shipped")
+                 "viscous friction of the device [N.s/m, N.m.s/rad]; default: the shipped simulated device")
       ->expected(2)
       ->check(CLI::Range(0.01, 100.0) | CLI::Range(0.0001, 1.0));
   app.add_option("--angular-share", options.angular_share,
-                 "with --pid: angular stiffness, in the one that the tool's inertia gives")
+                 "with --pid: angular stiffness relative to the one of the tool's inertia")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_flag("--tell", tell, "each violation with its circumstances");
+  app.add_flag("--tell", tell, "prints the parameters of each violation");
   CLI11_PARSE(app, argc, argv);
 
   const Scene floor = scene_of(false), posted = scene_of(true);

@@ -15,20 +15,21 @@
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/shipped_config.hpp"
 
-// Hours of the shipped scene in virtual time, armed, the hand pressing and rocking again and again: nothing
-// drifts, nothing grows, no counter's end is noticed. The device's sequence (16 bits) wraps every 66 seconds,
-// its clock (32 bits of microseconds) every 72 minutes; of the hours a thousand have 3.6 10^9 ticks.
+// Runs the shipped scene for hours in virtual time, armed, while the hand presses and rocks repeatedly.
+// Values must not drift, memory must not grow, and counter overflows must have no effect. The device's
+// sequence (16 bits) wraps every 66 s, its clock (32 bits of microseconds) every 72 minutes. 1000 hours have
+// 3.6 10^9 ticks.
 //
-// It is the daemon that is worn here, and three quarters of a tick of SimulatedDevice are its own sixteen
-// substeps. So the handle has no mass: the hand holds it by a spring, the firmware and its reports are
-// SimulatedDevice's.
+// The test concerns the daemon, and three quarters of the cost of a tick with SimulatedDevice are its sixteen
+// substeps. Therefore the handle has no mass here: the hand holds it by a spring; firmware and reports are
+// those of SimulatedDevice.
 
 namespace {
 
 using namespace wrenchd;
 using namespace wrenchd::test;
 
-/// Of the program itself, when it looks at its own size. A sanitizer's are its own.
+/// Memory pages that the measurement itself may add. A sanitizer adds its own pages.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr long kOwnPages = 1'000'000;
 #else
@@ -48,7 +49,7 @@ long resident_pages() {
   return resident;
 }
 
-/// A handle on the spring of a hand that follows the shipped path, a report a tick.
+/// A handle on the spring of a hand that follows the shipped path. Sends one report per tick.
 class HeldHandle final : public ReportLink {
  public:
   explicit HeldHandle(const RunConfig& plan)
@@ -76,8 +77,8 @@ class HeldHandle final : public ReportLink {
   void close() noexcept override {}
 
  private:
-  /// Where spring and motors are in balance; the wrench is smoothed, for a spring alone would ring at half
-  /// the rate of the loop.
+  /// Returns the pose at which spring and motors balance. The wrench is low-pass filtered, because a pure
+  /// spring would oscillate at half the loop rate.
   Pose held(TimePoint now) noexcept {
     const Wrench F = firmware_.motor_wrench(now);
     F_ = {F_.force_N + kSmoothing * (F.force_N - F_.force_N),
@@ -101,11 +102,11 @@ class HeldHandle final : public ReportLink {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Hours of the shipped scene in virtual time.");
+  CLI::App app("Runs the shipped scene for hours in virtual time.");
   double minutes = 5.0;
-  app.add_option("--minutes", minutes, "of virtual time")->check(CLI::PositiveNumber);
+  app.add_option("--minutes", minutes, "duration in virtual time [min]")->check(CLI::PositiveNumber);
   std::uint64_t seed = 1;
-  app.add_option("--seed", seed, "unused: every run is the same");
+  app.add_option("--seed", seed, "unused: all runs are equal");
   CLI11_PARSE(app, argc, argv);
   const RunConfig plan = shipped_config();
   VirtualClock clock;
@@ -118,7 +119,7 @@ int main(int argc, char** argv) {
   Invariants invariants({plan.profile.max_force_N, plan.profile.max_torque_Nm,
                          plan.settings.limits.force_slew_N_per_s, plan.settings.limits.torque_slew_Nm_per_s,
                          1.0 / plan.settings.servo.rate_Hz, 0.004});
-  loop.arm();
+  loop.requests().arm();
   const auto ticks = static_cast<std::uint64_t>(minutes * 60.0 * plan.settings.servo.rate_Hz);
   long violations = 0, faults = 0, pages_after_a_minute = 0;
   std::uint64_t last_sequence = 0;
@@ -131,7 +132,7 @@ int main(int argc, char** argv) {
       const RealtimeGuard guard;
       clock.sleep_until(clock.now() + period);
       loop.tick(clock.now(), clock.now());
-      loop.latest_record().read(last);
+      loop.telemetry().latest_record().read(last);
       allocations += guard.allocations();
       locks += guard.locks();
     }
@@ -156,7 +157,7 @@ int main(int argc, char** argv) {
       static_cast<State>(last.state) != State::active)
     ++violations;
   if (ticks > minute && std::abs(most_N - first_lap_N) > 1e-3 * first_lap_N)
-    ++violations;  // a force that drifts
+    ++violations;  // the force drifts
   std::printf(
       "soak minutes %g ticks %llu allocations %llu locks %llu page_faults %ld pages_grown %ld faults %ld "
       "most_N %.6f injected_J %.3g violations %ld seed %llu\n",

@@ -25,10 +25,10 @@
 #include "tests/support/invariants.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// Changes of what is rendered, thousands of them and half of them wrong, while the real loop runs in wall
-// time and a simulated hand presses. Every tick is looked at: what it computed from has to be what was handed
-// over, and every wrench within its limits and its slew. Ticks are timed with changes and without, turn and
-// turn about in one run, for what the machine does besides is the same for both.
+// Changes the rendering thousands of times, half of the changes invalid, while the real loop runs in wall
+// time and a simulated hand presses. The program checks every tick: the rendering in use must be one that was
+// published, and every wrench must respect its limits and its slew rate. Slices with and without changes
+// alternate in one run and have separate timing, so that other load affects both equally.
 
 namespace {
 
@@ -67,13 +67,13 @@ RunConfig plan_of() {
   return plan;
 }
 
-/// Asks for one change after the other.
+/// Requests one random change at a time.
 class Asker {
  public:
   Asker(Reconfigurator& bench, const fs::path& directory, std::uint64_t seed)
       : bench_(bench), directory_(directory), engine_(seed) {}
 
-  /// True where it was taken.
+  /// Returns true if the daemon accepted the change.
   bool ask(bool good) {
     const std::string gain = good ? to_text(between(1000.0, 4500.0)) : "-1.0";
     try {
@@ -131,7 +131,7 @@ class Asker {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Changes what is rendered, many times and half of them wrong, while the real loop runs.");
+  CLI::App app("Changes the rendering many times, half of the changes invalid, while the real loop runs.");
   int changes = 10000;
   std::uint64_t seed = 1;
   app.add_option("--changes", changes)->capture_default_str()->check(CLI::Range(10, 10000000));
@@ -141,14 +141,14 @@ int main(int argc, char** argv) {
   const test::TemporaryDirectory directory;
   const RunConfig plan = plan_of();
   for (const RealtimeGrant& grant : lock_memory(plan.settings.servo.realtime))
-    std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.request.c_str());
+    std::printf("%s: %s\n", grant.granted ? "granted" : "denied", grant.request.c_str());
   WallClock clock;
   SimulatedDevice simulated(plan.profile, plan.settings.simulation);
   LoopbackLink link(simulated, clock, plan.settings.simulation);
   Runtime station(plan, link, clock);
   station.open();
 
-  std::map<std::uint32_t, std::uint64_t> sums;  // of what was handed over, by number
+  std::map<std::uint32_t, std::uint64_t> sums;  // checksums of the published renderings, by id
   std::mutex sums_mutex;
   std::atomic<bool> changing{false}, over{false};
   Times with, without;
@@ -159,8 +159,8 @@ int main(int argc, char** argv) {
   std::uint64_t missed = 0;
   std::uint64_t torn = 0, unknown = 0, broken = 0, in_contact = 0, loop_faults = 0;
   std::atomic<std::uint64_t> pushed{0};
-  std::set<std::uint32_t> felt;     // numbers of the renderings in the records
-  std::vector<TickRecord> waiting;  // for a sum that was not told yet
+  std::set<std::uint32_t> active_ids;  // ids of the renderings in the records
+  std::vector<TickRecord> waiting;     // records whose rendering is not in `sums` yet
   const auto judge = [&](const TickRecord& r) {
     const std::lock_guard lock(sums_mutex);
     const auto sum = sums.find(r.rendering_id);
@@ -172,7 +172,7 @@ int main(int argc, char** argv) {
   std::atomic<bool> stop{false};
   std::thread servo([&] {
     for (const RealtimeGrant& grant : prepare_servo_thread(plan.settings.servo))
-      std::printf("%s: %s\n", grant.granted ? "granted" : "refused", grant.request.c_str());
+      std::printf("%s: %s\n", grant.granted ? "granted" : "denied", grant.request.c_str());
     station.loop().run(clock, stop);
   });
   std::thread watcher([&] {
@@ -200,7 +200,7 @@ int main(int argc, char** argv) {
       Times& times = changing.load() ? with : without;
       times.tick_us.push_back(tick_us);
       times.late_us.push_back(1e-3 * static_cast<double>(r.wake_latency_ns));
-      felt.insert(r.rendering_id);
+      active_ids.insert(r.rendering_id);
       in_contact += r.contacts > 0 ? 1 : 0;
       pushed += r.F_out[2] > 0.2 ? 1 : 0;
       loop_faults +=
@@ -210,29 +210,30 @@ int main(int argc, char** argv) {
   });
 
   Asker asker(station.reconfigurator(), directory.path(), seed);
-  int applied = 0, refused = 0, done = 0;
-  // A hand that presses, before anything is changed.
+  int applied = 0, rejected = 0, done = 0;
+  // Waits until the hand presses, before the first change.
   for (const TimePoint end = clock.now() + std::chrono::seconds(20); pushed == 0 && clock.now() < end;) {
-    if (station.loop().state() == State::disarmed) station.loop().arm();
+    if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   constexpr int kInARow = 250;
   while (done < changes) {
-    // As long without as with: turn and turn about.
+    // Slices with and without changes have the same duration and alternate.
     changing.store(true);
     const TimePoint began = clock.now();
     for (int i = 0; i < kInARow && done < changes; ++i, ++done) {
-      (asker.ask(done % 2 == 0) ? applied : refused) += 1;
+      (asker.ask(done % 2 == 0) ? applied : rejected) += 1;
       const auto [number, sum] = station.reconfigurator().current_rendering();
       {
         const std::lock_guard lock(sums_mutex);
         if (number > 0) sums[number] = sum;
       }
-      if (station.loop().state() == State::disarmed) station.loop().arm();
-      if (is_latched(station.loop().state())) station.loop().acknowledge();
+      if (station.loop().telemetry().state() == State::disarmed) station.loop().requests().arm();
+      if (is_latched(station.loop().telemetry().state())) station.loop().requests().acknowledge();
     }
     const Duration took = clock.now() - began;
-    while (station.loop().crossfading()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (station.loop().telemetry().crossfading())
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     changing.store(false);
     std::this_thread::sleep_for(took);
   }
@@ -244,12 +245,13 @@ int main(int argc, char** argv) {
 
   const auto number = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
   std::printf(
-      "swaps changes %d applied %d refused %d felt %zu torn %llu unknown %llu violations %llu in_contact "
+      "swaps changes %d applied %d rejected %d active %zu torn %llu unknown %llu violations %llu in_contact "
       "%llu "
       "pushed %llu late_or_stopped %llu dropped %llu seed %llu\n",
-      changes, applied, refused, felt.size(), number(torn), number(unknown), number(broken + torn + unknown),
-      number(in_contact), number(pushed), number(loop_faults), number(missed), number(seed));
+      changes, applied, rejected, active_ids.size(), number(torn), number(unknown),
+      number(broken + torn + unknown), number(in_contact), number(pushed), number(loop_faults),
+      number(missed), number(seed));
   with.print("swaps_with");
   without.print("swaps_without");
-  return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && refused > 0 && pushed > 0 ? 0 : 1;
+  return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && rejected > 0 && pushed > 0 ? 0 : 1;
 }

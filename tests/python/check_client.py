@@ -31,9 +31,9 @@ def insist_on_arming(client):
     if state == "disarmed":
         try:
             client.arm()
-        except wrenchd.Refused as refused:  # so busy that a beat came too late
-            assert refused.code == wrenchd.Refused.NOT_NOW, refused
-            client.call("lease.take")
+        except wrenchd.Rejected as refused:  # so busy that a beat came too late
+            assert refused.code == wrenchd.Rejected.INVALID_STATE, refused
+            client.call("lease.acquire")
 
 
 def rests(client):
@@ -72,13 +72,13 @@ class Commands(unittest.TestCase):
         self.assertTrue(soon(lambda: rests(self.client)))
 
     def test_lease_arm_and_stop(self):
-        with self.assertRaises(wrenchd.Refused) as refused:
+        with self.assertRaises(wrenchd.Rejected) as refused:
             self.client.arm()
-        self.assertEqual(refused.exception.code, wrenchd.Refused.NOT_NOW)
+        self.assertEqual(refused.exception.code, wrenchd.Rejected.INVALID_STATE)
         with self.client.lease():
-            with wrenchd.Client() as other, self.assertRaises(wrenchd.Refused) as refused:
+            with wrenchd.Client() as other, self.assertRaises(wrenchd.Rejected) as refused:
                 other.lease()
-            self.assertEqual(refused.exception.code, wrenchd.Refused.TAKEN)
+            self.assertEqual(refused.exception.code, wrenchd.Rejected.LEASE_HELD)
 
             def active():
                 insist_on_arming(self.client)
@@ -86,13 +86,13 @@ class Commands(unittest.TestCase):
 
             self.assertTrue(soon(active))
             with self.client.open_state() as state:
-                self.assertTrue(soon(lambda: len(state.latest().touches) == 4))
+                self.assertTrue(soon(lambda: len(state.latest().contact_list) == 4))
                 tick = state.latest()
             self.client.stop()
             self.assertTrue(soon(lambda: self.client.status()["state"] in ("stopped", "fault")))
         self.assertTrue(soon(lambda: rests(self.client)))
-        if tick.touches:
-            self.assertAlmostEqual(sum(touch.share for touch in tick.touches), 1.0)
+        if tick.contact_list:
+            self.assertAlmostEqual(sum(contact.load_fraction for contact in tick.contact_list), 1.0)
 
     def test_a_lease_ends_with_its_connection(self):
         dying = wrenchd.Client()
@@ -101,15 +101,15 @@ class Commands(unittest.TestCase):
 
         def free():
             try:
-                self.client.lease().give()
+                self.client.lease().release()
                 return True
-            except wrenchd.Refused:
+            except wrenchd.Rejected:
                 return False
 
         self.assertTrue(soon(free))
 
     def test_refusals_have_a_sentence(self):
-        with self.assertRaisesRegex(wrenchd.Refused, "dance"):
+        with self.assertRaisesRegex(wrenchd.Rejected, "dance"):
             self.client.call("dance")
         self.assertIn("state", self.client.status())
 
@@ -154,11 +154,11 @@ class ReadsState(unittest.TestCase):
         first = self.state.next().tick
         written = self.state._written
         slots = self.state._layout.slots
-        self.assertTrue(soon(lambda: self.state.behind > slots + 10))
+        self.assertTrue(soon(lambda: self.state.unread > slots + 10))
         second = self.state.next().tick
         self.assertEqual(second - first, self.state.missed + 1)
         self.assertGreater(self.state.missed, slots // 2)
-        self.assertLess(self.state.behind, slots)
+        self.assertLess(self.state.unread, slots)
         self.assertGreater(written(), slots)
 
     def test_a_record_that_is_written_over_while_it_is_copied_is_not_taken(self):
@@ -182,19 +182,19 @@ class ReadsState(unittest.TestCase):
         self.assertEqual(len(late), 1)
         self.assertIsNone(taken)
 
-    def test_touches_name_what_touches(self):
+    def test_contacts_name_features_and_obstacle(self):
         def touched():
-            return bool(self.state.latest().touches)
+            return bool(self.state.latest().contact_list)
 
         self.assertTrue(soon(touched))
         for tick in self.state.ticks(5000):
-            if tick.touches:
+            if tick.contact_list:
                 break
-        touch = tick.touches[0]
-        self.assertEqual(touch.obstacle, "table")
-        self.assertRegex(str(touch), r"^hull vertex \d+ on table plane$")
-        self.assertEqual(touch.normal_W, (0.0, 0.0, 1.0))
-        self.assertLess(abs(touch.point_W_m[2]), 1e-6)
+        contact = tick.contact_list[0]
+        self.assertEqual(contact.obstacle, "table")
+        self.assertRegex(str(contact), r"^hull vertex \d+ on table plane$")
+        self.assertEqual(contact.normal_W, (0.0, 0.0, 1.0))
+        self.assertLess(abs(contact.point_W_m[2]), 1e-6)
 
     def test_arrays_are_the_same_ticks(self):
         try:
@@ -204,13 +204,13 @@ class ReadsState(unittest.TestCase):
         array = self.state.array(200)
         self.assertTrue((numpy.diff(array["tick"].astype(numpy.int64)) == 1).all())
         self.assertEqual(array["F_out"].shape, (200, 6))
-        self.assertEqual(array["touches"]["point_W_m"].shape, (200, 16, 3))
+        self.assertEqual(array["contact_list"]["point_W_m"].shape, (200, 16, 3))
         numpy.testing.assert_allclose(numpy.linalg.norm(array["X_WP"][:, 3:], axis=1), 1.0)
 
 
 class Names(unittest.TestCase):
     def test_each_rendering_has_its_own_and_the_daemon_is_asked_once(self):
-        answers = [{"rendering": 4, "obstacles": ["bolt"]}, wrenchd.Gone("gone"), {"rendering": 7, "obstacles": []}]
+        answers = [{"rendering_id": 4, "obstacles": ["bolt"]}, wrenchd.Disconnected("gone"), {"rendering_id": 7, "obstacles": []}]
         asked = []
 
         def ask():
@@ -219,7 +219,7 @@ class Names(unittest.TestCase):
                 raise asked[-1]
             return asked[-1]
 
-        names = wrenchd.state._Names({"rendering": 3, "obstacles": ["table", "nut"]}, ask)
+        names = wrenchd.state._Names({"rendering_id": 3, "obstacles": ["table", "nut"]}, ask)
         self.assertEqual(names.of(3, 1), "nut")
         self.assertEqual(asked, [])
         self.assertEqual([names.of(4, 0), names.of(4, 1), names.of(3, 0)], ["bolt", "obstacle 1", "table"])
@@ -227,7 +227,7 @@ class Names(unittest.TestCase):
         self.assertEqual([names.of(5, 0), names.of(7, 0), names.of(6, 0)], ["obstacle 0"] * 3)
         self.assertEqual(answers, [])
         with self.assertRaises(wrenchd.ProtocolError):
-            wrenchd.state._Names({"rendering": 3}, ask)
+            wrenchd.state._Names({"rendering_id": 3}, ask)
 
 
 class Unhappy(unittest.TestCase):
@@ -239,15 +239,15 @@ class Unhappy(unittest.TestCase):
         client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"result":{"state":"disarmed"}}\n').path)
         self.assertEqual(client.status(), {"state": "disarmed"})
         for _ in range(3):
-            with self.assertRaises(wrenchd.Gone):
+            with self.assertRaises(wrenchd.Disconnected):
                 client.status()
-        with self.assertRaises(wrenchd.Gone):
+        with self.assertRaises(wrenchd.Disconnected):
             client.event()
-        self.assertFalse(client.is_there())
+        self.assertFalse(client.is_connected())
 
     def test_half_a_line_is_no_answer(self):
         client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"res').path, 1.0)
-        with self.assertRaises((wrenchd.Gone, wrenchd.Timeout)):
+        with self.assertRaises((wrenchd.Disconnected, wrenchd.Timeout)):
             client.status()
 
     def test_a_daemon_that_hangs(self):
@@ -274,7 +274,7 @@ class Unhappy(unittest.TestCase):
         with self.assertRaisesRegex(wrenchd.ProtocolError, "not sealed"):
             wrenchd.State(layout, unsealed)
         with self.assertRaises(wrenchd.ProtocolError):
-            wrenchd.State({**layout, "version": 2}, os.memfd_create("x"))
+            wrenchd.State({**layout, "version": 99}, os.memfd_create("x"))
 
     def test_no_descriptor_is_left(self):
         def count():

@@ -24,10 +24,10 @@ def check(what, good):
 
 
 with h5py.File(sys.argv[1], "r") as file:
-    ticks, touches = file["ticks"], file["touches"]
+    ticks, contacts = file["ticks"], file["contacts"]
     for name, unit in UNITS.items():
         check(name + " has its unit", ticks.attrs[name + ".unit"] == unit)
-    for table in (ticks, touches):
+    for table in (ticks, contacts):
         for name in table.dtype.names:
             check(name + " has a unit", len(table.attrs[name + ".unit"]) > 0)
             check(name + " has a meaning", len(table.attrs[name + ".doc"]) > 0)
@@ -36,7 +36,7 @@ with h5py.File(sys.argv[1], "r") as file:
     check("states have names", names[5] == "active")
 
     fields = file["fields"]
-    check("a row a column", len(fields) == len(ticks.dtype.names) + len(touches.dtype.names))
+    check("a row a column", len(fields) == len(ticks.dtype.names) + len(contacts.dtype.names))
     rows = {(row["table"].decode(), row["name"].decode()): row for row in fields}
     check("the table of fields has units", rows[("ticks", "F_out")]["unit"].decode() == UNITS["F_out"])
     check("and counts", rows[("ticks", "F_out")]["count"] == 6)
@@ -53,13 +53,13 @@ with h5py.File(sys.argv[1], "r") as file:
     check("the rate is told", abs(rate - file.attrs["rate_Hz"]) < 0.02 * rate)
 
     # Contacts: those of a tick are rows of the other table, their normals are unit, their shares add up.
-    some = np.flatnonzero(ticks["touch_count"] > 0)
+    some = np.flatnonzero(ticks["contact_count"] > 0)
     check("it touched", len(some) > 100)
     for row in ticks[some[:: max(len(some) // 50, 1)]]:
-        mine = touches[row["first_touch"] : row["first_touch"] + row["touch_count"]]
+        mine = contacts[row["first_contact"] : row["first_contact"] + row["contact_count"]]
         check("as many as there are", len(mine) == min(row["contacts"], 16))
         check("unit normals", np.allclose(np.linalg.norm(mine["normal_W"], axis=1), 1.0))
-        carried = np.sum(mine["share"])
+        carried = np.sum(mine["load_fraction"])
         check("shares add up", carried == 0.0 or abs(carried - 1.0) < 1e-6)
 
     # What it ran with.
@@ -67,7 +67,7 @@ with h5py.File(sys.argv[1], "r") as file:
     check("the scene", "[tool]" in file["config/scene"][()].decode())
     check("the profile", "name" in file["config/profile"][()].decode())
     mesh = file["meshes/tool"]
-    check("the tool is inside", mesh.attrs["inside"] == 1)
+    check("the tool is embedded", mesh.attrs["embedded"] == 1)
     check("and is what it says", hashlib.sha256(bytes(mesh[:])).hexdigest() == mesh.attrs["sha256"])
     for name in ("format", "wrenchd_version", "kernel", "realtime", "clock"):
         check(name + " is told", len(file.attrs[name]) > 0)
@@ -78,4 +78,4 @@ with h5py.File(sys.argv[1], "r") as file:
     if file.attrs["clock"] == "CLOCK_MONOTONIC":
         first = 1e-9 * (file.attrs["started_unix_ns"] + ticks["now_ns"][0] - file.attrs["started_ns"])
         check("it began just now", 0 <= datetime.datetime.now().timestamp() - first < 600)
-    print(len(ticks), "ticks,", len(touches), "touches")
+    print(len(ticks), "ticks,", len(contacts), "contacts")

@@ -18,7 +18,7 @@ try:
         start = time.monotonic()
         for tick in state.ticks(wanted):
             numbers.append(tick.tick)
-            farthest_behind = max(farthest_behind, state.behind)
+            farthest_behind = max(farthest_behind, state.unread)
         seconds = time.monotonic() - start
         assert all(process.poll() is None for process in busy)
     gaps = sum(after != before + 1 for before, after in zip(numbers, numbers[1:]))

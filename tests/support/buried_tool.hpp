@@ -12,10 +12,10 @@
 
 namespace wrenchd::test {
 
-/// The shipped station with a boulder of 60 mm around the origin in the place of its table. The hand goes
-/// from one place to the next as it is told, and stays at the last.
+/// The shipped runtime with a boulder of 60 mm around the origin instead of its table. The hand follows the
+/// given path once and stays at its end.
 struct BuriedTool {
-  TemporaryDirectory files;  ///< with the boulder
+  TemporaryDirectory files;  ///< contains the boulder
   RunConfig config = shipped_config();
 
   explicit BuriedTool(const std::vector<Waypoint>& path, std::size_t triangles = 2000) {
@@ -30,7 +30,7 @@ struct BuriedTool {
   }
 };
 
-/// Walls on six sides, so far from the origin.
+/// Walls on six sides of the origin at this distance.
 inline std::vector<HalfSpaceSettings> closed_box(double half_m) {
   std::vector<HalfSpaceSettings> walls;
   for (int axis = 0; axis < 3; ++axis) {
@@ -45,7 +45,7 @@ inline ProxyInitialization proxy_initialization(const VirtualRuntime& s) {
   return static_cast<ProxyInitialization>(s.last.proxy_initialization);
 }
 
-/// Gives a placer on a thread of its own time to answer, while little passes for the hand.
+/// Gives a proxy search in the background time to finish while little virtual time passes.
 inline void wait_for_proxy_search(const VirtualRuntime& s) {
   if (proxy_initialization(s) == ProxyInitialization::searching)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

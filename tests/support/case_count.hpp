@@ -3,8 +3,7 @@
 
 namespace wrenchd::test {
 
-/// How many of so many random cases to look at: a tenth under sanitizers, where all is ten times slower and
-/// the cases looked at elsewhere prove no more.
+/// Returns the number of random cases to run: a tenth under sanitizers, where each case is ten times slower.
 constexpr int case_count(int cases) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   return (cases + 9) / 10;

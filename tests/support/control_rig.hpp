@@ -19,15 +19,16 @@
 #include "daemon/control/control_interface.hpp"
 #include "daemon/realtime.hpp"
 #include "daemon/wall_clock.hpp"
+#include "tests/support/request_line.hpp"
 #include "tests/support/shipped_config.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace wrenchd::test {
 
-/// Users that a rig's clients can be.
+/// Users that a rig's clients can have.
 enum class TestUser : uid_t { stranger = 60001, observer = 60002, operator_ = 60003, administrator = 60004 };
 
-/// A client that can misbehave. Its address tells the rig who it wants to be.
+/// A client that can misbehave. Its socket address tells the rig which user it represents.
 class RigClient {
  public:
   RigClient(const std::filesystem::path& path, TestUser who) : RigClient(path, static_cast<uid_t>(who)) {}
@@ -52,7 +53,8 @@ class RigClient {
   int fd() const noexcept { return fd_.get(); }
   void disconnect() noexcept { fd_.reset(); }
 
-  /// As much as goes, within a second. False: the other side has hung up, or reads no more.
+  /// Sends as many bytes as possible within 1 s. Returns false if the daemon has closed the connection or
+  /// does not read.
   bool send(std::string_view bytes) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(1);
     while (!bytes.empty() && std::chrono::steady_clock::now() < end) {
@@ -68,7 +70,8 @@ class RigClient {
     return bytes.empty();
   }
 
-  /// The next line, without its end; nothing: it did not come in time, or the other side has hung up.
+  /// Returns the next line without its end; empty if none came in time or the daemon has closed the
+  /// connection.
   std::optional<std::string> read_line(std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (true) {
@@ -90,10 +93,10 @@ class RigClient {
       received_.append(bytes, static_cast<std::size_t>(got));
     }
   }
-  /// The other side has hung up, as far as line() has seen.
+  /// Returns true if read_line() found the connection closed by the daemon.
   bool closed_by_peer() const noexcept { return closed_by_peer_; }
 
-  /// Asks, and waits for the answer to that; events meanwhile are kept. The whole reply; null: none came.
+  /// Sends a request and returns its whole response; null if none came. Stores events that arrive before it.
   Json request(const std::string& method, const Json& params = Json::object()) {
     const int id = ++last_id_;
     if (!send(request_line(id, method, params))) return nullptr;
@@ -110,13 +113,13 @@ class RigClient {
       throw std::runtime_error(method + ": " + reply.dump());
     return reply["result"];
   }
-  /// The code of the error that it answers; 0: none.
+  /// Sends a request and returns the error code of its response; 0 if there is no error.
   int error_code(const std::string& method, const Json& params = Json::object()) {
     const Json reply = request(method, params);
     return reply.is_object() && reply.contains("error") ? reply["error"]["code"].get<int>() : 0;
   }
   void heartbeat() { send("{\"jsonrpc\":\"2.0\",\"method\":\"beat\"}\n"); }
-  /// The next event of that name; null: it did not come in time.
+  /// Returns the next event with this name; null if none came in time.
   Json next_event(const std::string& name, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     while (true) {
       while (!events.empty()) {
@@ -126,8 +129,8 @@ class RigClient {
       }
       const auto text = read_line(limit);
       if (!text) return nullptr;
-      Json told = Json::parse(*text);
-      if (told.contains("method")) events.push_back(told["params"]);
+      Json message = Json::parse(*text);
+      if (message.contains("method")) events.push_back(message["params"]);
     }
   }
 
@@ -140,7 +143,7 @@ class RigClient {
   int last_id_ = 0;
 };
 
-/// Above the table, and still: one that can be armed.
+/// The hand rests above the table, so that the loop can be armed.
 inline RunConfig resting_config() {
   RunConfig plan = shipped_config();
   plan.settings.servo.realtime = Realtime::best_effort;
@@ -154,8 +157,8 @@ inline RunConfig resting_config() {
   return plan;
 }
 
-/// A real servo loop in a thread, with its simulated device, behind a real control socket. Who connects says
-/// who it is.
+/// A real servo loop in a thread with its simulated device, behind a real control socket. The client's
+/// address selects the client's user.
 class ControlRig {
  public:
   explicit ControlRig(const RunConfig& plan = resting_config(), const std::vector<MethodRow>& more = {})
@@ -177,16 +180,17 @@ class ControlRig {
   RigClient connect(TestUser who) const { return {path(), who}; }
   ServoLoop& loop() { return runtime_.runtime.loop(); }
   EventFeed& feed() { return feed_; }
-  State state() { return loop().state(); }
+  State state() { return loop().telemetry().state(); }
 
-  /// A fault that the machine made, by letting the loop wait, is acknowledged; a stop is not.
+  /// Waits until the loop is in this state. Acknowledges faults that a busy machine causes by delaying the
+  /// loop, but not a stop.
   bool wait_for_state(State state, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     const auto end = std::chrono::steady_clock::now() + limit;
-    while (loop().state() != state && std::chrono::steady_clock::now() < end) {
-      if (loop().state() == State::fault) loop().acknowledge();
+    while (loop().telemetry().state() != state && std::chrono::steady_clock::now() < end) {
+      if (loop().telemetry().state() == State::fault) loop().requests().acknowledge();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    return loop().state() == state;
+    return loop().telemetry().state() == state;
   }
 
  private:
@@ -201,7 +205,7 @@ class ControlRig {
     if (uid == static_cast<uid_t>(TestUser::stranger)) return {};
     Peer peer{uid, 65534, {}, 1};
     if (uid == static_cast<uid_t>(TestUser::operator_)) peer.groups = {getegid()};
-    if (uid == static_cast<uid_t>(TestUser::administrator)) peer.groups = {1};  // daemon
+    if (uid == static_cast<uid_t>(TestUser::administrator)) peer.groups = {1};  // the daemon group
     return peer;
   }
 

@@ -54,7 +54,7 @@ bool ExactIntersection::intersect(const Pose& X_BA) const {
   return intersecting_pairs(X_BA) > 0;
 }
 
-/// Boxes that hold every triangle with room to spare find the few pairs that are looked at exactly.
+/// Enlarged boxes around the triangles select the few pairs for the exact test.
 std::size_t ExactIntersection::intersecting_pairs(const Pose& X_BA) const {
   constexpr double kRoom_m = 1e-9;
   const Quaterniond& q = X_BA.rotation;

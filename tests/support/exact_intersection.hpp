@@ -9,16 +9,16 @@
 
 namespace wrenchd::test {
 
-/// Do two meshes have a point in common? Answered by CGAL, in exact arithmetic throughout, and by nothing of
-/// ours: the pose's numbers are taken as the fractions that they are, its rotation as q v q* / |q|^2.
+/// Tests whether two meshes have a common point. Uses CGAL with exact arithmetic and no code of wrenchd: the
+/// numbers of the pose are exact fractions, and the rotation is q v q* / |q|^2.
 class ExactIntersection {
  public:
-  /// a moves, b stands still.
+  /// a: the moving mesh. b: the static mesh.
   ExactIntersection(const TriangleMesh& a, const TriangleMesh& b);
   ~ExactIntersection();
 
   bool intersect(const Pose& X_BA) const;
-  /// Pairs of triangles that have a point in common.
+  /// Returns the number of triangle pairs that have a common point.
   std::size_t intersecting_pairs(const Pose& X_BA) const;
 
  private:

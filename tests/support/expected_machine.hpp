@@ -7,8 +7,8 @@
 
 namespace wrenchd::test {
 
-/// The machine as safety wants it, written by hand and not from the table: what leads where. What is not here
-/// stays.
+/// The expected state machine: target state by trigger and state. Written by hand from the safety
+/// requirements, not from the daemon's table. Pairs that are absent do not change the state.
 inline const std::map<Trigger, std::map<State, State>>& expected_machine() {
   static const auto machine = [] {
     using S = State;
@@ -50,7 +50,7 @@ inline const std::map<Trigger, std::map<State, State>>& expected_machine() {
   return machine;
 }
 
-/// Whether a trigger leads anywhere from there.
+/// Returns true if the trigger changes the state.
 inline bool transition_expected(Trigger trigger, State from) {
   const auto known = expected_machine().find(trigger);
   return known != expected_machine().end() && known->second.count(from) > 0;

@@ -10,7 +10,7 @@ namespace {
 using Kind = SimulatedFault::Kind;
 
 constexpr double kArmAt_s = 0.08;
-constexpr double kPressed_s = 0.5;  ///< by then the hand is where the phase wants it
+constexpr double kPressed_s = 0.5;  ///< time at which the hand has reached the phase's target
 constexpr int kDeadman = 0;
 constexpr int kStopButton = 1;
 
@@ -61,13 +61,14 @@ const char* name(Phase phase) {
 
 FaultRig::FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust)
     : config(rig_plan(phase, adjust)),
-      scene(config.scene),
+      scene(std::make_shared<const Scene>(config.scene)),
       simulated(config.profile, config.settings.simulation),
       link(simulated, clock, config.settings.simulation),
       device(config.profile, link),
       faulty_device(device),
-      proxy_initializer(scene),
-      loop(config.settings, config.profile, faulty_device, scene, proxy_initializer, clock),
+      proxy_initializer(std::make_shared<OverriddenProxyInitializer>(*scene)),
+      loop(config.settings, config.profile, faulty_device,
+           std::make_unique<Rendering>(0, config.settings, config.profile, scene, proxy_initializer), clock),
       invariants_(limits_of(config)) {
   simulated.inject({Kind::press_button, Duration{0}, std::chrono::hours(1), kDeadman});
   faulty_device.open();
@@ -76,7 +77,7 @@ FaultRig::FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust)
 const TickRecord& FaultRig::tick(Duration after) {
   clock.step(after);
   loop.tick(clock.now(), clock.now());
-  loop.latest_record().read(last_);
+  loop.telemetry().latest_record().read(last_);
   if (const auto wrong = invariants_.check(last_); wrong && violation_.empty()) violation_ = *wrong;
   return last_;
 }
@@ -93,7 +94,7 @@ bool FaultRig::bring_to(State state) {
   if (!tick_until(in(State::disarmed), 300)) return false;
   if (state != State::disarmed) {
     if (!tick_until(at(kArmAt_s), 300)) return false;
-    loop.arm();
+    loop.requests().arm();
     if (!tick_until(in(State::active), 300)) return false;
   }
   tick_until(at(kPressed_s), 1000);
@@ -102,14 +103,14 @@ bool FaultRig::bring_to(State state) {
     case State::active:
       break;
     case State::waiting:
-      loop.reinitialize_proxy();
+      loop.requests().reinitialize_proxy();
       break;
     case State::degraded:
     case State::ramping:
       inject(Kind::silence, 0.005);
       break;
     case State::releasing:
-      loop.disarm();
+      loop.requests().disarm();
       break;
     case State::fault:
       faulty_device.corrupt = [](DeviceSample& s) {
@@ -119,12 +120,12 @@ bool FaultRig::bring_to(State state) {
       faulty_device.corrupt = {};
       break;
     case State::stopped:
-      loop.stop();
+      loop.requests().stop();
       break;
     case State::self_test:
-      loop.stop();
+      loop.requests().stop();
       tick();
-      loop.acknowledge();
+      loop.requests().acknowledge();
       break;
     default:
       return false;
@@ -157,7 +158,7 @@ const std::vector<Injection>& injections() {
     const auto not_testing = [](State s, Phase) { return s != State::self_test; };
 
     add({"unplugged", Fault::device_lost, 1, wire(Kind::unplug, 0.5)});
-    add({"a write finds nobody",
+    add({"a write finds no device",
          Fault::device_lost,
          1,
          [](FaultRig& r) { r.faulty_device.write_result = Fault::device_lost; },
@@ -235,16 +236,16 @@ const std::vector<Injection>& injections() {
          [](FaultRig&) {},
          {},
          [](State s, Phase p) { return s == State::active && p == Phase::saturated; }});
-    add({"whoever armed is gone",
+    add({"the client that armed is lost",
          Fault::heartbeat_lost,
          103,
-         [](FaultRig& r) { r.loop.arm_with_lease(); },
+         [](FaultRig& r) { r.loop.requests().arm_with_lease(); },
          {},
          [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
-    add({"nobody lives",
+    add({"heartbeats stop",
          Fault::heartbeat_missing,
          103,
-         [](FaultRig& r) { r.loop.request(kArm | kLease); },
+         [](FaultRig& r) { r.loop.requests().request(kArm | kLease); },
          {},
          [](State s, Phase p) { return s == State::disarmed && p == Phase::free; }});
     add({"the dead man's button",
@@ -255,7 +256,7 @@ const std::vector<Injection>& injections() {
          armed});
     add({"the stop button", Fault::stop_button, 1,
          spoil([](DeviceSample& s) { s.buttons |= 1U << kStopButton; })});
-    add({"somebody says stop", Fault::stop_requested, 1, [](FaultRig& r) { r.loop.stop(); }});
+    add({"a stop is requested", Fault::stop_requested, 1, [](FaultRig& r) { r.loop.requests().stop(); }});
     add({"what comes again and again",
          Fault::degraded_too_long,
          560,

@@ -16,7 +16,7 @@
 
 namespace wrenchd::test {
 
-/// Virtual time that can jump in the middle of a tick, go back, and leave out sleep.
+/// Virtual time that can jump within a tick, run backwards, and report a suspend.
 class RigClock final : public Clock {
  public:
   TimePoint now() const noexcept override {
@@ -31,18 +31,18 @@ class RigClock final : public Clock {
     reads_ = 0;
   }
 
-  Duration solver_time{};  ///< from the end of the reading to the wrench
+  Duration solver_time{};  ///< time from the end of the device read to the wrench
   Duration suspended{};
 
  private:
-  /// At the start of the tick, and after the reading.
+  /// The loop reads the clock at the start of the tick and after the device read.
   static constexpr int kReadsBeforeSolver = 2;
 
   TimePoint now_{};
   mutable int reads_ = 0;
 };
 
-/// A device whose samples and writes are spoiled on their way.
+/// A device whose samples and writes a test can corrupt.
 class FaultyDevice final : public Device {
  public:
   explicit FaultyDevice(Device& device) : device_(device) {}
@@ -68,7 +68,7 @@ class FaultyDevice final : public Device {
   Device& device_;
 };
 
-/// A placer that finds what it is told to.
+/// A proxy initializer whose result a test can override.
 class OverriddenProxyInitializer final : public ProxyInitializer {
  public:
   explicit OverriddenProxyInitializer(const Scene& scene) : initializer_(scene) {}
@@ -91,45 +91,45 @@ class OverriddenProxyInitializer final : public ProxyInitializer {
   std::uint32_t number_ = 0;
 };
 
-/// What the hand does when the fault comes.
+/// What the hand does when the fault occurs.
 enum class Phase : std::uint8_t {
-  free,       ///< it holds the tool above the table
-  contact,    ///< it presses it on the table
-  saturated,  ///< it presses harder than the limits let the table push back
+  free,       ///< the hand holds the tool above the table
+  contact,    ///< the hand presses the tool on the table
+  saturated,  ///< the hand presses harder than the force limit can oppose
 };
 const char* name(Phase phase);
 
-/// The shipped cube on its table in virtual time, with everything that can go wrong within reach. Every tick
-/// is held against the invariants.
+/// The shipped cube on its table in virtual time, with access to everything that can fail. Checks every tick
+/// against the invariants.
 class FaultRig {
  public:
-  /// adjust: what shall be otherwise in its plan.
+  /// adjust: changes the configuration before the rig is built.
   explicit FaultRig(Phase phase, const std::function<void(RunConfig&)>& adjust = {});
 
-  /// One period later, and the tick. Returns what it recorded.
+  /// Advances the time and runs one tick. Returns its record.
   const TickRecord& tick(Duration after = std::chrono::milliseconds(1));
-  /// Ticks until the loop is in this state, while the hand is as the phase says. False where it does not come
-  /// to that.
+  /// Runs ticks until the loop is in this state, while the hand does what the phase says. Returns false if
+  /// the loop does not reach the state.
   bool bring_to(State state);
 
   const TickRecord& last() const noexcept { return last_; }
   State state() const noexcept { return static_cast<State>(last_.state); }
   bool raised(Fault fault) const noexcept { return (last_.faults & bit(fault)) != 0; }
   double force_N() const noexcept;
-  /// Which invariant was broken first, and where; empty where none was.
+  /// Returns the first violated invariant and its tick; empty if there is none.
   const std::string& violation() const noexcept { return violation_; }
 
-  /// From now on, for so long.
+  /// Injects a simulated fault from now on, for `for_s` seconds.
   void inject(SimulatedFault::Kind kind, double for_s, double value = 0.0);
 
   RigClock clock;
   RunConfig config;
-  Scene scene;
+  std::shared_ptr<const Scene> scene;
   SimulatedDevice simulated;
   LoopbackLink link;
   ProfileDevice device;
   FaultyDevice faulty_device;
-  OverriddenProxyInitializer proxy_initializer;
+  std::shared_ptr<OverriddenProxyInitializer> proxy_initializer;
   ServoLoop loop;
 
  private:
@@ -139,21 +139,21 @@ class FaultRig {
   bool armed_ = false;
 };
 
-/// A fault that can be made to happen, and what has to follow.
+/// A fault that a test can cause, and the expected reaction.
 struct Injection {
   std::string name;
   Fault expected;
-  int within_ticks;  ///< until it is found, from the first tick at which something is wrong
+  int within_ticks;  ///< maximum number of ticks from the first faulty tick to the detection
   std::function<void(FaultRig&)> begin;
   std::function<void(FaultRig&)> each_tick = {};
-  /// Where it can be found at all.
+  /// Returns true if the loop can detect the fault in this state and phase.
   std::function<bool(State, Phase)> applies = [](State, Phase) { return true; };
 };
 
-/// All of them.
+/// Returns all injections.
 const std::vector<Injection>& injections();
 
-/// The states that a fault can come in.
+/// Returns the states in which a fault can occur.
 const std::vector<State>& rig_states();
 
 }  // namespace wrenchd::test

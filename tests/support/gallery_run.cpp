@@ -15,15 +15,11 @@ namespace {
 
 constexpr double kDeg = 180.0 / std::numbers::pi;
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 double norm3(const std::array<double, 6>& x, std::size_t from) {
   return std::hypot(x[from], x[from + 1], x[from + 2]);
 }
 
-/// Of its x axis, seen from above.
+/// Returns the angle of the pose's x axis about the world's z axis.
 double heading_rad(const Pose& X) {
   const Vector3d x = X.rotation * Vector3d::UnitX();
   return std::atan2(x.y(), x.x());
@@ -44,7 +40,7 @@ double turned_deg(const GalleryRun& run, bool hand, double time_s) {
   for (const TickRecord* tick = run.ticks.data(); tick <= end; ++tick) {
     const auto& x = hand ? tick->X_WP : tick->X_WQ;
     if (!std::isfinite(x[0])) continue;
-    const double now = heading_rad(pose_of(x));
+    const double now = heading_rad(pose_from_numbers(x));
     if (begun) turned += std::remainder(now - last, 2.0 * std::numbers::pi);
     last = now;
     begun = true;
@@ -73,7 +69,7 @@ GalleryRun run_gallery_scene(const std::string& name, double seconds) {
   const auto count = static_cast<std::size_t>(std::lround(last_s * run.config.settings.servo.rate_Hz)) + 1;
   TimePoint first{};
   for (std::size_t i = 0; i < count; ++i) {
-    if (i == 1) station.runtime.loop().arm();
+    if (i == 1) station.runtime.loop().requests().arm();
     station.tick();
     if (i == 0) first = station.clock.now();
     run.ticks.push_back(station.last);
@@ -99,7 +95,7 @@ double run_figure(const GalleryRun& run, const std::string& quantity, double tim
     if (quantity == std::string("torque_") + kAxes[k] + "_mNm") return 1e3 * tick.F_out[3 + k];
   }
   if (quantity == "contacts") return tick.contacts;
-  const Pose X_WP = pose_of(tick.X_WP), X_WQ = pose_of(tick.X_WQ);
+  const Pose X_WP = pose_from_numbers(tick.X_WP), X_WQ = pose_from_numbers(tick.X_WQ);
   if (quantity == "depth_mm") return 1e3 * (X_WP.translation_m - X_WQ.translation_m).norm();
   const bool hand = quantity.rfind("hand_", 0) == 0;
   const std::string what = hand ? quantity.substr(5) : quantity;
@@ -125,7 +121,7 @@ std::vector<ExpectedFigure> expected_figures(const std::string& name) {
   std::ifstream in(file);
   std::vector<ExpectedFigure> all;
   std::string line;
-  std::getline(in, line);  // time_s,quantity,least,most
+  std::getline(in, line);  // the header: time_s,quantity,min,max
   while (std::getline(in, line)) {
     std::istringstream cells(line);
     std::string time, quantity, least, most;

@@ -9,37 +9,38 @@
 
 namespace wrenchd::test {
 
-/// A scene of the gallery, felt once from the start of its hand script to its end, in virtual time.
+/// One run of a gallery scene in virtual time, from the start to the end of its hand script.
 struct GalleryRun {
   RunConfig config;
   std::vector<TickRecord> ticks;
-  std::vector<double> scene_time_s;  ///< of each tick
+  std::vector<double> scene_time_s;  ///< scene time of each tick
 };
 
-/// The plan of a scene of the gallery as shipped, but for the self-test, which is left out.
+/// Returns the configuration of a gallery scene as shipped, without the self-test.
 RunConfig gallery_config(const std::string& name);
 
-/// How long its hand script lasts.
+/// Returns the duration of the configuration's hand script [s].
 double script_duration_s(const RunConfig& plan);
 
-/// Runs it armed from the start. seconds: no longer than that; 0: once through its script.
+/// Runs the scene, armed from the start. seconds: maximum duration; 0: the whole hand script.
 GalleryRun run_gallery_scene(const std::string& name, double seconds = 0.0);
 
-/// What there is to look at in a run. M is the frame of the tool's mesh.
+/// Returns a quantity of a run. M is the frame of the tool's mesh.
 ///
-///   peak_force_N, peak_torque_Nm   largest of the run, on the handle (at a moment: force_N, torque_Nm)
+///   peak_force_N, peak_torque_Nm   largest of the run, on the handle (at a time: force_N, torque_Nm)
 ///   force_x_N, torque_x_mNm, ...   one component
-///   contacts                       vertices and edges that touch
-///   x_mm, y_mm, z_mm               of M at the proxy, in the world
-///   turn_deg                       of M at the proxy about the world's z, counted on from the start
-///   tilt_deg                       between M's z at the proxy and the world's
-///   hand_x_mm, hand_y_mm, ...      the same where the hand is
-///   depth_mm                       from one to the other, between centres of mass
+///   contacts                       number of vertices and edges in contact
+///   x_mm, y_mm, z_mm               position of M at the proxy, in the world
+///   turn_deg                       rotation of M at the proxy about the world's z, unwrapped since the start
+///   tilt_deg                       angle between M's z at the proxy and the world's z
+///   hand_x_mm, hand_y_mm, ...      the same quantities at the hand
+///   depth_mm                       distance from hand to proxy, between centres of mass
 ///
-/// Throws std::invalid_argument where nothing is called so, or the run has no such moment.
+/// Throws std::invalid_argument if the quantity is unknown or the run has no tick at this time.
 double run_figure(const GalleryRun& run, const std::string& quantity, double time_s);
 
-/// One line of tests/data/gallery/NAME.csv: what is expected, at a moment or (time below 0) of the whole run.
+/// One line of tests/data/gallery/NAME.csv: a range of a quantity, at a time or (time below 0) for the whole
+/// run.
 struct ExpectedFigure {
   double time_s = -1.0;
   std::string quantity;

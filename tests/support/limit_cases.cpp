@@ -13,13 +13,13 @@ namespace {
 
 constexpr double kMost = std::numeric_limits<double>::max();
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();
-constexpr std::uint64_t kTicksEach = 64;  ///< of one device
+constexpr std::uint64_t kTicksEach = 64;  ///< number of ticks per device
 
 }  // namespace
 
 LimitCases::LimitCases(std::uint64_t seed) : state_(seed), limits_({}, profile_) {}
 
-/// splitmix64 (Steele, Lea, Flood 2014): the cases must not cost more than what they try.
+/// splitmix64 (Steele, Lea, Flood 2014). Its cost is small compared with the code under test.
 std::uint64_t LimitCases::bits() noexcept {
   std::uint64_t z = state_ += 0x9e37'79b9'7f4a'7c15;
   z = (z ^ (z >> 30)) * 0xbf58'476d'1ce4'e5b9;
@@ -35,7 +35,7 @@ double LimitCases::power_of_two(int from, int to) noexcept {
   return std::ldexp(1.0 + uniform01(), from + static_cast<int>(uniform01() * (to - from)));
 }
 
-/// A finite number of any kind.
+/// Returns a finite number of any magnitude.
 double LimitCases::any_double() noexcept {
   const double sign = chance(0.5) ? 1.0 : -1.0;
   switch (bits() % 6) {
@@ -54,7 +54,7 @@ double LimitCases::any_double() noexcept {
   }
 }
 
-/// An infinity of either sign, or a NaN of any sign and payload.
+/// Returns an infinity of either sign, or a NaN of any sign and payload.
 double LimitCases::not_finite() noexcept {
   constexpr std::uint64_t kSign = 0x8000'0000'0000'0000, kExponent = 0x7ff0'0000'0000'0000;
   return std::bit_cast<double>(kExponent | (chance(0.5) ? bits() : bits() & kSign));
@@ -105,7 +105,7 @@ Vector3d LimitCases::requested_vector(double limit, const Vector3d& last) noexce
   return between(0, 1.5) * limit * direction();
 }
 
-/// What may stand in the memory of a limiter: nothing of it has to be legal.
+/// Returns an arbitrary previous wrench, which need not respect the limits.
 Vector3d LimitCases::previous_vector(double limit) noexcept {
   switch (bits() % 6) {
     case 0:
@@ -152,13 +152,13 @@ Twist LimitCases::motion() noexcept {
   switch (bits() % 8) {
     case 0:
       return {};
-    case 1:  // pushed by both
+    case 1:  // both push
       if (f > 0 && tau > 0) V = {F.force_N / f * speed, F.torque_Nm / tau * spin};
       return V;
     case 2:  // one pushes, the other brakes
       if (f > 0 && tau > 0) V = {F.force_N / f * speed, -F.torque_Nm / tau * spin};
       return V;
-    case 3:  // braked by both
+    case 3:  // both brake
       if (f > 0 && tau > 0) V = {-F.force_N / f * speed, -F.torque_Nm / tau * spin};
       return V;
     case 4:
@@ -241,7 +241,7 @@ void LimitCases::randomize_device() {
   last_ = Wrench{};
 }
 
-/// One number of the input is none any more.
+/// Replaces one number of the input by one that is not finite.
 void LimitCases::corrupt() noexcept {
   const double bad = not_finite();
   const auto axis = static_cast<Eigen::Index>(bits() % 3);

@@ -10,26 +10,25 @@
 
 namespace wrenchd::test {
 
-/// A stream of ticks for a limiter, the same for the same seed: ordinary ones, and what a defect or an enemy
-/// would hand in. Numbers that are not finite, denormal, huge, exactly at a limit or the next double to it;
-/// steps of no time, backwards, of years; a last wrench that could never have gone out; twists that push,
-/// brake and cancel.
+/// A stream of inputs for a limiter, determined by a seed. It mixes ordinary ticks with adversarial ones:
+/// numbers that are not finite, denormal, huge, exactly at a limit or adjacent to it; time steps that are
+/// zero, negative or years long; previous wrenches outside the limits; twists that push, brake and cancel.
 class LimitCases {
  public:
   explicit LimitCases(std::uint64_t seed);
 
-  /// One tick further: makes a case, runs the limiter, asks the oracle. Returns the invariant that is broken,
-  /// or an empty text.
+  /// Creates the next case, runs the limiter and asks the oracle. Returns the violated invariant, or an empty
+  /// text.
   std::string next();
 
   const Limited& out() const noexcept { return out_; }
 
-  /// The case that next() ran, every number to its last digit.
+  /// Returns the case that next() ran, with all digits of every number.
   std::string describe() const;
 
  private:
   std::uint64_t bits() noexcept;
-  double uniform01() noexcept;  ///< [0, 1)
+  double uniform01() noexcept;  ///< uniform in [0, 1)
   bool chance(double probability) noexcept { return uniform01() < probability; }
   double between(double from, double to) noexcept { return from + (to - from) * uniform01(); }
   double power_of_two(int from, int to) noexcept;
@@ -52,8 +51,8 @@ class LimitCases {
   DeviceProfile profile_;
   LimitGuarantees guarantees_;
   WrenchLimits limits_;
-  Wrench last_;    ///< what went out last, or what was put in its place
-  Wrench before_;  ///< the same, of the case that ran
+  Wrench last_;    ///< wrench sent last, or the value that replaces it
+  Wrench before_;  ///< previous wrench of the case that ran
   LimitInput input_;
   Limited out_;
 };

@@ -7,7 +7,7 @@
 
 namespace wrenchd::test {
 
-/// What is promised to hold, whatever a limiter does inside.
+/// Guarantees of a limiter, independent of its implementation.
 struct LimitGuarantees {
   double max_force_N = 0.0;
   double max_torque_Nm = 0.0;
@@ -15,23 +15,23 @@ struct LimitGuarantees {
   double torque_ceiling_Nm = 0.0;
   double force_slew_N_per_s = 0.0;
   double torque_slew_Nm_per_s = 0.0;
-  double workspace_radius_m = 0.0;  ///< 0: no edge
+  double workspace_radius_m = 0.0;  ///< 0: unlimited
   Vector3d workspace_centre_m = Vector3d::Zero();
-  double max_power_W = 0.0;  ///< 0: any
+  double max_power_W = 0.0;  ///< 0: unlimited
 };
 
-/// One tick of a limiter, judged from outside, in long double and without a line of its code. Returns the
-/// invariant that is broken, or an empty text.
+/// Judges one tick of a limiter from outside, in long double and without the limiter's code. Returns the
+/// violated invariant, or an empty text.
 ///
-///   I1  what goes out is finite; an input that is not makes it zero, and is told
-///   I2  each group is no longer than its maximum and its ceiling
-///   I3  each group points where it was asked to, cos >= 1 - 1e-12; where the slew cut it, it lies between
-///   what
-///       went out last and what was asked for: out = a last + b asked, with a, b >= 0
-///   I4  from some point on the way from last to zero, each group moved by no more than slew * dt
-///   I5  authority 0: zero. Else no more than authority and edge leave of what was asked for
-///   I6  the power into the hand is no more than its maximum
-///   I7  nothing is cut for nothing: every cause told is one, and what is cut reaches the limit that cut it
+///   I1  the output is finite; an input that is not finite makes it zero and is reported
+///   I2  each group is within its maximum and its ceiling
+///   I3  each group points in the requested direction, cos >= 1 - 1e-12; if the slew limit acts, the output
+///   is
+///       between the previous output and the request: out = a last + b requested, with a, b >= 0
+///   I4  from some point between the previous output and zero, each group changes by at most slew * dt
+///   I5  authority 0 gives zero. Otherwise the output is at most authority times edge factor times the
+///   request I6  the power into the hand is at most its maximum I7  no group is limited without cause: every
+///   reported cause applies, and a limited group reaches the limit that acts
 std::string broken_invariant(const LimitGuarantees& promise, const Wrench& last, const LimitInput& input,
                              const Limited& out);
 

@@ -68,7 +68,7 @@ const Pose& HandTrajectory::next() {
   return X_WP_;
 }
 
-/// Down and up again: every second stab at 5 m/s, the others at a quarter of that.
+/// Moves down and up again: every second stab at 5 m/s, the others at a quarter of that.
 void HandTrajectory::stab() {
   const double depth_m = 2.0 * case_.start_m.norm();
   const bool fast = std::fmod(t_s_, 0.4) < 0.2;
@@ -80,7 +80,7 @@ void HandTrajectory::stab() {
   X_WP_.rotation = rotation_from(0.5 * std::sin(5.0 * t_s_) * Vector3d(0.94, 0.28, 0.19));
 }
 
-/// Velocities at random, now and then as fast as a hand can be, around a place half way into the obstacle.
+/// Random velocities up to the fastest of a hand, around a position half way into the obstacle.
 void HandTrajectory::shake() {
   if (ticks_ % 20 == 1) {
     const double vigour = ticks_ % 200 == 1 ? 5.0 : 1.0;

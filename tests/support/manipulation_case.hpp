@@ -11,32 +11,32 @@
 
 namespace wrenchd::test {
 
-/// How a hand handles a tool, at 1000 poses a second.
+/// How a hand moves a tool, at 1000 poses per second.
 enum class HandMotion : std::uint8_t {
-  stab,   ///< straight through the obstacle and back, at up to 5 m/s, turning a little
-  shake,  ///< at random, at up to 5 m/s and 50 rad/s
-  press,  ///< in a hole: from side to side, tilting, in and out
-  slide,  ///< over the top and beyond its edges
+  stab,   ///< straight through the obstacle and back at up to 5 m/s, with a small rotation
+  shake,  ///< random motion at up to 5 m/s and 50 rad/s
+  press,  ///< in a hole: lateral motion, tilt, and motion along the hole
+  slide,  ///< over the top and past its edges
 };
 
-/// A tool, an obstacle, and what is done with them.
+/// A tool, an obstacle, and the motion of the tool.
 struct ManipulationCase {
   std::string name;
   GeneratedMesh tool, obstacle;
   HandMotion motion;
-  Vector3d start_m;  ///< of the tool; nothing overlaps there
+  Vector3d start_m;  ///< start position of the tool, without overlap
 };
 
-/// Twenty of them: thin and thick, flat and round, fine and coarse, loose and tight.
+/// Twenty cases: thin and thick, flat and round, fine and coarse, loose and tight.
 const std::vector<ManipulationCase>& manipulation_cases();
 
-/// The obstacle may move, from where it stands.
+/// Returns the scene of a case. motion: the obstacle's motion from its initial pose.
 Scene scene_of(const ManipulationCase& handling, const ObstacleMotion& motion = {});
 
-/// A tool for the proxy: half-spaces would need the hull that tool_body() makes, meshes do not.
+/// Returns a tool without a convex hull, which only half-spaces need. Meshes do not.
 ToolBody mesh_tool(TriangleMesh mesh, double mass_kg = 0.1);
 
-/// The hand's poses of the tool's body frame, one after the other.
+/// The commanded poses of the tool's body frame, in sequence.
 class HandTrajectory {
  public:
   explicit HandTrajectory(const ManipulationCase& handling, std::uint64_t seed = 1)

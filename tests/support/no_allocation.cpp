@@ -7,8 +7,8 @@
 #include <dlfcn.h>
 #include <pthread.h>
 
-// The program's own malloc stands before glibc's and hands on to it, so that every allocation in the process
-// passes here, whoever asks. Under a sanitizer malloc is the sanitizer's, which tells through a hook instead.
+// The program's own malloc precedes glibc's and forwards to it, so that it sees every allocation of the
+// process. Under a sanitizer, malloc belongs to the sanitizer, which reports through a hook instead.
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define WRENCHD_SANITIZED 1

@@ -5,8 +5,8 @@
 
 namespace wrenchd::test {
 
-/// Counts what the servo thread must not do, on the thread that holds it: heap allocation and release (new,
-/// malloc and their kin, also inside libraries), and mutex locks.
+/// Counts operations that the servo thread must not perform, on the thread that owns the guard: heap
+/// allocation and release (new, malloc and related functions, also inside libraries), and mutex locks.
 class RealtimeGuard {
  public:
   RealtimeGuard() noexcept;

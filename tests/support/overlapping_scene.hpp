@@ -16,7 +16,7 @@ struct OverlappingScene {
   Pose X_WP;
 };
 
-/// A random body pressed into a random half-space by least_m up to most_m.
+/// Returns a random body that overlaps a random half-space by a depth between least_m and most_m.
 inline OverlappingScene overlap_half_space(RandomValues& random, double least_m, double most_m,
                                            double least_axis = 0.2) {
   const Vector3d n = random.unit<3>();
@@ -26,7 +26,7 @@ inline OverlappingScene overlap_half_space(RandomValues& random, double least_m,
   return {std::move(scene), X_WP};
 }
 
-/// A random body pressed into walls through the origin, by about depth_m into each.
+/// Returns a random body that overlaps walls through the origin by about depth_m each.
 inline OverlappingScene overlap_corner(RandomValues& random, int half_spaces, double depth_m) {
   std::vector<HalfSpaceSettings> walls;
   for (int i = 0; i < half_spaces; ++i) walls.push_back(half_space(random.unit<3>(), 0.0));
@@ -38,8 +38,7 @@ inline OverlappingScene overlap_corner(RandomValues& random, int half_spaces, do
   return {std::move(scene), X_WP};
 }
 
-/// Two random convex bodies, the tool moved towards the obstacle until they overlap by depth_m along their
-/// separating axis.
+/// Returns two random convex bodies that overlap by depth_m along their separating axis.
 inline OverlappingScene overlap_body(RandomValues& random, double depth_m) {
   ToolBody tool = random_body(random, random.integer(6, 14));
   const ToolBody other = random_body(random, random.integer(6, 14));

@@ -19,27 +19,27 @@ inline DeviceProfile polhem_profile() {
                       SearchPath({WRENCHD_SOURCE_DIR "/config"}));
 }
 
-/// A Polhem whose counters began wherever it was switched on, and a person who moves it as they are told.
-/// Virtual time.
+/// A Polhem whose counters start at an arbitrary pose, and a simulated person who follows the homing
+/// instructions. Runs in virtual time.
 struct PolhemInHand {
   VirtualClock clock;
   DeviceProfile profile = polhem_profile();
   EmulatedPolhem board{64};
   LoopbackLink link{board, clock};
   ProfileDevice device{profile, link};
-  Pose X_BH;    ///< where the handle truly is
-  Pose target;  ///< where the person moves it
+  Pose X_BH;    ///< true pose of the handle
+  Pose target;  ///< pose to which the person moves the handle
   JointCounts at_power_on{};
-  std::size_t swapped_axis = 6;  ///< this axis the person takes for the next one
+  std::size_t swapped_axis = 6;  ///< index of the axis that the person confuses with the next axis; 6: none
 
-  /// Switched on with the handle this far from home.
+  /// X_home_start: pose of the handle at power-on, relative to its home pose.
   explicit PolhemInHand(const Pose& X_home_start = {Quaterniond::Identity(), {-0.03, 0.02, 0.04}}) {
     X_BH = target = homing_plan(profile).X_BR * X_home_start;
     at_power_on = counts();
     update_encoders();
   }
 
-  /// For good, from now on.
+  /// Unplugs the device permanently.
   void unplug() {
     board.inject({SimulatedFault::Kind::unplug, clock.now() - TimePoint{}, std::chrono::hours(1)});
   }
@@ -54,7 +54,7 @@ struct PolhemInHand {
     for (std::size_t i = 0; i < 6; ++i) turned[i] = static_cast<int>(std::lround(now[i] - at_power_on[i]));
     board.set_encoder_counts(turned);
   }
-  /// A millisecond of the hand's: 0.1 m/s, 1 rad/s.
+  /// Moves the hand for 1 ms at 0.1 m/s and 1 rad/s.
   void step() {
     const Vector3d way = target.translation_m - X_BH.translation_m;
     X_BH.translation_m += way * std::min(1.0, 1e-4 / std::max(way.norm(), 1e-12));
@@ -64,7 +64,7 @@ struct PolhemInHand {
             .normalized();
     update_encoders();
   }
-  /// Sets out to do what is asked for.
+  /// Chooses the hand's next target according to the homing state.
   void follow_instructions(const HomingState& state) {
     if (state.step == HomingStep::reference) target = homing_plan(profile).X_BR;
     if (state.step != HomingStep::moving) return;

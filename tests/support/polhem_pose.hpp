@@ -19,8 +19,8 @@ inline Matrix3d about_z(double angle) {
   return Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
 }
 
-/// haptikfabrikenapi's own formulas for polhem_v1, from encoder counts to position and orientation of its
-/// end.
+/// Position and orientation of the end of polhem_v1 from encoder counts, by the formulas of
+/// haptikfabrikenapi.
 struct PolhemPose {
   Vector3d p;
   Matrix3d R;
@@ -40,10 +40,10 @@ inline PolhemPose polhem_pose(const std::array<int, 6>& counts) {
           tC};
 }
 
-/// Turned by half a turn about z: x and y the other way.
+/// Half a turn about z, which reverses x and y.
 inline const Matrix3d kHalfTurn = Vector3d(-1, -1, 1).asDiagonal();
 
-/// What the maker's software tells the motors for a force in the base.
+/// Returns the currents that the maker's software sends to the motors for a force in the base frame.
 inline std::array<double, 3> polhem_currents_mA(const PolhemPose& place, const Vector3d& F_N) {
   const auto [p, R, tA, tB, tC] = place;
   const Vector3d f = kHalfTurn * F_N;

@@ -13,7 +13,7 @@
 
 namespace wrenchd::test {
 
-/// The surface of a convex body as triangles, outward-oriented.
+/// Returns the surface of a convex body as outward-oriented triangles.
 inline TriangleMesh surface_of(const ConvexBody& body) {
   TriangleMesh mesh;
   mesh.vertices_m = body.vertices_T_m;
@@ -30,7 +30,7 @@ inline TriangleMesh surface_of(const ConvexBody& body) {
   return mesh;
 }
 
-/// A tool that is the convex hull of these points, as a uniform solid.
+/// Returns a tool that is the convex hull of these points, as a uniform solid.
 inline ToolBody tool_of(const std::vector<Vector3d>& points_M, double mass_kg = 1.0) {
   ToolBody tool;
   TriangleMesh mesh = surface_of(convex_hull(points_M));
@@ -40,7 +40,7 @@ inline ToolBody tool_of(const std::vector<Vector3d>& points_M, double mass_kg = 
   return tool;
 }
 
-/// Corners of a box whose faces are split into n x n squares.
+/// Returns the corners of a box whose faces are divided into n x n squares.
 inline std::vector<Vector3d> subdivided_box_points(int n, const Vector3d& size_m) {
   std::vector<Vector3d> points;
   for (int i = 0; i <= n; ++i)
@@ -54,12 +54,12 @@ inline std::vector<Vector3d> subdivided_box_points(int n, const Vector3d& size_m
   return points;
 }
 
-/// A box with its centre at the origin of M.
+/// Returns a box with its centre at the origin of M.
 inline ToolBody box(const Vector3d& size_m, double mass_kg = 1.0) {
   return tool_of(subdivided_box_points(1, size_m), mass_kg);
 }
 
-/// Points on an ellipsoid of random half-axes: compact and elongated bodies alike.
+/// Returns the hull of points on an ellipsoid with random half-axes, compact or elongated.
 inline ToolBody random_body(RandomValues& random, int points, double least_axis = 0.2) {
   const Vector3d axes(random.uniform(least_axis, 1.0), random.uniform(least_axis, 1.0),
                       random.uniform(least_axis, 1.0));
@@ -72,7 +72,7 @@ inline HalfSpaceSettings half_space(const Vector3d& normal, double offset_m) {
   return {"", normal.normalized(), offset_m};
 }
 
-/// The least gap of the tool to any half-space of the scene [m]: negative where they overlap.
+/// Returns the smallest gap between the tool and any half-space of the scene [m]; negative if they overlap.
 inline double least_gap_m(const Scene& scene, const Pose& X_WT) {
   double least = std::numeric_limits<double>::infinity();
   for (const HalfSpaceSettings& half_space : scene.half_spaces())
@@ -81,7 +81,7 @@ inline double least_gap_m(const Scene& scene, const Pose& X_WT) {
   return least;
 }
 
-/// The same scene seen from elsewhere: the world moved by a.
+/// Transforms the half-spaces by the world motion a.
 inline std::vector<HalfSpaceSettings> transformed(const Pose& a, std::vector<HalfSpaceSettings> half_spaces) {
   for (HalfSpaceSettings& h : half_spaces) {
     h.normal_W = a.rotation * h.normal_W;

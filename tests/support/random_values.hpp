@@ -12,17 +12,17 @@
 
 namespace wrenchd::test {
 
-/// The many values a law is held against. The seed is fixed by the test, so that a failure can be seen again.
+/// Random values for property tests. The test fixes the seed, so that a failure is reproducible.
 class RandomValues {
  public:
   explicit RandomValues(std::uint64_t seed) : engine_(seed) {}
 
   double uniform(double from, double to) { return from + (to - from) * uniform01_(engine_); }
   double normal() { return normal_(engine_); }
-  /// Evenly over the decades between the two, which must be positive.
+  /// Returns a value with a uniformly distributed logarithm. Both bounds must be positive.
   double log_uniform(double from, double to) { return std::exp(uniform(std::log(from), std::log(to))); }
   bool chance(double probability) { return uniform01_(engine_) < probability; }
-  /// A whole number, both ends included.
+  /// Returns an integer in [from, to].
   int integer(int from, int to) { return std::uniform_int_distribution<int>(from, to)(engine_); }
   std::uint64_t bits() { return engine_(); }
 
@@ -41,13 +41,13 @@ class RandomValues {
   }
   Quaterniond rotation(double angle_rad) { return Quaterniond(Eigen::AngleAxisd(angle_rad, unit<3>())); }
   Pose pose(double distance_m = 1.0) { return {rotation(), vector<3>(distance_m)}; }
-  /// Twist coordinates with a rotation of at most this angle.
+  /// Returns twist coordinates with a rotation of at most max_angle_rad.
   Vector6d twist(double distance_m, double max_angle_rad) {
     Vector6d xi;
     xi << vector<3>(distance_m), uniform(0.0, max_angle_rad) * unit<3>();
     return xi;
   }
-  /// Of a body that could exist: H = m (tr(C) I - C) with a positive definite C.
+  /// Returns the inertia of a physically possible body: H = m (tr(C) I - C) with a positive definite C.
   Inertia inertia(double size_m = 1.0) {
     const Matrix3d A = size_m * Matrix3d::NullaryExpr([&] { return normal(); });
     const Matrix3d C = A * A.transpose() + 0.01 * size_m * size_m * Matrix3d::Identity();

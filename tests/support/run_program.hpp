@@ -20,12 +20,13 @@
 namespace wrenchd::test {
 
 struct ProgramResult {
-  int exit_code = -1;  ///< -1: ended by a signal, or did not end in time
+  int exit_code = -1;  ///< -1 if a signal ended the program, or if it did not end in time
   std::string out;
   std::string err;
 };
 
-/// A built program that runs beside the test. Its streams are files, so it never waits for the test to read.
+/// A built program that runs beside the test. Its streams are files, so that the program never waits for the
+/// test.
 class RunningProgram {
  public:
   RunningProgram(const std::string& name, const std::vector<std::string>& arguments,
@@ -64,7 +65,7 @@ class RunningProgram {
   std::string out() const { return text_of("out"); }
   std::string err() const { return text_of("err"); }
 
-  /// True once standard error holds the text; false when `limit` has passed before.
+  /// Waits until standard error contains the text. Returns false after `limit`.
   bool wait_for_output(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(30)) const {
     for (const auto end = std::chrono::steady_clock::now() + limit; std::chrono::steady_clock::now() < end;) {
       if (err().find(text) != std::string::npos) return true;

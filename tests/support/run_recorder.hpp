@@ -9,7 +9,7 @@
 
 namespace wrenchd::test {
 
-/// Records a station that a test ticks by hand. Begins before the first tick.
+/// Records a runtime whose ticks the test runs. Must be created before the first tick.
 class RunRecorder {
  public:
   RunRecorder(Runtime& station, const std::filesystem::path& file)
@@ -21,7 +21,7 @@ class RunRecorder {
   RunRecorder(const RunRecorder&) = delete;
   RunRecorder& operator=(const RunRecorder&) = delete;
 
-  /// What was ticked since; within two seconds of the loop's time.
+  /// Appends the ticks since the last call. Must be called at least every two seconds of loop time.
   void append_new_ticks() {
     for (; state_.read(next_, record_); ++next_)
       batch_.add(record_.tick, std::span(record_.contacts).first(record_.contact_count));

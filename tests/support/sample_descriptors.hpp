@@ -12,7 +12,7 @@ namespace wrenchd::test {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// "05 01 a1": two hexadecimal digits a byte, blanks between them as one likes.
+/// Parses "05 01 a1": two hexadecimal digits per byte, with any blanks between them.
 inline Bytes from_hex(std::string_view text) {
   Bytes bytes;
   std::string digits;
@@ -26,19 +26,19 @@ inline Bytes from_hex(std::string_view text) {
   return bytes;
 }
 
-/// The descriptor that devices/README.md gives to makers.
+/// Returns the descriptor that devices/README.md recommends to makers.
 inline Bytes reference_descriptor() {
   return from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0");
 }
 
-// What real devices send, as people have captured and published it.
+// Published captures of real devices.
 
 /// The axes of 3Dconnexion's devices, X Y Z in report 1 and Rx Ry Rz in report 2.
 inline const std::string kSplitAxes =
     "05 01 09 08 a1 01 a1 00 85 01 16 a2 fe 26 5e 01 36 88 fa 46 78 05 55 0c 65 11 09 30 09 31 09 32"
     "75 10 95 03 81 06 c0 a1 00 85 02 09 33 09 34 09 35 75 10 95 03 81 06 c0";
-/// All six in report 1.
+/// All six axes in report 1.
 inline const std::string kCombinedAxes =
     "05 01 09 08 a1 01 a1 00 85 01 16 a2 fe 26 5e 01 36 88 fa 46 78 05 55 0c 65 11 09 30 09 31 09 32"
     "09 33 09 34 09 35 75 10 95 06 81 02 c0";
@@ -46,13 +46,13 @@ inline const std::string kCombinedAxes =
 inline const std::string kButtonsAndLed =
     "a1 02 85 03 05 01 05 09 19 01 29 02 15 00 25 01 35 00 45 01 75 01 95 02 81 02 95 0e 81 03 c0"
     "a1 02 85 04 05 08 09 4b 15 00 25 01 95 01 75 01 91 02 95 01 75 07 91 03 c0";
-/// Reports 5 to 11 and 19: feature reports of the maker's.
+/// Reports 5 to 11 and 19: vendor-defined feature reports.
 inline const std::string kMakersFeatures =
     "06 00 ff 09 01 a1 02 15 80 25 7f 75 08 09 3a a1 02 85 05 09 20 95 01 b1 02 c0 a1 02 85 06 09 21"
     "95 01 b1 02 c0 a1 02 85 07 09 22 95 01 b1 02 c0 a1 02 85 08 09 23 95 07 b1 02 c0 a1 02 85 09 09"
     "24 95 07 b1 02 c0 a1 02 85 0a 09 25 95 07 b1 02 c0 a1 02 85 0b 09 26 95 01 b1 02 c0 a1 02 85 13"
     "09 2e 95 01 b1 02 c0";
-/// Report 0x17: percent of the battery, and a bit of the maker's.
+/// Report 0x17: battery level in percent, and a vendor-defined bit.
 inline const std::string kBattery =
     "a1 02 85 17 15 00 25 64 55 00 65 00 05 06 09 20 75 08 95 01 81 02 15 00 25 01 06 00 ff 09 27 75"
     "01 95 01 81 02 75 07 81 03 c0";
@@ -67,14 +67,16 @@ inline Bytes space_mouse_wireless() {
   return from_hex(kCombinedAxes + kButtonsAndLed + kBattery + kMakersFeatures + "c0 c0");
 }
 
-/// A home-made firmware under the id of a SpaceMouse Pro, which is split; this one is not. 32 buttons.
+/// A home-made firmware under the id of a SpaceMouse Pro, which splits the axes; this firmware combines them.
+/// 32 buttons.
 inline Bytes home_made_combined() {
   return from_hex(kCombinedAxes +
                   "a1 00 85 03 15 00 25 01 75 01 95 20 05 09 19 01 29 20 81 02 c0"
                   "a1 02 85 04 05 08 09 4b 15 00 25 01 95 01 75 01 91 02 95 01 75 07 91 03 c0 c0");
 }
 
-/// Another, under the id of a SpaceMouse Pro Wireless, which is combined; this one is split. No units.
+/// A home-made firmware under the id of a SpaceMouse Pro Wireless, which combines the axes; this firmware
+/// splits them. No units.
 inline Bytes home_made_split() {
   return from_hex(
       "05 01 09 08 a1 01 a1 00 85 01 16 a2 fe 26 5e 01 36 88 fa 46 78 05 09 30 09 31 09 32 75 10 95 03"
@@ -82,7 +84,7 @@ inline Bytes home_made_split() {
       "a1 00 85 03 15 00 25 01 75 01 95 18 05 09 19 01 29 18 81 02 c0 c0");
 }
 
-/// A home-made mouse of six axes of ten bits each behind three buttons, with no report id.
+/// A home-made six-axis mouse with ten bits per axis, preceded by three buttons, without report ids.
 inline Bytes ten_bit_axes() {
   return from_hex(
       "05 01 09 08 a1 01 a1 00 05 09 19 01 29 03 15 00 25 01 95 03 75 01 81 02 05 01 09 30 09 31 09 32"
@@ -101,10 +103,10 @@ inline Bytes boot_keyboard() {
       "05 08 19 01 29 05 91 02 95 01 75 03 91 01 95 06 75 08 15 00 25 65 05 07 19 00 29 65 81 00 c0");
 }
 
-/// A joystick with force effects, laid out as OpenFFBoard's reports are: eight axes behind 64 buttons, the
-/// state of the actuators, a constant force, its own commands of up to 64 bits, and a pool of effects. It
-/// has what makes such descriptors hard: usages with their page, an exponent written as a byte, a maximum
-/// that comes before its minimum, push and pop, alternatives between delimiters, nested collections.
+/// A joystick with force effects, similar to OpenFFBoard: eight axes after 64 buttons, the state of the
+/// actuators, a constant force, vendor commands of up to 64 bits, and a pool of effects. It contains features
+/// that make parsing hard: usages with their page, an exponent written as a byte, a maximum before its
+/// minimum, push and pop, alternatives between delimiters, nested collections.
 inline Bytes effects_joystick() {
   return from_hex(
       "05 01 09 04 a1 01 a1 00 85 01 05 09 19 01 29 40 15 00 25 01 95 40 75 01 81 02"  // buttons
@@ -112,7 +114,7 @@ inline Bytes effects_joystick() {
       "a4 06 00 ff 09 00 a1 01 85 a1 09 01 15 00 26 04 00 75 08 95 01 91 02 09 02 75 10 91 02"  // commands
       "09 03 75 08 91 02 09 04 75 20 91 02 19 05 29 06 75 40 95 02 91 02 c0 b4"
       "05 0f 09 92 a1 02 85 02 09 9f 09 a0 09 a4 09 a6 09 94 15 00 25 01 35 00 45 01 75 01 95 05 81 02"
-      "95 03 81 03 c0"                                                     // its state
+      "95 03 81 03 c0"                                                     // state of the actuators
       "09 73 a1 02 85 05 09 22 25 28 15 01 35 01 45 28 75 08 95 01 91 02"  // constant force
       "09 70 16 01 80 26 ff 7f 36 f0 d8 46 10 27 75 10 91 02"
       "09 57 a1 02 a9 01 0b 01 00 0a 00 0a 01 00 a9 00 0b 02 00 0a 00 66 14 00 55 fe 15 00 27 a0 8c 00 00"
@@ -125,7 +127,7 @@ inline std::vector<Bytes> sample_descriptors() {
           ten_bit_axes(),    teensy_rawhid(),        boot_keyboard(),      effects_joystick()};
 }
 
-/// Bytes of a descriptor changed, put in, taken out, repeated or joined with another's.
+/// Changes, inserts, removes or repeats bytes of a descriptor, or joins it with another one.
 inline void mutate(RandomValues& random, const std::vector<Bytes>& samples, Bytes& bytes) {
   const auto place = [&](const Bytes& in) { return random.integer(0, static_cast<int>(in.size()) - 1); };
   const auto at = [&] { return bytes.begin() + place(bytes); };
@@ -157,7 +159,7 @@ inline void mutate(RandomValues& random, const std::vector<Bytes>& samples, Byte
   }
 }
 
-/// A sample with one to four mutations, or, a quarter of them, noise.
+/// Returns a sample with one to four mutations (75 %) or noise (25 %).
 inline Bytes malformed_descriptor(RandomValues& random) {
   static const std::vector<Bytes> kSamples = sample_descriptors();
   Bytes bytes;

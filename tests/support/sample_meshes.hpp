@@ -12,7 +12,7 @@
 
 namespace wrenchd::test {
 
-/// A box of six outward quads. Vertex i: bit 0 of i says high in x, bit 1 in y, bit 2 in z.
+/// A box of six outward quads. Bits 0, 1 and 2 of the vertex index select the upper bound in x, y and z.
 inline PolygonSoup box(const Vector3d& low, const Vector3d& high) {
   PolygonSoup soup;
   for (unsigned i = 0; i < 8; ++i)
@@ -22,7 +22,7 @@ inline PolygonSoup box(const Vector3d& low, const Vector3d& high) {
   return soup;
 }
 
-/// Each polygon as a fan of triangles.
+/// Splits each polygon into a fan of triangles.
 inline PolygonSoup triangulated(const PolygonSoup& soup) {
   PolygonSoup out{soup.vertices, {}};
   for (const auto& face : soup.faces)
@@ -35,7 +35,7 @@ inline PolygonSoup inside_out(PolygonSoup soup) {
   return soup;
 }
 
-/// Both in one soup, no vertex shared.
+/// Combines two soups without shared vertices.
 inline PolygonSoup concatenated(PolygonSoup a, const PolygonSoup& b) {
   const std::size_t first = a.vertices.size();
   a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
@@ -57,7 +57,7 @@ inline std::string point_text(const Vector3d& p) {
   return number_text(p.x()) + " " + number_text(p.y()) + " " + number_text(p.z());
 }
 
-/// "3 0 1 2", with `first` added to each number.
+/// Returns "0 1 2" with `first` added to each index.
 inline std::string indices_text(const std::vector<std::size_t>& face, std::size_t first) {
   std::string text;
   for (const std::size_t v : face) text += " " + std::to_string(v + first);
@@ -79,7 +79,7 @@ inline std::string as_obj(const PolygonSoup& soup) {
   return text;
 }
 
-/// Triangles only.
+/// Precondition: all faces are triangles.
 inline std::string as_ascii_stl(const PolygonSoup& soup) {
   std::string text = "solid box\n";
   for (const auto& face : soup.faces) {
@@ -98,7 +98,7 @@ void append_bytes(std::string& text, T x, bool swapped = false) {
   text.append(bytes.data(), bytes.size());
 }
 
-/// Triangles only; the machine is taken to be little-endian, as the format is.
+/// Precondition: all faces are triangles. Assumes a little-endian machine, as the format is little-endian.
 inline std::string as_binary_stl(const PolygonSoup& soup, const std::string& title = "box") {
   std::string text = title;
   text.resize(80, '\0');

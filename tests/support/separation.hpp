@@ -9,10 +9,9 @@
 
 namespace wrenchd::test {
 
-/// How far two convex bodies are apart along the best of the axes that can matter when they overlap (face
-/// normals of both, cross products of all edges), every vertex looked at each time [m]. Exact where they
-/// overlap; where they are apart it is positive, and at most the distance. Slow, and on its own: it shares
-/// nothing with what it checks but the vertices.
+/// Returns the largest separation of two convex bodies over all relevant axes (face normals of both, cross
+/// products of all edges) [m]. Tests every vertex for each axis. Exact if the bodies overlap; otherwise
+/// positive and at most their distance. Slow. Shares only the vertices with the code under test.
 inline double separation_m(const std::vector<Vector3d>& a_W, const ConvexBody& a, const ConvexBody& b) {
   double best = -std::numeric_limits<double>::infinity();
   const auto try_axis = [&](Vector3d n) {
@@ -48,7 +47,7 @@ inline double separation_m(const std::vector<Vector3d>& a_W, const ConvexBody& a
   return best;
 }
 
-/// Of the tool of a scene to the nearest of its obstacles.
+/// Returns the separation of the scene's tool from its nearest obstacle [m].
 inline double separation_m(const Scene& scene, const Pose& X_WT) {
   const ConvexBody& tool = scene.tool().hull;
   std::vector<Vector3d> points;

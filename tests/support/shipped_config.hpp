@@ -7,8 +7,8 @@
 
 namespace wrenchd::test {
 
-/// The configuration as it is shipped: simulated device, cube on table. The self-test is left out, so that a
-/// test begins with what it is about.
+/// Returns the shipped configuration: simulated device, cube on table. The self-test is disabled, so that a
+/// test starts directly.
 inline RunConfig shipped_config() {
   RunConfig plan = load_run_config({WRENCHD_SOURCE_DIR "/config/wrenchd.toml", {}, {}, false},
                                    SearchPath({WRENCHD_SOURCE_DIR "/config"}));
@@ -16,7 +16,7 @@ inline RunConfig shipped_config() {
   return plan;
 }
 
-/// A station with its simulated device within reach, opened.
+/// A runtime with an open simulated device that the test can access.
 template <class TheClock>
 struct SimulatedRuntime {
   TheClock clock;
@@ -32,7 +32,7 @@ struct SimulatedRuntime {
   }
 };
 
-/// The same in virtual time, ticked by hand.
+/// A runtime with a simulated device in virtual time. The test runs each tick.
 struct VirtualRuntime : SimulatedRuntime<VirtualClock> {
   TickRecord last;
 
@@ -44,10 +44,10 @@ struct VirtualRuntime : SimulatedRuntime<VirtualClock> {
   Fault tick_after(Duration pause) {
     clock.sleep_until(clock.now() + pause);
     const Fault fault = runtime.loop().tick(clock.now(), clock.now());
-    runtime.loop().latest_record().read(last);
+    runtime.loop().telemetry().latest_record().read(last);
     return fault;
   }
-  /// Ticks until a fault, or for so long. Returns the fault.
+  /// Runs ticks until a fault occurs or the duration ends. Returns the fault.
   Fault run(double duration_s) {
     const TimePoint end = clock.now() + from_seconds(duration_s);
     Fault fault = Fault::none;

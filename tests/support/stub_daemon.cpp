@@ -38,7 +38,7 @@ int listen_at(const std::string& path) {
   return fd;
 }
 
-/// The descriptor goes with the first byte.
+/// Sends the descriptor with the first byte.
 void send_line(int peer, const std::string& line, int descriptor = -1) {
   iovec part = {const_cast<char*>(line.data()), line.size()};
   msghdr message{};
@@ -73,7 +73,8 @@ StubDaemon::StubDaemon()
     prepare_servo_thread(simulated_.runtime.config().settings.servo);
     loop().run(simulated_.clock, stop_loop_);
   });
-  while (loop().state() == State::disconnected) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  while (loop().telemetry().state() == State::disconnected)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   serving_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
 }
 
@@ -112,7 +113,7 @@ void StubDaemon::send_raw(const std::string& bytes) {
 
 void StubDaemon::expire_lease() {
   holder_.store(-1);
-  loop().disarm();
+  loop().requests().disarm();
 }
 
 void StubDaemon::disconnect_all() {
@@ -124,7 +125,7 @@ void StubDaemon::disconnect(int peer) {
   peers_.erase(peer);
   close(peer);
   int held = peer;
-  if (holder_.compare_exchange_strong(held, -1)) loop().disarm();
+  if (holder_.compare_exchange_strong(held, -1)) loop().requests().disarm();
 }
 
 void StubDaemon::serve(const std::stop_token& stop) {
@@ -163,9 +164,9 @@ bool StubDaemon::receive(int peer) {
 void StubDaemon::answer(int peer, const std::string& line) {
   const json request = json::parse(line);
   const std::string method = request.at("method");
-  if (method == "beat") {
+  if (method == "lease.heartbeat") {
     if (holder_.load() == peer) ++heartbeats_;
-    loop().heartbeat();
+    loop().requests().heartbeat();
   } else {
     requested_methods_.push_back(method);
   }
@@ -182,14 +183,14 @@ void StubDaemon::answer(int peer, const std::string& line) {
 
 json StubDaemon::status() {
   json cause;
-  if (const Fault fault = loop().cause(); fault != Fault::none)
-    cause = {{"name", fault_row(fault).name}, {"sentence", fault_row(fault).message}};
-  return {{"state", name(loop().state())}, {"cause", cause}, {"sequence", sequence_}};
+  if (const Fault fault = loop().telemetry().cause(); fault != Fault::none)
+    cause = {{"name", fault_row(fault).name}, {"message", fault_row(fault).message}};
+  return {{"state", name(loop().telemetry().state())}, {"cause", cause}, {"sequence", sequence_}};
 }
 
 json StubDaemon::result_of(int peer, const std::string& method, const json& params, int& descriptor) {
   const auto ask = [&](CommandSet commands) {
-    loop().request(commands);
+    loop().requests().request(commands);
     return json::object();
   };
   if (method == "describe") return {{"protocol", 1}, {"methods", json::array()}};
@@ -206,15 +207,15 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
     return json::object();
   }
   if (method == "lease.take") {
-    int nobody = -1;
-    if (!holder_.compare_exchange_strong(nobody, peer) && nobody != peer)
+    int no_holder = -1;
+    if (!holder_.compare_exchange_strong(no_holder, peer) && no_holder != peer)
       throw Refusal{-32003, "another client has the lease; wait until it gives it back"};
-    return {{"beat_within_s", 0.1}};
+    return {{"heartbeat_timeout_s", 0.1}};
   }
-  if (method == "lease.give") {
+  if (method == "lease.release") {
     int held = peer;
     if (!holder_.compare_exchange_strong(held, -1)) throw Refusal{-32002, "you do not hold the lease"};
-    loop().disarm();
+    loop().requests().disarm();
     return json::object();
   }
   if (method == "arm") {
@@ -224,7 +225,7 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
   if (method == "disarm") return ask(kDisarm);
   if (method == "stop") return ask(kStop);
   if (method == "acknowledge") return ask(kAcknowledge);
-  if (method == "start_over") return ask(kReinitialize);
+  if (method == "reinitialize_proxy") return ask(kReinitialize);
   if (method == "state.open") {
     json answer;
     open_state(state_, simulated_.runtime.reconfigurator().obstacle_names(),

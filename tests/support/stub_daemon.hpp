@@ -18,9 +18,9 @@
 
 namespace wrenchd::test {
 
-/// The other end of a client library: a control socket that speaks the protocol as far as clients need it,
-/// and behind it the real loop with the simulated device, in wall time, and its real shared memory. It knows
-/// no roles; what clients are refused is the lease.
+/// The daemon's side for tests of the client libraries: a control socket with the methods that clients need,
+/// and behind it the real loop with the simulated device in wall time and its real shared memory. It has no
+/// roles; it refuses clients only because of the lease.
 class StubDaemon {
  public:
   StubDaemon();
@@ -31,17 +31,17 @@ class StubDaemon {
 
   int heartbeats() const { return heartbeats_.load(); }
   bool leased() const { return holder_.load() >= 0; }
-  /// Methods asked for since the start, in order.
+  /// Returns the methods that clients requested since the start, in order.
   std::vector<std::string> requested_methods() const;
-  /// Sends an event to all that subscribed to its name.
+  /// Sends an event to all clients that subscribed to its name.
   void send_event(const std::string& name, const std::string& level);
-  /// Sends these bytes, whatever they are, to all, in parts.
+  /// Sends these bytes in parts to all clients.
   void send_raw(const std::string& bytes);
-  /// From here on nothing is answered.
+  /// From now on the stub answers no request.
   void stop_answering() { silent_.store(true); }
-  /// As when a beat came too late.
+  /// Ends the lease as if a heartbeat was missing.
   void expire_lease();
-  /// Ends all connections.
+  /// Closes all connections.
   void disconnect_all();
 
  private:
@@ -65,7 +65,7 @@ class StubDaemon {
   std::atomic<bool> stop_loop_{false};
   std::thread servo_;
   int listening_;
-  mutable std::mutex mutex_;  ///< of what follows
+  mutable std::mutex mutex_;  ///< guards all members below
   std::map<int, Peer> peers_;
   std::vector<std::string> requested_methods_;
   std::uint64_t sequence_ = 0;

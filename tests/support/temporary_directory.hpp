@@ -10,7 +10,7 @@
 
 namespace wrenchd::test {
 
-/// A directory of its own, gone with the test.
+/// A directory that exists as long as this object.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {
@@ -27,11 +27,11 @@ class TemporaryDirectory {
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Writes a file, and the directories on the way to it.
+  /// Writes a file and creates its parent directories.
   std::filesystem::path write(const std::filesystem::path& name, std::string_view text) const {
     const std::filesystem::path file = path_ / name;
     std::filesystem::create_directories(file.parent_path());
-    std::filesystem::remove(file);  // truncating a file makes some file systems wait for the disk
+    std::filesystem::remove(file);  // on some file systems a truncated file waits for the disk
     std::ofstream(file, std::ios::binary) << text;
     return file;
   }

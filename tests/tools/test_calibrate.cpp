@@ -11,7 +11,7 @@ namespace {
 using namespace test;
 using Catch::Contains;
 
-/// A person who does as told, by the sentences alone.
+/// A simulated person who follows the instructions, given only their text.
 struct Obedient {
   PolhemInHand polhem;
   std::vector<std::string> heard;
@@ -49,13 +49,13 @@ struct Obedient {
 
 }  // namespace
 
-TEST_CASE("a calibration tells a person what to do, and ends with the offsets", "[calibrate]") {
+TEST_CASE("a calibration instructs the operator and returns the offsets", "[calibrate]") {
   Obedient bench;
   const Calibration found = bench.calibrated();
   CHECK(found.profile == "polhem");
   CHECK(found.serial == "A1");
   REQUIRE(found.offsets.size() == 6);
-  // What the joints counted of too little when the device was switched on.
+  // Count offsets of the joints at power-on.
   const Kinematics& k = bench.polhem.profile.kinematics;
   for (std::size_t i = 0; i < 6; ++i) {
     const double missing = bench.polhem.at_power_on[k.report_index[i]] * k.rad_per_count[i];
@@ -64,14 +64,14 @@ TEST_CASE("a calibration tells a person what to do, and ends with the offsets", 
   CHECK(bench.heard.back() == "Homed: the device may be armed.");
 }
 
-TEST_CASE("a calibration that fails says of what, and gives nothing", "[calibrate]") {
+TEST_CASE("a failed calibration states the reason and returns nothing", "[calibrate]") {
   Obedient bench;
   bench.polhem.swapped_axis = 1;
   CHECK_THROWS_WITH(bench.calibrated(), Contains("Homing failed. That moved z, not y.") &&
                                             Contains("look at their order in the profile"));
 }
 
-TEST_CASE("a calibration may be stopped, or lose its device", "[calibrate]") {
+TEST_CASE("a calibration ends if the operator cancels or the device is disconnected", "[calibrate]") {
   Obedient stopping;
   stopping.ms_left = 2000;
   CHECK_THROWS_WITH(stopping.calibrated(), Contains("nothing was stored"));
@@ -80,22 +80,22 @@ TEST_CASE("a calibration may be stopped, or lose its device", "[calibrate]") {
   CHECK_THROWS_WITH(losing.calibrated(), Contains("was unplugged"));
 }
 
-TEST_CASE("wrenchctl calibrate refuses what it cannot calibrate") {
+TEST_CASE("wrenchctl calibrate rejects devices that it cannot calibrate") {
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{"calibrate", "gone"}, "gone.toml: no such file"},
       {{"calibrate", "loopback"}, "profile loopback: it is for the simulated device"},
-      {{"calibrate", "polhem"}, "no such device is plugged in; wrenchctl devices lists what is"},
+      {{"calibrate", "polhem"}, "no such device is connected; wrenchctl devices lists the connected devices"},
       {{"calibrate", ""}, "must not be empty; name a profile, or leave it out"},
       {{"calibrate", "polhem", "--serial", ""}, "--serial: must not be empty; give the serial number"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code != 0);
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   }
 }
 

@@ -37,7 +37,7 @@ int code_of(const Act& act) {
   return 0;
 }
 
-/// A busy machine may make the loop late, which is a fault to it.
+/// A busy machine may delay the loop, which then raises a fault.
 void insist_on_arming(Client& client) {
   const std::string state = client.state();
   if (state == "fault") client.acknowledge();
@@ -56,7 +56,7 @@ std::size_t open_descriptors() {
 
 }  // namespace
 
-TEST_CASE("a client takes the lease, arms, and reads what the hand feels", "[client]") {
+TEST_CASE("a client acquires the lease, arms, and reads the wrench on the hand", "[client]") {
   StubDaemon daemon;
   Client client(daemon.socket());
   CHECK(soon([&] { return client.state() == "disarmed"; }));
@@ -101,11 +101,11 @@ TEST_CASE("a client that dies fades out: its lease ends with its connection", "[
       return client.state() == "active";
     }));
   }
-  CHECK(soon([&] { return !is_driving(daemon.loop().state()); }));
+  CHECK(soon([&] { return !is_driving(daemon.loop().telemetry().state()); }));
   CHECK_FALSE(daemon.leased());
 }
 
-TEST_CASE("a lease that was lost is told when arming, and is given back without ado", "[client]") {
+TEST_CASE("arming without the lease is an error; releasing a lost lease is not", "[client]") {
   StubDaemon daemon;
   Client client(daemon.socket());
   client.acquire_lease();
@@ -115,7 +115,7 @@ TEST_CASE("a lease that was lost is told when arming, and is given back without 
   CHECK_NOTHROW(client.acquire_lease());
 }
 
-TEST_CASE("what the daemon refuses comes with its sentence and its code", "[client]") {
+TEST_CASE("a rejected request throws with the daemon's message and code", "[client]") {
   StubDaemon daemon;
   Client first(daemon.socket());
   Client second(daemon.socket());
@@ -125,10 +125,10 @@ TEST_CASE("what the daemon refuses comes with its sentence and its code", "[clie
   CHECK(code_of([&] { second.call("dance"); }) == -32601);
   CHECK(code_of([&] { second.call("status", "no JSON"); }) == ClientError::kProtocol);
   CHECK_THROWS_WITH(second.reload(), "wrenchd.toml:3: no such key; delete it");
-  CHECK(second.state() == "disarmed");  // the connection goes on
+  CHECK(second.state() == "disarmed");  // the connection remains usable
 }
 
-TEST_CASE("events come in order, those asked for only, whatever answers come in between", "[client]") {
+TEST_CASE("subscribed events come in order, also between responses", "[client]") {
   StubDaemon daemon;
   Client client(daemon.socket());
   const auto snapshot = nlohmann::json::parse(client.subscribe({"state", "fault"}));
@@ -157,7 +157,7 @@ TEST_CASE("events come in order, those asked for only, whatever answers come in 
   CHECK_FALSE(client.poll_event(event, 20ms));
 }
 
-TEST_CASE("a daemon that goes, hangs or talks nonsense is an error, never a wait without end", "[client]") {
+TEST_CASE("a daemon that ends, hangs or sends invalid data is an error after a bounded time", "[client]") {
   StubDaemon daemon;
   Client client(daemon.socket(), 200ms);
   StateReader state = client.open_state();
@@ -177,11 +177,11 @@ TEST_CASE("a daemon that goes, hangs or talks nonsense is an error, never a wait
     CHECK(code_of([&] { client.status(); }) == ClientError::kDisconnected);
     ClientEvent event;
     CHECK(code_of([&] { client.poll_event(event); }) == ClientError::kDisconnected);
-    REQUIRE(state.next(tick));  // the memory is there still, and written to
+    REQUIRE(state.next(tick));  // the shared memory remains readable
   }
 }
 
-TEST_CASE("a reader hears that the daemon is gone", "[client]") {
+TEST_CASE("a reader detects that the daemon is gone", "[client]") {
   auto daemon = std::make_unique<StubDaemon>();
   Client client(daemon->socket());
   StateReader state = client.open_state();
@@ -191,18 +191,18 @@ TEST_CASE("a reader hears that the daemon is gone", "[client]") {
   CHECK(code_of([&] {
           while (state.next(tick, 10s)) continue;
         }) == ClientError::kDisconnected);
-  CHECK(state.latest(tick));  // what it left behind can be read
+  CHECK(state.latest(tick));  // the last ticks remain readable
   CHECK(tick.integer("released") == 1);
 }
 
-TEST_CASE("no daemon: the error names where it was looked for, and the cure", "[client]") {
+TEST_CASE("without a daemon the error names the searched sockets and the remedy", "[client]") {
   CHECK(code_of([] { Client("/nowhere/control.sock"); }) == ClientError::kNoDaemon);
   CHECK_THROWS_WITH(Client("/nowhere/control.sock"),
                     Catch::Contains("/nowhere/control.sock: No such file") && Catch::Contains("start it"));
   CHECK_THROWS_AS(Client(std::string(200, 'x')), ClientError);
 }
 
-TEST_CASE("clients leave no descriptor behind, taken or not", "[client]") {
+TEST_CASE("clients leak no descriptor, used or unused", "[client]") {
   StubDaemon daemon;
   { const Client client(daemon.socket()); }
   CHECK(soon([&] { return daemon.requested_methods().empty(); }));
@@ -210,7 +210,7 @@ TEST_CASE("clients leave no descriptor behind, taken or not", "[client]") {
   const std::size_t before = open_descriptors();
   for (int i = 0; i < 20; ++i) {
     Client client(daemon.socket());
-    client.call("state.open");  // its descriptor is nobody's
+    client.call("state.open");  // the client discards the descriptor
     client.status();
     StateReader state = client.open_state();
     StateReader moved = std::move(state);
@@ -220,7 +220,7 @@ TEST_CASE("clients leave no descriptor behind, taken or not", "[client]") {
   CHECK(soon([&] { return open_descriptors() == before; }));
 }
 
-TEST_CASE("the example prints what the hand feels", "[client]") {
+TEST_CASE("the example prints wrench and contacts", "[client]") {
   const StubDaemon daemon;
   setenv("WRENCHD_SOCKET", daemon.socket().c_str(), 1);
   const ProgramResult ran = run_program("wrenchd_client_example", {"3"});
@@ -232,5 +232,5 @@ TEST_CASE("the example prints what the hand feels", "[client]") {
   CHECK(ran.out.starts_with("wrenchd is disarmed\ntick "));
   CHECK(std::count(ran.out.begin(), ran.out.end(), '\n') == 4);
   CHECK(alone.exit_code == 1);
-  CHECK(alone.err.find("no wrenchd answers (") == 0);
+  CHECK(alone.err.find("no wrenchd responds (") == 0);
 }

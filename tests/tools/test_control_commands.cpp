@@ -6,7 +6,7 @@
 #include "daemon/control/json_rpc.hpp"
 #include "tests/support/run_program.hpp"
 
-// wrenchctl and the daemon, as two programs.
+// wrenchctl and the daemon as two processes.
 
 namespace wrenchd {
 namespace {
@@ -22,7 +22,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// A daemon whose simulated hand rests above the table, ready to be armed.
+/// A daemon whose simulated hand rests above the table, ready to arm.
 struct Daemon {
   TemporaryDirectory dir;
   std::string socket = (dir.path() / "control.sock").string();
@@ -58,13 +58,13 @@ struct Daemon {
   }
 };
 
-TEST_CASE("wrenchctl tells the status of a daemon, for a person and for a program", "[control_commands]") {
+TEST_CASE("wrenchctl status prints text for a user and JSON for a program", "[control_commands]") {
   const Daemon daemon;
   const ProgramResult text = daemon.ctl({"status"});
   CHECK(text.exit_code == 0);
   for (const char* part :
-       {"state      disarmed\n", "device     loopback (simulated), present\n", "armed by   nobody\n",
-        "lease      nobody has it\n", "limits     10 N, 0.5 N.m\n", "at 1000 Hz", "(p50 / p99.9 / max)"})
+       {"state      disarmed\n", "device     loopback (simulated), present\n", "armed by   -\n",
+        "lease      free\n", "limits     10 N, 0.5 N.m\n", "at 1000 Hz", "(p50 / p99.9 / max)"})
     has(text.out, part);
   const ProgramResult json = daemon.ctl({"status", "--json"});
   CHECK(json.exit_code == 0);
@@ -74,12 +74,12 @@ TEST_CASE("wrenchctl tells the status of a daemon, for a person and for a progra
   CHECK(status["tick"] > 0);
 }
 
-TEST_CASE("wrenchctl tells that a device without motors is not felt", "[control_commands]") {
+TEST_CASE("wrenchctl status reports that a device without motors applies no force", "[control_commands]") {
   const Daemon daemon("spacemouse_split");
   has(daemon.ctl({"status"}).out, "limits     0 N, 0 N.m: it has no motors, and nothing is felt\n");
 }
 
-TEST_CASE("wrenchctl arm holds the hand until it is interrupted, and everybody can watch",
+TEST_CASE("wrenchctl arm keeps the force until a signal, while other clients watch",
           "[control_commands][wall_time]") {
   const Daemon daemon;
   RunningProgram watch("wrenchctl", {"watch", "--socket", daemon.socket, "--json"});
@@ -130,13 +130,13 @@ TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wa
   REQUIRE(daemon.comes_to("active"));
   SECTION("killed") {
     arm.signal(SIGKILL);
-    CHECK(daemon.program.wait_for_output("hung up", std::chrono::seconds(5)));
+    CHECK(daemon.program.wait_for_output("disconnected", std::chrono::seconds(5)));
   }
   SECTION("stopped") {
     arm.signal(SIGSTOP);
-    CHECK(daemon.program.wait_for_output("gives no sign of life", std::chrono::seconds(5)));
+    CHECK(daemon.program.wait_for_output("sends no heartbeat", std::chrono::seconds(5)));
   }
-  CHECK(daemon.program.wait_for_output("client_gone: ", std::chrono::seconds(5)));
+  CHECK(daemon.program.wait_for_output("heartbeat_lost: ", std::chrono::seconds(5)));
   CHECK(daemon.comes_to("disarmed"));
 }
 
@@ -146,42 +146,42 @@ TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
   const ProgramResult stop = daemon.ctl({"stop"});
   CHECK(stop.exit_code == 0);
   has(stop.out, "asked: stop; state stopped");
-  has(daemon.ctl({"status"}).out, "cause      stop_asked: ");
+  has(daemon.ctl({"status"}).out, "cause      stop_requested: ");
   const ProgramResult arm = daemon.ctl({"arm"});
   CHECK(arm.exit_code == 1);
-  has(arm.err, "It cannot be armed in state 'stopped': acknowledge what happened first.");
+  has(arm.err, "The loop cannot be armed in state 'stopped': acknowledge what happened first.");
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 0);
   CHECK(daemon.comes_to("disarmed"));
 }
 
-TEST_CASE("wrenchctl describe shows what can be asked, by whom", "[control_commands]") {
+TEST_CASE("wrenchctl describe lists methods and roles", "[control_commands]") {
   const Daemon daemon;
   const ProgramResult all = daemon.ctl({"describe"});
   CHECK(all.exit_code == 0);
-  for (const char* part : {"lease.take  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
-                           "from_other: true or false, may be left out; "})
+  for (const char* part : {"lease.acquire  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
+                           "preempt: true or false, optional; "})
     has(all.out, part);
   const ProgramResult one = daemon.ctl({"describe", "arm"});
   CHECK(one.out.find("arm  (operator)\n") == 0);
   CHECK(one.out.find("stop") == std::string::npos);
   const ProgramResult none = daemon.ctl({"describe", "dance"});
   CHECK(none.exit_code == 1);
-  has(none.err, "there is no method 'dance'; wrenchctl describe, without a name, lists them");
+  has(none.err, "there is no method 'dance'; wrenchctl describe without a name lists the methods");
 }
 
-TEST_CASE("wrenchctl says where it looked for a daemon, and what to do", "[control_commands]") {
+TEST_CASE("wrenchctl names the searched sockets and the remedy", "[control_commands]") {
   const TemporaryDirectory dir;
   const std::string socket = (dir.path() / "control.sock").string();
   const ProgramResult gone = run_program("wrenchctl", {"status", "--socket", socket});
   CHECK(gone.exit_code == 1);
   CHECK(gone.out == "");
-  has(gone.err, "wrenchctl: no wrenchd answers (" + socket + ": No such file or directory); start it");
+  has(gone.err, "wrenchctl: no wrenchd responds (" + socket + ": No such file or directory); start it");
   const ProgramResult usual = run_program("wrenchctl", {"arm"});  // tests have $WRENCHD_SOCKET set to none
   CHECK(usual.exit_code == 1);
-  has(usual.err, "no wrenchd answers (none: ");
+  has(usual.err, "no wrenchd responds (none: ");
 }
 
-TEST_CASE("beside a daemon that has the socket no second one starts, and what it finds is told",
+TEST_CASE("a second daemon does not start on an occupied socket, and states the reason",
           "[control_commands]") {
   const Daemon daemon;
   const ProgramResult second =
@@ -199,8 +199,7 @@ TEST_CASE("beside a daemon that has the socket no second one starts, and what it
   has(group.err, "key 'control.operators': this machine has no group 'no-such-group-here'; make it with");
 }
 
-TEST_CASE("a daemon armed by its command line can be disarmed by anybody who operates",
-          "[control_commands]") {
+TEST_CASE("any operator can disarm a daemon that its command line armed", "[control_commands]") {
   const TemporaryDirectory dir;
   const std::string socket = (dir.path() / "control.sock").string();
   const RunningProgram program("wrenchd", {"--realtime", "off", "--arm", "--control", socket});

@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/config"}));
 
-/// A machine on which everything is as it should be. Each test makes one thing worse.
+/// A machine without problems. Each test changes one property.
 struct Healthy {
   TemporaryDirectory dir;
   MachineState patient;
@@ -40,13 +40,13 @@ struct Healthy {
     patient.wake_latency = WakeLatency{true, 5us, 40us, 90us};
   }
 
-  /// The one finding that is not ok.
+  /// Returns the only finding that is not ok.
   Finding worst() const {
     Finding found;
     for (const Finding& f : check_machine(patient)) {
       if (f.health == Health::ok) continue;
       INFO(text(check_machine(patient)));
-      CHECK(found.summary == "");  // nothing else is worse for it
+      CHECK(found.summary == "");  // no other finding changes
       found = f;
     }
     return found;
@@ -57,7 +57,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Of that health, about that, with that cure.
+/// Returns true if the finding has this severity, and its summary and remedy contain these texts.
 void check(const Finding& found, Health health, const std::string& what, const std::string& cure) {
   INFO(found.summary << " -> " << found.cure);
   CHECK(found.health == health);
@@ -65,7 +65,7 @@ void check(const Finding& found, Health health, const std::string& what, const s
   CHECK(has(found.cure, cure));
 }
 
-TEST_CASE("a machine that is as it should be has nothing to cure", "[doctor]") {
+TEST_CASE("a machine without problems has only ok findings", "[doctor]") {
   const Healthy h;
   const auto findings = check_machine(h.patient);
   INFO(text(findings));
@@ -77,7 +77,7 @@ TEST_CASE("a machine that is as it should be has nothing to cure", "[doctor]") {
   CHECK_FALSE(has_failure(findings));
 }
 
-TEST_CASE("kernel and processors could be better, and a throttled real-time share is wrong", "[doctor]") {
+TEST_CASE("kernel and processors cause warnings; a throttled real-time share is an error", "[doctor]") {
   SECTION("kernel") {
     Healthy h;
     h.dir.write("sys/kernel/realtime", "0\n");
@@ -101,7 +101,7 @@ TEST_CASE("kernel and processors could be better, and a throttled real-time shar
   }
 }
 
-TEST_CASE("limits of the user are hints, those of the service are not", "[doctor]") {
+TEST_CASE("limits of the user cause warnings, limits of the service cause errors", "[doctor]") {
   SECTION("priority") {
     Healthy h;
     h.patient.rtprio_limit = 0;
@@ -121,7 +121,7 @@ TEST_CASE("limits of the user are hints, those of the service are not", "[doctor
   }
 }
 
-TEST_CASE("who may open devices, and who may arm", "[doctor]") {
+TEST_CASE("groups determine access to devices and arming", "[doctor]") {
   SECTION("an onlooker") {
     Healthy h;
     h.patient.groups = {"ann"};
@@ -139,7 +139,7 @@ TEST_CASE("who may open devices, and who may arm", "[doctor]") {
   }
 }
 
-TEST_CASE("rules that are missing, or of other profiles", "[doctor]") {
+TEST_CASE("missing or outdated udev rules are errors", "[doctor]") {
   const std::string cure = "wrenchctl udev-rules -o /etc/udev/rules.d/70-wrenchd.rules";
   SECTION("none") {
     Healthy h;
@@ -153,8 +153,7 @@ TEST_CASE("rules that are missing, or of other profiles", "[doctor]") {
   }
 }
 
-TEST_CASE("nodes that the service cannot open, that everybody can, and devices that fall asleep",
-          "[doctor]") {
+TEST_CASE("inaccessible nodes, world-accessible nodes and autosuspend are errors", "[doctor]") {
   Healthy h;
   SECTION("root's") {
     h.patient.nodes[0].group = "root";
@@ -171,8 +170,7 @@ TEST_CASE("nodes that the service cannot open, that everybody can, and devices t
   }
 }
 
-TEST_CASE("wake-ups are judged against the period of a tick, and not where real time was refused",
-          "[doctor]") {
+TEST_CASE("wake latency is compared with the tick period only if real time was granted", "[doctor]") {
   Healthy h;
   h.patient.wake_latency = WakeLatency{true, 5us, 300us, 2ms};
   check(h.worst(), Health::warning, "p50 5 us, p99.9 300 us, at most 2000 us late, with SCHED_FIFO", "heavy");
@@ -182,30 +180,29 @@ TEST_CASE("wake-ups are judged against the period of a tick, and not where real 
   check(h.worst(), Health::warning, "without SCHED_FIFO", "run it as root");
 }
 
-TEST_CASE("wake-ups are really measured", "[doctor]") {
+TEST_CASE("the wake latency is measured", "[doctor]") {
   const WakeLatency seen = measure_wake_latency(100ms);
   CHECK(seen.max > 0ns);
   CHECK(seen.p50 > 0ns);
   CHECK(seen.p50 <= seen.p999);
 }
 
-TEST_CASE("findings read as lines with their cures", "[doctor]") {
+TEST_CASE("findings are printed as lines with their remedies", "[doctor]") {
   const std::vector<Finding> findings = {{Health::ok, "a: fine", ""},
                                          {Health::warning, "b: so so", "do c"},
                                          {Health::failure, "d: bad", "do e"}};
   CHECK(text(findings) ==
-        "ok      a: fine\nbetter  b: so so\n        -> do c\nWRONG   d: bad\n        -> do e\n");
+        "ok      a: fine\nwarning b: so so\n        -> do c\nERROR   d: bad\n        -> do e\n");
   CHECK(has_failure(findings));
 }
 
-TEST_CASE("wrenchctl doctor looks at this machine, and its exit code says whether anything is wrong",
-          "[doctor][wrenchctl]") {
+TEST_CASE("wrenchctl doctor checks this machine; its exit code reports failures", "[doctor][wrenchctl]") {
   const ProgramResult result = run_program("wrenchctl", {"doctor"});
   INFO(result.out << result.err);
   CHECK(result.err == "");
   CHECK(has(result.out, "kernel: "));
-  CHECK(has(result.out, "wake-ups: p50 "));
-  CHECK(result.exit_code == (has(result.out, "WRONG   ") ? 5 : 0));
+  CHECK(has(result.out, "wake latency: p50 "));
+  CHECK(result.exit_code == (has(result.out, "ERROR   ") ? 5 : 0));
 }
 
 }  // namespace

@@ -67,6 +67,6 @@ TEST_CASE("a part of a recording is exported", "[export]") {
   CHECK(lines_of({.columns = {"tick"}, .from_s = 2.0}).size() == 1);
 }
 
-TEST_CASE("a column that is not there is refused with the nearest that is", "[export]") {
+TEST_CASE("an unknown column is rejected with the most similar name", "[export]") {
   CHECK_THROWS_WITH(lines_of({.columns = {"F_oot"}}), Contains("no column 'F_oot'") && Contains("F_out"));
 }

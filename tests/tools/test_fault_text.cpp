@@ -7,7 +7,7 @@
 using namespace wrenchd;
 using Catch::Matchers::Contains;
 
-TEST_CASE("the list of faults has all of them, with what follows and what to do", "[fault_text]") {
+TEST_CASE("the fault text contains every fault with reaction and remedy", "[fault_text]") {
   const std::string text = fault_text();
   for (const FaultRow& row : fault_rows()) {
     CHECK_THAT(text, Contains(std::string(row.name) + "\n"));
@@ -16,16 +16,16 @@ TEST_CASE("the list of faults has all of them, with what follows and what to do"
   CHECK_THAT(fault_text("overspeed"), Contains("state fault; in the same tick, no force in that tick"));
   CHECK_THAT(fault_text("sample_late"),
              Contains("state degraded; after 3 ms, within one tick, no force 10 ms later"));
-  CHECK_THAT(fault_text("client_gone"),
+  CHECK_THAT(fault_text("heartbeat_lost"),
              Contains("state releasing; after 100 ms, within one tick, no force 100 ms later"));
-  CHECK_THAT(fault_text("overheated"), Contains("it is told, and the force stays"));
+  CHECK_THAT(fault_text("overheated"), Contains("the loop reports it, and the force remains"));
 }
 
-TEST_CASE("a fault that there is not is told with those that there are", "[fault_text]") {
+TEST_CASE("an unknown fault name is rejected with the list of names", "[fault_text]") {
   CHECK_THROWS_WITH(fault_text("hunger"), Contains("there is no fault 'hunger'") && Contains("overspeed"));
 }
 
-TEST_CASE("the machine is shown row by row", "[fault_text]") {
+TEST_CASE("the state machine is printed row by row", "[fault_text]") {
   const std::string text = state_machine_text();
   CHECK(std::count(text.begin(), text.end(), '\n') == static_cast<long>(transitions().size()) + 1);
   CHECK_THAT(text, Contains("hard fault") && Contains("somebody has to look at it"));

@@ -14,24 +14,24 @@
 #include "tests/support/temporary_directory.hpp"
 #include "tools/gallery.hpp"
 
-// Every scene of the gallery, felt once through its hand script: no fault, nothing cut through, and what its
-// paragraph says is so in figures.
+// Runs every scene of the gallery once through its hand script: no fault, no overlap, and the figures that
+// its description states.
 
 namespace wrenchd::test {
 namespace {
 
-/// Under sanitizers everything takes many times as long: only as much of a script then.
+/// Maximum duration of a script under sanitizers, which are many times slower.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr double kSeconds = 2.0;
 #else
-constexpr double kSeconds = 0.0;  // all of it
+constexpr double kSeconds = 0.0;  // the whole script
 #endif
 
 Pose pose_of(const std::array<double, 7>& x) {
   return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
 }
 
-/// That the tool has nothing in common with any obstacle, looked at in exact arithmetic.
+/// Checks in exact arithmetic that the tool overlaps no obstacle.
 class Admissible {
  public:
   explicit Admissible(const SceneSettings& settings) : scene_(settings) {
@@ -50,7 +50,7 @@ class Admissible {
   }
 
  private:
-  static constexpr double kRounding_m = 1e-12;  ///< half-spaces are touched, and not kept clear of
+  static constexpr double kRounding_m = 1e-12;  ///< tolerance of half-spaces, which have no clearance
   Scene scene_;
   std::vector<std::unique_ptr<ExactIntersection>> meetings_;
 };
@@ -62,8 +62,7 @@ std::vector<std::string> names() {
   return all;
 }
 
-/// So many poses of a run are looked at: meshes of a hundred thousand triangles take exact arithmetic a
-/// while.
+/// Number of poses of a run for the exact test, which is slow for meshes of a hundred thousand triangles.
 std::size_t poses_of(const Scene& scene) {
   std::size_t triangles = scene.tool().mesh.triangles.size();
   for (const MeshObstacle& obstacle : scene.meshes()) triangles += obstacle.mesh->surface.triangles().size();
@@ -90,7 +89,7 @@ void check_exhibit(const std::string& name) {
     if (static_cast<ProxyInitialization>(run.ticks[i].proxy_initialization) != ProxyInitialization::complete)
       continue;
     INFO("tick " << i);
-    CHECK(admissible.at(pose_of(run.ticks[i].X_WQ), run.scene_time_s[i]));
+    CHECK(admissible.at(pose_from_numbers(run.ticks[i].X_WQ), run.scene_time_s[i]));
     touching += run.ticks[i].contacts > 0 ? 1 : 0;
   }
 
@@ -139,7 +138,7 @@ TEST_CASE("gallery: an obstacle that moves", "[gallery]") {
   check_exhibit("moving_obstacle");
 }
 
-TEST_CASE("a recording of a scene whose meshes are made needs nothing but itself", "[gallery][program]") {
+TEST_CASE("a recording of a scene with generated meshes replays without other files", "[gallery][program]") {
   const TemporaryDirectory files;
   const std::string file = (files.path() / "run.h5").string();
   const std::string name = GENERATE("staircase", "peg_in_hole");
@@ -149,11 +148,11 @@ TEST_CASE("a recording of a scene whose meshes are made needs nothing but itself
   const ProgramResult again = run_program("wrenchctl", {"replay", file});
   INFO(again.err);
   CHECK(again.exit_code == 0);
-  CHECK(again.out.find("with: what is in the recording") != std::string::npos);
-  CHECK(again.out.find("3001 ticks, all the same, bit for bit") != std::string::npos);
+  CHECK(again.out.find("with: the files in the recording") != std::string::npos);
+  CHECK(again.out.find("3001 ticks, all bits are equal") != std::string::npos);
 }
 
-TEST_CASE("every scene of the gallery says what it is, repeats, has a camera, and is tested", "[gallery]") {
+TEST_CASE("every gallery scene has a description, a repeating script, a viewpoint and a test", "[gallery]") {
   const std::vector<std::string> all = names();
   CHECK(all == std::vector<std::string>{"bolt_and_nut", "gear_pair", "hares", "key_in_lock",
                                         "moving_obstacle", "paper_cube", "peg_in_hole", "staircase",
@@ -188,10 +187,10 @@ TEST_CASE("wrenchctl gallery lists the scenes, and shows one", "[gallery][wrench
   CHECK_THAT(none.err, Catch::Contains("there are bolt_and_nut, gear_pair"));
 }
 
-TEST_CASE("tools/run refuses a name that is not in the gallery, with those there are", "[gallery]") {
+TEST_CASE("tools/run rejects an unknown gallery name with the list of names", "[gallery]") {
   const ProgramResult result = run_program("../../../tools/run", {"teapot"});
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.err, Catch::Contains("there is no 'teapot' in the gallery; there are bolt_and_nut"));
+  CHECK_THAT(result.err, Catch::Contains("the gallery has no scene 'teapot'; the scenes are bolt_and_nut"));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ struct Ids {
   std::uint16_t vendor, product, page, usage;
 };
 
-/// A HID device in its socket; the nodes have the number of the port.
+/// A connected HID device; the node numbers are the port number.
 UsbDevice hid(int port, Ids ids, const Bytes& descriptor, const std::string& name) {
   UsbDevice device;
   device.port_path = "3-" + std::to_string(port);
@@ -70,37 +70,37 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("where nothing is plugged in the list says so", "[list_devices]") {
-  CHECK(list({}) == "Nothing is plugged in: no USB device but hubs, and no HID device.\n");
+TEST_CASE("the list states that no device is connected", "[list_devices]") {
+  CHECK(list({}) == "No device is connected: no USB device except hubs, and no HID device.\n");
   CHECK(list({}, true) == list({}));
 }
 
-TEST_CASE("a SpaceNavigator has its profile, what it senses and drives, and why no other", "[list_devices]") {
+TEST_CASE("a SpaceNavigator is listed with profile, degrees of freedom and rejected profiles",
+          "[list_devices]") {
   CHECK(list({space_navigator_in(2)}) ==
         "3-2, interface 0: 046d:c626 \"SpaceNavigator\" of 3Dconnexion, no serial number\n"
         "  /dev/hidraw2 can be opened\n"
         "  profile spacemouse_split: 3Dconnexion SpaceMouse family, translation and rotation in two reports: "
-        "moves a tool, feels nothing\n"
+        "steers a tool, no force\n"
         "  senses x y z rx ry rz; drives none: it moves a tool, and every wrench is dropped\n"
-        "  its report descriptor agrees with the profile\n"
+        "  the report descriptor agrees with the profile\n"
         "  the other profiles:\n"
         "    example, falcon, polhem, polhem_lpc1768, reference_full_speed, reference_high_speed: its ids do "
         "not include 046d:c626\n"
         "    loopback: it is for the simulated device\n"
-        "    spacemouse_combined: in-report 1 of the device has 7 bytes, that of the profile 13\n"
-        "    woodenhaptics: it is used only where the configuration names it\n");
+        "    spacemouse_combined: input report 1 of the device has 7 bytes, in the profile 13\n"
+        "    woodenhaptics: it is used only if the configuration names it\n");
 }
 
-TEST_CASE("a borrowed id does not hide how the device speaks", "[list_devices]") {
+TEST_CASE("the report descriptor identifies a device with a copied id", "[list_devices]") {
   const std::string text =
       list({hid(1, {0x046d, 0xc62b, 1, 8}, home_made_combined(), "home-made SpaceMouse")});
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
-  CHECK(holds(text, "\n  its report descriptor agrees with the profile\n"));
-  CHECK(
-      holds(text, "\n    spacemouse_split: in-report 1 of the device has 13 bytes, that of the profile 7\n"));
+  CHECK(holds(text, "\n  the report descriptor agrees with the profile\n"));
+  CHECK(holds(text, "\n    spacemouse_split: input report 1 of the device has 13 bytes, in the profile 7\n"));
 }
 
-TEST_CASE("two equal devices are told apart by serial number, where they have one", "[list_devices]") {
+TEST_CASE("serial numbers distinguish two equal devices", "[list_devices]") {
   const std::string text = list({reference_in(1, "B2"), reference_in(2, "A1")});
   CHECK(holds(text, "3-1, interface 0: 1209:0001 \"handle\", serial number B2\n"));
   CHECK(holds(text, "3-2, interface 0: 1209:0001 \"handle\", serial number A1\n"));
@@ -109,7 +109,7 @@ TEST_CASE("two equal devices are told apart by serial number, where they have on
               "\n\n2 devices have the profile reference_full_speed: for one of them alone write a profile "
               "with inherits = \"reference_full_speed\" and its serial in [match]: \"A1\" \"B2\"\n"));
 
-  const std::string cure = ", and no serial numbers that tell them apart: leave in the one you mean\n";
+  const std::string cure = ", and no serial numbers to distinguish them: connect only the intended device\n";
   CHECK(holds(list({reference_in(1, "A1"), reference_in(2, "A1")}), cure));
   CHECK(holds(list({reference_in(1, ""), reference_in(2, "A1")}), cure));
   CHECK_FALSE(holds(list({reference_in(1, "A1"), space_navigator_in(2)}), "devices have the profile"));
@@ -129,34 +129,36 @@ TEST_CASE("a profile that states the serial number goes to that device", "[list_
   const std::size_t second = text.find("3-2, ");
   CHECK(holds(text.substr(0, second), "\n  profile mine: "));
   CHECK(holds(text.substr(0, second),
-              "\n    reference_full_speed: it fits as well, and the other is nearer\n"));
+              "\n    reference_full_speed: this profile also matches, but less specifically\n"));
   CHECK(holds(text.substr(second), "\n  profile reference_full_speed: "));
   CHECK(holds(text.substr(second), "\n    mine: it is for serial number A1, not B2\n"));
 
   known.profiles.back().match.serial.clear();
   const std::string both = device_list(std::vector{reference_in(1, "A1")}, known, false, open_to_all);
   CHECK(holds(both, "\n  several profiles match 1209:0001, the last of them mine; name one"));
-  CHECK(holds(both, "\n    reference_full_speed, mine: it fits, and is not alone\n"));
+  CHECK(holds(both, "\n    reference_full_speed, mine: this profile also matches\n"));
 }
 
-TEST_CASE("devices of fewer degrees of freedom say what they lack", "[list_devices]") {
+TEST_CASE("devices with fewer degrees of freedom list the missing ones", "[list_devices]") {
   const std::string polhem = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
   CHECK(holds(polhem, "\n  profile polhem: "));
   CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; of a wrench rx ry rz is dropped\n"));
-  CHECK(holds(polhem, "\n  its report descriptor agrees with the profile\n"));
+  CHECK(holds(polhem, "\n  the report descriptor agrees with the profile\n"));
   CHECK(holds(polhem, "\n    woodenhaptics: it is used only where the configuration names it\n"));
 
   UsbDevice falcon = hid(5, {0x0403, 0xcb48, 0, 0}, {}, "FALCON HAPTIC");
   falcon.hidraw_node.clear();
   const std::string text = list({falcon});
   CHECK(holds(text, "\n  /dev/bus/usb/003/005 can be opened\n  profile falcon: "));
+  CHECK(holds(
+      text,
+      "\n  senses x y z; drives x y z; the pose stays constant along rx ry rz; wrenchd drops rx ry rz of "
+      "every wrench\n"));
   CHECK(holds(text,
-              "\n  senses x y z; drives x y z; along rx ry rz the handle stays where it is; of a wrench "
-              "rx ry rz is dropped\n"));
-  CHECK(holds(text, "\n  it is not HID: there is no report descriptor to hold the profile against\n"));
+              "\n  the device is not HID, so there is no report descriptor to compare with the profile\n"));
 }
 
-TEST_CASE("closed devices are named and refused, and nobody is sent to open them", "[list_devices]") {
+TEST_CASE("closed devices are named and rejected, without advice to open them", "[list_devices]") {
   UsbDevice touch = hid(3, {0x2988, 0x0304, 0xff00, 1}, teensy_rawhid(), "Touch");
   UsbDevice second = touch;
   second.interface = 1;
@@ -165,20 +167,20 @@ TEST_CASE("closed devices are named and refused, and nobody is sent to open them
         "  3D Systems Touch (HID) (2988:0304): its protocol is not public; use it with its maker's driver, "
         "or ask "
         "the maker to publish the reports\n"
-        "  wrenchd does not open it, whatever a profile says\n");
+        "  wrenchd does not open this device, independent of profiles\n");
 }
 
-TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
+TEST_CASE("an unrelated device has one line, and --all shows the rejection reasons", "[list_devices]") {
   UsbDevice keys = hid(6, {0x04d9, 0x1702, 1, 2}, boot_keyboard(), "USB Keyboard");  // its second interface
   keys.interface = 1;
   UsbDevice disk = hid(7, {0x0781, 0x5581, 0, 0}, {}, "Ultra");
   disk.hidraw_node.clear();
   const std::vector<UsbDevice> devices = {keyboard_in(6), keys, disk};
   CHECK(list(devices) ==
-        "Nothing is plugged in that wrenchd knows.\n"
-        "Other devices (--all says of each why no profile is for it):\n"
-        "  3-6: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard), 01:02 (mouse); no profile is for it\n"
-        "  3-7: 0781:5581 \"Ultra\", not HID; no profile is for it\n");
+        "No known device is connected.\n"
+        "Other devices (--all shows the rejection reasons):\n"
+        "  3-6: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard), 01:02 (mouse); no profile matches\n"
+        "  3-7: 0781:5581 \"Ultra\", not HID; no profile matches\n");
   const std::string all = list(devices, true);
   CHECK(holds(all, "3-6, interface 0: "));
   CHECK(holds(all, "3-6, interface 1: "));
@@ -188,14 +190,15 @@ TEST_CASE("a keyboard takes a line, and --all its reasons", "[list_devices]") {
   CHECK(holds(list({space_navigator_in(1), keyboard_in(2)}), "\n\nOther devices (--all"));
 }
 
-TEST_CASE("a device that may not be opened comes with the udev rule", "[list_devices]") {
+TEST_CASE("a device without access is listed with the udev rule", "[list_devices]") {
   const std::string text = list({space_navigator_in(2)}, false, open_to_root);
-  CHECK(holds(text,
-              "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add to "
-              "/etc/udev/rules.d/70-wrenchd.rules the line\n"
-              "    SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"046d\", ATTRS{idProduct}==\"c626\", "
-              "GROUP=\"wrenchd\", MODE=\"0660\"\n"
-              "  and be in the group wrenchd; "));
+  CHECK(holds(
+      text,
+      "\n  cannot open /dev/hidraw2 (046d:c626 in 3-2, interface 0): Permission denied; add this line to "
+      "/etc/udev/rules.d/70-wrenchd.rules\n"
+      "    SUBSYSTEM==\"hidraw\", ATTRS{idVendor}==\"046d\", ATTRS{idProduct}==\"c626\", "
+      "GROUP=\"wrenchd\", MODE=\"0660\"\n"
+      "  and join the group wrenchd; "));
   CHECK_FALSE(holds(text, "can be opened"));
 
   UsbDevice without = space_navigator_in(2);
@@ -205,30 +208,29 @@ TEST_CASE("a device that may not be opened comes with the udev rule", "[list_dev
   CHECK(holds(list({high_speed}, false, open_to_root), R"(SUBSYSTEM=="usb", ATTR{idVendor}=="1209")"));
 }
 
-TEST_CASE("a profile that the device contradicts is told, line by line", "[list_devices]") {
-  // Its ids and its in-report are right; what it takes is a byte too short.
+TEST_CASE("differences between profile and report descriptor are listed line by line", "[list_devices]") {
+  // Ids and input report agree; the output report is one byte too short.
   const Bytes shorter = from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1e 91 02 c0");
   const std::string text = list({hid(1, {0x1209, 0x0001, 0xff00, 1}, shorter, "handle")});
-  CHECK(
-      holds(text,
-            "\n  its report descriptor disagrees with the profile; change the profile, or it is for another "
-            "device:\n    output report 0x02: the profile says 32 bytes, the device 31\n    output report "
-            "0x02, "));
+  CHECK(holds(text,
+              "\n  the report descriptor disagrees with the profile; change the profile, unless it belongs "
+              "to another "
+              "device:\n    output report 0x02: the profile has 32 bytes, the device 31\n    output report "
+              "0x02, "));
   Bytes cut = reference_descriptor();
   cut.pop_back();
-  CHECK(
-      holds(list({hid(1, {0x1209, 0x0001, 0xff00, 1}, cut, "handle")}),
-            "\n  its report descriptor is refused, so the profile could not be held against it: byte 30: "));
+  CHECK(holds(list({hid(1, {0x1209, 0x0001, 0xff00, 1}, cut, "handle")}),
+              "\n  the report descriptor is invalid, so it cannot be compared with the profile: byte 30: "));
 }
 
-TEST_CASE("a controller that no profile knows is told how to get one", "[list_devices]") {
+TEST_CASE("a controller without a profile is listed with the command that proposes one", "[list_devices]") {
   const std::string text = list({hid(8, {0x1d50, 0x6018, 1, 8}, ten_bit_axes(), "home-made")});
-  CHECK(holds(text, "\n  no profile is for it:\n    example, falcon, "));
+  CHECK(holds(text, "\n  no profile matches:\n    example, falcon, "));
   CHECK(holds(text, "\n  wrenchctl profile --from /dev/hidraw8 proposes one\n"));
 }
 
-TEST_CASE("of a device with several interfaces those that matter are told", "[list_devices]") {
+TEST_CASE("only the relevant interfaces of a device are listed", "[list_devices]") {
   UsbDevice keys = hid(2, {0x046d, 0xc626, 1, 6}, boot_keyboard(), "SpaceNavigator");
   UsbDevice axes = space_navigator_in(2);
   axes.interface = 1;
@@ -236,14 +238,14 @@ TEST_CASE("of a device with several interfaces those that matter are told", "[li
   CHECK(text.find("3-2, interface 1: ") == 0);
   CHECK_FALSE(holds(text, "interface 0"));
   CHECK(holds(list({keys, axes}, true),
-              "spacemouse_combined, spacemouse_split: the usage is 0006, the profile is for 0008"));
+              "spacemouse_combined, spacemouse_split: the usage is 0006, the profile requires 0008"));
 
   // The Teensy's other interface has the ids of the profile too, and comes first.
   UsbDevice console = hid(3, {0x16c0, 0x0486, 0xffc9, 4}, teensy_rawhid(), "RawHID");
   UsbDevice raw = hid(3, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID");
   raw.interface = 1;
   CHECK(list({console, raw}).find("3-3, interface 1: ") == 0);
-  CHECK(holds(list({console}), "    polhem: the usage page is ffc9, the profile is for ffab\n"));
+  CHECK(holds(list({console}), "    polhem: the usage page is ffc9, the profile requires ffab\n"));
 }
 
 TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") {
@@ -258,11 +260,10 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
   CHECK(holds(list({device, other}), "2 devices have the profile spacemouse_combined"));
   UsbDevice keys = keyboard_in(9);
   keys.port_path.clear();
-  CHECK(
-      holds(list({keys, keys}), "keyboard); no profile is for it\n  /dev/hidraw9 (not on USB): 04d9:1702 "));
+  CHECK(holds(list({keys, keys}), "keyboard); no profile matches\n  /dev/hidraw9 (not on USB): 04d9:1702 "));
 }
 
-TEST_CASE("profiles that are refused are told below the list", "[list_devices]") {
+TEST_CASE("invalid profiles are listed below the devices", "[list_devices]") {
   KnownProfiles known = kShipped;
   known.refused = {"profiles/mine.toml:3:1: key 'x' is not known"};
   const std::string text = device_list(std::vector{space_navigator_in(1)}, known, false, open_to_all);
@@ -270,10 +271,10 @@ TEST_CASE("profiles that are refused are told below the list", "[list_devices]")
   CHECK(
       text.ends_with("\n\nProfiles that were refused, and not asked:\n"
                      "  profiles/mine.toml:3:1: key 'x' is not known\n"));
-  CHECK(holds(device_list({}, {}, false, open_to_all), "There is no profile to hold a device against.\n"));
+  CHECK(holds(device_list({}, {}, false, open_to_all), "There are no profiles.\n"));
 }
 
-TEST_CASE("no device moves the cursor of a terminal", "[list_devices]") {
+TEST_CASE("control characters from devices are not printed", "[list_devices]") {
   UsbDevice device = space_navigator_in(1);
   device.product_name = "\x1b[2J\nprofile";
   device.manufacturer = "\x9b\x31m";
@@ -316,7 +317,7 @@ std::string mock_hid(int port, const std::string& vendor, const std::string& pro
          "\nE: SUBSYSTEM=hidraw\nE: DEVNAME=/dev/hidraw" + n + "\nE: MAJOR=243\nE: MINOR=" + n + "\n\n";
 }
 
-/// What `wrenchctl devices` prints on a machine where nothing else is plugged in.
+/// Returns the output of `wrenchctl devices` on a machine without other devices.
 std::string printed(const std::string& devices, const std::string& options = {}) {
   const TemporaryDirectory dir;
   const auto file = dir.write("devices", devices);
@@ -338,16 +339,16 @@ TEST_CASE("wrenchctl devices lists what udev knows", "[list_devices]") {
   REQUIRE(second != std::string::npos);
   CHECK(text.find("3-1, interface 0: 046d:c626 \"SpaceNavigator\", no serial number\n") == 0);
   CHECK(holds(text.substr(0, second), "\n  /dev/hidraw1 can be opened\n  profile spacemouse_split: "));
-  CHECK(holds(text.substr(0, second), "\n  its report descriptor agrees with the profile\n"));
+  CHECK(holds(text.substr(0, second), "\n  the report descriptor agrees with the profile\n"));
   CHECK(holds(text.substr(second), "\n  profile reference_full_speed: "));
-  CHECK(holds(text, "\n  3-3: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard); no profile is for it\n"));
+  CHECK(holds(text, "\n  3-3: 04d9:1702 \"USB Keyboard\", 01:06 (keyboard); no profile matches\n"));
   CHECK(holds(printed(devices, "--all"), "3-3, interface 0: 04d9:1702 \"USB Keyboard\", no serial number\n"));
 }
 
-TEST_CASE("wrenchctl devices where nothing is plugged in", "[list_devices]") {
+TEST_CASE("wrenchctl devices without a connected device", "[list_devices]") {
   const std::string one_that_is_nothing =
       "P: /devices/virtual/mem/null\nN: null\nE: SUBSYSTEM=mem\nE: DEVNAME=/dev/null\n";
-  CHECK(printed(one_that_is_nothing).find("Nothing is plugged in: ") == 0);
+  CHECK(printed(one_that_is_nothing).find("No device is connected: ") == 0);
 }
 #endif
 

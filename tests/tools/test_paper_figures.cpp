@@ -66,10 +66,11 @@ TEST_CASE("five figures and what they show are written", "[paper]") {
   CHECK(crosses == 3);
 }
 
-TEST_CASE("figures that cannot be written or drawn are refused with a cure", "[paper]") {
+TEST_CASE("figures that cannot be written or drawn are rejected with a remedy", "[paper]") {
   const test::TemporaryDirectory files;
   const auto file = files.write("file", "not a directory");
-  CHECK_THROWS_WITH(write_paper_figures(file), Contains("file: is no directory") && Contains("name another"));
+  CHECK_THROWS_WITH(write_paper_figures(file),
+                    Contains("file: is not a directory") && Contains("name another"));
   CHECK_THROWS_WITH(write_paper_figures(file / "below"), Contains("cannot be made one"));
 
   const std::string path = std::getenv("PATH");

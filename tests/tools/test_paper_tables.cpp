@@ -9,7 +9,7 @@
 
 using namespace wrenchd;
 
-TEST_CASE("the paper's numbers are met to their last digit, but for two of Eq. (47)", "[paper]") {
+TEST_CASE("all numbers of the paper except two of Eq. (47) are reproduced to their last digit", "[paper]") {
   std::istringstream lines(paper_tables());
   int met = 0;
   int starred = 0;
@@ -27,7 +27,7 @@ TEST_CASE("the paper's numbers are met to their last digit, but for two of Eq. (
   CHECK(met > 14);
 }
 
-TEST_CASE("the tables hold the digits that are known beyond the paper's", "[paper]") {
+TEST_CASE("the tables contain more digits than the paper", "[paper]") {
   const std::string text = paper_tables();
   for (const char* digits : {"9.631542185", "-0.086714620", "270.712157436", "-0.296066223", "4.4684"})
     CHECK(text.find(digits) != std::string::npos);

@@ -22,7 +22,7 @@ std::string contents(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Twenty seconds of pressing to and fro, one tick of which pushes as none else.
+/// Twenty seconds of alternating force with a single peak.
 Recording pressed() {
   Recording recording;
   recording.header.rate_Hz = 1000.0;
@@ -60,11 +60,11 @@ TEST_CASE("a recording becomes figures, and the tables that they show", "[plot]"
   }
   CHECK(contents(files.path() / "new/figures/force.svg").find("force on the hand [N]") != std::string::npos);
   const std::string run = contents(files.path() / "new/figures/run.csv");
-  CHECK(run.find(",9.75,") != std::string::npos);  // no peak is lost where ticks are left out
+  CHECK(run.find(",9.75,") != std::string::npos);  // the export keeps every peak
   CHECK(std::count(run.begin(), run.end(), '\n') < 6002);
 }
 
-TEST_CASE("all figures become one file of the kind that is asked for", "[plot]") {
+TEST_CASE("all figures are written to one file of the requested type", "[plot]") {
   const TemporaryDirectory files;
   for (const auto& [name, magic] : {std::pair<std::string, std::string>{"all.svg", "<?xml"},
                                     {"all.pdf", "%PDF"},
@@ -76,7 +76,7 @@ TEST_CASE("all figures become one file of the kind that is asked for", "[plot]")
   }
 }
 
-TEST_CASE("a run without contact, without arming, or of one tick is drawn too", "[plot]") {
+TEST_CASE("a run without contact, without arming, or with one tick is plotted", "[plot]") {
   const TemporaryDirectory files;
   Recording recording = pressed();
   for (TickRecord& tick : recording.ticks) {
@@ -91,10 +91,10 @@ TEST_CASE("a run without contact, without arming, or of one tick is drawn too", 
   CHECK(plot_recording(recording, files.path() / "one").size() == 6);
 }
 
-TEST_CASE("what cannot be drawn is refused with a cure", "[plot]") {
+TEST_CASE("a recording that cannot be plotted is rejected with a remedy", "[plot]") {
   const TemporaryDirectory files;
   CHECK_THROWS_WITH(plot_recording({}, files.path() / "none"), Contains("has no ticks"));
   const auto file = files.write("file", "");
-  CHECK_THROWS_WITH(plot_recording(pressed(), file), Contains("is no directory") && Contains(".svg"));
+  CHECK_THROWS_WITH(plot_recording(pressed(), file), Contains("is not a directory") && Contains(".svg"));
   CHECK_THROWS_WITH(plot_recording(pressed(), file / "x.png"), Contains("cannot be written"));
 }

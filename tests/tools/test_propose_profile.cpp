@@ -29,7 +29,7 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// What loading it as a profile is refused with.
+/// Returns the message with which the profile is rejected.
 std::string rejection_text(const std::string& text) {
   const TemporaryDirectory dir;
   const auto file = dir.write("proposed.toml", text);
@@ -42,7 +42,7 @@ std::string rejection_text(const std::string& text) {
   return {};
 }
 
-/// As a person would who has read the lines marked FILL IN, and can only know what no descriptor tells.
+/// Completes the lines marked FILL IN with values that no descriptor contains.
 std::string completed(std::string text) {
   const std::array<std::array<std::string, 2>, 8> known = {{{"report_rate_Hz", "62.5"},
                                                             {"stale_fault_s", "0.2"},
@@ -67,7 +67,7 @@ DeviceProfile loaded(const std::string& text) {
   return load_profile(dir.write("proposed.toml", text));
 }
 
-/// Six bytes that go from 0 to 255, and rest in the middle.
+/// Six bytes with the range 0 to 255 and the rest count in the middle.
 Bytes unsigned_axes() {
   return from_hex(
       "05 01 09 08 a1 01 85 07 15 00 26 ff 00 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 c0");
@@ -77,7 +77,7 @@ std::string text_of(const Bytes& bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
+TEST_CASE("a proposal contains the content of the descriptor", "[propose_profile]") {
   const std::string text = proposal(space_navigator());
   CHECK(holds(text, "# Made from a test\n# Device: usb 046d:c626, \"SpaceNavigator\"\n"));
   CHECK(holds(text,
@@ -90,12 +90,12 @@ TEST_CASE("a proposal says what the descriptor says", "[propose_profile]") {
   CHECK(holds(text, "[pose_report]\nid = 0x01\nlength = 7\n"));
   CHECK(holds(text, "\ntranslation = { byte = 1, type = \"i16\", step_m = 4e-06 }\n"));
   CHECK(holds(text, "# Rx 16 bits from byte 1, -350 to 350; Ry 16 bits from byte 3, -350 to 350;"));
-  CHECK(holds(text, "# GUESSED: the step. The descriptor gives no angle for a count;"));
+  CHECK(holds(text, "# GUESSED: the step. The descriptor gives no angle per count;"));
   CHECK(holds(text, "\nid = 0x03\nlength = 3\n# Buttons: 2 bits from byte 1.\n"));
   CHECK(holds(text, "# LED: byte 1 of output report 0x04;"));
 }
 
-TEST_CASE("limits are never guessed, and no proposal loads as it is", "[propose_profile]") {
+TEST_CASE("limits are never guessed, and no proposal loads before its completion", "[propose_profile]") {
   for (const Bytes& bytes : {space_navigator(), space_mouse_wireless(), home_made_combined(), ten_bit_axes(),
                              teensy_rawhid(), effects_joystick()}) {
     const std::string text = proposal(bytes);
@@ -158,20 +158,20 @@ TEST_CASE("the end of a cap's way means the same speed whatever the device count
 
 TEST_CASE("fields of any width at any bit, and the middle of unsigned axes", "[propose_profile]") {
   const std::string text = proposal(ten_bit_axes());
-  CHECK(holds(text, "What the device says of its reports, which have no id:\n"));
+  CHECK(holds(text, "The device's reports, without ids:\n"));
   CHECK(holds(text, "id = \"none\"\nlength = 8\n"));
   CHECK(holds(text, "\ntranslation = { byte = 0, bit = 3, bits = 10, step_m = "));
   CHECK(holds(text, "\nrotation = { byte = 4, bit = 1, bits = 10, step_rad = "));
   CHECK(holds(text, "\nbuttons = { byte = 0, bits = 3 }\n"));
   const std::string middle = proposal(unsigned_axes());
-  CHECK(holds(middle, "# GUESSED: the offset, which makes the count 128 the one at which the cap rests."));
+  CHECK(holds(middle, "# GUESSED: the offset, which assumes the count 128 for the undeflected puck."));
   const PoseReportLayout pose = loaded(completed(middle)).pose_report;
   CHECK_FALSE(pose.translation.is_signed);
   CHECK(pose.translation.step * 128 + pose.translation.offset == Approx(0.0).margin(1e-12));
   CHECK(pose.rotation.step * 128 + pose.rotation.offset == Approx(0.0).margin(1e-12));
 }
 
-TEST_CASE("axes that no field can hold are told, not bent", "[propose_profile]") {
+TEST_CASE("axes that no field can hold are left open, not changed", "[propose_profile]") {
   // Z before Y.
   const std::string text = proposal(
       from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 32 09 31 09 33 09 34 09 35 81 02 c0"));
@@ -186,16 +186,16 @@ TEST_CASE("three numbers are one field only with one width, sign, step and middl
     return proposal(from_hex("05 01 09 08 a1 01 75 08 95 01" + x + "09 30 81 02" + y_and_z +
                              "09 31 81 02 09 32 81 02 15 81 25 7f 09 33 81 02 09 34 81 02 09 35 81 02 c0"));
   };
-  const auto told = [](const std::string& text) { return holds(text, "# FILL IN: translation. X "); };
+  const auto left_open = [](const std::string& text) { return holds(text, "# FILL IN: translation. X "); };
   const std::string whole_byte = "15 00 26 ff 00", half_of_it = "15 00 25 64", with_sign = "15 81 25 7f";
-  CHECK_FALSE(told(three(whole_byte, whole_byte)));
-  CHECK_FALSE(told(three(with_sign, with_sign)));
-  CHECK_FALSE(told(three(with_sign, "15 9c 25 64")));  // a shorter way, but the same middle
-  CHECK(told(three(whole_byte, half_of_it)));
-  CHECK(told(three(with_sign, whole_byte)));
-  CHECK(told(three(with_sign, "75 10")));
-  CHECK(told(three(with_sign + "55 0e 65 11", "35 00 45 01")));  // another step
-  CHECK(told(three(with_sign + "55 0e 65 11", "65 00")));        // none
+  CHECK_FALSE(left_open(three(whole_byte, whole_byte)));
+  CHECK_FALSE(left_open(three(with_sign, with_sign)));
+  CHECK_FALSE(left_open(three(with_sign, "15 9c 25 64")));  // a shorter way, but the same middle
+  CHECK(left_open(three(whole_byte, half_of_it)));
+  CHECK(left_open(three(with_sign, whole_byte)));
+  CHECK(left_open(three(with_sign, "75 10")));
+  CHECK(left_open(three(with_sign + "55 0e 65 11", "35 00 45 01")));  // another step
+  CHECK(left_open(three(with_sign + "55 0e 65 11", "65 00")));        // none
 }
 
 TEST_CASE("steps of the widest axes are steps that a profile may have", "[propose_profile]") {
@@ -207,7 +207,7 @@ TEST_CASE("steps of the widest axes are steps that a profile may have", "[propos
   CHECK(find_differences(parse_report_descriptor(bytes), expected_reports(profile)).empty());
 }
 
-TEST_CASE("buttons become a mask of 32, or are told where other things lie between them",
+TEST_CASE("buttons become a mask of 32, or are left open if other fields lie between them",
           "[propose_profile]") {
   const std::string axes =
       "05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02";
@@ -218,15 +218,16 @@ TEST_CASE("buttons become a mask of 32, or are told where other things lie betwe
   // A button, seven bits of a dial, a button, padding.
   const std::string apart = proposal(from_hex(axes + bit + "09 01 95 01 81 02 05 01 09 37 75 07 81 02" + bit +
                                               "09 02 81 02 95 07 81 03 c0"));
-  CHECK(holds(apart,
-              "# Buttons: 9 bits from byte 6. There are other things between them:\n# FILL IN: button_list"));
+  CHECK(
+      holds(apart, "# Buttons: 9 bits from byte 6. Other fields lie between them:\n# FILL IN: button_list"));
   CHECK_FALSE(holds(apart, "\nbuttons ="));
 }
 
-TEST_CASE("a report longer than a profile's may be is told", "[propose_profile]") {
+TEST_CASE("a report that is too long for a profile is reported", "[propose_profile]") {
   const std::string text =
       proposal(from_hex("06 ab ff 0a 00 02 a1 01 75 08 15 00 26 ff 00 95 41 09 01 81 02 c0"));
-  CHECK(holds(text, "# FILL IN: length. The device says 65 bytes; a profile's report has 64 at most.\n"));
+  CHECK(holds(
+      text, "# FILL IN: length. The device's report has 65 bytes, but a profile's report has at most 64.\n"));
   CHECK_FALSE(holds(text, "\nlength ="));
   CHECK(holds(text, "\nwrench_report = \"none\" "));
 }
@@ -276,7 +277,7 @@ TEST_CASE("a hostile name cannot leave its comment", "[propose_profile]") {
   CHECK(holds(rejection_text(text), "key 'limits.max_linear_speed_m_per_s' is missing"));
 }
 
-TEST_CASE("whatever a device says of itself, a proposal is good TOML without limits", "[propose_profile]") {
+TEST_CASE("for any descriptor a proposal is valid TOML without limits", "[propose_profile]") {
   RandomValues random(21);
   const int cases = case_count(20'000);
   int proposed = 0;
@@ -323,9 +324,9 @@ TEST_CASE("what is no device for wrenchd gets no proposal", "[propose_profile]")
   CHECK_THROWS_WITH(
       proposal(boot_keyboard()),
       "a test: nothing to propose: it is no multi-axis controller (01:08); it wants to be 01:06 "
-      "(keyboard), and has no report of its maker's own; name another device");
+      "(keyboard), and has no vendor-defined report; name another device");
   CHECK_THROWS_WITH(proposal(from_hex("05 01 c0")),
-                    "a test: report descriptor, byte 2: ends a collection, and none is open");
+                    "a test: report descriptor, byte 2: ends a collection, but none is open");
 }
 
 TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") {
@@ -336,7 +337,7 @@ TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") 
     CHECK(parse_hex_text(text) == expected);
   CHECK(parse_hex_text("# nothing").empty());
   CHECK_THROWS_WITH(parse_hex_text("05 01\n 5 01"),
-                    Catch::Contains("2:2: expected bytes of two") && Catch::Contains("found '5'"));
+                    Catch::Contains("2:2: expected bytes with two") && Catch::Contains("found '5'"));
   CHECK_THROWS_WITH(parse_hex_text("0x"), Catch::Contains("1:1: "));
   CHECK_THROWS_WITH(parse_hex_text("05 0g"), Catch::Contains("1:4: "));
   CHECK_THROWS_WITH(parse_hex_text("05 01 / 09"), Catch::Contains("1:7: "));
@@ -378,7 +379,8 @@ Bytes four_bytes(std::size_t x) {
   return {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(x >> 8U), 0, 0};
 }
 
-TEST_CASE("wrenchctl profile asks the kernel for what a hidraw device says", "[propose_profile]") {
+TEST_CASE("wrenchctl profile reads the report descriptor of a hidraw device from the kernel",
+          "[propose_profile]") {
   const TemporaryDirectory dir;
   const auto device = dir.write("device",
                                 "P: /devices/virtual/hidraw/hidraw0\nN: hidraw0\nE: DEVNAME=/dev/hidraw0\n"
@@ -407,26 +409,27 @@ TEST_CASE("wrenchctl profile asks the kernel for what a hidraw device says", "[p
 
 TEST_CASE("wrenchctl profile refuses bad sources with their place and the cure", "[propose_profile]") {
   const TemporaryDirectory dir;
-  const auto says = [&](const std::string& from, const std::string& why) {
+  const auto rejects = [&](const std::string& from, const std::string& why) {
     const ProgramResult result = run_program("wrenchctl", {"profile", "--from", from});
     INFO(result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out.empty());
     CHECK(result.err.find("wrenchctl: " + from + why) == 0);
   };
-  says((dir.path() / "none").string(), ": no such file; name a /dev/hidrawN");
-  says(dir.path().string(), ": is neither a hidraw device nor a regular file");
-  says("/dev/null", ": is no hidraw device; name a /dev/hidrawN");
-  says(dir.write("empty", "").string(), ": is empty; the device may have been unplugged");
-  says(dir.write("words", "05 01 oh").string(), ":1:7: expected bytes of two hexadecimal digits");
-  says(dir.write("comments", "# no bytes\n").string(),
-       ": report descriptor, byte 0: the descriptor is empty");
+  rejects((dir.path() / "none").string(), ": no such file; name a /dev/hidrawN");
+  rejects(dir.path().string(), ": is neither a hidraw device nor a regular file");
+  rejects("/dev/null", ": is not a hidraw device; name a /dev/hidrawN");
+  rejects(dir.write("empty", "").string(), ": is empty; check whether the device is still connected");
+  rejects(dir.write("words", "05 01 oh").string(), ":1:7: expected bytes with two hexadecimal digits");
+  rejects(dir.write("comments", "# no bytes\n").string(),
+          ": report descriptor, byte 0: the descriptor is empty");
   Bytes cut = space_navigator();
   cut.pop_back();
-  says(dir.write("cut", text_of(cut)).string(),
-       ": report descriptor, byte 216: 1 collection(s) are still open");
-  says(dir.write("large", std::string((1 << 20) + 1, '0')).string(), ": is larger than 1 MiB");
-  says(dir.write("keyboard", text_of(boot_keyboard())).string(), ": nothing to propose: it is no multi-axis");
+  rejects(dir.write("cut", text_of(cut)).string(),
+          ": report descriptor, byte 216: 1 collection(s) are still open");
+  rejects(dir.write("large", std::string((1 << 20) + 1, '0')).string(), ": is larger than 1 MiB");
+  rejects(dir.write("keyboard", text_of(boot_keyboard())).string(),
+          ": nothing to propose: it is no multi-axis");
 
   const ProgramResult bare = run_program("wrenchctl", {"profile"});
   CHECK(bare.exit_code > 100);

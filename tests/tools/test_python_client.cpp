@@ -46,7 +46,7 @@ std::string contents(const std::string& name) {
 
 }  // namespace
 
-TEST_CASE("the Python package does what it says", "[python]") {
+TEST_CASE("the Python package passes its own checks", "[python]") {
   StubDaemon daemon;
   const Ran ran = run_python(daemon.socket(), "tests/python/check_client.py");
   INFO(ran.out);
@@ -72,7 +72,7 @@ TEST_CASE("the Python example works as printed", "[python]") {
   CHECK(ran.out.find("\nticks missed: 0\n") != std::string::npos);
 }
 
-TEST_CASE("all of them work with wrenchd itself", "[python][program][wall_time]") {
+TEST_CASE("the clients work with wrenchd itself", "[python][program][wall_time]") {
   const TemporaryDirectory directory;
   const std::string socket = (directory.path() / "control.sock").string();
   RunningProgram wrenchd("wrenchd", {"--config", WRENCHD_SOURCE_DIR "/config/wrenchd.toml", "--control",
@@ -93,7 +93,7 @@ TEST_CASE("all of them work with wrenchd itself", "[python][program][wall_time]"
   CHECK(wrenchd.wait().exit_code == 0);
 }
 
-TEST_CASE("what the guide prints as a Python program is the example", "[python]") {
+TEST_CASE("the Python program in the guide is the example", "[python]") {
   std::istringstream example(contents("tools/python/example.py"));
   std::string printed;
   int lines = 0;

@@ -34,8 +34,8 @@ std::string encoded(const std::string& profile, const Wrench& F, const std::stri
 
 }  // namespace
 
-TEST_CASE("a SpaceMouse says where its cap is, in both formats", "[report_text]") {
-  // 350 counts are the end of the way: 1.4 mm. X right, Y toward the user, Z down become -Y, -X, -Z.
+TEST_CASE("SpaceMouse reports are decoded in both formats", "[report_text]") {
+  // 350 counts are the full deflection: 1.4 mm. X right, Y toward the user, Z down become -Y, -X, -Z.
   const std::string t = decoded("spacemouse_split", "01 5e 01 00 00 a2 fe");
   CHECK_THAT(t, Contains("translation          0.0014 0 -0.0014 m   counts 350 0 -350"));
   CHECK_THAT(t, Contains("translation in base  0 -0.0014 0.0014 m"));
@@ -49,7 +49,7 @@ TEST_CASE("a SpaceMouse says where its cap is, in both formats", "[report_text]"
              Contains("battery_percent      87") && Contains("charging             yes"));
 }
 
-TEST_CASE("a Polhem says where its encoders are, and the hidden button is found", "[report_text]") {
+TEST_CASE("Polhem reports are decoded, with the button inside an encoder count", "[report_text]") {
   const std::string bytes = "00 00 00 00 78 ec 0a 27 00 00 00 00 01 00";
   const std::string text = decoded("polhem", bytes);
   CHECK_THAT(text, Contains("joints               0 0 -5000 9994 0 0 counts"));
@@ -95,7 +95,7 @@ TEST_CASE("a wrench becomes the bytes that the firmware takes", "[report_text]")
   CHECK(encoded("falcon", {}) == "3c 41 41 41 41 41 41 41 41 41 41 41 41 42 41 3e");
 }
 
-TEST_CASE("what the motors are told depends on where the hand is", "[report_text]") {
+TEST_CASE("the motor efforts depend on the handle pose", "[report_text]") {
   const std::string aside = "3c 41 48 41 41 41 41 41 41 41 41 41 41 b1 41 3e";
   CHECK(encoded("falcon", {{1, 0, 0}, {0, 0, 0}}, aside) != encoded("falcon", {{1, 0, 0}, {0, 0, 0}}));
   const std::string unhomed = "3c 41 48 41 41 41 41 41 41 41 41 41 41 41 41 3e";
@@ -105,29 +105,29 @@ TEST_CASE("what the motors are told depends on where the hand is", "[report_text
   CHECK_THAT(none.remarks.front(), Contains("not homed"));
 }
 
-TEST_CASE("what is cut and what is dropped is told", "[report_text]") {
+TEST_CASE("clamped and dropped components are reported", "[report_text]") {
   const EncodedWrench e = encode_wrench(shipped("polhem"), {{9, 0, 0}, {0, 0.1, 0}});
   REQUIRE(e.remarks.size() == 3);
   CHECK_THAT(e.remarks[0], Contains("home position"));
-  CHECK(e.remarks[1] == "the force is cut from 9 to 5 N, the limit of the profile");
-  CHECK(e.remarks[2] == "dropped, for there are no motors: ry");
+  CHECK(e.remarks[1] == "the force is limited from 9 to 5 N, the limit in the profile");
+  CHECK(e.remarks[2] == "dropped, because there are no motors: ry");
   CHECK_THROWS_WITH(encode_wrench(shipped("spacemouse_split"), {}), Contains("has no motors"));
 }
 
-TEST_CASE("bytes that are no report are refused with the reason for each report", "[report_text]") {
+TEST_CASE("bytes that match no report are rejected with the reason for each report", "[report_text]") {
   CHECK_THAT(refused("spacemouse_split", "01 00 00"),
-             Contains("these 3 bytes are no report of spacemouse_split") &&
+             Contains("these 3 bytes match no report of spacemouse_split") &&
                  Contains("report 0x01 (translation) has 7 bytes, these are 3") &&
-                 Contains("report 0x03 (buttons) begins with another id: these begin with 01"));
+                 Contains("report 0x03 (buttons) begins with another id: found 01"));
   CHECK_THAT(refused("falcon", "3c 41 41 41 41 41 41 41 41 41 41 41 41 41 3e"),
              Contains("has 16 bytes, these are 15"));
   CHECK_THAT(refused("falcon", "3c 41 41 41 41 41 41 41 41 41 41 41 41 41 3e 00"),
-             Contains("has 3e at byte 15, these have 00"));
+             Contains("has 3e at byte 15, found 00"));
   CHECK_THAT(refused("loopback", hex_text(std::vector<std::uint8_t>(64, 1))), Contains("another checksum"));
   CHECK_THAT(refused("falcon", ""), Contains("no bytes"));
 }
 
-TEST_CASE("bytes are read as people write them", "[report_text]") {
+TEST_CASE("bytes are parsed in all usual notations", "[report_text]") {
   using Bytes = std::vector<std::uint8_t>;
   CHECK(parse_bytes("01 a0 FF").bytes == Bytes{1, 0xa0, 0xff});
   CHECK(parse_bytes("01a0ff").bytes == Bytes{1, 0xa0, 0xff});

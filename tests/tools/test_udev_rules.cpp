@@ -22,7 +22,7 @@ DeviceProfile profile(const std::string& name, Transport transport, std::vector<
   return p;
 }
 
-/// The lines that act, without the comments.
+/// Returns the effective lines, without comments.
 std::vector<std::string> rules_of(const std::vector<DeviceProfile>& profiles) {
   std::istringstream text(udev_rules(profiles));
   std::vector<std::string> lines;
@@ -35,8 +35,9 @@ bool has(const std::string& line, const std::string& part) {
   return line.find(part) != std::string::npos;
 }
 
-TEST_CASE("a device with motors: its hidraw node is the service's alone, and plugging it in starts it",
-          "[udev_rules]") {
+TEST_CASE(
+    "a device with motors: only the service can open its hidraw node, and connecting it starts the service",
+    "[udev_rules]") {
   DeviceProfile arm = profile("arm", Transport::hidraw, {{0x16c0, 0x0486}});
   arm.match.usage_page = 0xffab;
   CHECK(rules_of({arm}) ==
@@ -49,7 +50,7 @@ TEST_CASE("a device with motors: its hidraw node is the service's alone, and plu
             R"(LABEL="wrenchd_end")"});
 }
 
-TEST_CASE("a device past the kernel: its USB node, and not only its power", "[udev_rules]") {
+TEST_CASE("a libusb device: the rules cover its USB node, not only its power settings", "[udev_rules]") {
   const auto lines = rules_of({profile("falcon", Transport::libusb, {{0x0403, 0xcb48}})});
   REQUIRE(lines.size() == 4);
   CHECK(lines[1] ==
@@ -58,7 +59,7 @@ TEST_CASE("a device past the kernel: its USB node, and not only its power", "[ud
         R"(ENV{SYSTEMD_WANTS}+="wrenchd.service")");
 }
 
-TEST_CASE("a device that drives nothing keeps its people, and moves no pointer", "[udev_rules]") {
+TEST_CASE("a device without motors keeps the access of other rules and moves no pointer", "[udev_rules]") {
   DeviceProfile mouse = profile("mouse", Transport::hidraw, {{0x046d, 0xc626}});
   mouse.has_output = false;
   mouse.match.usage_page = 1;
@@ -70,7 +71,8 @@ TEST_CASE("a device that drives nothing keeps its people, and moves no pointer",
                     R"(ENV{LIBINPUT_IGNORE_DEVICE}="1")");
 }
 
-TEST_CASE("a profile that is used only when named gets its node, and starts nothing", "[udev_rules]") {
+TEST_CASE("a profile that requires explicit selection gets its node and does not start the service",
+          "[udev_rules]") {
   DeviceProfile named = profile("named", Transport::hidraw, {{0x16c0, 0x0486}});
   named.match.only_when_named = true;
   const auto alone = rules_of({named});
@@ -81,7 +83,7 @@ TEST_CASE("a profile that is used only when named gets its node, and starts noth
   CHECK(has(both[1], "SYSTEMD_WANTS"));
 }
 
-TEST_CASE("what cannot be used, and what is simulated, has no rule", "[udev_rules]") {
+TEST_CASE("unusable and simulated devices have no rule", "[udev_rules]") {
   CHECK(rules_of({profile("touch", Transport::hidraw, {{0x2988, 0x0302}}),
                   profile("loopback", Transport::loopback, {{0x1209, 0x0009}})})
             .size() == 2);
@@ -114,7 +116,7 @@ TEST_CASE("every shipped profile has rules for each of its ids, and none is open
   CHECK_FALSE(has(text, R"(TAG+="uaccess")"));
 }
 
-TEST_CASE("wrenchctl udev-rules: a profile more is a rule more, one that is refused ends it",
+TEST_CASE("wrenchctl udev-rules: each profile adds a rule, and an invalid profile is an error",
           "[udev_rules][wrenchctl]") {
   const TemporaryDirectory dir;
   dir.write("profiles/mine.toml",

@@ -67,7 +67,7 @@ std::string contents(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Files of a solve, and the solve.
+/// The input files of a solve, and the call of wrenchctl.
 struct Bench {
   TemporaryDirectory dir;
   fs::path scene = dir.write("scene.toml", kScene);
@@ -131,7 +131,7 @@ TEST_CASE("wrenchctl solve reproduces example 4.1") {
   check_vector(row, "spatial_t", R * kEpsW + Vector3d(0, 25, 0).cross(R * kEpsV), 3e-7);
 }
 
-TEST_CASE("ten times the lengths are a hundred times the energy and the same rotation") {
+TEST_CASE("ten times the lengths give a hundred times the energy and the same rotation") {
   Bench bench;
   bench.scene = bench.dir.write("scene.toml", scene_of("mesh = \"body.off\"\nscale = 10.0"));
   bench.poses = bench.dir.write("poses.csv", kPoseHeader + tilted_pose(10));
@@ -142,7 +142,7 @@ TEST_CASE("ten times the lengths are a hundred times the energy and the same rot
   check_about_z(rows[0], kAngle);
 }
 
-TEST_CASE("the mass scales the energy and moves nothing") {
+TEST_CASE("the mass scales the energy and does not change the projection") {
   Bench bench;
   bench.scene = bench.dir.write("scene.toml", "mass = 3.0\n" + kScene);
   const Row row = bench.solved().at(0);
@@ -151,7 +151,7 @@ TEST_CASE("the mass scales the energy and moves nothing") {
   check_about_z(row, kAngle);
 }
 
-TEST_CASE("poses are of the mesh's own frame, wherever it is in the body") {
+TEST_CASE("poses refer to the mesh frame, independent of its position in the body") {
   Bench bench;
   const Vector3d shift(70, -30, 20);
   bench.mesh = bench.dir.write("body.off",
@@ -185,7 +185,7 @@ TEST_CASE("every format of mesh and every way to write the plane give the same a
 TEST_CASE("each method of wrenchctl solve answers") {
   const Bench bench;
   CHECK(std::abs(bench.solved({"--method", "exact"}).at(0).at("energy") - kEnergy) < 1e-9);
-  // The optimum turns about z, and the family has the plane of that turn among its own.
+  // The optimum rotates about z, and one plane of the family contains that rotation.
   const Row planar = bench.solved({"--method", "planar"}).at(0);
   CHECK(planar.at("energy") == Approx(kEnergy).epsilon(1e-2));
   CHECK(planar.at("energy") > kEnergy - 1e-9);
@@ -204,7 +204,7 @@ TEST_CASE("a stiffness scales the wrench") {
   check_vector(row, "eps_v", kEpsV, 1e-8);
 }
 
-TEST_CASE("an admissible pose comes back as it was, without contact") {
+TEST_CASE("an admissible pose is returned unchanged, without contact") {
   Bench bench;
   bench.poses = bench.dir.write("poses.csv", kPoseHeader + "0.1,100,-7,0,0.6,0,0.8\n");
   const Row row = bench.solved().at(0);
@@ -216,7 +216,7 @@ TEST_CASE("an admissible pose comes back as it was, without contact") {
     check_vector(row, name, Vector3d::Zero(), 1e-300);
 }
 
-TEST_CASE("one row a pose, in their order, each without history") {
+TEST_CASE("one row per pose in input order, each without history") {
   Bench bench;
   bench.poses = bench.dir.write(
       "poses.csv", kPoseHeader + "0,100,0,0,0,0,1\n" + tilted_pose(1) + "0,20,0,0,0,0,1\n" + tilted_pose(1));
@@ -265,7 +265,7 @@ TEST_CASE("wrenchctl solve: more planes are nearer the optimum, and the energy l
   CHECK(exact.at("body_fx") == Approx(-2.0 * lift * std::sin(0.2)).epsilon(1e-9));
 }
 
-TEST_CASE("wrenchctl replay refuses what is no recording, by its name") {
+TEST_CASE("wrenchctl replay rejects files that are not recordings") {
   const TemporaryDirectory dir;
   const std::string signature("\x89HDF\r\n\x1a\n", 8);
   for (const fs::path& file :
@@ -280,7 +280,7 @@ TEST_CASE("wrenchctl replay refuses what is no recording, by its name") {
   }
 }
 
-TEST_CASE("an answer replaces a file, follows a link, and fills a pipe") {
+TEST_CASE("the output replaces a file, follows a link, and can be a pipe") {
   Bench bench;
   bench.dir.write("out.csv", "old");
   CHECK(bench.solved().size() == 1);
@@ -302,7 +302,7 @@ TEST_CASE("an answer replaces a file, follows a link, and fills a pipe") {
   CHECK(fs::is_fifo(bench.out));
 }
 
-TEST_CASE("a pose without an admissible one near it is told, and the rest is answered") {
+TEST_CASE("wrenchctl solve reports a pose without an admissible pose near it and solves the other poses") {
   Bench bench;
   // A slot of 10 between two walls, for a cube of 50; the other poses are no better.
   bench.scene = bench.dir.write(
@@ -312,7 +312,7 @@ TEST_CASE("a pose without an admissible one near it is told, and the rest is ans
     const ProgramResult result = bench.solve({"--method", method});
     CHECK(result.exit_code == 3);
     CHECK(result.err.find("wrenchctl: pose 1 of " + bench.poses.string() +
-                          ": no admissible pose found near it") == 0);
+                          ": no admissible pose found near it, ") == 0);
     const auto rows = rows_of(contents(bench.out));
     REQUIRE(rows.size() == 1);
     CHECK(std::isnan(rows[0].at("energy")));
@@ -320,12 +320,12 @@ TEST_CASE("a pose without an admissible one near it is told, and the rest is ans
   }
 }
 
-/// What is spoilt, and how it must be told.
+/// An invalid input file, and the expected message.
 struct Bad {
   std::string what;
   std::string file;  ///< which of scene.toml, body.off, poses.csv to write; empty: none
   std::string text;
-  std::string place;  ///< that standard error holds, behind the file's name
+  std::string place;  ///< location in the message, after the file name
   std::string cure;
 };
 
@@ -347,7 +347,7 @@ void check_refused(const std::vector<Bad>& table) {
   }
 }
 
-TEST_CASE("wrenchctl solve refuses bad scenes") {
+TEST_CASE("wrenchctl solve rejects invalid scenes") {
   const std::string plane = "\n[[obstacle]]\nhalf_space = { normal = [0, 1, 0], offset = 0 }\n";
   const auto tool = [&](const std::string& lines) { return "[tool]\n" + lines + plane; };
   check_refused({
@@ -356,7 +356,7 @@ TEST_CASE("wrenchctl solve refuses bad scenes") {
       {"typo", "scene.toml", tool("mesh = \"body.off\"\nscal = 2.0"), ":3:1", "did you mean 'scale'?"},
       {"no mesh", "scene.toml", tool("scale = 1.0"), ":1:1", "key 'tool.mesh' is missing"},
       {"mesh is no text", "scene.toml", tool("mesh = 3"), ":2:8", "expected a text between quotation marks"},
-      {"mesh is not there", "scene.toml", tool("mesh = \"no.off\""), ":2:8", "no such file; looked for "},
+      {"mesh is not there", "scene.toml", tool("mesh = \"no.off\""), ":2:8", "no such file; searched "},
       {"scale of another type", "scene.toml", tool("mesh = \"body.off\"\nscale = \"mm\""), ":3:9",
        "expected a number"},
       {"scale zero", "scene.toml", tool("mesh = \"body.off\"\nscale = 0"), ":3:9", "from 1e-09 to 1000000 m"},
@@ -375,7 +375,7 @@ TEST_CASE("wrenchctl solve refuses bad scenes") {
       {"no offset", "scene.toml", scene_of("mesh = \"body.off\"", "normal = [0, 1, 0]"), ":4:14",
        "half_space.offset' is missing"},
       {"mesh obstacle", "scene.toml", "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"none.off\"\n",
-       ":4:8", "no such file; looked for"},
+       ":4:8", "no such file; searched"},
       {"binary", "scene.toml",
        std::string("\x7f"
                    "ELF\0\1\2",
@@ -384,7 +384,7 @@ TEST_CASE("wrenchctl solve refuses bad scenes") {
   });
 }
 
-TEST_CASE("wrenchctl solve refuses bad meshes") {
+TEST_CASE("wrenchctl solve rejects invalid meshes") {
   const std::string cube = as_off(box({-25, -25, -25}, {25, 25, 25}));
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string text = cube;
@@ -406,22 +406,22 @@ TEST_CASE("wrenchctl solve refuses bad meshes") {
        "belongs to face 0 only: the surface is open (4 in all); close the hole"},
       {"self-intersecting", "body.off",
        as_off(concatenated(box({0, 0, 0}, {2, 2, 2}), box({1, 1, 1}, {3, 3, 3}))), "",
-       "cut through each other"},
+       "intersect each other"},
   });
 }
 
-TEST_CASE("wrenchctl solve works with a mesh that can be repaired, and says so on standard error") {
+TEST_CASE("wrenchctl solve repairs a mesh and reports the repair on standard error") {
   const Bench bench;
   bench.dir.write("body.off", as_off(inside_out(box({-25, -25, -25}, {25, 25, 25}))));
   const ProgramResult result = bench.solve();
   CHECK(result.exit_code == 0);
   CHECK(result.err ==
-        "wrenchctl: " + bench.mesh.string() + ": turned 6 faces round, first face 0 near (-25, 25, -25)\n");
+        "wrenchctl: " + bench.mesh.string() + ": flipped 6 faces, first face 0 near (-25, 25, -25)\n");
   CHECK(std::abs(rows_of(contents(bench.out)).at(0).at("energy") - kEnergy) < 1e-9);
 }
 
-// An open plate in the way of a cube; beyond its border there is nothing.
-TEST_CASE("wrenchctl takes an open mesh as an obstacle where the scene says that it is a surface") {
+// An open plate in the path of a cube.
+TEST_CASE("wrenchctl accepts an open mesh as an obstacle of kind surface") {
   const TemporaryDirectory dir;
   dir.write("body.off", as_off(box({-0.025, -0.025, -0.025}, {0.025, 0.025, 0.025})));
   dir.write("sheet.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
@@ -436,7 +436,7 @@ TEST_CASE("wrenchctl takes an open mesh as an obstacle where the scene says that
   const ProgramResult checked = run_program("wrenchctl", {"check", scene.string()});
   INFO(checked.err);
   CHECK(checked.exit_code == 0);
-  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": taken as a surface") !=
+  CHECK(checked.out.find("changed: " + (dir.path() / "sheet.obj").string() + ": used as a surface") !=
         std::string::npos);
   const fs::path poses =
       dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.05,0,0,0,1\n0,0,-0.1,0,0,0,1\n0,0,-0.1,0,0,0,1\n");
@@ -450,7 +450,7 @@ TEST_CASE("wrenchctl takes an open mesh as an obstacle where the scene says that
   CHECK(wrong.err.find("kind.toml:5:8: key 'obstacle[0].kind': expected") != std::string::npos);
 }
 
-TEST_CASE("wrenchctl mesh and check tell what was repaired, and a size that is not likely") {
+TEST_CASE("wrenchctl mesh and check report repairs and an implausible size") {
   const TemporaryDirectory dir;
   PolygonSoup soup = box({0, 0, 0}, {80, 80, 80});
   std::reverse(soup.faces[2].begin(), soup.faces[2].end());
@@ -461,20 +461,20 @@ TEST_CASE("wrenchctl mesh and check tell what was repaired, and a size that is n
   CHECK(mesh.err == "");
   for (const char* line :
        {"faces              7\n", "repaired           removed 1 duplicate face: face 6 near (0, 0, 0)\n",
-        "repaired           turned 1 face round: face 2 near (0, 0, 80)\n", "triangles          12\n",
+        "repaired           flipped 1 face: face 2 near (0, 0, 80)\n", "triangles          12\n",
         "remark             as a tool, its largest side is 80 m at scale 1: were millimetres taken for "
         "metres? 'scale' would be 0.001\n"})
     CHECK(mesh.out.find(line) != std::string::npos);
   const fs::path scene = dir.write("scene.toml", "[tool]\nmesh = \"body.ply\"\n");
   const ProgramResult check = run_program("wrenchctl", {"check", scene.string()});
   CHECK(check.exit_code == 0);
-  CHECK(check.out.find("  changed: " + file.string() + ": turned 1 face round") != std::string::npos);
+  CHECK(check.out.find("  changed: " + file.string() + ": flipped 1 face") != std::string::npos);
   CHECK(check.out.find("  remark: " + file.string() + ": its largest side is 80 m") != std::string::npos);
   CHECK(run_program("wrenchctl", {"mesh", file.string(), "--scale", "0.001"}).out.find("remark") ==
         std::string::npos);
 }
 
-TEST_CASE("wrenchctl says on standard error what it does with a large mesh, and keeps what it made") {
+TEST_CASE("wrenchctl reports the progress of a large mesh and caches the result") {
   const TemporaryDirectory dir;
   const std::string file = (dir.path() / "large.off").string();
   REQUIRE(
@@ -494,7 +494,7 @@ TEST_CASE("wrenchctl says on standard error what it does with a large mesh, and 
   CHECK(fs::is_directory(dir.path() / "cache" / "wrenchd"));
 }
 
-TEST_CASE("wrenchctl solve refuses bad poses") {
+TEST_CASE("wrenchctl solve rejects invalid poses") {
   const auto row = [](const std::string& text) { return kPoseHeader + "0,0,0,0,0,0,1\n" + text + "\n"; };
   check_refused({
       {"empty", "poses.csv", "", ":1:1", "is empty; expected the header"},
@@ -512,14 +512,14 @@ TEST_CASE("wrenchctl solve refuses bad poses") {
   });
 }
 
-TEST_CASE("wrenchctl refuses files that are not there, and places that cannot be written to") {
+TEST_CASE("wrenchctl rejects missing input files and unwritable output files") {
   const Bench bench;
   const std::string scene = bench.scene.string(), poses = bench.poses.string(),
                     dir = bench.dir.path().string();
   const std::string missing = dir + "/missing";
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{"solve", missing, "--poses", poses}, missing + ": no such file"},
       {{"solve", dir, "--poses", poses}, dir + ": is a directory; name a file in it"},
@@ -538,28 +538,27 @@ TEST_CASE("wrenchctl refuses files that are not there, and places that cannot be
       {{"mesh", dir}, dir + ": is not a file; name an OFF, OBJ, STL or PLY file"},
       {{"mesh", poses}, poses + ": unknown mesh format '.csv'; save it as .off, .obj, .stl or .ply"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find("wrenchctl: " + told) == 0);
+    CHECK(result.err.find("wrenchctl: " + expected) == 0);
   }
   CHECK(std::distance(fs::directory_iterator(bench.dir.path()), fs::directory_iterator()) == 3);
 }
 
-TEST_CASE("wrenchctl refuses a command line that it does not understand") {
+TEST_CASE("wrenchctl rejects an invalid command line") {
   const Bench bench;
   const std::string scene = bench.scene.string(), poses = bench.poses.string(), mesh = bench.mesh.string();
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string expected;
   } const table[] = {
       {{},
-       "A subcommand (status, watch, view, arm, disarm, stop, acknowledge, reload, record, describe; solve, "
-       "check, decode, devices, doctor, encode, export, faults, gallery, mesh, profile, paper, plot, replay "
-       "or "
-       "udev-rules) is required"},
+       "A subcommand (solve, check, decode, encode, devices, udev-rules, calibrate, profile, doctor, status, "
+       "watch, arm, describe, record, disarm, stop, acknowledge, reload, view, faults, mesh, gallery, paper, "
+       "replay, export, plot) is required"},
       {{"dance"}, "not expected: dance"},
       {{"solve"}, "scene is required"},
       {{"solve", scene}, "--poses is required"},
@@ -603,12 +602,12 @@ TEST_CASE("wrenchctl refuses a command line that it does not understand") {
       {{"mesh", mesh, "--scale", "nan"}, "--scale: expected a number from"},
       {{"mesh", mesh, mesh}, mesh},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, expected] : table) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(expected << "\ngot " << result.err);
     CHECK(result.exit_code > 100);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   }
 }
 
@@ -623,10 +622,10 @@ TEST_CASE("wrenchctl paper prints the paper's examples and draws its figures") {
 
   const ProgramResult refused = run_program("wrenchctl", {"paper", "-o", "/dev/null/figures"});
   CHECK(refused.exit_code == 1);
-  CHECK(refused.err.find("wrenchctl: /dev/null/figures: is no directory") == 0);
+  CHECK(refused.err.find("wrenchctl: /dev/null/figures: is not a directory") == 0);
 }
 
-/// Without what is told of large meshes that nobody has kept yet.
+/// Removes the progress lines of large meshes that are not in the cache.
 std::string without_progress(const std::string& err) {
   std::string rest;
   for (const std::string& line : split(err, '\n'))
@@ -645,20 +644,20 @@ TEST_CASE("wrenchctl check accepts every file that is shipped") {
     INFO(file << "\n" << result.err);
     CHECK(result.exit_code == 0);
     CHECK(without_progress(result.err) == "");
-    CHECK(result.out.find(file.string() + ": a good ") == 0);
+    CHECK(result.out.find(file.string() + ": valid ") == 0);
   }
   CHECK(count >= 5);  // configuration, scene, two profiles, hand script
 }
 
-TEST_CASE("wrenchctl check refuses what the daemon would refuse, by its kind") {
+TEST_CASE("wrenchctl check rejects the files that the daemon rejects") {
   const Bench bench;
-  const auto bad = [&](const std::string& name, const std::string& text, const std::string& told) {
+  const auto bad = [&](const std::string& name, const std::string& text, const std::string& expected) {
     const fs::path file = bench.dir.write(name, text);
     const ProgramResult result = run_program("wrenchctl", {"check", file.string()});
     INFO(name << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   };
   const auto shipped = [](const std::string& name) {
     return contents(fs::path(WRENCHD_SOURCE_DIR) / "config" / name);
@@ -697,40 +696,40 @@ TEST_CASE("wrenchctl decode and encode read and write the bytes of shipped profi
 
   const ProgramResult cut = run_program("wrenchctl", {"encode", "polhem_lpc1768", "--wrench=-9,0,0,0,1,0"});
   CHECK(cut.exit_code == 0);
-  CHECK(cut.err.find("the force is cut from 9 to 5 N") != std::string::npos);
-  CHECK(cut.err.find("dropped, for there are no motors: ry") != std::string::npos);
+  CHECK(cut.err.find("the force is limited from 9 to 5 N") != std::string::npos);
+  CHECK(cut.err.find("dropped, because there are no motors: ry") != std::string::npos);
 }
 
-TEST_CASE("wrenchctl decode and encode say what an empty text should be") {
+TEST_CASE("wrenchctl decode and encode reject an empty text with an example") {
   CHECK(run_program("wrenchctl", {"decode", "loopback", "--hex", ""})
             .err.find("--hex: must not be empty; give bytes in hexadecimal") != std::string::npos);
   CHECK(run_program("wrenchctl", {"encode", "loopback", "--wrench", ""})
             .err.find("--wrench: must not be empty; give force in N") != std::string::npos);
 }
 
-TEST_CASE("wrenchctl decode and encode refuse what they cannot read, with the place and the cure") {
-  const auto refuses = [](std::vector<std::string> arguments, const std::string& told) {
+TEST_CASE("wrenchctl decode and encode reject invalid input with location and remedy") {
+  const auto refuses = [](std::vector<std::string> arguments, const std::string& expected) {
     const ProgramResult result = run_program("wrenchctl", arguments);
-    INFO(told << "\n" << result.err);
+    INFO(expected << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   };
   refuses({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
   refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
   refuses({"decode", "loopback", "--hex", "01 02"},
-          "these 2 bytes are no report of loopback:\n  report 0x01 has 64 bytes");
-  refuses({"decode", "nobody", "--hex", "01"}, "no such file; looked for ");
-  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: six numbers are wanted, and 3 given");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is wrong, at 'x'");
+          "these 2 bytes match no report of loopback:\n  report 0x01 has 64 bytes");
+  refuses({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
+  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
   refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "six numbers are wanted, and 7 given");
-  refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split takes no wrench");
+  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "expected six numbers, found 7");
+  refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split accepts no wrench");
   refuses({"encode", "falcon", "--wrench", "1,0,0,0,0,0", "--at", "3c"},
-          "--at: these 1 bytes are no report of falcon");
+          "--at: these 1 bytes match no report of falcon");
 }
 
-TEST_CASE("wrenchctl mesh tells what a mesh is") {
+TEST_CASE("wrenchctl mesh describes a mesh") {
   const Bench bench;
   const ProgramResult good = run_program("wrenchctl", {"mesh", bench.mesh.string(), "--scale", "0.001"});
   CHECK(good.exit_code == 0);
@@ -757,7 +756,7 @@ TEST_CASE("wrenchctl mesh tells what a mesh is") {
   CHECK(overflow.err.find(vast.string() + ": has no usable volume at scale 1") != std::string::npos);
 }
 
-TEST_CASE("wrenchctl mesh makes what wrenchctl mesh accepts") {
+TEST_CASE("wrenchctl mesh accepts the meshes that it generates") {
   const TemporaryDirectory dir;
   for (const char* kind :
        {"cube", "plate", "table", "sphere", "bumpy", "boulder", "peg", "hole", "bolt", "nut", "gear"}) {
@@ -779,7 +778,7 @@ TEST_CASE("wrenchctl mesh makes what wrenchctl mesh accepts") {
   CHECK(one.out != other.out);
 }
 
-// A cube pushed down through a plate in one step of 100 mm, and drawn aside until it is free.
+// The hand pushes a cube through a plate in one step of 100 mm, then moves it aside until it is free.
 TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump through") {
   const TemporaryDirectory dir;
   for (const char* kind : {"cube", "plate", "gear"})
@@ -817,7 +816,7 @@ TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump throug
     const double top = tool == std::string("cube") ? 0.0255 : 0.0055;
     CHECK(std::stod(column(2, 4)) == Approx(top).margin(1e-8));
     CHECK(std::stod(column(2, 4)) > top);
-    // Without history the other side is as near.
+    // Without history the other side is equally close.
     const ProgramResult alone =
         run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string()});
     CHECK(alone.exit_code == 0);
@@ -825,7 +824,7 @@ TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump throug
   }
 }
 
-TEST_CASE("wrenchctl solve with bodies that are not convex wants method exact") {
+TEST_CASE("wrenchctl solve requires method exact for bodies that are not convex") {
   const TemporaryDirectory dir;
   REQUIRE(run_program("wrenchctl", {"mesh", "--make", "gear", "--triangles", "500", "-o",
                                     (dir.path() / "gear.off").string()})
@@ -841,25 +840,25 @@ TEST_CASE("wrenchctl solve with bodies that are not convex wants method exact") 
   CHECK(result.err.find("only method exact") != std::string::npos);
 }
 
-/// A cube of 50 mm on a cube of 50 mm that comes up from below by 10 mm in a second, and goes back.
+/// A cube of 50 mm on a cube of 50 mm that rises by 10 mm in one second and then reverses.
 fs::path scene_with_lift(const TemporaryDirectory& dir) {
   REQUIRE(run_program("wrenchctl", {"mesh", "--make", "cube", "--triangles", "12", "-o",
                                     (dir.path() / "cube.off").string()})
               .exit_code == 0);
   return dir.write("scene.toml",
                    "[tool]\nmesh = \"cube.off\"\n[[obstacle]]\nname = \"lift\"\nmesh = \"cube.off\"\n"
-                   "position_m = [0, 0, -0.055]\nvelocity_m_per_s = [0, 0, 0.01]\nturn_back_after_s = 1\n");
+                   "position_m = [0, 0, -0.055]\nvelocity_m_per_s = [0, 0, 0.01]\nreverse_after_s = 1\n");
 }
 
-TEST_CASE("wrenchctl solve without --proxy leaves obstacles where they start, and says so", "[moving]") {
+TEST_CASE("wrenchctl solve without --proxy leaves obstacles at their start and reports it", "[moving]") {
   const TemporaryDirectory dir;
   const std::string scene = scene_with_lift(dir).string();
   const std::string table = dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,-0.01,0,0,0,1\n").string();
   const ProgramResult alone = run_program("wrenchctl", {"solve", scene, "--poses", table});
   CHECK(alone.exit_code == 0);
-  CHECK(alone.err ==
-        "wrenchctl: obstacles move, and every pose is solved with them where they stand at time 0; --proxy "
-        "moves them\n");
+  CHECK(
+      alone.err ==
+      "wrenchctl: the obstacles move, but every pose is solved at scene time 0; use --proxy to move them\n");
   CHECK(std::stod(split(split(alone.out, '\n').at(1), ',').at(4)) == Approx(-0.005).margin(1e-6));
   const ProgramResult followed = run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy"});
   CHECK(followed.exit_code == 0);
@@ -867,14 +866,14 @@ TEST_CASE("wrenchctl solve without --proxy leaves obstacles where they start, an
   const ProgramResult planar =
       run_program("wrenchctl", {"solve", scene, "--poses", table, "--proxy", "--method", "planar"});
   CHECK(planar.exit_code == 1);
-  CHECK(planar.err.find("the obstacle 'lift' moves, which only method exact can deal with") !=
+  CHECK(planar.err.find("the obstacle 'lift' moves, and only method exact supports moving obstacles") !=
         std::string::npos);
   const ProgramResult check = run_program("wrenchctl", {"check", scene});
   CHECK(check.exit_code == 0);
   CHECK(check.out.find("1 mesh obstacle(s), moving\n") != std::string::npos);
 }
 
-TEST_CASE("wrenchctl solve --rate is for a trajectory, and a rate that is one", "[moving]") {
+TEST_CASE("wrenchctl solve --rate requires --proxy and a valid rate", "[moving]") {
   const TemporaryDirectory dir;
   const std::string scene = scene_with_lift(dir).string();
   const std::string table = dir.write("poses.csv", "px,py,pz,qx,qy,qz,qw\n0,0,0.1,0,0,0,1\n").string();
@@ -892,7 +891,7 @@ TEST_CASE("wrenchctl solve --rate is for a trajectory, and a rate that is one", 
         0);
 }
 
-TEST_CASE("wrenchctl solve --proxy moves obstacles at the rate it is given", "[moving]") {
+TEST_CASE("wrenchctl solve --proxy moves obstacles at the given rate", "[moving]") {
   const TemporaryDirectory dir;
   const std::string scene = scene_with_lift(dir).string();
   std::string poses = "px,py,pz,qx,qy,qz,qw\n";
@@ -910,12 +909,12 @@ TEST_CASE("wrenchctl solve --proxy moves obstacles at the rate it is given", "[m
   CHECK(height_m(400) == Approx(-0.005).margin(1e-6));
 }
 
-TEST_CASE("wrenchctl explains itself") {
+TEST_CASE("wrenchctl prints its help") {
   const ProgramResult help = run_program("wrenchctl", {"--help"});
   CHECK(help.exit_code == 0);
   CHECK(help.err == "");
-  for (const char* word : {"solve", "check", "mesh", "Exit codes: 0 done; 1 refused", "2 mesh: not a solid",
-                           "3 solve: a pose had no admissible pose", "over 100"})
+  for (const char* word : {"solve", "check", "mesh", "Exit codes: 0 done; 1 rejected", "2 mesh: not a solid",
+                           "3 solve: no admissible pose", "over 100"})
     CHECK(help.out.find(word) != std::string::npos);
   const ProgramResult solve = run_program("wrenchctl", {"solve", "--help"});
   for (const char* word : {"--poses", "--method", "{exact,planar,descent,translational}", "--output",

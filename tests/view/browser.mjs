@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests of the page share: the programs, and a browser that draws by software.
+// Shared by the tests of the page: the programs, and a browser with software rendering.
 import { spawn } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -13,7 +13,7 @@ const SKIPPED = 77;
 
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
-/** Waits until it is so; fails, with what it was told to say, where it never is. */
+/** Waits until the condition is true; otherwise fails with the given text. */
 export async function until(what, holds, limit_ms = 60000) {
   for (const end = Date.now() + limit_ms; Date.now() < end; await sleep(50)) {
     const value = await holds();
@@ -26,7 +26,7 @@ const running = [];
 const directory = mkdtempSync(join(tmpdir(), "wrenchd-view-"));
 export const file = (name) => join(directory, name);
 
-/** A program that runs beside the test; out: what it has said. */
+/** A program that runs beside the test; out: its output. */
 export function start(program, words) {
   // Flight recordings go where the test goes.
   const child = spawn(join(binaries, program), words, { env: { ...process.env, XDG_STATE_HOME: directory } });
@@ -44,7 +44,7 @@ export async function finished(program, words) {
   return one.out;
 }
 
-/** A daemon with the simulated device. Where tests share a machine its loop may be late, which is no fault here. */
+/** A daemon with the simulated device. Its loop may be late on a shared machine, which the tests tolerate. */
 export async function daemon(more = []) {
   const socket = file("control.sock");
   const one = start("wrenchd", ["--realtime", "best_effort", "--control", socket, ...more]);
@@ -52,7 +52,7 @@ export async function daemon(more = []) {
   return { ...one, socket, status: async () => JSON.parse(await finished("wrenchctl", ["status", "--json", "--socket", socket])) };
 }
 
-/** The view, and the address that it prints. */
+/** wrenchctl view, and the address that it prints. */
 export async function view(words) {
   const one = start("wrenchctl", ["view", ...words]);
   const url = await until(`an address (${one.err})`, () => /http:\S+/.exec(one.out)?.[0]);
@@ -71,7 +71,7 @@ async function playwright() {
   return (await import(pathToFileURL(library))).chromium;
 }
 
-/** Chromium that gives way: drawing by software it takes all processors, and the daemon has none of its own here. */
+/** Chromium with low priority, because software rendering would take all processors from the daemon. */
 function niced(by) {
   const program = file("chromium");
   writeFileSync(program, `#!/bin/sh\nexec nice -n ${by} ${CHROMIUM} "$@"\n`, { mode: 0o700 });
@@ -89,7 +89,7 @@ export async function chromiumLaunch(url) {
 }
 
 let browser;
-/** A page, of which every complaint fails the test. */
+/** A page; every console error fails the test. */
 export async function open(url, options = {}) {
   browser ??= await (await playwright()).launch({ executablePath: niced(5), args: ARGUMENTS });
   const page = await browser.newPage({ viewport: { width: 1280, height: 720 }, ...options });
@@ -99,7 +99,7 @@ export async function open(url, options = {}) {
   page.on("console", (message) => ["error", "warning"].includes(message.type()) && complaints.push(message.text()));
   page.on("request", (request) => !request.url().startsWith(new URL(url).origin) && !request.url().startsWith("data:") && complaints.push(`asks for ${request.url()}`));
   await page.goto(url);
-  // Software that draws slowly says so; that is no complaint of ours.
+  // Ignores warnings about slow software rendering.
   const own = () => complaints.filter((text) => !/GPU stall|GL Driver|swiftshader/i.test(text));
   return Object.assign(page, { complaints: own });
 }
@@ -115,7 +115,7 @@ async function end(code) {
   process.exit(code);
 }
 
-/** Runs what is given, and ends the process with its outcome, and everything that it has started. */
+/** Runs a test, ends all programs that it started, and exits with its result. */
 export async function test(run) {
   try {
     await run();

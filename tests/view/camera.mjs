@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A running daemon is looked at from where its [view] says, until whoever looks turns the scene himself.
+// The camera follows the daemon's [view] until the user moves the camera.
 import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { daemon, file, open, source, test, until, view } from "./browser.mjs";
@@ -21,21 +21,21 @@ test(async () => {
   };
   await until("it is seen from where [view] says", seen_from([0.2, 0.1, 0.15], [0.01, 0.0, 0.02]));
 
-  // A reload of another view is followed.
+  // A reload with another viewpoint moves the camera.
   looking([-0.1, 0.25, 0.1], [0.0, 0.0, 0.0]);
   wrenchd.child.kill("SIGHUP");
   await until("it is seen from the new place", seen_from([-0.1, 0.25, 0.1], [0.0, 0.0, 0.0]));
 
-  // Who has turned the scene keeps his place when it is told again; Fit goes back.
+  // A camera that the user has moved stays when the scene arrives again; Fit restores the viewpoint.
   await page.mouse.move(300, 250);
   await page.mouse.down();
   await page.mouse.move(380, 260, { steps: 4 });
   await page.mouse.up();
   const turned = (await camera()).eye;
   assert.ok(away(turned, [-0.1, 0.25, 0.1]) > 0.01);
-  const told = (await camera()).told;
+  const told = (await camera()).sceneCount;
   wrenchd.child.kill("SIGHUP");
-  await until("the scene is told again", async () => (await camera()).told > told);
+  await until("the scene arrives again", async () => (await camera()).sceneCount > told);
   assert.ok(away((await camera()).eye, turned) < 1e-9);
   await page.keyboard.press("f");
   await until("Fit goes back", seen_from([-0.1, 0.25, 0.1], [0.0, 0.0, 0.0]));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Everything by keys alone; light and dark; narrow and wide.
+// Operation by keyboard alone; light and dark; narrow and wide.
 import assert from "node:assert/strict";
 import { daemon, open, test, text, until, view } from "./browser.mjs";
 
@@ -10,7 +10,7 @@ test(async () => {
   const page = await open(url, { viewport: { width: 1000, height: 600 } });
   await until("the page shows the state", async () => (await text(page, "state")) === "disarmed");
 
-  // A stop from anywhere, by Space and by Escape, and even where Space would press a button.
+  // Stop by Space and by Escape, also if the focus is on a button.
   for (const key of ["Space", "Escape"]) {
     await until("it is armed", async () => {
       const now = await state();
@@ -29,7 +29,7 @@ test(async () => {
 
   await until("the page shows that it may be armed", () => page.locator("#arm").isEnabled());
 
-  // The focus goes where it is seen to go.
+  // The focus is visible.
   await page.locator("#arm").focus();
   const visited = ["arm"];
   for (let i = 0; i < 9; ++i) {

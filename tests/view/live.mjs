@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A running daemon: the page shows it, arms it, and is watched while it does.
+// A running daemon: the page shows it and arms it; the lease depends on the page's heartbeats.
 import assert from "node:assert/strict";
 import { daemon, open, sleep, test, text, until, view } from "./browser.mjs";
 
@@ -9,7 +9,7 @@ test(async () => {
   const wrenchd = await daemon();
   const server = await view(["--socket", wrenchd.socket]);
   const state = async () => (await wrenchd.status()).state;
-  const small = { viewport: { width: 700, height: 500 } };  // software draws it: a page that is slow is disarmed
+  const small = { viewport: { width: 700, height: 500 } };  // software rendering: a slow page loses its lease
   const page = await open(server.url, small);
   await until("the page shows the state", async () => (await text(page, "state")) === "disarmed");
   await until("the scene is there", () => page.evaluate(() => window.view.world().ghost !== null));
@@ -24,7 +24,7 @@ test(async () => {
     }, 120000);
   };
 
-  // Armed: force is felt and shown.
+  // Armed: there is force, and the page shows it.
   await armed();
   await until("the page says who armed", async () => /process/.test(await text(page, "armed-by")));
   const { frame, world } = await until("a force is shown", async () => {
@@ -35,7 +35,7 @@ test(async () => {
   frame.p.forEach((x, i) => assert.ok(Math.abs(world.ghost[i] - x) < 1e-6));
   assert.equal(frame.touches[0].obstacle, "table");
 
-  // Disarmed on purpose is no fault. On a busy machine a page drawn slowly may be missed before: then once more.
+  // A disarm by the user is no fault. On a busy machine a slow page may lose its lease before; then the test arms again.
   await until("it is disarmed without a cause", async () => {
     await armed();
     await page.keyboard.press("d");
@@ -44,7 +44,7 @@ test(async () => {
     return now === "disarmed" && lease === null && cause === null;
   });
 
-  // A page that hangs lets go. On a busy machine the daemon may be the first to miss somebody: then once more.
+  // A page that hangs releases the lease. On a busy machine the daemon may act first; then the test arms again.
   await until("the page says why", async () => {
     await armed();
     const hung = page.evaluate(() => {
@@ -53,27 +53,27 @@ test(async () => {
     await until("it is disarmed while the page hangs", async () => !ARMED.includes(await state()), 3900);
     await hung;
     await sleep(500);
-    return /nobody has seen this page/.test(await text(page, "toast"));
+    return /this page was hidden or unresponsive/.test(await text(page, "toast"));
   });
 
-  // Stop, by the button, whoever armed.
+  // The stop button works for every page.
   await armed();
   await page.locator("#stop").click();
   await until("it is stopped", async () => (await state()) === "stopped");
-  await until("the banner says what to do", async () => /cknowledge/.test(await text(page, "banner-cure")));
+  await until("the banner says what to do", async () => /cknowledge/.test(await text(page, "banner-remedy")));
   await page.locator("#acknowledge").click();
   await until("it is disarmed again", async () => (await state()) === "disarmed");
 
-  // A tab that is closed lets go.
+  // A closed tab releases the lease.
   await armed();
   assert.deepEqual(page.complaints(), []);
   await page.close();
   await until("it is disarmed when the tab is closed", async () => !ARMED.includes(await state()), 3000);
 
-  // A daemon that ends is told, and one that comes back is shown again.
+  // The page shows that the daemon has ended, and shows a restarted daemon again.
   const again = await open(server.url, small);
   await until("the page shows the daemon", async () => (await text(again, "state")) === "disarmed");
-  const armAsItIsTold = again.evaluate(() => new Promise((seen) => {  // before any further picture
+  const armOnLink = again.evaluate(() => new Promise((seen) => {  // before any further picture
     const shown = document.getElementById("state");
     new MutationObserver(() => shown.textContent === "connection lost" && seen(document.getElementById("arm").disabled))
       .observe(shown, { childList: true, characterData: true, subtree: true });
@@ -81,14 +81,14 @@ test(async () => {
   wrenchd.child.kill("SIGTERM");
   await wrenchd.ended;
   await until("the page says that it is gone", async () => (await text(again, "state")) === "connection lost");
-  assert.match(await text(again, "banner-what"), /No connection to wrenchd/);
-  assert.equal(await armAsItIsTold, true);
+  assert.match(await text(again, "banner-title"), /No connection to wrenchd/);
+  assert.equal(await armOnLink, true);
   await daemon();
   await until("it is back", async () => (await text(again, "state")) === "disarmed");
   assert.equal(await again.locator("#banner").isVisible(), false);
 
-  // So is the end of the view.
+  // The page shows that the view has ended.
   server.child.kill("SIGTERM");
-  await until("the page says that nobody serves it", async () => /wrenchctl view/.test(await text(again, "banner-what")));
+  await until("the page says that nobody serves it", async () => /wrenchctl view/.test(await text(again, "banner-title")));
   await sleep(100);
 });

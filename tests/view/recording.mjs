@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page shows what the recording says: its numbers and its scene, held against the columns as h5py reads them.
+// The page shows the numbers and the scene of the recording, compared with the columns that h5py reads.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { writeFileSync } from "node:fs";
 import { file, finished, open, test, text, until, view } from "./browser.mjs";
 
-// In virtual time a tick takes no time at all: one is made to have taken long.
+// In virtual time ticks have no duration; the test sets the duration of one tick.
 const COLUMNS = `
 import h5py, json, sys
 with h5py.File(sys.argv[1], "r+") as f:
@@ -71,7 +71,7 @@ test(async () => {
   // At the end: the curves and the histogram have the extremes of single ticks.
   const most = await page.evaluate(() => Math.max(...window.view.history().values[3]));
   near(most, columns.most_force_N, 1e-9, "the greatest force of the curve");
-  const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.took.max_us));
+  const longest = await until("the histogram", () => page.evaluate(() => window.view.times()?.tick_duration.max_us));
   near(longest, columns.longest_us, 1e-6, "the longest tick");
   assert.ok((await page.evaluate(() => window.view.world().triangles)) > 20);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Nobody gets anything who does not know the whole address, or whose browser another page has sent.
+// The server rejects requests without the token, and requests from other web pages.
 import assert from "node:assert/strict";
 import http from "node:http";
 import net from "node:net";
@@ -46,7 +46,7 @@ test(async () => {
   const wrong = pathname.replace(/[0-9a-f](?=\/$)/, (digit) => (digit === "0" ? "1" : "0"));
   for (const path of ["/", "/index.html", wrong, pathname.slice(0, -2) + "/", `${pathname.slice(0, -1)}0/`, "/favicon.ico"])
     assert.equal(await status({ path }), 403, path);
-  // What is not part of the page.
+  // Files that are not part of the page.
   for (const name of ["../../../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd", "/etc/passwd", "nothing.js"])
     assert.equal(await status({ path: pathname + name }), 404, name);
   assert.equal(await status({ method: "POST" }), 405);

@@ -15,12 +15,12 @@ namespace {
 
 using nlohmann::json;
 
-/// So many beats in the time that the daemon waits for one.
-constexpr double kBeatsInTime = 4.0;
+/// Number of heartbeats within the daemon's heartbeat timeout.
+constexpr double kHeartbeatsPerTimeout = 4.0;
 
 }  // namespace
 
-/// The thread that says that the program lives. It ends by itself where the connection does.
+/// The thread that sends heartbeats. The thread ends when the connection ends.
 class Client::HeartbeatThread {
  public:
   HeartbeatThread(std::shared_ptr<ClientConnection> connection, std::chrono::duration<double> every)
@@ -30,9 +30,9 @@ class Client::HeartbeatThread {
           std::unique_lock lock(mutex);
           while (!stop.stop_requested()) {
             try {
-              connection->notify("beat");
+              connection->notify("lease.heartbeat");
             } catch (const ClientError&) {
-              return;  // whoever calls next hears of it
+              return;  // the next call reports the error
             }
             ended.wait_for(lock, stop, every, [] { return false; });
           }
@@ -58,7 +58,7 @@ json parameters(const std::string& method, const std::string& params) {
   json parsed = json::parse(params, nullptr, false);
   if (!parsed.is_object())
     throw ClientError(ClientError::kProtocol,
-                      "the parameters of '" + method + "' are no JSON object: " + params);
+                      "the parameters of '" + method + "' are not a JSON object: " + params);
   return parsed;
 }
 
@@ -95,32 +95,34 @@ bool Client::poll_event(ClientEvent& out, std::chrono::milliseconds timeout) {
 }
 
 void Client::acquire_lease() {
-  const json lease = connection_->call("lease.take", json::object());
-  const std::chrono::duration<double> within(lease.value("beat_within_s", 0.1));
-  heartbeat_thread_ = std::make_unique<HeartbeatThread>(connection_, within / kBeatsInTime);
+  const json lease = connection_->call("lease.acquire", json::object());
+  const std::chrono::duration<double> within(lease.value("heartbeat_timeout_s", 0.1));
+  heartbeat_thread_ = std::make_unique<HeartbeatThread>(connection_, within / kHeartbeatsPerTimeout);
 }
 
 void Client::release_lease() {
   heartbeat_thread_.reset();
   try {
-    call("lease.give");
-  } catch (const ClientError& error) {  // lost meanwhile: there is nothing to give back
+    call("lease.release");
+  } catch (const ClientError& error) {  // the lease ended before, so there is nothing to release
     if (error.code() != ClientError::kInvalidState && error.code() != ClientError::kLeaseHeld) throw;
   }
 }
 
 void Client::heartbeat() {
-  connection_->notify("beat");
+  connection_->notify("lease.heartbeat");
 }
 
 StateReader Client::open_state() {
   int descriptor = -1;
   const json answer = connection_->call("state.open", json::object(), &descriptor);
   if (descriptor < 0 || !answer.contains("layout"))
-    throw ClientError(ClientError::kProtocol, "wrenchd handed no shared memory over; see its log");
+    throw ClientError(ClientError::kProtocol, "wrenchd sent no shared memory; see its log");
   return StateReader(
       answer["layout"].dump(), descriptor, [connection = connection_] { return connection->is_connected(); },
-      [connection = connection_] { return connection->call("state.names", json::object(), nullptr).dump(); });
+      [connection = connection_] {
+        return connection->call("state.obstacles", json::object(), nullptr).dump();
+      });
 }
 
 }  // namespace wrenchd

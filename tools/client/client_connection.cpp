@@ -21,17 +21,17 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kLongestLine = 16U << 20;
-/// Events that nobody polls for are kept so far; then the oldest go.
-constexpr std::size_t kMostEvents = 10'000;
+constexpr std::size_t kMaxLineBytes = 16U << 20;
+/// Maximum number of stored events. If there are more, the oldest is dropped.
+constexpr std::size_t kMaxEvents = 10'000;
 
-[[noreturn]] void gone(const std::string& why) {
+[[noreturn]] void fail(const std::string& why) {
   throw ClientError(ClientError::kDisconnected,
-                    "wrenchd ended the connection (" + why + "); connect again when it is back");
+                    "wrenchd ended the connection (" + why + "); connect again when wrenchd is running");
 }
 
-std::vector<std::string> places(const std::string& named) {
-  if (!named.empty()) return {named};
+std::vector<std::string> socket_paths(const std::string& socket) {
+  if (!socket.empty()) return {socket};
   if (const char* set = std::getenv("WRENCHD_SOCKET"); set != nullptr && *set != '\0') return {set};
   std::vector<std::string> all = {"/run/wrenchd/control.sock"};
   if (const char* run = std::getenv("XDG_RUNTIME_DIR"); run != nullptr && *run != '\0')
@@ -39,51 +39,51 @@ std::vector<std::string> places(const std::string& named) {
   return all;
 }
 
-/// 0, or why not.
-int try_to_connect(int descriptor, const std::string& place) {
+/// Returns 0, or the errno of the failure.
+int try_to_connect(int descriptor, const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  if (place.size() >= sizeof(address.sun_path)) return ENAMETOOLONG;
-  std::memcpy(address.sun_path, place.data(), place.size());
+  if (path.size() >= sizeof(address.sun_path)) return ENAMETOOLONG;
+  std::memcpy(address.sun_path, path.data(), path.size());
   return connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 ? 0 : errno;
 }
 
-/// Who may connect there, from the file.
-std::string who_may(const std::string& place) {
+/// Returns the users that may connect, from the permissions of the socket file.
+std::string permitted_users(const std::string& path) {
   struct stat status {};
-  if (stat(place.c_str(), &status) != 0 || (status.st_mode & 0060U) == 0)
-    return "only the user that wrenchd runs as, and root, may; set 'observers' under [control] in "
-           "wrenchd.toml to a group of yours";
+  if (stat(path.c_str(), &status) != 0 || (status.st_mode & 0060U) == 0)
+    return "only root and wrenchd's own user may connect; set 'observers' in [control] of "
+           "wrenchd.toml to one of your groups";
   const struct group* group = getgrgid(status.st_gid);
   const std::string name = group != nullptr ? group->gr_name : std::to_string(status.st_gid);
-  return "group '" + name + "' may; add yourself to it with: sudo usermod -aG " + name +
-         " $USER, and log in anew";
+  return "group '" + name + "' may connect; join it with: sudo usermod -aG " + name +
+         " $USER, and log in again";
 }
 
-/// found: where the daemon is.
-int connected(const std::string& named, std::string& found) {
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+/// Connects to the named socket or to the default ones. found: receives the path of the daemon's socket.
+int connect_socket(const std::string& socket, std::string& found) {
+  const int descriptor = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0)
     throw ClientError(ClientError::kNoDaemon, std::string("socket: ") + std::strerror(errno));
   std::string tried;
-  for (const std::string& place : places(named)) {
-    const int error = try_to_connect(descriptor, place);
+  for (const std::string& path : socket_paths(socket)) {
+    const int error = try_to_connect(descriptor, path);
     if (error == 0) {
-      found = place;
+      found = path;
       return descriptor;
     }
-    tried += (tried.empty() ? "" : "; ") + place + ": " + std::strerror(error);
-    if (error == EACCES) tried += " (" + who_may(place) + ")";
+    tried += (tried.empty() ? "" : "; ") + path + ": " + std::strerror(error);
+    if (error == EACCES) tried += " (" + permitted_users(path) + ")";
   }
   close(descriptor);
   throw ClientError(ClientError::kNoDaemon,
-                    "no wrenchd answers (" + tried + "); start it, or name its socket in WRENCHD_SOCKET");
+                    "no wrenchd responds (" + tried + "); start it, or name its socket in WRENCHD_SOCKET");
 }
 
 }  // namespace
 
 ClientConnection::ClientConnection(const std::string& socket, std::chrono::milliseconds answer_within)
-    : socket_(connected(socket, socket_path_)), response_timeout_(answer_within) {}
+    : socket_(connect_socket(socket, socket_path_)), response_timeout_(answer_within) {}
 
 ClientConnection::~ClientConnection() {
   close_descriptor();
@@ -103,12 +103,12 @@ json ClientConnection::call(const std::string& method, const json& params, int* 
   send({{"jsonrpc", "2.0"}, {"id", id}, {"method", method}, {"params", params}});
   for (std::string line;;) {
     if (!read_line(line, end))
-      throw ClientError(ClientError::kTimeout, "wrenchd did not answer '" + method + "' within " +
+      throw ClientError(ClientError::kTimeout, "wrenchd did not respond to '" + method + "' within " +
                                                    std::to_string(response_timeout_.count()) +
                                                    " ms; see its log");
     json message = json::parse(line, nullptr, false);
     if (!message.is_object())
-      throw ClientError(ClientError::kProtocol, "what answers is not wrenchd: " + line.substr(0, 80));
+      throw ClientError(ClientError::kProtocol, "the response is not wrenchd's: " + line.substr(0, 80));
     if (message.contains("method")) {
       queue_event(std::move(message));
       continue;
@@ -116,9 +116,9 @@ json ClientConnection::call(const std::string& method, const json& params, int* 
     if (const auto error = message.find("error"); error != message.end()) {
       if (message.value("id", json()) != id && !message.value("id", json()).is_null()) continue;
       throw ClientError(error->value("code", int{ClientError::kProtocol}),
-                        error->value("message", method + " was refused"));
+                        error->value("message", method + " was rejected"));
     }
-    if (message.value("id", json()) != id) continue;  // of a call that was given up
+    if (message.value("id", json()) != id) continue;  // response to a call that timed out
     if (descriptor != nullptr) *descriptor = std::exchange(descriptor_, -1);
     return message.value("result", json::object());
   }
@@ -143,11 +143,11 @@ bool ClientConnection::poll_event(json& out, std::chrono::milliseconds timeout) 
 
 void ClientConnection::queue_event(json message) {
   if (!message.contains("params")) return;
-  if (events_.size() == kMostEvents) events_.pop_front();
+  if (events_.size() == kMaxEvents) events_.pop_front();
   events_.push_back(std::move(message["params"]));
 }
 
-/// What has come is told even where the connection ended after it.
+/// Received data stays readable after the connection has ended.
 bool ClientConnection::is_connected() const noexcept {
   pollfd here = {socket_, POLLRDHUP, 0};
   return poll(&here, 1, 0) >= 0 && (here.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
@@ -160,11 +160,11 @@ bool ClientConnection::wait_for(short events, Clock::time_point end) const {
     const int ready = poll(&here, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
     if (ready > 0) return true;
     if (ready == 0) return false;
-    if (errno != EINTR) gone(std::strerror(errno));
+    if (errno != EINTR) fail(std::strerror(errno));
   }
 }
 
-/// False where no whole line came in time.
+/// Returns false if no complete line came in time.
 bool ClientConnection::read_line(std::string& line, Clock::time_point end) {
   for (;;) {
     const std::size_t at = received_.find('\n', scanned_);
@@ -175,7 +175,7 @@ bool ClientConnection::read_line(std::string& line, Clock::time_point end) {
       return true;
     }
     scanned_ = received_.size();
-    if (received_.size() > kLongestLine) gone("a line without end");
+    if (received_.size() > kMaxLineBytes) fail("an overlong line");
     if (!wait_for(POLLIN, end)) return false;
     receive();
   }
@@ -191,10 +191,10 @@ void ClientConnection::receive() {
   message.msg_control = ancillary.data();
   message.msg_controllen = ancillary.size();
   const ssize_t got = recvmsg(socket_, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
-  if (got == 0) gone("end of file");
+  if (got == 0) fail("end of file");
   if (got < 0) {
     if (errno == EAGAIN || errno == EINTR) return;
-    gone(std::strerror(errno));
+    fail(std::strerror(errno));
   }
   for (cmsghdr* one = CMSG_FIRSTHDR(&message); one != nullptr; one = CMSG_NXTHDR(&message, one)) {
     if (one->cmsg_level != SOL_SOCKET || one->cmsg_type != SCM_RIGHTS) continue;
@@ -215,8 +215,8 @@ void ClientConnection::send(const json& request) {
       continue;
     }
     if (errno == EINTR) continue;
-    if (errno != EAGAIN) gone(std::strerror(errno));
-    if (!wait_for(POLLOUT, end)) gone("it takes no more requests");
+    if (errno != EAGAIN) fail(std::strerror(errno));
+    if (!wait_for(POLLOUT, end)) fail("wrenchd accepts no more requests");
   }
 }
 

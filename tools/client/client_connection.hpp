@@ -11,21 +11,22 @@
 
 namespace wrenchd {
 
-/// A socket that speaks JSON-RPC 2.0, one object a line. An answer is told from events that come in between
-/// by its id. Any thread may call anything.
+/// A socket that speaks JSON-RPC 2.0 with one object per line. Matches responses by their id and queues the
+/// events that arrive between them. Thread-safe. Not RT-safe: waits for the daemon.
 class ClientConnection {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Throws ClientError.
+  /// Throws ClientError if no daemon accepts the connection.
   ClientConnection(const std::string& socket, std::chrono::milliseconds answer_within);
   ~ClientConnection();
   ClientConnection(const ClientConnection&) = delete;
   ClientConnection& operator=(const ClientConnection&) = delete;
 
-  /// descriptor: takes the one that comes with the answer; -1 where none does. Null: such are closed.
+  /// Sends a request and returns its result. descriptor: receives the file descriptor of the response, or -1
+  /// if there is none. Null: closes such descriptors. Throws ClientError.
   nlohmann::json call(const std::string& method, const nlohmann::json& params, int* descriptor = nullptr);
-  /// Wants no answer.
+  /// Sends a notification, which has no response. Throws ClientError.
   void notify(const std::string& method);
   bool poll_event(nlohmann::json& out, std::chrono::milliseconds timeout);
   bool is_connected() const noexcept;
@@ -39,14 +40,14 @@ class ClientConnection {
   void close_descriptor() noexcept;
   void queue_event(nlohmann::json message);
 
-  std::string socket_path_;  ///< path of the socket; before socket_, which finds it
+  std::string socket_path_;  ///< path of the socket; declared before socket_, whose initialization sets it
   int socket_;
   std::chrono::milliseconds response_timeout_;
   std::mutex read_mutex_;
   std::mutex write_mutex_;
   std::string received_;
-  std::size_t scanned_ = 0;  ///< of received_, without an end of line
-  int descriptor_ = -1;      ///< that came with what was received
+  std::size_t scanned_ = 0;  ///< number of bytes in received_ that contain no line end
+  int descriptor_ = -1;      ///< descriptor received with the pending data; -1: none
   std::int64_t last_id_ = 0;
   std::deque<nlohmann::json> events_;
 };

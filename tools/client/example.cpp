@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Prints what the hand feels, ten times a second, until wrenchd ends or the number of lines given is printed.
+// Prints wrench and contacts ten times per second until wrenchd ends, or until the given number of lines.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -19,9 +19,9 @@ int main(int argc, char** argv) {
       const auto F = tick.wrench();
       std::printf("tick %8llu %-8s F %+6.2f %+6.2f %+6.2f N |", static_cast<unsigned long long>(tick.tick()),
                   tick.state().c_str(), F[0], F[1], F[2]);
-      for (const wrenchd::ProxyContact& touch : tick.contacts())
-        std::printf(" %s on %s %s (%.0f %%)", touch.tool_feature.c_str(), touch.obstacle.c_str(),
-                    touch.obstacle_feature.c_str(), 100.0 * touch.share);
+      for (const wrenchd::ProxyContact& contact : tick.contacts())
+        std::printf(" %s on %s %s (%.0f %%)", contact.tool_feature.c_str(), contact.obstacle.c_str(),
+                    contact.obstacle_feature.c_str(), 100.0 * contact.load_fraction);
       std::printf("\n");
       std::fflush(stdout);
       ++printed;

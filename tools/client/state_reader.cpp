@@ -20,18 +20,18 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uint64_t kVersion = 1;
-/// How often a reader that waits asks whether the daemon is there still.
-constexpr auto kLookAround = std::chrono::milliseconds(50);
+constexpr std::uint64_t kVersion = 2;
+/// Interval at which a waiting reader checks whether the daemon is still connected.
+constexpr auto kConnectionCheckInterval = std::chrono::milliseconds(50);
 
-[[noreturn]] void not_understood(const std::string& what) {
+[[noreturn]] void fail_protocol(const std::string& what) {
   throw ClientError(ClientError::kProtocol, "the daemon's state cannot be read: " + what +
                                                 "; use the client library of the daemon's version");
 }
 
 struct Field {
   std::string name, unit, doc;
-  char type = 'f';  ///< f, i or u
+  char type = 'f';  ///< 'f', 'i' or 'u'
   std::size_t width = 8;
   std::size_t count = 1;
   std::size_t offset = 0;
@@ -51,19 +51,19 @@ Field read_field(const json& from, std::size_t room) {
   static const std::map<std::string, std::size_t> kWidths = {{"u8", 1},  {"u16", 2}, {"u32", 4},
                                                              {"u64", 8}, {"i64", 8}, {"f64", 8}};
   const auto width = kWidths.find(type);
-  if (width == kWidths.end()) not_understood("field '" + field.name + "' is of type '" + type + "'");
+  if (width == kWidths.end()) fail_protocol("field '" + field.name + "' is of type '" + type + "'");
   field.type = type.front();
   field.width = width->second;
   if (field.count == 0 || field.count > room || field.offset > room ||
       field.offset + field.count * field.width > room)
-    not_understood("field '" + field.name + "' lies outside of its record");
+    fail_protocol("field '" + field.name + "' lies outside of its record");
   if (from.contains("values")) field.values = from.at("values").get<std::vector<std::string>>();
   if (from.contains("bits")) field.bits = from.at("bits").get<std::vector<std::string>>();
   return field;
 }
 
 Fields read_fields(const json& list, std::size_t room) {
-  if (!list.is_array() || list.empty()) not_understood("its layout has no fields");
+  if (!list.is_array() || list.empty()) fail_protocol("its layout has no fields");
   Fields fields;
   for (const json& one : list) {
     Field field = read_field(one, room);
@@ -83,9 +83,9 @@ const Field& field_of(const Fields& fields, std::string_view name) {
 std::uint64_t bits_of(const Field& field, const std::byte* record, std::size_t i) {
   if (i >= field.count)
     throw ClientError(ClientError::kProtocol, "field '" + field.name + "' has " +
-                                                  std::to_string(field.count) + " numbers, and number " +
-                                                  std::to_string(i) + " was asked for");
-  std::uint64_t bits = 0;  // of a little-endian machine, as the reader has made sure
+                                                  std::to_string(field.count) + " numbers, and index " +
+                                                  std::to_string(i) + " was requested");
+  std::uint64_t bits = 0;  // value on a little-endian machine, which the constructor requires
   std::memcpy(&bits, record + field.offset + i * field.width, field.width);
   return bits;
 }
@@ -117,14 +117,14 @@ struct TickState::Layout {
   std::size_t bytes, header_bytes, written_offset, slots, slot_bytes, record_offset, record_bytes;
   double rate_Hz;
   Fields fields;
-  std::size_t touches_offset, touch_bytes, most_touches;
-  Fields touch_fields;
+  std::size_t contacts_offset, contact_bytes, max_contacts;
+  Fields contact_fields;
 
   explicit Layout(const json& from) {
     if (from.at("version").get<std::uint64_t>() != kVersion)
-      not_understood("its layout is of version " + from.at("version").dump());
+      fail_protocol("its layout has version " + from.at("version").dump());
     if (from.at("byte_order") != "little" || std::endian::native != std::endian::little)
-      not_understood("only little-endian machines are known");
+      fail_protocol("only little-endian machines are supported");
     bytes = from.at("bytes");
     header_bytes = from.at("header_bytes");
     written_offset = from.at("written_offset");
@@ -137,20 +137,20 @@ struct TickState::Layout {
                       record_offset == 8 && record_bytes < slot_bytes && header_bytes >= 64 &&
                       header_bytes < bytes && written_offset % 8 == 0 && written_offset < header_bytes &&
                       slots <= (bytes - header_bytes) / slot_bytes && rate_Hz > 0.0;
-    if (!fits) not_understood("the sizes in its layout contradict each other");
+    if (!fits) fail_protocol("the sizes in its layout contradict each other");
     fields = read_fields(from.at("fields"), record_bytes);
-    const json& touches = from.at("touches");
-    touches_offset = touches.at("offset");
-    touch_bytes = touches.at("bytes");
-    most_touches = touches.at("most");
-    if (touch_bytes == 0 || touches_offset > record_bytes ||
-        most_touches > (record_bytes - touches_offset) / touch_bytes)
-      not_understood("the contacts lie outside of the record");
-    touch_fields = read_fields(touches.at("fields"), touch_bytes);
+    const json& contacts = from.at("contacts");
+    contacts_offset = contacts.at("offset");
+    contact_bytes = contacts.at("bytes");
+    max_contacts = contacts.at("max_count");
+    if (contact_bytes == 0 || contacts_offset > record_bytes ||
+        max_contacts > (record_bytes - contacts_offset) / contact_bytes)
+      fail_protocol("the contacts lie outside of the record");
+    contact_fields = read_fields(contacts.at("fields"), contact_bytes);
   }
 };
 
-/// Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more.
+/// Caches the names of obstacles by rendering, because a tick may belong to an earlier rendering.
 class TickState::Names {
  public:
   Names(const json& layout, std::function<std::string()> ask) : ask_(std::move(ask)) { keep(layout); }
@@ -160,7 +160,8 @@ class TickState::Names {
     if (rendering > known_.rbegin()->first && ask_) {
       try {
         keep(json::parse(ask_()));
-      } catch (const std::exception&) {  // the daemon is gone, or busy: a number tells which one, too
+      } catch (const std::exception&) {  // the daemon is gone or busy; the obstacle number identifies the
+                                         // obstacle instead
       }
     }
     const auto found = known_.find(rendering);
@@ -170,7 +171,7 @@ class TickState::Names {
 
  private:
   void keep(const json& from) {
-    known_[from.at("rendering")] = from.at("obstacles").get<std::vector<std::string>>();
+    known_[from.at("rendering_id")] = from.at("obstacles").get<std::vector<std::string>>();
     while (known_.size() > kMostKept) known_.erase(known_.begin());
   }
 
@@ -201,35 +202,35 @@ std::string TickState::text(std::string_view field) const {
 
 std::vector<ProxyContact> TickState::contacts() const {
   const auto count =
-      std::min<std::size_t>(static_cast<std::size_t>(integer("touch_count")), layout_->most_touches);
+      std::min<std::size_t>(static_cast<std::size_t>(integer("contact_count")), layout_->max_contacts);
   std::vector<ProxyContact> out(count);
-  const auto rendering = static_cast<std::uint32_t>(integer("rendering"));
+  const auto rendering_id = static_cast<std::uint32_t>(integer("rendering_id"));
   for (std::size_t k = 0; k < count; ++k) {
-    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->touches_offset +
-                            k * layout_->touch_bytes;
+    const std::byte* from = reinterpret_cast<const std::byte*>(words_.data()) + layout_->contacts_offset +
+                            k * layout_->contact_bytes;
     const auto get = [&](std::string_view name, std::size_t i = 0) {
-      return parse_number(field_of(layout_->touch_fields, name), from, i);
+      return parse_number(field_of(layout_->contact_fields, name), from, i);
     };
     const auto feature = [&](const std::string& body) {
-      std::string name = text_of(field_of(layout_->touch_fields, body + "_feature_kind"), from);
+      std::string name = text_of(field_of(layout_->contact_fields, body + "_feature_kind"), from);
       if (name == "plane" || name == "none") return name;
       const auto number = [&](const std::string& which) {
-        return std::to_string(bits_of(field_of(layout_->touch_fields, body + which), from, 0));
+        return std::to_string(bits_of(field_of(layout_->contact_fields, body + which), from, 0));
       };
       name += " " + number("_first");
       return name.find("edge") == std::string::npos ? name : name + "-" + number("_second");
     };
-    ProxyContact& touch = out[k];
+    ProxyContact& contact = out[k];
     for (std::size_t i = 0; i < 3; ++i) {
-      touch.point_W_m[i] = get("point_W_m", i);
-      touch.normal_W[i] = get("normal_W", i);
+      contact.point_W_m[i] = get("point_W_m", i);
+      contact.normal_W[i] = get("normal_W", i);
     }
-    touch.share = get("share");
-    touch.multiplier_kg_m = get("multiplier_kg_m");
-    touch.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
-    touch.obstacle = names_->of(rendering, touch.obstacle_number);
-    touch.tool_feature = feature("tool");
-    touch.obstacle_feature = feature("obstacle");
+    contact.load_fraction = get("load_fraction");
+    contact.multiplier_kg_m = get("multiplier_kg_m");
+    contact.obstacle_number = static_cast<std::uint32_t>(get("obstacle"));
+    contact.obstacle = names_->of(rendering_id, contact.obstacle_number);
+    contact.tool_feature = feature("tool");
+    contact.obstacle_feature = feature("obstacle");
   }
   return out;
 }
@@ -246,21 +247,21 @@ StateReader::StateReader(const std::string& layout, int descriptor, std::functio
     layout_ = std::make_shared<const TickState::Layout>(described);
     names_ = std::make_shared<TickState::Names>(described, std::move(ask_names));
   } catch (const json::exception& error) {
-    not_understood(error.what());
+    fail_protocol(error.what());
   }
-  // Memory that could shrink would end this process where it is read.
+  // The memory must be sealed: if it shrank, a read would end this process.
   const int seals = fcntl(descriptor, F_GET_SEALS);
   struct stat file {};
   if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || fstat(descriptor, &file) != 0 ||
       static_cast<std::uint64_t>(file.st_size) < layout_->bytes)
-    not_understood("its memory is not sealed, or too small");
+    fail_protocol("its memory is not sealed, or too small");
   void* const mapped = mmap(nullptr, layout_->bytes, PROT_READ, MAP_SHARED, descriptor, 0);
-  if (mapped == MAP_FAILED) not_understood(std::string("mmap: ") + std::strerror(errno));
+  if (mapped == MAP_FAILED) fail_protocol(std::string("mmap: ") + std::strerror(errno));
   memory_ = static_cast<const std::byte*>(mapped);
   bytes_ = layout_->bytes;
   if (std::memcmp(memory_, "WRENCHST", 8) != 0) {
     unmap();
-    not_understood("its memory does not begin with WRENCHST");
+    fail_protocol("its memory does not begin with WRENCHST");
   }
   next_ = unread();
 }
@@ -298,7 +299,8 @@ void StateReader::unmap() noexcept {
 
 namespace {
 
-/// A word that another process writes. Loads of lock-free atomics write nothing, so read-only memory will do.
+/// Loads a word that another process writes. A load of a lock-free atomic does not write, so read-only memory
+/// suffices.
 std::uint64_t load(const std::byte* at, std::memory_order order) {
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
   return reinterpret_cast<const std::atomic<std::uint64_t>*>(at)->load(order);
@@ -310,8 +312,8 @@ std::uint64_t StateReader::unread() const noexcept {
   return load(memory_ + layout_->written_offset, std::memory_order_acquire) - next_;
 }
 
-/// A word of a newer record is seen together with its guard, for words are stored with release order; so two
-/// equal guards have only the words of one record between them.
+/// The daemon stores words with release order, so a word of a newer record becomes visible together with the
+/// record's guard. Therefore two equal guards enclose words of one record only.
 StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const {
   const std::byte* slot = memory_ + layout_->header_bytes + i % layout_->slots * layout_->slot_bytes;
   const std::uint64_t whole = 2 * i + 2;
@@ -324,7 +326,7 @@ StateReader::CopyResult StateReader::copy(std::uint64_t i, TickState& out) const
   return load(slot, std::memory_order_relaxed) == whole ? CopyResult::complete : CopyResult::overrun;
 }
 
-/// Goes on in the middle of what is there, so as not to be overrun again at once.
+/// Continues in the middle of the available ticks, so that the next overrun is not immediate.
 void StateReader::skip_overwritten() {
   const std::uint64_t ahead = unread();
   if (ahead <= layout_->slots / 2) return;
@@ -337,7 +339,7 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + timeout;
   const auto pause = std::chrono::duration<double>(0.25 / layout_->rate_Hz);
-  auto look_around = Clock::now() + kLookAround;
+  auto next_check = Clock::now() + kConnectionCheckInterval;
   for (;;) {
     while (unread() > 0) {
       if (copy(next_, out) == CopyResult::complete) {
@@ -348,10 +350,11 @@ bool StateReader::next(TickState& out, std::chrono::milliseconds timeout) {
     }
     const auto now = Clock::now();
     if (now >= end) return false;
-    if (now >= look_around) {
-      look_around = now + kLookAround;
+    if (now >= next_check) {
+      next_check = now + kConnectionCheckInterval;
       if (is_connected_ && !is_connected_() && unread() == 0)
-        throw ClientError(ClientError::kDisconnected, "the daemon is gone; connect again when it is back");
+        throw ClientError(ClientError::kDisconnected,
+                          "the daemon is gone; connect again when wrenchd is running");
     }
     std::this_thread::sleep_for(pause);
   }

@@ -8,5 +8,5 @@ with wrenchd.Client() as client:
         for tick in state.ticks(1000):
             if tick.tick % 100 == 0:
                 force = ["%+.2f" % f for f in tick.F_out[:3]]
-                print(tick.tick, tick.state, *force, "N |", ", ".join(map(str, tick.touches)))
+                print(tick.tick, tick.state, *force, "N |", ", ".join(map(str, tick.contact_list)))
         print("ticks missed:", state.missed)

@@ -20,7 +20,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// A cell or two may bend a smooth surface by more than kCrease_rad.
+/// Crease angle for simplified meshes, where a few cells may bend a smooth surface by more than kCrease_rad.
 constexpr double kCoarseCrease_rad = 1.0;
 
 struct Surface {
@@ -32,18 +32,19 @@ struct Surface {
   }
 };
 
-/// What is known of the vertices that become one: the squared distances to the planes of their triangles.
+/// The vertices that merge into one: sum of the squared distances to the planes of their triangles.
 struct Cell {
-  Vector3d sum = Vector3d::Zero();  ///< of vertices
+  Vector3d sum = Vector3d::Zero();  ///< sum of the vertices
   double count = 0.0;
   Matrix3d A = Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
   std::uint32_t number = 0;
 
-  /// Where those distances are least; where that is anywhere along a line or a plane, nearest to the mean.
+  /// Returns the point with the smallest sum of squared distances. If the minimum is a line or a plane,
+  /// returns its point nearest to the mean.
   Vector3d best(double reach) const {
     constexpr double kFlat =
-        1e-3;  ///< of the greatest: planes that differ by less say nothing of a direction
+        1e-3;  ///< relative to the largest eigenvalue; smaller ones do not determine a direction
     const Vector3d mean = sum / count;
     const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(A);
     const Vector3d rest = b - A * mean;
@@ -63,7 +64,7 @@ Surface clustered(const Surface& fine, const Vector3d& origin, double side) {
   std::vector<Cell*> cell_of(fine.vertices.size());
   for (std::size_t i = 0; i < fine.vertices.size(); ++i) {
     std::uint64_t key = 0;
-    for (int k = 0; k < 3; ++k)  // 21 bits each: fine enough for any mesh that has to be made coarser
+    for (int k = 0; k < 3; ++k)  // 21 bits per axis suffice for any mesh that needs simplification
       key = key << 21U | (static_cast<std::uint64_t>((fine.vertices[i][k] - origin[k]) / side) & 0x1fffffU);
     Cell& cell = cells[key];
     if (cell.count == 0.0) cell.number = static_cast<std::uint32_t>(cells.size() - 1);
@@ -93,7 +94,7 @@ Surface clustered(const Surface& fine, const Vector3d& origin, double side) {
     if (turned) std::swap(c[1], c[2]);
     sides[c] += turned ? -1 : 1;
   }
-  // Two that lie on each other and look opposite ways are a fold that was flattened: neither is drawn.
+  // Two coincident triangles with opposite orientation are a collapsed fold; neither is drawn.
   for (const auto& [c, net] : sides) {
     if (net > 0) coarse.triangles.push_back(c);
     if (net < 0) coarse.triangles.push_back({c[0], c[2], c[1]});
@@ -106,7 +107,7 @@ Surface coarser(const Surface& fine, std::size_t most) {
   for (const Vector3d& p : fine.vertices) box.extend(p);
   double area = 0.0;
   for (const Triangle& t : fine.triangles) area += fine.area(t).norm();
-  // About two triangles a cell that the surface passes through.
+  // Gives about two triangles per cell that the surface intersects.
   double side = std::max(std::sqrt(2.0 * area / static_cast<double>(most)), box.sizes().maxCoeff() / 2e6);
   constexpr int kTries = 20;
   Surface coarse;
@@ -118,7 +119,7 @@ Surface coarser(const Surface& fine, std::size_t most) {
   return coarse;
 }
 
-/// The triangles at each vertex, one after the other.
+/// The triangles at each vertex, stored consecutively.
 struct Around {
   std::vector<std::uint32_t> begin, triangles;
 
@@ -149,7 +150,8 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
   }
   const Around around(s);
   std::vector<std::vector<std::pair<Vector3d, std::uint32_t>>> corners(s.vertices.size());
-  // The corner of a vertex with this normal, which many triangles share where the surface is smooth.
+  // Returns the drawn vertex for a mesh vertex and this normal. Triangles share it where the surface is
+  // smooth.
   const auto corner = [&](std::uint32_t v, const Vector3d& normal) {
     for (const auto& [known, number] : corners[v])
       if ((known - normal).squaredNorm() < 1e-8) return number;
@@ -176,8 +178,8 @@ void draw(const Surface& s, bool made_coarser, DisplayMesh& out) {
         straightest = std::max(straightest, normals[j].dot(normals[i]));
       }
       if (others > 0 && (straightest >= line_bend || v > w))
-        continue;                                 // of two triangles one draws their edge
-      if (made_coarser && others != 1) continue;  // where cells became one there is no edge of the body's own
+        continue;                                 // only one of the two triangles draws their common edge
+      if (made_coarser && others != 1) continue;  // open edges at merged cells are not edges of the body
       append(out.lines, s.vertices[v]);
       append(out.lines, s.vertices[w]);
     }
@@ -193,7 +195,7 @@ DisplayMesh display_mesh(std::span<const float> vertices, std::span<const Triang
   for (const Triangle& t : triangles)
     for (const std::uint32_t v : t)
       if (v >= surface.vertices.size())
-        throw std::invalid_argument("a triangle names vertex " + std::to_string(v) + " of " +
+        throw std::invalid_argument("a triangle refers to vertex " + std::to_string(v) + " of " +
                                     std::to_string(surface.vertices.size()));
   surface.triangles.assign(triangles.begin(), triangles.end());
   DisplayMesh out;

@@ -14,28 +14,30 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kAgain = 300ms;      ///< between two attempts to connect
-constexpr auto kWatched = 6ms;      ///< between two looks: a frame has ticks that are no older
-constexpr auto kUnwatched = 100ms;  ///< the memory keeps two seconds
-constexpr auto kStatusEvery =
-    1s;  ///< what no event tells: who has the lease is told, how long ticks take is not
-constexpr std::size_t kMostEvents = 200;
+constexpr auto kReconnectInterval = 300ms;  ///< interval between two attempts to connect
+/// Reading interval with an open page; bounds the age of the ticks in a frame.
+constexpr auto kWatchedInterval = 6ms;
+constexpr auto kUnwatchedInterval =
+    100ms;  ///< reading interval without a page; the shared memory retains 2 s
+/// Interval for status values without events, such as tick durations. Lease changes have events.
+constexpr auto kStatusInterval = 1s;
+constexpr std::size_t kMaxEvents = 200;
 
-/// Memory of another process, for as long as it is looked at.
-class Mapped {
+/// Maps memory of another process for the lifetime of this object.
+class MappedMemory {
  public:
-  explicit Mapped(int descriptor) {
+  explicit MappedMemory(int descriptor) {
     struct stat file {};
     if (descriptor >= 0 && fstat(descriptor, &file) == 0) {
       bytes_ = static_cast<std::size_t>(file.st_size);
       memory_ = mmap(nullptr, bytes_, PROT_READ, MAP_SHARED, descriptor, 0);
     }
     if (descriptor >= 0) close(descriptor);
-    if (memory_ == MAP_FAILED) throw std::runtime_error("the shapes of the scene cannot be mapped");
+    if (memory_ == MAP_FAILED) throw std::runtime_error("the geometry of the scene cannot be mapped");
   }
-  ~Mapped() { munmap(memory_, bytes_); }
-  Mapped(const Mapped&) = delete;
-  Mapped& operator=(const Mapped&) = delete;
+  ~MappedMemory() { munmap(memory_, bytes_); }
+  MappedMemory(const MappedMemory&) = delete;
+  MappedMemory& operator=(const MappedMemory&) = delete;
   std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(memory_), bytes_}; }
 
  private:
@@ -52,7 +54,7 @@ void pause(const std::stop_token& stop, std::chrono::milliseconds time) {
 }  // namespace
 
 LiveFeed::LiveFeed(std::string socket) : socket_(std::move(socket)) {
-  link_.error = "looking for wrenchd";
+  link_.error = "connecting to wrenchd";
   reader_thread_ = std::jthread([this](const std::stop_token& stop) { run_reader(stop); });
   scene_thread_ = std::jthread([this](const std::stop_token& stop) { run_scene_fetcher(stop); });
 }
@@ -91,18 +93,18 @@ void LiveFeed::run_reader(const std::stop_token& stop) {
     } catch (const ClientError& error) {
       set_disconnected(error.what());
     }
-    pause(stop, kAgain);
+    pause(stop, kReconnectInterval);
   }
 }
 
 void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_token& stop) {
   TickState state;
-  auto ask_again = std::chrono::steady_clock::now() + kStatusEvery;
+  auto next_status = std::chrono::steady_clock::now() + kStatusInterval;
   while (!stop.stop_requested()) {
     bool any = false;
     while (reader.next(state, 0ms)) {
       any = true;
-      const ViewTick tick = view_tick(state);
+      const ViewTick tick = view_tick(tick_record(state));
       const ChannelValues values = tick.channels();
       const std::scoped_lock lock(mutex_);
       history_.add(tick.time_ns, values);
@@ -110,24 +112,25 @@ void LiveFeed::read_ticks(Client& client, StateReader& reader, const std::stop_t
       wake_latency_.add(tick.time_ns, tick.wake_latency_ns);
     }
     if (any) {
-      Sample now{view_tick(state), view_status(state), reader.missed()};
+      const TickRecord record = tick_record(state);
+      Sample now{view_tick(record), view_status(record, state.contacts()), reader.missed()};
       rendering_id_.store(now.tick.rendering_id);
       const std::scoped_lock lock(mutex_);
       newest_sample_ = std::move(now);
     }
-    bool news = std::chrono::steady_clock::now() >= ask_again;
+    bool status_due = std::chrono::steady_clock::now() >= next_status;
     ClientEvent event;
     while (client.poll_event(event, 0ms)) {
-      news = news || event.name != "log";
+      status_due = status_due || event.name != "log";
       if (event.name == "reload") ++reloads_;
       const std::scoped_lock lock(mutex_);
-      if (events_.size() < kMostEvents) events_.push_back(event.json);
+      if (events_.size() < kMaxEvents) events_.push_back(event.json);
     }
-    if (news) {
+    if (status_due) {
       request_status(client);
-      ask_again = std::chrono::steady_clock::now() + kStatusEvery;
+      next_status = std::chrono::steady_clock::now() + kStatusInterval;
     }
-    std::this_thread::sleep_for(watched_.load() ? kWatched : kUnwatched);
+    std::this_thread::sleep_for(watched_.load() ? kWatchedInterval : kUnwatchedInterval);
   }
 }
 
@@ -139,8 +142,8 @@ void LiveFeed::request_status(Client& client) {
   ++link_.revision;
 }
 
-/// The scene is fetched with each connection, whenever the ticks are of another rendering, and after a
-/// reload, which may have changed from where it is looked at.
+/// Fetches the scene after each connection, after each change of the rendering, and after a reload, which may
+/// change the viewpoint.
 void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
   std::uint64_t of_connection = 0;
   std::uint32_t of_rendering = 0, of_reload = 0;
@@ -153,7 +156,7 @@ void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
     try {
       if (connection != of_connection) {
         const std::scoped_lock lock(mutex_);
-        scene_ = nullptr;  // another daemon may count its meshes as the last did
+        scene_ = nullptr;  // another daemon may use the same mesh numbers for other meshes
       }
       Client client(socket_, 60s);
       fetch_scene(client);
@@ -172,8 +175,8 @@ void LiveFeed::run_scene_fetcher(const std::stop_token& stop) {
 
 void LiveFeed::fetch_scene(Client& client) {
   int descriptor = -1;
-  const Json description = Json::parse(client.call("scene.shapes", "{}", descriptor));
-  const Mapped memory(descriptor);
+  const Json description = Json::parse(client.call("scene.geometry", "{}", descriptor));
+  const MappedMemory memory(descriptor);
   const auto known = scene();
   auto made = std::make_shared<const ViewScene>(description, memory.bytes(), known.get());
   const std::scoped_lock lock(mutex_);

@@ -22,34 +22,34 @@
 
 namespace wrenchd {
 
-/// What a running daemon shows: its ticks through shared memory, its events and its status as they come, and
-/// its scene. Connects by itself, again and again. Two threads of its own, one for the ticks and one for the
-/// scene, which may take seconds to be made ready; whoever asks never waits for either for long.
+/// The live data of a running daemon: ticks through shared memory, events, status and scene. Reconnects
+/// automatically. One thread reads the ticks; another prepares the scene, which may take seconds. The methods
+/// never wait long for these threads. Not RT-safe: allocates and locks a mutex.
 class LiveFeed {
  public:
   static constexpr std::int64_t kBucket_ns = 10'000'000;
-  static constexpr std::size_t kBuckets = 1'000;  ///< ten seconds
+  static constexpr std::size_t kBuckets = 1'000;  ///< 10 s
 
-  /// socket: as Client has it.
+  /// socket: path of the daemon's socket; empty: default paths as for Client.
   explicit LiveFeed(std::string socket);
   ~LiveFeed();
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
-  /// Whether anybody looks; else the ticks are taken in larger portions.
+  /// Sets whether a page is open. Without one, the feed reads ticks less often.
   void set_watched(bool by_anybody) noexcept { watched_.store(by_anybody); }
 
-  /// What there is now. Any thread.
+  /// State of the connection. Thread-safe.
   struct Link {
     bool connected = false;
-    std::string error;             ///< it is not
-    std::uint64_t connection = 0;  ///< one more with each connection
+    std::string error;             ///< reason why there is no connection; empty if there is one
+    std::uint64_t connection = 0;  ///< number of the connection, incremented for each new one
     double rate_Hz = 0.0;
-    Json status;                 ///< as the daemon told it last; null before
-    std::uint64_t revision = 0;  ///< one more whenever status or why is another
+    Json status;                 ///< last status from the daemon; null before the first one
+    std::uint64_t revision = 0;  ///< incremented when status or error changes
   };
   Link link() const;
-  /// The newest tick. Nothing where there was none yet.
+  /// The newest tick. newest_sample() is empty before the first tick.
   struct Sample {
     ViewTick tick;
     ViewStatus words;
@@ -60,11 +60,11 @@ class LiveFeed {
   std::string scene_error() const;
   RollingHistogram::Summary tick_duration() const;
   RollingHistogram::Summary wake_latency() const;
-  /// With the lock held for so long.
+  /// Calls the function with the history while the mutex is locked.
   void with_history(const std::function<void(const MinMaxHistory&)>& look) const;
-  /// Events since the last call, oldest first: their JSON.
+  /// Returns the events since the last call as JSON texts, oldest first.
   std::vector<std::string> events();
-  std::string state() const;  ///< of the newest tick
+  std::string state() const;  ///< loop state of the newest tick
 
   const std::string& socket() const noexcept { return socket_; }
 
@@ -79,10 +79,10 @@ class LiveFeed {
   std::string socket_;
   std::atomic<bool> watched_{false};
   std::atomic<std::uint32_t> rendering_id_{0};
-  std::atomic<std::uint32_t> reloads_{0};     ///< that were told
-  std::atomic<std::uint64_t> connection_{0};  ///< 0: none
+  std::atomic<std::uint32_t> reloads_{0};     ///< number of reload events
+  std::atomic<std::uint64_t> connection_{0};  ///< number of the connection; 0: none
 
-  mutable std::mutex mutex_;  ///< of what follows
+  mutable std::mutex mutex_;  ///< guards the members below, up to the threads
   Link link_;
   std::optional<Sample> newest_sample_;
   MinMaxHistory history_{kBucket_ns, kBuckets};
@@ -91,7 +91,7 @@ class LiveFeed {
   std::shared_ptr<const ViewScene> scene_;
   std::string scene_error_;
 
-  std::jthread reader_thread_, scene_thread_;  ///< last: they use all of the above
+  std::jthread reader_thread_, scene_thread_;  ///< declared last, because the threads use all members above
 };
 
 }  // namespace wrenchd

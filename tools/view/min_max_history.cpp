@@ -25,7 +25,8 @@ void MinMaxHistory::add(std::int64_t time_ns, const ChannelValues& values) {
     started_ = true;
     return;
   }
-  for (std::size_t i = 0; i < kChannelCount; ++i) {  // fmin and fmax take the number where one of two is NaN
+  // Fmin and fmax ignore NaN if the other value is a number.
+  for (std::size_t i = 0; i < kChannelCount; ++i) {
     current_.min[i] = std::fmin(current_.min[i], values[i]);
     current_.max[i] = std::fmax(current_.max[i], values[i]);
   }

@@ -9,25 +9,25 @@
 
 namespace wrenchd {
 
-/// What is drawn over time.
+/// The quantities that the page draws over time.
 enum class Channel : std::uint8_t {
-  force_x,  ///< as told to the device [N]
+  force_x,  ///< as sent to the device [N]
   force_y,
   force_z,
-  force,     ///< its magnitude [N]
-  torque_x,  ///< likewise [N.m]
+  force,     ///< magnitude of the force [N]
+  torque_x,  ///< as sent to the device [N.m]
   torque_y,
   torque_z,
   torque,
   energy,  ///< T of Eq. (8) [kg m^2]
-  depth,   ///< from p to q [m]
-  angle,   ///< likewise [rad]
+  depth,   ///< distance from p to q [m]
+  angle,   ///< angle from p to q [rad]
 };
 inline constexpr std::size_t kChannelCount = 11;
 using ChannelValues = std::array<double, kChannelCount>;
 
-/// Curves for a screen: of each short stretch of time the least and the greatest value of each channel, so
-/// that a peak of a single tick is drawn however many ticks a pixel has. NaN where a stretch had no value.
+/// Curves for a screen: minimum and maximum of each channel per time bucket, so that a peak in a single tick
+/// stays visible at any zoom. NaN if a bucket has no value. Not RT-safe: allocates.
 class MinMaxHistory {
  public:
   struct Bucket {
@@ -35,21 +35,22 @@ class MinMaxHistory {
     ChannelValues min, max;
   };
 
-  /// kept: so many of the newest stretches; older ones are forgotten.
+  /// kept: maximum number of buckets; older ones are dropped.
   explicit MinMaxHistory(std::int64_t stretch_ns, std::size_t kept = std::numeric_limits<std::size_t>::max())
       : bucket_ns_(stretch_ns), capacity_(kept) {}
 
-  /// Times never fall; where one does, as after a restart of whoever counts them, all is forgotten.
+  /// Adds the values of one tick. Times must not decrease; if one does, for example after a restart of the
+  /// daemon, the history is cleared.
   void add(std::int64_t time_ns, const ChannelValues& values);
 
-  /// Whole stretches, by their numbers, that are never used again. The one that is still growing is not among
-  /// them.
+  /// Returns the index range of the complete buckets; the current bucket is not in it. Indices are never
+  /// reused.
   std::uint64_t first_index() const noexcept { return first_; }
   std::uint64_t end_index() const noexcept { return first_ + complete_.size(); }
   const Bucket& at(std::uint64_t number) const {
     return complete_[static_cast<std::size_t>(number - first_)];
   }
-  /// The first stretch that begins at this time or later.
+  /// Returns the index of the first bucket that begins at this time or later.
   std::uint64_t index_at(std::int64_t time_ns) const;
 
  private:

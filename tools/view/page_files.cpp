@@ -32,7 +32,8 @@ std::string sha256_base64(std::string_view text) {
   return {reinterpret_cast<const char*>(out.data()), static_cast<std::size_t>(length)};
 }
 
-/// The import map has to stand in the page itself, where it would be refused unless it is named.
+/// The browser requires the import map in the page itself, and accepts it only if the policy contains its
+/// hash.
 std::string policy_of(const std::string& page) {
   std::string scripts = "'self'";
   constexpr std::string_view kBegin = "<script type=\"importmap\">", kEnd = "</script>";
@@ -59,8 +60,9 @@ PageFiles::PageFiles(const fs::path& directory) {
   }
   const auto page = files_.find("index.html");
   if (page == files_.end())
-    throw std::runtime_error(directory.string() +
-                             ": holds no index.html, the page of the view; build or install wrenchd again");
+    throw std::runtime_error(
+        directory.string() +
+        ": contains no index.html, the page of the view; build or install wrenchd again");
   policy_ = policy_of(page->second.bytes);
 }
 
@@ -75,7 +77,7 @@ fs::path PageFiles::directory() {
   const fs::path installed = "/usr/share/wrenchd/view";
   for (const fs::path& place : {beside, installed})
     if (fs::exists(place / "index.html")) return place;
-  throw std::runtime_error("the page of the view is not there; looked for " + beside.string() + ", " +
+  throw std::runtime_error("the page of the view is missing; searched " + beside.string() + ", " +
                            installed.string() + "; build it (target view_page), or install wrenchd");
 }
 

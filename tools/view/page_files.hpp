@@ -8,25 +8,26 @@
 
 namespace wrenchd {
 
-/// What the browser is served: the page and its libraries, read into memory at the start. Nothing else of the
-/// machine can be asked for.
+/// The files that the server delivers to browsers: the page and its libraries, loaded into memory at the
+/// start. No other file is accessible. Not RT-safe: reads files.
 class PageFiles {
  public:
   struct File {
-    std::string type;  ///< "text/html; charset=utf-8"
+    std::string type;  ///< MIME type, such as "text/html; charset=utf-8"
     std::string bytes;
   };
 
-  /// Everything below that directory. Throws std::runtime_error where there is no index.html.
+  /// Loads all files below the directory. Throws std::runtime_error if it contains no index.html.
   explicit PageFiles(const std::filesystem::path& directory);
 
-  /// name: as in a URL, "main.js", "" for the page itself. Null: there is none.
+  /// Returns the file with this URL path, such as "main.js"; "" is the page itself. Null if there is none.
   const File* find(std::string_view name) const;
-  /// What the page may load and run: only what is served here, and the one script that stands in it.
+  /// Returns the content security policy: the page may load and run only delivered files and its inline
+  /// import map.
   const std::string& security_policy() const noexcept { return policy_; }
 
-  /// share/wrenchd/view beside the directory of this program, or where the package has it. Throws
-  /// std::runtime_error that names the places.
+  /// Returns share/wrenchd/view next to the program's directory, or the installed directory. Throws
+  /// std::runtime_error with the searched directories if neither exists.
   static std::filesystem::path directory();
 
  private:

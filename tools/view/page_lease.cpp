@@ -9,13 +9,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kBeatEvery = 25ms;    ///< the daemon waits for 100
-constexpr auto kAnswerWithin = 2s;   ///< or the lease is lost anyway
-constexpr int kFadeLooks = 20;       ///< of the time between two beats: a fade takes 100 ms
-constexpr auto kUntilArmed = 500ms;  ///< until the ticks tell of it
+constexpr auto kHeartbeatInterval = 25ms;  ///< heartbeat interval; the daemon's timeout is 100 ms
+constexpr auto kResponseTimeout = 2s;      ///< response timeout; after it the lease is lost anyway
+constexpr int kFadeChecks = 20;            ///< in heartbeat intervals; a fade takes 100 ms
+constexpr auto kArmedDelay = 500ms;        ///< time until the ticks show the new state
 
-const char* name(PageLease::Request wish) {
-  switch (wish) {
+const char* name(PageLease::Request request) {
+  switch (request) {
     case PageLease::Request::arm:
       return "arm";
     case PageLease::Request::disarm:
@@ -36,14 +36,14 @@ bool is_armed(const std::string& state) {
   return state == "waiting" || state == "ramping" || state == "active" || state == "degraded";
 }
 
-bool is_over(const std::string& state) {
+bool is_released(const std::string& state) {
   return !is_armed(state) && state != "releasing";
 }
 
 }  // namespace
 
-PageLease::PageLease(std::string socket, std::function<void(const Reply&)> tell)
-    : socket_(std::move(socket)), on_reply_(std::move(tell)) {
+PageLease::PageLease(std::string socket, std::function<void(const Reply&)> on_reply)
+    : socket_(std::move(socket)), on_reply_(std::move(on_reply)) {
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   stop_thread_ = std::jthread([this](const std::stop_token& stop) { run_stops(stop); });
 }
@@ -55,13 +55,13 @@ PageLease::~PageLease() {
   thread_.join();
 }
 
-void PageLease::submit(std::uint64_t page, Request wish) {
+void PageLease::submit(std::uint64_t page, Request request) {
   {
     const std::scoped_lock lock(mutex_);
-    if (wish == Request::stop)
+    if (request == Request::stop)
       pending_stops_.push_back(page);
     else
-      pending_.push_back({page, wish});
+      pending_.push_back({page, request});
   }
   changed_.notify_all();
 }
@@ -84,16 +84,17 @@ void PageLease::set_loop_state(const std::string& state) {
 }
 
 Client& PageLease::client() {
-  if (!client_) client_.emplace(socket_, kAnswerWithin);
+  if (!client_) client_.emplace(socket_, kResponseTimeout);
   return *client_;
 }
 
 void PageLease::arm(std::uint64_t page) {
   const std::uint64_t other = holder_.load();
-  if (other == page) return;  // it was pressed twice
+  if (other == page) return;  // the user pressed the button twice
   if (other != 0)
-    throw ClientError(ClientError::kLeaseHeld, "Another page of this view has armed; disarm there first.");
-  client().call("lease.take");
+    throw ClientError(ClientError::kLeaseHeld,
+                      "Another page of this view holds the lease; disarm on that page first.");
+  client().call("lease.acquire");
   last_heartbeat_ns_.store(now_ns());
   holder_.store(page);
   armed_at_ = std::chrono::steady_clock::now();
@@ -106,36 +107,36 @@ void PageLease::arm(std::uint64_t page) {
   }
 }
 
-/// The force fades, and others may arm. why: told to the page that held it; empty: it knows.
+/// Disarms and releases the lease. why: message to the page that held it; empty: no message.
 void PageLease::release(const std::string& why) {
   const std::uint64_t page = holder_.exchange(0);
   if (page == 0) return;
   try {
     client().call("disarm");
-    // The lease is kept until the force has faded: to the daemon, one that ends before is a client that died.
-    for (int i = 0; i < kFadeLooks && !is_over(client().state()); ++i) {
+    // Keeps the lease until the force is zero. The daemon treats a lease that ends before as a lost client.
+    for (int i = 0; i < kFadeChecks && !is_released(client().state()); ++i) {
       client().heartbeat();
-      std::this_thread::sleep_for(kBeatEvery);
+      std::this_thread::sleep_for(kHeartbeatInterval);
     }
-    client().call("lease.give");
+    client().call("lease.release");
   } catch (const ClientError&) {
-    client_.reset();  // a connection that ends takes the lease with it
+    client_.reset();  // the end of the connection also ends the lease
   }
   if (!why.empty()) on_reply_({page, "lease", false, why});
 }
 
-void PageLease::execute(const PendingRequest& asked) {
-  Reply told{asked.page, name(asked.request), true, {}};
+void PageLease::execute(const PendingRequest& request) {
+  Reply reply{request.page, name(request.request), true, {}};
   try {
-    switch (asked.request) {
+    switch (request.request) {
       case Request::arm:
-        arm(asked.page);
+        arm(request.page);
         break;
       case Request::disarm:
         if (holder_.load() == 0)
           client().call("disarm");
         else
-          release(asked.page == holder_.load() ? "" : "another page of this view disarmed");
+          release(request.page == holder_.load() ? "" : "Another page of this view has disarmed.");
         break;
       case Request::acknowledge:
         client().call("acknowledge");
@@ -144,36 +145,37 @@ void PageLease::execute(const PendingRequest& asked) {
         break;
     }
   } catch (const ClientError& error) {
-    told.accepted = false;
-    told.error = error.what();
-    if (error.code() > 0) {  // the connection, not the daemon's answer
+    reply.accepted = false;
+    reply.error = error.what();
+    if (error.code() > 0) {  // an error of the connection, not a response of the daemon
       client_.reset();
       holder_.store(0);
     }
   }
-  on_reply_(told);
+  on_reply_(reply);
 }
 
 void PageLease::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    std::optional<PendingRequest> asked;
-    bool gone = false;
+    std::optional<PendingRequest> request;
+    bool closed = false;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, stop, kBeatEvery, [this] { return !pending_.empty() || holder_closed_; });
-      gone = std::exchange(holder_closed_, false);
+      changed_.wait_for(lock, stop, kHeartbeatInterval,
+                        [this] { return !pending_.empty() || holder_closed_; });
+      closed = std::exchange(holder_closed_, false);
       if (!pending_.empty()) {
-        asked = pending_.front();
+        request = pending_.front();
         pending_.pop_front();
       }
     }
-    if (gone) release("the page was closed");
+    if (closed) release("The page was closed.");
     const std::int64_t silent_ns = now_ns() - last_heartbeat_ns_.load();
     if (holder_.load() != 0 && silent_ns > std::chrono::nanoseconds(kPageTimeout).count())
-      release("Disarmed: nobody has seen this page for a second. It was hidden, or it hung.");
+      release("Disarmed: this page was hidden or unresponsive for one second. Arm again if necessary.");
     if (holder_.load() != 0 && disarmed_by_daemon_.load() &&
-        std::chrono::steady_clock::now() > armed_at_ + kUntilArmed)
-      release("The daemon has disarmed; its state says why.");
+        std::chrono::steady_clock::now() > armed_at_ + kArmedDelay)
+      release("The daemon has disarmed; the state shows the cause.");
     if (holder_.load() != 0) {
       try {
         client().heartbeat();
@@ -182,7 +184,7 @@ void PageLease::run(const std::stop_token& stop) {
         on_reply_({holder_.exchange(0), "lease", false, error.what()});
       }
     }
-    if (asked) execute(*asked);
+    if (request) execute(*request);
   }
   release("");
 }
@@ -196,14 +198,14 @@ void PageLease::run_stops(const std::stop_token& stop) {
       page = pending_stops_.front();
       pending_stops_.pop_front();
     }
-    Reply told{page, name(Request::stop), true, {}};
+    Reply reply{page, name(Request::stop), true, {}};
     try {
-      Client(socket_, kAnswerWithin).stop();
+      Client(socket_, kResponseTimeout).stop();
     } catch (const ClientError& error) {
-      told.accepted = false;
-      told.error = error.what();
+      reply.accepted = false;
+      reply.error = error.what();
     }
-    on_reply_(told);
+    on_reply_(reply);
   }
 }
 

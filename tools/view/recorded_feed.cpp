@@ -21,7 +21,7 @@ RecordedFeed::RecordedFeed(std::string name, Recording recording, std::shared_pt
       recording_(std::move(recording)),
       scene_(std::move(scene)),
       scene_error_(std::move(why_no_scene)) {
-  if (recording_.ticks.empty()) throw RecordingError(name_ + ": has no ticks; there is nothing to be seen");
+  if (recording_.ticks.empty()) throw RecordingError(name_ + ": has no ticks, so there is nothing to show");
   for (const TickRecord& record : recording_.ticks) history_.add(record.now_ns, view_tick(record).channels());
 }
 
@@ -55,8 +55,8 @@ std::size_t RecordedFeed::index_at(double t_s) const {
 Json RecordedFeed::frame(double t_s) const {
   const std::size_t row = index_at(t_s);
   const TickRecord& record = recording_.ticks[row];
-  return frame_json(view_tick(record), view_status(record, recording_.contacts_of(row)), scene_.get(),
-                    begin_ns());
+  return frame_json(view_tick(record), view_status(record, proxy_contacts(recording_.contacts_of(row))),
+                    scene_.get(), begin_ns());
 }
 
 std::pair<std::uint64_t, std::uint64_t> RecordedFeed::bucket_range(double t_s) const {

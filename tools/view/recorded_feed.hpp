@@ -14,14 +14,14 @@
 
 namespace wrenchd {
 
-/// What a recording shows, at any time within it. Only read once it is made.
+/// The data of a recording at any time within it. Immutable after construction. Not RT-safe: allocates.
 class RecordedFeed {
  public:
   static constexpr std::int64_t kBucket_ns = 10'000'000;
   static constexpr double kHistory_s = 10.0;
 
-  /// name: for people. scene: null where it is not known; why_no_scene says why. Throws RecordingError where
-  /// the recording has no ticks.
+  /// name: title for the user. scene: null if unknown; scene_error then contains the reason. Throws
+  /// RecordingError if the recording has no ticks.
   RecordedFeed(std::string name, Recording recording, std::shared_ptr<const ViewScene> scene,
                std::string why_no_scene);
 
@@ -31,16 +31,16 @@ class RecordedFeed {
   const std::string& scene_error() const noexcept { return scene_error_; }
   std::int64_t begin_ns() const noexcept { return recording_.ticks.front().now_ns; }
   double duration_s() const noexcept;
-  double rate_Hz() const noexcept;  ///< of its ticks, by their median distance
+  double rate_Hz() const noexcept;  ///< from the median interval of the ticks
 
-  /// The last tick that began at that time [s] from the beginning, or before.
+  /// Returns the last tick that began at or before this time since the start [s], as a frame message.
   Json frame(double t_s) const;
   const MinMaxHistory& history() const noexcept { return history_; }
-  /// The stretches of the last ten seconds up to then.
+  /// Returns the range of history buckets in the ten seconds before this time.
   std::pair<std::uint64_t, std::uint64_t> bucket_range(double t_s) const;
-  /// How long ticks took and how late they began, in the ten seconds up to then.
+  /// Returns tick durations and wake latencies in the ten seconds before this time.
   std::pair<RollingHistogram::Summary, RollingHistogram::Summary> tick_times(double t_s) const;
-  /// When the state became another: [{t, state, cause}, ...].
+  /// Returns the changes of the loop state: [{t, state, cause}, ...].
   Json state_changes() const;
 
  private:

@@ -17,7 +17,7 @@ double RollingHistogram::lower_edge_us(std::size_t bin) {
 
 void RollingHistogram::add(std::int64_t time_ns, std::int64_t took_ns) {
   const std::int64_t number = time_ns / kSecond_ns;
-  if (number < newest_second_ - kWindow_s) *this = {};  // a clock that began anew
+  if (number < newest_second_ - kWindow_s) *this = {};  // the clock has restarted
   newest_second_ = std::max(newest_second_, number);
   Second& second = seconds_[static_cast<std::size_t>(number % kWindow_s)];
   if (second.number != number) {

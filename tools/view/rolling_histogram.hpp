@@ -8,11 +8,12 @@
 
 namespace wrenchd {
 
-/// How long something took, over the last ten seconds: a histogram whose bins are equally wide in the
-/// logarithm, from 1 us to 100 ms. What is shorter or longer is in the first or the last.
+/// Histogram of durations over the last ten seconds with logarithmic bins from 1 us to 100 ms. The first and
+/// the last bin also contain shorter and longer durations. Not thread-safe. Not RT-safe: summary() takes some
+/// 10 us.
 class RollingHistogram {
  public:
-  static constexpr std::size_t kBinsPerDecade = 12;  ///< as drawn
+  static constexpr std::size_t kBinsPerDecade = 12;  ///< resolution of the drawn histogram
   static constexpr std::size_t kDecades = 5;
   static constexpr std::size_t kBins = kBinsPerDecade * kDecades;
   static constexpr std::int64_t kWindow_s = 10;
@@ -23,17 +24,18 @@ class RollingHistogram {
     std::array<std::uint64_t, kBins> bins{};
     std::uint64_t count = 0;
     double p50_us = 0.0,
-           p99_9_us = 0.0;  ///< upper edges of fine bins, 2.4 % wide: never too low; no more than max_us
+           /// Upper edges of bins that are 2.4 % wide, clamped to max_us: never below the true quantile.
+        p99_9_us = 0.0;
     double max_us = 0.0;
   };
-  /// Of the ten seconds up to the newest time.
+  /// Returns the statistics of the ten seconds before the newest time.
   Summary summary() const;
 
-  /// Lower edge of a bin [us].
+  /// Returns the lower edge of a bin [us].
   static double lower_edge_us(std::size_t bin);
 
  private:
-  static constexpr std::size_t kSubBins = 8;  ///< in each bin
+  static constexpr std::size_t kSubBins = 8;  ///< fine bins per drawn bin
   struct Second {
     std::int64_t number = -1;
     std::array<std::uint32_t, kBins * kSubBins> bins{};

@@ -28,16 +28,12 @@ void serve(ViewServer& server, const ViewOptions& options) {
     char* const words[] = {program.data(), url.data(), nullptr};
     pid_t pid = -1;
     if (posix_spawnp(&pid, program.c_str(), nullptr, nullptr, words, environ) != 0)
-      std::fputs("wrenchctl: there is no xdg-open; open the address yourself\n", stderr);
+      std::fputs("wrenchctl: xdg-open is missing; open the address by hand\n", stderr);
   }
   server.run();
 }
 
-Pose pose_of(const PoseSettings& placed) {
-  return {rotation_from(placed.rotation_vector_rad), placed.position_m};
-}
-
-/// The scene of a recording, as it is inside.
+/// Loads the scene that the recording contains.
 std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunConfig& plan) {
   MeshLoader meshes(cache_directory(),
                     [](const std::string& what) { std::fprintf(stderr, "wrenchctl: %s\n", what.c_str()); });
@@ -45,15 +41,14 @@ std::shared_ptr<const ViewScene> scene_of(const Recording& recording, const RunC
   const SceneGeometry shapes(scene);
   Json description = shapes.description(*scene);
   const DeviceSettings& device = plan.settings.device;
-  description["shapes"] = 1;
-  description["rendering"] = 0;
-  // Scene time began with tick 0, which a recording that was started later does not have: ticks are even
-  // enough.
+  description["geometry_id"] = 1;
+  description["rendering_id"] = 0;
+  // Scene time starts at tick 0. If the recording starts later, extrapolates with the nominal period.
   const TickRecord& first = recording.ticks.front();
   description["scene_time_begins_ns"] =
       first.now_ns - std::llround(1e9 * static_cast<double>(first.tick) / plan.settings.servo.rate_Hz);
-  description["X_WB"] = pose_json(pose_of(device.base_in_world));
-  description["X_HT"] = pose_json(pose_of(device.tool_in_handle) * scene->tool().X_MT());
+  description["X_WB"] = pose_json(device.base_in_world.pose());
+  description["X_HT"] = pose_json(device.tool_in_handle.pose() * scene->tool().X_MT());
   description["wrench_about"] = plan.profile.wrench_point == WrenchPoint::handle ? "handle" : "world origin";
   description["view"] = view_json(plan.settings.view);
   return std::make_shared<const ViewScene>(description, shapes.bytes());

@@ -7,15 +7,16 @@
 
 namespace wrenchd {
 
-/// wrenchctl view
+/// Options of `wrenchctl view`.
 struct ViewOptions {
-  std::filesystem::path recording;  ///< empty: the daemon that runs
-  std::string socket;               ///< of that; empty: the usual places
-  std::uint16_t port = 0;           ///< 0: one that is free
-  bool open_browser = false;        ///< in a browser, by xdg-open
+  std::filesystem::path recording;  ///< recording to show; empty: the running daemon
+  std::string socket;               ///< path of the daemon's socket; empty: default paths
+  std::uint16_t port = 0;           ///< 0: a free port
+  bool open_browser = false;        ///< opens the page in a browser with xdg-open
 };
 
-/// Prints the address of the page, and serves it until a signal ends it. Throws what goes wrong at the start.
+/// Prints the address of the page and serves the page until a signal arrives. Throws std::runtime_error if
+/// the start fails. Not RT-safe: runs a server.
 void run_view(const ViewOptions& options);
 
 }  // namespace wrenchd

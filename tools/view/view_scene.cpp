@@ -23,19 +23,19 @@ Pose pose_of(const Json& x) {
 
 ObstacleMotion motion_of(const Json& json) {
   return {vector_of(json.at("linear_m_per_s")), vector_of(json.at("angular_rad_per_s")),
-          json.at("turn_back_s").get<double>(), json.at("begin_s").get<double>(),
-          json.at("last_s").get<double>()};
+          json.at("reverse_after_s").get<double>(), json.at("start_s").get<double>(),
+          json.at("duration_s").get<double>()};
 }
 
 std::optional<ScheduledMotion> later_of(const Json& json) {
-  return ScheduledMotion{json.at("from_s").get<double>(), pose_of(json.at("X_WO")),
+  return ScheduledMotion{json.at("start_s").get<double>(), pose_of(json.at("X_WO")),
                          motion_of(json.at("motion"))};
 }
 
 template <class T>
 std::vector<T> part(std::span<const std::byte> bytes, std::size_t offset, std::size_t count) {
   if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T))
-    throw std::runtime_error("the shapes of the scene lie outside of their memory");
+    throw std::runtime_error("the geometry of the scene exceeds its memory");
   std::vector<T> out(count);
   if (count > 0) std::memcpy(out.data(), bytes.data() + offset, count * sizeof(T));
   return out;
@@ -59,8 +59,8 @@ std::string message_of(Detail detail, std::uint32_t number, const DisplayMesh& m
 }  // namespace
 
 ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, const ViewScene* known) try
-    : shapes_(description.at("shapes").get<std::uint64_t>()),
-      rendering_id_(description.at("rendering").get<std::uint32_t>()),
+    : shapes_(description.at("geometry_id").get<std::uint64_t>()),
+      rendering_id_(description.at("rendering_id").get<std::uint32_t>()),
       start_ns_(description.at("scene_time_begins_ns").get<std::int64_t>()),
       X_WB_(pose_of(description.at("X_WB"))),
       X_HT_(pose_of(description.at("X_HT"))),
@@ -75,7 +75,8 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     const auto add_all = [&](Detail detail, std::size_t most) {
       std::uint32_t number = 0;
       for (const Json& mesh : meshes) {
-        // Each mesh gets its share, and none is made too coarse to be known again.
+        // Distributes the triangles in proportion to the meshes' sizes, with a minimum that keeps a mesh
+        // recognizable.
         constexpr double kLeast = 2'000.0;
         const auto triangles = static_cast<double>(source_triangles_[number]);
         const double share = static_cast<double>(most) * triangles / static_cast<double>(std::max(all, most));
@@ -102,11 +103,11 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
     } else {
       shown["mesh"] = one.at("mesh");
       shown["pose"] = one.at("X_WO");
-      if (one.contains("motion") || one.contains("later"))
+      if (one.contains("motion") || one.contains("scheduled"))
         moving_obstacles_.push_back({number, pose_of(one.at("X_WO")),
                                      one.contains("motion") ? motion_of(one["motion"]) : ObstacleMotion{},
-                                     one.contains("later") ? later_of(one["later"]) : std::nullopt});
-      shown["moves"] = one.contains("motion") || one.contains("later");
+                                     one.contains("scheduled") ? later_of(one["scheduled"]) : std::nullopt});
+      shown["moves"] = one.contains("motion") || one.contains("scheduled");
     }
     obstacles.push_back(std::move(shown));
     ++number;
@@ -118,9 +119,9 @@ ViewScene::ViewScene(const Json& description, std::span<const std::byte> bytes, 
                {"obstacles", obstacles}, {"view", description.value("view", Json())}}
               .dump(-1, ' ', false, Json::error_handler_t::replace);
 } catch (const nlohmann::json::exception& error) {
-  throw std::runtime_error(std::string("the scene is not told as this program knows it: ") + error.what());
+  throw std::runtime_error(std::string("the scene has an unknown format: ") + error.what());
 } catch (const std::invalid_argument& error) {
-  throw std::runtime_error(std::string("the shapes of the scene: ") + error.what());
+  throw std::runtime_error(std::string("the geometry of the scene: ") + error.what());
 }
 
 Json ViewScene::moving_obstacle_poses(std::int64_t time_ns) const {

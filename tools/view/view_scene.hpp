@@ -15,30 +15,30 @@
 
 namespace wrenchd {
 
-/// A scene as the page gets it: what `scene.shapes` of the daemon answers, made ready to be drawn. Then it is
-/// only read.
+/// A scene prepared for the page, from the daemon's response to `scene.geometry`. Immutable after
+/// construction. Not RT-safe: allocates; large meshes take seconds.
 class ViewScene {
  public:
-  /// Triangles of all meshes together; what has more is made coarser.
+  /// Maximum number of triangles of all meshes together. Larger scenes are simplified.
   static constexpr std::size_t kMaxTriangles = 150'000;
-  /// Of the same, for machines that draw slowly, while something moves.
+  /// Maximum number of triangles while something moves, on machines that draw slowly.
   static constexpr std::size_t kReducedTriangles = 15'000;
 
-  /// description, bytes: of SceneGeometry. known: one whose meshes are these, if any. Throws
-  /// std::runtime_error where the two do not fit to each other.
+  /// description, bytes: the two parts of SceneGeometry. known: a scene whose meshes can be reused; may be
+  /// null. Throws std::runtime_error if description and bytes do not match.
   ViewScene(const Json& description, std::span<const std::byte> bytes, const ViewScene* known = nullptr);
 
   std::uint64_t shapes() const noexcept { return shapes_; }
   std::uint32_t rendering_id() const noexcept { return rendering_id_; }
 
-  /// {type: "scene", tool, obstacles, ...}: which mesh is whose, and where it stands.
+  /// Returns {type: "scene", tool, obstacles, ...}: the mesh and pose of tool and obstacles.
   const std::string& text() const noexcept { return text_; }
-  /// A binary message for each mesh, and where that is much, after them another for each that is coarser: u32
-  /// 1 or 3, number, how many corners, triangles, points of lines; then floats: positions and normals of the
-  /// corners; u32: corners of the triangles; floats: points of the lines.
+  /// Returns one binary message per mesh, then one per simplified mesh if necessary. Layout: u32: 1 (full) or
+  /// 3 (simplified), mesh number, number of vertices, of triangles, of line points; floats: positions and
+  /// normals of the vertices; u32: indices of the triangles; floats: line points.
   const std::vector<std::shared_ptr<const std::string>>& meshes() const noexcept { return meshes_; }
 
-  /// Where the obstacles that move stand at this time (CLOCK_MONOTONIC): [[number, pose], ...].
+  /// Returns the poses of moving obstacles at this time (CLOCK_MONOTONIC): [[number, pose], ...].
   Json moving_obstacle_poses(std::int64_t time_ns) const;
   std::string obstacle_name(std::uint32_t number) const;
 
@@ -59,7 +59,7 @@ class ViewScene {
   std::int64_t start_ns_ = 0;
   std::string text_;
   std::vector<std::shared_ptr<const std::string>> meshes_;
-  std::vector<std::size_t> source_triangles_;  ///< triangles of each mesh
+  std::vector<std::size_t> source_triangles_;  ///< number of triangles of each mesh before simplification
   std::vector<std::string> names_;
   std::vector<MovingObstacle> moving_obstacles_;
   Pose X_WB_, X_HT_;

@@ -40,9 +40,10 @@ using namespace std::chrono_literals;
 constexpr auto kFrameEvery = 16ms;
 constexpr auto kTimesEvery = 250ms;
 constexpr auto kRequestWithin = 20s;
-constexpr std::size_t kMostConnections = 32;
-constexpr std::size_t kMostWaiting = 256;  ///< messages to a page that does not read: then it is hung up on
-constexpr std::size_t kLongestMessage = 4096;  ///< from a page
+constexpr std::size_t kMaxConnections = 32;
+/// Maximum number of unsent messages per page; above it the server closes the connection.
+constexpr std::size_t kMaxWaiting = 256;
+constexpr std::size_t kMaxMessageBytes = 4096;  ///< maximum size of a message from a page [bytes]
 
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
@@ -56,7 +57,7 @@ std::string random_token() {
   return token;
 }
 
-/// Takes as long wherever they differ.
+/// Compares in constant time, so that the duration reveals nothing about the token.
 bool same(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   unsigned different = 0;
@@ -68,23 +69,26 @@ std::shared_ptr<const std::string> text_of(const Json& json) {
   return std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-Json sum_json(const RollingHistogram::Summary& sum) {
-  return {{"bins", sum.bins},
-          {"count", sum.count},
-          {"p50_us", sum.p50_us},
-          {"p99_9_us", sum.p99_9_us},
-          {"max_us", sum.max_us}};
+Json summary_json(const RollingHistogram::Summary& summary) {
+  return {{"bins", summary.bins},
+          {"count", summary.count},
+          {"p50_us", summary.p50_us},
+          {"p99_9_us", summary.p99_9_us},
+          {"max_us", summary.max_us}};
 }
 
-Json times_json(const RollingHistogram::Summary& took, const RollingHistogram::Summary& late) {
-  return {{"type", "times"}, {"took", sum_json(took)}, {"late", sum_json(late)}};
+Json times_json(const RollingHistogram::Summary& tick_duration,
+                const RollingHistogram::Summary& wake_latency) {
+  return {{"type", "times"},
+          {"tick_duration", summary_json(tick_duration)},
+          {"wake_latency", summary_json(wake_latency)}};
 }
 
-/// What every page has to know of faults: their sentences and cures.
+/// Returns message and remedy of all faults, which every page requires.
 Json faults_json() {
   Json out = Json::object();
   for (const FaultRow& row : fault_rows())
-    out[std::string(row.name)] = {{"sentence", row.message}, {"cure", row.cure}};
+    out[std::string(row.name)] = {{"message", row.message}, {"cure", row.cure}};
   return out;
 }
 
@@ -105,13 +109,13 @@ struct ViewServer::Server {
   std::map<std::uint64_t, std::weak_ptr<Page>> pages;
   std::uint64_t last_page = 0;
   std::size_t connections = 0;
-  std::unique_ptr<PageLease> lease;  ///< last: its threads post to io
+  std::unique_ptr<PageLease> lease;  ///< declared last: its threads post to io
 
-  Server(std::uint16_t wanted_port, PageFiles page_files);
+  Server(std::uint16_t requested_port, PageFiles page_files);
   ~Server() { lease.reset(); }
   void accept();
   void push_frames();
-  void tell(const PageLease::Reply& told);
+  void tell(const PageLease::Reply& reply);
 
   bool is_ours(beast::string_view authority) const {
     const std::string number = ":" + std::to_string(port);
@@ -123,7 +127,7 @@ struct ViewServer::Server {
   }
 };
 
-/// A page that is open: its WebSocket.
+/// The WebSocket of an open page.
 class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
  public:
   Page(tcp::socket&& socket, Server& server)
@@ -138,7 +142,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
 
   void open(const http::request<http::string_body>& request) {
     socket_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
-    socket_.read_message_max(kLongestMessage);
+    socket_.read_message_max(kMaxMessageBytes);
     socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
       if (error) return;
       self->server_.pages[self->number_] = self;
@@ -148,40 +152,40 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   }
 
   void send(std::shared_ptr<const std::string> message, bool text = true) {
-    if (waiting_.size() >= kMostWaiting) return hang_up();
+    if (waiting_.size() >= kMaxWaiting) return disconnect();
     waiting_.push_back({std::move(message), text});
     if (waiting_.size() == 1) write();
   }
   void send(const Json& json) { send(text_of(json)); }
 
-  /// What is new, unless it has yet to read what came before.
+  /// Sends new data, unless the page has not read the previous data yet.
   void push(const std::shared_ptr<const std::string>& frame, std::chrono::steady_clock::time_point now) {
     if (!waiting_.empty()) return;
     LiveFeed& feed = *server_.live;
     const LiveFeed::Link link = feed.link();
-    if (link.revision != link_told_) {
-      link_told_ = link.revision;
+    if (link.revision != link_revision_) {
+      link_revision_ = link.revision;
       send({{"type", "link"},
             {"connected", link.connected},
-            {"why", link.error},
+            {"error", link.error},
             {"socket", feed.socket()},
             {"rate_Hz", link.rate_Hz},
             {"status", link.status}});
     }
     const auto scene = feed.scene();
     if (scene != scene_) show(scene);
-    if (const std::string why = feed.scene_error(); why != why_no_scene_) {
-      why_no_scene_ = why;
-      send({{"type", "no_scene"}, {"why", why}});
+    if (const std::string error = feed.scene_error(); error != scene_error_) {
+      scene_error_ = error;
+      send({{"type", "no_scene"}, {"error", error}});
     }
     if (link.connected && frame) {
       std::string history;
       feed.with_history([&](const MinMaxHistory& extremes) {
-        const bool anew = link.connection != history_of_ || history_at_ < extremes.first_index() ||
-                          history_at_ > extremes.end_index();
-        if (anew) history_at_ = extremes.first_index();
-        if (anew || history_at_ < extremes.end_index())
-          history = history_message(extremes, history_at_, extremes.end_index(), anew, 0);
+        const bool reset = link.connection != history_of_ || history_at_ < extremes.first_index() ||
+                           history_at_ > extremes.end_index();
+        if (reset) history_at_ = extremes.first_index();
+        if (reset || history_at_ < extremes.end_index())
+          history = history_message(extremes, history_at_, extremes.end_index(), reset, 0);
         history_at_ = extremes.end_index();
         history_of_ = link.connection;
       });
@@ -194,7 +198,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     }
   }
 
-  void hang_up() {
+  void disconnect() {
     beast::error_code ignored;
     beast::get_lowest_layer(socket_).socket().close(ignored);
   }
@@ -216,7 +220,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
                     {"changes", feed->state_changes()}});
       send(hello);
       if (feed->scene()) show(feed->scene());
-      if (!feed->scene_error().empty()) send({{"type", "no_scene"}, {"why", feed->scene_error()}});
+      if (!feed->scene_error().empty()) send({{"type", "no_scene"}, {"error", feed->scene_error()}});
       at(0.0);
     } else {
       hello["mode"] = "live";
@@ -231,7 +235,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     scene_ = scene;
   }
 
-  /// A moment of a recording.
+  /// Sends the state of a recording at this time.
   void at(double t_s) {
     const RecordedFeed& feed = *server_.recorded;
     const auto [from, to] = feed.bucket_range(t_s);
@@ -245,13 +249,13 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
       times_at_ = now + kTimesEvery;
       times_timer_.cancel();
       tell_times(t_s);
-    } else {  // later: the moment at which somebody stops looking about is told of too
+    } else {  // posted, so that the page also receives the event that ends its input
       times_timer_.expires_at(times_at_);
       times_timer_.async_wait([self = shared_from_this(), t_s](beast::error_code error) {
         if (!error) self->tell_times(t_s);
       });
     }
-    send(feed.frame(t_s));  // last: the page asks again when it has come
+    send(feed.frame(t_s));  // sent last: the page requests the next frame when this one arrives
   }
 
   void tell_times(double t_s) {
@@ -261,23 +265,24 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
 
   void read() {
     socket_.async_read(buffer_, [self = shared_from_this()](beast::error_code error, std::size_t) {
-      if (error) return self->hang_up();
-      self->hear(beast::buffers_to_string(self->buffer_.data()));
+      if (error) return self->disconnect();
+      self->handle(beast::buffers_to_string(self->buffer_.data()));
       self->buffer_.consume(self->buffer_.size());
       self->read();
     });
   }
 
-  void hear(const std::string& text) {
-    const Json said = Json::parse(text, nullptr, false);
-    if (!said.is_object() || !said.contains("type") || !said["type"].is_string()) return hang_up();
-    const std::string type = said["type"];
+  void handle(const std::string& text) {
+    const Json message = Json::parse(text, nullptr, false);
+    if (!message.is_object() || !message.contains("type") || !message["type"].is_string())
+      return disconnect();
+    const std::string type = message["type"];
     if (server_.recorded != nullptr) {
-      if (type == "at" && said.contains("t") && said["t"].is_number()) at(said["t"].get<double>());
+      if (type == "at" && message.contains("t") && message["t"].is_number()) at(message["t"].get<double>());
       return;
     }
     PageLease& lease = *server_.lease;
-    if (type == "alive") lease.heartbeat(number_);
+    if (type == "heartbeat") lease.heartbeat(number_);
     if (type == "stop") lease.submit(number_, PageLease::Request::stop);
     if (type == "arm") lease.submit(number_, PageLease::Request::arm);
     if (type == "disarm") lease.submit(number_, PageLease::Request::disarm);
@@ -288,7 +293,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
     socket_.text(waiting_.front().text);
     socket_.async_write(asio::buffer(*waiting_.front().bytes),
                         [self = shared_from_this()](beast::error_code error, std::size_t) {
-                          if (error) return self->hang_up();
+                          if (error) return self->disconnect();
                           self->waiting_.pop_front();
                           if (!self->waiting_.empty()) self->write();
                         });
@@ -299,9 +304,9 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
   std::uint64_t number_;
   beast::flat_buffer buffer_;
   std::deque<Message> waiting_;
-  std::uint64_t link_told_ = ~std::uint64_t{0};
+  std::uint64_t link_revision_ = ~std::uint64_t{0};
   std::shared_ptr<const ViewScene> scene_;
-  std::string why_no_scene_;
+  std::string scene_error_;
   std::uint64_t history_of_ = 0, history_at_ = 0;
   std::chrono::steady_clock::time_point times_at_{};
   asio::steady_timer times_timer_{socket_.get_executor()};
@@ -309,7 +314,7 @@ class ViewServer::Server::Page : public std::enable_shared_from_this<Page> {
 
 namespace {
 
-/// A connection of which nobody knows yet what it wants.
+/// A connection before its HTTP request is complete.
 template <class Server>
 class Visit : public std::enable_shared_from_this<Visit<Server>> {
  public:
@@ -330,8 +335,8 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
   }
 
  private:
-  /// What was asked for below the token; nothing: the token is another.
-  std::optional<std::string> wanted() const {
+  /// Returns the requested path below the token; empty if the token is wrong.
+  std::optional<std::string> requested_path() const {
     const auto target = request_.target();
     const std::size_t end = server_.token.size() + 1;
     if (target.size() < end + 1 || target[0] != '/' || target[end] != '/') return {};
@@ -345,11 +350,11 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
     const bool upgrade = websocket::is_upgrade(request_);
     if (!server_.is_ours(request_[http::field::host]) || !from_us || (upgrade && origin == request_.end()))
       return refuse(http::status::forbidden,
-                    "This page is served to browsers that were sent to it by wrenchctl view.\n");
-    const auto name = wanted();
+                    "Only browsers that open the address from wrenchctl view may load this page.\n");
+    const auto name = requested_path();
     if (!name)
       return refuse(http::status::forbidden,
-                    "The address is not complete: open the one that wrenchctl view printed, all of it.\n");
+                    "The address is incomplete; open the whole address that wrenchctl view printed.\n");
     if (upgrade && *name == "live") {
       stream_.expires_never();
       became_page_ = true;
@@ -357,9 +362,9 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
       return;
     }
     if (request_.method() != http::verb::get && request_.method() != http::verb::head)
-      return refuse(http::status::method_not_allowed, "Only GET is answered here.\n");
+      return refuse(http::status::method_not_allowed, "Only the method GET is supported.\n");
     const PageFiles::File* file = server_.files.find(*name);
-    if (file == nullptr) return refuse(http::status::not_found, "There is no such file.\n");
+    if (file == nullptr) return refuse(http::status::not_found, "The file does not exist.\n");
     respond(http::status::ok, file->type, file->bytes);
   }
 
@@ -394,16 +399,17 @@ class Visit : public std::enable_shared_from_this<Visit<Server>> {
 
 }  // namespace
 
-ViewServer::Server::Server(std::uint16_t wanted_port, PageFiles page_files) : files(std::move(page_files)) {
+ViewServer::Server::Server(std::uint16_t requested_port, PageFiles page_files)
+    : files(std::move(page_files)) {
   try {
-    const tcp::endpoint here(asio::ip::address_v4::loopback(), wanted_port);
+    const tcp::endpoint here(asio::ip::address_v4::loopback(), requested_port);
     acceptor.open(here.protocol());
     acceptor.set_option(tcp::acceptor::reuse_address(true));
     acceptor.bind(here);
     acceptor.listen();
   } catch (const boost::system::system_error& error) {
-    throw std::runtime_error("127.0.0.1:" + std::to_string(wanted_port) + " cannot be listened on: " +
-                             error.code().message() + "; name another port, or none, with --port");
+    throw std::runtime_error("127.0.0.1:" + std::to_string(requested_port) + ": cannot listen: " +
+                             error.code().message() + "; name another port with --port, or omit it");
   }
   port = acceptor.local_endpoint().port();
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) signals.add(signal);
@@ -415,7 +421,7 @@ ViewServer::Server::Server(std::uint16_t wanted_port, PageFiles page_files) : fi
 void ViewServer::Server::accept() {
   acceptor.async_accept([this](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error && connections < kMostConnections) {
+    if (!error && connections < kMaxConnections) {
       socket.set_option(tcp::no_delay(true), error);
       ++connections;
       std::make_shared<Visit<Server>>(std::move(socket), *this)->read();
@@ -424,7 +430,7 @@ void ViewServer::Server::accept() {
   });
 }
 
-/// The same frame for all pages that can take one.
+/// Sends the same frame to all pages that are ready to receive one.
 void ViewServer::Server::push_frames() {
   frame_timer.expires_after(kFrameEvery);
   frame_timer.async_wait([this](beast::error_code error) {
@@ -451,19 +457,22 @@ void ViewServer::Server::push_frames() {
   }
 }
 
-void ViewServer::Server::tell(const PageLease::Reply& told) {
-  const auto found = pages.find(told.page);
+void ViewServer::Server::tell(const PageLease::Reply& reply) {
+  const auto found = pages.find(reply.page);
   if (found == pages.end()) return;
   if (const auto page = found->second.lock())
-    page->send({{"type", "told"}, {"what", told.request}, {"done", told.accepted}, {"text", told.error}});
+    page->send({{"type", "reply"},
+                {"request", reply.request},
+                {"accepted", reply.accepted},
+                {"error", reply.error}});
 }
 
 ViewServer::ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed)
     : server_(std::make_unique<Server>(port, std::move(files))) {
   server_->live = &feed;
   server_->lease =
-      std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Reply& told) {
-        asio::post(server->io, [server, told] { server->tell(told); });
+      std::make_unique<PageLease>(feed.socket(), [server = server_.get()](const PageLease::Reply& reply) {
+        asio::post(server->io, [server, reply] { server->tell(reply); });
       });
 }
 

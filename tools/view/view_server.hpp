@@ -12,17 +12,18 @@ namespace wrenchd {
 class LiveFeed;
 class RecordedFeed;
 
-/// Serves the page of the view to browsers on this machine, and what they show over a WebSocket. Listens on
-/// 127.0.0.1 alone; answers nobody who does not know the token in the address, or whose browser was sent by
-/// another page (Host and Origin). One thread, that of run().
+/// Serves the view's page to browsers on this machine, and its data over a WebSocket. Listens only on
+/// 127.0.0.1. Rejects requests without the token in the address, and requests from other web pages (Host and
+/// Origin). Runs on the thread that calls run().
 ///
 ///   http://127.0.0.1:PORT/TOKEN/         the page and its files
 ///   ws://127.0.0.1:PORT/TOKEN/live       messages: JSON, and binary ones for meshes and curves
 ///
-/// A browser that does not read gets fewer frames, and nobody waits for it.
+/// A page that reads slowly receives fewer frames and delays no other page. Not RT-safe: runs a server.
 class ViewServer {
  public:
-  /// port: 0: one that is free. Throws std::runtime_error where it cannot listen. The feed must outlive this.
+  /// port: 0 selects a free port. The feed must outlive this object. Throws std::runtime_error if the server
+  /// cannot listen.
   ViewServer(std::uint16_t port, PageFiles files, LiveFeed& feed);
   ViewServer(std::uint16_t port, PageFiles files, const RecordedFeed& feed);
   ~ViewServer();
@@ -30,9 +31,9 @@ class ViewServer {
   ViewServer& operator=(const ViewServer&) = delete;
 
   std::string url() const;
-  /// Until SIGINT, SIGTERM or stop(). Whatever a page has armed is disarmed at the end.
+  /// Runs until SIGINT, SIGTERM or stop(). Releases the lease at the end, which disarms the loop.
   void run();
-  void stop();  ///< any thread
+  void stop();  ///< thread-safe
 
  private:
   struct Server;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <utility>
 
 #include "core/fault.hpp"
 #include "core/limits.hpp"
@@ -27,7 +29,7 @@ Json json_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// JSON has no NaN: what is none is null.
+/// Returns null for NaN and infinity, which JSON lacks.
 Json number(double x) {
   return std::isfinite(x) ? Json(x) : Json(nullptr);
 }
@@ -47,20 +49,28 @@ std::string bits_text(std::uint64_t bits, ValueNames names) {
   return all;
 }
 
-/// The wrench in the world: where it takes hold, force and torque.
-struct Held {
-  Vector3d p_W = Vector3d::Zero(), force_W = Vector3d::Zero(), torque_W = Vector3d::Zero();
+/// Wrench on the hand in the world, about the handle point.
+struct HandWrench {
+  Vector3d p_WH_m = Vector3d::Zero();
+  Vector3d force_W = Vector3d::Zero();
+  Vector3d torque_W = Vector3d::Zero();
 };
 
-Held held(const ViewTick& tick, const ViewScene* scene) {
+/// Without a scene the frames are unknown. Then the wrench is shown as it was sent, at the tool.
+HandWrench hand_wrench(const ViewTick& tick, const ViewScene* scene) {
   const Vector3d force(tick.F_out[0], tick.F_out[1], tick.F_out[2]),
       torque(tick.F_out[3], tick.F_out[4], tick.F_out[5]);
   const Pose X_WP = pose_of(tick.X_WP);
   if (scene == nullptr) return {X_WP.translation_m, force, torque};
-  const Vector3d p_W = X_WP * inverse(scene->X_HT()).translation_m;  // the handle point, with the tool at p
-  if (!scene->wrench_about_handle()) return {p_W, force, torque - p_W.cross(force)};
+  const Vector3d p_WH_m = X_WP * inverse(scene->X_HT()).translation_m;
+  if (!scene->wrench_about_handle()) return {p_WH_m, force, torque - p_WH_m.cross(force)};
   const Quaterniond& R_WB = scene->X_WB().rotation;
-  return {p_W, R_WB * force, R_WB * torque};
+  return {p_WH_m, R_WB * force, R_WB * torque};
+}
+
+/// "vertex 12", "edge 3-7".
+std::string feature_text(std::uint8_t kind, std::uint32_t first, std::uint32_t second) {
+  return text(Feature{static_cast<FeatureKind>(kind), first, second});
 }
 
 }  // namespace
@@ -84,19 +94,38 @@ ChannelValues ViewTick::channels() const noexcept {
           energy_kg_m2, depth_m(), angle_rad()};
 }
 
-ViewTick view_tick(const TickState& state) {
-  ViewTick tick;
-  tick.tick = state.tick();
-  tick.time_ns = state.time_ns();
-  tick.X_WP = state.hand_pose();
-  tick.X_WQ = state.proxy_pose();
-  tick.F_out = state.wrench();
-  tick.energy_kg_m2 = state.number("energy");
-  tick.rendering_id = static_cast<std::uint32_t>(state.integer("rendering"));
-  for (std::size_t i = 0; i < std::tuple_size_v<decltype(TickRecord::stage_ns)>; ++i)
-    tick.duration_ns += state.integer("stage_ns", i);
-  tick.wake_latency_ns = state.integer("wake_latency_ns");
-  return tick;
+TickRecord tick_record(const TickState& state) {
+  TickRecord record;
+  auto* const bytes = reinterpret_cast<std::byte*>(&record);
+  for (const RecordField& field : tick_fields())
+    for (std::size_t i = 0; i < field.count; ++i) {
+      std::byte* const to = bytes + field.offset + i * size_of(field.type);
+      if (field.type == FieldType::f64) {
+        const double number = state.number(field.name, i);
+        std::memcpy(to, &number, sizeof number);
+      } else {  // the low bytes, on the little-endian machines that StateReader accepts
+        const std::int64_t number = state.integer(field.name, i);
+        std::memcpy(to, &number, size_of(field.type));
+      }
+    }
+  return record;
+}
+
+std::vector<ProxyContact> proxy_contacts(std::span<const Touch> contacts) {
+  std::vector<ProxyContact> out;
+  for (const Touch& contact : contacts) {
+    ProxyContact one;
+    one.point_W_m = contact.point_W_m;
+    one.normal_W = contact.normal_W;
+    one.load_fraction = contact.load_fraction;
+    one.multiplier_kg_m = contact.multiplier_kg_m;
+    one.obstacle_number = contact.obstacle;
+    one.tool_feature = feature_text(contact.tool_feature_kind, contact.tool_first, contact.tool_second);
+    one.obstacle_feature =
+        feature_text(contact.obstacle_feature_kind, contact.obstacle_first, contact.obstacle_second);
+    out.push_back(std::move(one));
+  }
+  return out;
 }
 
 ViewTick view_tick(const TickRecord& record) {
@@ -113,95 +142,69 @@ ViewTick view_tick(const TickRecord& record) {
   return tick;
 }
 
-ViewStatus view_status(const TickState& state) {
-  return {state.state(),
-          state.text("cause"),
-          state.text("limit_causes"),
-          state.text("placing"),
-          static_cast<unsigned>(state.integer("contacts")),
-          state.number("authority"),
-          state.number("guard_share"),
-          state.contacts()};
-}
-
-ViewStatus view_status(const TickRecord& record, std::span<const Touch> touches) {
-  ViewStatus words;
+ViewStatus view_status(const TickRecord& record, std::vector<ProxyContact> contacts) {
   const auto cause = static_cast<Fault>(record.state_cause);
-  words.state = name(static_cast<State>(record.state));
-  words.cause = cause == Fault::none ? "none" : std::string(fault_row(cause).name);
-  words.limits = bits_text(record.limit_causes, ValueNames::limit_bits);
-  words.proxy_initialization = name(static_cast<ProxyInitialization>(record.proxy_initialization));
-  words.contact_count = record.contacts;
-  words.authority = record.authority;
-  words.passivity_scale = record.passivity_scale;
-  for (const Touch& touch : touches) {
-    const auto feature = [](std::uint8_t kind, std::uint32_t first, std::uint32_t second) {
-      return text(Feature{static_cast<FeatureKind>(kind), first, second});
-    };
-    ProxyContact one;
-    one.point_W_m = touch.point_W_m;
-    one.normal_W = touch.normal_W;
-    one.share = touch.share;
-    one.multiplier_kg_m = touch.multiplier_kg_m;
-    one.obstacle_number = touch.obstacle;
-    one.tool_feature = feature(touch.tool_feature_kind, touch.tool_first, touch.tool_second);
-    one.obstacle_feature = feature(touch.obstacle_feature_kind, touch.obstacle_first, touch.obstacle_second);
-    words.contacts.push_back(std::move(one));
-  }
-  return words;
+  ViewStatus status;
+  status.state = name(static_cast<State>(record.state));
+  status.cause = cause == Fault::none ? "none" : std::string(fault_row(cause).name);
+  status.limits = bits_text(record.limit_causes, ValueNames::limit_bits);
+  status.proxy_initialization = name(static_cast<ProxyInitialization>(record.proxy_initialization));
+  status.contact_count = record.contacts;
+  status.authority = record.authority;
+  status.passivity_scale = record.passivity_scale;
+  status.contacts = std::move(contacts);
+  return status;
 }
 
-Json frame_json(const ViewTick& tick, const ViewStatus& words, const ViewScene* scene,
+Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene* scene,
                 std::int64_t begin_ns) {
-  Json touches = Json::array();
-  for (const ProxyContact& touch : words.contacts)
-    touches.push_back(
-        {{"p", numbers(touch.point_W_m)},
-         {"n", numbers(touch.normal_W)},
-         {"share", number(touch.share)},
-         {"obstacle", scene != nullptr ? scene->obstacle_name(touch.obstacle_number) : touch.obstacle},
-         {"tool", touch.tool_feature},
-         {"on", touch.obstacle_feature}});
-  const Held wrench = held(tick, scene);
+  Json contacts = Json::array();
+  for (const ProxyContact& contact : status.contacts)
+    contacts.push_back(
+        {{"p", numbers(contact.point_W_m)},
+         {"n", numbers(contact.normal_W)},
+         {"load_fraction", number(contact.load_fraction)},
+         {"obstacle", scene != nullptr ? scene->obstacle_name(contact.obstacle_number) : contact.obstacle},
+         {"tool", contact.tool_feature},
+         {"on", contact.obstacle_feature}});
+  const HandWrench wrench = hand_wrench(tick, scene);
   return {{"type", "frame"},
           {"t", 1e-9 * static_cast<double>(tick.time_ns - begin_ns)},
           {"tick", tick.tick},
-          {"state", words.state},
-          {"cause", words.cause},
+          {"state", status.state},
+          {"cause", status.cause},
           {"p", numbers(tick.X_WP)},
           {"q", tick.proxy_valid() ? numbers(tick.X_WQ) : Json(nullptr)},
           {"F", numbers(tick.F_out)},
           {"wrench",
-           {{"at", json_of(wrench.p_W)},
+           {{"at", json_of(wrench.p_WH_m)},
             {"force", json_of(wrench.force_W)},
             {"torque", json_of(wrench.torque_W)}}},
           {"energy", number(tick.energy_kg_m2)},
           {"depth_m", number(tick.depth_m())},
           {"angle_rad", number(tick.angle_rad())},
-          {"contacts", words.contact_count},
-          {"touches", touches},
-          {"authority", number(words.authority)},
-          {"guard", number(words.passivity_scale)},
-          {"limits", words.limits},
-          {"placing", words.proxy_initialization},
-          {"took_us", 1e-3 * static_cast<double>(tick.duration_ns)},
-          {"late_us", 1e-3 * static_cast<double>(tick.wake_latency_ns)},
+          {"contact_count", status.contact_count},
+          {"contacts", contacts},
+          {"authority", number(status.authority)},
+          {"passivity_scale", number(status.passivity_scale)},
+          {"limits", status.limits},
+          {"proxy_initialization", status.proxy_initialization},
           {"moved", scene != nullptr ? scene->moving_obstacle_poses(tick.time_ns) : Json::array()}};
 }
 
-std::string history_message(const MinMaxHistory& extremes, std::uint64_t from, std::uint64_t to, bool anew,
+std::string history_message(const MinMaxHistory& history, std::uint64_t from, std::uint64_t to, bool reset,
                             std::int64_t begin_ns) {
   constexpr std::uint32_t kNumbers = 1 + 2 * kChannelCount;
-  const std::array<std::uint32_t, 4> head = {2, anew ? 1U : 0U, static_cast<std::uint32_t>(to - from),
+  const std::array<std::uint32_t, 4> head = {2, reset ? 1U : 0U, static_cast<std::uint32_t>(to - from),
                                              kNumbers};
   std::string out(reinterpret_cast<const char*>(head.data()), sizeof head);
   std::array<double, kNumbers> row{};
   for (std::uint64_t i = from; i < to; ++i) {
-    const MinMaxHistory::Bucket& stretch = extremes.at(i);
-    row[0] = 1e-9 * static_cast<double>(stretch.begin_ns - begin_ns);
+    const MinMaxHistory::Bucket& bucket = history.at(i);
+    row[0] = 1e-9 * static_cast<double>(bucket.begin_ns - begin_ns);
     for (std::size_t k = 0; k < kChannelCount; ++k) {
-      row[1 + 2 * k] = stretch.min[k];
-      row[2 + 2 * k] = stretch.max[k];
+      row[1 + 2 * k] = bucket.min[k];
+      row[2 + 2 * k] = bucket.max[k];
     }
     out.append(reinterpret_cast<const char*>(row.data()), sizeof row);
   }

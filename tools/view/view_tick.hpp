@@ -17,43 +17,57 @@
 
 namespace wrenchd {
 
-/// The numbers of one tick that are drawn, wherever it comes from. Poses and wrenches as in TickRecord.
+/// Numbers of one tick that the page draws. Poses and wrenches have the format of TickRecord.
 struct ViewTick {
   std::uint64_t tick = 0;
   std::int64_t time_ns = 0;
-  std::array<double, 7> X_WP{}, X_WQ{};  ///< q is NaN while the proxy has no place
-  std::array<double, 6> F_out{};         ///< told to the device
-  double energy_kg_m2 = 0.0;             ///< T of Eq. (8) [kg m^2]; NaN as q
-  std::uint32_t rendering_id = 0;
-  std::int64_t duration_ns = 0, wake_latency_ns = 0;
+  std::array<double, 7> X_WP{};      ///< Commanded pose p.
+  std::array<double, 7> X_WQ{};      ///< Proxy pose q; NaN if the proxy is not valid.
+  std::array<double, 6> F_out{};     ///< Wrench sent to the device.
+  double energy_kg_m2 = 0.0;         ///< T of Eq. (8); NaN if the proxy is not valid.
+  std::uint32_t rendering_id = 0;    ///< Number of the active rendering.
+  std::int64_t duration_ns = 0;      ///< Sum of the durations of all stages.
+  std::int64_t wake_latency_ns = 0;  ///< Time from the tick's due time to its start.
 
   bool proxy_valid() const noexcept;
-  double depth_m() const noexcept;    ///< from p to q; NaN as q
-  double angle_rad() const noexcept;  ///< likewise
+  double depth_m() const noexcept;    ///< Distance from p to q; NaN if the proxy is not valid.
+  double angle_rad() const noexcept;  ///< Angle of the rotation from p to q; NaN if the proxy is not valid.
   ChannelValues channels() const noexcept;
 };
 
-ViewTick view_tick(const TickState& state);
+/// Returns the record of a live tick, field by field from the table of tick fields. Throws ClientError if the
+/// daemon lacks a field. Not RT-safe: allocates.
+TickRecord tick_record(const TickState& state);
+/// Returns the numbers to draw. RT-safe.
 ViewTick view_tick(const TickRecord& record);
 
-/// What else is shown of it.
+/// Status texts and contacts of one tick.
 struct ViewStatus {
-  std::string state, cause, limits, proxy_initialization;
-  unsigned contact_count = 0;
-  double authority = 0.0, passivity_scale = 1.0;
+  std::string state;
+  std::string cause;
+  std::string limits;
+  std::string proxy_initialization;
+  unsigned contact_count = 0;  ///< All contacts that hold the proxy, also those not in `contacts`.
+  double authority = 0.0;
+  double passivity_scale = 1.0;
   std::vector<ProxyContact> contacts;
 };
 
-ViewStatus view_status(const TickState& state);
-ViewStatus view_status(const TickRecord& record, std::span<const Touch> touches);
+/// Returns recorded contacts in the format of live ones. The obstacle names are empty. Not RT-safe:
+/// allocates.
+std::vector<ProxyContact> proxy_contacts(std::span<const Touch> contacts);
+/// Returns the status texts of a tick with its contacts. Not RT-safe: allocates.
+ViewStatus view_status(const TickRecord& record, std::vector<ProxyContact> contacts);
 
-/// {type: "frame", ...}: one moment, as the page gets it. scene: null where nobody knows it. begin_ns: what
-/// the page counts time from.
-Json frame_json(const ViewTick& tick, const ViewStatus& words, const ViewScene* scene, std::int64_t begin_ns);
+/// Returns {type: "frame", ...}, one tick as the page draws it. scene: null if not known. begin_ns: origin of
+/// the page's time axis. Not RT-safe: allocates.
+Json frame_json(const ViewTick& tick, const ViewStatus& status, const ViewScene* scene,
+                std::int64_t begin_ns);
 
-/// A binary message of the stretches [from, to): u32 2, u32 1 where what the page has is no longer true, u32
-/// stretches, u32 numbers a stretch; then doubles: time [s], and least and greatest of each channel in turn.
-std::string history_message(const MinMaxHistory& extremes, std::uint64_t from, std::uint64_t to, bool anew,
+/// Returns a binary message with the buckets [from, to) of the history. Header: u32 2, u32 1 if the page must
+/// discard its history, u32 number of buckets, u32 doubles per bucket. Each bucket: time [s], then minimum
+/// and maximum of each channel. Not RT-safe: allocates.
+std::string history_message(const MinMaxHistory& history, std::uint64_t from, std::uint64_t to, bool reset,
                             std::int64_t begin_ns);
 
 }  // namespace wrenchd

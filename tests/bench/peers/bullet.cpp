@@ -9,10 +9,10 @@
 
 namespace {
 
-/// Bullet counts in centimetres here: its built-in margins and tolerances are meant for bodies of about 1.
+/// Bullet works in centimetres here: its built-in margins and tolerances assume bodies of about 1 unit.
 constexpr double kUnitsPerMetre = 100.0;
 
-/// Not two builds at once: the single and the double one share inline objects across modules.
+/// The build has only one precision: single and double builds share inline objects across modules.
 constexpr const char* kNames[] = {"Bullet GJK and EPA", "Bullet contact pair", nullptr};
 
 btVector3 scaled(const double* p) {

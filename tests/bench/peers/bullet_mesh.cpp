@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Bullet counts in centimetres here: its built-in margins and tolerances are meant for bodies of about 1.
+/// Bullet works in centimetres here: its built-in margins and tolerances assume bodies of about 1 unit.
 constexpr double kUnitsPerMetre = 100.0;
 
 btVector3 scaled(const double* p) {
@@ -38,7 +38,7 @@ struct Surface {
   }
 };
 
-/// Counts what the algorithm reports; a manifold would keep four at most.
+/// Counts the contacts that the algorithm reports. A manifold would keep at most four.
 struct Counter final : btManifoldResult {
   using btManifoldResult::btManifoldResult;
   int count = 0;
@@ -83,7 +83,7 @@ int peer_ask(void* peer, int, const PeerPose* X_BA, double*) {
   };
   const btCollisionObjectWrapper a = wrapped(pair.A.object), b = wrapped(pair.B.object);
   btPersistentManifold* manifold = pair.dispatcher.getNewManifold(&pair.A.object, &pair.B.object);
-  // Its closest-point algorithm, the default, passes over this kind of shape.
+  // Bullet's default closest-point algorithm ignores this kind of shape.
   btCollisionAlgorithm* algorithm =
       pair.dispatcher.findAlgorithm(&a, &b, manifold, BT_CONTACT_POINT_ALGORITHMS);
   Counter counter(&a, &b);

@@ -36,7 +36,7 @@ struct Pair {
 }  // namespace
 
 const char* peer_query_name(int query) {
-  return query == 0 ? "CGAL whether they meet" : nullptr;
+  return query == 0 ? "CGAL do intersect" : nullptr;
 }
 
 void* peer_open(const PeerMesh* A, const PeerMesh* B) {

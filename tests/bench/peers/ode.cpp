@@ -11,7 +11,7 @@
 
 namespace {
 
-/// ODE keeps pointers into these, so they live as long as the geometry.
+/// ODE keeps pointers to these arrays, so they must live as long as the geometry.
 struct Convex {
   std::vector<dReal> planes, points;
   std::vector<unsigned> polygons;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMostContacts = 8192;
 
-/// ODE keeps pointers into these, so they live as long as the geometry.
+/// ODE keeps pointers to these arrays, so they must live as long as the geometry.
 struct Surface {
   std::vector<double> vertices;
   std::vector<dTriIndex> triangles;
@@ -41,7 +41,7 @@ struct Pair {
   std::vector<dContactGeom> contacts;
 };
 
-/// It has something to say whenever one of its tables is full.
+/// Suppresses ODE's message about a full contact table.
 void be_quiet(int, const char*, va_list) {}
 
 }  // namespace

@@ -9,11 +9,12 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/scene.hpp"
 #include "core/inertia.hpp"
+#include "tests/support/rejection.hpp"
 #include "tests/support/sample_meshes.hpp"
 #include "tests/support/temporary_directory.hpp"
 
-// Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or refused
-// with its name, the place and the cure.
+// Twelve defects, five severities, four formats: every file is accepted, repaired with a report, or rejected
+// with its name, the location and the remedy.
 
 namespace wrenchd {
 namespace {
@@ -22,7 +23,7 @@ namespace fs = std::filesystem;
 using namespace test;
 
 constexpr std::array<std::size_t, 5> kCounts = {1, 2, 5, 20, 80};  ///< of 320 faces, by severity
-constexpr double kVolume_m3 = 1.1e-4;                              ///< of the ball, about
+constexpr double kVolume_m3 = 1.1e-4;                              ///< about the volume of the ball
 
 PolygonSoup ball() {
   const TriangleMesh mesh = make_mesh({"sphere", 320});
@@ -31,7 +32,7 @@ PolygonSoup ball() {
   return soup;
 }
 
-/// Faces spread evenly, `count` of them.
+/// Returns the i-th of `count` evenly distributed face indices.
 std::size_t spread(std::size_t i, std::size_t count, const PolygonSoup& soup) {
   return i * soup.faces.size() / count;
 }
@@ -39,7 +40,7 @@ std::size_t spread(std::size_t i, std::size_t count, const PolygonSoup& soup) {
 enum class Format { off, obj, stl, ply };
 constexpr std::array<Format, 4> kFormats = {Format::off, Format::obj, Format::stl, Format::ply};
 
-/// STL and PLY come as text and as binary, by severity; PLY in both orders of bytes.
+/// The severity selects text or binary STL and PLY, and the byte order of PLY.
 bool binary(Format format, std::size_t severity) {
   return (format == Format::stl || format == Format::ply) && severity % 2 == 0;
 }
@@ -64,13 +65,13 @@ std::string written(const PolygonSoup& soup, Format format, std::size_t severity
 }
 
 struct Expected {
-  enum class Outcome { accepted, repaired, refused } outcome;
-  std::string words;        ///< that are told
-  bool as_surface = false;  ///< it can be used as one
+  enum class Outcome { accepted, repaired, rejected } outcome;
+  std::string words;        ///< part of the report or of the message
+  bool as_surface = false;  ///< the mesh is valid as a surface
 };
 constexpr auto accepted = Expected::Outcome::accepted;
 constexpr auto repaired = Expected::Outcome::repaired;
-constexpr auto refused = Expected::Outcome::refused;
+constexpr auto rejected = Expected::Outcome::rejected;
 
 struct Defect {
   std::string name;
@@ -124,8 +125,7 @@ PolygonSoup with_faces_twice(std::size_t count) {
   return soup;
 }
 
-/// A face is cut in two through the middle of a side, and a face without area closes the gap to the one
-/// beyond.
+/// Splits a face through the middle of a side. A face without area closes the gap to the neighbour.
 PolygonSoup with_caps(std::size_t count) {
   PolygonSoup soup = ball();
   for (std::size_t i = 0; i < count; ++i) {
@@ -163,7 +163,7 @@ std::string with_numbers_that_are_none(std::size_t severity, Format format) {
   return written(soup, format, severity);
 }
 
-/// STL has no indices: facets of four corners, or more facets than there are, are the like of it.
+/// STL has no indices. Facets of four corners, or a wrong facet count, are the corresponding defect.
 std::string with_indices_out_of_range(std::size_t severity, Format format) {
   PolygonSoup soup = ball();
   const std::size_t count = kCounts[severity];
@@ -222,7 +222,7 @@ std::string cut_short(std::size_t severity, Format format) {
   return bytes;
 }
 
-/// A defect of the mesh itself, whatever it is written as.
+/// A defect of the mesh itself, independent of the format.
 auto in_any_format(PolygonSoup (*make)(std::size_t count)) {
   return [make](std::size_t severity, Format format) {
     return written(make(kCounts[severity]), format, severity);
@@ -237,26 +237,26 @@ const std::vector<Defect>& defects() {
   static const std::vector<Defect> all = {
       {"truncated", cut_short,
        [](std::size_t severity, Format format) {
-         // An OBJ is one wherever it ends: it has a hole, or no faces.
-         if (format != Format::obj) return Expected{refused, "export the mesh again"};
-         if (severity < 2) return Expected{refused, "the surface is open", true};
-         return Expected{refused, severity == 2 ? "has no faces" : "expected 3 numbers"};
+         // A truncated OBJ is a valid OBJ with a hole, or without faces.
+         if (format != Format::obj) return Expected{rejected, "export the mesh again"};
+         if (severity < 2) return Expected{rejected, "the surface is open", true};
+         return Expected{rejected, severity == 2 ? "has no faces" : "expected 3 numbers"};
        }},
-      {"not_finite", with_numbers_that_are_none, always({refused, "number"})},
+      {"not_finite", with_numbers_that_are_none, always({rejected, "number"})},
       {"out_of_range", with_indices_out_of_range,
        [](std::size_t severity, Format format) {
          if (format == Format::stl)
-           return Expected{refused, binary(format, severity) ? "bytes, not" : "has 4 vertices"};
-         return Expected{refused, binary(format, severity) ? "uses vertex 162"
-                                  : format == Format::ply  ? "uses vertex 162"
-                                                           : "there is no vertex '16"};
+           return Expected{rejected, binary(format, severity) ? "bytes, not" : "has 4 vertices"};
+         return Expected{rejected, binary(format, severity) ? "uses vertex 162"
+                                   : format == Format::ply  ? "uses vertex 162"
+                                                            : "there is no vertex '16"};
        }},
-      {"hole", in_any_format(with_holes), always({refused, "the surface is open", true})},
-      {"fin", in_any_format(with_fins), always({refused, "belongs to 3 faces", true})},
+      {"hole", in_any_format(with_holes), always({rejected, "the surface is open", true})},
+      {"fin", in_any_format(with_fins), always({rejected, "belongs to 3 faces", true})},
       {"duplicate_points", in_any_format(with_corners_of_their_own),
        [](std::size_t severity, Format format) {
-         if (format == Format::stl) return Expected{accepted, ""};  // it has no others
-         // Where all faces around a point have points of their own, nobody uses it any longer.
+         if (format == Format::stl) return Expected{accepted, ""};  // STL has no shared vertices
+         // If all faces at a point have points of their own, the point is unused.
          if (severity > 2) return Expected{repaired, " duplicate points, first vertex 16"};
          return Expected{repaired, "merged " + std::to_string(3 * kCounts[severity]) + " duplicate points"};
        }},
@@ -270,28 +270,28 @@ const std::vector<Defect>& defects() {
        }},
       {"turned", in_any_format(with_faces_turned),
        [](std::size_t severity, Format) {
-         return Expected{repaired, "turned " + many(kCounts[severity], "face") + " round"};
+         return Expected{repaired, "flipped " + many(kCounts[severity], "face")};
        }},
-      {"cut_through", in_any_format(with_spikes_through), always({refused, "cut through each other", true})},
+      {"cut_through", in_any_format(with_spikes_through), always({rejected, "intersect each other", true})},
       {"garbage", with_garbage,
        [](std::size_t severity, Format format) {
          constexpr std::array<const char*, 4> words = {"ends before face 320 of ",
                                                        "is no statement of an OBJ file",
                                                        "is no word of an STL file", "face 320 of "};
-         if (format == Format::stl && binary(format, severity)) return Expected{refused, "bytes, not"};
-         return Expected{refused, words[static_cast<std::size_t>(format)]};
+         if (format == Format::stl && binary(format, severity)) return Expected{rejected, "bytes, not"};
+         return Expected{rejected, words[static_cast<std::size_t>(format)]};
        }},
       {"unit", with_another_unit,
        [](std::size_t severity, Format) {
          if (kScales[severity] == 1e4)
            return Expected{repaired, "were millimetres taken for metres? 'scale' would be 0.001"};
-         return Expected{refused, "give 'scale' in metres per mesh unit"};
+         return Expected{rejected, "give 'scale' in metres per mesh unit"};
        }},
   };
   return all;
 }
 
-/// The file as an obstacle, beside a good tool.
+/// Returns a scene with the file as an obstacle and a valid tool.
 SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind kind) {
   SceneSettings settings;
   settings.tool.mesh = tool;
@@ -304,27 +304,32 @@ SceneSettings scene_with(const fs::path& tool, const fs::path& file, BodyKind ki
   return settings;
 }
 
+/// Checks a scene that was built although the mesh has a defect. Returns its repairs and warnings.
+std::string check_accepted(const Scene& scene, const MeshLoader& loader, const Expected& expected) {
+  std::string report;
+  for (const std::string& change : loader.changes()) report += change + "\n";
+  for (const std::string& warning : loader.warnings()) report += warning + "\n";
+  INFO(report);
+  CHECK(expected.outcome == (report.empty() ? accepted : repaired));
+  const TriangleMesh& mesh = scene.meshes()[0].mesh->surface.mesh();
+  const double size = report.find("millimetres") == std::string::npos ? 1.0 : 1e12;
+  CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(kVolume_m3 * size).epsilon(0.02));
+  return report;
+}
+
 void check_file(const fs::path& file, const fs::path& tool, const Expected& expected) {
   MeshLoader loader;
-  std::string told;
-  try {
+  std::string report;
+  const std::string rejection = rejection_message<MeshError>([&] {
     const Scene scene(scene_with(tool, file, BodyKind::solid), loader);
-    for (const std::string& change : loader.changes()) told += change + "\n";
-    for (const std::string& remark : loader.warnings()) told += remark + "\n";
-    INFO(told);
-    CHECK(expected.outcome == (told.empty() ? accepted : repaired));
-    const TriangleMesh& mesh = scene.meshes()[0].mesh->surface.mesh();
-    const double size = told.find("millimetres") == std::string::npos ? 1.0 : 1e12;
-    CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(kVolume_m3 * size).epsilon(0.02));
-  } catch (const MeshError& error) {
-    told = error.what();
-    INFO(told);
-    CHECK(expected.outcome == refused);
-  }
-  INFO(told);
-  CHECK((told.empty() || told.find(file.string() + ":") == 0));
-  CHECK(told.find(expected.words) != std::string::npos);
-  CHECK((told.find("kind = \"surface\"") != std::string::npos) == expected.as_surface);
+    report = check_accepted(scene, loader, expected);
+  });
+  if (!rejection.empty()) report = rejection;
+  INFO(report);
+  if (!rejection.empty()) CHECK(expected.outcome == rejected);
+  CHECK((report.empty() || report.find(file.string() + ":") == 0));
+  CHECK(report.find(expected.words) != std::string::npos);
+  CHECK((report.find("kind = \"surface\"") != std::string::npos) == expected.as_surface);
   if (expected.as_surface) {
     const Scene scene(scene_with(tool, file, BodyKind::surface), loader);
     CHECK(scene.meshes()[0].mesh->surface.kind() == BodyKind::surface);
@@ -332,7 +337,7 @@ void check_file(const fs::path& file, const fs::path& tool, const Expected& expe
   }
 }
 
-TEST_CASE("240 bad meshes are accepted, repaired with a report, or refused with a reason", "[bad_meshes]") {
+TEST_CASE("240 bad meshes are accepted, repaired with a report, or rejected with a reason", "[bad_meshes]") {
   const TemporaryDirectory dir;
   const fs::path tool = dir.write("tool.off", as_off(box({0, 0, 0}, {1, 1, 1})));
   int files = 0;

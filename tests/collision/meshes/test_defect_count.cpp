@@ -6,24 +6,25 @@
 namespace wrenchd {
 namespace {
 
-TEST_CASE("a tally tells the first, and how many", "[tally]") {
-  std::vector<std::string> told;
-  DefectCount tally;
-  tally.report(told, "cure");
-  tally.report(told, "removed", "face", " without area");
-  CHECK(told.empty());
-  CHECK_FALSE(tally.any());
-  tally.add([] { return "face 3 near " + format_point({1, 2.5, -1e-3}); });
-  tally.report(told, "cure");
-  tally.report(told, "removed", "face", " without area");
-  CHECK(told == std::vector<std::string>{"face 3 near (1, 2.5, -0.001); cure",
-                                         "removed 1 face without area: face 3 near (1, 2.5, -0.001)"});
-  tally.add([]() -> std::string { throw 1; });  // only the first is put into words
-  told.clear();
-  tally.report(told, "cure");
-  tally.report(told, "removed", "face", " without area");
-  CHECK(told == std::vector<std::string>{"face 3 near (1, 2.5, -0.001) (2 in all); cure",
-                                         "removed 2 faces without area, first face 3 near (1, 2.5, -0.001)"});
+TEST_CASE("a defect count reports the first defect and the number", "[defect_count]") {
+  std::vector<std::string> report;
+  DefectCount defects;
+  defects.report(report, "cure");
+  defects.report(report, "removed", "face", " without area");
+  CHECK(report.empty());
+  CHECK_FALSE(defects.any());
+  defects.add([] { return "face 3 near " + format_point({1, 2.5, -1e-3}); });
+  defects.report(report, "cure");
+  defects.report(report, "removed", "face", " without area");
+  CHECK(report == std::vector<std::string>{"face 3 near (1, 2.5, -0.001); cure",
+                                           "removed 1 face without area: face 3 near (1, 2.5, -0.001)"});
+  defects.add([]() -> std::string { throw 1; });  // only the first defect is described
+  report.clear();
+  defects.report(report, "cure");
+  defects.report(report, "removed", "face", " without area");
+  CHECK(report ==
+        std::vector<std::string>{"face 3 near (1, 2.5, -0.001) (2 in all); cure",
+                                 "removed 2 faces without area, first face 3 near (1, 2.5, -0.001)"});
 }
 
 }  // namespace

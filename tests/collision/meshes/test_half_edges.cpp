@@ -11,15 +11,15 @@ namespace {
 
 using namespace test;
 
-TEST_CASE("every side of every face is listed, those of an edge together", "[soup_sides]") {
+TEST_CASE("every half-edge is listed, grouped by edge", "[half_edges]") {
   PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
   soup.faces.push_back({0, 1, 5});
   soup.faces.push_back({7, 7});
   const std::vector<HalfEdge> sides = half_edges_of(soup);
   CHECK(sides.size() == 6 * 4 + 3 + 2);
-  std::map<std::pair<std::size_t, std::size_t>, int> seen;
+  std::map<std::pair<std::size_t, std::size_t>, int> edges;
   for_each_edge(sides, [&](std::span<const HalfEdge> along) {
-    CHECK(++seen[along[0].edge] == 1);
+    CHECK(++edges[along[0].edge] == 1);
     for (std::size_t i = 0; i < along.size(); ++i) {
       CHECK(along[i].edge == along[0].edge);
       CHECK((i == 0 || along[i - 1].face <= along[i].face));
@@ -33,7 +33,7 @@ TEST_CASE("every side of every face is listed, those of an edge together", "[sou
       CHECK(runs);
     }
   });
-  CHECK(seen.size() == 12 + 1 + 1);  // a diagonal, and a side from a corner to itself
+  CHECK(edges.size() == 12 + 1 + 1);  // a diagonal, and a side from a corner to itself
   CHECK(half_edges_of({}).empty());
 }
 

@@ -33,7 +33,7 @@ TEST_CASE("every kind of mesh that can be made is a solid of about as many trian
     }
 }
 
-TEST_CASE("made meshes have the measures that are said of them", "[make_mesh]") {
+TEST_CASE("generated meshes have the documented dimensions", "[make_mesh]") {
   const auto volume = [](const char* kind) {
     return solid_properties(make_mesh({kind, 50000}), 1.0).volume_m3;
   };
@@ -47,13 +47,13 @@ TEST_CASE("made meshes have the measures that are said of them", "[make_mesh]") 
   CHECK(volume("hole") == Approx(3.14159265 * (0.02 * 0.02 - 0.01 * 0.01) * 0.08).epsilon(2e-3));
 }
 
-TEST_CASE("a box has the sides asked for", "[make_mesh]") {
+TEST_CASE("a box has the requested sides", "[make_mesh]") {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : make_mesh({"box", 12, 1, {0.1, 0.02, 0.3}}).vertices_m) box.extend(p);
   CHECK((box.sizes() - Vector3d(0.1, 0.02, 0.3)).norm() < 1e-15);
 }
 
-TEST_CASE("the dowel leaves a tenth of a millimetre in its socket, all the way", "[make_mesh]") {
+TEST_CASE("the dowel has a clearance of 0.1 mm in its socket along its whole length", "[make_mesh]") {
   const auto radii = [](const TriangleMesh& mesh, double below_m) {
     std::vector<double> all;
     for (const Vector3d& p : mesh.vertices_m)
@@ -66,7 +66,7 @@ TEST_CASE("the dowel leaves a tenth of a millimetre in its socket, all the way",
   CHECK(*std::min_element(hole.begin(), hole.end()) == Approx(0.0100));
 }
 
-TEST_CASE("every ray from a hare's neck leaves it once, so that it cannot cut through itself",
+TEST_CASE("every ray from the hare's neck leaves it once, so that it cannot intersect itself",
           "[make_mesh]") {
   for (const std::size_t triangles : {2000, 20000}) {
     const TriangleMesh hare = make_mesh({"hare", triangles});
@@ -83,7 +83,7 @@ TEST_CASE("every ray from a hare's neck leaves it once, so that it cannot cut th
   }
 }
 
-TEST_CASE("what is made has a name of its own", "[make_mesh]") {
+TEST_CASE("every generated mesh has a name of its own", "[make_mesh]") {
   std::set<std::string> all;
   for (const GeneratedMesh& made : std::initializer_list<GeneratedMesh>{{"gear"},
                                                                         {"gear", 300},
@@ -96,7 +96,7 @@ TEST_CASE("what is made has a name of its own", "[make_mesh]") {
   CHECK(all.count("made gear, 300 triangles") == 1);
 }
 
-TEST_CASE("a mesh that nobody knows is refused by its name", "[make_mesh]") {
+TEST_CASE("an unknown kind of mesh is rejected with its name", "[make_mesh]") {
   CHECK_THROWS_WITH(make_mesh({"teapot"}), Catch::Contains("teapot"));
 }
 

@@ -29,7 +29,7 @@ struct Bench {
   void put(const std::string& bytes) const { dir.write(fs::relative(only_file(), dir.path()), bytes); }
 };
 
-TEST_CASE("a cache gives back what was written, under its key alone", "[mesh_cache]") {
+TEST_CASE("a cache returns what was written under the same key only", "[mesh_cache]") {
   Bench bench;
   const std::string bytes("some\0bytes", 10);
   CHECK_FALSE(bench.cache.read(bench.key));
@@ -46,7 +46,7 @@ TEST_CASE("a cache gives back what was written, under its key alone", "[mesh_cac
   bench.only_file();
 }
 
-TEST_CASE("a cache file that was changed in any byte, cut or lengthened counts as none", "[mesh_cache]") {
+TEST_CASE("a cache file with any modified, missing or additional byte counts as missing", "[mesh_cache]") {
   Bench bench;
   REQUIRE(bench.cache.write(bench.key, "some bytes"));
   const std::string good = bench.contents();
@@ -67,13 +67,13 @@ TEST_CASE("a cache file that was changed in any byte, cut or lengthened counts a
   CHECK_FALSE(bench.cache.read(bench.key));
   bench.put(good);
   CHECK(bench.cache.read(bench.key));
-  // And it is written over.
+  // The file can be overwritten.
   bench.put("no");
   REQUIRE(bench.cache.write(bench.key, "some bytes"));
   CHECK(bench.contents() == good);
 }
 
-TEST_CASE("a file under another key, that others may write to, or that is none, is not trusted",
+TEST_CASE("a cache file with a wrong key, unsafe permissions or a wrong type is not trusted",
           "[mesh_cache]") {
   Bench bench;
   REQUIRE(bench.cache.write(bench.key, "some bytes"));
@@ -99,7 +99,7 @@ TEST_CASE("a file under another key, that others may write to, or that is none, 
   CHECK_FALSE(bench.cache.read(bench.key));
 }
 
-TEST_CASE("a directory that cannot be written to is told, and no error", "[mesh_cache]") {
+TEST_CASE("a directory that is not writable is reported and causes no error", "[mesh_cache]") {
   const TemporaryDirectory dir;
   const fs::path file = dir.write("file", "");
   MeshCache cache(file / "cache");
@@ -111,7 +111,7 @@ TEST_CASE("a directory that cannot be written to is told, and no error", "[mesh_
   CHECK_FALSE(off.write(MeshCache::key({"a"}), "bytes"));
 }
 
-TEST_CASE("the cache is where the system or the user has caches", "[mesh_cache]") {
+TEST_CASE("the cache directory follows the system or the user", "[mesh_cache]") {
   struct Variable {
     explicit Variable(const char* name_) : name(name_), was(std::getenv(name_) ? std::getenv(name_) : "") {}
     ~Variable() { was.empty() ? ::unsetenv(name) : ::setenv(name, was.c_str(), 1); }

@@ -24,14 +24,14 @@ std::string defects(const PolygonSoup& soup) {
   return text;
 }
 
-/// Exactly these defects, one a line.
+/// Requires exactly these defects, one per line.
 void check_defects(const PolygonSoup& soup, const std::vector<std::string>& expected) {
   std::string text;
   for (const std::string& defect : expected) text += defect + "\n";
   CHECK(defects(soup) == text);
 }
 
-/// One defect that holds all of these words.
+/// Requires one defect that contains all of these words.
 void check_defect_with(const PolygonSoup& soup, const std::vector<std::string>& words) {
   const std::string text = defects(soup);
   INFO(text);
@@ -61,7 +61,7 @@ TEST_CASE("a closed box is a solid") {
 }
 
 TEST_CASE("a solid may have concave faces, corners on an edge, several shells and cavities") {
-  // An L of three unit squares, two high.
+  // An L of three unit squares, of height two.
   PolygonSoup ell{{}, {{5, 4, 3, 2, 1, 0}, {6, 7, 8, 9, 10, 11}}};
   for (const double z : {0.0, 2.0})
     for (const auto& [x, y] : {std::pair{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}})
@@ -69,7 +69,7 @@ TEST_CASE("a solid may have concave faces, corners on an edge, several shells an
   for (std::size_t i = 0; i < 6; ++i) ell.faces.push_back({i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6});
   check_good(ell, 6);
 
-  // A vertex half-way along the edge from 0 to 1, in both faces there.
+  // A vertex half-way along the edge from 0 to 1, in both faces at the edge.
   PolygonSoup corner = kBox;
   corner.vertices.emplace_back(1, 0, 0);
   corner.faces[2] = {0, 8, 1, 5, 4};
@@ -83,7 +83,7 @@ TEST_CASE("a solid may have concave faces, corners on an edge, several shells an
              30 - 8 + 0.008);
 }
 
-TEST_CASE("a quad that is not flat is cut into triangles") {
+TEST_CASE("a quad that is not planar is triangulated") {
   PolygonSoup soup = kBox;
   soup.vertices[7] += Vector3d(0.1, 0.2, 0.3);
   TriangleMesh mesh;
@@ -93,10 +93,10 @@ TEST_CASE("a quad that is not flat is cut into triangles") {
   CHECK(report.volume > 30);
 }
 
-TEST_CASE("a face of five corners that crosses itself cannot be cut, and is told") {
+TEST_CASE("a face of five corners that crosses itself is reported") {
   const PolygonSoup star{{{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {3, 1, 0}, {1, 1, 3}},
                          {{0, 2, 1, 3, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}}};
-  check_defect_with(star, {"face 0", "cannot be cut into triangles"});
+  check_defect_with(star, {"face 0", "cannot be triangulated"});
 }
 
 TEST_CASE("vertices that no face uses do not count") {
@@ -111,7 +111,7 @@ TEST_CASE("vertices that no face uses do not count") {
   CHECK(mesh.vertices_m.size() == 8);
 }
 
-TEST_CASE("scale and place of a solid do not matter") {
+TEST_CASE("scale and position of a solid do not matter") {
   for (const double scale : {1e-6, 1e-3, 1.0, 1e3, 1e6}) {
     for (const double offset : {0.0, 1e3}) {
       PolygonSoup soup = kBox;
@@ -124,7 +124,7 @@ TEST_CASE("scale and place of a solid do not matter") {
   }
 }
 
-TEST_CASE("numbers that are none are found") {
+TEST_CASE("coordinates that are not finite are found") {
   PolygonSoup soup = kBox;
   soup.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
   check_defects(soup, {"vertex 3 is not a number: (2, nan, 0); export the mesh again"});
@@ -132,7 +132,7 @@ TEST_CASE("numbers that are none are found") {
   check_defects(soup, {"vertex 3 is not a number: (2, nan, 0) (2 in all); export the mesh again"});
 }
 
-TEST_CASE("faces that are none are found") {
+TEST_CASE("faces that are no polygons are found") {
   PolygonSoup soup = kBox;
   soup.faces[1][2] = 8;
   check_defects(
@@ -153,7 +153,7 @@ TEST_CASE("faces that are none are found") {
   soup.faces[0] = {0, 4, 6, 4};
   check_defects(soup, {"face 0 uses a vertex twice; remove degenerate faces in the modeller"});
 
-  // All of them are told at once.
+  // All defects are reported at once.
   soup.vertices[0].z() = std::numeric_limits<double>::infinity();
   soup.faces[5][0] = 100;
   CHECK(defects(soup).find("vertex 0 ") != std::string::npos);
@@ -187,7 +187,7 @@ TEST_CASE("a hole is found") {
   check_defect_with({kBox.vertices, {kBox.faces[0]}}, {"belongs to face 0 only", "(4 in all)"});
 }
 
-TEST_CASE("a face that looks the wrong way is found") {
+TEST_CASE("a face with the wrong orientation is found") {
   PolygonSoup soup = kBox;
   std::reverse(soup.faces[0].begin(), soup.faces[0].end());
   check_defect_with(soup, {"faces 0 and ", "oriented against each other along the edge from (0, ",
@@ -198,13 +198,13 @@ TEST_CASE("a face that looks the wrong way is found") {
 
 TEST_CASE("a solid that is inside out is found") {
   check_defects(inside_out(kBox),
-                {"all faces look inwards (the volume is negative); flip the faces in the modeller"});
+                {"all faces point inwards (the volume is negative); flip the faces in the modeller"});
   check_defect_with(concatenated(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5})),
-                    {"make outer shells look outwards and cavities inwards"});
+                    {"make outer shells face outwards and cavities inwards"});
   check_defect_with(concatenated(kBox, inside_out(box({10, 0, 0}, {11, 1, 1}))),
-                    {"make outer shells look outwards"});
+                    {"make outer shells face outwards"});
   check_defect_with(concatenated(inside_out(kBox), inside_out(box({10, 0, 0}, {11, 1, 1}))),
-                    {"all faces look inwards"});
+                    {"all faces point inwards"});
 }
 
 TEST_CASE("an edge with more than two faces is found") {
@@ -233,40 +233,40 @@ TEST_CASE("parts that meet in one vertex are found") {
   PolygonSoup soup = concatenated(kBox, box({2, 3, 5}, {4, 4, 6}));
   for (auto& face : soup.faces)
     for (std::size_t& v : face) v = v == 8 ? 7 : v;
-  check_defects(soup,
-                {"parts of the surface meet only in vertex 7 at (2, 3, 5); separate them in the modeller"});
-  // The same where the file has the vertex twice: the surfaces touch.
+  check_defects(
+      soup, {"parts of the surface are joined only in vertex 7 at (2, 3, 5); separate them in the modeller"});
+  // The same with two vertices in the file: the surfaces touch.
   CHECK_FALSE(check_solid(concatenated(kBox, box({2, 3, 5}, {4, 4, 6}))).solid());
 }
 
-TEST_CASE("faces that cut through each other are found") {
+TEST_CASE("faces that intersect each other are found") {
   const PolygonSoup soup = concatenated(kBox, box({1, 1, 1}, {3, 2, 2}));
-  check_defect_with(soup, {" near (", "cut through each other", " in all); unite the parts in the modeller"});
+  check_defect_with(soup, {" near (", "intersect each other", " in all); unite the parts in the modeller"});
   CHECK(check_solid(soup).self_intersecting);
-  // A spike through the lid alone; numbers are the file's, not those of the triangles it is cut into.
+  // A spike through the lid only. The numbers are those of the file, not those of the triangles.
   const PolygonSoup spike{{{1, 1, 6}, {1.5, 1, 6}, {1, 1.5, 6}, {1.1, 1.1, 4}},
                           {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}}};
   REQUIRE(check_solid(spike).solid());
-  check_defect_with(concatenated(kBox, spike), {"faces 5 and ", "cut through each other"});
-  check_defect_with(concatenated(kBox, kBox), {"cut through each other"});
+  check_defect_with(concatenated(kBox, spike), {"faces 5 and ", "intersect each other"});
+  check_defect_with(concatenated(kBox, kBox), {"intersect each other"});
   check_defect_with(concatenated(kBox, box({2, 0, 0}, {4, 3, 5})),
-                    {"cut through each other"});  // face on face
+                    {"intersect each other"});  // coincident faces
 }
 
-TEST_CASE("a mesh in which everything cuts through everything is refused in good time") {
+TEST_CASE("a mesh in which everything intersects is rejected quickly") {
   PolygonSoup soup;
   for (int i = 0; i < 300; ++i)
     soup = concatenated(soup, box(Vector3d::Constant(1e-4 * i), Vector3d::Constant(1 + 1e-4 * i)));
-  check_defect_with(soup, {"cut through each other (1000 or more in all)"});
+  check_defect_with(soup, {"intersect each other (1000 or more in all)"});
 }
 
-TEST_CASE("a face that cannot be cut into triangles is found") {
+TEST_CASE("a face that cannot be triangulated is found") {
   PolygonSoup soup = box({0, 0, 0}, {1, 1, 1});
-  for (Vector3d& p : soup.vertices) p *= 1e110;  // beyond what the plane of a face can be computed with
-  check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be cut into triangles (6 in all); make it flat"});
+  for (Vector3d& p : soup.vertices) p *= 1e110;  // the plane of a face cannot be computed beyond this
+  check_defect_with(soup, {"face 0 near (0, 0, 0) cannot be triangulated (6 in all); make it planar"});
 }
 
-TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must have numbers and areas") {
+TEST_CASE("a surface may be open, one-sided and self-intersecting, but needs finite coordinates and areas") {
   const auto triangles_of = [](const PolygonSoup& soup) {
     TriangleMesh mesh;
     const MeshReport report = check_surface(soup, &mesh);
@@ -304,9 +304,9 @@ TEST_CASE("a surface need not be closed, one-sided or free of cuts, but must hav
   refused_with({kBox.vertices, {}}, "no face that has an area");
 }
 
-TEST_CASE("a surface of which the repair leaves nothing is refused") {
+TEST_CASE("a surface of which the repair leaves nothing is rejected") {
   PolygonSoup far = triangulated(kBox);
-  far.vertices[5].x() = 1e126;  // beside it all other points are one
+  far.vertices[5].x() = 1e126;  // relative to this point all others coincide
   TriangleMesh mesh;
   const MeshReport report = repair_and_check_surface(far, &mesh);
   CHECK(mesh.triangles.empty());
@@ -314,7 +314,7 @@ TEST_CASE("a surface of which the repair leaves nothing is refused") {
   CHECK(report.defects[0].find("a vertex that is much too far away") != std::string::npos);
 }
 
-TEST_CASE("what has no inside is refused") {
+TEST_CASE("a mesh without an inside is rejected") {
   CHECK_FALSE(check_solid({}).solid());
   CHECK_FALSE(check_solid({kBox.vertices, {}}).solid());
   const PolygonSoup leaf{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {2, 1, 0}}};
@@ -324,7 +324,7 @@ TEST_CASE("what has no inside is refused") {
   CHECK_FALSE(check_solid(flat).solid());
 }
 
-TEST_CASE("numbers at the end of their range crash nothing") {
+TEST_CASE("coordinates at the end of their range cause no crash") {
   for (const double scale : {1e-320, 1e-200, 1e-110, 1e110, 1e200, 1e307}) {
     PolygonSoup soup = kBox;
     for (Vector3d& p : soup.vertices) p *= scale;

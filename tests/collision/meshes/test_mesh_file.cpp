@@ -20,27 +20,32 @@ using namespace test;
 
 const PolygonSoup kBox = box({-1, 2, -3}, {4, 2.5, 1});
 
-/// What the file is refused with; empty when it is read. Nothing else may reach the standard streams.
+PolygonSoup read_file(const fs::path& file) {
+  return parse_mesh(read_mesh_source(file));
+}
+
+/// Returns the message with which the file is rejected; empty if it is read. Nothing else may appear on the
+/// standard streams.
 std::string rejection_text(const fs::path& file) {
-  std::ostringstream said;
-  std::streambuf* const out = std::cout.rdbuf(said.rdbuf());
-  std::streambuf* const err = std::cerr.rdbuf(said.rdbuf());
+  std::ostringstream printed;
+  std::streambuf* const out = std::cout.rdbuf(printed.rdbuf());
+  std::streambuf* const err = std::cerr.rdbuf(printed.rdbuf());
   std::string message;
   try {
-    read_mesh_file(file);
+    read_file(file);
   } catch (const MeshError& error) {
     message = error.what();
   }
   std::cout.rdbuf(out);
   std::cerr.rdbuf(err);
-  CHECK(said.str() == "");
+  CHECK(printed.str() == "");
   return message;
 }
 
 void check_is_the_box(const fs::path& file) {
   INFO(file);
   TriangleMesh mesh;
-  const MeshReport report = check_solid(read_mesh_file(file), &mesh);
+  const MeshReport report = check_solid(read_file(file), &mesh);
   REQUIRE(report.solid());
   CHECK(report.vertices == 8);
   CHECK(mesh.triangles.size() == 12);
@@ -80,7 +85,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST_CASE("what exporters write beside the mesh does no harm") {
+TEST_CASE("additional data of exporters is ignored") {
   const TemporaryDirectory dir;
   const PolygonSoup triangles = triangulated(kBox);
   const std::string off = as_off(kBox);
@@ -118,7 +123,7 @@ TEST_CASE("what exporters write beside the mesh does no harm") {
   check_is_the_box(dir.write("named.ply", replaced(as_binary_ply(kBox), "vertex_indices", "vertex_index")));
 }
 
-TEST_CASE("what exporters write in their own way is read") {
+TEST_CASE("variants of exporters are read") {
   const TemporaryDirectory dir;
   const PolygonSoup triangles = triangulated(kBox);
   const std::string mark = "\xef\xbb\xbf";
@@ -164,12 +169,12 @@ TEST_CASE("what exporters write in their own way is read") {
 
 TEST_CASE("STL vertices are merged where they are equal") {
   const TemporaryDirectory dir;
-  const PolygonSoup soup = read_mesh_file(dir.write("a.stl", as_binary_stl(triangulated(kBox))));
+  const PolygonSoup soup = read_file(dir.write("a.stl", as_binary_stl(triangulated(kBox))));
   CHECK(soup.vertices.size() == 8);
   CHECK(soup.faces.size() == 12);
 }
 
-/// A file, where it must be refused, and what the message must say.
+/// A file, the place of its defect, and a part of the message.
 struct Bad {
   std::string name;
   std::string bytes;
@@ -190,7 +195,7 @@ void check_refused(const std::vector<Bad>& table) {
   }
 }
 
-TEST_CASE("what is no mesh file is refused with its name and a cure") {
+TEST_CASE("a file that is no mesh is rejected with its name and a remedy") {
   const TemporaryDirectory dir;
   CHECK(rejection_text(dir.path() / "missing.off") ==
         (dir.path() / "missing.off").string() + ": no such file; check the path in the scene");
@@ -204,12 +209,12 @@ TEST_CASE("what is no mesh file is refused with its name and a cure") {
       {"empty.stl", "", "", "is empty; export"},
       {"box.step", off, "", "unknown mesh format '.step'; save it as .off, .obj, .stl or .ply"},
       {"box", off, "", "unknown mesh format ''; save it as"},
-      {"blank.off", "\n \n# nothing\n", "", "holds no mesh"},
+      {"blank.off", "\n \n# nothing\n", "", "contains no mesh"},
       {"blank.obj", "\n \n# nothing\n", "", "has no faces"},
   });
 }
 
-TEST_CASE("a wrong extension is told") {
+TEST_CASE("a wrong extension is rejected") {
   const PolygonSoup triangles = triangulated(kBox);
   check_refused({
       {"stl.off", as_ascii_stl(triangles), ":1", "expected OFF"},
@@ -218,21 +223,21 @@ TEST_CASE("a wrong extension is told") {
       {"binary_stl.obj", as_binary_stl(triangles, "\x01\x02"), ":1", "no statement of an OBJ file"},
       {"off.ply", as_off(kBox), ":1", "expected 'ply', found 'OFF'"},
       {"off.stl", as_off(kBox), "", "does not begin with 'solid'"},
-      {"short.stl", "OFF\n", "", "is too short for an STL"},
+      {"short.stl", "OFF\n", "", "is too short for an STL file"},
       {"ply.stl", as_binary_ply(triangles), "", "does not begin with 'solid'"},
   });
 }
 
-TEST_CASE("bad OFF files are refused at their line") {
+TEST_CASE("invalid OFF files are rejected with the line") {
   const std::string off = as_off(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(off, from, to); };
   check_refused({
       {"cut.off", off.substr(0, off.size() - 10), "", "ends before face 5 of 6"},
       {"cut_vertices.off", off.substr(0, 38), ":6", "vertex 3: expected 3 numbers, found 2"},
-      {"cut_number.off", off.substr(0, off.size() - 3), ":16", "corners announced, 3 numbers follow"},
+      {"cut_number.off", off.substr(0, off.size() - 3), ":16", "corners declared, 3 numbers follow"},
       {"header_only.off", "OFF\n", ":1", "three counts"},
       {"vertices.off", with("8 6 0", "4000000000 6 0"), ":2",
-       "announces 4000000000 vertices and 6 faces, more than the file can hold"},
+       "declares 4000000000 vertices and 6 faces, more than the file can hold"},
       {"many.off", with("8 6 0", "2000000000 6 0"), ":2", "more than the file can hold; correct the counts"},
       {"faces.off", with("8 6 0", "8 2000000000 0"), ":2", "more than the file can hold; correct the counts"},
       {"negative.off", with("8 6 0", "-8 6 0"), ":2", "expected a count, found '-8'"},
@@ -255,10 +260,10 @@ TEST_CASE("bad OFF files are refused at their line") {
       {"negative_index.off", with("4 0 4 6 2", "4 0 -4 6 2"), ":11", "face 0: there is no vertex '-4'"},
       {"fraction_index.off", with("4 0 4 6 2", "4 0 4.5 6 2"), ":11", "face 0: there is no vertex '4.5'"},
       {"corners.off", with("4 0 4 6 2", "4000000000 0 4 6 2"), ":11",
-       "face 0: '4000000000' corners announced"},
-      {"negative_corners.off", with("4 0 4 6 2", "-4 0 4 6 2"), ":11", "face 0: '-4' corners announced"},
+       "face 0: '4000000000' corners declared"},
+      {"negative_corners.off", with("4 0 4 6 2", "-4 0 4 6 2"), ":11", "face 0: '-4' corners declared"},
       {"binary.off", std::string("OFF BINARY\n\0\0\0\x8\0\0\0\x6\0\0\0\0", 23), ":1",
-       "save the mesh as ascii OFF"},
+       "save the mesh as ASCII OFF"},
       {"textures.off", with("OFF", "STOFF"), ":1", "expected OFF (or COFF, NOFF, CNOFF), found 'STOFF'"},
       {"skel.off", with("OFF", "SKEL"), ":1", "save the mesh as a plain OFF"},
       {"colour.off", replaced(with("OFF", "COFF"), "\n4 2 -3\n", "\n4 2 -3 -7\n"), ":4",
@@ -267,7 +272,7 @@ TEST_CASE("bad OFF files are refused at their line") {
   });
 }
 
-TEST_CASE("bad OBJ files are refused at their line") {
+TEST_CASE("invalid OBJ files are rejected with the line") {
   const std::string obj = as_obj(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(obj, from, to); };
   check_refused({
@@ -288,7 +293,7 @@ TEST_CASE("bad OBJ files are refused at their line") {
   });
 }
 
-TEST_CASE("bad STL files are refused") {
+TEST_CASE("invalid STL files are rejected") {
   const PolygonSoup triangles = triangulated(kBox);
   const std::string ascii = as_ascii_stl(triangles), binary = as_binary_stl(triangles);
   std::string counted = binary, nan = binary;
@@ -298,10 +303,9 @@ TEST_CASE("bad STL files are refused") {
   std::memcpy(nan.data() + 84 + 50 * 2 + 4 * 7, &no_number, 4);
   check_refused({
       {"cut_ascii.stl", ascii.substr(0, ascii.size() / 2), "",
-       "is not a readable stl file, or it ends too early"},
-      {"no_end.stl", ascii.substr(0, ascii.size() - 13), "",
-       "is not a readable stl file, or it ends too early"},
-      {"cut_binary.stl", binary.substr(0, binary.size() - 1), "", "has 684 bytes, not 683: it is cut short"},
+       "ends before 'endsolid'; the file is truncated"},
+      {"no_end.stl", ascii.substr(0, ascii.size() - 13), "", "ends before 'endsolid'; the file is truncated"},
+      {"cut_binary.stl", binary.substr(0, binary.size() - 1), "", "has 684 bytes, not 683: it is truncated"},
       {"count.stl", counted, "", "a binary STL of 4000000000 triangles has 200000000084 bytes, not 684"},
       {"too_long.stl", binary + binary.substr(84), "", "not 1284"},
       {"nan_binary.stl", nan, "", "face 2: corner 1 is not a finite number"},
@@ -317,7 +321,7 @@ TEST_CASE("bad STL files are refused") {
   });
 }
 
-TEST_CASE("bad PLY files are refused") {
+TEST_CASE("invalid PLY files are rejected") {
   const std::string ply = as_ascii_ply(kBox), binary = as_binary_ply(kBox);
   const auto with = [&](const std::string& from, const std::string& to) { return replaced(ply, from, to); };
   const std::string start = "ply\nformat ascii 1.0\n";
@@ -330,14 +334,14 @@ TEST_CASE("bad PLY files are refused") {
       {"type.ply", with("double y", "real y"), ":6", "'real' is no type of PLY"},
       {"count.ply", with("vertex 8", "vertex eight"), ":4", "expected 'element NAME COUNT'"},
       {"negative.ply", with("vertex 8", "vertex -8"), ":4", "expected 'element NAME COUNT'"},
-      {"many.ply", with("vertex 8", "vertex 4000000000"), "", "vertex 18 of 4000000000 is cut short"},
-      {"many_faces.ply", with("face 6", "face 4000000000"), "", "face 6 of 4000000000 is cut short"},
+      {"many.ply", with("vertex 8", "vertex 4000000000"), "", "vertex 18 of 4000000000 is truncated"},
+      {"many_faces.ply", with("face 6", "face 4000000000"), "", "face 6 of 4000000000 is truncated"},
       {"hollow.ply", start + "element vertex 400000000000\nend_header\n", "",
        "element 'vertex' has no properties"},
       {"hollow_other.ply", start + "element foo 40000000000000\nend_header\n", "",
        "element 'foo' has no properties"},
       {"few.ply", with("face 6", "face 5"), "",
-       "goes on behind the elements that its header counts; correct the counts"},
+       "continues behind the elements that its header declares; correct the counts"},
       {"integers.ply", with("double y", "int y"), "", "needs a property 'y' of type float or double"},
       {"no_z.ply", with("property double z\n", ""), "", "needs a property 'z'"},
       {"no_list.ply", with("property list uchar int vertex_indices", "property int vertex_indices"), "",
@@ -346,16 +350,16 @@ TEST_CASE("bad PLY files are refused") {
        "needs a property list 'vertex_indices' of type int"},
       {"list_length.ply", with("uchar int", "float int"), ":9", "the length of a list cannot be a float"},
       {"long_list.ply", replaced(with("uchar int", "uint int"), "\n4 0 4 6 2", "\n4000000000 0 4 6 2"), "",
-       "face 0 of 6 is cut short"},
+       "face 0 of 6 is truncated"},
       {"negative_list.ply", replaced(with("uchar int", "int int"), "\n4 0 4 6 2", "\n-4 0 4 6 2"), "",
        "face 0 of 6"},
       {"byte_list.ply", replaced(ply, "\n4 0 4 6 2", "\n260 0 4 6 2"), "", "face 0 of 6"},
       {"fraction.ply", replaced(ply, "\n4 0 4 6 2", "\n4 0 4.5 6 2"), "", "face 0 of 6"},
       {"nan.ply", replaced(ply, "\n4 2 -3\n", "\n4 nan -3\n"), "",
-       "vertex 1 of 8 is cut short, or its 'y' is no number"},
-      {"cut.ply", ply.substr(0, ply.size() - 3), "", "face 5 of 6 is cut short"},
-      {"cut_binary.ply", binary.substr(0, binary.size() - 1), "", "face 5 of 6 is cut short"},
-      {"long_binary.ply", binary + "x", "", "goes on behind the elements"},
+       "vertex 1 of 8 is truncated, or its 'y' is no number"},
+      {"cut.ply", ply.substr(0, ply.size() - 3), "", "face 5 of 6 is truncated"},
+      {"cut_binary.ply", binary.substr(0, binary.size() - 1), "", "face 5 of 6 is truncated"},
+      {"long_binary.ply", binary + "x", "", "continues behind the elements"},
       {"halfedges.ply", with("end_header", "element halfedge 0\nproperty int source\nend_header"), "",
        "save the mesh with vertices and faces only"},
       {"colours.ply",
@@ -370,7 +374,7 @@ TEST_CASE("bad PLY files are refused") {
   });
 }
 
-TEST_CASE("noise in any format is refused, and crashes nothing") {
+TEST_CASE("noise in any format is rejected without a crash") {
   const TemporaryDirectory dir;
   std::mt19937 random(7);
   for (const char* name : {"noise.off", "noise.obj", "noise.stl", "noise.ply"}) {
@@ -383,7 +387,7 @@ TEST_CASE("noise in any format is refused, and crashes nothing") {
   }
 }
 
-TEST_CASE("a good file with bytes changed is read or refused, and crashes nothing") {
+TEST_CASE("a valid file with modified bytes is read or rejected without a crash") {
   const TemporaryDirectory dir;
   const PolygonSoup triangles = triangulated(kBox);
   const std::pair<const char*, std::string> good[] = {{"a.off", as_off(kBox)},
@@ -402,7 +406,7 @@ TEST_CASE("a good file with bytes changed is read or refused, and crashes nothin
       const fs::path file = dir.write(name, bytes);
       try {
         TriangleMesh mesh;
-        const MeshReport report = check_solid(read_mesh_file(file), &mesh);
+        const MeshReport report = check_solid(read_file(file), &mesh);
         CHECK((report.solid() || !report.defects.empty()));
       } catch (const MeshError& error) {
         CHECK(std::string(error.what()).find(file.string()) == 0);

@@ -22,7 +22,7 @@ PolygonSoup soup_of(const TriangleMesh& mesh) {
   return soup;
 }
 
-/// Repairs it, and is told exactly these changes; what comes out is a solid of this volume.
+/// Repairs the soup and requires exactly these repairs. The result is a solid of this volume.
 void check_repaired(PolygonSoup soup, const std::vector<std::string>& changes, double volume = kVolume) {
   CHECK(repair(soup) == changes);
   TriangleMesh mesh;
@@ -30,7 +30,7 @@ void check_repaired(PolygonSoup soup, const std::vector<std::string>& changes, d
   INFO((report.defects.empty() ? "" : report.defects[0]));
   REQUIRE(report.solid());
   CHECK(solid_properties(mesh, 1.0).volume_m3 == Approx(volume).epsilon(1e-5));
-  CHECK(repair(soup).empty());  // once is enough
+  CHECK(repair(soup).empty());  // a second repair changes nothing
 }
 
 TEST_CASE("a good mesh is left as it is", "[mesh_repair]") {
@@ -45,20 +45,20 @@ TEST_CASE("a good mesh is left as it is", "[mesh_repair]") {
   }
 }
 
-TEST_CASE("points that no face uses are left out", "[mesh_repair]") {
+TEST_CASE("unused points are removed", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.vertices.insert(soup.vertices.begin() + 1, Vector3d(1000, 0, 0));
   soup.vertices.emplace_back(0, 1000, 0);
   for (auto& face : soup.faces)
     for (std::size_t& v : face) v += v > 0 ? 1 : 0;
-  check_repaired(soup, {"left out 2 points that no face uses, first vertex 1 at (1000, 0, 0)"});
+  check_repaired(soup, {"removed 2 points that no face uses, first vertex 1 at (1000, 0, 0)"});
   repair(soup);
   CHECK(soup.vertices == kBox.vertices);
   CHECK(soup.vertex_in_file(1) == 2);
 }
 
 TEST_CASE("points at the same place are merged", "[mesh_repair]") {
-  PolygonSoup soup{{}, {}};  // every face has corners of its own, as STL has them
+  PolygonSoup soup{{}, {}};  // every face has its own corners, as in STL
   for (const auto& face : kBox.faces) {
     soup.faces.emplace_back();
     for (const std::size_t v : face) {
@@ -69,10 +69,10 @@ TEST_CASE("points at the same place are merged", "[mesh_repair]") {
   check_repaired(soup, {"merged 16 duplicate points, first vertex 8 at (0, 0, 0)"});
 }
 
-TEST_CASE("repeated corners and faces of two corners go", "[mesh_repair]") {
+TEST_CASE("repeated corners and faces of two corners are removed", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.faces[2] = {0, 1, 1, 5, 4, 0};
-  check_repaired(soup, {"left out repeated corners of 1 face: face 2 near (0, 0, 0)"});
+  check_repaired(soup, {"removed repeated corners of 1 face: face 2 near (0, 0, 0)"});
   soup = kBox;
   soup.faces.insert(soup.faces.begin() + 1, {0, 1});
   soup.faces.push_back({3, 3, 3});
@@ -84,8 +84,8 @@ TEST_CASE("repeated corners and faces of two corners go", "[mesh_repair]") {
   CHECK(soup.face_in_file(1) == 2);
 }
 
-TEST_CASE("a face without area goes, and leaves no hole", "[mesh_repair]") {
-  // A corner on an edge that only one side knows: a cap fills the gap.
+TEST_CASE("a face without area is removed and leaves no hole", "[mesh_repair]") {
+  // A corner on an edge that only one of the two faces has: a cap fills the gap.
   PolygonSoup soup = triangulated(kBox);
   const auto edge = std::find(soup.faces.begin(), soup.faces.end(), std::vector<std::size_t>{0, 1, 5});
   REQUIRE(edge != soup.faces.end());
@@ -95,14 +95,14 @@ TEST_CASE("a face without area goes, and leaves no hole", "[mesh_repair]") {
   soup.faces.push_back({0, 1, 8});
   check_repaired(soup, {"removed 1 face without area: face 13 near (0, 0, 0)"});
 
-  // Several on one edge, one cap upon the other.
+  // Several corners on one edge, one cap on another.
   soup.vertices.emplace_back(0.5, 0, 0);
   *std::find(soup.faces.begin(), soup.faces.end(), std::vector<std::size_t>{0, 8, 5}) = {0, 9, 5};
   soup.faces.push_back({9, 8, 5});
   soup.faces.push_back({0, 8, 9});
   check_repaired(soup, {"removed 2 faces without area, first face 13 near (0, 0, 0)"});
 
-  // One that hangs on an edge, both ways up.
+  // A face attached to an edge, in both orientations.
   soup = triangulated(kBox);
   soup.vertices.emplace_back(1, 0, 0);
   soup.faces.push_back({0, 1, 8});
@@ -112,29 +112,29 @@ TEST_CASE("a face without area goes, and leaves no hole", "[mesh_repair]") {
 }
 
 TEST_CASE("a needle is closed", "[mesh_repair]") {
-  // Corner 0 is split into two that lie nearly at one place, with two needles between them.
+  // Corner 0 is split into two nearby points, with two needles between them.
   PolygonSoup soup = triangulated(kBox);
   soup.vertices.emplace_back(1e-12, 0, 0);
   std::size_t count = 0;
   for (auto& face : soup.faces)
     for (std::size_t& v : face)
       if (v == 0 && count++ < 2) v = 8;
-  // Whatever was torn is joined: the two are one.
+  // All cracks are closed: the two parts are one.
   repair(soup);
   CHECK(check_solid(soup).solid());
   CHECK(soup.vertices.size() == 8);
 }
 
-TEST_CASE("faces given twice are kept once, either way up", "[mesh_repair]") {
+TEST_CASE("of duplicate faces one is kept, whatever their orientation", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   soup.faces.push_back({7, 3, 2, 6});
   check_repaired(soup, {"removed 1 duplicate face: face 6 near (2, 3, 5)"});
   soup.faces.push_back({4, 6, 7, 5});
   check_repaired(soup, {"removed 2 duplicate faces, first face 6 near (2, 3, 5)"});
-  soup = kBox;  // all of it
+  soup = kBox;  // all faces twice
   for (const auto& face : kBox.faces) soup.faces.push_back(face);
   check_repaired(soup, {"removed 6 duplicate faces, first face 6 near (0, 0, 0)"});
-  soup = kBox;  // with a lining
+  soup = kBox;  // with an inner copy
   for (const auto& face : inside_out(kBox).faces) soup.faces.push_back(face);
   check_repaired(soup, {"removed 6 duplicate faces, first face 6 near (0, 3, 0)"});
 }
@@ -166,10 +166,10 @@ TEST_CASE("cracks of single precision are closed, wider ones are not", "[mesh_re
   }
 }
 
-TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[mesh_repair]") {
+TEST_CASE("faces with the wrong orientation are flipped", "[mesh_repair]") {
   PolygonSoup soup = kBox;
   std::reverse(soup.faces[3].begin(), soup.faces[3].end());
-  check_repaired(soup, {"turned 1 face round: face 3 near (2, 3, 0)"});
+  check_repaired(soup, {"flipped 1 face: face 3 near (2, 3, 0)"});
   const PolygonSoup gear = soup_of(make_mesh({"gear", 2000}));
   const double volume = check_solid(gear).volume;
   RandomValues random(1);
@@ -183,19 +183,19 @@ TEST_CASE("faces that look the wrong way are turned as their neighbours are", "[
   }
 }
 
-TEST_CASE("a solid that is inside out is turned, with its cavities", "[mesh_repair]") {
+TEST_CASE("a solid that is inside out is flipped, with its cavities", "[mesh_repair]") {
   const PolygonSoup cavity = inside_out(box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}));
   const PolygonSoup beside = box({10, 0, 0}, {11, 1, 1});
-  check_repaired(inside_out(kBox), {"turned 6 faces round, first face 0 near (0, 3, 0)"});
-  check_repaired(inside_out(concatenated(kBox, cavity)),
-                 {"turned 12 faces round, first face 0 near (0, 3, 0)"}, kVolume - 1);
-  check_repaired(concatenated(inside_out(kBox), beside),
-                 {"turned 6 faces round, first face 0 near (0, 3, 0)"}, kVolume + 1);
+  check_repaired(inside_out(kBox), {"flipped 6 faces, first face 0 near (0, 3, 0)"});
+  check_repaired(inside_out(concatenated(kBox, cavity)), {"flipped 12 faces, first face 0 near (0, 3, 0)"},
+                 kVolume - 1);
+  check_repaired(concatenated(inside_out(kBox), beside), {"flipped 6 faces, first face 0 near (0, 3, 0)"},
+                 kVolume + 1);
   check_repaired(concatenated(concatenated(kBox, cavity), inside_out(beside)),
-                 {"turned 6 faces round, first face 12 near (10, 1, 0)"}, kVolume);
+                 {"flipped 6 faces, first face 12 near (10, 1, 0)"}, kVolume);
 }
 
-TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {
+TEST_CASE("a defect that needs a guess is left unchanged", "[mesh_repair]") {
   const auto left = [](PolygonSoup soup) {
     CHECK(repair(soup).empty());
     return !check_solid(soup).solid();
@@ -203,7 +203,7 @@ TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {
   PolygonSoup hole = kBox;
   hole.faces.pop_back();
   CHECK(left(hole));
-  CHECK(left(concatenated(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))));  // a cavity, or a body in a body?
+  CHECK(left(concatenated(kBox, box({0.5, 0.5, 0.5}, {1.5, 1.5, 1.5}))));  // a cavity, or a body in a body
   CHECK(left(concatenated(kBox, box({1, 1, 1}, {3, 2, 2}))));
   PolygonSoup fin = triangulated(kBox);
   fin.vertices.emplace_back(1, -1, 0);
@@ -219,13 +219,14 @@ TEST_CASE("what can only be guessed at is left", "[mesh_repair]") {
   out_of_range.faces[0][0] = 8;
   CHECK(left(out_of_range));
   CHECK(left({}));
-  // A band with half a twist has one side.
+  // A Moebius band has one side.
   PolygonSoup band;
   for (std::size_t i = 0; i < 12; ++i) {
-    const double turn = std::numbers::pi * static_cast<double>(i) / 12, around = 2 * turn;
+    const double rotation = std::numbers::pi * static_cast<double>(i) / 12, around = 2 * rotation;
     const Vector3d out(std::cos(around), std::sin(around), 0);
     for (const double side : {-0.2, 0.2})
-      band.vertices.push_back(out + side * (std::cos(turn) * out + std::sin(turn) * Vector3d::UnitZ()));
+      band.vertices.push_back(out +
+                              side * (std::cos(rotation) * out + std::sin(rotation) * Vector3d::UnitZ()));
     const std::size_t a = 2 * i, b = i < 11 ? a + 2 : 1, c = i < 11 ? a + 3 : 0;
     band.faces.push_back({a, b, c, a + 1});
   }

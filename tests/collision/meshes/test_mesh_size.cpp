@@ -14,25 +14,25 @@ const TriangleMesh& cube() {
   return mesh;
 }
 
-std::string asked(double scale, PlausibleSize likely) {
+std::string question(double scale, PlausibleSize likely) {
   return implausible_size(cube(), scale, likely).value_or("");
 }
 
-TEST_CASE("a size that is not likely is asked about, with the scale that would cure it", "[mesh_size]") {
-  CHECK(asked(1.0, kPlausibleToolSize) == "");
-  CHECK(asked(0.02, kPlausibleToolSize) == "");
-  CHECK(asked(40.0, kPlausibleToolSize) == "");
-  CHECK(asked(1000.0, kPlausibleToolSize) ==
+TEST_CASE("an implausible size causes a question with the scale that corrects it", "[mesh_size]") {
+  CHECK(question(1.0, kPlausibleToolSize) == "");
+  CHECK(question(0.02, kPlausibleToolSize) == "");
+  CHECK(question(40.0, kPlausibleToolSize) == "");
+  CHECK(question(1000.0, kPlausibleToolSize) ==
         "its largest side is 50 m at scale 1e+03: were millimetres taken for metres? 'scale' would be 1");
-  CHECK(asked(0.001, kPlausibleToolSize) ==
+  CHECK(question(0.001, kPlausibleToolSize) ==
         "its largest side is 5e-05 m at scale 0.001: were metres taken for millimetres? 'scale' would be 1");
-  CHECK(asked(1e-7, kPlausibleToolSize) ==
+  CHECK(question(1e-7, kPlausibleToolSize) ==
         "its largest side is 5e-09 m at scale 1e-07: give 'scale' in metres per mesh unit");
-  CHECK(asked(1000.0, kPlausibleObstacleSize) == "");
-  CHECK(asked(10000.0, kPlausibleObstacleSize).find("its largest side is 500 m") == 0);
+  CHECK(question(1000.0, kPlausibleObstacleSize) == "");
+  CHECK(question(10000.0, kPlausibleObstacleSize).find("its largest side is 500 m") == 0);
 }
 
-TEST_CASE("a size that contacts cannot be found at is refused", "[mesh_size]") {
+TEST_CASE("a size outside the range of contact queries is rejected", "[mesh_size]") {
   const auto refused = [](const TriangleMesh& mesh, double scale) -> std::string {
     try {
       require_size_for_contacts(mesh, scale, "cube.off");

@@ -6,7 +6,7 @@
 namespace wrenchd {
 namespace {
 
-TEST_CASE("what is packed is taken out again, and nothing that is not there", "[pack]") {
+TEST_CASE("packed values are unpacked, and missing values are detected", "[packer]") {
   std::string bytes;
   const Packer pack(bytes);
   const std::vector<Vector3d> points = {{1, 2, 3}, {4, 5, 6}};

@@ -10,27 +10,27 @@ namespace {
 using Kind = MeshSurface::Kind;
 
 struct Count {
-  std::vector<int> seen;
+  std::vector<int> visited;
   double worst_outside_m = 0.0;
 };
 
-/// Every triangle under a box lies in it, and in all boxes above.
-void descend(const TriangleBvh& tree, const MeshSurface& surface, std::uint32_t node,
+/// Every triangle under a box lies in the box and in all boxes above.
+void descend(const TriangleBvh& bvh, const MeshSurface& surface, std::uint32_t node,
              std::vector<std::uint32_t> above, Count& count) {
   for (std::uint32_t i = 0; i < 8; ++i) {
-    const TriangleBvh::Box& box = tree.boxes()[8 * node + i];
+    const TriangleBvh::Box& box = bvh.boxes()[8 * node + i];
     if (box.count < 0) continue;
     std::vector<std::uint32_t> path = above;
     path.push_back(8 * node + i);
     if (box.count == 0) {
-      descend(tree, surface, box.child, path, count);
+      descend(bvh, surface, box.child, path, count);
       continue;
     }
     for (int lane = 0; lane < box.count; ++lane) {
-      const std::uint32_t t = tree.leaves()[box.child].triangle[lane];
-      ++count.seen[t];
+      const std::uint32_t t = bvh.leaves()[box.child].triangle[lane];
+      ++count.visited[t];
       for (const std::uint32_t b : path) {
-        const auto& [centre, axis, half, size, child, n, features] = tree.boxes()[b];
+        const auto& [centre, axis, half, size, child, n, features] = bvh.boxes()[b];
         const Vector3d u(axis[0][0], axis[0][1], axis[0][2]), v(axis[1][0], axis[1][1], axis[1][2]);
         const std::array<Vector3d, 3> axes = {u, v, u.cross(v)};
         for (int k = 0; k < 3; ++k) {
@@ -49,24 +49,24 @@ void descend(const TriangleBvh& tree, const MeshSurface& surface, std::uint32_t 
   }
 }
 
-TEST_CASE("a tree holds every triangle once, inside all boxes above it", "[triangle_tree]") {
+TEST_CASE("a BVH contains every triangle once, inside all boxes above it", "[triangle_bvh]") {
   for (const char* kind : {"cube", "plate", "bumpy", "hole", "bolt", "gear"})
     for (const std::size_t triangles : {12, 500, 6000}) {
       INFO(kind << ' ' << triangles);
       const MeshSurface surface(make_mesh({kind, triangles}), Kind::solid);
-      const TriangleBvh tree(surface);
+      const TriangleBvh bvh(surface);
       Count count{std::vector<int>(surface.triangles().size(), 0)};
-      descend(tree, surface, 0, {}, count);
-      CHECK(std::all_of(count.seen.begin(), count.seen.end(), [](int n) { return n == 1; }));
+      descend(bvh, surface, 0, {}, count);
+      CHECK(std::all_of(count.visited.begin(), count.visited.end(), [](int n) { return n == 1; }));
       CHECK(count.worst_outside_m <= 0.0);
-      CHECK(static_cast<double>(tree.leaves().size()) <=
+      CHECK(static_cast<double>(bvh.leaves().size()) <=
             1.05 * static_cast<double>(surface.triangles().size()) / 8.0 + 1.0);
     }
 }
 
-TEST_CASE("a tree of no triangles is no tree", "[triangle_tree]") {
-  const TriangleBvh tree(MeshSurface(TriangleMesh{}, Kind::surface));
-  CHECK(tree.nodes().empty());
+TEST_CASE("a BVH without triangles is empty", "[triangle_bvh]") {
+  const TriangleBvh bvh(MeshSurface(TriangleMesh{}, Kind::surface));
+  CHECK(bvh.nodes().empty());
 }
 
 }  // namespace

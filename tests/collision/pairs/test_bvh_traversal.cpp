@@ -21,19 +21,19 @@ Triangle triangle(const MeshSurface& surface, std::uint32_t t, const Pose& X) {
   return {X * surface.corner_m(t, 0), X * surface.corner_m(t, 1), X * surface.corner_m(t, 2)};
 }
 
-/// Of the pairs that a walk lists, those that meet at a pose.
-PairSet meeting(BvhTraversal& walk, const MeshBvh& a, const MeshBvh& b, const Sweep& sweep,
-                const Pose& X_BA) {
+/// Counts the listed pairs that intersect at a pose.
+PairSet intersecting(BvhTraversal& traversal, const MeshBvh& a, const MeshBvh& b, const Sweep& sweep,
+                     const Pose& X_BA) {
   VisitBudget budget = {1000000000};
-  REQUIRE(walk.find(a.bvh, b.bvh, sweep, budget));
+  REQUIRE(traversal.find(a.bvh, b.bvh, sweep, budget));
   PairSet out;
-  for (const TrianglePair& pair : walk)
+  for (const TrianglePair& pair : traversal)
     if (triangles_intersect(triangle(a.surface, pair.a, X_BA), triangle(b.surface, pair.b, Pose{})))
       out.insert({pair.a, pair.b});
   return out;
 }
 
-/// A pose at which the two touch or overlap somewhere.
+/// Returns a pose at which the two meshes touch or overlap.
 Pose near_pose(RandomValues& random, const MeshBvh& a, const MeshBvh& b) {
   const double reach = a.surface.radius_m() + b.surface.radius_m();
   return {random.rotation(), random.uniform(0.3, 0.95) * reach * random.unit<3>()};
@@ -48,9 +48,9 @@ const std::vector<std::pair<GeneratedMesh, GeneratedMesh>>& mesh_pairs() {
   return pairs;
 }
 
-TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of processor", "[tree_walk]") {
+TEST_CASE("a traversal finds every pair that exact arithmetic finds, on every processor", "[bvh_traversal]") {
   RandomValues random(21);
-  BvhTraversal fastest, portable(simd::walk_portable);
+  BvhTraversal fastest, portable(simd::traverse_portable);
   std::size_t all = 0;
   for (const auto& [tool, obstacle] : mesh_pairs()) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
@@ -58,8 +58,8 @@ TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of
     for (int n = 0; n < 12; ++n) {
       const Pose X_BA = near_pose(random, a, b);
       const Sweep sweep = {X_BA, X_BA};
-      const PairSet found = meeting(fastest, a, b, sweep, X_BA);
-      CHECK(found == meeting(portable, a, b, sweep, X_BA));
+      const PairSet found = intersecting(fastest, a, b, sweep, X_BA);
+      CHECK(found == intersecting(portable, a, b, sweep, X_BA));
       CHECK(found.size() == exact.intersecting_pairs(X_BA));
       all += found.size();
     }
@@ -67,11 +67,12 @@ TEST_CASE("a walk finds every pair that exact arithmetic finds, on every kind of
   CHECK(all > 1000);
 }
 
-// What a sweep must list is found by trying: the pairs that meet at many poses on the way, and at many within
-// reach of its end.
-TEST_CASE("a swept walk lists whatever meets on the way and within reach of the end", "[tree_walk]") {
+// The pairs that a swept traversal must list are found by sampling: pairs that intersect at many poses on the
+// path, and at many within reach of its end.
+TEST_CASE("a swept traversal lists every pair that meets on the path or within reach of its end",
+          "[bvh_traversal]") {
   RandomValues random(22);
-  BvhTraversal still, swept, portable(simd::walk_portable);
+  BvhTraversal still, swept, portable(simd::traverse_portable);
   std::size_t all = 0;
   for (const auto& [tool, obstacle] : mesh_pairs()) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
@@ -79,14 +80,14 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
     for (int n = 0; n < 8; ++n) {
       Sweep sweep;
       sweep.X_BA_start = near_pose(random, a, b);
-      const double way = r * random.log_uniform(1e-4, 0.3), turn = random.log_uniform(1e-4, 0.05);
-      sweep.X_BA_end = {(sweep.X_BA_start.rotation * random.rotation(turn)).normalized(),
-                        sweep.X_BA_start.translation_m + way * random.unit<3>()};
-      sweep.reach_m = 0.3 * (way + turn * r);
+      const double path = r * random.log_uniform(1e-4, 0.3), rotation = random.log_uniform(1e-4, 0.05);
+      sweep.X_BA_end = {(sweep.X_BA_start.rotation * random.rotation(rotation)).normalized(),
+                        sweep.X_BA_start.translation_m + path * random.unit<3>()};
+      sweep.reach_m = 0.3 * (path + rotation * r);
       VisitBudget budget = {1000000000};
       std::set<std::pair<std::uint32_t, std::uint32_t>> listed, listed_portable;
       const bool complete = swept.find(a.bvh, b.bvh, sweep, budget);
-      if (!complete) continue;  // too long a way for the list
+      if (!complete) continue;  // the path is too long for the list
       for (const TrianglePair& pair : swept) listed.insert({pair.a, pair.b});
       CHECK(portable.find(a.bvh, b.bvh, sweep, budget));
       for (const TrianglePair& pair : portable) listed_portable.insert({pair.a, pair.b});
@@ -100,9 +101,9 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
           X = {(sweep.X_BA_end.rotation * random.rotation((1.0 - shift) * sweep.reach_m / r)).normalized(),
                sweep.X_BA_end.translation_m + shift * sweep.reach_m * random.unit<3>()};
         }
-        for (const auto& pair : meeting(still, a, b, {X, X}, X)) {
+        for (const auto& pair : intersecting(still, a, b, {X, X}, X)) {
           ++all;
-          // A pair that meets all along, or passes by, is not kept apart by any plane; it is always listed.
+          // No plane separates a pair that meets or passes, so it is always listed.
           REQUIRE(listed.count(pair) == 1);
           REQUIRE(listed_portable.count(pair) == 1);
         }
@@ -112,44 +113,44 @@ TEST_CASE("a swept walk lists whatever meets on the way and within reach of the 
   CHECK(all > 5000);
 }
 
-TEST_CASE("pairs without features that can meet first are left out when they are not wanted", "[tree_walk]") {
+TEST_CASE("a traversal omits pairs without features that can meet first, if requested", "[bvh_traversal]") {
   const MeshBvh a(make_mesh({"cube", 5000})), b(make_mesh({"table", 5000}));
   const Pose X_BA = {Quaterniond::Identity(), {0, 0, 0.035}};
   Sweep sweep = {X_BA, X_BA, 1e-5};
-  BvhTraversal walk;
+  BvhTraversal traversal;
   VisitBudget budget = {1000000};
-  CHECK(walk.find(a.bvh, b.bvh, sweep, budget));
-  const std::size_t all = walk.size();
+  CHECK(traversal.find(a.bvh, b.bvh, sweep, budget));
+  const std::size_t all = traversal.size();
   sweep.all_pairs = false;
-  CHECK(walk.find(a.bvh, b.bvh, sweep, budget));
-  CHECK(walk.size() * 4 < all);
+  CHECK(traversal.find(a.bvh, b.bvh, sweep, budget));
+  CHECK(traversal.size() * 4 < all);
   const auto has = [](const std::array<std::uint32_t, 3>& features) {
     return features != std::array{MeshSurface::kNone, MeshSurface::kNone, MeshSurface::kNone};
   };
   std::set<std::uint32_t> corners;
-  for (const TrianglePair& pair : walk) {
+  for (const TrianglePair& pair : traversal) {
     const auto& fa = a.surface.features()[pair.a];
     const auto& fb = b.surface.features()[pair.b];
     CHECK((has(fa.vertices) || has(fb.vertices) || (has(fa.edges) && has(fb.edges))));
     for (const std::uint32_t v : fa.vertices)
       if (v != MeshSurface::kNone) corners.insert(v);
   }
-  CHECK(corners.size() == 4);  // of the cube's lower face
+  CHECK(corners.size() == 4);  // corners of the cube's lower face
 }
 
-TEST_CASE("a walk stops where its budget ends, and says so", "[tree_walk]") {
+TEST_CASE("a traversal stops at the end of its budget and reports it", "[bvh_traversal]") {
   const MeshBvh a(make_mesh({"peg", 1000})), b(make_mesh({"hole", 2000}));
   const Sweep sweep = {Pose{Quaterniond::Identity(), {3e-4, 0, 0}},
                        Pose{Quaterniond::Identity(), {3e-4, 0, 0}}};
-  BvhTraversal walk;
+  BvhTraversal traversal;
   VisitBudget plenty = {1000000};
-  REQUIRE(walk.find(a.bvh, b.bvh, sweep, plenty));
+  REQUIRE(traversal.find(a.bvh, b.bvh, sweep, plenty));
   const std::uint32_t needed = 1000000 - plenty.remaining;
   CHECK(needed > 100);
   VisitBudget enough = {needed}, short_of_one = {needed - 1};
-  CHECK(walk.find(a.bvh, b.bvh, sweep, enough));
+  CHECK(traversal.find(a.bvh, b.bvh, sweep, enough));
   CHECK(enough.remaining == 0);
-  CHECK_FALSE(walk.find(a.bvh, b.bvh, sweep, short_of_one));
+  CHECK_FALSE(traversal.find(a.bvh, b.bvh, sweep, short_of_one));
 }
 
 }  // namespace

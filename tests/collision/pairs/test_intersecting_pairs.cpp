@@ -16,20 +16,20 @@ using namespace test;
 std::set<std::pair<std::uint32_t, std::uint32_t>> make_state_set(const IntersectingPairs& pairs) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> out;
   for (const TrianglePair& pair : pairs.pairs()) out.insert({pair.a, pair.b});
-  REQUIRE(out.size() == pairs.pairs().size());  // none twice
+  REQUIRE(out.size() == pairs.pairs().size());  // no pair occurs twice
   return out;
 }
 
-TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of processor",
-          "[meeting_pairs]") {
+TEST_CASE("the intersecting pairs are those of exact arithmetic, on every processor",
+          "[intersecting_pairs]") {
   const std::vector<std::pair<GeneratedMesh, GeneratedMesh>> cases = {
       {{"bumpy", 2000}, {"boulder", 3000}}, {{"cube", 12}, {"plate", 500}},
       {{"bolt", 2000}, {"nut", 2000}},      {{"gear", 3000}, {"gear", 1000}},
       {{"peg", 1000}, {"hole", 2000}},      {{"sphere", 80}, {"boulder", 20000}},
   };
   RandomValues random(31);
-  IntersectingPairs fastest, portable(simd::walk_portable);
-  std::size_t all = 0, asked = 0;
+  IntersectingPairs fastest, portable(simd::traverse_portable);
+  std::size_t all = 0, exact_tests = 0;
   for (const auto& [tool, obstacle] : cases) {
     const MeshBvh a(make_mesh(tool)), b(make_mesh(obstacle));
     const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
@@ -41,19 +41,19 @@ TEST_CASE("the pairs that meet are those of exact arithmetic, on every kind of p
       CHECK(make_state_set(fastest) == make_state_set(portable));
       CHECK(fastest.pairs().size() == exact.intersecting_pairs(X_BA));
       all += fastest.pairs().size();
-      asked += fastest.double_precision_tests();
+      exact_tests += fastest.double_precision_tests();
     }
   }
   CHECK(all > 2000);
-  CHECK(asked * 5 < all);  // single precision decides most
+  CHECK(exact_tests * 5 < all);  // single precision decides most pairs
 }
 
-// There one pair decides, and single precision cannot tell.
-TEST_CASE("at the verge of touching the pairs are those of exact arithmetic", "[meeting_pairs]") {
+// One pair decides, and single precision cannot classify it.
+TEST_CASE("nearly touching meshes yield the pairs of exact arithmetic", "[intersecting_pairs]") {
   const MeshBvh a(make_mesh({"bumpy", 2000})), b(make_mesh({"boulder", 3000}));
   const ExactIntersection exact(a.surface.mesh(), b.surface.mesh());
   RandomValues random(32);
-  IntersectingPairs pairs, portable(simd::walk_portable);
+  IntersectingPairs pairs, portable(simd::traverse_portable);
   for (int n = 0; n < 20; ++n) {
     const Quaterniond R = random.rotation();
     const Vector3d out = random.unit<3>();
@@ -73,7 +73,7 @@ TEST_CASE("at the verge of touching the pairs are those of exact arithmetic", "[
   }
 }
 
-TEST_CASE("faces that lie on each other meet in every pair of triangles that touch", "[meeting_pairs]") {
+TEST_CASE("coplanar touching faces intersect in every touching pair of triangles", "[intersecting_pairs]") {
   const MeshBvh cube(make_mesh({"cube", 12})), large(make_mesh({"cube", 1200}));
   const ExactIntersection exact(cube.surface.mesh(), large.surface.mesh());
   const double edge_m = 2.0 * cube.surface.mesh().vertices_m[0].cwiseAbs().maxCoeff();
@@ -87,18 +87,18 @@ TEST_CASE("faces that lie on each other meet in every pair of triangles that tou
   }
 }
 
-TEST_CASE("more pairs than there is room for are not taken for all", "[meeting_pairs]") {
+TEST_CASE("a search with more pairs than room reports that it is incomplete", "[intersecting_pairs]") {
   const MeshBvh bumpy(make_mesh({"bumpy", 60000}));
   for (const simd::TraversalKernel kernel :
-       {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::walk_portable}}) {
+       {simd::TraversalKernel{nullptr}, simd::TraversalKernel{simd::traverse_portable}}) {
     IntersectingPairs pairs(kernel);
-    CHECK_FALSE(pairs.find(bumpy, bumpy, Pose{}));  // each meets itself and its neighbours
+    CHECK_FALSE(pairs.find(bumpy, bumpy, Pose{}));  // every triangle intersects itself and its neighbours
     CHECK(pairs.pairs().size() <= BvhTraversal::kCapacity);
     CHECK(pairs.pairs().size() > BvhTraversal::kCapacity / 2);
   }
 }
 
-TEST_CASE("a mesh of no triangles meets nothing", "[meeting_pairs]") {
+TEST_CASE("a mesh without triangles intersects nothing", "[intersecting_pairs]") {
   const MeshBvh cube(make_mesh({"cube", 12})), nothing(TriangleMesh{});
   IntersectingPairs pairs;
   CHECK(pairs.find(cube, nothing, Pose{}));

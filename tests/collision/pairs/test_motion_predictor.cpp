@@ -15,12 +15,12 @@ double apart_m(const Pose& a, const Pose& b) {
   return (a.translation_m - b.translation_m).norm() + kRadius_m * a.rotation.angularDistance(b.rotation);
 }
 
-/// A hand that slides, turns and speeds up.
+/// A hand that translates, rotates and accelerates.
 Pose hand(double t) {
   return {rotation_from(t * Vector3d(0.0, 1e-3, 4e-4)), {0.10, 1e-4 * t + 1e-7 * t * t, -5e-5 * t}};
 }
 
-TEST_CASE("nothing is expected to move that never did", "[expected_motion]") {
+TEST_CASE("a predictor without motion predicts no motion", "[motion_predictor]") {
   MotionPredictor motion;
   CHECK_FALSE(motion.has_observation());
   motion.observe(hand(3), hand(0));
@@ -29,24 +29,24 @@ TEST_CASE("nothing is expected to move that never did", "[expected_motion]") {
   CHECK(motion.chord_deviation_m(20, kRadius_m) == 0.0);
 }
 
-TEST_CASE("a tool that goes with the hand is expected where it will be", "[expected_motion]") {
+TEST_CASE("the prediction of a tool that moves with the hand is correct", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 100; ++i) motion.observe(hand(i), hand(i));
   const double way_m = apart_m(hand(100), hand(120));
   CHECK(apart_m(motion.predict(0), hand(100)) < 1e-15);
   CHECK(apart_m(motion.predict(20), hand(120)) < 0.02 * way_m);
-  // A parabola of 2e-7 m per tick and tick leaves its chord by an eighth of that times 20^2.
+  // A parabola of 2e-7 m per tick^2 deviates from its chord by an eighth of that times 20^2.
   CHECK(motion.chord_deviation_m(20, 0.0) == Approx(1e-5).epsilon(0.01));
 }
 
-TEST_CASE("a tool that is held drifts from the hand", "[expected_motion]") {
+TEST_CASE("a held tool drifts from the hand in the prediction", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 200; ++i) motion.observe(hand(0), hand(i));
-  // It stays, but for what the hand gains in speed.
+  // The tool stays, except for the hand's gain in speed.
   CHECK(apart_m(motion.predict(10), hand(0)) < 0.1 * apart_m(hand(200), hand(210)));
 }
 
-TEST_CASE("a tool that jitters is expected to go with the hand", "[expected_motion]") {
+TEST_CASE("a jittering tool is predicted to move with the hand", "[motion_predictor]") {
   RandomValues random(61);
   MotionPredictor motion;
   double farthest_m = 0.0;
@@ -55,11 +55,11 @@ TEST_CASE("a tool that jitters is expected to go with the hand", "[expected_moti
     motion.observe(jitters, hand(i));
     if (i > 100) farthest_m = std::max(farthest_m, apart_m(motion.predict(20), hand(i + 20)));
   }
-  // By its own steps alone it would be expected up to 20 steps of 1e-5 m away.
+  // From its own steps alone it would be predicted up to 20 steps of 1e-5 m away.
   CHECK(farthest_m < 1e-4);
 }
 
-TEST_CASE("what was forgotten is not expected to go on", "[expected_motion]") {
+TEST_CASE("after a reset the predictor predicts no motion", "[motion_predictor]") {
   MotionPredictor motion;
   for (int i = 0; i <= 50; ++i) motion.observe(hand(i), hand(i));
   motion.reset();
@@ -68,7 +68,7 @@ TEST_CASE("what was forgotten is not expected to go on", "[expected_motion]") {
   CHECK(apart_m(motion.predict(20), hand(0)) < 1e-15);
 }
 
-TEST_CASE("a tool that is late is expected where it would have come to", "[expected_motion]") {
+TEST_CASE("a deferred tick predicts the tool where it would have moved", "[motion_predictor]") {
   MotionPredictor motion;
   motion.observe_deferred(hand(0));
   CHECK_FALSE(motion.has_observation());

@@ -20,13 +20,13 @@ const Scene& bumpy_bodies() {
   return scene;
 }
 
-/// A tool that slides along, turning and speeding up a little.
+/// A tool that translates, rotates and accelerates slightly.
 Pose restrict_to_dofs(double t) {
   return {rotation_from(t * Vector3d(0.0, 5e-4, 2e-4)), {0.10, 1e-4 * t + 2e-7 * t * t, -5e-5 * t}};
 }
 
-/// The servo loop's use of it: a look from the last pose to this one, then a look ahead. Answers whether the
-/// way was listed.
+/// Use by the servo loop: a sweep from the last pose to this one, then a prefetch. Returns whether the path
+/// was covered.
 bool tick(PredictiveCandidateList& pairs, const Pose& from, const Pose& to) {
   VisitBudget budget = {kPlenty};
   const bool listed = pairs.ensure_covers(from, to, budget);
@@ -34,28 +34,28 @@ bool tick(PredictiveCandidateList& pairs, const Pose& from, const Pose& to) {
   return listed;
 }
 
-TEST_CASE("what moves evenly needs no list at once", "[pairs_ahead]") {
+TEST_CASE("uniform motion needs no immediate list", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
-  const std::uint32_t at_first = pairs.immediate_lists();
-  CHECK(at_first >= 1);  // nothing was known of the motion
-  CHECK(at_first <= 6);
+  const std::uint32_t initially = pairs.immediate_lists();
+  CHECK(initially >= 1);  // no motion was known
+  CHECK(initially <= 6);
   int changes = 0;
   for (int i = 60; i < 160; ++i) {
     const CandidatePairs* before = &pairs.current();
     REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
     changes += &pairs.current() != before;
   }
-  CHECK(pairs.immediate_lists() == at_first);
-  CHECK(changes > 5);  // it left one list after the other
+  CHECK(pairs.immediate_lists() == initially);
+  CHECK(changes > 5);  // the list changed several times
 }
 
-// In visits, not in time. Where the list ahead were left to the end, or the one at once were a long one, a
-// tick would have ten times the work of the others.
-TEST_CASE("the work for lists ahead is spread over the ticks", "[pairs_ahead]") {
+// The unit is node visits, not time. If the prefetch were left to the end, or an immediate list were long,
+// one tick would have ten times the work of the others.
+TEST_CASE("the work for prefetched lists is spread over the ticks", "[predictive_candidate_list]") {
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
-  const auto inside = [](int i) {  // where many pairs are near
+  const auto inside = [](int i) {  // many pairs are near
     return Pose{restrict_to_dofs(i).rotation, restrict_to_dofs(i).translation_m - Vector3d(0.003, 0, 0)};
   };
   PredictiveCandidateList pairs(scene);
@@ -72,7 +72,8 @@ TEST_CASE("the work for lists ahead is spread over the ticks", "[pairs_ahead]") 
   CHECK(most < 3 * all / 100);
 }
 
-TEST_CASE("with work to spare lists are younger, and what is spent is no more than that", "[pairs_ahead]") {
+TEST_CASE("spare work makes lists younger, and the prefetch uses no more than that",
+          "[predictive_candidate_list]") {
   const auto lists = [](std::uint32_t to_spare) {
     PredictiveCandidateList pairs(bumpy_bodies());
     int changes = 0;
@@ -90,7 +91,7 @@ TEST_CASE("with work to spare lists are younger, and what is spent is no more th
   CHECK(lists(1000) > 1.5 * lists(0));
 }
 
-TEST_CASE("at rest nothing is listed, whatever there is to spare", "[pairs_ahead]") {
+TEST_CASE("a tool at rest builds no list, however much work is spare", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   for (int i = 0; i < 100; ++i) {
@@ -101,7 +102,8 @@ TEST_CASE("at rest nothing is listed, whatever there is to spare", "[pairs_ahead
   }
 }
 
-TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pairs_ahead]") {
+TEST_CASE("a late prefetched list is completed, and no immediate list is built",
+          "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   int i = 1;
   for (; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
@@ -112,15 +114,15 @@ TEST_CASE("a list ahead that is late is ended, and none is made beside it", "[pa
     VisitBudget budget = {kPlenty}, starved = {1};
     REQUIRE(pairs.ensure_covers(restrict_to_dofs(i - 1), restrict_to_dofs(i), budget));
     changes += &pairs.current() != last ? 1 : 0;
-    if (changes == 2) CHECK(budget.remaining < kPlenty);  // the first may have been done, not this one
+    if (changes == 2) CHECK(budget.remaining < kPlenty);  // the first one may be complete, this one not
     pairs.prefetch(restrict_to_dofs(i), restrict_to_dofs(i), starved);
   }
   REQUIRE(changes == 2);
   CHECK(pairs.immediate_lists() == before);
 }
 
-// A look may go farther than the tool comes in the end: what was left for it is not gone back to.
-TEST_CASE("a list that has served does not come back", "[pairs_ahead]") {
+// A sweep may go farther than the tool moves in the end. The rest of its list is not continued.
+TEST_CASE("a used list is not used again", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   int changes = 0;
@@ -136,15 +138,16 @@ TEST_CASE("a list that has served does not come back", "[pairs_ahead]") {
   CHECK(changes > 5);
 }
 
-// For some ticks no work is left for the list ahead, until the one that serves holds no longer.
-TEST_CASE("what can be made at once goes before a list ahead that cannot be ended in time", "[pairs_ahead]") {
+// For some ticks no work is available for the next list, until the current one expires.
+TEST_CASE("an immediate list takes precedence over a prefetched list that cannot be completed in time",
+          "[predictive_candidate_list]") {
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
   const auto round = [](int i) {
     const double angle = 2e-3 * i;
     return Pose{rotation_from(Vector3d(0, 0, -angle)), 0.1 * Vector3d(std::cos(angle), std::sin(angle), 0)};
   };
-  const auto made_at_once = [&](std::uint32_t part) {
+  const auto builds_immediately = [&](std::uint32_t part) {
     PredictiveCandidateList pairs(scene);
     int i = -60;
     double widest_m = 0.0;
@@ -166,18 +169,18 @@ TEST_CASE("what can be made at once goes before a list ahead that cannot be ende
       pairs.prefetch(round(i), round(i), starved);
     }
     const bool made = pairs.immediate_lists() > before;
-    // The tool was where it was expected: the lists to come need not hold for more.
+    // The predictions were correct, so the next lists need no larger reach.
     const double usual_m = std::exchange(widest_m, 0.0);
     go_to(i + 20);
     CHECK(widest_m < 1.2 * usual_m);
     return made;
   };
-  CHECK_FALSE(made_at_once(2000));  // the list ahead is ended
-  CHECK(made_at_once(600));
-  CHECK_FALSE(made_at_once(100));  // the list ahead is gone on with
+  CHECK_FALSE(builds_immediately(2000));  // the prefetched list is completed
+  CHECK(builds_immediately(600));
+  CHECK_FALSE(builds_immediately(100));  // the prefetched list continues
 }
 
-TEST_CASE("after a list made at once the next leads on from where it ends", "[pairs_ahead]") {
+TEST_CASE("after an immediate list the next list starts where it ends", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t before = pairs.immediate_lists();
@@ -195,7 +198,7 @@ TEST_CASE("after a list made at once the next leads on from where it ends", "[pa
   CHECK(pairs.immediate_lists() == before + 1);
 }
 
-TEST_CASE("what turns round is listed at once", "[pairs_ahead]") {
+TEST_CASE("a reversal of the motion causes an immediate list", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t before = pairs.immediate_lists();
@@ -207,8 +210,8 @@ TEST_CASE("what turns round is listed at once", "[pairs_ahead]") {
   CHECK(pairs.current().covers(aside));
 }
 
-TEST_CASE("a way that is too long for the budget is not listed, and what was listed remains",
-          "[pairs_ahead]") {
+TEST_CASE("a path that exceeds the budget gets no list, and the current list remains",
+          "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   REQUIRE(tick(pairs, restrict_to_dofs(0), restrict_to_dofs(1)));
   const CandidatePairs* before = &pairs.current();
@@ -220,7 +223,7 @@ TEST_CASE("a way that is too long for the budget is not listed, and what was lis
   CHECK(few.remaining <= 20);
 }
 
-TEST_CASE("a tool that was put elsewhere is not expected to fly on", "[pairs_ahead]") {
+TEST_CASE("after a reset no motion is predicted", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 40; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   pairs.reset();
@@ -232,11 +235,11 @@ TEST_CASE("a tool that was put elsewhere is not expected to fly on", "[pairs_ahe
   CHECK(pairs.current().covers(near(20)));
   const std::uint32_t before = pairs.immediate_lists();
   for (int i = 20; i < 40; ++i) REQUIRE(tick(pairs, near(i - 1), near(i)));
-  CHECK(pairs.immediate_lists() == before);  // one list holds: it hardly moves
+  CHECK(pairs.immediate_lists() == before);  // one list suffices: the tool hardly moves
 }
 
-// What can wait takes no more of a tick than there is for it; the list that serves goes on to serve.
-TEST_CASE("a list that may wait is made over several ticks, and serves then", "[pairs_ahead]") {
+// Deferrable work uses no more of a tick than its budget. The current list remains in use.
+TEST_CASE("a deferrable list is built over several ticks and then used", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const std::uint32_t before = pairs.immediate_lists();
@@ -260,7 +263,7 @@ TEST_CASE("a list that may wait is made over several ticks, and serves then", "[
   CHECK(pairs.covered_fraction(restrict_to_dofs(59), aside) == 1.0);
 }
 
-TEST_CASE("a list that waits is given up where the way leads elsewhere", "[pairs_ahead]") {
+TEST_CASE("a pending list is discarded if the path leads elsewhere", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
   const auto aside = [&](double s) {

@@ -12,8 +12,8 @@ namespace {
 using namespace test;
 
 std::vector<SeparatingAxes> kernels() {
-  std::vector<SeparatingAxes> all = {SeparatingAxes(simd::apart_portable)};
-  if (simd::has_avx2()) all.emplace_back(simd::apart_avx2);
+  std::vector<SeparatingAxes> all = {SeparatingAxes(simd::separated_portable)};
+  if (simd::has_avx2()) all.emplace_back(simd::separated_avx2);
   return all;
 }
 
@@ -32,7 +32,8 @@ Triangle between(const Triangle& a, const Triangle& b, double t) {
   return {(1 - t) * a[0] + t * b[0], (1 - t) * a[1] + t * b[1], (1 - t) * a[2] + t * b[2]};
 }
 
-TEST_CASE("axes keep apart no pair that meets on the way, of any size and anywhere", "[separating_axes]") {
+TEST_CASE("separating axes never separate a pair that meets on the path, at any size and position",
+          "[separating_axes]") {
   RandomValues random(17);
   int met = 0, apart = 0, parted = 0;
   const int runs = case_count(20000);
@@ -43,7 +44,7 @@ TEST_CASE("axes keep apart no pair that meets on the way, of any size and anywhe
     const Triangle start = triangle(random, where + 0.5 * size_m * random.unit<3>(), size_m);
     const Vector3d way_m = size_m * random.log_uniform(1e-4, 3.0) * random.unit<3>();
     Triangle end = moved(start, way_m);
-    for (Vector3d& p : end) p += 0.1 * size_m * random.unit<3>();  // it turns, too
+    for (Vector3d& p : end) p += 0.1 * size_m * random.unit<3>();  // includes a rotation
     bool meets = false;
     for (int k = 0; k <= 20 && !meets; ++k) meets = triangles_intersect(between(start, end, k / 20.0), b);
     met += meets;
@@ -60,16 +61,16 @@ TEST_CASE("axes keep apart no pair that meets on the way, of any size and anywhe
   CHECK(apart > parted / 2);
 }
 
-TEST_CASE("axes keep apart by the margin, to a nanometre between small triangles", "[separating_axes]") {
+TEST_CASE("separating axes respect the margin, down to 1 nm between small triangles", "[separating_axes]") {
   RandomValues random(18);
   const double size_m = 1e-4;
   for (int n = 0; n < 300; ++n) {
-    // One corner above the middle of the other's side: only a plane upright on that side, or one parallel to
-    // two edges, is between them.
-    const Quaterniond turn = random.rotation();
+    // One corner lies above the middle of the other triangle's side. Only a plane that contains that side and
+    // the normal, or one parallel to two edges, separates them.
+    const Quaterniond rotation = random.rotation();
     const Vector3d place = 0.1 * random.unit<3>();
     const auto put = [&](double x, double y, double z) -> Vector3d {
-      return place + turn * (size_m * Vector3d(x, y, z));
+      return place + rotation * (size_m * Vector3d(x, y, z));
     };
     const Triangle b = {put(-1, 0, 0), put(1, 0, 0), put(0, -1, 0)};
     const double gap_m = random.log_uniform(1e-8, 1e-5);
@@ -83,7 +84,7 @@ TEST_CASE("axes keep apart by the margin, to a nanometre between small triangles
   }
 }
 
-TEST_CASE("triangles without area are never apart by mistake", "[separating_axes]") {
+TEST_CASE("triangles without area are never separated wrongly", "[separating_axes]") {
   const Vector3d p(0.1, 0.2, 0.3), q = p + Vector3d(1e-3, 0, 0);
   const Triangle point = {p, p, p}, line = {p, q, p};
   const Triangle b = {p - Vector3d(1e-3, 1e-3, 0), p + Vector3d(2e-3, -1e-3, 0), p + Vector3d(0, 2e-3, 0)};

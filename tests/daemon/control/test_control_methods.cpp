@@ -89,7 +89,7 @@ TEST_CASE("every method is documented, and takes its parameters and no other", "
         bad[param.name] = wrong;
         const RpcError error = refused(t.methods, name, bad, Role::administrator);
         CHECK(error.code() == RpcCode::invalid_params);
-        CHECK(says(error, "'" + param.name + "' has to be " + type_text(param.type)));
+        CHECK(says(error, "'" + param.name + "' must be " + type_text(param.type)));
       }
       Json less = good;
       less.erase(param.name);
@@ -109,7 +109,7 @@ TEST_CASE("every method refuses each role below its own, whatever the parameters
       for (const Json& params : {good_params(row), Json{{"no_such_thing", 1}}}) {
         const RpcError error = refused(t.methods, name, params, role);
         CHECK(error.code() == RpcCode::permission_denied);
-        CHECK(error.details()["needs"] == wrenchd::name(row.min_role));
+        CHECK(error.details()["min_role"] == wrenchd::name(row.min_role));
         CHECK(says(error, "group '"));
         ++refusals;
       }
@@ -121,8 +121,8 @@ TEST_CASE("anybody may stop and look, operators may arm, and nobody below", "[co
   const Table t;
   for (const char* open : {"describe", "status", "subscribe", "unsubscribe", "stop", "devices"})
     CHECK(t.methods.methods().at(open).min_role == Role::observer);
-  for (const char* closed :
-       {"lease.take", "lease.give", "beat", "arm", "disarm", "acknowledge", "start_over"})
+  for (const char* closed : {"lease.acquire", "lease.release", "lease.heartbeat", "arm", "disarm",
+                             "acknowledge", "reinitialize_proxy"})
     CHECK(t.methods.methods().at(closed).min_role == Role::operator_);
 }
 
@@ -130,7 +130,7 @@ TEST_CASE("what does not exist is told with what is nearest", "[control_methods]
   const Table t;
   const RpcError error = refused(t.methods, "lease_take", Json::object(), Role::observer);
   CHECK(error.code() == RpcCode::method_not_found);
-  CHECK(says(error, "did you mean 'lease.take'?"));
+  CHECK(says(error, "did you mean 'lease.acquire'?"));
   CHECK(says(refused(t.methods, "subscribe", {{"event", Json::array()}}, Role::observer),
              "there is no parameter 'event'; did you mean 'events'?"));
   CHECK(refused(t.methods, std::string(60000, 'x'), Json::object(), Role::observer).code() ==
@@ -144,7 +144,7 @@ TEST_CASE("describe tells all of the table", "[control_methods]") {
   CHECK(told["methods"].size() == t.methods.methods().size());
   for (const Json& method : told["methods"]) {
     const MethodRow& row = t.methods.methods().at(method["name"].get<std::string>());
-    CHECK(method["role"] == name(row.min_role));
+    CHECK(method["min_role"] == name(row.min_role));
     CHECK(method["doc"] == row.doc);
     CHECK(method["params"].size() == row.params.size());
   }
@@ -153,7 +153,8 @@ TEST_CASE("describe tells all of the table", "[control_methods]") {
     events.insert(event["name"].get<std::string>());
     CHECK(event["doc"].get<std::string>().size() > 10);
   }
-  for (const char* name : {"state", "fault", "device", "lease", "stiffness", "placing", "lost"})
+  for (const char* name :
+       {"state", "fault", "device", "lease", "stiffness", "proxy_initialization", "events_lost"})
     CHECK(events.count(name) == 1);
   CHECK(told["errors"].size() == 9);
   for (const Json& error : told["errors"]) CHECK(error["code"].get<int>() < 0);

@@ -84,7 +84,7 @@ void send_files(const RigClient& client, int count) {
 
 void claim_root(const RigClient& client) {
   std::array<char, CMSG_SPACE(sizeof(ucred))> control{};
-  std::string bytes = request("lease.take");
+  std::string bytes = request("lease.acquire");
   iovec part{bytes.data(), bytes.size()};
   msghdr message{};
   message.msg_iov = &part;
@@ -131,11 +131,11 @@ std::vector<Abuse> abuses() {
   std::vector<Abuse> table = {
       forbidden("arm"),
       forbidden("disarm"),
-      forbidden("lease.take"),
-      forbidden("lease.give"),
-      forbidden("beat"),
+      forbidden("lease.acquire"),
+      forbidden("lease.release"),
+      forbidden("lease.heartbeat"),
       forbidden("acknowledge"),
-      forbidden("start_over"),
+      forbidden("reinitialize_proxy"),
       line_of("no such method", request("sudo"), RpcCode::method_not_found),
       line_of("a method with a path in it", request("../../stop"), RpcCode::method_not_found),
       line_of("a method of 60 kB", request(std::string(60000, 'm')), RpcCode::method_not_found),
@@ -146,11 +146,11 @@ std::vector<Abuse> abuses() {
               "\n",
               RpcCode::invalid_request),
       line_of("operator arms without the lease", request("arm"), RpcCode::invalid_state, TestUser::operator_),
-      line_of("operator beats without the lease", request("beat"), RpcCode::invalid_state,
+      line_of("operator beats without the lease", request("lease.heartbeat"), RpcCode::invalid_state,
               TestUser::operator_),
-      line_of("operator gives what it has not", request("lease.give"), RpcCode::invalid_state,
+      line_of("operator gives what it has not", request("lease.release"), RpcCode::invalid_state,
               TestUser::operator_),
-      line_of("operator takes the lease from another", request("lease.take", R"({"from_other":true})"),
+      line_of("operator takes the lease from another", request("lease.acquire", R"({"preempt":true})"),
               RpcCode::permission_denied, TestUser::operator_),
       line_of("a batch with stop in it", "[" + request("stop").substr(0, request("stop").size() - 1) + "]\n",
               RpcCode::invalid_request),
@@ -189,7 +189,7 @@ std::vector<Abuse> abuses() {
       {"half a line, and hangs up",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
-         client.send(request("lease.take").substr(0, 40));
+         client.send(request("lease.acquire").substr(0, 40));
          client.disconnect();
        }},
       {"a request without its end, and hangs up",
@@ -273,7 +273,7 @@ std::vector<Abuse> abuses() {
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"arm\"}\n", 5000);
-         flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"lease.take\"}\n", 100);
+         flood(client, "{\"jsonrpc\":\"2.0\",\"method\":\"lease.acquire\"}\n", 100);
        }},
       {"a subscriber that never reads",
        [](ControlRig& rig) {
@@ -347,22 +347,22 @@ std::vector<Abuse> abuses() {
       {"takes and gives the lease without end",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
-         flood(client, request("lease.take") + request("lease.give"), 200);
+         flood(client, request("lease.acquire") + request("lease.release"), 200);
        }},
       {"two want the lease",
        [](ControlRig& rig) {
          RigClient first = rig.connect(TestUser::operator_), second = rig.connect(TestUser::operator_);
-         for (const char* method : {"lease.take", "arm", "beat", "lease.give"}) {
-           CHECK(first.error_code("lease.take") == 0);  // and counts as a sign of life
+         for (const char* method : {"lease.acquire", "arm", "lease.heartbeat", "lease.release"}) {
+           CHECK(first.error_code("lease.acquire") == 0);  // and counts as a sign of life
            CHECK(second.error_code(method) == code_of(RpcCode::lease_held));
          }
-         CHECK(second.error_code("lease.take", {{"from_other", true}}) ==
+         CHECK(second.error_code("lease.acquire", {{"preempt", true}}) ==
                code_of(RpcCode::permission_denied));
        }},
       {"another process keeps the holder's connection open",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
-         CHECK(client.error_code("lease.take") == 0);
+         CHECK(client.error_code("lease.acquire") == 0);
          CHECK(client.error_code("arm") == 0);
          const pid_t child = ::fork();
          if (child == 0) {
@@ -377,7 +377,7 @@ std::vector<Abuse> abuses() {
       {"the holder hangs up in the middle of a line",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
-         client.send(request("lease.take") + request("arm"));
+         client.send(request("lease.acquire") + request("arm"));
          CHECK(next_code(client) == 0);
          CHECK(next_code(client) == 0);
          CHECK(rig.wait_for_state(State::waiting, 500ms));
@@ -432,10 +432,10 @@ TEST_CASE("anybody who may connect can stop, and only operators take it back", "
   ControlRig rig;
   RigClient observer = rig.connect(TestUser::observer), operating = rig.connect(TestUser::operator_);
   CHECK(operating.error_code("acknowledge") == code_of(RpcCode::invalid_state));
-  CHECK(observer.result("stop")["asked"] == "stop");
+  CHECK(observer.result("stop")["requested"] == "stop");
   CHECK(rig.wait_for_state(State::stopped));
   CHECK(observer.error_code("acknowledge") == code_of(RpcCode::permission_denied));
-  CHECK(operating.error_code("lease.take") == 0);
+  CHECK(operating.error_code("lease.acquire") == 0);
   CHECK(operating.error_code("arm") == code_of(RpcCode::invalid_state));
   CHECK(rig.state() == State::stopped);
   CHECK(operating.error_code("acknowledge") == 0);
@@ -459,12 +459,12 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
   // ours.
   bool holds = false;
   for (int attempt = 0; attempt < 5 && !holds; ++attempt) {
-    REQUIRE(holder.error_code("lease.take") == 0);
+    REQUIRE(holder.error_code("lease.acquire") == 0);
     for (int beats = 0; beats < 40; ++beats) {
       holder.heartbeat();
       std::this_thread::sleep_for(20ms);
     }
-    holds = holder.error_code("beat") == 0;
+    holds = holder.error_code("lease.heartbeat") == 0;
   }
   if (!kSanitized) CHECK(holds);
   RigClient observer = rig.connect(TestUser::observer);
@@ -491,7 +491,7 @@ TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releas
   });
   // Where the machine lets a beat wait for too long it is tried again.
   for (int attempt = 0; attempt < 5 && rig.state() != State::active; ++attempt) {
-    CHECK(holder->result("lease.take")["beat_within_s"] == 0.1);
+    CHECK(holder->result("lease.acquire")["heartbeat_timeout_s"] == 0.1);
     CHECK(holder->error_code("arm") == 0);
     rig.wait_for_state(State::active, 2000ms);
   }
@@ -525,9 +525,9 @@ TEST_CASE("an administrator takes the lease from another, who is told", "[contro
   ControlRig rig;
   RigClient holder = rig.connect(TestUser::operator_), administrator = rig.connect(TestUser::administrator);
   holder.result("subscribe", {{"events", {"lease"}}});
-  CHECK(holder.error_code("lease.take") == 0);
-  CHECK(administrator.error_code("lease.take") == code_of(RpcCode::lease_held));
-  CHECK(administrator.result("lease.take", {{"from_other", true}})["beat_within_s"] == 0.1);
+  CHECK(holder.error_code("lease.acquire") == 0);
+  CHECK(administrator.error_code("lease.acquire") == code_of(RpcCode::lease_held));
+  CHECK(administrator.result("lease.acquire", {{"preempt", true}})["heartbeat_timeout_s"] == 0.1);
   const Json taken = holder.next_event("lease");
   CHECK(taken["holder"].get<std::string>().find("uid 60003") != std::string::npos);
   CHECK(holder.next_event("lease")["holder"].is_null());
@@ -549,7 +549,7 @@ TEST_CASE("events come in their order, and what a slow reader loses is counted",
     REQUIRE(line);
     const Json event = Json::parse(*line)["params"];
     const auto sequence = event["sequence"].get<std::uint64_t>();
-    if (event["name"] == "lost") {
+    if (event["name"] == "events_lost") {
       lost += event["count"].get<std::uint64_t>();
       CHECK(sequence == last + event["count"].get<std::uint64_t>());
     } else {
@@ -652,7 +652,7 @@ TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
 TEST_CASE("a daemon that ends tells those who listen, and hangs up", "[control_socket]") {
   auto rig = std::make_optional<ControlRig>();
   RigClient client = rig->connect(TestUser::operator_);
-  CHECK(client.error_code("lease.take") == 0);
+  CHECK(client.error_code("lease.acquire") == 0);
   client.result("subscribe");
   rig.reset();
   std::vector<std::string> names;

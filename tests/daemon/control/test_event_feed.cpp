@@ -9,8 +9,8 @@ namespace {
 
 using namespace test;
 
-std::vector<Json> operator_instruction(const EventFeed& feed, std::uint64_t next,
-                                       const std::set<std::string>& names = {}) {
+std::vector<Json> events_of(const EventFeed& feed, std::uint64_t next,
+                            const std::set<std::string>& names = {}) {
   std::vector<Json> events;
   for (const std::string& line : feed.events_since(next, names, 1 << 20).lines)
     events.push_back(Json::parse(line)["params"]);
@@ -22,13 +22,13 @@ TEST_CASE("events of the loop get numbers without a gap, their names, levels, ti
   VirtualRuntime s{resting_config()};
   EventFeed feed(s.runtime.loop());
   s.run(0.05);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   s.run(1.0);
   REQUIRE(s.state() == State::active);
-  s.runtime.loop().stop();
+  s.runtime.loop().requests().stop();
   s.tick();
   feed.drain();
-  const auto events = operator_instruction(feed, 1);
+  const auto events = events_of(feed, 1);
   REQUIRE(events.size() > 5);
   for (std::size_t i = 0; i < events.size(); ++i) {
     CHECK(events[i]["sequence"] == i + 1);
@@ -36,20 +36,20 @@ TEST_CASE("events of the loop get numbers without a gap, their names, levels, ti
     CHECK(events[i]["time_ns"].is_number_integer());
   }
   std::vector<std::string> states;
-  for (const Json& event : operator_instruction(feed, 1, {"state"})) states.push_back(event["state"]);
+  for (const Json& event : events_of(feed, 1, {"state"})) states.push_back(event["state"]);
   CHECK(states == std::vector<std::string>{"disarmed", "waiting", "ramping", "active", "stopped"});
-  const auto faults = operator_instruction(feed, 1, {"fault"});
+  const auto faults = events_of(feed, 1, {"fault"});
   REQUIRE(faults.size() == 1);
-  CHECK(faults[0]["fault"]["name"] == "stop_asked");
+  CHECK(faults[0]["fault"]["name"] == "stop_requested");
   CHECK(faults[0]["fault"]["cure"].get<std::string>() != "");
   CHECK(faults[0]["level"] == "error");
-  CHECK(operator_instruction(feed, 1, {"state"}).back()["cause"]["name"] == "stop_asked");
-  CHECK(operator_instruction(feed, 1, {"device"})[0]["present"] == true);
+  CHECK(events_of(feed, 1, {"state"}).back()["cause"]["name"] == "stop_requested");
+  CHECK(events_of(feed, 1, {"device"})[0]["present"] == true);
   const FeedSnapshot now = feed.snapshot();
   CHECK(now.sequence == events.size());
   CHECK(now.state == State::stopped);
   CHECK(now.cause == Fault::stop_requested);
-  CHECK(now.proxy_initialization == "placed");
+  CHECK(now.proxy_initialization == "found");
 }
 
 TEST_CASE("a snapshot and the events after it are the whole story, while the loop runs", "[event_feed]") {
@@ -59,11 +59,11 @@ TEST_CASE("a snapshot and the events after it are the whole story, while the loo
   // The loop comes to new states, its events are drained by a thread, and snapshots are taken by this one.
   std::thread life([&] {
     while (!stop) {
-      s.runtime.loop().arm();
+      s.runtime.loop().requests().arm();
       s.run(0.6);
-      s.runtime.loop().stop();
+      s.runtime.loop().requests().stop();
       s.tick();
-      s.runtime.loop().acknowledge();
+      s.runtime.loop().requests().acknowledge();
       s.tick();
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }

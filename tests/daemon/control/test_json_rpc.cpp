@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/json_rpc.hpp"
+#include "tests/support/request_line.hpp"
 
 namespace wrenchd {
 namespace {
@@ -58,9 +59,9 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
       {head + ",\"params\":{\"a\":\"\xc0\x80\"}}", RpcCode::parse_error, "it is no JSON"},
       {head + ",\"params\":{\"a\":\"\\ud800\"}}", RpcCode::parse_error, "it is no JSON"},
       {head + ",\"params\":{\"a\":\"\t\"}}", RpcCode::parse_error, "it is no JSON"},
-      {head + std::string("}\0", 2), RpcCode::parse_error, "it holds a zero byte"},
-      {head + ",\"params\":{\"a\":\"x\\u0000y\"}}", RpcCode::parse_error, "holds the character zero"},
-      {head + ",\"params\":{\"a\\u0000\":1}}", RpcCode::parse_error, "holds the character zero"},
+      {head + std::string("}\0", 2), RpcCode::parse_error, "it contains a zero byte"},
+      {head + ",\"params\":{\"a\":\"x\\u0000y\"}}", RpcCode::parse_error, "contains the character zero"},
+      {head + ",\"params\":{\"a\\u0000\":1}}", RpcCode::parse_error, "contains the character zero"},
       {head + ",\"id\":6}", RpcCode::parse_error, "the name 'id' stands twice in one object"},
       {head + ",\"params\":{\"a\":[{\"b\":1,\"b\":2}]}}", RpcCode::parse_error, "the name 'b' stands twice"},
       {nested(kMaxDepth - 1), RpcCode::parse_error, "deeper than 16"},
@@ -72,26 +73,28 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
       {"1", RpcCode::invalid_request, "A request is an object"},
       {"\"stop\"", RpcCode::invalid_request, "A request is an object"},
       {"null", RpcCode::invalid_request, "A request is an object"},
-      {"{}", RpcCode::invalid_request, "This is JSON-RPC 2.0"},
-      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::invalid_request, "This is JSON-RPC 2.0", true},
-      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::invalid_request, "This is JSON-RPC 2.0", true},
+      {"{}", RpcCode::invalid_request, "does not name JSON-RPC 2.0"},
+      {R"({"jsonrpc":"1.0","id":5,"method":"stop"})", RpcCode::invalid_request, "does not name JSON-RPC 2.0",
+       true},
+      {R"({"jsonrpc":2.0,"id":5,"method":"stop"})", RpcCode::invalid_request, "does not name JSON-RPC 2.0",
+       true},
       {R"({"jsonrpc":"2.0","id":5})", RpcCode::invalid_request, "names no method", true},
       {R"({"jsonrpc":"2.0","id":5,"method":5})", RpcCode::invalid_request, "names no method", true},
       {head + ",\"parms\":{}}", RpcCode::invalid_request, "no member 'parms'; did you mean 'params'?", true},
       {head + ",\"params\":[1]}", RpcCode::invalid_params, "Parameters have names", true},
       {head + ",\"params\":null}", RpcCode::invalid_params, "Parameters have names", true},
-      {R"({"jsonrpc":"2.0","id":1.5,"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":null,"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":{},"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
-      {R"({"jsonrpc":"2.0","id":true,"method":"stop"})", RpcCode::invalid_request, "The id has to be"},
+      {R"({"jsonrpc":"2.0","id":1.5,"method":"stop"})", RpcCode::invalid_request, "The id must be"},
+      {R"({"jsonrpc":"2.0","id":null,"method":"stop"})", RpcCode::invalid_request, "The id must be"},
+      {R"({"jsonrpc":"2.0","id":{},"method":"stop"})", RpcCode::invalid_request, "The id must be"},
+      {R"({"jsonrpc":"2.0","id":true,"method":"stop"})", RpcCode::invalid_request, "The id must be"},
       {R"({"jsonrpc":"2.0","id":9007199254740993,"method":"stop"})", RpcCode::invalid_request,
-       "The id has to be"},
+       "The id must be"},
       {R"({"jsonrpc":"2.0","id":-9007199254740993,"method":"stop"})", RpcCode::invalid_request,
-       "The id has to be"},
+       "The id must be"},
       {R"({"jsonrpc":"2.0","id":99999999999999999999,"method":"stop"})", RpcCode::invalid_request,
-       "The id has to be"},
+       "The id must be"},
       {R"({"jsonrpc":"2.0","method":"stop","id":")" + std::string(kMaxIdBytes + 1, 'i') + "\"}",
-       RpcCode::invalid_request, "The id has to be"},
+       RpcCode::invalid_request, "The id must be"},
   };
   for (const auto& [line, code, told, has_id] : table) {
     INFO(line.substr(0, 200));
@@ -116,11 +119,11 @@ TEST_CASE("replies are one line of JSON-RPC each, whatever stands in them", "[js
   CHECK(Json::parse(broken)["params"]["text"] == "\xef\xbf\xbd\n");
   CHECK(std::count(broken.begin(), broken.end(), '\n') == 1);
   const RpcRequest back = request_of([] {
-    std::string line = request_line(1, "beat", Json::object());
+    std::string line = test::request_line(1, "lease.heartbeat", Json::object());
     line.pop_back();
     return line;
   }());
-  CHECK(back.method == "beat");
+  CHECK(back.method == "lease.heartbeat");
 }
 
 }  // namespace

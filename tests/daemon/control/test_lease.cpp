@@ -87,7 +87,7 @@ TEST_CASE("a holder that hangs up releases the hand in the next tick", "[lease]"
 
 TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
   Rig r;
-  r.s.runtime.loop().arm();
+  r.s.runtime.loop().requests().arm();
   r.s.run(1.0);
   REQUIRE(r.s.state() == State::active);
   r.lease.acquire(kA, r.s.clock.now());
@@ -97,7 +97,7 @@ TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
   r.lease.acquire(kB, r.s.clock.now());
   r.lease.check(r.s.clock.now() + 1s);
   r.lease.acquire(kB, r.s.clock.now());
-  r.lease.release("gave it back");
+  r.lease.release("released it");
   r.s.run(0.3);
   CHECK(r.s.state() == State::active);
 }
@@ -114,7 +114,7 @@ TEST_CASE("who takes the lease over disarms what the other armed, and can arm it
   r.lease.client_lost(kA.client);
   r.s.tick();
   CHECK(r.s.state() == State::active);
-  r.lease.release("gave it back");
+  r.lease.release("released it");
   r.s.tick();
   CHECK(r.s.state() == State::releasing);
 }

@@ -66,7 +66,6 @@ TEST_CASE("a socket is made with its directory, for those who may connect, and g
     const ListeningSocket socket(path, kOwnerOnly);
     CHECK(connects(path));
     CHECK(mode_of(path) == 0600);
-    CHECK_FALSE(socket.from_systemd());
   }
   CHECK_FALSE(fs::exists(path));
   {
@@ -140,11 +139,11 @@ TEST_CASE("a directory in which others could put another socket is refused", "[l
   const TemporaryDirectory dir;
   fs::create_directory(dir.path() / "open");
   fs::permissions(dir.path() / "open", fs::perms::all);
-  CHECK(has(rejection_text(dir.path() / "open/control.sock"), "others may write there"));
+  CHECK(has(rejection_text(dir.path() / "open/control.sock"), "other users can write there"));
   ::chmod((dir.path() / "open").c_str(), 01777);  // as /tmp: nobody can replace what is another's
   CHECK(rejection_text(dir.path() / "open/control.sock") == "");
   CHECK(has(rejection_text(dir.path() / "gone/on/control.sock"),
-            "gone/on: cannot be made: No such file or directory"));
+            "gone/on: cannot be created: No such file or directory"));
   dir.write("file", "");
   CHECK(has(rejection_text(dir.path() / "file/control.sock"), "file: is no directory"));
   CHECK(has(rejection_text(dir.path() / std::string(120, 'x')), "is longer than the 107 bytes"));
@@ -158,7 +157,7 @@ TEST_CASE("a lock that is a link is not followed", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path victim = dir.write("victim", "kept");
   fs::create_symlink(victim, dir.path() / "control.sock.lock");
-  CHECK(has(rejection_text(dir.path() / "control.sock"), "control.sock.lock: cannot be made"));
+  CHECK(has(rejection_text(dir.path() / "control.sock"), "control.sock.lock: cannot be created"));
   CHECK(fs::file_size(victim) == 4);
 }
 
@@ -218,7 +217,7 @@ TEST_CASE("what systemd passes is taken, and stays where it is", "[listening_soc
         ::setenv("LISTEN_FDS", "1", 1);
         try {
           const ListeningSocket socket("/no/such/directory/control.sock", kOwnerOnly);
-          code = socket.from_systemd() && socket.fd() == 3 && connects(path) ? 0 : 2;
+          code = socket.fd() == 3 && connects(path) ? 0 : 2;
         } catch (const std::runtime_error& error) {
           code = std::string(error.what()).find("ListenStream=") != std::string::npos ? 3 : 4;
         }

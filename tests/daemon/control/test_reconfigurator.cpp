@@ -81,7 +81,7 @@ struct Bench : VirtualRuntime {
   }
   /// Armed, and pressed on the table until nothing moves.
   void press() {
-    runtime.loop().arm();
+    runtime.loop().requests().arm();
     go_for(3.0);
     REQUIRE(state() == State::active);
     REQUIRE(last.contacts == 4);
@@ -260,7 +260,7 @@ TEST_CASE("a block that is moved sets out when it is told, and pushes the tool b
   s.go_for(2.0);
   CHECK(std::abs(s.last.X_WQ[1]) < 0.002);
   CHECK_THROWS_WITH(s.bench().move_obstacle("block", {Quaterniond::Identity(), {9.0, 0.1, 0.02}}, 1.0),
-                    Catch::Contains("give it at least over_s = 1.8"));
+                    Catch::Contains("give it at least duration_s = 1.8"));
 }
 
 TEST_CASE("a tool that a wall comes down on is on the side of it where the proxy was", "[workbench]") {
@@ -367,7 +367,7 @@ TEST_CASE("a local model pushes, and fades out when its client is silent", "[wor
   RunConfig plan = pressing_plan();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()}};
   Bench s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   s.go_for(2.0);
   REQUIRE(s.state() == State::active);
   s.watch_from_here();
@@ -392,14 +392,14 @@ TEST_CASE("a local model pushes, and fades out when its client is silent", "[wor
   wall.stiffness_N_per_m = -1.0;
   CHECK_THROWS_WITH(s.bench().set_model(wall, 0.3), Catch::Contains("stiffness_N_per_m: expected 0 to"));
   wall.stiffness_N_per_m = 1.0;
-  CHECK_THROWS_WITH(s.bench().set_model(wall, 60.0), Catch::Contains("sent again"));
+  CHECK_THROWS_WITH(s.bench().set_model(wall, 60.0), Catch::Contains("send it again"));
 }
 
 TEST_CASE("a local model that is stiffer than the device bears is felt softer", "[workbench][models]") {
   RunConfig plan = pressing_plan();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.065}, Vector3d::Zero()}};
   Bench s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   s.go_for(2.0);
   LocalModel spring;
   spring.kind = LocalModel::Kind::spring;
@@ -438,7 +438,7 @@ struct Configured {
   }
 };
 
-TEST_CASE("a configuration that is read again is applied whole, but for what takes a restart",
+TEST_CASE("a configuration that is read again is applied whole, but for what requires a restart",
           "[workbench][reload]") {
   Configured c;
   Bench s(c.read());
@@ -451,7 +451,7 @@ TEST_CASE("a configuration that is read again is applied whole, but for what tak
   const ReloadResult result = s.bench().reload(read);
   CHECK(result.applied == std::vector<std::string>{"wrench.stiffness", "limits.max_force_N"});
   REQUIRE(result.not_applied.size() == 2);
-  CHECK(result.not_applied[0] == "servo.rate_Hz: takes a restart");
+  CHECK(result.not_applied[0] == "servo.rate_Hz: requires a restart");
   CHECK(result.not_applied[1] ==
         "limits.force_slew_N_per_s: is looser than 2000, which holds as long as the loop is armed; disarm, "
         "and reload again");
@@ -459,11 +459,11 @@ TEST_CASE("a configuration that is read again is applied whole, but for what tak
   CHECK(s.force_N() <= 2.0);
   CHECK(s.force().z() == Approx(std::min(2.0, 300.0 * (0.025 - s.last.X_WP[2]))).epsilon(0.02));
   // Disarmed, what was looser is taken; what was not changed since is not told again.
-  s.runtime.loop().disarm();
+  s.runtime.loop().requests().disarm();
   s.go_for(0.3);
   const ReloadResult again = s.bench().reload(read);
   CHECK(again.applied == std::vector<std::string>{"limits.force_slew_N_per_s"});
-  CHECK(again.not_applied == std::vector<std::string>{"servo.rate_Hz: takes a restart"});
+  CHECK(again.not_applied == std::vector<std::string>{"servo.rate_Hz: requires a restart"});
 }
 
 TEST_CASE("a limit that is tightened holds in the next tick, in the middle of a push",
@@ -519,7 +519,7 @@ TEST_CASE("a thousand random changes under a hand that presses, half of them wro
   plan.settings.simulation.hand_repeats = true;
   const auto simulation = plan.settings.simulation;
   Bench s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   s.go_for(2.5);
   RandomValues random(7);
   const auto number = [&random](double low, double high) { return random.uniform(low, high); };
@@ -584,10 +584,10 @@ TEST_CASE("a thousand random changes under a hand that presses, half of them wro
         name_of_strange = fault_row(fault).name;
       strange +=
           fault != Fault::none && fault != Fault::energy_generated && fault != Fault::motors_stalled ? 1 : 0;
-      if (is_latched(s.state())) s.runtime.loop().acknowledge();
+      if (is_latched(s.state())) s.runtime.loop().requests().acknowledge();
       torn += sums.at(s.last.rendering_id) == s.last.rendering_checksum ? 0 : 1;
       pushed += s.force_N() > 0.3 ? 1 : 0;
-      if (s.state() == State::disarmed) s.runtime.loop().arm();
+      if (s.state() == State::disarmed) s.runtime.loop().requests().arm();
     }
   }
   INFO("applied " << applied << ", refused " << refused << ", ticks that pushed " << pushed << ", most step "

@@ -76,14 +76,14 @@ int run_python(const std::string& arguments, std::string& out) {
 TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Python",
           "[recording][program][wall_time]") {
   const Daemon daemon;
-  CHECK(daemon.ctl({"record", "stop"}).err.find("Nothing is recorded; 'record.start' begins.") !=
+  CHECK(daemon.ctl({"record", "stop"}).err.find("No recording runs; 'record.start' starts one.") !=
         std::string::npos);
   const ProgramResult started = daemon.ctl({"record", "start", "mine"});
   INFO(started.err);
   REQUIRE(started.exit_code == 0);
   const auto file = daemon.recordings / "mine.h5";
   CHECK(started.out == "recording " + file.string() + "\n");
-  CHECK(daemon.ctl({"record", "start"}).err.find("It is recorded already, into " + file.string()) !=
+  CHECK(daemon.ctl({"record", "start"}).err.find("A recording runs already: " + file.string()) !=
         std::string::npos);
   CHECK(daemon.ctl({"status"}).out.find("recording  " + file.string()) != std::string::npos);
   std::this_thread::sleep_for(4s);
@@ -113,12 +113,13 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
   CHECK(run_python(script.string() + " " WRENCHD_SOURCE_DIR "/tools/python " + daemon.socket, rows) == 0);
   CHECK(rows == std::to_string(read_recording(file).ticks.size()) + "\n");
   CHECK(daemon.ctl({"record", "get", "yours"}).err.find("there are: mine.h5") != std::string::npos);
-  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no name for a recording") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no valid name of a recording") !=
+        std::string::npos);
   CHECK(daemon.ctl({"record", "get"}).err.find("record list") != std::string::npos);
-  CHECK(daemon.ctl({"record", "list", "-o", "x"}).err.find("takes no -o") != std::string::npos);
+  CHECK(daemon.ctl({"record", "list", "-o", "x"}).err.find("accepts no -o") != std::string::npos);
   CHECK(daemon.ctl({"record", "start", "next"}).exit_code == 0);
   CHECK(daemon.ctl({"record", "list"}).out.find("next") == std::string::npos);
-  CHECK(daemon.ctl({"record", "get", "next"}).err.find("is being written") != std::string::npos);
+  CHECK(daemon.ctl({"record", "get", "next"}).err.find("is incomplete") != std::string::npos);
   CHECK(daemon.ctl({"record", "stop"}).exit_code == 0);
   CHECK(daemon.ctl({"record", "list"}).out.find("\nnext.h5 ") != std::string::npos);
 
@@ -129,21 +130,22 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
   CHECK(std::filesystem::exists(elsewhere));
   CHECK(daemon.ctl({"record", "start", "no/such/directory/x.h5"}).err.find("cannot be created") !=
         std::string::npos);
-  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is no name for a recording") != std::string::npos);
-  CHECK(daemon.ctl({"record", "stop", "x"}).err.find("takes no file") != std::string::npos);
+  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is no valid name of a recording") !=
+        std::string::npos);
+  CHECK(daemon.ctl({"record", "stop", "x"}).err.find("accepts no file") != std::string::npos);
 }
 
 TEST_CASE("an emergency stop leaves a flight recording, which status and the event name",
           "[recording][flight][program]") {
   const Daemon daemon;
   CHECK(daemon.ctl({"stop"}).exit_code == 0);
-  REQUIRE(daemon.wrenchd.wait_for_output("what led to stop_asked is in "));
+  REQUIRE(daemon.wrenchd.wait_for_output("what led to stop_requested is in "));
   const std::string err = daemon.wrenchd.err();
-  CHECK(err.find("; what led to it: " + (daemon.recordings / "flight-").string()) != std::string::npos);
+  CHECK(err.find("; recorded in " + (daemon.recordings / "flight-").string()) != std::string::npos);
   const ProgramResult status = daemon.ctl({"status", "--json"});
   const auto last = nlohmann::json::parse(status.out)["recording"]["last_flight"].get<std::string>();
   CHECK(last.starts_with((daemon.recordings / "flight-").string()));
-  CHECK(last.ends_with("-stop_asked.h5"));
+  CHECK(last.ends_with("-stop_requested.h5"));
   CHECK(daemon.ctl({"status"}).out.find("last fault " + last) != std::string::npos);
   const Recording recording = read_recording(last);
   CHECK(recording.ticks.front().tick == 0);  // it had not run for a minute
@@ -186,11 +188,11 @@ TEST_CASE("a recording of wrenchd is replayed, exported and drawn by wrenchctl",
   INFO(replayed.out << replayed.err);
   CHECK(replayed.exit_code == 0);
   CHECK(replayed.out.find("compared: X_WP, X_WQ, eps, F_T, F_out, energy, ") != std::string::npos);
-  CHECK(replayed.out.find("6001 ticks, all the same, bit for bit") != std::string::npos);
+  CHECK(replayed.out.find("6001 ticks, all bits are equal") != std::string::npos);
   const ProgramResult other = run_program(
       "wrenchctl", {"replay", file, "--scene", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"});
   CHECK(other.exit_code == 4);
-  CHECK(other.out.find(" differs first: ") != std::string::npos);
+  CHECK(other.out.find("first difference at tick ") != std::string::npos);
 
   const ProgramResult csv =
       run_program("wrenchctl", {"export", file, "--columns", "state,F_out", "--every", "1000"});

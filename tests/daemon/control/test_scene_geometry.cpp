@@ -35,8 +35,8 @@ std::shared_ptr<const Scene> three_bodies() {
 
 Json told(const SceneGeometry& shapes, const Scene& scene) {
   Json description = shapes.description(scene);
-  description["shapes"] = 1;
-  description["rendering"] = 0;
+  description["geometry_id"] = 1;
+  description["rendering_id"] = 0;
   description["scene_time_begins_ns"] = 5'000'000'000;
   description["X_WB"] = pose_json({});
   description["X_HT"] = pose_json({});
@@ -69,7 +69,7 @@ TEST_CASE("a mesh is in the shapes once, however many obstacles it is", "[view]"
   CHECK(told["obstacles"][0]["half_space"]["offset_m"] == -0.1);
   CHECK(told["obstacles"][1]["mesh"] == 1);
   CHECK(told["obstacles"][2]["mesh"] == 1);
-  CHECK(told["obstacles"][2]["motion"]["turn_back_s"] == 1.5);
+  CHECK(told["obstacles"][2]["motion"]["reverse_after_s"] == 1.5);
   const Json& gear = told["meshes"][1];
   const TriangleMesh& mesh = scene->meshes()[0].mesh->surface.mesh();
   REQUIRE(gear["vertices"] == mesh.vertices_m.size());

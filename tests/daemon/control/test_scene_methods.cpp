@@ -65,7 +65,7 @@ TEST_CASE("obstacles are added, listed, moved and removed by name", "[scene_meth
   CHECK(a.obstacles() == std::vector<std::string>{"table"});
   const Json added = a.ask("scene.add", {{"obstacle", a_block()}});
   CHECK(added["name"] == "block");
-  CHECK(added["rendering"] == 1);
+  CHECK(added["rendering_id"] == 1);
   CHECK(a.obstacles() == std::vector<std::string>{"table", "block"});
   const Json scene = a.ask("scene.get");
   CHECK(scene["obstacles"][0]["half_space"]["normal"] == Json({0.0, 0.0, 1.0}));
@@ -79,7 +79,7 @@ TEST_CASE("obstacles are added, listed, moved and removed by name", "[scene_meth
 TEST_CASE("a scene file is looked for, and taken whole", "[scene_methods]") {
   const Asked a;
   CHECK(a.ask("scene.load",
-              {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering"] == 1);
+              {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering_id"] == 1);
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
   const RpcError none = a.refused("scene.load", {{"file", "scenes/no_such.toml"}});
   CHECK(none.code() == RpcCode::rejected);
@@ -92,10 +92,10 @@ TEST_CASE("the scene is told with the place from where it is seen best, one that
   RunConfig plan = shipped_config();
   plan.settings.view = {{0.1, -0.2, 0.3}, {0.0, 0.0, 0.05}};
   const Asked a(plan);
-  CHECK(a.ask("scene.shapes")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
+  CHECK(a.ask("scene.geometry")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
   a.ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
-  CHECK(a.ask("scene.shapes")["view"].is_null());
-  CHECK(Asked().ask("scene.shapes")["view"].is_null());
+  CHECK(a.ask("scene.geometry")["view"].is_null());
+  CHECK(Asked().ask("scene.geometry")["view"].is_null());
 }
 
 TEST_CASE("what a scene cannot be is refused with its place, and nothing changes", "[scene_methods]") {
@@ -117,8 +117,9 @@ TEST_CASE("what a scene cannot be is refused with its place, and nothing changes
   null["scale"] = nullptr;
   CHECK(a.refused("scene.add", {{"obstacle", null}}).code() == RpcCode::invalid_params);
   has(a.refused("scene.remove", {{"name", "tabel"}}), "'tabel'");
-  has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"over_s", 1.0}}), "half_space");
-  CHECK(a.refused("scene.move", {{"name", "table"}, {"over_s", 1.0}}).code() == RpcCode::invalid_params);
+  has(a.refused("scene.move", {{"name", "table"}, {"position_m", {0, 0, 0}}, {"duration_s", 1.0}}),
+      "half_space");
+  CHECK(a.refused("scene.move", {{"name", "table"}, {"duration_s", 1.0}}).code() == RpcCode::invalid_params);
   has(a.refused("rendering.set", {{"wrench", {{"law", "hooke"}}}}), "law");
   has(a.refused("rendering.set", {{"wrench", {{"stiffnes", 1.0}}}}), "stiffness");
   has(a.refused("rendering.set", {{"rendering", {{"method", "planar"}, {"friction", {{"static", 0.5}}}}}}),
@@ -141,7 +142,7 @@ TEST_CASE("a workspace is changed all at once or not at all", "[scene_methods]")
 TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
   const Asked a;
   const Json plane = {{"id", 7},           {"kind", "plane"},
-                      {"expires_s", 1.0},  {"normal", {0, 0, 1}},
+                      {"lifetime_s", 1.0}, {"normal", {0, 0, 1}},
                       {"offset_m", 0.005}, {"stiffness_N_per_m", 200.0}};
   CHECK(a.ask("model.set", plane) == Json::object());
   CHECK(a.ask("model.remove", {{"id", 7}}) == Json::object());
@@ -157,10 +158,10 @@ TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
   has(with("normal", nullptr), "'normal'");
   has(with("kind", "spring"), "'position_m'");
   has(with("id", -1), "0 to 4294967295");
-  has(with("expires_s", 11.0), "expires_s");
+  has(with("lifetime_s", 11.0), "lifetime_s");
   has(with("normal", {0, 0, 0}), "normal");
   has(with("stiffness_N_per_m", -5.0), "stiffness_N_per_m");
-  CHECK(with("expires_s", nullptr).code() == RpcCode::invalid_params);
+  CHECK(with("lifetime_s", nullptr).code() == RpcCode::invalid_params);
 }
 
 TEST_CASE("who only looks on changes nothing, and only an administrator reloads", "[scene_methods]") {

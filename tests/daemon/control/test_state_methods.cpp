@@ -21,16 +21,16 @@ TEST_CASE("obstacles are named by the rendering that they are of, also when the 
   const auto ask = [&](const std::string& method, const Json& params = Json::object()) {
     return MethodTable::run(table.look_up({method, params, 1, true}, Role::administrator), params, {});
   };
-  CHECK(ask("state.names").result == Json({{"obstacles", {"table"}}, {"rendering", 0}}));
+  CHECK(ask("state.obstacles").result == Json({{"obstacles", {"table"}}, {"rendering_id", 0}}));
   const MethodResult first = ask("state.open");
   CHECK(first.fd >= 0);
-  CHECK(first.result["layout"]["rendering"] == 0);
+  CHECK(first.result["layout"]["rendering_id"] == 0);
   CHECK(first.result["layout"]["obstacles"] == Json::array({"table"}));
 
   ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
-  CHECK(ask("state.names").result == Json({{"obstacles", {"table", "plunger"}}, {"rendering", 1}}));
+  CHECK(ask("state.obstacles").result == Json({{"obstacles", {"table", "plunger"}}, {"rendering_id", 1}}));
   CHECK(ask("state.open").result["layout"]["obstacles"] == Json({"table", "plunger"}));
-  CHECK(ask("state.open").result["layout"]["rendering"] == 1);
+  CHECK(ask("state.open").result["layout"]["rendering_id"] == 1);
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ double farthest_m(const RunConfig& plan, double& pushed_N) {
   double farthest = 0.0;
   pushed_N = 0.0;
   for (int i = 0; i < 3500; ++i) {
-    if (i == 5) s.runtime.loop().arm();
+    if (i == 5) s.runtime.loop().requests().arm();
     REQUIRE(s.tick() == Fault::none);
     pushed_N = std::max(pushed_N, s.force_N());
     const Pose goal = s.simulated.hand_target().X_BG;
@@ -73,7 +73,7 @@ TEST_CASE("a led handle takes from the hand what the motors and friction take", 
   const SimulatedEnergy& energy = s.simulated.handle().energy();
   double most_kinetic_J = 0.0;
   for (int i = 0; i < 2500; ++i) {
-    if (i == 5) s.runtime.loop().arm();
+    if (i == 5) s.runtime.loop().requests().arm();
     s.tick();
     const double kinetic_J = s.simulated.handle().kinetic_energy_J();
     most_kinetic_J = std::max(most_kinetic_J, kinetic_J);
@@ -91,7 +91,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
     VirtualRuntime s(shipped_config());
     RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 5000; ++i) {
-      if (i == 50) s.runtime.loop().arm();
+      if (i == 50) s.runtime.loop().requests().arm();
       s.tick();
       recorder.append_new_ticks();
     }
@@ -117,7 +117,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
   double then_N = 0.0, now_N = 0.0;
   for (const TickRecord& tick : before.ticks) then_N = std::max(then_N, std::abs(tick.F_T[2]));
   for (int i = 0; i < 5000; ++i) {
-    if (i == 50) s.runtime.loop().arm();
+    if (i == 50) s.runtime.loop().requests().arm();
     s.tick();
     now_N = std::max(now_N, std::abs(s.last.F_T[2]));
   }
@@ -140,7 +140,7 @@ TEST_CASE("what cannot be played back is refused", "[playback]") {
     writer.append(ticks);
     return file;
   };
-  CHECK_THROWS_WITH(read_playback(recorded("still.h5")), Contains("has no good sample"));
+  CHECK_THROWS_WITH(read_playback(recorded("still.h5")), Contains("has no valid sample"));
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     ticks[i].tick = i;
     ticks[i].now_ns = 1;
@@ -173,8 +173,8 @@ TEST_CASE("wrenchd plays back what its command line names", "[playback][program]
   CHECK(bad.err.find("bad.csv:2:1: expected 8 numbers") != std::string::npos);
   const ProgramResult alone = with({"--playback-mode", "open"});
   CHECK(alone.exit_code == 1);
-  CHECK(alone.err.find("nothing is played back; name it with --playback") != std::string::npos);
+  CHECK(alone.err.find("there is no playback file; name one with --playback") != std::string::npos);
   const ProgramResult real = run_program("wrenchd", {"--profile", "polhem", "--playback", csv.string()});
   CHECK(real.exit_code == 1);
-  CHECK(real.err.find("--playback: a person holds a real device") != std::string::npos);
+  CHECK(real.err.find("--playback: a person moves a real device") != std::string::npos);
 }

@@ -40,7 +40,7 @@ TEST_CASE("a recording is named by a plain name, or by an administrator's path",
   for (const char* name :
        {"/data/x.h5", "../x", "a/b", "", ".", "..", ".hidden", "a b", "a\nb", "\xC3\xA4"}) {
     INFO(name);
-    CHECK_THROWS_WITH(recording_path(name, there, false), Contains("no name for a recording") &&
+    CHECK_THROWS_WITH(recording_path(name, there, false), Contains("no valid name of a recording") &&
                                                               Contains("only administrators") &&
                                                               Contains(there.string()));
   }
@@ -75,7 +75,7 @@ TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]
   for (const char* name : {"link", "directory", "pipe", "c"})
     CHECK_THROWS_WITH(open_recording(there, name), Contains("there are: b.h5, a.h5"));
   for (const char* name : {"../secret", "/etc/passwd", ""})
-    CHECK_THROWS_WITH(open_recording(there, name), Contains("no name for a recording"));
+    CHECK_THROWS_WITH(open_recording(there, name), Contains("no valid name of a recording"));
 }
 
 TEST_CASE("recordings go where the settings say, else where the system keeps state", "[recording]") {
@@ -110,7 +110,7 @@ TEST_CASE("a directory for recordings is made, or refused with a cure", "[record
         (perms::owner_all | perms::group_read | perms::group_exec));  // nothing for others
   const auto file = files.write("file", "");
   CHECK_THROWS_WITH(make_recordings_directory(file / "below"),
-                    Contains("cannot be made") && Contains("set directory in [recording]"));
+                    Contains("cannot be created") && Contains("set directory in [recording]"));
 }
 
 TEST_CASE("nothing is recorded where the disk has less room than is to stay free", "[recording]") {
@@ -119,7 +119,7 @@ TEST_CASE("nothing is recorded where the disk has less room than is to stay free
   CHECK(left_MB > 0.0);
   CHECK_NOTHROW(check_free_space(files.path(), keeping_free(0.0)));
   CHECK_THROWS_WITH(check_free_space(files.path(), keeping_free(2.0 * left_MB)),
-                    Contains("MB are left") && Contains("keep_free_MB"));
+                    Contains("MB are free") && Contains("keep_free_MB"));
   CHECK_THROWS_AS(free_MB(files.path() / "none"), RecordingError);
 }
 
@@ -131,13 +131,13 @@ TEST_CASE("the flight recorder's files are named by time and fault, and the olde
   files.write(first.filename(), "1");
   CHECK(flight_path(files.path(), 1795356901, "overspeed") ==
         files.path() / "flight-20261122T141501Z-overspeed-2.h5");
-  files.write("flight-20261122T141500Z-stop_asked.h5", "2");
+  files.write("flight-20261122T141500Z-stop_requested.h5", "2");
   files.write("flight-20261122T141502Z-pinned.h5", "3");
   files.write("run-1.h5", "4");
   files.write("flight-plan.txt", "5");
   prune_flights(files.path(), 2);
   const auto there = [&](const char* name) { return std::filesystem::exists(files.path() / name); };
-  CHECK_FALSE(there("flight-20261122T141500Z-stop_asked.h5"));
+  CHECK_FALSE(there("flight-20261122T141500Z-stop_requested.h5"));
   CHECK(there("flight-20261122T141501Z-overspeed.h5"));
   CHECK(there("flight-20261122T141502Z-pinned.h5"));
   CHECK(there("run-1.h5"));

@@ -89,7 +89,7 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK_FALSE(recordings.stop());
   const auto file = recordings.start("mine", false);
   CHECK(file == files.path() / "mine.h5");
-  CHECK_THROWS_WITH(recordings.start("other", false), Contains("mine.h5: is being recorded already"));
+  CHECK_THROWS_WITH(recordings.start("other", false), Contains("mine.h5: a recording runs already"));
   run(5000);
   CHECK(recordings.status().running->ticks > 3000);
   const auto written = recordings.stop();
@@ -109,8 +109,8 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK(recordings.stop()->ticks == 0);
   const auto events = told(feed);
   REQUIRE(events.size() == 4);
-  CHECK(events[0]["what"] == "started");
-  CHECK(events[1]["what"] == "ended");
+  CHECK(events[0]["phase"] == "started");
+  CHECK(events[1]["phase"] == "ended");
   CHECK(events[1]["ticks"] == 5000);
 }
 
@@ -136,7 +136,7 @@ TEST_CASE("a directory that cannot be written to, and a disk without room, are r
     VirtualRuntime s(plan);
     EventFeed feed(s.runtime.loop());
     Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
-    CHECK_THROWS_WITH(recordings.start("mine", false), Contains("cannot be made"));
+    CHECK_THROWS_WITH(recordings.start("mine", false), Contains("cannot be created"));
     CHECK_THROWS_WITH(recordings.start("/nowhere/x.h5", true), Contains("cannot be created"));
     CHECK_FALSE(recordings.status().running);
   }
@@ -145,7 +145,7 @@ TEST_CASE("a directory that cannot be written to, and a disk without room, are r
   VirtualRuntime s(plan);
   EventFeed feed(s.runtime.loop());
   Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
-  CHECK_THROWS_WITH(recordings.start("mine", false), Contains("MB are left"));
+  CHECK_THROWS_WITH(recordings.start("mine", false), Contains("MB are free"));
   CHECK_FALSE(std::filesystem::exists(files.path() / "mine.h5"));
 }
 
@@ -169,18 +169,18 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
     Recordings recordings(s.runtime, feed, s.clock, Recordings::Pace::manual);
     recordings.start("mine", false);
     for (int i = 0; i < 40000 && recordings.status().running; ++i) {
-      if (i == 50) s.runtime.loop().arm();
+      if (i == 50) s.runtime.loop().requests().arm();
       s.tick();
       if (i % 500 == 0) recordings.pump();
     }
     failed = recordings.status().failed;
     CHECK_FALSE(recordings.status().running);
-    CHECK(told(feed).back()["what"] == "failed");
+    CHECK(told(feed).back()["phase"] == "failed");
     CHECK_FALSE(recordings.stop());
   }
   INFO(failed);
   if (keep_free_MB > 0.0) {
-    CHECK(failed.find("MB are left") != std::string::npos);
+    CHECK(failed.find("MB are free") != std::string::npos);
     CHECK(read_recording(disk / "mine.h5").ticks.size() > 500);
   } else {
     CHECK(failed.find("is the disk full, ") != std::string::npos);
@@ -197,12 +197,13 @@ TEST_CASE("the flight recorder writes what led to a fault, and the second after"
   std::string last;
   for (std::uint64_t flight = 1; flight <= 3; ++flight) {
     REQUIRE(run.comes_true([&] {
-      if (run.s.runtime.loop().state() == State::fault) run.s.runtime.loop().acknowledge();
-      return run.s.runtime.loop().state() == State::disarmed;
+      if (run.s.runtime.loop().telemetry().state() == State::fault)
+        run.s.runtime.loop().requests().acknowledge();
+      return run.s.runtime.loop().telemetry().state() == State::disarmed;
     }));
     std::this_thread::sleep_for(1s);
     const TimePoint at = run.s.clock.now();
-    run.s.runtime.loop().stop();
+    run.s.runtime.loop().requests().stop();
     const auto flights = run.recordings.status().flights;
     REQUIRE(run.comes_true([&] { return run.recordings.status().flights > flights; }));
     last = run.recordings.status().last_flight.string();
@@ -220,7 +221,7 @@ TEST_CASE("the flight recorder writes what led to a fault, and the second after"
     for (const TickRecord& tick : recording.ticks)
       stopped = stopped || (tick.faults & bit(Fault::stop_requested)) != 0;
     CHECK(stopped);
-    run.s.runtime.loop().acknowledge();
+    run.s.runtime.loop().requests().acknowledge();
     std::this_thread::sleep_for(1100ms);  // a name of another second
   }
   const auto faults = told(run.feed, "fault");
@@ -240,25 +241,25 @@ TEST_CASE("a flight that cannot be written is told, and the loop goes on", "[rec
   const TemporaryDirectory files;
   RunConfig plan = plan_with(files.write("file", "") / "below");
   LiveRun run(plan);
-  REQUIRE(run.comes_true([&] { return run.s.runtime.loop().state() == State::disarmed; }));
-  run.s.runtime.loop().stop();
+  REQUIRE(run.comes_true([&] { return run.s.runtime.loop().telemetry().state() == State::disarmed; }));
+  run.s.runtime.loop().requests().stop();
   REQUIRE(run.comes_true([&] {
     const auto events = told(run.feed);
-    return !events.empty() && events.back()["what"] == "failed";
+    return !events.empty() && events.back()["phase"] == "failed";
   }));
-  CHECK(told(run.feed).back()["why"].get<std::string>().find("cannot be made") != std::string::npos);
+  CHECK(told(run.feed).back()["reason"].get<std::string>().find("cannot be created") != std::string::npos);
   CHECK(run.recordings.status().flights == 0);
-  CHECK(run.s.runtime.loop().state() == State::stopped);
+  CHECK(run.s.runtime.loop().telemetry().state() == State::stopped);
 }
 
 TEST_CASE("what was going on when the loop ended is in the file", "[recording][flight]") {
   const TemporaryDirectory files;
   {
     LiveRun run(plan_with(files.path()));
-    REQUIRE(run.comes_true([&] { return run.s.runtime.loop().state() == State::disarmed; }));
+    REQUIRE(run.comes_true([&] { return run.s.runtime.loop().telemetry().state() == State::disarmed; }));
     run.recordings.start("mine", false);
     std::this_thread::sleep_for(300ms);
-    run.s.runtime.loop().stop();
+    run.s.runtime.loop().requests().stop();
     REQUIRE(run.comes_true([&] { return !told(run.feed, "fault").empty(); }));
     run.stop = true;
     run.servo.join();

@@ -22,8 +22,8 @@ void record_run(const RunConfig& plan, const std::filesystem::path& file, double
   s.inject(SimulatedFault::Kind::unplug, duration_s - 0.01, 1.0);
   RunRecorder recorder(s.runtime, file);
   for (int i = 0; i < static_cast<int>(1000 * duration_s); ++i) {
-    if (i == 50 || i == 4500) s.runtime.loop().arm();
-    if (i == 4200) s.runtime.loop().disarm();
+    if (i == 50 || i == 4500) s.runtime.loop().requests().arm();
+    if (i == 4200) s.runtime.loop().requests().disarm();
     const bool lost = s.tick() == Fault::device_lost;
     recorder.append_new_ticks();
     if (lost) break;
@@ -87,8 +87,8 @@ TEST_CASE("a replay places the proxy at the ticks at which it was placed, where 
     VirtualRuntime s(buried.config, ProxySearchMode::background);  // a thread's answers come when they come
     RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 4000; ++i) {
-      if (i == 5) s.runtime.loop().arm();
-      if (i == 20 || i == 3500) s.runtime.loop().reinitialize_proxy();
+      if (i == 5) s.runtime.loop().requests().arm();
+      if (i == 20 || i == 3500) s.runtime.loop().requests().reinitialize_proxy();
       wait_for_proxy_search(s);
       REQUIRE(s.tick() == Fault::none);
       recorder.append_new_ticks();
@@ -125,8 +125,8 @@ TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]"
     s.clock.sleep_until(TimePoint{from_seconds(77777.7)});  // the loop's own time begins later
     RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 3000; ++i) {
-      if (i == 5) s.runtime.loop().arm();
-      if (i == 2500) s.runtime.loop().reinitialize_proxy();
+      if (i == 5) s.runtime.loop().requests().arm();
+      if (i == 2500) s.runtime.loop().requests().reinitialize_proxy();
       wait_for_proxy_search(s);
       REQUIRE(s.tick() == Fault::none);
       recorder.append_new_ticks();
@@ -196,7 +196,7 @@ TEST_CASE("a recording in which something was changed from outside is replayed u
     VirtualRuntime s(plan);
     RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 3000; ++i) {
-      if (i == 50) s.runtime.loop().arm();
+      if (i == 50) s.runtime.loop().requests().arm();
       if (i == 2000)
         s.runtime.reconfigurator().set_rendering(read_toml_text("[wrench]\nlaw = \"energy\"", "here"),
                                                  "here");
@@ -260,5 +260,5 @@ TEST_CASE("a recording is replayed with what is in it alone", "[replay]") {
   for (RecordedFile& f : outside.files)
     if (f.role == "tool") f.embedded = false;
   CHECK_THROWS_WITH(unpack_run_config(outside, directory.path() / "outside"),
-                    Catch::Contains("is not there") && Catch::Contains("SHA-256"));
+                    Catch::Contains("does not exist") && Catch::Contains("SHA-256"));
 }

@@ -151,13 +151,13 @@ TEST_CASE("a proxy without an admissible pose is a fault after three ticks", "[f
     for (const double side : {1.0, -1.0})  // the cube is 50 mm wide
       plan.scene.half_spaces.push_back({"wall", {side, 0.0, 0.0}, -0.02});
   });
-  rig.proxy_initializer.override_pose = true;
-  rig.proxy_initializer.overriding_pose.translation_m.z() = 0.06;
+  rig.proxy_initializer->override_pose = true;
+  rig.proxy_initializer->overriding_pose.translation_m.z() = 0.06;
   int ticks = 0;
   for (; ticks < 100 && !rig.raised(Fault::projection_failed); ++ticks) rig.tick();
   CHECK(ticks < 20);
   CHECK(rig.raised(Fault::projection_failed));
-  rig.loop.arm();
+  rig.loop.requests().arm();
   for (int i = 0; i < 500; ++i) {
     rig.tick();
     REQUIRE(rig.force_N() == 0.0);

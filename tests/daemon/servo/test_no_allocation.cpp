@@ -42,7 +42,7 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   s.runtime.enable_shared_state();
   s.inject(SimulatedFault::Kind::corrupt, 5.0, 0.002);
   s.inject(SimulatedFault::Kind::unplug, 9.99, 1.0);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
 
   int in_contact = 0;
   int saturated = 0;
@@ -113,8 +113,9 @@ TEST_CASE("to be placed, to start over and to be armed neither allocates nor loc
     wait_for_proxy_search(s);
     const RealtimeGuard guard;
     if (proxy_initialization(s) == ProxyInitialization::complete && placed == 1)
-      s.runtime.loop().reinitialize_proxy();
-    if (proxy_initialization(s) == ProxyInitialization::complete && placed == 2) s.runtime.loop().arm();
+      s.runtime.loop().requests().reinitialize_proxy();
+    if (proxy_initialization(s) == ProxyInitialization::complete && placed == 2)
+      s.runtime.loop().requests().arm();
     s.tick();
     seeking += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
     placed += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;

@@ -30,97 +30,95 @@ Scene cube_and_boulder(std::size_t triangles, std::vector<HalfSpaceSettings> wal
 
 const Pose kDeep = {rotation_from({0.1, 0.2, 0.3}), {0.01, 0.02, 0.03}};
 
-ProxyInitializationResult awaited(ProxyInitializer& placer) {
-  ProxyInitializationResult answer;
-  while (!placer.take_result(answer)) std::this_thread::sleep_for(1ms);
-  return answer;
+ProxyInitializationResult wait_for_result(ProxyInitializer& initializer) {
+  ProxyInitializationResult result;
+  while (!initializer.take_result(result)) std::this_thread::sleep_for(1ms);
+  return result;
 }
 
-TEST_CASE("the answer is admissible, and the same on a thread and in step", "[placer]") {
+TEST_CASE("the result is feasible, and equal in a background thread and in a tick", "[proxy_initializer]") {
   const Scene scene = cube_and_boulder(2000);
   BackgroundProxyInitializer thread(scene);
   InTickProxyInitializer step(scene);
-  for (ProxyInitializer* placer :
+  for (ProxyInitializer* initializer :
        {static_cast<ProxyInitializer*>(&thread), static_cast<ProxyInitializer*>(&step)}) {
-    ProxyInitializationResult answer;
-    CHECK_FALSE(placer->take_result(answer));  // nothing was asked
-    placer->request({7, kDeep, 1.25});
-    answer = awaited(*placer);
-    CHECK(answer.id == 7);
-    CHECK(answer.scene_time_s == 1.25);
-    REQUIRE(answer.found);
-    CHECK(FeasiblePoseSearch(scene).admissible(answer.X_WQ));
-    CHECK((answer.X_WQ.translation_m - kDeep.translation_m).norm() > 0.01);
-    CHECK_FALSE(placer->take_result(answer));  // once
+    ProxyInitializationResult result;
+    CHECK_FALSE(initializer->take_result(result));  // no request yet
+    initializer->request({7, kDeep, 1.25});
+    result = wait_for_result(*initializer);
+    CHECK(result.id == 7);
+    CHECK(result.scene_time_s == 1.25);
+    REQUIRE(result.found);
+    CHECK(FeasiblePoseSearch(scene).admissible(result.X_WQ));
+    CHECK((result.X_WQ.translation_m - kDeep.translation_m).norm() > 0.01);
+    CHECK_FALSE(initializer->take_result(result));  // each result is taken once
   }
   thread.request({8, kDeep});
   step.request({8, kDeep});
-  const ProxyInitializationResult a = awaited(thread), b = awaited(step);
+  const ProxyInitializationResult a = wait_for_result(thread), b = wait_for_result(step);
   CHECK(a.X_WQ.translation_m == b.X_WQ.translation_m);
   CHECK(a.X_WQ.rotation.coeffs() == b.X_WQ.rotation.coeffs());
 }
 
-TEST_CASE("a pose that is admissible is its own answer, whatever the scene is of", "[placer]") {
+TEST_CASE("a feasible pose is its own result, among meshes and among half-spaces", "[proxy_initializer]") {
   const Pose X_WP = {rotation_from({0.1, 0.2, 0.3}), {0, 0, 0.2}};
   const Scene boulder = cube_and_boulder(500);
   const Scene table(cube(), {{"table", Vector3d::UnitZ(), 0.0}});
   for (const Scene* scene : {&boulder, &table}) {
-    InTickProxyInitializer placer(*scene);
-    placer.request({1, X_WP});
-    const ProxyInitializationResult answer = awaited(placer);
-    REQUIRE(answer.found);
-    CHECK((answer.X_WQ.translation_m - X_WP.translation_m).norm() < 1e-12);
+    InTickProxyInitializer initializer(*scene);
+    initializer.request({1, X_WP});
+    const ProxyInitializationResult result = wait_for_result(initializer);
+    REQUIRE(result.found);
+    CHECK((result.X_WQ.translation_m - X_WP.translation_m).norm() < 1e-12);
   }
 }
 
-TEST_CASE("of several questions the newest is answered last", "[placer]") {
+TEST_CASE("of several requests the newest is answered last", "[proxy_initializer]") {
   const Scene scene = cube_and_boulder(500);
-  BackgroundProxyInitializer placer(scene);
-  for (std::uint32_t number = 1; number <= 5; ++number) placer.request({number, kDeep});
-  ProxyInitializationResult answer;
-  do answer = awaited(placer);
-  while (answer.id != 5);
-  CHECK(answer.found);
+  BackgroundProxyInitializer initializer(scene);
+  for (std::uint32_t id = 1; id <= 5; ++id) initializer.request({id, kDeep});
+  ProxyInitializationResult result;
+  do result = wait_for_result(initializer);
+  while (result.id != 5);
+  CHECK(result.found);
 }
 
-TEST_CASE("where the tool does not fit the answer is that there is no place", "[placer]") {
+TEST_CASE("if the tool does not fit, no feasible pose is found", "[proxy_initializer]") {
   const bool boulder = GENERATE(false, true);
-  const auto walls = closed_box(0.02);  // the cube's half edge is 25 mm
+  const auto walls = closed_box(0.02);  // half the edge of the cube is 25 mm
   const Scene scene = boulder ? cube_and_boulder(100, walls) : Scene(cube(), walls);
-  BackgroundProxyInitializer placer(scene);
-  placer.request({1, Pose{}});
-  CHECK_FALSE(awaited(placer).found);
+  BackgroundProxyInitializer initializer(scene);
+  initializer.request({1, Pose{}});
+  CHECK_FALSE(wait_for_result(initializer).found);
 }
 
-TEST_CASE("a search that is told to stop ends, and a placer with one under way is joined at once",
-          "[placer]") {
-  // A tenth of a million triangles, and a thousand poses to look at before one is free.
+TEST_CASE("a stopped search ends, and the destructor joins a running search at once", "[proxy_initializer]") {
+  // 100 000 triangles; about 1000 poses are checked before a free one is found.
   const Scene scene = cube_and_boulder(100000);
   std::stop_source stop;
   stop.request_stop();
   const auto start = std::chrono::steady_clock::now();
   CHECK(FeasiblePoseSearch(scene).nearest(kDeep, stop.get_token()).status == ProjectionStatus::infeasible);
-  auto placer = std::make_unique<BackgroundProxyInitializer>(scene);
-  placer->request({1, kDeep});
+  auto initializer = std::make_unique<BackgroundProxyInitializer>(scene);
+  initializer->request({1, kDeep});
   std::this_thread::sleep_for(50ms);
-  ProxyInitializationResult answer;
-  CHECK_FALSE(placer->take_result(answer));
-  placer.reset();
-  CHECK(std::chrono::steady_clock::now() - start <
-        1s);  // milliseconds, on a machine that has nothing else to do
+  ProxyInitializationResult result;
+  CHECK_FALSE(initializer->take_result(result));
+  initializer.reset();
+  CHECK(std::chrono::steady_clock::now() - start < 1s);  // a few milliseconds on an idle machine
 }
 
-TEST_CASE("to ask and to look for the answer neither allocates nor locks", "[placer][realtime]") {
+TEST_CASE("requesting and taking a result neither allocate nor lock", "[proxy_initializer][realtime]") {
   const Scene scene = cube_and_boulder(500);
-  BackgroundProxyInitializer placer(scene);
-  ProxyInitializationResult answer;
+  BackgroundProxyInitializer initializer(scene);
+  ProxyInitializationResult result;
   std::uint64_t allocations = 0, locks = 0;
-  for (std::uint32_t number = 1; number <= 3; ++number) {
+  for (std::uint32_t id = 1; id <= 3; ++id) {
     bool answered = false;
     while (!answered) {
       const RealtimeGuard guard;
-      if (answer.id + 1 == number) placer.request({number, kDeep});
-      answered = placer.take_result(answer) && answer.id == number;
+      if (result.id + 1 == id) initializer.request({id, kDeep});
+      answered = initializer.take_result(result) && result.id == id;
       allocations += guard.allocations();
       locks += guard.locks();
     }
@@ -129,11 +127,11 @@ TEST_CASE("to ask and to look for the answer neither allocates nor locks", "[pla
   CHECK(locks == 0);
 }
 
-TEST_CASE("where the proxy stands has a name", "[placer]") {
-  CHECK(std::string(name(ProxyInitialization::complete)) == "following");
-  CHECK(std::string(name(ProxyInitialization::searching)) == "placing");
-  CHECK(std::string(name(ProxyInitialization::found)) == "placed");
-  CHECK(std::string(name(ProxyInitialization::failed)) == "no place");
+TEST_CASE("each progress value has a name", "[proxy_initializer]") {
+  CHECK(std::string(name(ProxyInitialization::complete)) == "complete");
+  CHECK(std::string(name(ProxyInitialization::searching)) == "searching");
+  CHECK(std::string(name(ProxyInitialization::found)) == "found");
+  CHECK(std::string(name(ProxyInitialization::failed)) == "failed");
 }
 
 }  // namespace

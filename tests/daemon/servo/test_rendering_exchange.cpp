@@ -12,20 +12,20 @@ namespace {
 
 using namespace test;
 
-/// Makes renderings of one scene, and counts those that are there by the users of the scene.
+/// Makes renderings of one scene. Counts the living renderings by the number of owners of the scene.
 struct Maker {
-  RunConfig plan = shipped_config();
-  std::shared_ptr<const Scene> scene = std::make_shared<const Scene>(plan.scene);
-  std::shared_ptr<ProxyInitializer> placer = make_proxy_initializer(scene, ProxySearchMode::in_tick);
-  long without = scene.use_count();
+  RunConfig config = shipped_config();
+  std::shared_ptr<const Scene> scene = std::make_shared<const Scene>(config.scene);
+  std::shared_ptr<ProxyInitializer> initializer = make_proxy_initializer(scene, ProxySearchMode::in_tick);
+  long other_owners = scene.use_count();
 
   std::unique_ptr<Rendering> make(std::uint32_t number) {
-    return std::make_unique<Rendering>(number, plan.settings, plan.profile, scene, placer);
+    return std::make_unique<Rendering>(number, config.settings, config.profile, scene, initializer);
   }
-  long alive() const { return scene.use_count() - without; }
+  long alive() const { return scene.use_count() - other_owners; }
 };
 
-TEST_CASE("what was not taken yet gives way to what is offered next", "[exchange]") {
+TEST_CASE("a new offer replaces an offer that was not taken", "[exchange]") {
   Maker maker;
   {
     RenderingExchange exchange;
@@ -40,7 +40,7 @@ TEST_CASE("what was not taken yet gives way to what is offered next", "[exchange
     CHECK(exchange.taken());
     CHECK(exchange.take() == nullptr);
     exchange.retire(taken);
-    CHECK(maker.alive() == 1);  // it is destroyed by whoever offers, and not by whoever gives back
+    CHECK(maker.alive() == 1);  // the building thread destroys it, not the servo thread
     exchange.destroy_retired();
     CHECK(maker.alive() == 0);
     exchange.offer(maker.make(3));
@@ -49,7 +49,7 @@ TEST_CASE("what was not taken yet gives way to what is offered next", "[exchange
   CHECK(maker.alive() == 0);
 }
 
-TEST_CASE("between two threads none is lost, and none is there twice", "[exchange]") {
+TEST_CASE("between two threads no rendering is lost or taken twice", "[exchange]") {
   Maker maker;
   RenderingExchange exchange;
   std::atomic<bool> done{false};
@@ -57,19 +57,19 @@ TEST_CASE("between two threads none is lost, and none is there twice", "[exchang
   int taken = 0;
   bool ordered = true;
   std::thread servo([&] {
-    Rendering* held = nullptr;
-    const auto look = [&] {
+    Rendering* current = nullptr;
+    const auto take_next = [&] {
       Rendering* next = exchange.take();
       if (next == nullptr) return;
       ordered = ordered && next->id() > last;
       last = next->id();
       ++taken;
-      if (held != nullptr) exchange.retire(held);
-      held = next;
+      if (current != nullptr) exchange.retire(current);
+      current = next;
     };
-    while (!done.load()) look();
-    look();
-    exchange.retire(held);
+    while (!done.load()) take_next();
+    take_next();
+    exchange.retire(current);
   });
   constexpr std::uint32_t kOffers = 300;
   for (std::uint32_t i = 1; i <= kOffers; ++i) {

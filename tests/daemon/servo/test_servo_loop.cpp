@@ -24,13 +24,6 @@ namespace {
 /// When the shipped hand is deep in the table, in seconds after power-on.
 constexpr double kPressing_s = 2.4;
 
-Pose pose_of(const std::array<double, 7>& x) {
-  Pose X;
-  X.rotation.coeffs() << x[3], x[4], x[5], x[6];
-  X.translation_m = {x[0], x[1], x[2]};
-  return X;
-}
-
 /// A handle that lies where it is, and says so at every tick.
 class StillDevice final : public Device {
  public:
@@ -58,7 +51,9 @@ class Listener final : public ProxyInitializer {
  public:
   std::vector<ProxyInitializationRequest> questions;
 
-  void request(const ProxyInitializationRequest& question) noexcept override { questions.push_back(question); }
+  void request(const ProxyInitializationRequest& question) noexcept override {
+    questions.push_back(question);
+  }
   bool take_result(ProxyInitializationResult& answer) noexcept override {
     answer = {questions.back().id, false, Pose{}, questions.back().scene_time_s};
     return true;
@@ -85,7 +80,7 @@ TEST_CASE("after every start the loop is disarmed: it measures and projects, and
 
 TEST_CASE("armed, the simulated hand presses the cube into the table and the table holds it", "[servo]") {
   VirtualRuntime s;
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   CHECK(s.state() == State::active);
   CHECK(s.last.contacts == 4);
@@ -95,7 +90,7 @@ TEST_CASE("armed, the simulated hand presses the cube into the table and the tab
   CHECK(s.last.F_out[2] == Approx(600.0 * depth_m).epsilon(0.02));
   CHECK(std::hypot(s.last.F_out[0], s.last.F_out[1]) < 1e-3);
   CHECK(s.simulated.handle().hand_wrench().force_N.z() == Approx(-s.last.F_out[2]).epsilon(0.05));
-  CHECK(pose_of(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
+  CHECK(pose_from_numbers(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
 }
 
 TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the base's axes", "[servo]") {
@@ -106,16 +101,16 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   plan.settings.wrench.gains.damping.setZero();
   const Matrix6d K = plan.settings.wrench.gains.stiffness;
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   int compared = 0;
   for (int i = 0; i < 8000; ++i) {
     REQUIRE(s.tick() == Fault::none);
     if (s.state() != State::active || s.last.limit_causes != kNotLimited || s.last.contacts == 0) continue;
-    const Pose X_WP = pose_of(s.last.X_WP);
-    const Vector6d eps = log(inverse(X_WP) * pose_of(s.last.X_WQ));
+    const Pose X_WP = pose_from_numbers(s.last.X_WP);
+    const Vector6d eps = log(inverse(X_WP) * pose_from_numbers(s.last.X_WQ));
     const Vector6d W_T = K * eps;
     const Pose X_WB{Quaterniond(Eigen::AngleAxisd(1.2, Vector3d::UnitZ())), Vector3d::Zero()};
-    const Pose X_WH = X_WB * pose_of(s.last.X_BH);
+    const Pose X_WH = X_WB * pose_from_numbers(s.last.X_BH);
     const Vector3d f_W = X_WP.rotation * W_T.head<3>();
     const Vector3d t_W = X_WP.rotation * W_T.tail<3>() + (X_WP.translation_m - X_WH.translation_m).cross(f_W);
     const Vector3d f_B = X_WB.rotation.conjugate() * f_W;
@@ -136,18 +131,19 @@ TEST_CASE("a device that cannot turn the hand is armed and pushes, and the torqu
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
   Runtime station(plan, *link, clock, ProxySearchMode::in_tick);
   station.open();
-  station.loop().arm();
+  station.loop().requests().arm();
   TickRecord last;
   bool pushed = false, told = false;
   for (int i = 0; i < 5000; ++i) {
     clock.sleep_until(clock.now() + std::chrono::milliseconds(1));
     REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().latest_record().read(last);
+    station.loop().telemetry().latest_record().read(last);
     CHECK(Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm() == 0.0);
     CHECK((last.limit_causes & kTorqueMagnitude) == 0);
     CHECK((last.undriven_dofs & ~kAngularDofs) == 0);
     pushed = pushed || last.F_out[2] > 0.5;
-    told = told || live_line(last, station.loop().timing()).find("(no motor: rx ry rz)") != std::string::npos;
+    told = told || live_line(last, station.loop().telemetry().timing()).find("(no motor: rx ry rz)") !=
+                       std::string::npos;
   }
   CHECK(static_cast<State>(last.state) == State::active);
   CHECK(pushed);
@@ -164,11 +160,11 @@ TEST_CASE("armed, the motors hold the weight of the handle, however the base sta
   VirtualRuntime s(plan);
   REQUIRE(s.run(0.2) == Fault::none);
   CHECK(s.force_N() == 0.0);  // disarmed
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(3.0) == Fault::none);
   REQUIRE(s.state() == State::active);
   CHECK(s.last.contacts == 0);
-  const Wrench weight = gravity.wrench(pose_of(s.last.X_BH));
+  const Wrench weight = gravity.wrench(pose_from_numbers(s.last.X_BH));
   CHECK(weight.force_N.norm() == Approx(0.3 * kGravity_m_per_s2));
   CHECK((weight.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-12);
   CHECK((weight.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-12);
@@ -180,12 +176,12 @@ TEST_CASE("a profile may ask for the paper's spatial wrench about the world orig
   plan.profile.wrench_point = WrenchPoint::world_origin;
   plan.settings.wrench.gains.damping.setZero();
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s + 0.6) == Fault::none);
   REQUIRE(s.last.contacts > 0);
   const Wrench W_T{{s.last.F_T[0], s.last.F_T[1], s.last.F_T[2]},
                    {s.last.F_T[3], s.last.F_T[4], s.last.F_T[5]}};
-  const Wrench W_S = spatial_wrench(pose_of(s.last.X_WP), W_T);
+  const Wrench W_S = spatial_wrench(pose_from_numbers(s.last.X_WP), W_T);
   CHECK((W_S.force_N - Vector3d(s.last.F_out[0], s.last.F_out[1], s.last.F_out[2])).norm() < 1e-9);
   CHECK((W_S.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-9);
 }
@@ -194,7 +190,7 @@ TEST_CASE("arming in contact waits: no push until the hand has moved out and is 
   VirtualRuntime s;
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.last.contacts > 0);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   for (int i = 0; i < 300; ++i) {
     REQUIRE(s.tick() == Fault::none);
     CHECK(s.state() == State::waiting);
@@ -206,7 +202,7 @@ TEST_CASE("authority rises over the soft start, and the force never faster than 
   RunConfig plan = shipped_config();
   plan.settings.limits.force_slew_N_per_s = 100.0;
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   double last_N = 0.0;
   double last_authority = 0.0;
   for (int i = 0; i < 4000; ++i) {
@@ -222,7 +218,7 @@ TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]")
   RunConfig plan = shipped_config();
   plan.settings.limits.max_force_N = 0.5;
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   CHECK((s.last.limit_causes & kForceMagnitude) != 0);
   CHECK(s.force_N() <= 0.5);
@@ -232,7 +228,7 @@ TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]")
 
 TEST_CASE("a device that leaves ends the loop, and the hand is released", "[servo]") {
   VirtualRuntime s;
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   s.inject(SimulatedFault::Kind::unplug, kPressing_s, 1.0);
   CHECK(s.run(4.0) == Fault::device_lost);
@@ -246,7 +242,7 @@ TEST_CASE("a device that leaves ends the loop, and the hand is released", "[serv
 TEST_CASE("an old pose fades the force before it is one to look at, and what passes comes back by a ramp",
           "[servo]") {
   VirtualRuntime s;
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.force_N() > 0.5);
   s.inject(SimulatedFault::Kind::silence, kPressing_s, 0.014);
@@ -270,7 +266,7 @@ TEST_CASE("a gap in time takes the force: no kick after a stall", "[servo]") {
   RunConfig plan = shipped_config();
   plan.settings.servo.realtime = required ? Realtime::required : Realtime::best_effort;
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.force_N() > 0.5);
   CHECK(s.tick_after(std::chrono::milliseconds(300)) == (required ? Fault::loop_stalled : Fault::tick_late));
@@ -290,7 +286,7 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
   FeasiblePoseSearch placement(s.runtime.scene());
   const double slew_N = buried.config.settings.limits.force_slew_N_per_s * 1e-3;
   const double most_N = buried.config.profile.max_force_N;
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.tick() == Fault::none);
   CHECK(proxy_initialization(s) == ProxyInitialization::searching);
   int seeking = 0;
@@ -311,7 +307,7 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
       ++seeking;
       continue;
     }
-    if (s.last.tick % 10 == 0) CHECK(placement.admissible(pose_of(s.last.X_WQ)));
+    if (s.last.tick % 10 == 0) CHECK(placement.admissible(pose_from_numbers(s.last.X_WQ)));
     waited = waited || s.state() == State::waiting;
     ramped = ramped || s.state() == State::ramping;
     CHECK(s.force_N() <= last_N + slew_N + 1e-9);
@@ -332,11 +328,11 @@ TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, an
           "[servo][placing]") {
   const BuriedTool buried({{0.0, {0, 0, 0.03}}});
   VirtualRuntime s(buried.config);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(0.5) == Fault::none);
   CHECK(proxy_initialization(s) == ProxyInitialization::complete);
   CHECK(s.last.contacts > 0);
-  CHECK(FeasiblePoseSearch(s.runtime.scene()).admissible(pose_of(s.last.X_WQ)));
+  CHECK(FeasiblePoseSearch(s.runtime.scene()).admissible(pose_from_numbers(s.last.X_WQ)));
   CHECK(s.last.energy > 0.0);
   CHECK(s.state() == State::waiting);
   CHECK(s.force_N() == 0.0);
@@ -347,7 +343,7 @@ TEST_CASE("where the tool fits nowhere there is no force, it is said once, and t
   RunConfig plan = shipped_config();
   plan.scene.half_spaces = closed_box(0.02);  // the cube's half edge is 25 mm
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   int answers = 0;
   for (int i = 0; i < 1000; ++i) {
     const ProxyInitialization before = proxy_initialization(s);
@@ -364,21 +360,21 @@ TEST_CASE("where the tool fits nowhere there is no force, it is said once, and t
   }
   CHECK(answers >= 9);  // ten times a second
   CHECK(answers <= 11);
-  int said = 0;
-  for (Event event; s.runtime.loop().events().pop(event);) {
-    said += event.kind == Event::Kind::proxy_search_failed ? 1 : 0;
-    CHECK(event.kind != Event::Kind::proxy_found);
-    CHECK(event.kind != Event::Kind::projection_infeasible);
+  int failures = 0;
+  for (Event event; s.runtime.loop().telemetry().events().pop(event);) {
+    failures += std::holds_alternative<Event::ProxySearchFailed>(event.data) ? 1 : 0;
+    CHECK_FALSE(std::holds_alternative<Event::ProxyFound>(event.data));
+    CHECK_FALSE(std::holds_alternative<Event::ProjectionInfeasible>(event.data));
   }
-  CHECK(said == 1);
+  CHECK(failures == 1);
 }
 
 TEST_CASE("starting over drops the force at once and comes back by the soft start", "[servo][placing]") {
   VirtualRuntime s;
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.force_N() > 0.5);
-  s.runtime.loop().reinitialize_proxy();
+  s.runtime.loop().requests().reinitialize_proxy();
   REQUIRE(s.tick() == Fault::none);
   CHECK(s.last.commands == kReinitialize);
   CHECK(proxy_initialization(s) == ProxyInitialization::searching);
@@ -406,7 +402,7 @@ TEST_CASE("to be armed while a place is looked for does not begin the search ane
     VirtualRuntime s;
     int ticks = 0;
     for (; ticks < 100 && proxy_initialization(s) != ProxyInitialization::found; ++ticks) {
-      if (ticks == armed_at) s.runtime.loop().arm();
+      if (ticks == armed_at) s.runtime.loop().requests().arm();
       REQUIRE(s.tick() == Fault::none);
     }
     return ticks;
@@ -424,7 +420,7 @@ TEST_CASE("what a hand goes through while it feels nothing does not hold it once
   REQUIRE(s.run(1.5) == Fault::none);
   CHECK(s.last.X_WP[2] < -0.11);
   CHECK(s.last.X_WQ[2] > 0.05);  // it followed, and never through the boulder
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(1.5) == Fault::none);
   CHECK(s.state() == State::active);
   CHECK(s.last.contacts == 0);
@@ -442,7 +438,7 @@ TEST_CASE("a stop while the proxy is being placed ends the loop and the search",
   stop.store(true);
   servo.join();
   TickRecord last;
-  REQUIRE(s->runtime.loop().latest_record().read(last));
+  REQUIRE(s->runtime.loop().telemetry().latest_record().read(last));
   CHECK(fault == Fault::none);
   CHECK(last.released == 1);
   CHECK(static_cast<ProxyInitialization>(last.proxy_initialization) == ProxyInitialization::searching);
@@ -455,7 +451,7 @@ TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
   const BuriedTool buried({{0.0, {0, 0, 0.03}}});
   VirtualRuntime s(buried.config);
   REQUIRE(s.run(0.1) == Fault::none);
-  s.runtime.loop().reinitialize_proxy();
+  s.runtime.loop().requests().reinitialize_proxy();
   s.inject(SimulatedFault::Kind::silence, 0.1, 0.008);
   while (proxy_initialization(s) == ProxyInitialization::complete) REQUIRE(s.tick() == Fault::none);
   for (int i = 0; i < 5; ++i) {
@@ -470,9 +466,9 @@ TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
 
 TEST_CASE("who stops, acknowledges and arms in one breath has stopped", "[servo]") {
   VirtualRuntime s;
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
-  s.runtime.loop().request(kStop | kAcknowledge | kArm);
+  s.runtime.loop().requests().request(kStop | kAcknowledge | kArm);
   CHECK(s.tick() == Fault::stop_requested);
   CHECK(s.state() == State::stopped);
   CHECK(s.force_N() == 0.0);
@@ -481,11 +477,11 @@ TEST_CASE("who stops, acknowledges and arms in one breath has stopped", "[servo]
 TEST_CASE("release may be called at any time, and again", "[servo]") {
   VirtualRuntime s;
   s.runtime.loop().release(s.clock.now());
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   for (int i = 0; i < 3; ++i) {
     s.runtime.loop().release(s.clock.now());
-    CHECK(s.runtime.loop().state() == State::shutdown);
+    CHECK(s.runtime.loop().telemetry().state() == State::shutdown);
   }
   CHECK(s.run(0.1) == Fault::none);
   CHECK(s.simulated.motor_wrench().force_N.norm() == 0.0);
@@ -496,42 +492,43 @@ TEST_CASE("release may be called at any time, and again", "[servo]") {
 TEST_CASE("scene time begins at the first tick and goes by the times of the ticks, whatever the loop does",
           "[servo][moving]") {
   const RunConfig plan = shipped_config();
-  const Scene scene(plan.scene);
   StillDevice device;
-  Listener placer;
   VirtualClock clock;
-  ServoLoop loop(plan.settings, plan.profile, device, scene, placer, clock);
+  const auto scene = std::make_shared<const Scene>(plan.scene);
+  const auto listener = std::make_shared<Listener>();
+  ServoLoop loop(plan.settings, plan.profile, device,
+                 std::make_unique<Rendering>(0, plan.settings, plan.profile, scene, listener), clock);
   const TimePoint first{from_seconds(123456.789)};  // a machine that has been on for days
   std::vector<double> expected_s;
   TimePoint now = first;
   for (int i = 0; i < 3000; ++i) {
-    if (i == 700) loop.arm();
-    if (i == 1200) loop.disarm();
-    if (i == 1500) loop.reinitialize_proxy();
+    if (i == 700) loop.requests().arm();
+    if (i == 1200) loop.requests().disarm();
+    if (i == 1500) loop.requests().reinitialize_proxy();
     if (i == 2000) loop.release(now);
     const Fault fault = loop.tick(now, now);
     REQUIRE((fault == Fault::none || (i == 1001 && fault == Fault::loop_stalled)));
-    if (placer.questions.size() > expected_s.size()) expected_s.push_back(seconds(now - first));
+    if (listener->questions.size() > expected_s.size()) expected_s.push_back(seconds(now - first));
     now += i == 1000 ? std::chrono::seconds(5) : from_seconds(0.00098 + 0.00001 * (i % 5));
   }
   REQUIRE(expected_s.size() > 20);
   CHECK(expected_s.front() == 0.0);
   CHECK(expected_s.back() == Approx(8.0).margin(0.2));
-  REQUIRE(placer.questions.size() == expected_s.size());
+  REQUIRE(listener->questions.size() == expected_s.size());
   for (std::size_t i = 0; i < expected_s.size(); ++i)
-    CHECK(placer.questions[i].scene_time_s == expected_s[i]);
+    CHECK(listener->questions[i].scene_time_s == expected_s[i]);
 }
 
 TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the hand", "[servo][moving]") {
   RunConfig plan = shipped_config();
   plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   double most_tilt = 0.0, most_lift_m = 0.0;
   for (int i = 0; i < 6000; ++i) {
     REQUIRE(s.tick() == Fault::none);
     if (proxy_initialization(s) != ProxyInitialization::complete) continue;
-    const Pose X_WQ = pose_of(s.last.X_WQ);
+    const Pose X_WQ = pose_from_numbers(s.last.X_WQ);
     const double down = X_WQ.translation_m.z() - 0.025;  // of a cube that lies on the table
     if (s.last.contacts > 0) most_lift_m = std::max(most_lift_m, down);
     most_tilt = std::max(most_tilt, std::abs(X_WQ.rotation.y()));
@@ -547,7 +544,7 @@ TEST_CASE("a plunger that presses against a hand at rest pushes with all its for
   plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, {}}};
   plan.settings.simulation.hand_repeats = false;
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   double least_share = 1.0, most_N = 0.0, worst_J = 0.0, gave_J = 0.0;
   for (int i = 0; i < 20000; ++i) {
     REQUIRE(s.tick() == Fault::none);
@@ -565,8 +562,8 @@ TEST_CASE("a plunger that presses against a hand at rest pushes with all its for
 TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
   VirtualRuntime a;
   VirtualRuntime b;
-  a.runtime.loop().arm();
-  b.runtime.loop().arm();
+  a.runtime.loop().requests().arm();
+  b.runtime.loop().requests().arm();
   for (int i = 0; i < 6000; ++i) {
     REQUIRE(a.tick() == Fault::none);
     REQUIRE(b.tick() == Fault::none);
@@ -580,7 +577,7 @@ TEST_CASE("all three methods hold the cube", "[servo]") {
   RunConfig plan = shipped_config();
   plan.settings.rendering.method = method;
   VirtualRuntime s(plan);
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
   // The traditional penalty gives energy from nowhere as the cube tips onto its face, and the guard takes it
   // back.
@@ -598,7 +595,7 @@ TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device
   SimulatedRuntime<WallClock> s(plan);
   WallClock& clock = s.clock;
   Runtime& station = s.runtime;
-  station.loop().arm();
+  station.loop().requests().arm();
   std::atomic<bool> stop{false};
   Fault fault = Fault::none;
   std::thread servo([&] { fault = station.loop().run(clock, stop); });
@@ -606,25 +603,9 @@ TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device
   stop.store(true);
   servo.join();
   TickRecord last;
-  REQUIRE(station.loop().latest_record().read(last));
+  REQUIRE(station.loop().telemetry().latest_record().read(last));
   CHECK(fault == Fault::none);
   CHECK(last.released == 1);
-  CHECK(station.loop().timing().tick.count() > 10);
-  CHECK(station.loop().timing().tick.count() <= 600);  // with the fade
-}
-
-TEST_CASE("what the servo thread says becomes lines that name the cure", "[servo]") {
-  CHECK(to_text({Event::Kind::fault_raised, {}, static_cast<std::uint32_t>(Fault::device_lost), 0.0}) ==
-        "device_lost: the device left the bus; plug it in again; wrenchd comes back disarmed");
-  CHECK(to_text({Event::Kind::state_changed, {}, static_cast<std::uint32_t>(State::active), 0.0}) ==
-        "state: active");
-  CHECK(to_text({Event::Kind::proxy_found, {}, 0, 0.0125}) == "placed 12.5 mm from the hand");
-  CHECK(to_text({Event::Kind::proxy_search_started, {}, 0, 0.0}).find("zero wrench until") !=
-        std::string::npos);
-  CHECK(to_text({Event::Kind::proxy_search_failed, {}, 0, 0.0}).find("the tool does not fit") !=
-        std::string::npos);
-  CHECK(to_text({Event::Kind::fault_raised, {}, static_cast<std::uint32_t>(Fault::tick_late), 0.0305})
-            .find("tick_late: a tick came some milliseconds late (30.5 ms); give wrenchd") == 0);
-  CHECK(to_text({Event::Kind::arming_refused, {}, static_cast<std::uint32_t>(State::fault), 0.0}) ==
-        "not armed: acknowledge what happened first");
+  CHECK(station.loop().telemetry().timing().tick.count() > 10);
+  CHECK(station.loop().telemetry().timing().tick.count() <= 600);  // with the fade
 }

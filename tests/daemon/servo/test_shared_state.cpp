@@ -30,14 +30,14 @@ const Reconfigurator::ObstacleNames kTable{3, {"table"}};
 StateReader reader_of(const SharedState& state, const Reconfigurator::ObstacleNames& obstacles = kTable) {
   std::string layout;
   int descriptor = -1;
-  open_state(state, obstacles, [&](const nlohmann::json& result, int handed_over) {
+  open_state(state, obstacles, [&](const nlohmann::json& result, int sent_descriptor) {
     layout = result.at("layout").dump();
-    descriptor = fcntl(handed_over, F_DUPFD_CLOEXEC, 0);
+    descriptor = fcntl(sent_descriptor, F_DUPFD_CLOEXEC, 0);
   });
   return StateReader(layout, descriptor);
 }
 
-/// A record whose every number follows from one: whoever has parts of two sees it.
+/// Returns a record in which every field depends on `number`, so that a mixture of two records is detected.
 TickRecord record_of(std::uint64_t number) {
   TickRecord r;
   auto* const bytes = reinterpret_cast<std::byte*>(&r);
@@ -52,22 +52,22 @@ TickRecord record_of(std::uint64_t number) {
   return r;
 }
 
-Touches touches_of(std::uint64_t number) {
-  Touches touches;
+Touches contacts_of(std::uint64_t number) {
+  Touches contacts;
   for (std::uint64_t i = 0; i < number % (kMaxTouches + 1); ++i) {
     Touch touch;
     touch.point_W_m.fill(static_cast<double>(number));
-    touch.share = static_cast<double>(i);
-    touches.add(touch);
+    touch.load_fraction = static_cast<double>(i);
+    contacts.add(touch);
   }
-  return touches;
+  return contacts;
 }
 
-/// Is this record_of() and touches_of() its own number, in every bit of every field?
-bool whole(const TickState& state) {
+/// Returns true if every field equals that of record_of() and contacts_of() for the number of the tick.
+bool complete(const TickState& state) {
   const std::uint64_t number = state.tick();
-  const TickRecord wanted = record_of(number);
-  const auto* const bytes = reinterpret_cast<const std::byte*>(&wanted);
+  const TickRecord reference = record_of(number);
+  const auto* const bytes = reinterpret_cast<const std::byte*>(&reference);
   for (const RecordField& field : tick_fields())
     for (std::size_t i = 0; i < field.count; ++i) {
       if (field.type == FieldType::f64) {
@@ -78,39 +78,38 @@ bool whole(const TickState& state) {
       std::memcpy(&expected, bytes + field.offset + i * size_of(field.type), size_of(field.type));
       if (state.integer(field.name, i) != expected) return false;
     }
-  const std::vector<ProxyContact> told = state.contacts();
-  if (told.size() != number % (kMaxTouches + 1)) return false;
-  for (std::size_t i = 0; i < told.size(); ++i)
-    if (told[i].point_W_m[2] != static_cast<double>(number) || told[i].share != static_cast<double>(i))
+  const std::vector<ProxyContact> contacts = state.contacts();
+  if (contacts.size() != number % (kMaxTouches + 1)) return false;
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    if (contacts[i].point_W_m[2] != static_cast<double>(number) ||
+        contacts[i].load_fraction != static_cast<double>(i))
       return false;
   return true;
 }
 
 }  // namespace
 
-TEST_CASE("what is written is read, every field, in order, each once", "[shared_state]") {
+TEST_CASE("a reader gets every field of every record, in order, once", "[shared_state]") {
   SharedState state(100.0);
   REQUIRE(state.slots() == 256);
   state.write(record_of(999), {});
   StateReader reader = reader_of(state);
   TickState tick;
-  CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));  // what was there before is not the next
+  CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));  // next() starts after the records that exist
   REQUIRE(reader.latest(tick));
   CHECK(tick.tick() == 999);
   for (std::uint64_t i = 1000; i < 3000; ++i) {
-    state.write(record_of(i), touches_of(i));
+    state.write(record_of(i), contacts_of(i));
     REQUIRE(reader.next(tick));
     REQUIRE(tick.tick() == i);
-    REQUIRE(whole(tick));
+    REQUIRE(complete(tick));
     CHECK(reader.unread() == 0);
   }
   CHECK_FALSE(reader.next(tick, std::chrono::milliseconds(1)));
   CHECK(reader.missed() == 0);
 }
 
-TEST_CASE(
-    "a reader that slept for two seconds of ticks has missed none; one that slept longer is told how many",
-    "[shared_state]") {
+TEST_CASE("a reader that pauses for 2 s misses nothing; a longer pause is counted", "[shared_state]") {
   SharedState state(4000.0);
   REQUIRE(state.slots() >= 8000);
   StateReader reader = reader_of(state);
@@ -132,11 +131,10 @@ TEST_CASE(
   CHECK(taken + reader.missed() == written);
 }
 
-TEST_CASE("readers beside a writer at full speed never see a torn record, however often they are overrun",
-          "[shared_state]") {
-  SharedState state(4.0);  // 8 records: overrun all the time
+TEST_CASE("readers beside a writer at full speed never get a torn record", "[shared_state]") {
+  SharedState state(4.0);  // 8 records, overwritten all the time
   std::atomic<bool> stop{false};
-  std::array<std::uint64_t, 2> seen{}, torn{}, back{}, missed{};
+  std::array<std::uint64_t, 2> read{}, torn{}, backward{}, missed{};
   std::vector<std::thread> readers;
   for (std::size_t r = 0; r < 2; ++r)
     readers.emplace_back([&, r] {
@@ -145,27 +143,27 @@ TEST_CASE("readers beside a writer at full speed never see a torn record, howeve
       std::uint64_t last = 0;
       while (!stop.load()) {
         if (r == 0 ? !reader.next(tick, std::chrono::milliseconds(1)) : !reader.latest(tick)) continue;
-        ++seen[r];
-        if (!whole(tick)) ++torn[r];
-        if (tick.tick() < last) ++back[r];
+        ++read[r];
+        if (!complete(tick)) ++torn[r];
+        if (tick.tick() < last) ++backward[r];
         last = tick.tick();
       }
       missed[r] = reader.missed();
     });
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
   for (std::uint64_t i = 0; std::chrono::steady_clock::now() < end; ++i)
-    state.write(record_of(i), touches_of(i));
+    state.write(record_of(i), contacts_of(i));
   stop.store(true);
   for (std::thread& reader : readers) reader.join();
   for (std::size_t r = 0; r < 2; ++r) {
-    CHECK(seen[r] > 100);
+    CHECK(read[r] > 100);
     CHECK(torn[r] == 0);
-    CHECK(back[r] == 0);
+    CHECK(backward[r] == 0);
   }
   CHECK(missed[0] > 100);
 }
 
-TEST_CASE("who has the descriptor can read the memory, and nothing else", "[shared_state]") {
+TEST_CASE("the descriptor allows reading only", "[shared_state]") {
   SharedState state(100.0);
   const int fd = state.descriptor();
   const auto size = static_cast<off_t>(state.bytes());
@@ -183,16 +181,15 @@ TEST_CASE("who has the descriptor can read the memory, and nothing else", "[shar
   CHECK(state.written() == 1);
 }
 
-TEST_CASE("writing neither allocates nor locks, and touches no page for the first time",
-          "[shared_state][realtime]") {
+TEST_CASE("writing neither allocates nor locks, and causes no page fault", "[shared_state][realtime]") {
   SharedState state(1000.0);
   const TickRecord record = record_of(5);
-  const Touches touches = touches_of(16);
-  state.write(record, touches);
+  const Touches contacts = contacts_of(16);
+  state.write(record, contacts);
   rusage before{}, after{};
   getrusage(RUSAGE_THREAD, &before);
   const RealtimeGuard guard;
-  for (std::uint64_t i = 0; i < 2 * state.slots(); ++i) state.write(record, touches);
+  for (std::uint64_t i = 0; i < 2 * state.slots(); ++i) state.write(record, contacts);
   const std::uint64_t allocations = guard.allocations();
   const std::uint64_t locks = guard.locks();
   getrusage(RUSAGE_THREAD, &after);
@@ -203,11 +200,11 @@ TEST_CASE("writing neither allocates nor locks, and touches no page for the firs
 #endif
 }
 
-TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][servo]") {
+TEST_CASE("every tick of the loop is published with its contacts", "[shared_state][servo]") {
   VirtualRuntime s;
   StateReader reader =
       reader_of(s.runtime.enable_shared_state(), s.runtime.reconfigurator().obstacle_names());
-  s.runtime.loop().arm();
+  s.runtime.loop().requests().arm();
   TickState tick;
   for (int i = 0; i < 2400; ++i) {
     REQUIRE(s.tick() == Fault::none);
@@ -219,23 +216,23 @@ TEST_CASE("every tick of the loop is shown, with what touches", "[shared_state][
   CHECK(tick.state() == "active");
   CHECK(tick.text("projection_status") == "converged");
   CHECK(tick.text("faults").empty());
-  const std::vector<ProxyContact> touches = tick.contacts();
-  REQUIRE(touches.size() == 4);
-  double share = 0.0;
-  for (const ProxyContact& touch : touches) {
+  const std::vector<ProxyContact> contacts = tick.contacts();
+  REQUIRE(contacts.size() == 4);
+  double load = 0.0;
+  for (const ProxyContact& touch : contacts) {
     CHECK(touch.obstacle == "table");
     CHECK(touch.obstacle_feature == "plane");
     CHECK(touch.tool_feature.starts_with("hull vertex "));
     CHECK(touch.normal_W == std::array<double, 3>{0.0, 0.0, 1.0});
     CHECK(std::abs(touch.point_W_m[2]) < 1e-8);
     CHECK(std::abs(std::abs(touch.point_W_m[0] - tick.proxy_pose()[0]) - 0.025) < 1e-6);
-    share += touch.share;
+    load += touch.load_fraction;
   }
-  CHECK(share == Approx(1.0));
+  CHECK(load == Approx(1.0));
   s.runtime.loop().release(s.clock.now());
   REQUIRE(reader.next(tick));
   CHECK(tick.integer("released") == 1);
-  CHECK(tick.text("commands") == "let go");
+  CHECK(tick.text("commands") == "release");
 }
 
 TEST_CASE("the layout describes every field, within a line of the protocol", "[shared_state]") {
@@ -243,7 +240,7 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
   CHECK(state.slots() >= 16'000);
   const nlohmann::json layout = state_layout(state, kTable);
   CHECK(layout.dump().size() < 32 * 1024);
-  for (const nlohmann::json& list : {layout["fields"], layout["touches"]["fields"]})
+  for (const nlohmann::json& list : {layout["fields"], layout["contacts"]["fields"]})
     for (const nlohmann::json& field : list) {
       INFO(field);
       CHECK_FALSE(field["unit"].get<std::string>().empty());
@@ -254,15 +251,14 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
           for (const std::string name : field[names]) CHECK((!name.empty() && name != "unknown"));
     }
   CHECK(layout["obstacles"] == nlohmann::json({"table"}));
-  CHECK(layout["rendering"] == 3);
+  CHECK(layout["rendering_id"] == 3);
 }
 
-TEST_CASE(
-    "contacts have the names of their own rendering's obstacles, and the daemon is asked once a rendering",
-    "[shared_state]") {
+TEST_CASE("contacts have the obstacle names of their rendering, requested from the daemon once per rendering",
+          "[shared_state]") {
   SharedState state(4.0);
   int asked = 0;
-  std::string answer = R"({"rendering": 4, "obstacles": ["bolt"]})";
+  std::string answer = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
   StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
                      [&] {
                        ++asked;
@@ -272,9 +268,9 @@ TEST_CASE(
   const auto touched_in = [&](std::uint32_t rendering) {
     TickRecord record;
     record.rendering_id = rendering;
-    Touches touches;
-    touches.add(Touch{});
-    state.write(record, touches);
+    Touches contacts;
+    contacts.add(Touch{});
+    state.write(record, contacts);
     TickState tick;
     REQUIRE(reader.latest(tick));
     return tick.contacts().at(0).obstacle;
@@ -283,19 +279,19 @@ TEST_CASE(
   CHECK(asked == 0);
   CHECK(touched_in(4) == "bolt");
   CHECK(touched_in(4) == "bolt");
-  CHECK(touched_in(3) == "table");  // looked at late
+  CHECK(touched_in(3) == "table");  // a tick that is read late
   CHECK(asked == 1);
-  CHECK(touched_in(5) == "obstacle 0");  // that is not known yet
-  answer = R"({"rendering": 7, "obstacles": ["nut"]})";
-  CHECK(touched_in(6) == "obstacle 0");  // that is known no more
+  CHECK(touched_in(5) == "obstacle 0");  // not known yet
+  answer = R"({"rendering_id": 7, "obstacles": ["nut"]})";
+  CHECK(touched_in(6) == "obstacle 0");  // not known any more
   CHECK(touched_in(7) == "nut");
-  for (const char* bad : {"", "no JSON", "{}", R"({"rendering": 8, "obstacles": 1})"}) {
+  for (const char* bad : {"", "no JSON", "{}", R"({"rendering_id": 8, "obstacles": 1})"}) {
     answer = bad;
     CHECK(touched_in(8) == "obstacle 0");
   }
 }
 
-TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") {
+TEST_CASE("a layout that does not fit its memory is rejected", "[shared_state]") {
   SharedState state(4.0);
   const nlohmann::json good = state_layout(state, kTable);
   const auto open = [&](const nlohmann::json& layout) {
@@ -308,7 +304,7 @@ TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") 
     INFO(where << " = " << value);
     CHECK_THROWS_AS(open(layout), ClientError);
   };
-  refused("/version", 2);
+  refused("/version", SharedState::kVersion + 1);
   refused("/bytes", state.bytes() + 1);
   refused("/slots", state.slots() + 1);
   refused("/slots", 0);
@@ -319,8 +315,8 @@ TEST_CASE("a layout that does not fit its memory is refused", "[shared_state]") 
   refused("/fields/3/offset", sizeof(StateRecord));
   refused("/fields/3/count", 1'000'000);
   refused("/fields/3/type", "f16");
-  refused("/touches/most", 1000);
-  refused("/touches/fields/0/offset", 87);
+  refused("/contacts/max_count", 1000);
+  refused("/contacts/fields/0/offset", 87);
   refused("/fields", nullptr);
   const int unsealed = memfd_create("unsealed", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   REQUIRE(ftruncate(unsealed, static_cast<off_t>(state.bytes())) == 0);

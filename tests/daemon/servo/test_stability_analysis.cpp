@@ -12,7 +12,8 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A second of ticks 1 ms apart with samples of this age, whose commands are acknowledged as late.
+/// Returns the measurement of 1 s of ticks at 1 kHz. age: age of each sample. Commands are acknowledged after
+/// ticks_to_acknowledge.
 LoopMeasurement measured(Duration age, std::uint64_t ticks_to_acknowledge) {
   LoopMeasurement loop(0.002);
   for (std::uint64_t i = 1; i < 1000; ++i) {
@@ -23,64 +24,64 @@ LoopMeasurement measured(Duration age, std::uint64_t ticks_to_acknowledge) {
   return loop;
 }
 
-StabilityAnalysis stability_of(const RunConfig& plan) {
-  const Scene scene(plan.scene);
-  return StabilityAnalysis(plan.settings, plan.profile, scene.tool().solid.inertia, scene.tool().X_MT());
+StabilityAnalysis stability_of(const RunConfig& config) {
+  const Scene scene(config.scene);
+  return StabilityAnalysis(config.settings, config.profile, scene.tool().solid.inertia, scene.tool().X_MT());
 }
 
 }  // namespace
 
-TEST_CASE("what the shipped device bears is not touched, and ten times as much is scaled", "[stability]") {
-  RunConfig plan = shipped_config();
-  plan.settings.wrench.law = SpringLaw::pid;
+TEST_CASE("the shipped stiffness stays, and ten times that stiffness is scaled", "[stability]") {
+  RunConfig config = shipped_config();
+  config.settings.wrench.law = SpringLaw::pid;
   const LoopMeasurement loop = measured(500us, 1);
-  const StiffnessScale shipped = stability_of(plan).max_stable_scale(loop);
+  const StiffnessScale shipped = stability_of(config).max_stable_scale(loop);
   CHECK(shipped.bound_known);
   CHECK(shipped.spring == 1.0);
   CHECK(shipped.damper == 1.0);
-  plan.settings.wrench.gains.stiffness *= 10.0;
-  const StiffnessScale stiff = stability_of(plan).max_stable_scale(loop);
+  config.settings.wrench.gains.stiffness *= 10.0;
+  const StiffnessScale stiff = stability_of(config).max_stable_scale(loop);
   CHECK(stiff.spring < 0.5);
-  // Passive by the formula, with the delay that was measured.
-  const double b = plan.profile.damping_N_s_per_m;
+  // METHOD (78) with the measured delay.
+  const double b = config.profile.damping_N_s_per_m;
   CHECK(stiff.spring * 6000.0 * (0.5 * loop.longest_period_s() + loop.delay_s()) +
-            stiff.damper * plan.settings.wrench.gains.damping(0, 0) <=
+            stiff.damper * config.settings.wrench.gains.damping(0, 0) <=
         b * (1.0 + 1e-9));
-  CHECK(stability_of(plan).max_stable_scale(measured(2500us, 3)).spring < stiff.spring);
+  CHECK(stability_of(config).max_stable_scale(measured(2500us, 3)).spring < stiff.spring);
 }
 
-TEST_CASE("a profile that states no damping bounds nothing, and its own maximum does", "[stability]") {
-  RunConfig plan = shipped_config();
-  plan.settings.wrench.law = SpringLaw::pid;
-  plan.settings.wrench.gains.stiffness *= 10.0;
-  plan.profile.damping_N_s_per_m = DeviceProfile::kNotStated;
-  const StiffnessScale unknown = stability_of(plan).max_stable_scale(measured(500us, 1));
+TEST_CASE("without stated damping only the maximum stiffness of the profile applies", "[stability]") {
+  RunConfig config = shipped_config();
+  config.settings.wrench.law = SpringLaw::pid;
+  config.settings.wrench.gains.stiffness *= 10.0;
+  config.profile.damping_N_s_per_m = DeviceProfile::kNotStated;
+  const StiffnessScale unknown = stability_of(config).max_stable_scale(measured(500us, 1));
   CHECK_FALSE(unknown.bound_known);
   CHECK(unknown.spring == 1.0);
-  plan.profile.max_stiffness_N_per_m = 1500.0;
-  CHECK(stability_of(plan).max_stable_scale(measured(500us, 1)).spring == Approx(0.25));
+  config.profile.max_stiffness_N_per_m = 1500.0;
+  CHECK(stability_of(config).max_stable_scale(measured(500us, 1)).spring == Approx(0.25));
 }
 
-TEST_CASE("the encoders that a profile states bound the stiffness too", "[stability]") {
-  RunConfig plan = shipped_config();
-  plan.profile.encoder_step_m = 200e-6;
-  const StiffnessScale coarse = stability_of(plan).max_stable_scale(measured(500us, 1));
+TEST_CASE("the encoder step of a profile bounds the stiffness", "[stability]") {
+  RunConfig config = shipped_config();
+  config.profile.encoder_step_m = 200e-6;
+  const StiffnessScale coarse = stability_of(config).max_stable_scale(measured(500us, 1));
   CHECK(coarse.bound_known);
   CHECK(coarse.spring * 600.0 <= 51.0);
-  plan.profile.encoder_step_m = DeviceProfile::kNotStated;
-  CHECK(stability_of(plan).max_stable_scale(measured(500us, 1)).spring == 1.0);
+  config.profile.encoder_step_m = DeviceProfile::kNotStated;
+  CHECK(stability_of(config).max_stable_scale(measured(500us, 1)).spring == 1.0);
 }
 
-TEST_CASE("the energy law is bound by its own stiffness", "[stability]") {
-  RunConfig plan = shipped_config();
-  plan.settings.wrench.law = SpringLaw::energy;
+TEST_CASE("the bound of the energy law uses the stiffness of that law", "[stability]") {
+  RunConfig config = shipped_config();
+  config.settings.wrench.law = SpringLaw::energy;
   const LoopMeasurement loop = measured(500us, 1);
-  CHECK(stability_of(plan).max_stable_scale(loop).spring == 1.0);
-  plan.settings.wrench.energy_stiffness_per_s2 *= 20.0;
-  CHECK(stability_of(plan).max_stable_scale(loop).spring < 0.3);
+  CHECK(stability_of(config).max_stable_scale(loop).spring == 1.0);
+  config.settings.wrench.energy_stiffness_per_s2 *= 20.0;
+  CHECK(stability_of(config).max_stable_scale(loop).spring < 0.3);
 }
 
-TEST_CASE("wrenchd scales what is too stiff for the device, and says so", "[stability]") {
+TEST_CASE("wrenchd scales a stiffness above the bound, and logs it", "[stability]") {
   const TemporaryDirectory dir;
   const std::string config =
       dir.write(
@@ -91,6 +92,6 @@ TEST_CASE("wrenchd scales what is too stiff for the device, and says so", "[stab
       run_program("wrenchd", {"--config", config, "--virtual-time", "--seconds", "4", "--arm", "--live"});
   INFO(result.err);
   CHECK(result.exit_code == 0);
-  CHECK(result.err.find("% of the stiffness that is asked for") != std::string::npos);
+  CHECK(result.err.find("scales the stiffness to") != std::string::npos);
   CHECK(result.out.find("in contact at 0 of") == std::string::npos);
 }

@@ -22,35 +22,35 @@ DeviceSample sample_at(TimePoint now, double device_time_s) {
 
 }  // namespace
 
-TEST_CASE("a third of all reports may be bad for ever, and more may not", "[watches]") {
+TEST_CASE("one bad report in four is tolerated for ever, one in two is not", "[watches]") {
   for (const int one_in : {4, 2}) {
     LinkWatch watch(1000.0);
-    FaultSet found = 0;
+    FaultSet faults = 0;
     for (int i = 1; i < 5000; ++i) {
       DeviceSample sample = sample_at(TimePoint{} + i * 1ms, 1e-3 * i);
       if (i % one_in == 0) {
         sample.rejected = 1;
         sample.fresh = false;
       }
-      found |= watch.check(sample, sample.arrived);
+      faults |= watch.check(sample, sample.arrived);
     }
-    CHECK(((found & bit(Fault::link_lossy)) != 0) == (one_in == 2));
-    CHECK((found & bit(Fault::report_malformed)) != 0);
+    CHECK(((faults & bit(Fault::link_lossy)) != 0) == (one_in == 2));
+    CHECK((faults & bit(Fault::report_malformed)) != 0);
   }
 }
 
-TEST_CASE("two clocks that differ are no lag, and reports that wait somewhere are", "[watches]") {
+TEST_CASE("clock drift is no lag; a queue that delays reports is", "[watches]") {
   LinkWatch watch(1000.0);
-  const auto look = [&](int i, double lag_s, double rate) {
+  const auto check = [&](int i, double lag_s, double rate) {
     const TimePoint now = TimePoint{} + i * 1ms;
     return watch.check(sample_at(now, rate * 1e-3 * i - lag_s), now) & bit(Fault::sample_late);
   };
-  for (int i = 1; i < 100000; ++i) REQUIRE(look(i, 0.0, 1.0 - 1e-4) == 0);
-  for (int i = 100000; i < 100100; ++i) REQUIRE(look(i, 0.002, 1.0 - 1e-4) == 0);
-  CHECK(look(100100, 0.004, 1.0 - 1e-4) != 0);
+  for (int i = 1; i < 100000; ++i) REQUIRE(check(i, 0.0, 1.0 - 1e-4) == 0);
+  for (int i = 100000; i < 100100; ++i) REQUIRE(check(i, 0.002, 1.0 - 1e-4) == 0);
+  CHECK(check(100100, 0.004, 1.0 - 1e-4) != 0);
 }
 
-TEST_CASE("a device that reports seldom may be silent for three of its periods", "[watches]") {
+TEST_CASE("a sample of a device with slow reports is late after three report periods", "[watches]") {
   LinkWatch watch(125.0);
   const TimePoint start{1s};
   CHECK(watch.check(sample_at(start, 0.0), start) == 0);
@@ -60,7 +60,7 @@ TEST_CASE("a device that reports seldom may be silent for three of its periods",
   CHECK(watch.check(old, start + 25ms) == bit(Fault::sample_late));
 }
 
-TEST_CASE("a handle that rests is not stuck, nor one whose twist is noise", "[watches]") {
+TEST_CASE("a handle at rest is not stuck, with a zero twist or with noise", "[watches]") {
   PoseWatch watch{DeviceProfile{}};
   for (int i = 0; i < 5000; ++i) {
     DeviceSample sample = sample_at(TimePoint{} + i * 1ms, 1e-3 * i);
@@ -69,7 +69,7 @@ TEST_CASE("a handle that rests is not stuck, nor one whose twist is noise", "[wa
   }
 }
 
-TEST_CASE("two orientations that are none are dropped, and no fault yet", "[watches]") {
+TEST_CASE("two invalid rotations in a row are no fault", "[watches]") {
   PoseWatch watch{DeviceProfile{}};
   for (int i = 0; i < 30; ++i) {
     DeviceSample sample = sample_at(TimePoint{} + i * 1ms, 1e-3 * i);
@@ -78,7 +78,7 @@ TEST_CASE("two orientations that are none are dropped, and no fault yet", "[watc
   }
 }
 
-TEST_CASE("flags of a watchdog that tripped before the motors were driven are no fault", "[watches]") {
+TEST_CASE("a watchdog flag from before the motors were enabled is no fault", "[watches]") {
   MotorWatch watch;
   DeviceSample sample = sample_at(TimePoint{}, 0.0);
   sample.watchdog_tripped = true;
@@ -92,7 +92,7 @@ TEST_CASE("flags of a watchdog that tripped before the motors were driven are no
   CHECK(watch.check(sample, true, TimePoint{} + 111ms) == bit(Fault::watchdog_tripped));
 }
 
-TEST_CASE("a write that is refused for a moment is no fault", "[watches]") {
+TEST_CASE("single failed writes are no fault; 2 ms and 20 ms of failed writes are", "[watches]") {
   WriteWatch watch;
   TimePoint now{};
   for (int i = 0; i < 100; ++i, now += 1ms)
@@ -102,8 +102,7 @@ TEST_CASE("a write that is refused for a moment is no fault", "[watches]") {
   CHECK(watch.check(Fault::write_failed, now + 25ms) == bit(Fault::write_failed));
 }
 
-TEST_CASE("ticks that come when they should, and a little late, are no fault; a gap counts for two periods",
-          "[watches]") {
+TEST_CASE("punctual and slightly late ticks are no fault; dt is clamped to two periods", "[watches]") {
   PaceWatch watch(1ms, 20ms);
   TimePoint now{5s};
   CHECK(watch.check(now, 0ns) == 0);
@@ -112,13 +111,14 @@ TEST_CASE("ticks that come when they should, and a little late, are no fault; a 
   CHECK(watch.dt_s() == Approx(2e-3));
   CHECK(watch.check(now += 7ms, 0ns) == bit(Fault::tick_late));
   CHECK(watch.check(now += 22ms, 0ns) == bit(Fault::loop_stalled));
-  CHECK(watch.check(now += 1ms, 50ms) == 0);  // no sleep takes so little
+  CHECK(watch.check(now += 1ms, 50ms) == 0);  // 50 ms is no suspension
   CHECK(watch.check(now += 1ms, 1h) == bit(Fault::suspended));
   CHECK(watch.check(now - 1ns, 1h) == bit(Fault::clock_reversed));
   CHECK(watch.dt_s() == 0.0);
 }
 
-TEST_CASE("full force on a hand that moves is no pinning, nor is a moment of it", "[watches]") {
+TEST_CASE("full force on a moving handle is no stall, nor is 400 ms of full force on a still handle",
+          "[watches]") {
   MotorStallWatch watch(10.0, 0.5);
   const Wrench F{{0, 0, 9.9}, {0, 0, 0}};
   Pose X_BH;
@@ -133,7 +133,7 @@ TEST_CASE("full force on a hand that moves is no pinning, nor is a moment of it"
   CHECK(watch.check({{0, 0, 0}, {0, 0.49, 0}}, X_BH, now + 1ms) == bit(Fault::motors_stalled));
 }
 
-TEST_CASE("a client that lives is heard, whoever armed without a lease is not asked", "[watches]") {
+TEST_CASE("a client with a lease must send heartbeats; without a lease there is no timeout", "[watches]") {
   ClientWatch watch;
   CHECK(watch.check(TimePoint{1h}) == 0);
   watch.start(TimePoint{});
@@ -148,10 +148,10 @@ TEST_CASE("a client that lives is heard, whoever armed without a lease is not as
   CHECK(watch.check(TimePoint{1h}) == 0);
 }
 
-TEST_CASE("a client that hangs up is gone at once, where it had promised to live", "[watches]") {
+TEST_CASE("a closed connection of a client with a lease is a fault at once", "[watches]") {
   ClientWatch watch;
   watch.client_lost();
-  CHECK(watch.check(TimePoint{1s}) == 0);  // whoever armed without a lease is not meant
+  CHECK(watch.check(TimePoint{1s}) == 0);  // no lease, no fault
   watch.start(TimePoint{1s});
   watch.heartbeat(TimePoint{1s});
   CHECK(watch.check(TimePoint{1s}) == 0);
@@ -159,6 +159,6 @@ TEST_CASE("a client that hangs up is gone at once, where it had promised to live
   CHECK(watch.check(TimePoint{1s}) == bit(Fault::heartbeat_lost));
   watch.stop();
   CHECK(watch.check(TimePoint{1s}) == 0);
-  watch.start(TimePoint{2s});  // the next one is another
+  watch.start(TimePoint{2s});  // a new lease starts without a fault
   CHECK(watch.check(TimePoint{2s}) == 0);
 }

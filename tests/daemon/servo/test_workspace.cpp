@@ -15,7 +15,7 @@ double distance(const Pose& a, const Pose& b) {
   return (a.translation_m - b.translation_m).norm() + a.rotation.angularDistance(b.rotation);
 }
 
-TEST_CASE("a workspace that nobody touched is the pose of the base", "[workspace]") {
+TEST_CASE("a workspace without changes applies the base pose", "[workspace]") {
   RandomValues random(1);
   const Pose X_WB = random.pose();
   Workspace workspace(X_WB);
@@ -25,7 +25,7 @@ TEST_CASE("a workspace that nobody touched is the pose of the base", "[workspace
   }
 }
 
-TEST_CASE("the scale changes over a tenth of a second, and moves nothing by itself", "[workspace]") {
+TEST_CASE("the scale changes over 100 ms without moving the tool", "[workspace]") {
   RandomValues random(2);
   const double to = GENERATE(0.3, 3.0);
   Workspace workspace(random.pose());
@@ -37,13 +37,13 @@ TEST_CASE("the scale changes over a tenth of a second, and moves nothing by itse
     CHECK(distance(workspace.update(X_BH, kTick_s), X_WH) < 1e-12);
   CHECK(ticks >= 99);
   CHECK(ticks <= 101);
-  // From there on a way of the handle is so many times as long.
+  // After the ramp, tool motion is the scale times handle motion.
   const Pose further = {X_BH.rotation, X_BH.translation_m + Vector3d(0.01, 0.02, -0.01)};
   CHECK((workspace.update(further, kTick_s).translation_m - X_WH.translation_m).norm() ==
         Approx(to * Vector3d(0.01, 0.02, -0.01).norm()));
 }
 
-TEST_CASE("the wrench has the same power on the hand as in the world, whatever the scale", "[workspace]") {
+TEST_CASE("the wrench has equal power at the hand and in the world at every scale", "[workspace]") {
   RandomValues random(3);
   for (int i = 0; i < 200; ++i) {
     Workspace workspace(random.pose());
@@ -56,7 +56,7 @@ TEST_CASE("the wrench has the same power on the hand as in the world, whatever t
     const Wrench F_B = workspace.wrench_on_hand(F_W);
     CHECK(F_B.force_N.dot(V_BH.linear_m_per_s) + F_B.torque_Nm.dot(V_BH.angular_rad_per_s) ==
           Approx(F_W.force_N.dot(V_W.linear_m_per_s) + F_W.torque_Nm.dot(V_W.angular_rad_per_s)));
-    // And the twist is that of follow().
+    // The twist is the derivative of update().
     const double dt = 1e-7;
     const Pose now = workspace.update(X_BH, 0.0);
     const Pose then = workspace.update({X_BH.rotation, X_BH.translation_m + dt * V_BH.linear_m_per_s}, 0.0);
@@ -64,7 +64,7 @@ TEST_CASE("the wrench has the same power on the hand as in the world, whatever t
   }
 }
 
-TEST_CASE("the clutch holds the tool, and lets it go on from where it is told", "[workspace]") {
+TEST_CASE("the clutch holds the tool, and motion continues from the given pose", "[workspace]") {
   RandomValues random(4);
   Workspace workspace(random.pose());
   workspace.set_scale(2.0);
@@ -75,12 +75,12 @@ TEST_CASE("the clutch holds the tool, and lets it go on from where it is told", 
   workspace.disengage_clutch(X_on);
   const Pose X_BH = random.pose();
   CHECK(distance(workspace.update(X_BH, kTick_s), X_on) < 1e-12);
-  const Pose turned = {X_BH.rotation * rotation_from({0.0, 0.1, 0.0}), X_BH.translation_m};
-  CHECK(distance(workspace.update(turned, kTick_s),
+  const Pose rotated = {X_BH.rotation * rotation_from({0.0, 0.1, 0.0}), X_BH.translation_m};
+  CHECK(distance(workspace.update(rotated, kTick_s),
                  {X_on.rotation * rotation_from({0.0, 0.1, 0.0}), workspace.X_WH().translation_m}) < 1e-9);
 }
 
-TEST_CASE("recentred, the base is where the configuration has it", "[workspace]") {
+TEST_CASE("recentring restores the configured base pose", "[workspace]") {
   RandomValues random(5);
   const Pose X_WB = random.pose();
   Workspace workspace(X_WB);

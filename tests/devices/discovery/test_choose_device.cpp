@@ -49,7 +49,7 @@ std::string picked(const DeviceChoice& choice) {
 
 }  // namespace
 
-TEST_CASE("the device of the profile that is named is picked", "[choose_device]") {
+TEST_CASE("the device of the named profile is selected", "[choose_device]") {
   const DeviceChoice choice = choose({falcon(), reference("A")}, {.profile = "reference_full_speed"});
   REQUIRE(picked(choice) == "reference_full_speed");
   CHECK(choice.selection->device == 1);
@@ -57,13 +57,13 @@ TEST_CASE("the device of the profile that is named is picked", "[choose_device]"
   CHECK(choice.rejections[1].empty());
 }
 
-TEST_CASE("without a name any device is picked that has a profile", "[choose_device]") {
+TEST_CASE("without a name any device with a profile is selected", "[choose_device]") {
   CHECK(picked(choose({falcon()}, {})) == "falcon");
   CHECK(picked(choose({reference("A")}, {})) == "reference_full_speed");
   CHECK(picked(choose({}, {})) == "none");
 }
 
-TEST_CASE("what no profile is for is told where to look", "[choose_device]") {
+TEST_CASE("a device without a profile is rejected with a hint", "[choose_device]") {
   UsbDevice stranger = reference("A");
   stranger.vendor = 0x1234;
   const DeviceChoice choice = choose({stranger}, {});
@@ -71,20 +71,20 @@ TEST_CASE("what no profile is for is told where to look", "[choose_device]") {
   CHECK_THAT(choice.rejections[0], Contains("wrenchctl devices"));
 }
 
-TEST_CASE("two equal devices are told apart by serial number alone", "[choose_device]") {
+TEST_CASE("two equal devices are distinguished by serial number alone", "[choose_device]") {
   const std::vector<UsbDevice> two = {reference("A"), reference("B")};
   const DeviceChoice either = choose(two, {.profile = "reference_full_speed"});
   CHECK_FALSE(either.selection);
-  CHECK_THAT(either.rejections[0], Contains("serial number A") && Contains("not alone"));
+  CHECK_THAT(either.rejections[0], Contains("serial number A") && Contains("other devices match too"));
   CHECK_THAT(either.rejections[1], Contains("serial number B"));
   const DeviceChoice second = choose(two, {.profile = "reference_full_speed", .serial = "B"});
   REQUIRE(second.selection);
   CHECK(second.selection->device == 1);
-  CHECK_THAT(second.rejections[0], Contains("wants serial number B"));
+  CHECK_THAT(second.rejections[0], Contains("requires serial number B"));
   CHECK_FALSE(choose(two, {.profile = "reference_full_speed", .serial = "C"}).selection);
 }
 
-TEST_CASE("after an unplugging only the same device is picked", "[choose_device]") {
+TEST_CASE("after unplugging only the same device is selected", "[choose_device]") {
   const DeviceCriteria wanted = {.profile = "reference_full_speed", .serial = {}, .previous = reference("A")};
   UsbDevice elsewhere = reference("A");
   elsewhere.port_path = "1-7";
@@ -93,22 +93,22 @@ TEST_CASE("after an unplugging only the same device is picked", "[choose_device]
   const DeviceChoice other = choose({reference("B")}, wanted);
   CHECK_FALSE(other.selection);
   CHECK_THAT(other.rejections[0],
-             Contains("not the device that was unplugged") && Contains("start wrenchd anew"));
+             Contains("not the device that was unplugged") && Contains("restart wrenchd"));
 }
 
-TEST_CASE("a device whose reports are not those of its profile is not picked", "[choose_device]") {
+TEST_CASE("a device whose reports differ from its profile is not selected", "[choose_device]") {
   UsbDevice other_reports = reference("A");
   other_reports.report_descriptor = from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 0f 91 02 c0");
   const DeviceChoice choice = choose({other_reports}, {.profile = "reference_full_speed"});
   CHECK_FALSE(choice.selection);
-  CHECK_THAT(choice.rejections[0], Contains("disagrees") && Contains("output report"));
+  CHECK_THAT(choice.rejections[0], Contains("differs") && Contains("output report"));
   other_reports.report_descriptor = {0x75};
   CHECK_THAT(choose({other_reports}, {.profile = "reference_full_speed"}).rejections[0],
-             Contains("is refused"));
+             Contains("is invalid"));
 }
 
-TEST_CASE("a profile for endpoints takes the interface it names and no other", "[choose_device]") {
+TEST_CASE("a profile with endpoints matches only its interface", "[choose_device]") {
   UsbDevice second = falcon();
   second.interface = 1;
   const DeviceChoice choice = choose({second, falcon()}, {.profile = "falcon"});
@@ -117,7 +117,7 @@ TEST_CASE("a profile for endpoints takes the interface it names and no other", "
   CHECK_THAT(choice.rejections[0], Contains("interface 0 of the device, this is 1"));
 }
 
-TEST_CASE("a closed device is refused by name, whatever is wanted", "[choose_device]") {
+TEST_CASE("a device with a closed protocol is rejected by name", "[choose_device]") {
   UsbDevice touch = reference("A");
   touch.vendor = 0x2988;
   touch.product = 0x0302;

@@ -31,7 +31,7 @@ Reports in_reports(const Bytes& descriptor) {
   return reports;
 }
 
-TEST_CASE("a HID device has its ids, strings, usage and in-reports", "[plugged_device]") {
+TEST_CASE("a HID device has its ids, strings, usage and input reports", "[inspected_device]") {
   const InspectedDevice facts = inspect_device(usb(space_navigator(), 0x01, 0x08));
   CHECK(text(facts.identity.id) == "046d:c626");
   CHECK(facts.identity.serial == "A1");
@@ -45,10 +45,10 @@ TEST_CASE("a HID device has its ids, strings, usage and in-reports", "[plugged_d
   CHECK(in_reports(space_navigator()) == Reports{{1, 7}, {2, 7}, {3, 3}});
   CHECK(in_reports(space_mouse_wireless()) == Reports{{1, 13}, {3, 3}, {0x17, 3}});
   CHECK(in_reports(home_made_combined()) == Reports{{1, 13}, {3, 5}});
-  CHECK(in_reports(teensy_rawhid()) == Reports{{0, 64}});  // no ids
+  CHECK(in_reports(teensy_rawhid()) == Reports{{0, 64}});  // no report ids
 }
 
-TEST_CASE("what is not HID has no usage, and nothing is wrong with it", "[plugged_device]") {
+TEST_CASE("a device that is not HID has no usage, without an error", "[inspected_device]") {
   const InspectedDevice facts = inspect_device(usb({}, 0, 0));
   CHECK_FALSE(facts.identity.usage_page);
   CHECK_FALSE(facts.identity.usage);
@@ -57,7 +57,7 @@ TEST_CASE("what is not HID has no usage, and nothing is wrong with it", "[plugge
   CHECK(facts.descriptor_error.empty());
 }
 
-TEST_CASE("of a device whose descriptor is refused the rest is known, and why", "[plugged_device]") {
+TEST_CASE("a device with an invalid descriptor keeps its identity and gets the error", "[inspected_device]") {
   Bytes cut = space_navigator();
   cut.pop_back();
   const InspectedDevice facts = inspect_device(usb(cut, 0x01, 0x08));
@@ -67,7 +67,7 @@ TEST_CASE("of a device whose descriptor is refused the rest is known, and why", 
   CHECK(facts.descriptor_error.find("byte 216: ") == 0);
 }
 
-TEST_CASE("whatever a descriptor holds, there are facts or a reason", "[plugged_device]") {
+TEST_CASE("every descriptor gives a result or an error", "[inspected_device]") {
   RandomValues random(31);
   for (int i = 0; i < case_count(20'000); ++i) {
     const Bytes bytes = malformed_descriptor(random);

@@ -23,7 +23,7 @@ std::vector<DeviceProfile> shipped() {
 
 const std::vector<DeviceProfile> kProfiles = shipped();
 
-DeviceIdentity plugged(int vendor, int product, std::uint16_t page = 0x01, std::uint16_t usage = 0x08) {
+DeviceIdentity identity(int vendor, int product, std::uint16_t page = 0x01, std::uint16_t usage = 0x08) {
   DeviceIdentity device;
   device.id = {static_cast<std::uint16_t>(vendor), static_cast<std::uint16_t>(product)};
   device.usage_page = page;
@@ -31,7 +31,7 @@ DeviceIdentity plugged(int vendor, int product, std::uint16_t page = 0x01, std::
   return device;
 }
 
-/// The name of the matching profile, or why there is none.
+/// Returns the name of the matching profile, or the reason if there is none.
 std::string matched(const DeviceIdentity& device, std::string_view named = {}) {
   const MatchResult result = match_profile(device, kProfiles, named);
   REQUIRE(result.rejections.size() == kProfiles.size());
@@ -47,15 +47,15 @@ std::string why_not(const DeviceIdentity& device, const std::string& profile) {
 
 }  // namespace
 
-TEST_CASE("each device of the table has its profile", "[match_profile]") {
+TEST_CASE("each device of the table matches its profile", "[match_profile]") {
   for (const int pid : {0xc626, 0xc628, 0xc627, 0xc625, 0xc629, 0xc62b})
-    CHECK(matched(plugged(0x046d, pid)) == "spacemouse_split");
-  CHECK(matched(plugged(0x256f, 0xc635)) == "spacemouse_split");
+    CHECK(matched(identity(0x046d, pid)) == "spacemouse_split");
+  CHECK(matched(identity(0x256f, 0xc635)) == "spacemouse_split");
   for (const int pid : {0xc62e, 0xc62f, 0xc631, 0xc632, 0xc633, 0xc638, 0xc63a, 0xc652})
-    CHECK(matched(plugged(0x256f, pid)) == "spacemouse_combined");
-  CHECK(matched(plugged(0x16c0, 0x0486, 0xffab, 0x0200)) == "polhem");
-  CHECK(matched(plugged(0x1234, 0x0006, 0xffab, 0x0200)) == "polhem_lpc1768");
-  DeviceIdentity falcon = plugged(0x0403, 0xcb48);
+    CHECK(matched(identity(0x256f, pid)) == "spacemouse_combined");
+  CHECK(matched(identity(0x16c0, 0x0486, 0xffab, 0x0200)) == "polhem");
+  CHECK(matched(identity(0x1234, 0x0006, 0xffab, 0x0200)) == "polhem_lpc1768");
+  DeviceIdentity falcon = identity(0x0403, 0xcb48);
   falcon.usage_page.reset();
   falcon.usage.reset();
   CHECK(matched(falcon) == "falcon");
@@ -63,15 +63,15 @@ TEST_CASE("each device of the table has its profile", "[match_profile]") {
 
 TEST_CASE("the report descriptor decides between split and combined, not the id", "[match_profile]") {
   DeviceIdentity by_hand =
-      plugged(0x046d, 0xc62b);  // passes for a SpaceMouse Pro, speaks the combined format
+      identity(0x046d, 0xc62b);  // has the id of a SpaceMouse Pro but uses the combined format
   by_hand.input_reports = {{1, 13}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_combined");
   CHECK(why_not(by_hand, "spacemouse_split") ==
-        "in-report 1 of the device has 13 bytes, that of the profile 7");
+        "input report 1 of the device has 13 bytes, in the profile 7");
   by_hand.input_reports = {{1, 7}, {2, 7}, {3, 5}};
   CHECK(matched(by_hand) == "spacemouse_split");
 
-  DeviceIdentity old = plugged(0x046d, 0xc623);
+  DeviceIdentity old = identity(0x046d, 0xc623);
   CHECK(matched(old).empty());
   CHECK_THAT(why_not(old, "spacemouse_split"), Contains("the report descriptor has not been read"));
   old.input_reports = {{1, 7}, {2, 7}};
@@ -79,78 +79,79 @@ TEST_CASE("the report descriptor decides between split and combined, not the id"
   old.input_reports = {{1, 7}, {3, 7}};
   CHECK(matched(old).empty());
   CHECK(why_not(old, "spacemouse_split") ==
-        "in-report 2 of the profile is not in the device's report descriptor");
+        "input report 2 of the profile is not in the device's report descriptor");
 }
 
-TEST_CASE("a device without ids is told by the length of its report", "[match_profile]") {
-  DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
+TEST_CASE("a device without report ids is matched by the length of its report", "[match_profile]") {
+  DeviceIdentity polhem = identity(0x16c0, 0x0486, 0xffab, 0x0200);
   polhem.input_reports = {{0, 64}};
   CHECK(matched(polhem) == "polhem");
   polhem.input_reports = {{0, 8}};
   CHECK(matched(polhem).empty());
 }
 
-TEST_CASE("every profile that does not match says why", "[match_profile]") {
-  const DeviceIdentity stranger = plugged(0x1d50, 0x6018);
+TEST_CASE("every profile that does not match has a reason", "[match_profile]") {
+  const DeviceIdentity stranger = identity(0x1d50, 0x6018);
   const MatchResult result = match_profile(stranger, kProfiles);
   CHECK_FALSE(result.profile);
   CHECK(result.refusal.empty());
   for (const std::string& why : result.rejections) CHECK_FALSE(why.empty());
   CHECK(why_not(stranger, "falcon") == "its ids do not include 1d50:6018");
   CHECK(why_not(stranger, "loopback") == "it is for the simulated device");
-  CHECK(why_not(plugged(0x16c0, 0x0486, 0xff00, 1), "polhem") ==
-        "the usage page is ff00, the profile is for ffab");
-  CHECK(why_not(plugged(0x16c0, 0x0486, 0xffab, 1), "polhem") ==
-        "the usage is 0001, the profile is for 0200");
+  CHECK(why_not(identity(0x16c0, 0x0486, 0xff00, 1), "polhem") ==
+        "the usage page is ff00, the profile requires ffab");
+  CHECK(why_not(identity(0x16c0, 0x0486, 0xffab, 1), "polhem") ==
+        "the usage is 0001, the profile requires 0200");
   DeviceIdentity unread;
   unread.id = {0x16c0, 0x0486};
-  CHECK(why_not(unread, "polhem") == "the usage page is not known, the profile is for ffab");
+  CHECK(why_not(unread, "polhem") == "the usage page is not known, the profile requires ffab");
 }
 
-TEST_CASE("a profile that shares its ids is used only where the configuration names it", "[match_profile]") {
-  const DeviceIdentity board = plugged(0x16c0, 0x0486, 0xffab, 0x0200);
-  CHECK(why_not(board, "woodenhaptics") == "it is used only where the configuration names it");
+TEST_CASE("a profile with shared ids is used only if the configuration names it", "[match_profile]") {
+  const DeviceIdentity board = identity(0x16c0, 0x0486, 0xffab, 0x0200);
+  CHECK(why_not(board, "woodenhaptics") == "it is used only if the configuration names it");
   CHECK(matched(board, "woodenhaptics") == "woodenhaptics");
   CHECK(matched(board, "falcon").empty());
 }
 
-TEST_CASE("over libusb a profile is for one interface of a device", "[match_profile]") {
-  DeviceIdentity falcon = plugged(0x0403, 0xcb48);
-  CHECK(matched(falcon) == "falcon");  // as far as is known
+TEST_CASE("a libusb profile matches one interface of a device", "[match_profile]") {
+  DeviceIdentity falcon = identity(0x0403, 0xcb48);
+  CHECK(matched(falcon) == "falcon");  // as far as it is known
   falcon.interface = 0;
   CHECK(matched(falcon) == "falcon");
   falcon.interface = 1;
-  CHECK_THAT(why_not(falcon, "falcon"), Contains("speaks over interface 0") && Contains("this is 1"));
-  DeviceIdentity polhem = plugged(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are told apart by usage
+  CHECK_THAT(why_not(falcon, "falcon"), Contains("uses interface 0") && Contains("this is 1"));
+  DeviceIdentity polhem =
+      identity(0x16c0, 0x0486, 0xffab, 0x0200);  // hidraw nodes are distinguished by usage
   polhem.interface = 3;
   CHECK(matched(polhem) == "polhem");
 }
 
-TEST_CASE("closed devices, and those that only share a vendor, are refused by name", "[match_profile]") {
-  CHECK_THAT(matched(plugged(0x2988, 0x0304)),
+TEST_CASE("unusable devices are rejected by name", "[match_profile]") {
+  CHECK_THAT(matched(identity(0x2988, 0x0304)),
              Contains("3D Systems Touch (HID) (2988:0304)") && Contains("protocol is not public"));
-  CHECK_THAT(matched(plugged(0x2988, 0x0302)), Contains("Touch (USB)"));
-  CHECK_THAT(matched(plugged(0x0301, 0x2988)), Contains("Touch (USB)"));
-  CHECK_THAT(matched(plugged(0x1451, 0x0402)), Contains("Force Dimension"));
-  CHECK_THAT(matched(plugged(0x1451, 0x0301)), Contains("Force Dimension"));
-  CHECK_THAT(matched(plugged(0x16c0, 0x0483)), Contains("Haply Inverse3"));
-  CHECK_THAT(matched(plugged(0x2fe3, 0x0100)), Contains("VerseGrip"));
+  CHECK_THAT(matched(identity(0x2988, 0x0302)), Contains("Touch (USB)"));
+  CHECK_THAT(matched(identity(0x0301, 0x2988)), Contains("Touch (USB)"));
+  CHECK_THAT(matched(identity(0x1451, 0x0402)), Contains("Force Dimension"));
+  CHECK_THAT(matched(identity(0x1451, 0x0301)), Contains("Force Dimension"));
+  CHECK_THAT(matched(identity(0x16c0, 0x0483)), Contains("Haply Inverse3"));
+  CHECK_THAT(matched(identity(0x2fe3, 0x0100)), Contains("VerseGrip"));
   for (const int pid :
        {0xc650, 0xc651, 0xc654, 0xc655, 0xc656, 0xc657, 0xc658, 0xc664, 0xc665, 0xc668, 0xc62c})
-    CHECK_THAT(matched(plugged(0x256f, pid)), Contains("no six-axis device"));
-  CHECK_THAT(matched(plugged(0x256f, 0xc641)), Contains("sources disagree"));
+    CHECK_THAT(matched(identity(0x256f, pid)), Contains("no six-axis device"));
+  CHECK_THAT(matched(identity(0x256f, 0xc641)), Contains("sources disagree"));
   CHECK(find_unusable_device({0x256f, 0xc652}) == nullptr);
   CHECK(find_unusable_device({0x256f, 0xc653}) == nullptr);
 }
 
-TEST_CASE("a refused device stays refused when a profile claims it", "[match_profile]") {
+TEST_CASE("an unusable device stays rejected if a profile lists its id", "[match_profile]") {
   std::vector<DeviceProfile> profiles = {kProfiles.front()};
   profiles[0].transport = Transport::hidraw;
   profiles[0].match.usb = {{0x2988, 0x0304}};
-  CHECK_FALSE(match_profile(plugged(0x2988, 0x0304), profiles).profile);
+  CHECK_FALSE(match_profile(identity(0x2988, 0x0304), profiles).profile);
 }
 
-TEST_CASE("two equal devices are told apart by serial number", "[match_profile]") {
+TEST_CASE("two equal devices are distinguished by serial number", "[match_profile]") {
   DeviceProfile left = kProfiles.front();
   left.name = "left";
   left.transport = Transport::hidraw;
@@ -162,7 +163,7 @@ TEST_CASE("two equal devices are told apart by serial number", "[match_profile]"
   right.match.serial = "B2";
   any.name = "any";
   const std::vector<DeviceProfile> profiles = {any, left, right};
-  DeviceIdentity device = plugged(0x1209, 0x0007);
+  DeviceIdentity device = identity(0x1209, 0x0007);
   device.serial = "B2";
   CHECK(match_profile(device, profiles).profile == 2u);
   CHECK(match_profile(device, profiles).rejections[1] == "it is for serial number A1, not B2");

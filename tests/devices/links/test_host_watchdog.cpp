@@ -37,64 +37,65 @@ WrenchReport push(std::uint64_t sequence) {
   return report;
 }
 
-/// A writer that has heard that, at kStart.
-struct Said {
+/// A watchdog that received a report at kStart.
+struct FedWatchdog {
   DeviceProfile profile;
-  HostWatchdog word;
+  HostWatchdog watchdog;
   Packet packet;
 
-  Said(const DeviceProfile& of, const WrenchReport& report) : profile(of), word(profile, kAfter) {
-    word.feed(kStart, packet_of(profile, report));
+  FedWatchdog(const DeviceProfile& of, const WrenchReport& report) : profile(of), watchdog(profile, kAfter) {
+    watchdog.feed(kStart, packet_of(profile, report));
   }
-  bool speaks(TimePoint now) { return word.send_zero(now, packet); }
+  bool speaks(TimePoint now) { return watchdog.send_zero(now, packet); }
   WrenchReport spoken() const { return decode(profile.wrench_report, packet.report()).report; }
 };
 
-TEST_CASE("a loop that pushes and falls silent is spoken for: zero wrench, motors off", "[last_word]") {
-  Said said(shipped("loopback"), push(65534));
-  CHECK(said.word.due() == kStart + kAfter);
-  CHECK_FALSE(said.speaks(kStart + kAfter - 1ns));
+TEST_CASE("if the loop hangs after a nonzero wrench, the watchdog sends zero with the motors off",
+          "[host_watchdog]") {
+  FedWatchdog fed(shipped("loopback"), push(65534));
+  CHECK(fed.watchdog.due() == kStart + kAfter);
+  CHECK_FALSE(fed.speaks(kStart + kAfter - 1ns));
   TimePoint now = kStart + kAfter;
   for (unsigned n = 1; n <= HostWatchdog::kZeroReports; ++n, now += HostWatchdog::kZeroInterval) {
-    REQUIRE(said.word.due() == now);
-    REQUIRE(said.speaks(now));
-    const WrenchReport report = said.spoken();
+    REQUIRE(fed.watchdog.due() == now);
+    REQUIRE(fed.speaks(now));
+    const WrenchReport report = fed.spoken();
     CHECK(report.F.force_N.isZero(0.0));
     CHECK(report.F.torque_Nm.isZero(0.0));
     CHECK_FALSE(report.enable);
     CHECK(report.hold_time_s == Approx(0.008));
-    CHECK(report.sequence == ((65534 + n) & 0xffff));  // a device takes no number twice
-    CHECK(decode(said.profile.wrench_report, said.packet.report()).outcome == Decoding::ok);
+    CHECK(report.sequence == ((65534 + n) & 0xffff));  // a device accepts no sequence twice
+    CHECK(decode(fed.profile.wrench_report, fed.packet.report()).outcome == Decoding::ok);
   }
-  CHECK(said.word.due() == TimePoint::max());
-  CHECK_FALSE(said.speaks(now + 1h));
+  CHECK(fed.watchdog.due() == TimePoint::max());
+  CHECK_FALSE(fed.speaks(now + 1h));
 }
 
-TEST_CASE("whoever goes on speaking is not interrupted", "[last_word]") {
-  Said said(shipped("loopback"), push(1));
+TEST_CASE("the watchdog does not interrupt a running loop", "[host_watchdog]") {
+  FedWatchdog fed(shipped("loopback"), push(1));
   TimePoint now = kStart;
   for (std::uint64_t n = 2; n < 100; ++n) {
     now += 1ms;
-    CHECK_FALSE(said.speaks(now));
-    said.word.feed(now, packet_of(said.profile, push(n)));
+    CHECK_FALSE(fed.speaks(now));
+    fed.watchdog.feed(now, packet_of(fed.profile, push(n)));
   }
-  CHECK(said.speaks(now + kAfter));
-  // One that comes back is heard again, and spoken for again.
-  said.word.feed(now + 1s, packet_of(said.profile, push(7)));
-  CHECK_FALSE(said.speaks(now + 1s));
-  REQUIRE(said.speaks(now + 1s + kAfter));
-  CHECK(said.spoken().sequence == 8);
+  CHECK(fed.speaks(now + kAfter));
+  // After the loop resumes, the watchdog is armed again.
+  fed.watchdog.feed(now + 1s, packet_of(fed.profile, push(7)));
+  CHECK_FALSE(fed.speaks(now + 1s));
+  REQUIRE(fed.speaks(now + 1s + kAfter));
+  CHECK(fed.spoken().sequence == 8);
 }
 
-TEST_CASE("a silence without a push is nobody's business", "[last_word]") {
-  // The self-test wants to see the watchdog trip: motors on, zero wrench, and then nothing.
+TEST_CASE("the watchdog ignores silence after a zero wrench", "[host_watchdog]") {
+  // The self-test of the device's watchdog: motors on, zero wrench, then silence.
   const DeviceProfile profile = shipped("loopback");
   WrenchReport rest = push(1);
   rest.F = {};
-  CHECK(Said(profile, rest).word.due() == TimePoint::max());
+  CHECK(FedWatchdog(profile, rest).watchdog.due() == TimePoint::max());
   WrenchReport off = push(1);
   off.enable = false;
-  CHECK(Said(profile, off).word.due() == TimePoint::max());
+  CHECK(FedWatchdog(profile, off).watchdog.due() == TimePoint::max());
   CHECK(HostWatchdog().due() == TimePoint::max());
   // A device without motors.
   DeviceProfile mouse = shipped("spacemouse_split");
@@ -102,36 +103,36 @@ TEST_CASE("a silence without a push is nobody's business", "[last_word]") {
   CHECK(HostWatchdog(mouse, kAfter).due() == TimePoint::max());
 }
 
-TEST_CASE("what is no wrench leaves the last one standing", "[last_word]") {
-  Said said(shipped("loopback"), push(1));
+TEST_CASE("a report that is no wrench does not change the watchdog's state", "[host_watchdog]") {
+  FedWatchdog fed(shipped("loopback"), push(1));
   Packet other;
   other.length = 3;
   other.bytes[0] = 0x7f;
-  said.word.feed(kStart + 5ms, other);
-  CHECK(said.word.due() == kStart + kAfter);
-  CHECK(said.speaks(kStart + kAfter));
+  fed.watchdog.feed(kStart + 5ms, other);
+  CHECK(fed.watchdog.due() == kStart + kAfter);
+  CHECK(fed.speaks(kStart + kAfter));
 }
 
-TEST_CASE("motors that are told their efforts are told none", "[last_word]") {
+TEST_CASE("the watchdog sends zero efforts to a device with motor efforts", "[host_watchdog]") {
   const DeviceProfile polhem = shipped("polhem");
   REQUIRE(polhem.wrench_report.efforts.present);
   WrenchReport report;
   report.efforts = {0.0, 0.3, 0.0};
-  Said said(polhem, report);
-  REQUIRE(said.speaks(kStart + kAfter));
-  for (const double effort : said.spoken().efforts) CHECK(effort == 0.0);
+  FedWatchdog fed(polhem, report);
+  REQUIRE(fed.speaks(kStart + kAfter));
+  for (const double effort : fed.spoken().efforts) CHECK(effort == 0.0);
   report.efforts = {};
-  CHECK(Said(polhem, report).word.due() == TimePoint::max());
+  CHECK(FedWatchdog(polhem, report).watchdog.due() == TimePoint::max());
 }
 
-TEST_CASE("the last word neither allocates nor locks", "[last_word]") {
-  Said said(shipped("loopback"), push(1));
-  const Packet packet = packet_of(said.profile, push(2));
+TEST_CASE("the watchdog does not allocate or lock", "[host_watchdog]") {
+  FedWatchdog fed(shipped("loopback"), push(1));
+  const Packet packet = packet_of(fed.profile, push(2));
   std::uint64_t allocations = 0, locks = 0;
   {
     const test::RealtimeGuard guard;
-    said.word.feed(kStart, packet);
-    said.speaks(kStart + kAfter);
+    fed.watchdog.feed(kStart, packet);
+    fed.speaks(kStart + kAfter);
     allocations = guard.allocations(), locks = guard.locks();
   }
   CHECK(allocations == 0);

@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A device that takes reports only while its gate is open, and keeps a writer waiting otherwise.
+/// A device that accepts reports only while its gate is open; otherwise the write blocks.
 class Gate {
  public:
   LinkStatus write(std::span<const std::uint8_t> report) {
@@ -61,7 +61,7 @@ class Gate {
   bool open_ = true;
 };
 
-/// A writer at a gate. The gate outlives a writer that is left alone with it.
+/// A writer at a gate. The gate outlives a detached writer.
 struct Bench {
   std::shared_ptr<Gate> gate = std::make_shared<Gate>();
   LatestWriter writer;
@@ -77,7 +77,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 }  // namespace
 
-TEST_CASE("what is handed over is written", "[usb]") {
+TEST_CASE("a submitted report is written", "[usb]") {
   Bench bench;
   for (std::uint8_t n = 1; n <= 100; ++n) {
     CHECK(bench.hand_over(n) == LinkStatus::ok);
@@ -88,7 +88,7 @@ TEST_CASE("what is handed over is written", "[usb]") {
   CHECK(bench.writer.slot().written() == 100);
 }
 
-TEST_CASE("while a write is stuck the newest report waits, the others are dropped, and it is told in time",
+TEST_CASE("while a write is stuck, only the newest report waits, and the delay is reported in time",
           "[usb]") {
   Bench bench;
   bench.gate->set_open(false);
@@ -104,20 +104,20 @@ TEST_CASE("while a write is stuck the newest report waits, the others are droppe
   CHECK(bench.writer.slot().replaced() == 7);
 }
 
-TEST_CASE("the last report handed over is the last one written, at every close", "[usb]") {
+TEST_CASE("on every close the last submitted report is the last one written", "[usb]") {
   for (int round = 0; round < 200; ++round) {
     auto gate = std::make_shared<Gate>();
     {
       LatestWriter writer([gate](auto report) { return gate->write(report); }, {.close_timeout = 1h});
       for (std::uint8_t n = 1; n <= 20; ++n) writer.submit(TimePoint{1h}, std::array{n});
-      writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{0});  // the zeros
+      writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{0});  // the zeros of a release
     }
     REQUIRE_FALSE(gate->taken().empty());
     REQUIRE(gate->taken().back() == 0);
   }
 }
 
-TEST_CASE("close does not wait for ever, and the last report is written once it can be", "[usb]") {
+TEST_CASE("close returns after its timeout, and the last report is written later", "[usb]") {
   Bench bench({.close_timeout = 1ms});
   bench.gate->set_open(false);
   bench.hand_over(1);
@@ -132,7 +132,7 @@ TEST_CASE("close does not wait for ever, and the last report is written once it 
   CHECK(bench.gate->taken() == Bytes{1, 0});
 }
 
-TEST_CASE("what a write needs is kept until the write is over", "[usb]") {
+TEST_CASE("the state of a write lives until the write ends", "[usb]") {
   auto gate = std::make_shared<Gate>();
   gate->set_open(false);
   {
@@ -146,7 +146,7 @@ TEST_CASE("what a write needs is kept until the write is over", "[usb]") {
   while (gate.use_count() > 1) std::this_thread::yield();
 }
 
-TEST_CASE("a device that is gone ends the writing", "[usb]") {
+TEST_CASE("a disconnected device ends the writer", "[usb]") {
   Bench bench;
   bench.gate->status = LinkStatus::disconnected;
   bench.hand_over(1);
@@ -156,7 +156,7 @@ TEST_CASE("a device that is gone ends the writing", "[usb]") {
   CHECK(bench.gate->taken() == Bytes{1});
 }
 
-TEST_CASE("a loop that is stuck while it pushes is spoken for by the writer", "[usb]") {
+TEST_CASE("the writer sends zero commands for a hanging loop", "[usb]") {
   const DeviceProfile profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/loopback.toml");
   WrenchReport push;
   push.F.force_N = {0.0, 0.0, 1.0};
@@ -174,14 +174,14 @@ TEST_CASE("a loop that is stuck while it pushes is spoken for by the writer", "[
   }
 }
 
-TEST_CASE("a write that throws is a write that failed", "[usb]") {
+TEST_CASE("a write that throws counts as failed", "[usb]") {
   LatestWriter writer([](auto) -> LinkStatus { throw std::runtime_error("no"); }, {.close_timeout = 1h});
   writer.submit(TimePoint{1h}, std::array<std::uint8_t, 1>{1});
   CHECK_FALSE(writer.close());
   CHECK(writer.slot().failed() == 1);
 }
 
-TEST_CASE("handing over to the thread neither allocates nor locks", "[usb][realtime]") {
+TEST_CASE("submitting a report does not allocate or lock", "[usb][realtime]") {
   Bench bench;
   std::uint64_t seen = 0;
   {

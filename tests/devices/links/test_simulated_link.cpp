@@ -25,7 +25,7 @@ namespace {
 
 const SearchPath kShipped({WRENCHD_SOURCE_DIR "/config"});
 
-/// Every shipped profile, so that none can be forgotten.
+/// All shipped profiles, read from the folder.
 std::vector<DeviceProfile> all_shipped() {
   std::vector<DeviceProfile> profiles;
   for (const auto& file : profile_files(kShipped)) profiles.push_back(load_profile(file, kShipped));
@@ -36,7 +36,7 @@ DeviceProfile shipped(const std::string& name) {
   return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml", kShipped);
 }
 
-/// No delays, no quanta but those of the protocols: what is left is a device's own resolution.
+/// No delays and no quanta except those of the protocol: the resolution of the device remains.
 SimulationSettings exact(std::vector<Waypoint> hand_path) {
   SimulationSettings s;
   s.hand_path = std::move(hand_path);
@@ -77,7 +77,7 @@ struct Session {
       Duration time, const std::function<void()>& each = [] {}) {
     for (const TimePoint end = clock.now() + time; clock.now() < end; each()) step();
   }
-  /// Until the device tells poses, and the hand rests.
+  /// Runs until the device sends poses and the hand rests.
   void settle() {
     open();
     run(2s);
@@ -93,13 +93,13 @@ struct Session {
   Fault written = Fault::none;
 };
 
-/// What half a count of each encoder can move the pose by.
+/// Change of the pose by half a count of each encoder.
 struct Resolution {
   double m = 1e-6;
   double rad = 1e-6;
 };
 
-/// What rounding to the steps of the report's own fields does.
+/// Change of the pose by rounding to the steps of the report fields.
 Resolution resolution_of_fields(const DeviceProfile& profile) {
   const PoseReportLayout& report = profile.pose_report;
   Resolution resolution;
@@ -127,7 +127,7 @@ Resolution resolution_at(const DeviceProfile& profile, const Pose& X_BH) {
   return sum;
 }
 
-/// The pose of the nearest counts.
+/// Pose of the nearest counts.
 Pose on_counts(const DeviceProfile& profile, const Pose& X_BH) {
   const Kinematics& k = profile.kinematics;
   if (k.kind == Kinematics::Kind::none) return X_BH;
@@ -147,13 +147,13 @@ double apart_rad(const Pose& a, const Pose& b) {
 bool senses_turns(const DeviceProfile& profile) {
   return (sensed_dofs(profile) & kAngularDofs) != 0;
 }
-bool is_cap(const DeviceProfile& profile) {
+bool is_puck(const DeviceProfile& profile) {
   return pose_source(profile) == PoseSource::deflection;
 }
 
 }  // namespace
 
-TEST_CASE("the motion of a hand comes out as the pose, for every shipped profile", "[simulation]") {
+TEST_CASE("the pose follows the motion of the hand, for every shipped profile", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, moving());
@@ -177,10 +177,10 @@ TEST_CASE("the motion of a hand comes out as the pose, for every shipped profile
       least_x = std::min(least_x, told.translation_m.x());
       most_x = std::max(most_x, told.translation_m.x());
     });
-    // A Falcon that is not homed yet tells nothing.
+    // A Falcon sends no valid pose before it is homed.
     CHECK(compared >= 5.3 / seconds(s.period));
     CHECK(most_x - least_x > 0.025);
-    // And the hand has come to where it wanted to be: a free handle follows it, and so does a steered tool.
+    // The hand has reached its goal: a free handle and a steered tool follow it.
     const HandTarget target = s.link->device().hand_target();
     CHECK(apart_m(s.sample.X_BH, target.X_BG) < 3e-4);
     if (senses_turns(profile)) CHECK(apart_rad(s.sample.X_BH, target.X_BG) < 0.012);
@@ -208,7 +208,7 @@ TEST_CASE("a wrench arrives as force on the simulated handle, for every shipped 
       CHECK(s.sample.dropped_dofs == kAllDofs);
       continue;
     }
-    // Efforts are counts too: a milliampere, or a count of 4096.
+    // Efforts are counts too: 1 mA, or one of 4096.
     const double resolution_N = driven == kAllDofs ? 1e-3 : 0.02;
     CHECK((felt.force_N - F.force_N).norm() < resolution_N);
     CHECK((moved - F.force_N / settings.hand_stiffness_N_per_m).norm() <
@@ -217,8 +217,7 @@ TEST_CASE("a wrench arrives as force on the simulated handle, for every shipped 
   }
 }
 
-TEST_CASE("a wall rendered through a simulated device holds the hand, for every shipped profile with motors",
-          "[simulation]") {
+TEST_CASE("a rendered wall stops the hand, for every shipped profile with motors", "[simulation]") {
   constexpr double kWall_N_per_m = 200.0, kWallAt_m = 0.02, kDeep_m = 0.006;
   for (const DeviceProfile& profile : all_shipped()) {
     if (driven_dofs(profile) == kNoDof) continue;
@@ -243,8 +242,7 @@ TEST_CASE("a wall rendered through a simulated device holds the hand, for every 
   }
 }
 
-TEST_CASE("a host that hangs: the watchdog of the profile frees the hand, where there is one",
-          "[simulation]") {
+TEST_CASE("if the host hangs, the device's watchdog releases the hand", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     if (driven_dofs(profile) == kNoDof) continue;
     INFO(profile.name);
@@ -270,8 +268,7 @@ TEST_CASE("a host that hangs: the watchdog of the profile frees the hand, where 
   }
 }
 
-TEST_CASE("faults of the wire show on every shipped profile as they do on the simulated device",
-          "[simulation]") {
+TEST_CASE("transport faults appear on every shipped profile as on the simulated device", "[simulation]") {
   const Kind kind = GENERATE(Kind::unplug, Kind::silence, Kind::freeze, Kind::corrupt, Kind::short_report,
                              Kind::refuse_commands);
   for (const DeviceProfile& profile : all_shipped()) {
@@ -287,7 +284,7 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
     Fault fault = Fault::none, written = Fault::none;
     s.run(500ms, [&] {
       rejected += s.sample.rejected;
-      fresh += s.sample.fresh && !is_cap(profile) ? 1 : 0;  // that of a cap goes on between reports
+      fresh += s.sample.fresh && !is_puck(profile) ? 1 : 0;  // the pose of a puck continues between reports
       if (fault == Fault::none) fault = s.sample.fault;
       if (written == Fault::none) written = s.written;
     });
@@ -300,12 +297,12 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
         break;
       case Kind::silence:
         CHECK(fault == Fault::sample_stale);
-        CHECK(fresh * seconds(s.period) <= 0.001);  // before it began
+        CHECK(fresh * seconds(s.period) <= 0.001);  // before the fault begins
         break;
-      case Kind::freeze:  // without a sequence nobody can tell
+      case Kind::freeze:  // not detectable without a sequence
         CHECK((rejected > 400) == report.sequence.present);
         break;
-      case Kind::corrupt:  // nor without a checksum
+      case Kind::corrupt:  // not detectable without a checksum
         CHECK((rejected > 400) == (report.checksum != Checksum::none));
         break;
       case Kind::short_report:
@@ -317,7 +314,7 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
       default:
         FAIL();
     }
-    s.run(3s);  // and it is over
+    s.run(3s);  // the fault is over
     if (kind != Kind::unplug) {
       CHECK(s.sample.fault == Fault::none);
       continue;
@@ -332,16 +329,16 @@ TEST_CASE("faults of the wire show on every shipped profile as they do on the si
   }
 }
 
-TEST_CASE("a pose that is wrong on request shows where a device can tell one", "[simulation]") {
+TEST_CASE("an injected pose fault appears on devices that send a pose", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, still());
     DeviceInHand& device = s.link->device();
     const bool tells_pose = pose_source(profile) == PoseSource::pose;
     if (!tells_pose)
-      CHECK_THROWS_WITH(device.inject({Kind::bad_quaternion, 0s, 1s}), Contains("that could be bad"));
-    if (is_cap(profile)) {
-      CHECK_THROWS_WITH(device.inject({Kind::jump, 0s, 1s}), Contains("that could be bad"));
+      CHECK_THROWS_WITH(device.inject({Kind::bad_quaternion, 0s, 1s}), Contains("choose another fault"));
+    if (is_puck(profile)) {
+      CHECK_THROWS_WITH(device.inject({Kind::jump, 0s, 1s}), Contains("choose another fault"));
       continue;
     }
     device.inject({Kind::jump, 2500ms, 100ms});
@@ -357,7 +354,7 @@ TEST_CASE("a pose that is wrong on request shows where a device can tell one", "
   }
 }
 
-TEST_CASE("a simulated link allocates nothing and takes no lock while it is open", "[simulation]") {
+TEST_CASE("an open simulated link does not allocate or lock", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     Session s(profile, moving());
@@ -377,7 +374,7 @@ TEST_CASE("a simulated link allocates nothing and takes no lock while it is open
   }
 }
 
-TEST_CASE("a simulated run is the same however time is cut", "[simulation]") {
+TEST_CASE("a simulated run does not depend on how calls divide the time", "[simulation]") {
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name);
     const auto run = [&](Duration cut) {
@@ -396,7 +393,7 @@ TEST_CASE("a simulated run is the same however time is cut", "[simulation]") {
   }
 }
 
-TEST_CASE("a device that sends whole poses in frames of its own is simulated in them", "[simulation]") {
+TEST_CASE("a device with its own frames is simulated in these frames", "[simulation]") {
   DeviceProfile profile = shipped("reference_full_speed");
   profile.X_BD = {rotation_from({0.3, -0.5, 1.1}), {0.02, -0.01, 0.05}};
   profile.X_EH = {rotation_from({-0.2, 0.4, 0.1}), {0.03, 0.04, -0.02}};
@@ -414,7 +411,7 @@ TEST_CASE("a device that sends whole poses in frames of its own is simulated in 
   CHECK((felt.torque_Nm - F.torque_Nm).norm() < 1e-5);
 }
 
-TEST_CASE("a cap at rest is silent, and the tool stays where the hand has left it", "[simulation]") {
+TEST_CASE("a puck at rest sends nothing, and the tool keeps its pose", "[simulation]") {
   for (const char* name : {"spacemouse_split", "spacemouse_combined"}) {
     INFO(name);
     Session s(shipped(name), still());
@@ -429,7 +426,7 @@ TEST_CASE("a cap at rest is silent, and the tool stays where the hand has left i
   }
 }
 
-TEST_CASE("a cap whose deflection is the pose is held where the hand wants the tool", "[simulation]") {
+TEST_CASE("in position mode the hand holds the puck at the goal of the tool", "[simulation]") {
   DeviceProfile profile = shipped("spacemouse_combined");
   profile.deflection->mode = Deflection::Mode::position;
   profile.deflection->linear_gain = 71.0;
@@ -438,11 +435,11 @@ TEST_CASE("a cap whose deflection is the pose is held where the hand wants the t
   s.open();
   s.run(3s);
   const Pose target = s.link->device().hand_target().X_BG;
-  CHECK(apart_m(s.sample.X_BH, target) < 71.0 * 4e-6);  // counts of it
+  CHECK(apart_m(s.sample.X_BH, target) < 71.0 * 4e-6);  // one count of the translation
   CHECK(apart_rad(s.sample.X_BH, target) < 11.4 * 2.5e-4);
 }
 
-TEST_CASE("out of reach an arm has an end stop, and comes back from it", "[simulation]") {
+TEST_CASE("an arm has an end stop at the boundary of its workspace and returns from it", "[simulation]") {
   for (const char* name : {"polhem", "woodenhaptics", "falcon"}) {
     INFO(name);
     Session s(shipped(name), exact({{0.0, {0.0, 0.0, 0.03}, {0, 0, 0}},
@@ -460,14 +457,14 @@ TEST_CASE("out of reach an arm has an end stop, and comes back from it", "[simul
   }
 }
 
-TEST_CASE("an arm whose first waypoint is out of reach starts as near to it as it comes", "[simulation]") {
+TEST_CASE("an arm with an unreachable first waypoint starts at the nearest reachable pose", "[simulation]") {
   VirtualClock clock;
   const auto link = make_simulated_link(shipped("polhem"), exact({{0.0, {0, 0, 5.0}, {0, 0, 0}}}), clock);
   CHECK(link->device().X_BH().translation_m.z() > 0.132);
   CHECK(link->device().X_BH().translation_m.z() < 0.4);
 }
 
-TEST_CASE("a profile that no emulator speaks like is not simulated, and the cure is told", "[simulation]") {
+TEST_CASE("a profile without an emulator is rejected with the remedy", "[simulation]") {
   VirtualClock clock;
   DeviceProfile arm = shipped("polhem");
   arm.name = "my_arm";
@@ -485,13 +482,13 @@ TEST_CASE("a profile that no emulator speaks like is not simulated, and the cure
   }
   CHECK_THROWS_WITH(make_simulated_link(arm, still(), clock),
                     Contains("my_arm") && Contains("Polhem") && Contains("inherits polhem"));
-  DeviceProfile cap = shipped("spacemouse_split");
-  cap.pose_report.translation.big_endian = true;
-  CHECK_THROWS_WITH(make_simulated_link(cap, still(), clock),
-                    Contains("spacemouse_split") && Contains("not those of a SpaceMouse"));
-  cap = shipped("spacemouse_split");
-  cap.more_reports.clear();
-  CHECK_THROWS_WITH(make_simulated_link(cap, still(), clock), Contains("do not carry both"));
+  DeviceProfile puck = shipped("spacemouse_split");
+  puck.pose_report.translation.big_endian = true;
+  CHECK_THROWS_WITH(make_simulated_link(puck, still(), clock),
+                    Contains("spacemouse_split") && Contains("differ from those of a SpaceMouse"));
+  puck = shipped("spacemouse_split");
+  puck.more_reports.clear();
+  CHECK_THROWS_WITH(make_simulated_link(puck, still(), clock), Contains("do not carry both"));
   CHECK_THROWS_WITH(make_simulated_link(shipped("falcon"), exact({}), clock),
                     Contains("at least one waypoint"));
 }

@@ -38,7 +38,7 @@ struct Pair {
   void say(const Bytes& report) const {
     REQUIRE(send(far, report.data(), report.size(), MSG_DONTWAIT) == static_cast<ssize_t>(report.size()));
   }
-  /// What the link's thread has written, or nothing after a while.
+  /// Returns the next report of the link's thread; empty after a timeout.
   Bytes hear() const {
     constexpr int kPatience_ms = 2000;
     pollfd waits{far, POLLIN, 0};
@@ -54,7 +54,7 @@ struct Pair {
   int far = -1, near = -1;
 };
 
-/// The link's thread finds out what a write came to; the next ones are told.
+/// Writes until the link reports the expected status: the result of a write appears with a later one.
 bool written_until(SocketLink& link, const Bytes& report, LinkStatus wanted) {
   for (int i = 0; i < 20'000; ++i) {
     if (link.write(kNow, report) == wanted) return true;
@@ -63,7 +63,7 @@ bool written_until(SocketLink& link, const Bytes& report, LinkStatus wanted) {
   return false;
 }
 
-TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_link]") {
+TEST_CASE("a socket transfers reports in both directions and keeps their boundaries", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   link.open();
@@ -80,10 +80,10 @@ TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_
   CHECK(read.arrived == kNow);
   CHECK(buffer[2] == 3);
   read = link.read(kNow, buffer);
-  CHECK(read.length == 6);  // cut to what fits, and its length told
+  CHECK(read.length == 6);  // truncated, with its full length
   CHECK(buffer[3] == 7);
   read = link.read(kNow, buffer);
-  CHECK(read.status == LinkStatus::ok);  // a report of no bytes is no end
+  CHECK(read.status == LinkStatus::ok);  // an empty report is no end of the connection
   CHECK(read.length == 0);
   CHECK(link.read(kNow, buffer).length == 1);
   CHECK(link.read(kNow, buffer).status == LinkStatus::not_ready);
@@ -94,30 +94,30 @@ TEST_CASE("a socket carries reports both ways and keeps their bounds", "[socket_
   CHECK(pair.hear() == Bytes{9});
 }
 
-TEST_CASE("a device that does not read makes a write fail and not wait", "[socket_link]") {
+TEST_CASE("if the device does not read, a write fails without waiting", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   link.open();
   const Bytes report(32, 1);
   CHECK(written_until(link, report, LinkStatus::not_ready));
   CHECK(pair.hear() == report);
-  CHECK(written_until(link, report, LinkStatus::ok));  // there is room again
+  CHECK(written_until(link, report, LinkStatus::ok));  // there is space again
 }
 
-TEST_CASE("when the other end of a socket is gone, so is the device", "[socket_link]") {
+TEST_CASE("when the other end of a socket closes, the device is disconnected", "[socket_link]") {
   Pair pair;
   SocketLink link(pair.near);
   link.open();
   std::array<std::uint8_t, 4> buffer{};
   pair.say({1});
   pair.hang_up();
-  CHECK(link.read(kNow, buffer).status == LinkStatus::ok);  // what it said before
+  CHECK(link.read(kNow, buffer).status == LinkStatus::ok);  // a report sent before the end
   CHECK(link.read(kNow, buffer).status == LinkStatus::disconnected);
   CHECK(written_until(link, Bytes{1}, LinkStatus::disconnected));
-  CHECK_THROWS_WITH(link.open(), Catch::Contains("nobody is at its other end"));
+  CHECK_THROWS_WITH(link.open(), Catch::Contains("the other end is closed"));
 }
 
-TEST_CASE("a closed socket link is silent, and speaks again when it is opened", "[socket_link]") {
+TEST_CASE("a closed socket link transfers nothing until it is opened again", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   std::array<std::uint8_t, 4> buffer{};
@@ -132,7 +132,7 @@ TEST_CASE("a closed socket link is silent, and speaks again when it is opened", 
   CHECK(pair.hear() == Bytes{1});
 }
 
-TEST_CASE("what is no socket of packets is refused with the cure", "[socket_link]") {
+TEST_CASE("a descriptor that is no packet socket is rejected with the remedy", "[socket_link]") {
   const Pair stream(SOCK_STREAM);
   SocketLink of_stream(stream.near);
   CHECK_THROWS_WITH(of_stream.open(),
@@ -151,10 +151,11 @@ TEST_CASE("waiting on a socket ends with a report, and with the deadline", "[soc
   link.wait_readable(start + std::chrono::milliseconds(20));
   CHECK(std::chrono::steady_clock::now() - start >= std::chrono::milliseconds(20));
   pair.say({1});
-  link.wait_readable(std::chrono::steady_clock::now() + std::chrono::hours(1));  // or this test never ends
+  link.wait_readable(std::chrono::steady_clock::now() +
+                     std::chrono::hours(1));  // otherwise the test would never end
 }
 
-TEST_CASE("a socket is read and written without allocating or locking", "[socket_link]") {
+TEST_CASE("reading and writing a socket does not allocate or lock", "[socket_link]") {
   const Pair pair;
   SocketLink link(pair.near);
   link.open();

@@ -26,7 +26,7 @@ const TimePoint kStart{1h};
 
 }  // namespace
 
-TEST_CASE("the newest report wins the slot and those before it are counted", "[usb]") {
+TEST_CASE("the newest report replaces the previous one, which is counted", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   CHECK_FALSE(slot.take(packet));
@@ -40,7 +40,7 @@ TEST_CASE("the newest report wins the slot and those before it are counted", "[u
   CHECK(slot.written() == 1);
 }
 
-TEST_CASE("a write without end is told after the deadline, however often one hands over", "[usb]") {
+TEST_CASE("an endless write is reported after the deadline, independent of further submissions", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   slot.submit(kStart, report(0));
@@ -49,14 +49,14 @@ TEST_CASE("a write without end is told after the deadline, however often one han
     CHECK(slot.submit(kStart + n * 1ms, report(n)) == (n > 4 ? LinkStatus::not_ready : LinkStatus::ok));
   CHECK(slot.overdue(kStart + 11ms));
 
-  slot.complete(LinkStatus::ok);  // at last: what is written next is the newest
+  slot.complete(LinkStatus::ok);  // the stuck write ends; the newest report is next
   CHECK(slot.submit(kStart + 12ms, report(12)) == LinkStatus::ok);
   REQUIRE(slot.take(packet));
   CHECK(number_in(packet) == 12);
   CHECK(slot.replaced() == 10);
 }
 
-TEST_CASE("a writer that never takes anything is overdue as well", "[usb]") {
+TEST_CASE("a writer that never takes a report is overdue", "[usb]") {
   WriteSlot slot(4ms);
   CHECK_FALSE(slot.overdue(kStart + 1h));
   slot.submit(kStart, report(1));
@@ -64,7 +64,7 @@ TEST_CASE("a writer that never takes anything is overdue as well", "[usb]") {
   CHECK(slot.overdue(kStart + 4ms + 1ns));
 }
 
-TEST_CASE("a slow writer that comes along is not overdue", "[usb]") {
+TEST_CASE("a slow writer that makes progress is not overdue", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   for (int n = 0; n < 1000; ++n) {
@@ -76,7 +76,7 @@ TEST_CASE("a slow writer that comes along is not overdue", "[usb]") {
   }
 }
 
-TEST_CASE("silence between two commands is not held against the writer", "[usb]") {
+TEST_CASE("a pause between two commands does not make the writer overdue", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   slot.submit(kStart, report(1));
@@ -85,7 +85,7 @@ TEST_CASE("silence between two commands is not held against the writer", "[usb]"
   CHECK(slot.submit(kStart + 1h, report(2)) == LinkStatus::ok);
 }
 
-TEST_CASE("a failed write is told once, with the next report", "[usb]") {
+TEST_CASE("a failed write is reported once, with the next report", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   slot.submit(kStart, report(1));
@@ -98,7 +98,7 @@ TEST_CASE("a failed write is told once, with the next report", "[usb]") {
   CHECK(number_in(packet) == 3);
 }
 
-TEST_CASE("once there is nobody to write to, no report is taken", "[usb]") {
+TEST_CASE("after disconnection no report is accepted", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   slot.submit(kStart, report(1));
@@ -108,7 +108,7 @@ TEST_CASE("once there is nobody to write to, no report is taken", "[usb]") {
   CHECK_FALSE(slot.take(packet));
 }
 
-TEST_CASE("a report that is too long is refused and the one before it stays", "[usb]") {
+TEST_CASE("a report that is too long is rejected and the previous one stays", "[usb]") {
   WriteSlot slot(4ms);
   Packet packet;
   slot.submit(kStart, report(1));
@@ -117,7 +117,7 @@ TEST_CASE("a report that is too long is refused and the one before it stays", "[
   CHECK(number_in(packet) == 1);
 }
 
-TEST_CASE("handing over and taking neither allocate nor lock", "[usb][realtime]") {
+TEST_CASE("submitting and taking do not allocate or lock", "[usb][realtime]") {
   WriteSlot slot(4ms);
   Packet packet;
   std::uint64_t seen = 0;

@@ -27,7 +27,7 @@ DeviceProfile shipped(const std::string& name) {
   return load_profile(WRENCHD_SOURCE_DIR "/config/profiles/" + name + ".toml");
 }
 
-/// A shipped profile's device on its emulator, opened and read once.
+/// The device of a shipped profile on its emulator, opened and read once.
 template <class Emulator>
 struct Bench {
   template <class... Args>
@@ -39,7 +39,7 @@ struct Bench {
     sample = device.read_newest(clock.now());
   }
   void pass(Duration time) { clock.sleep_until(clock.now() + time); }
-  /// Reads, then writes, once a millisecond.
+  /// Reads, then writes, once per millisecond.
   void step(const Wrench& F = {}, bool motors_on = false) {
     pass(1ms);
     sample = device.read_newest(clock.now());
@@ -64,7 +64,7 @@ using Mouse = EmulatedSpaceMouse;
 
 // --- SpaceMouse -------------------------------------------------------------------------------------------
 
-TEST_CASE("a SpaceMouse that nobody touches is silent, and that is no fault", "[emulators]") {
+TEST_CASE("an untouched SpaceMouse sends nothing, which is no fault", "[emulators]") {
   for (const auto& [name, format] : {std::pair("spacemouse_split", Mouse::Format::split),
                                      {"spacemouse_combined", Mouse::Format::combined}}) {
     Bench<Mouse> bench(name, format);
@@ -80,7 +80,7 @@ TEST_CASE("a SpaceMouse that nobody touches is silent, and that is no fault", "[
   }
 }
 
-TEST_CASE("what the cap is pushed comes out as the way of the tool, in both formats", "[emulators]") {
+TEST_CASE("the deflection of the puck moves the tool, in both formats", "[emulators]") {
   // To the right, half as much toward the user, a quarter down: -y, -x / 2, -z / 4 in the base.
   const Vector3d pushed_m = 4e-6 * Vector3d(-140, -280, -70);
   for (const auto& [name, format] : {std::pair("spacemouse_split", Mouse::Format::split),
@@ -96,12 +96,12 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
     bench.steps(1000);
     const Vector3d way = bench.sample.X_BH.translation_m - start;
     const double firmness = std::pow((pushed_m.norm() / 1.4e-3 - 0.08) / 0.92, 2.0);
-    const Vector3d expected = 71.0 * 1.4e-3 * firmness * pushed_m.normalized();  // one second
+    const Vector3d expected = 71.0 * 1.4e-3 * firmness * pushed_m.normalized();  // after one second
     INFO(name << ": " << way.transpose() << " is not " << expected.transpose());
     CHECK((way - expected).norm() < 1e-6);
     CHECK(bench.sample.X_BH.rotation.angularDistance(Quaterniond::Identity()) < 1e-9);
 
-    bench.emulator.set_deflection({0, 0, 0, 0, 0, -200});  // about z down: the other way about z up
+    bench.emulator.set_deflection({0, 0, 0, 0, 0, -200});  // about z down: the opposite rotation about z up
     bench.steps(40);
     const Quaterniond before = bench.sample.X_BH.rotation;
     bench.steps(500);
@@ -111,7 +111,7 @@ TEST_CASE("what the cap is pushed comes out as the way of the tool, in both form
   }
 }
 
-TEST_CASE("a cap's buttons bring the pose back to where it began, and make it slow", "[emulators]") {
+TEST_CASE("the buttons of the puck recentre the pose and reduce its speed", "[emulators]") {
   Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
   bench.open();
   bench.emulator.set_deflection({0, -350, 0, 0, 0, 100});
@@ -132,12 +132,13 @@ TEST_CASE("a cap's buttons bring the pose back to where it began, and make it sl
   bench.emulator.set_buttons(1);
   bench.steps(20);
   CHECK(same_bits(bench.sample.X_BH, {}));
-  bench.emulator.set_deflection({0, -350, 0, 0, 0, 0});  // pressed as it is, the pose goes on from there
+  bench.emulator.set_deflection(
+      {0, -350, 0, 0, 0, 0});  // with the button held, the pose continues from there
   bench.steps(500);
   CHECK(bench.sample.X_BH.translation_m.x() > 0.02);
 }
 
-TEST_CASE("a cap let go sends three packets of zeros and the pose stays", "[emulators]") {
+TEST_CASE("a released puck sends three packets of zeros and the pose stays", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
   bench.emulator.set_deflection({100, 0, 0, 50, 0, 0});
@@ -152,14 +153,13 @@ TEST_CASE("a cap let go sends three packets of zeros and the pose stays", "[emul
   CHECK(bench.sample.fault == Fault::none);
 }
 
-TEST_CASE("a SpaceMouse that falls silent while it is pushed stops the tool, and says so once",
-          "[emulators]") {
+TEST_CASE("a SpaceMouse that stops sending while deflected stops the tool, with a fault", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
   bench.emulator.set_deflection({100, 0, 0, 0, 0, 0});
   bench.steps(100);
   REQUIRE_FALSE(bench.sample.V_BH.linear_m_per_s.isZero());
-  bench.emulator.stop_sending();  // its battery, or the radio
+  bench.emulator.stop_sending();  // battery or radio failure
   int faults = 0;
   for (int i = 0; i < 1000; ++i) {
     bench.step();
@@ -170,7 +170,7 @@ TEST_CASE("a SpaceMouse that falls silent while it is pushed stops the tool, and
   CHECK(bench.sample.V_BH.linear_m_per_s.isZero());
 }
 
-TEST_CASE("buttons come through, the LED is switched off at the end", "[emulators]") {
+TEST_CASE("buttons arrive, and the LED is off at the end", "[emulators]") {
   Bench<Mouse> bench("spacemouse_combined", Mouse::Format::combined);
   bench.open();
   bench.emulator.set_buttons(2);
@@ -185,20 +185,20 @@ TEST_CASE("buttons come through, the LED is switched off at the end", "[emulator
   CHECK_FALSE(bench.emulator.led());
 }
 
-TEST_CASE("a wrench for a device without motors is dropped, and told", "[emulators]") {
+TEST_CASE("a wrench for a device without motors is dropped and reported", "[emulators]") {
   Bench<Mouse> bench("spacemouse_split", Mouse::Format::split);
   bench.open();
   bench.step({{1, 0, 0}, {0, 0, 0.1}}, true);
   CHECK(bench.last_write == Fault::none);
   bench.step();
-  CHECK(dof_text(bench.sample.dropped_dofs) == "x rz");  // of the write before
+  CHECK(dof_text(bench.sample.dropped_dofs) == "x rz");  // of the previous write
   bench.step();
   CHECK(bench.sample.dropped_dofs == kNoDof);
 }
 
 // --- Polhem -----------------------------------------------------------------------------------------------
 
-TEST_CASE("encoders put in come out as the pose that the maker's formulas give", "[emulators]") {
+TEST_CASE("encoder counts give the pose of the manufacturer's formulas", "[emulators]") {
   std::mt19937 random(5);
   const auto between = [&](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(random);
@@ -210,7 +210,7 @@ TEST_CASE("encoders put in come out as the pose that the maker's formulas give",
     bench.steps(5);
     std::array<int, 6> counts = {0, 0, -5000, 0, 0, 0};
     for (int i = 0; i < 2000; ++i) {
-      for (int j = 0; j < 3; ++j) {  // slow enough for a hand
+      for (int j = 0; j < 3; ++j) {  // within the speed limits
         auto& base = counts[static_cast<std::size_t>(j)];
         base = std::clamp(base + between(-20, 20), j == 2 ? -6500 : -1500, j == 2 ? -3500 : 1500);
         auto& wrist = counts[static_cast<std::size_t>(j + 3)];
@@ -230,7 +230,7 @@ TEST_CASE("encoders put in come out as the pose that the maker's formulas give",
   }
 }
 
-TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas", "[emulators]") {
+TEST_CASE("a force on a Polhem gives the currents of the manufacturer's formulas", "[emulators]") {
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   Bench<EmulatedPolhem> bench("polhem", 64u);
@@ -250,7 +250,7 @@ TEST_CASE("a force on a Polhem arrives as the currents of the maker's formulas",
   CHECK(dof_text(bench.device.read_newest(bench.clock.now()).dropped_dofs) == "ry");
 }
 
-TEST_CASE("a Polhem speaks only when spoken to, and wrenchd speaks first", "[emulators]") {
+TEST_CASE("a Polhem answers commands only, and wrenchd sends the first one", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
   bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   struct Nobody final : ReportSink {
@@ -261,7 +261,7 @@ TEST_CASE("a Polhem speaks only when spoken to, and wrenchd speaks first", "[emu
   CHECK(bench.emulator.reports_sent() == 1);
   bench.open();  // the first read sends zeros
   CHECK(bench.emulator.reports_sent() == 1);
-  for (int i = 0; i < 30; ++i) {  // only reading: one report for each time wrenchd had to speak again
+  for (int i = 0; i < 30; ++i) {  // reading only: one report per prompt of wrenchd
     bench.pass(1ms);
     bench.sample = bench.device.read_newest(bench.clock.now());
     REQUIRE(bench.sample.fault == Fault::none);
@@ -304,7 +304,7 @@ TEST_CASE("a Polhem's amplifiers are off half a second after the last report, an
 
 TEST_CASE("the profile's calibration sets the counters to home", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
-  bench.emulator.set_encoder_counts({12, 34, 56, 7, 8, 9});  // powered on at home, counters anywhere
+  bench.emulator.set_encoder_counts({12, 34, 56, 7, 8, 9});  // powered on at home, with arbitrary counters
   bench.emulator.press_calibration_button();
   bench.link.open();
   CHECK(bench.link.write(bench.clock.now(), bench.profile.calibration.bytes) == LinkStatus::ok);
@@ -317,7 +317,7 @@ TEST_CASE("the profile's calibration sets the counters to home", "[emulators]") 
 
 // --- Falcon -----------------------------------------------------------------------------------------------
 
-TEST_CASE("a Falcon is started: handshake, firmware with its echo, speed", "[emulators]") {
+TEST_CASE("a Falcon starts: handshake, firmware with echo, baud rate", "[emulators]") {
   std::vector<std::uint8_t> firmware(1000);
   std::mt19937 random(8);
   for (std::uint8_t& byte : firmware) byte = static_cast<std::uint8_t>(random() & 0xffu);
@@ -334,21 +334,21 @@ TEST_CASE("a Falcon is started: handshake, firmware with its echo, speed", "[emu
   CHECK(falcon.firmware() == firmware);
 }
 
-TEST_CASE("a Falcon that cannot be started is given up with a reason", "[emulators]") {
+TEST_CASE("a Falcon that does not start gives an error with the reason", "[emulators]") {
   using Catch::Contains;
   const std::vector<std::uint8_t> firmware(300, 7);
   EmulatedFalcon dead;
   dead.ignore_handshakes(1'000'000);
   CHECK_THROWS_WITH(falcon_start(dead, firmware, 2),
-                    Contains("its loader does not answer") && Contains("2 tries"));
+                    Contains("its boot loader does not answer") && Contains("2 attempts"));
   EmulatedFalcon deaf;
   deaf.corrupt_firmware_echoes(1'000'000);
-  CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("came back wrong"));
+  CHECK_THROWS_WITH(falcon_start(deaf, firmware), Contains("were echoed wrongly"));
   CHECK_THROWS_WITH(falcon_start(deaf, {}), Contains("the firmware is empty"));
   CHECK(deaf.state() != EmulatedFalcon::State::running);
 }
 
-TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it has to be", "[emulators]") {
+TEST_CASE("a Falcon can be opened in every state, and firmware is loaded only if needed", "[emulators]") {
   using Catch::Contains;
   const TemporaryDirectory dir;
   const std::string file = dir.write("firmware.bin", std::string(700, 'x')).string();
@@ -362,13 +362,13 @@ TEST_CASE("a Falcon is opened whatever state it is in, and loaded only where it 
   falcon.write(std::vector<std::uint8_t>{'<', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'A', 'B',
                                          'A', '>'});
   falcon.perform_homing();
-  falcon_open(falcon, "");  // it runs one, and knows where it is
+  falcon_open(falcon, "");  // a firmware runs and is homed
   CHECK(falcon.homed());
   CHECK(falcon.firmware().size() == 700);
   CHECK(falcon.efforts() == std::array<int, 3>{});
 }
 
-TEST_CASE("what the Falcon's profile says of its link", "[emulators]") {
+TEST_CASE("the Falcon's profile gives its link settings", "[emulators]") {
   const LinkSettings settings = link_settings(shipped("falcon"));
   CHECK(settings.in_endpoint == 0x81);
   CHECK(settings.out_endpoint == 0x02);
@@ -384,7 +384,7 @@ TEST_CASE("what the Falcon's profile says of its link", "[emulators]") {
   CHECK_FALSE(polhem.start_serial);
 }
 
-TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulators]") {
+TEST_CASE("before homing, the pose of a Falcon is not used and it is not driven", "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
   bench.emulator.set_true_counts({100, 100, 100});
@@ -407,8 +407,7 @@ TEST_CASE("a Falcon is neither followed nor pushed before it is homed", "[emulat
   CHECK(bench.emulator.efforts()[0] > 0);
 }
 
-TEST_CASE("a Falcon's handle comes out where it was put, and what it is not driven along is told",
-          "[emulators]") {
+TEST_CASE("the pose of a Falcon follows its handle, and undriven components are reported", "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
   bench.open();
@@ -425,8 +424,7 @@ TEST_CASE("a Falcon's handle comes out where it was put, and what it is not driv
     bench.steps(2);
     REQUIRE(bench.sample.fault == Fault::none);
     REQUIRE(bench.sample.buttons == (static_cast<unsigned>(i / 10) & 0xfu));
-    // Back to the device's axes, and through the equation that ties each leg's angle to the place of the
-    // handle.
+    // Back to the device's axes, and through the constraint between each leg's angle and the handle position.
     const Vector3d b = bench.sample.X_BH.translation_m;
     const Vector3d p(-b.y(), b.z(), 0.1346 - b.x());
     for (int leg = 0; leg < 3; ++leg) {
@@ -465,9 +463,8 @@ TEST_CASE("short packets of a Falcon are dropped, and its buttons do not flicker
   CHECK(rejected == 4);
 }
 
-TEST_CASE(
-    "a Falcon, which has no watchdog, gets a quarter of its limits, and its motors never more than 4096",
-    "[emulators]") {
+TEST_CASE("a Falcon has no watchdog and gets a quarter of its limits, at most 4096 motor counts",
+          "[emulators]") {
   Bench<EmulatedFalcon> bench("falcon");
   bench.emulator.run();
   bench.open();
@@ -482,7 +479,7 @@ TEST_CASE(
   CHECK(std::abs(2 * bench.emulator.efforts()[0] - most[0]) <= 2);
 }
 
-TEST_CASE("a device that is unplugged is lost, and is heard again after it was opened anew", "[emulators]") {
+TEST_CASE("an unplugged device is lost until it is opened again", "[emulators]") {
   Bench<EmulatedPolhem> bench("polhem", 64u);
   bench.emulator.set_encoder_counts({0, 0, -5000, 0, 0, 0});
   bench.emulator.inject({SimulatedFault::Kind::unplug, 10500us, 100ms});

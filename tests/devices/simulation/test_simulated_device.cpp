@@ -19,7 +19,7 @@ namespace {
 
 using Kind = SimulatedFault::Kind;
 
-/// A hand that goes down, turns and comes back in two seconds.
+/// A hand that moves down, rotates and returns within two seconds.
 SimulationSettings moving_hand() {
   SimulationSettings s;
   s.hand_path = {{0.0, {0.0, 0.0, 0.05}, {0, 0, 0}},
@@ -44,12 +44,12 @@ SimulationSettings nobody() {
   return s;
 }
 
-/// The whole stack on virtual time.
+/// The whole stack in virtual time.
 struct Rig {
   explicit Rig(const SimulationSettings& settings, const DeviceProfile& profile = reference_profile())
       : simulation(profile, settings), link(simulation, clock, settings), device(profile, link) {
     device.open();
-    device.read_newest(clock.now());  // the first read only empties the link
+    device.read_newest(clock.now());  // the first read only discards waiting reports
   }
   DeviceSample read_after(Duration wait) {
     clock.sleep_until(clock.now() + wait);
@@ -63,7 +63,7 @@ struct Rig {
   ProfileDevice device;
 };
 
-/// Keeps every report with its time.
+/// Stores each report with its time.
 struct Listener final : ReportSink {
   void take_report(TimePoint sent, std::span<const std::uint8_t> report) noexcept override {
     times.push_back(sent);
@@ -126,7 +126,7 @@ TEST_CASE("the hand path repeats for days, or stays at its end") {
   CHECK(once.at(24h).V_BG.linear_m_per_s.norm() == 0.0);
 }
 
-TEST_CASE("a hand path that cannot be followed is refused") {
+TEST_CASE("an invalid hand path is rejected") {
   using Catch::Contains;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH(HandPath({}, true), Contains("at least one"));
@@ -138,7 +138,7 @@ TEST_CASE("a hand path that cannot be followed is refused") {
   CHECK_NOTHROW(HandPath(open_path, false));
 }
 
-TEST_CASE("a simulation that cannot be is refused") {
+TEST_CASE("invalid simulation settings are rejected") {
   using Catch::Contains;
   const DeviceProfile profile = reference_profile();
   SimulationSettings s = still_hand();
@@ -206,7 +206,7 @@ TEST_CASE("other report rates keep their count and their time") {
   }
 }
 
-TEST_CASE("the same run gives the same bits, however time is cut") {
+TEST_CASE("equal runs give equal bits, independent of how calls divide the time") {
   const DeviceProfile profile = reference_profile();
   const auto run = [&](Duration cut) {
     SimulatedDevice simulation(profile, moving_hand());
@@ -271,7 +271,7 @@ TEST_CASE("a free body gains the speed that its mass and friction allow") {
   CHECK(simulation.V_BH().angular_rad_per_s.y() == Approx(w).epsilon(1e-3));
 }
 
-TEST_CASE("Coulomb friction holds what is weaker and takes its part of what is stronger") {
+TEST_CASE("Coulomb friction balances a weaker force and reduces a stronger one") {
   SimulationSettings s = nobody();
   s.coulomb_friction_N = 0.5;
   s.viscous_friction_N_s_per_m = 0.0;
@@ -290,7 +290,7 @@ TEST_CASE("Coulomb friction holds what is weaker and takes its part of what is s
   CHECK(push_for_100_ms(0.80) == Approx(0.3 / 0.15 * 0.1).epsilon(1e-3));
 }
 
-TEST_CASE("motors and hand together give what friction takes and the handle keeps") {
+TEST_CASE("the work of motors and hand equals friction loss plus kinetic energy") {
   Rig rig(moving_hand());
   double most_J = 0.0, worst_J = 0.0;
   for (int i = 0; i < 6000; ++i) {
@@ -307,7 +307,7 @@ TEST_CASE("motors and hand together give what friction takes and the handle keep
   CHECK(worst_J < 0.01 * most_J);
 }
 
-TEST_CASE("the handle never feels more than the actuators can do") {
+TEST_CASE("the force on the handle never exceeds the actuator limits") {
   SimulationSettings s = still_hand();
   s.actuator_max_force_N = 2.0;
   s.actuator_max_torque_Nm = 0.05;
@@ -320,7 +320,7 @@ TEST_CASE("the handle never feels more than the actuators can do") {
   CHECK((rig.simulation.motor_wrench().torque_Nm - Vector3d(0.0, 0.0, 0.05)).norm() < 1e-6);
 }
 
-TEST_CASE("a spatial wrench about the world origin does what its handle wrench would") {
+TEST_CASE("a spatial wrench about the world origin acts like the equivalent handle wrench") {
   const auto run = [](WrenchPoint point) {
     DeviceProfile profile = reference_profile();
     profile.wrench_point = point;
@@ -338,7 +338,7 @@ TEST_CASE("a spatial wrench about the world origin does what its handle wrench w
   CHECK(a.rotation.angularDistance(b.rotation) < 1e-3);
 }
 
-TEST_CASE("the encoders see whole quanta, and the pose to half of one") {
+TEST_CASE("encoders report whole quanta, within half a quantum of the pose") {
   SimulationSettings s = moving_hand();
   s.report_delay_s = 0.0;
   s.position_quantum_m = 1e-4;
@@ -372,7 +372,7 @@ TEST_CASE("the firmware's velocity follows the true one through quanta and filte
   CHECK(worst_v > 0.0);
 }
 
-TEST_CASE("the watchdog frees the hand within the hold time of the last command") {
+TEST_CASE("the watchdog releases the hand within the hold time of the last command") {
   for (const double hold_s : {0.001, 0.008, 0.031, 1.0, 0.0}) {
     SimulationSettings s = still_hand();
     s.command_delay_s = 0.0;
@@ -395,7 +395,7 @@ TEST_CASE("the watchdog frees the hand within the hold time of the last command"
   }
 }
 
-TEST_CASE("a trip is told until the motors are asked for again") {
+TEST_CASE("watchdog_tripped stays set until a command with enable") {
   Rig rig(still_hand());
   rig.write(kPush);
   DeviceSample sample = rig.read_after(5ms);
@@ -436,7 +436,7 @@ TEST_CASE("commands sent just before the link is closed still arrive") {
   CHECK_FALSE(rig.simulation.firmware().motors_on());
 }
 
-TEST_CASE("the firmware refuses what is not a new and whole command") {
+TEST_CASE("the firmware rejects repeated and incomplete commands") {
   SimulatedDevice simulation(reference_profile(), still_hand());
   Listener host;
   simulation.advance_to({}, host);
@@ -454,7 +454,7 @@ TEST_CASE("the firmware refuses what is not a new and whole command") {
   CHECK(simulation.firmware().commands_rejected() == 5);
 }
 
-TEST_CASE("a host that repeats itself does not feed the watchdog, one that starts anew is heard") {
+TEST_CASE("repeated commands do not feed the watchdog, and a restarted host is accepted") {
   SimulatedDevice simulation(reference_profile(), still_hand());
   Listener host;
   simulation.advance_to({}, host);
@@ -478,7 +478,7 @@ TEST_CASE("a host that stops reading finds the oldest reports, as behind hidraw"
   CHECK(rig.read_after(2ms).missing == 500 - PacketQueue::kCapacity);
 }
 
-TEST_CASE("a gap of more than a second is jumped, and the watchdog has tripped") {
+TEST_CASE("a gap of more than a second is skipped, and the watchdog has tripped") {
   Rig rig(moving_hand());
   rig.write(kPush);
   rig.read_after(300ms);
@@ -497,10 +497,10 @@ TEST_CASE("a gap of more than a second is jumped, and the watchdog has tripped")
   CHECK(rig.clock.now() - rig.simulation.now() < 63us);
 }
 
-TEST_CASE("each fault on request shows as what it is, for as long as it was asked") {
+TEST_CASE("each injected fault appears as such for its duration") {
   struct Case {
     Kind kind;
-    Fault fault;  ///< while it lasts
+    Fault fault;  ///< the fault raised while it is active
     std::uint32_t rejected;
   };
   for (const Case& c :
@@ -521,7 +521,7 @@ TEST_CASE("each fault on request shows as what it is, for as long as it was aske
   }
 }
 
-TEST_CASE("a teleport on request shows at both its ends") {
+TEST_CASE("an injected jump appears at its start and its end") {
   Rig rig(still_hand());
   rig.simulation.inject({Kind::jump, 50ms, 20ms});
   int teleports = 0;
@@ -529,7 +529,7 @@ TEST_CASE("a teleport on request shows at both its ends") {
   CHECK(teleports == 2);
 }
 
-TEST_CASE("a deaf device takes no command and its watchdog trips") {
+TEST_CASE("a device that refuses commands trips its watchdog") {
   Rig rig(still_hand());
   rig.simulation.inject({Kind::refuse_commands, 50ms, 50ms});
   DeviceSample sample;
@@ -546,7 +546,7 @@ TEST_CASE("a deaf device takes no command and its watchdog trips") {
   CHECK(rig.simulation.motor_wrench().force_N == Vector3d::Zero());
 }
 
-TEST_CASE("an unplugged device is lost at once, frees the hand, and has to be opened again") {
+TEST_CASE("an unplugged device is lost at once, releases the hand, and must be opened again") {
   for (const Duration unplugged : {Duration{100us}, Duration{50ms}}) {
     Rig rig(still_hand());
     rig.simulation.inject({Kind::unplug, 20ms + 300us, unplugged});
@@ -559,7 +559,7 @@ TEST_CASE("an unplugged device is lost at once, frees the hand, and has to be op
     rig.device.release(rig.clock.now());
     if (unplugged > 1ms) CHECK_THROWS_WITH(rig.device.open(), Catch::Contains("unplugged"));
     CHECK(rig.read_after(10ms).fault == Fault::device_lost);
-    rig.link.advance_to(rig.clock.now());  // time passes for the device although nobody listens
+    rig.link.advance_to(rig.clock.now());  // the device continues although the link is closed
     CHECK(rig.simulation.motor_wrench().force_N == Vector3d::Zero());
     CHECK(rig.read_after(50ms).fault == Fault::device_lost);
     rig.device.open();
@@ -586,7 +586,7 @@ TEST_CASE("two simulated minutes with commands every millisecond stay whole and 
   CHECK(rig.simulation.handle().energy().motors_J < 0.0);
 }
 
-TEST_CASE("a profile that the simulated device cannot follow is refused") {
+TEST_CASE("a profile that the simulated device does not support is rejected") {
   DeviceProfile profile = reference_profile();
   profile.wrench_report.torque.present = false;
   CHECK_THROWS_WITH(SimulatedDevice(profile, SimulationSettings{}),

@@ -40,7 +40,7 @@ Bytes numbered(std::size_t length, std::uint8_t first) {
   return bytes;
 }
 
-/// What the link reads next, waiting for it.
+/// Waits for the next report of the link and returns it.
 std::pair<LinkRead, Bytes> read_one(ReportLink& link, std::size_t room = 64) {
   Bytes buffer(room);
   link.wait_readable(now() + 1h);
@@ -51,7 +51,7 @@ std::pair<LinkRead, Bytes> read_one(ReportLink& link, std::size_t room = 64) {
 
 }  // namespace
 
-TEST_CASE("hidraw: nothing to read is told at once", "[usb]") {
+TEST_CASE("hidraw: a read without a report returns at once", "[usb]") {
   Bench bench;
   std::array<std::uint8_t, 64> buffer{};
   CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
@@ -60,7 +60,7 @@ TEST_CASE("hidraw: nothing to read is told at once", "[usb]") {
   CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
 }
 
-TEST_CASE("hidraw: a report is read as it was sent, however long it is", "[usb]") {
+TEST_CASE("hidraw: a report of any length is read unchanged", "[usb]") {
   Bench bench;
   for (const std::size_t length : {1U, 7U, 32U, 63U, 64U}) {
     const Bytes report = numbered(length, 1);
@@ -72,7 +72,7 @@ TEST_CASE("hidraw: a report is read as it was sent, however long it is", "[usb]"
   }
 }
 
-TEST_CASE("hidraw: a report longer than the buffer is cut, and its length is told", "[usb]") {
+TEST_CASE("hidraw: a report longer than the buffer is truncated, and its length is returned", "[usb]") {
   Bench bench;
   bench.mock.send(numbered(200, 1));
   const auto [read, bytes] = read_one(bench.link);
@@ -82,7 +82,7 @@ TEST_CASE("hidraw: a report longer than the buffer is cut, and its length is tol
   CHECK(bench.link.read(now(), buffer).status == LinkStatus::not_ready);
 }
 
-TEST_CASE("hidraw: a report is written with its id first where the device has ids", "[usb]") {
+TEST_CASE("hidraw: a report is written with its id first if the device has ids", "[usb]") {
   Bench bench;
   Bytes report = numbered(32, 2);
   CHECK(bench.link.write(now(), report) == LinkStatus::ok);
@@ -90,7 +90,7 @@ TEST_CASE("hidraw: a report is written with its id first where the device has id
   CHECK_FALSE(bench.mock.anything_received());
 }
 
-TEST_CASE("hidraw: where it has none hidapi's zero is put in front, and nothing is taken away on reading",
+TEST_CASE("hidraw: without ids a zero is added in front on writing, and nothing is removed on reading",
           "[usb]") {
   Bench bench({.numbered_reports = false});
   const Bytes report = numbered(32, 9);
@@ -102,7 +102,7 @@ TEST_CASE("hidraw: where it has none hidapi's zero is put in front, and nothing 
   CHECK(read_one(bench.link).second == numbered(64, 7));
 }
 
-TEST_CASE("hidraw: the last report handed over is written before the link is closed", "[usb]") {
+TEST_CASE("hidraw: the last submitted report is written before the link closes", "[usb]") {
   Bench bench;
   for (int i = 0; i < 50; ++i) bench.link.write(now(), numbered(32, 2));
   bench.link.write(now(), Bytes(32, 0));
@@ -117,7 +117,7 @@ TEST_CASE("hidraw: the last report handed over is written before the link is clo
   CHECK(bench.link.write(now(), numbered(32, 2)) == LinkStatus::disconnected);
 }
 
-TEST_CASE("hidraw: an unplugged device is gone at once and stays so", "[usb]") {
+TEST_CASE("hidraw: an unplugged device is disconnected at once and stays disconnected", "[usb]") {
   Bench bench;
   bench.mock.unplug();
   std::array<std::uint8_t, 64> buffer{};
@@ -128,10 +128,10 @@ TEST_CASE("hidraw: an unplugged device is gone at once and stays so", "[usb]") {
   bench.link.wait_readable(now() + 1h);
   bench.link.close();
   bench.link.close();
-  CHECK_THROWS_WITH(bench.link.open(), Contains("not plugged in any more"));
+  CHECK_THROWS_WITH(bench.link.open(), Contains("no longer connected"));
 }
 
-TEST_CASE("hidraw: unplugging is found without the heap, which hidapi would use", "[usb][realtime]") {
+TEST_CASE("hidraw: unplugging is detected without allocation", "[usb][realtime]") {
   Bench bench;
   std::array<std::uint8_t, 64> buffer{};
   bench.mock.unplug();
@@ -146,7 +146,7 @@ TEST_CASE("hidraw: unplugging is found without the heap, which hidapi would use"
   CHECK(allocations == 0);
 }
 
-TEST_CASE("hidraw: another device behind the same node is refused, and nothing is written to it", "[usb]") {
+TEST_CASE("hidraw: another device behind the same node is rejected, and nothing is written to it", "[usb]") {
   MockMachine machine;
   MockIdentity identity{.serial = "MINE"};
   auto mock = std::make_unique<MockHidraw>(machine, identity);
@@ -167,7 +167,7 @@ TEST_CASE("hidraw: another device behind the same node is refused, and nothing i
   CHECK_FALSE(other.anything_received());
 }
 
-TEST_CASE("hidraw: the same device plugged in again is opened again", "[usb]") {
+TEST_CASE("hidraw: the same device can be opened again after reconnection", "[usb]") {
   MockMachine machine;
   auto mock = std::make_unique<MockHidraw>(machine, MockIdentity{});
   HidrawLink link(list_usb_devices().at(0));
@@ -181,7 +181,7 @@ TEST_CASE("hidraw: the same device plugged in again is opened again", "[usb]") {
   }
 }
 
-TEST_CASE("hidraw: two equal devices are each read and written for themselves", "[usb]") {
+TEST_CASE("hidraw: two equal devices are read and written independently", "[usb]") {
   MockMachine machine;
   MockHidraw left(machine, {.place = "1-1", .number = 0, .serial = "L"});
   MockHidraw right(machine, {.place = "1-2", .number = 1, .serial = "R"});
@@ -200,16 +200,16 @@ TEST_CASE("hidraw: two equal devices are each read and written for themselves", 
   CHECK(left.receive(32) == Bytes(32, 3));
 }
 
-TEST_CASE("hidraw: a device without a node is refused with the alternative", "[usb]") {
+TEST_CASE("hidraw: a device without a node is rejected with the alternative", "[usb]") {
   UsbDevice device;
   device.port_path = "1-1";
   CHECK_THROWS_WITH(HidrawLink(device).open(), Contains("1-1") && Contains("use libusb"));
 }
 
-TEST_CASE("hidraw: a profile device reads the pose and the device hears the wrench", "[usb]") {
+TEST_CASE("hidraw: a profile device reads the pose, and the device receives the wrench", "[usb]") {
   Bench bench;
   DeviceProfile profile = reference_profile();
-  profile.stale_fault_s = 3600.0;  // however slow this machine is
+  profile.stale_fault_s = 3600.0;  // independent of the speed of the machine
   ProfileDevice device(profile, bench.link);
   device.open();
   device.read_newest(now());
@@ -234,7 +234,7 @@ TEST_CASE("hidraw: a profile device reads the pose and the device hears the wren
 TEST_CASE("hidraw: a device that another link has open is not opened", "[usb]") {
   Bench bench;
   HidrawLink second(bench.link.device());
-  CHECK_THROWS_WITH(second.open(), Contains("another program holds it: end that one"));
+  CHECK_THROWS_WITH(second.open(), Contains("another program uses it: end that program"));
   bench.link.close();
   CHECK_NOTHROW(second.open());
 }

@@ -11,7 +11,7 @@
 #include "tests/devices/usb/mock_device.hpp"
 #include "tests/support/run_program.hpp"
 
-// The whole daemon, a process of its own, with a device that is plugged in and out.
+// The complete daemon as a process, with a device that is connected and disconnected.
 
 using namespace wrenchd;
 using namespace wrenchd::test;
@@ -20,9 +20,8 @@ using Catch::Contains;
 
 namespace {
 
-/// The reference device behind a mock hidraw node, alive on a thread: what it reports goes to the host, what
-/// the host writes comes to it. The far end of the node is a stream, which runs reports together that wait,
-/// so no more than one in 2 ms is sent.
+/// The reference device behind a mock hidraw node, on a thread: it sends reports and receives commands. The
+/// far end of the node is a byte stream that merges waiting reports, so it sends at most one report per 2 ms.
 class LiveHandle : ReportSink {
  public:
   LiveHandle(MockMachine& machine, const MockIdentity& identity)
@@ -58,7 +57,7 @@ class LiveHandle : ReportSink {
       std::this_thread::sleep_for(2ms);
     }
   }
-  /// What a host does not read in time is lost.
+  /// A report that the host does not read in time is lost.
   void send() {
     try {
       if (!newest_.empty()) mock_.send(newest_);
@@ -86,7 +85,7 @@ bool soon(const Condition& condition) {
   return false;
 }
 
-/// A profile that minds no silence of this machine's.
+/// A profile that tolerates any silence of the machine.
 const char* const kPatient = R"(inherits = "reference_full_speed"
 name = "patient"
 stale_fault_s = 1.0
@@ -95,7 +94,7 @@ usb = ["1209:6d0f"]
 [pose_report]
 sequence = "none"
 )";
-/// Nor asks for what a mock on a busy machine cannot do.
+/// The self-test is off, because a mock on a busy machine cannot pass it.
 const char* const kLenient = "[servo]\nself_test_s = 0\n";
 
 }  // namespace
@@ -107,7 +106,7 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   const std::string config = files.write("lenient.toml", kLenient).string();
   RunningProgram wrenchd("wrenchd",
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
-  REQUIRE(wrenchd.wait_for_output("no device of profile patient is plugged in; waiting for it"));
+  REQUIRE(wrenchd.wait_for_output("no device of profile patient is connected; waiting for it"));
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
   REQUIRE(wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
@@ -123,7 +122,8 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   handle.reset();
 
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
-  REQUIRE(wrenchd.wait_for_output("the device is back, disarmed: 1209:6d0f serial A1 in 1-4"));
+  REQUIRE(
+      wrenchd.wait_for_output("the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
   REQUIRE(soon([&] { return handle->commands() > 300; }));
   CHECK_FALSE(handle->was_pushed());
 
@@ -183,7 +183,7 @@ TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing"
   wrenchctl.signal(SIGINT);
   const ProgramResult result = wrenchctl.wait();
   CHECK(result.exit_code == 1);
-  CHECK_THAT(result.err, Contains("stopped; nothing was stored"));
+  CHECK_THAT(result.err, Contains("cancelled; no calibration was stored"));
   CHECK_FALSE(std::filesystem::exists(files.path() / "calibration"));
   CHECK_FALSE(handle.was_pushed());
 }

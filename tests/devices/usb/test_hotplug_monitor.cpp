@@ -21,7 +21,7 @@ class Events {
     events_.push_back(event);
     changed_.notify_all();
   }
-  /// Waits for it; a test that never hears of it ends by the time limit of all tests.
+  /// Waits for the event; without it the test ends by its time limit.
   HotplugEvent await(HotplugEvent::Kind kind, const std::string& subsystem) {
     std::unique_lock lock(mutex_);
     std::vector<HotplugEvent>::iterator found;
@@ -45,7 +45,7 @@ class Events {
 
 }  // namespace
 
-TEST_CASE("plugging and unplugging are told, for the node and for the device", "[usb]") {
+TEST_CASE("connection and disconnection are reported for the node and for the device", "[usb]") {
   const auto source = GENERATE(HotplugMonitor::Source::udev, HotplugMonitor::Source::kernel);
   MockMachine machine;
   Events events;
@@ -57,7 +57,7 @@ TEST_CASE("plugging and unplugging are told, for the node and for the device", "
   const HotplugEvent usb = events.await(HotplugEvent::Kind::connected, "usb");
   CHECK(usb.node == "/dev/bus/usb/002/007");
   CHECK(usb.port_path == "2-1.4");
-  CHECK(events.count() == 2);  // not each interface
+  CHECK(events.count() == 2);  // not one per interface
   device.unplug();
   CHECK(events.await(HotplugEvent::Kind::disconnected, "hidraw").node == "/dev/hidraw5");
   CHECK(events.await(HotplugEvent::Kind::disconnected, "usb").port_path == "2-1.4");

@@ -45,10 +45,10 @@ std::string refusal(ReconnectingLink& link) {
 
 }  // namespace
 
-TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
+TEST_CASE("a link finds its device and is disconnected with it", "[usb]") {
   MockMachine machine;
   ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
-  CHECK(refusal(link) == "no device of profile reference is plugged in");
+  CHECK(refusal(link) == "no device of profile reference is connected");
   std::array<std::uint8_t, 64> buffer{};
   CHECK(link.read(now(), buffer).status == LinkStatus::disconnected);
   CHECK(link.write(now(), buffer) == LinkStatus::disconnected);
@@ -65,7 +65,7 @@ TEST_CASE("a link finds its device, and is gone with it", "[usb]") {
   CHECK_THAT(refusal(link), Contains("no device of profile reference"));
 }
 
-TEST_CASE("a device that is plugged in elsewhere is the same device", "[usb]") {
+TEST_CASE("a device in another USB port is the same device", "[usb]") {
   MockMachine machine;
   std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{.place = "1-1", .number = 0});
   ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
@@ -80,7 +80,7 @@ TEST_CASE("a device that is plugged in elsewhere is the same device", "[usb]") {
   CHECK(mock->receive(32) == Bytes(32, 7));
 }
 
-TEST_CASE("another device in its place is not opened, and nothing is written to it", "[usb]") {
+TEST_CASE("another device in the same port is not opened, and nothing is written to it", "[usb]") {
   MockMachine machine;
   std::optional<MockHidraw> mock(std::in_place, machine, MockIdentity{.serial = "A1"});
   ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());
@@ -94,7 +94,7 @@ TEST_CASE("another device in its place is not opened, and nothing is written to 
   CHECK_FALSE(mock->anything_received());
 }
 
-TEST_CASE("of two equal devices the serial number decides", "[usb]") {
+TEST_CASE("the serial number selects one of two equal devices", "[usb]") {
   MockMachine machine;
   MockHidraw first(machine, {.place = "1-1", .number = 0, .serial = "A1"});
   MockHidraw second(machine, {.place = "1-2", .number = 1, .serial = "B2"});
@@ -107,7 +107,7 @@ TEST_CASE("of two equal devices the serial number decides", "[usb]") {
   CHECK_FALSE(first.anything_received());
 }
 
-TEST_CASE("the profile says by which transport", "[usb]") {
+TEST_CASE("the profile selects the transport", "[usb]") {
   MockMachine machine;
   MockUsb mock(machine, {.hid = false});
   ReconnectingLink link(profile_for(Transport::libusb), {}, patient());
@@ -122,7 +122,7 @@ TEST_CASE("the profile says by which transport", "[usb]") {
   CHECK_FALSE(mock.claimed());
 }
 
-TEST_CASE("reading and writing over it allocate nothing", "[usb]") {
+TEST_CASE("reading and writing over a reconnecting link does not allocate", "[usb]") {
   MockMachine machine;
   MockHidraw mock(machine, {});
   ReconnectingLink link(profile_for(Transport::hidraw), {}, patient());

@@ -10,12 +10,12 @@ using namespace wrenchd;
 using namespace wrenchd::test;
 using Catch::Contains;
 
-TEST_CASE("with nothing plugged in nothing is listed", "[usb]") {
+TEST_CASE("without devices the list is empty", "[usb]") {
   const MockMachine machine;
   CHECK(list_usb_devices().empty());
 }
 
-TEST_CASE("a HID device is listed with everything it says of itself", "[usb]") {
+TEST_CASE("a HID device is listed with all its properties", "[usb]") {
   MockMachine machine;
   const MockHidraw device(machine, {.place = "3-1.2", .number = 4, .serial = "S 7"});
   const auto found = list_usb_devices();
@@ -54,7 +54,7 @@ TEST_CASE("an interface that is not HID has no node, descriptor or usage", "[usb
   CHECK(found[0].port_path == "1-4");
 }
 
-TEST_CASE("devices are listed by place, numbers as numbers, in whatever order they came", "[usb]") {
+TEST_CASE("devices are sorted by port path, numerically, independent of their order", "[usb]") {
   MockMachine machine;
   const MockHidraw c(machine, {.place = "1-10", .number = 0, .serial = "C"});
   const MockHidraw a(machine, {.place = "1-2", .number = 2, .serial = "A"});
@@ -65,7 +65,7 @@ TEST_CASE("devices are listed by place, numbers as numbers, in whatever order th
   CHECK(serials == "ABCD");
 }
 
-TEST_CASE("two equal devices are told apart by their serial numbers", "[usb]") {
+TEST_CASE("two equal devices are distinguished by their serial numbers", "[usb]") {
   MockMachine machine;
   const MockHidraw left(machine, {.place = "1-1", .number = 0, .serial = "L"});
   const MockHidraw right(machine, {.place = "1-2", .number = 1, .serial = "R"});
@@ -82,7 +82,7 @@ TEST_CASE("two equal devices are told apart by their serial numbers", "[usb]") {
   CHECK_FALSE(moved.is_same_device(found[0]));
 }
 
-TEST_CASE("what was unplugged is not listed any more", "[usb]") {
+TEST_CASE("an unplugged device is not listed", "[usb]") {
   MockMachine machine;
   MockHidraw device(machine, {});
   CHECK(list_usb_devices().size() == 1);
@@ -90,7 +90,7 @@ TEST_CASE("what was unplugged is not listed any more", "[usb]") {
   CHECK(list_usb_devices().empty());
 }
 
-TEST_CASE("where permission is refused the udev rule is told word for word", "[usb]") {
+TEST_CASE("without permission the error contains the udev rule", "[usb]") {
   UsbDevice device;
   device.vendor = 0x256f;
   device.product = 0xc635;
@@ -102,11 +102,11 @@ TEST_CASE("where permission is refused the udev rule is told word for word", "[u
                           R"(GROUP="wrenchd", MODE="0660")"));
   CHECK_THAT(open_error(device, device.usb_node, EACCES),
              Contains(R"(SUBSYSTEM=="usb", ATTR{idVendor}=="256f", ATTR{idProduct}=="c635")"));
-  CHECK_THAT(open_error(device, device.hidraw_node, ENODEV), Contains("not plugged in any more"));
-  CHECK_THAT(open_error(device, device.usb_node, EBUSY), Contains("another program holds it"));
+  CHECK_THAT(open_error(device, device.hidraw_node, ENODEV), Contains("no longer connected"));
+  CHECK_THAT(open_error(device, device.usb_node, EBUSY), Contains("another program uses it"));
 }
 
-TEST_CASE("whether a node can be opened is asked of the system", "[usb]") {
+TEST_CASE("open_error() asks the system whether a node can be opened", "[usb]") {
   MockMachine machine;
   MockHidraw mock(machine, {});
   const UsbDevice device = list_usb_devices().at(0);

@@ -21,7 +21,7 @@ TimePoint now() {
   return std::chrono::steady_clock::now();
 }
 
-/// No deadline of the link's passes in a test unless it is asked to, however slow the machine is.
+/// Settings without deadlines, so that a slow machine does not matter.
 LinkSettings patient() {
   return {.write_deadline = 1h, .close_timeout = 10s};
 }
@@ -158,7 +158,7 @@ TEST_CASE("libusb: reports are cut out of what a serial chip sends, whole, in tw
   bench.mock.send({0x31, 0x60, 4, '>', '<', 5, 6, '>'});
   CHECK(read_one(bench.link).second == Bytes{'<', 3, 4, '>'});
   CHECK(read_one(bench.link).second == Bytes{'<', 5, 6, '>'});
-  bench.mock.send({0x31, 0x60, '<', 7, '>', '<', 8, 9, '>'});  // one that is too short
+  bench.mock.send({0x31, 0x60, '<', 7, '>', '<', 8, 9, '>'});  // one of the reports is too short
   CHECK(read_one(bench.link).second == Bytes{'<', 8, 9, '>'});
 }
 
@@ -190,7 +190,8 @@ TEST_CASE("libusb: a report not taken by the deadline is called back, and the ne
   bench.mock.set_deaf(true);
   bench.link.write(now(), Bytes(32, 1));
   while (bench.link.slot()->failed() == 0) std::this_thread::yield();
-  CHECK(bench.link.write(now(), Bytes(32, 2)) == LinkStatus::not_ready);  // tells of the one before
+  CHECK(bench.link.write(now(), Bytes(32, 2)) ==
+        LinkStatus::not_ready);  // reports the failure of the previous write
   while (bench.link.slot()->failed() < 2) std::this_thread::yield();
   bench.mock.set_deaf(false);
   bench.link.write(now(), Bytes(32, 3));
@@ -216,7 +217,7 @@ TEST_CASE("libusb: closing waits for a device that takes the last report late", 
   bench.link.write(now(), Bytes(32, 1));
   bench.link.write(now(), Bytes(32, 0));
   std::thread closing([&] { bench.link.close(); });
-  std::this_thread::sleep_for(20ms);  // by then it waits; if not, the test shows less
+  std::this_thread::sleep_for(20ms);  // then it waits; otherwise the test covers less
   bench.mock.set_deaf(false);
   Bytes last;
   do last = bench.mock.receive();
@@ -253,7 +254,7 @@ TEST_CASE("libusb: an unplugged device is gone, whatever still waits", "[usb]") 
   CHECK(bench.link.write(now(), Bytes(32, 1)) == LinkStatus::disconnected);
   bench.link.close();
   bench.link.close();
-  CHECK_THROWS_WITH(bench.link.open(), Contains("not plugged in any more"));
+  CHECK_THROWS_WITH(bench.link.open(), Contains("no longer connected"));
 }
 
 TEST_CASE("libusb: another device in the same place is refused, and nothing is written to it", "[usb]") {

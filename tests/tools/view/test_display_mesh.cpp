@@ -26,7 +26,7 @@ Vector3d third(const std::vector<float>& xs, std::size_t i) {
   return {xs[3 * i], xs[3 * i + 1], xs[3 * i + 2]};
 }
 
-/// Of a corner of a triangle.
+/// Returns the normal at a triangle's corner.
 Vector3d position(const DisplayMesh& mesh, std::size_t i) {
   return third(mesh.positions, mesh.indices[i]);
 }

@@ -20,10 +20,10 @@ ChannelValues all(double x) {
 
 }  // namespace
 
-TEST_CASE("a peak of one tick is in the stretch in which it was", "[view]") {
+TEST_CASE("a peak of one tick is in the bucket of its time", "[view]") {
   MinMaxHistory extremes(10 * kMs);
   for (int i = 0; i < 100; ++i) extremes.add(i * kMs, all(i == 37 ? 5.0 : i == 38 ? -4.0 : 1.0));
-  REQUIRE(extremes.end_index() == 9);  // the tenth still grows
+  REQUIRE(extremes.end_index() == 9);  // the tenth bucket is incomplete
   for (std::uint64_t k = 0; k < extremes.end_index(); ++k) {
     CHECK(extremes.at(k).begin_ns == static_cast<std::int64_t>(k) * 10 * kMs);
     for (std::size_t c = 0; c < kChannelCount; ++c) {
@@ -33,7 +33,7 @@ TEST_CASE("a peak of one tick is in the stretch in which it was", "[view]") {
   }
 }
 
-TEST_CASE("a stretch has a number where any tick of it has one", "[view]") {
+TEST_CASE("a bucket has a value if any of its ticks has one", "[view]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   MinMaxHistory extremes(10 * kMs);
   extremes.add(0, all(nan));
@@ -47,7 +47,7 @@ TEST_CASE("a stretch has a number where any tick of it has one", "[view]") {
   CHECK(std::isnan(extremes.at(1).max[0]));
 }
 
-TEST_CASE("old stretches are forgotten, and numbers are never used again", "[view]") {
+TEST_CASE("old buckets are dropped, and indices are never reused", "[view]") {
   MinMaxHistory extremes(10 * kMs, 5);
   for (int i = 0; i <= 20; ++i) extremes.add(i * 10 * kMs, all(i));
   CHECK(extremes.first_index() == 15);
@@ -58,7 +58,7 @@ TEST_CASE("old stretches are forgotten, and numbers are never used again", "[vie
   CHECK(extremes.index_at(0) == 15);
   CHECK(extremes.index_at(1000 * kMs) == 20);
 
-  extremes.add(0, all(-1.0));  // the clock began anew
+  extremes.add(0, all(-1.0));  // the clock has restarted
   extremes.add(10 * kMs, all(-2.0));
   CHECK(extremes.first_index() == 20);
   REQUIRE(extremes.end_index() == 21);

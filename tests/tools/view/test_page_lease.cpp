@@ -26,32 +26,32 @@ bool soon(const Done& done) {
   return false;
 }
 
-/// A daemon, and what the lease tells its pages.
+/// A daemon, and the replies of the lease to its pages.
 struct Rig {
   StubDaemon daemon;
   std::mutex mutex;
-  std::vector<PageLease::Reply> told;
+  std::vector<PageLease::Reply> replies;
   PageLease lease{daemon.socket(), [this](const PageLease::Reply& one) {
                     const std::scoped_lock lock(mutex);
-                    told.push_back(one);
+                    replies.push_back(one);
                   }};
 
   Rig() {
-    soon([this] { return daemon.loop().state() == State::disarmed; });
+    soon([this] { return daemon.loop().telemetry().state() == State::disarmed; });
   }
   bool was_told(std::uint64_t page, const std::string& what, bool done) {
     return soon([&] {
       const std::scoped_lock lock(mutex);
-      for (const PageLease::Reply& one : told)
+      for (const PageLease::Reply& one : replies)
         if (one.page == page && one.request == what && one.accepted == done) return true;
       return false;
     });
   }
-  /// Lives for so long, at a frame's pace.
+  /// Sends heartbeats at the frame rate for this duration.
   void live(std::uint64_t page, std::chrono::milliseconds time) {
     for (const auto end = std::chrono::steady_clock::now() + time; std::chrono::steady_clock::now() < end;) {
       lease.heartbeat(page);
-      lease.set_loop_state(name(daemon.loop().state()));
+      lease.set_loop_state(name(daemon.loop().telemetry().state()));
       std::this_thread::sleep_for(16ms);
     }
   }
@@ -59,7 +59,7 @@ struct Rig {
 
 }  // namespace
 
-TEST_CASE("a page holds the lease for as long as it says that it lives", "[view]") {
+TEST_CASE("a page holds the lease as long as it sends heartbeats", "[view]") {
   Rig rig;
   rig.lease.submit(1, Wish::arm);
   REQUIRE(rig.was_told(1, "arm", true));
@@ -74,7 +74,7 @@ TEST_CASE("a page holds the lease for as long as it says that it lives", "[view]
   CHECK(rig.lease.holder() == 0);
 }
 
-TEST_CASE("a page that is closed lets go at once", "[view]") {
+TEST_CASE("a closed page releases the lease immediately", "[view]") {
   Rig rig;
   rig.lease.submit(1, Wish::arm);
   REQUIRE(rig.was_told(1, "arm", true));
@@ -93,7 +93,7 @@ TEST_CASE("only the page that armed keeps it armed, and any page disarms", "[vie
   rig.lease.submit(2, Wish::arm);
   CHECK(rig.was_told(2, "arm", false));
   CHECK(rig.lease.holder() == 1);
-  rig.lease.page_closed(2);  // it has nothing to let go of
+  rig.lease.page_closed(2);  // this page holds no lease
   rig.live(1, 200ms);
   CHECK(rig.daemon.leased());
   rig.lease.submit(3, Wish::disarm);
@@ -102,7 +102,7 @@ TEST_CASE("only the page that armed keeps it armed, and any page disarms", "[vie
   CHECK(soon([&] { return !rig.daemon.leased(); }));
 }
 
-TEST_CASE("a stop goes to the daemon whoever asks, with or without the lease", "[view]") {
+TEST_CASE("every page can stop, with or without the lease", "[view]") {
   Rig rig;
   rig.lease.submit(7, Wish::stop);
   CHECK(rig.was_told(7, "stop", true));
@@ -110,21 +110,21 @@ TEST_CASE("a stop goes to the daemon whoever asks, with or without the lease", "
   CHECK(std::find(asked.begin(), asked.end(), "stop") != asked.end());
 }
 
-TEST_CASE("a daemon that is not there is told to the page that asked", "[view]") {
+TEST_CASE("the page that sent a request receives an error if the daemon is absent", "[view]") {
   Rig rig;
-  std::vector<PageLease::Reply> told;
+  std::vector<PageLease::Reply> replies;
   std::mutex mutex;
   PageLease lost("/nowhere/control.sock", [&](const PageLease::Reply& one) {
     const std::scoped_lock lock(mutex);
-    told.push_back(one);
+    replies.push_back(one);
   });
   for (const Wish wish : {Wish::arm, Wish::stop}) lost.submit(1, wish);
   CHECK(soon([&] {
     const std::scoped_lock lock(mutex);
-    return told.size() == 2;
+    return replies.size() == 2;
   }));
   const std::scoped_lock lock(mutex);
-  for (const PageLease::Reply& one : told) {
+  for (const PageLease::Reply& one : replies) {
     CHECK_FALSE(one.accepted);
     CHECK(one.error.find("/nowhere/control.sock") != std::string::npos);
   }

@@ -38,11 +38,11 @@ TEST_CASE("quantiles are never too low, and at most 2.5 % too high", "[view]") {
   CHECK(sum.p50_us >= 500.0);
   CHECK(sum.p50_us <= 500.0 * 1.025);
   CHECK(sum.p99_9_us >= 999.0);
-  CHECK(sum.p99_9_us <= 1000.0);  // none is longer than the longest
+  CHECK(sum.p99_9_us <= 1000.0);  // clamped to the maximum
   CHECK(RollingHistogram().summary().count == 0);
 }
 
-TEST_CASE("what is older than ten seconds does not count", "[view]") {
+TEST_CASE("durations older than ten seconds are dropped", "[view]") {
   RollingHistogram times;
   times.add(1 * kSecond, 50'000'000);
   for (int s = 2; s <= 10; ++s) times.add(s * kSecond, 20'000);
@@ -53,7 +53,7 @@ TEST_CASE("what is older than ten seconds does not count", "[view]") {
   CHECK(times.summary().max_us == Approx(20.0));
   times.add(60 * kSecond, 20'000);
   CHECK(times.summary().count == 1);
-  times.add(3 * kSecond, 30'000);  // of another daemon, whose clock began anew
+  times.add(3 * kSecond, 30'000);  // from another daemon, whose clock has restarted
   CHECK(times.summary().count == 1);
   CHECK(times.summary().max_us == Approx(30.0));
 }

@@ -12,64 +12,65 @@
 
 namespace wrenchd {
 
-/// What the daemon told its subscribers.
+/// An event that the daemon sent to its subscribers.
 struct ClientEvent {
-  std::uint64_t sequence = 0;  ///< one more for each event; a gap is what was dropped
+  std::uint64_t sequence = 0;  ///< event counter; a gap means that the daemon dropped events
   std::int64_t time_ns = 0;    ///< CLOCK_MONOTONIC
   std::string name;            ///< "state", "fault", "device", ...
   std::string level;           ///< "info", "warning", "error"
-  std::string json;            ///< all of it, as a JSON object
+  std::string json;            ///< the whole event as a JSON object
 };
 
-/// A connection to wrenchd. Every call waits for its answer, and throws ClientError where there is none in
-/// time, where the connection ended, and where the daemon refused, with the daemon's own sentence. Answers
-/// are JSON texts, to be read by whatever the program reads JSON with. Any thread may call; calls take turns.
+/// A connection to wrenchd. Every call waits for its response. A call throws ClientError if the response is
+/// late, if the connection has ended, or if the daemon rejects the request; the error then contains the
+/// daemon's message. Results are JSON texts. Thread-safe: calls from several threads run one after the other.
+/// Not RT-safe: calls wait for the daemon.
 class Client {
  public:
-  /// socket: of the daemon; empty: $WRENCHD_SOCKET, then /run/wrenchd/control.sock, then
-  /// $XDG_RUNTIME_DIR/wrenchd/control.sock. Throws ClientError::kNoDaemon.
+  /// Connects to a daemon. socket: path of the daemon's socket; if empty, the first of $WRENCHD_SOCKET,
+  /// /run/wrenchd/control.sock and $XDG_RUNTIME_DIR/wrenchd/control.sock. Throws ClientError::kNoDaemon.
   explicit Client(const std::string& socket = {},
                   std::chrono::milliseconds answer_within = std::chrono::seconds(5));
-  /// Ends the connection, and with it the lease: the daemon fades the force out.
+  /// Closes the connection and thereby ends the lease: the daemon fades the force out.
   ~Client();
   Client(Client&& other) noexcept;
   Client& operator=(Client&& other) noexcept;
 
-  /// Path of the socket at which the daemon was found.
+  /// Returns the path of the daemon's socket.
   const std::string& socket() const noexcept;
 
-  /// Any method that describe() lists. params and the result are JSON objects.
+  /// Calls any method that describe() lists. params and the result are JSON objects.
   std::string call(const std::string& method, const std::string& params = "{}");
-  /// The same, for methods that hand over a descriptor: it is the caller's to close; -1 where none came.
+  /// Calls a method that returns a file descriptor. The caller must close it; -1 if the response has none.
   std::string call(const std::string& method, const std::string& params, int& descriptor);
 
   std::string describe() { return call("describe"); }
   std::string status() { return call("status"); }
   std::string devices() { return call("devices"); }
   std::string reload() { return call("reload"); }
-  std::string state();  ///< of status(): "disarmed", "active"
+  std::string state();  ///< state of the servo loop, such as "disarmed" or "active"
 
-  /// Events of these names from now on, or of all. Returns status() at that moment, as a snapshot.
+  /// Subscribes to events with these names, or to all events. Returns status() at that moment.
   std::string subscribe(const std::vector<std::string>& names = {});
   void unsubscribe() { call("unsubscribe"); }
-  /// The next event. False where none came in time.
+  /// Receives the next event. Returns false if none came in time.
   bool poll_event(ClientEvent& out, std::chrono::milliseconds timeout = std::chrono::seconds(1));
 
-  /// The right to arm, which one client has at a time. From here on a thread of this object's says that the
-  /// program lives, until release_lease(); where the program ends or loses its connection, the force fades
-  /// out. A program that may hang while it lives should do that itself: call("lease.take"), and beat() in
+  /// Acquires the lease, which is the right to arm; one client holds it at a time. A thread of this object
+  /// sends heartbeats until release_lease(). If the program ends or loses its connection, the force fades
+  /// out. A program that may hang should not use that thread: call("lease.acquire") and call heartbeat() in
   /// time.
   void acquire_lease();
   void release_lease();
   void heartbeat();
 
-  void arm() { call("arm"); }  ///< only with the lease
+  void arm() { call("arm"); }  ///< requires the lease
   void disarm() { call("disarm"); }
-  void stop() { call("stop"); }  ///< emergency stop; anybody may
+  void stop() { call("stop"); }  ///< emergency stop; requires no lease
   void acknowledge() { call("acknowledge"); }
-  void reinitialize_proxy() { call("start_over"); }
+  void reinitialize_proxy() { call("reinitialize_proxy"); }
 
-  /// The state of every tick, through shared memory.
+  /// Opens the shared memory that contains the state of every tick.
   StateReader open_state();
 
  private:

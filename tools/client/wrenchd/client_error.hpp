@@ -6,15 +6,15 @@
 
 namespace wrenchd {
 
-/// Why something could not be done, in a sentence that says what to do.
+/// The reason for a failure, as a message that says what to do.
 class ClientError : public std::runtime_error {
  public:
-  /// Beside the daemon's own codes, which are below zero (JSON-RPC 2.0).
+  /// The library's own codes are positive; the daemon's codes are negative (JSON-RPC 2.0).
   enum Code : int {
-    kNoDaemon = 1,      ///< nobody answers at the socket
-    kDisconnected = 2,  ///< the connection ended
-    kTimeout = 3,       ///< no answer in time
-    kProtocol = 4,      ///< what came is not what this library understands
+    kNoDaemon = 1,      ///< no daemon accepts connections at the socket
+    kDisconnected = 2,  ///< the connection has ended
+    kTimeout = 3,       ///< no response in time
+    kProtocol = 4,      ///< the received data has an unknown format
     kPermissionDenied = -32001,
     kInvalidState = -32002,
     kLeaseHeld = -32003,

@@ -15,33 +15,35 @@
 
 namespace wrenchd {
 
-/// A contact that holds the proxy.
+/// A contact that constrains the proxy.
 struct ProxyContact {
-  std::array<double, 3> point_W_m{};  ///< where tool and obstacle touch, in the world
-  std::array<double, 3> normal_W{};   ///< unit, from the obstacle to the tool
-  double share = 0.0;                 ///< of what all contacts carry, 0 to 1
-  double multiplier_kg_m = 0.0;       ///< the sum of multiplier times normal is 2 m (x_q - x_p)
+  std::array<double, 3> point_W_m{};  ///< contact point in the world
+  std::array<double, 3> normal_W{};   ///< unit normal from the obstacle to the tool, in the world
+  double load_fraction = 0.0;         ///< multiplier divided by the sum of all multipliers, 0 to 1
+  /// Lagrange multiplier; the sum of multiplier times normal over all contacts is 2 m (x_q - x_p).
+  double multiplier_kg_m = 0.0;
   std::uint32_t obstacle_number = 0;
-  std::string obstacle;          ///< as the scene of that tick names it, or "obstacle 2"
+  std::string obstacle;          ///< obstacle name in the scene of that tick, or "obstacle 2"
   std::string tool_feature;      ///< "vertex 12", "edge 3-7", "face 5", "hull vertex 1"
-  std::string obstacle_feature;  ///< likewise, or "plane"
+  std::string obstacle_feature;  ///< obstacle feature in the same format, or "plane"
 };
 
 /// One tick of the servo loop. Poses are x y z [m], qx qy qz qw. Wrenches are fx fy fz [N], tx ty tz [N.m].
-/// Every field that the daemon describes can be asked for by its name; `describe` of the layout lists them.
+/// Every field is accessible by its name; StateReader::describe() lists the fields.
 class TickState {
  public:
   std::uint64_t tick() const { return static_cast<std::uint64_t>(integer("tick")); }
-  std::int64_t time_ns() const { return integer("now_ns"); }               ///< CLOCK_MONOTONIC
-  std::string state() const { return text("state"); }                      ///< "active"
-  std::array<double, 7> hand_pose() const { return numbers<7>("X_WP"); }   ///< p: what the hand asks for
-  std::array<double, 7> proxy_pose() const { return numbers<7>("X_WQ"); }  ///< q: what the world allows
-  std::array<double, 6> wrench() const { return numbers<6>("F_out"); }     ///< told to the device
-  /// The contacts that carry most first. Where the scene was changed the daemon is asked once for the names
-  /// of its obstacles.
+  std::int64_t time_ns() const { return integer("now_ns"); }  ///< CLOCK_MONOTONIC
+  std::string state() const { return text("state"); }         ///< state of the loop, such as "active"
+  std::array<double, 7> hand_pose() const { return numbers<7>("X_WP"); }  ///< p: pose that the hand commands
+  /// Q: pose that the obstacles allow.
+  std::array<double, 7> proxy_pose() const { return numbers<7>("X_WQ"); }
+  std::array<double, 6> wrench() const { return numbers<6>("F_out"); }  ///< wrench sent to the device
+  /// Returns the contacts in descending order of their load. After a change of the scene, the first call
+  /// requests the obstacle names from the daemon.
   std::vector<ProxyContact> contacts() const;
 
-  /// The i-th number of a field. Throws ClientError where there is none of that name.
+  /// Returns the i-th number of a field. Throws ClientError if the field does not exist.
   double number(std::string_view field, std::size_t i = 0) const;
   std::int64_t integer(std::string_view field, std::size_t i = 0) const;
   template <std::size_t N>
@@ -50,7 +52,7 @@ class TickState {
     for (std::size_t i = 0; i < N; ++i) out[i] = number(field, i);
     return out;
   }
-  /// The name of a value, or of all bits that are set: "active", "force slew, authority", "".
+  /// Returns the name of a value, or the names of all set bits: "active", "force slew, authority", "".
   std::string text(std::string_view field) const;
 
  private:
@@ -63,35 +65,36 @@ class TickState {
   std::vector<std::uint64_t> words_;
 };
 
-/// Reads the daemon's state at the rate of its servo loop, from memory that the daemon writes and this maps
-/// read-only. The daemon knows nothing of readers: one that is slow misses ticks, and is told how many. One
-/// object serves one thread.
+/// Reads the daemon's state at the rate of its servo loop from shared memory, which this process maps
+/// read-only. The daemon does not wait for readers: a slow reader misses ticks, and missed() counts them.
+/// Each thread needs its own object. Not RT-safe: next() waits for the daemon.
 class StateReader {
  public:
-  /// layout: the text of the layout in the answer to `state.open`; descriptor: that came with it, and is
-  /// closed here. is_there: whether the daemon is there still. ask_names: what it answers to `state.names`.
-  /// Client::open_state() fills all in. Throws ClientError.
+  /// layout: the layout text in the response to `state.open`. descriptor: the file descriptor of that
+  /// response; this object closes it. is_there: returns true while the daemon is connected. ask_names:
+  /// returns the response to `state.obstacles`. Client::open_state() supplies all arguments. Throws
+  /// ClientError.
   StateReader(const std::string& layout, int descriptor, std::function<bool()> is_there = {},
               std::function<std::string()> ask_names = {});
   ~StateReader();
   StateReader(StateReader&& other) noexcept;
   StateReader& operator=(StateReader&& other) noexcept;
 
-  /// Waits for the tick after the last one taken; at first, for the first after this object was made. False
-  /// where none came in time. A reader that was overrun goes on with newer ones, and missed() grows. Throws
-  /// ClientError::kDisconnected where the daemon is gone.
+  /// Waits for the next tick; the first call waits for the first tick after the construction. Returns false
+  /// if none came in time. If the daemon has overwritten ticks, next() continues with newer ones and missed()
+  /// grows. Throws ClientError::kDisconnected if the daemon is gone.
   bool next(TickState& out, std::chrono::milliseconds timeout = std::chrono::seconds(1));
 
-  /// The newest tick, whatever was taken before. False where there was none at all.
+  /// Copies the newest tick, independent of next(). Returns false if there is no tick yet.
   bool latest(TickState& out) const;
 
-  /// Ticks that were overwritten before they were taken by next(), since this object was made.
+  /// Returns the number of ticks that the daemon overwrote before next() read them, since the construction.
   std::uint64_t missed() const noexcept { return missed_; }
-  /// Ticks that were written and not taken by next() yet.
+  /// Returns the number of ticks that next() has not read yet.
   std::uint64_t unread() const noexcept;
 
-  double rate_Hz() const noexcept;  ///< of the servo loop, as configured
-  /// Every field by name, with its unit in brackets and what it means.
+  double rate_Hz() const noexcept;  ///< configured rate of the servo loop
+  /// Returns one text per field: name, unit in brackets, and meaning.
   std::vector<std::string> describe() const;
 
  private:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The control socket: JSON-RPC 2.0, one object a line."""
+"""The control socket: JSON-RPC 2.0, one object per line."""
 
 import collections
 import json
@@ -9,43 +9,43 @@ import socket
 import threading
 import time
 
-from .errors import Gone, NoDaemon, ProtocolError, Refused, Timeout
+from .errors import Disconnected, NoDaemon, ProtocolError, Rejected, Timeout
 from .state import State
 
-_LONGEST_LINE = 16 << 20
-_MOST_EVENTS = 10_000  # that nobody takes; then the oldest go
-_BEATS_IN_TIME = 4  # in the time that the daemon waits for one
+_MAX_LINE = 16 << 20
+_MAX_EVENTS = 10_000  # maximum number of stored events; above it the oldest is dropped
+_HEARTBEATS_PER_TIMEOUT = 4  # heartbeats within the daemon's timeout
 
 
 def default_sockets():
-    """Where the daemon's socket is looked for, in this order."""
+    """Returns the paths at which clients search the daemon's socket, in this order."""
     if os.environ.get("WRENCHD_SOCKET"):
         return [os.environ["WRENCHD_SOCKET"]]
-    places = ["/run/wrenchd/control.sock"]
+    paths = ["/run/wrenchd/control.sock"]
     if os.environ.get("XDG_RUNTIME_DIR"):
-        places.append(os.path.join(os.environ["XDG_RUNTIME_DIR"], "wrenchd", "control.sock"))
-    return places
+        paths.append(os.path.join(os.environ["XDG_RUNTIME_DIR"], "wrenchd", "control.sock"))
+    return paths
 
 
-def _connected(places):
+def _connected(paths):
     tried = []
-    for place in places:
+    for path in paths:
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            connection.connect(place)
+            connection.connect(path)
             return connection
         except OSError as error:
             connection.close()
-            hint = " (are you in the group that may connect?)" if isinstance(error, PermissionError) else ""
-            tried.append(f"{place}: {error.strerror or error}{hint}")
-    raise NoDaemon(f"no wrenchd answers ({'; '.join(tried)}); start it, or name its socket in WRENCHD_SOCKET")
+            hint = " (join the group that may connect)" if isinstance(error, PermissionError) else ""
+            tried.append(f"{path}: {error.strerror or error}{hint}")
+    raise NoDaemon(f"no wrenchd responds ({'; '.join(tried)}); start it, or name its socket in WRENCHD_SOCKET")
 
 
 class Client:
-    """A connection to wrenchd. Every call waits for its answer; any thread may call, and calls take turns.
+    """A connection to wrenchd. Every call waits for its response. Thread-safe: calls run one after the other.
 
-    socket: path of the daemon's; otherwise the first of default_sockets() that answers.
-    answer_within_s: how long a call waits before it raises Timeout.
+    socket: path of the daemon's socket; by default the first of default_sockets() that accepts a connection.
+    answer_within_s: time after which a call raises Timeout.
     """
 
     def __init__(self, socket=None, answer_within_s=5.0):
@@ -55,13 +55,13 @@ class Client:
         self._reading = threading.RLock()
         self._writing = threading.Lock()
         self._received = bytearray()
-        self._looked_at = 0
+        self._scanned = 0
         self._descriptor = None
         self._last_id = 0
-        self._events = collections.deque(maxlen=_MOST_EVENTS)
+        self._events = collections.deque(maxlen=_MAX_EVENTS)
 
     def close(self):
-        """Ends the connection, and with it the lease: the daemon fades the force out."""
+        """Closes the connection and thereby ends the lease: the daemon fades the force out."""
         self._drop_descriptor()
         self._socket.close()
 
@@ -71,10 +71,10 @@ class Client:
     def __exit__(self, *_):
         self.close()
 
-    # What can be asked for
+    # Methods
 
     def call(self, method, **params):
-        """Any method that describe() lists. Returns its result."""
+        """Calls any method that describe() lists. Returns its result. Raises WrenchdError."""
         return self._call(method, params)[0]
 
     def describe(self):
@@ -90,75 +90,75 @@ class Client:
         return self.call("reload")
 
     def arm(self):
-        """Only with the lease."""
+        """Arms the loop. Requires the lease."""
         return self.call("arm")
 
     def disarm(self):
         return self.call("disarm")
 
     def stop(self):
-        """Emergency stop; anybody may."""
+        """Emergency stop. Requires no lease."""
         return self.call("stop")
 
     def acknowledge(self):
         return self.call("acknowledge")
 
-    def start_over(self):
-        return self.call("start_over")
+    def reinitialize_proxy(self):
+        return self.call("reinitialize_proxy")
 
-    def beat(self):
-        """Says that the program lives. Lease does so by itself."""
-        self._send({"jsonrpc": "2.0", "method": "beat", "params": {}})
+    def heartbeat(self):
+        """Sends a heartbeat. A Lease sends its own."""
+        self._send({"jsonrpc": "2.0", "method": "lease.heartbeat", "params": {}})
 
     def lease(self):
-        """The right to arm, which one client has at a time: `with client.lease(): client.arm(); ...`."""
+        """Acquires the lease, which is the right to arm; one client holds it: `with client.lease(): client.arm(); ...`."""
         return Lease(self)
 
     def open_state(self):
-        """The state of every tick, through shared memory."""
+        """Opens the shared memory with the state of every tick."""
         answer, descriptor = self._call("state.open", {}, True)
         if descriptor is None or "layout" not in answer:
-            raise ProtocolError("wrenchd handed no shared memory over; see its log")
-        return State(answer["layout"], descriptor, self.is_there, lambda: self.call("state.names"))
+            raise ProtocolError("wrenchd sent no shared memory; see its log")
+        return State(answer["layout"], descriptor, self.is_connected, lambda: self.call("state.obstacles"))
 
     def open_recording(self, name):
-        """A recording of the daemon's (call("record.list")), as a file to read: h5py.File(client.open_recording(...))."""
+        """Opens a recording in call("record.list") as a file: h5py.File(client.open_recording(name))."""
         _, descriptor = self._call("record.open", {"name": name}, True)
         if descriptor is None:
-            raise ProtocolError("wrenchd handed no recording over; see its log")
+            raise ProtocolError("wrenchd sent no recording; see its log")
         return os.fdopen(descriptor, "rb")
 
     # Events
 
     def subscribe(self, *names):
-        """Events of these names from now on, or of all. Returns status() at that moment, as a snapshot."""
+        """Subscribes to events with these names, or to all events. Returns status() at that moment."""
         return self.call("subscribe", **({"events": list(names)} if names else {}))
 
     def unsubscribe(self):
         return self.call("unsubscribe")
 
     def event(self, timeout_s=1.0):
-        """The next event, a dict with sequence, time_ns, name and level; None where none came in time."""
+        """Returns the next event, a dict with sequence, time_ns, name and level; None if none came in time."""
         end = time.monotonic() + timeout_s
         with self._reading:
             while not self._events:
                 line = self._read_line(end)
                 if line is None:
                     return None
-                self._keep_event(self._parsed(line))
+                self._queue_event(self._parsed(line))
             return self._events.popleft()
 
     def events(self):
-        """All events from now on, until the connection ends, which raises Gone."""
+        """Yields all events until the connection ends, which raises Disconnected."""
         while True:
             event = self.event()
             if event is not None:
                 yield event
 
-    # The line
+    # Transport
 
-    def is_there(self):
-        """Whether the daemon's end of the connection is open."""
+    def is_connected(self):
+        """Returns True if the daemon's end of the connection is open."""
         if self._socket.fileno() < 0:
             return False
         poll = select.poll()
@@ -175,16 +175,16 @@ class Client:
             while True:
                 line = self._read_line(end)
                 if line is None:
-                    raise Timeout(f"wrenchd did not answer '{method}' within {self._answer_within_s} s; see its log")
+                    raise Timeout(f"wrenchd did not respond to '{method}' within {self._answer_within_s} s; see its log")
                 message = self._parsed(line)
                 if "method" in message:
-                    self._keep_event(message)
+                    self._queue_event(message)
                     continue
                 if message.get("id") not in (request_id, None):
-                    continue  # of a call that was given up
+                    continue  # response to a call that timed out
                 if "error" in message:
                     error = message["error"]
-                    raise Refused(error.get("code"), error.get("message", f"{method} was refused"), error.get("data"))
+                    raise Rejected(error.get("code"), error.get("message", f"{method} was rejected"), error.get("data"))
                 descriptor = None
                 if wants_descriptor:
                     descriptor, self._descriptor = self._descriptor, None
@@ -197,10 +197,10 @@ class Client:
         except ValueError:
             message = None
         if not isinstance(message, dict):
-            raise ProtocolError(f"what answers is not wrenchd: {bytes(line[:80])!r}")
+            raise ProtocolError(f"the response is not wrenchd's: {bytes(line[:80])!r}")
         return message
 
-    def _keep_event(self, message):
+    def _queue_event(self, message):
         if isinstance(message.get("params"), dict):
             self._events.append(message["params"])
 
@@ -211,15 +211,15 @@ class Client:
 
     def _read_line(self, end):
         while True:
-            at = self._received.find(b"\n", self._looked_at)
+            at = self._received.find(b"\n", self._scanned)
             if at >= 0:
                 line = bytes(self._received[:at])
                 del self._received[:at + 1]
-                self._looked_at = 0
+                self._scanned = 0
                 return line
-            self._looked_at = len(self._received)
-            if self._looked_at > _LONGEST_LINE:
-                raise Gone("wrenchd sent a line without end; connect again")
+            self._scanned = len(self._received)
+            if self._scanned > _MAX_LINE:
+                raise Disconnected("wrenchd sent an overlong line; connect again")
             if not self._wait(select.POLLIN, end):
                 return None
             self._receive()
@@ -230,12 +230,12 @@ class Client:
         except BlockingIOError:
             return
         except OSError as error:
-            raise Gone(f"wrenchd ended the connection ({error}); connect again when it is back") from error
+            raise Disconnected(f"wrenchd ended the connection ({error}); connect again when wrenchd is running") from error
         if descriptors:
             self._drop_descriptor()
             self._descriptor = descriptors[0]
         if not data:
-            raise Gone("wrenchd ended the connection; connect again when it is back")
+            raise Disconnected("wrenchd ended the connection; connect again when wrenchd is running")
         self._received += data
 
     def _drop_descriptor(self):
@@ -252,34 +252,34 @@ class Client:
                     line = line[self._socket.send(line, socket.MSG_NOSIGNAL):]
                 except BlockingIOError:
                     if not self._wait(select.POLLOUT, end):
-                        raise Gone("wrenchd takes no more requests; connect again") from None
+                        raise Disconnected("wrenchd takes no more requests; connect again") from None
                 except OSError as error:
-                    raise Gone(f"wrenchd ended the connection ({error}); connect again when it is back") from error
+                    raise Disconnected(f"wrenchd ended the connection ({error}); connect again when wrenchd is running") from error
 
 
 class Lease:
-    """The right to arm. While it is held a thread says that the program lives; where the program ends or loses
-    its connection, the daemon fades the force out. A program that may hang while it lives should do that itself:
-    client.call("lease.take"), and client.beat() in time."""
+    """The right to arm. A thread sends heartbeats while the lease is held. If the program ends or loses its connection,
+    the daemon fades the force out. A program that may hang should not use that thread: client.call("lease.acquire"),
+    and call client.heartbeat() in time."""
 
     def __init__(self, client):
         self._client = client
         self._ended = threading.Event()
-        within_s = client.call("lease.take").get("beat_within_s", 0.1)
-        self._thread = threading.Thread(target=self._beat, args=(within_s / _BEATS_IN_TIME,), daemon=True)
+        within_s = client.call("lease.acquire").get("heartbeat_timeout_s", 0.1)
+        self._thread = threading.Thread(target=self._send_heartbeats, args=(within_s / _HEARTBEATS_PER_TIMEOUT,), daemon=True)
         self._thread.start()
 
-    def give(self):
-        """Gives the right back. One that was lost meanwhile, because a beat came too late, is nobody's fault here:
-        arm() says so to whoever still wants it."""
+    def release(self):
+        """Releases the lease. A lease that was lost before, because a heartbeat was late, is no error here; arm() reports
+        the loss."""
         if self._ended.is_set():
             return
         self._ended.set()
         self._thread.join()
         try:
-            self._client.call("lease.give")
-        except Refused as refused:
-            if refused.code not in (Refused.NOT_NOW, Refused.TAKEN):
+            self._client.call("lease.release")
+        except Rejected as rejected:
+            if rejected.code not in (Rejected.INVALID_STATE, Rejected.LEASE_HELD):
                 raise
 
     def __enter__(self):
@@ -287,16 +287,16 @@ class Lease:
 
     def __exit__(self, kind, *_):
         try:
-            self.give()
-        except Gone:
+            self.release()
+        except Disconnected:
             if kind is None:
                 raise
 
-    def _beat(self, every_s):
+    def _send_heartbeats(self, interval_s):
         while True:
             try:
-                self._client.beat()
-            except Gone:
-                return  # whoever calls next hears of it
-            if self._ended.wait(every_s):
+                self._client.heartbeat()
+            except Disconnected:
+                return  # the next call reports the error
+            if self._ended.wait(interval_s):
                 return

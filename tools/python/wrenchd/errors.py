@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why something could not be done. Each says in a sentence what to do."""
+"""Exceptions of the client. Their messages contain the remedy."""
 
 
 class WrenchdError(Exception):
@@ -7,28 +7,28 @@ class WrenchdError(Exception):
 
 
 class NoDaemon(WrenchdError):
-    """Nobody answers at the socket."""
+    """No daemon accepts connections at the socket."""
 
 
-class Gone(WrenchdError):
-    """The connection ended."""
+class Disconnected(WrenchdError):
+    """The connection has ended."""
 
 
 class Timeout(WrenchdError):
-    """No answer in time."""
+    """No response in time."""
 
 
 class ProtocolError(WrenchdError):
-    """What came is not what this package understands."""
+    """The received data has an unknown format."""
 
 
-class Refused(WrenchdError):
-    """The daemon said no, in its own words. code: of JSON-RPC 2.0, or one of these."""
+class Rejected(WrenchdError):
+    """The daemon rejected the request; the text is the daemon's message. code: JSON-RPC 2.0, or a code below."""
 
-    NOT_ALLOWED = -32001
-    NOT_NOW = -32002
-    TAKEN = -32003
-    REFUSED_INPUT = -32004
+    PERMISSION_DENIED = -32001
+    INVALID_STATE = -32002
+    LEASE_HELD = -32003
+    REJECTED = -32004
 
     def __init__(self, code, message, data=None):
         super().__init__(message)

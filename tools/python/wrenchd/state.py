@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon's state at the rate of its servo loop, from memory that the daemon writes and this maps read-only.
+"""The daemon's state at the rate of its servo loop, from shared memory that this package maps read-only.
 
-The memory is a ring of records, each behind a guard: 2 i + 1 while record i is being written, 2 i + 2 when it is
-whole. Two equal guards before and after a copy, and the copy is whole. That holds where a processor keeps its
-loads in order, as x86 does; on others there are thousands of instructions of the interpreter in between, and a lock
-taken, which orders them in practice.
+The memory is a ring of records, each with a guard: 2 i + 1 while the daemon writes record i, 2 i + 2 when it is complete.
+If the guard is the same before and after a copy, then the copy is consistent. This requires ordered loads, which x86
+guarantees. On other processors the interpreter executes thousands of instructions and a lock in between, which orders
+the loads in practice.
 """
 
 import fcntl
@@ -15,12 +15,12 @@ import sys
 import threading
 import time
 
-from .errors import Gone, ProtocolError, WrenchdError
+from .errors import Disconnected, ProtocolError, WrenchdError
 
-_VERSION = 1
+_VERSION = 2
 _F_GET_SEALS = 1034
 _F_SEAL_SHRINK = 2
-_LOOK_AROUND_S = 0.05  # how often a reader that waits asks whether the daemon is there still
+_CONNECTION_CHECK_S = 0.05  # how often a reader that waits asks whether the daemon is there still
 _TYPES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i64": "q", "f64": "d"}
 
 
@@ -32,7 +32,7 @@ class _Field:
         self.count = described["count"]
         self.offset = described["offset"]
         if described["type"] not in _TYPES:
-            raise ProtocolError(f"field '{self.name}' of the state is of an unknown type; use the package of the "
+            raise ProtocolError(f"field '{self.name}' of the state has an unknown type; use the package of the "
                                 "daemon's version")
         self.code = _TYPES[described["type"]]
         self.values = described.get("values")
@@ -58,10 +58,10 @@ class _Layout:
     def __init__(self, described):
         try:
             if described["version"] != _VERSION:
-                raise ProtocolError(f"the state's layout is of version {described['version']}, and {_VERSION} is what "
-                                    "can be read; use the package of the daemon's version")
+                raise ProtocolError(f"the state's layout has version {described['version']}, but this package "
+                                    f"requires version {_VERSION}; use the package of the daemon's version")
             if described["byte_order"] != sys.byteorder or sys.byteorder != "little":
-                raise ProtocolError("only little-endian machines are known")
+                raise ProtocolError("only little-endian machines are supported")
             self.bytes = described["bytes"]
             self.header_bytes = described["header_bytes"]
             self.written_word = described["written_offset"] // 8
@@ -73,15 +73,15 @@ class _Layout:
             if self.slots < 1 or self.header_bytes + self.slots * self.slot_bytes > self.bytes:
                 raise ProtocolError("the sizes in the state's layout contradict each other")
             self.fields = {f["name"]: _Field(f, self.record_bytes) for f in described["fields"]}
-            touches = described["touches"]
-            self.touches_offset = touches["offset"]
-            self.touch_bytes = touches["bytes"]
-            self.most_touches = touches["most"]
-            if self.touches_offset + self.most_touches * self.touch_bytes > self.record_bytes:
+            contacts = described["contacts"]
+            self.contacts_offset = contacts["offset"]
+            self.contact_bytes = contacts["bytes"]
+            self.max_contacts = contacts["max_count"]
+            if self.contacts_offset + self.max_contacts * self.contact_bytes > self.record_bytes:
                 raise ProtocolError("the contacts lie outside of the record")
-            self.touch_fields = {f["name"]: _Field(f, self.touch_bytes) for f in touches["fields"]}
+            self.contact_fields = {f["name"]: _Field(f, self.contact_bytes) for f in contacts["fields"]}
         except (KeyError, TypeError) as error:
-            raise ProtocolError(f"the state's layout cannot be understood ({error!r}); use the package of the daemon's "
+            raise ProtocolError(f"the state's layout has an unknown format ({error!r}); use the package of the daemon's "
                                 "version") from error
 
     def dtype(self):
@@ -93,14 +93,14 @@ class _Layout:
             return numpy.dtype({"names": [n for n, _, _ in named], "formats": [t for _, t, _ in named],
                                 "offsets": [o for _, _, o in named], "itemsize": size})
 
-        touch = of(self.touch_fields, self.touch_bytes)
-        return of(self.fields, self.record_bytes, [("touches", (touch, (self.most_touches,)), self.touches_offset)])
+        contact = of(self.contact_fields, self.contact_bytes)
+        return of(self.fields, self.record_bytes, [("contact_list", (contact, (self.max_contacts,)), self.contacts_offset)])
 
 
 class _Names:
-    """Names of obstacles, rendering by rendering: a tick that is looked at late is of one that is no more."""
+    """Caches the names of obstacles by rendering, because a tick may belong to an earlier rendering."""
 
-    _MOST_KEPT = 8
+    _CAPACITY = 8
 
     def __init__(self, described, ask):
         self._ask = ask
@@ -112,38 +112,38 @@ class _Names:
             try:
                 self._keep(self._ask())
             except WrenchdError:
-                pass  # gone, or busy: a number tells which one, too
+                pass  # the daemon is gone or busy; the obstacle number identifies the obstacle instead
         names = self._known.get(rendering, ())
         return names[number] if number < len(names) else f"obstacle {number}"
 
     def _keep(self, described):
         try:
-            self._known[described["rendering"]] = described["obstacles"]
+            self._known[described["rendering_id"]] = described["obstacles"]
         except (KeyError, TypeError) as error:
-            raise ProtocolError(f"the names of obstacles cannot be understood ({error!r}); use the package of the "
+            raise ProtocolError(f"the names of obstacles have an unknown format ({error!r}); use the package of the "
                                 "daemon's version") from error
-        while len(self._known) > self._MOST_KEPT:
+        while len(self._known) > self._CAPACITY:
             del self._known[min(self._known)]
 
 
-class Touch:
-    """A contact that holds the proxy: point_W_m, normal_W, share, multiplier_kg_m; and by name obstacle,
-    tool_feature, obstacle_feature. Where the scene was changed the daemon is asked once for the names of its
-    obstacles."""
+class Contact:
+    """A contact that constrains the proxy. Attributes: point_W_m, normal_W, load_fraction, multiplier_kg_m, and the names
+    obstacle, tool_feature, obstacle_feature. After a change of the scene the first access requests the obstacle names
+    from the daemon."""
 
     def __init__(self, layout, names, record, base):
-        for name in ("point_W_m", "normal_W", "share", "multiplier_kg_m"):
-            setattr(self, name, layout.touch_fields[name].value(record, base))
-        self.kind = layout.touch_fields["contact_kind"].value(record, base)
-        self.obstacle_number = layout.touch_fields["obstacle"].value(record, base)
-        self.obstacle = names.of(layout.fields["rendering"].value(record), self.obstacle_number)
+        for name in ("point_W_m", "normal_W", "load_fraction", "multiplier_kg_m"):
+            setattr(self, name, layout.contact_fields[name].value(record, base))
+        self.kind = layout.contact_fields["contact_kind"].value(record, base)
+        self.obstacle_number = layout.contact_fields["obstacle"].value(record, base)
+        self.obstacle = names.of(layout.fields["rendering_id"].value(record), self.obstacle_number)
         self.tool_feature = self._feature(layout, record, base, "tool")
         self.obstacle_feature = self._feature(layout, record, base, "obstacle")
 
     @staticmethod
     def _feature(layout, record, base, body):
         def of(name):
-            return layout.touch_fields[body + name].value(record, base)
+            return layout.contact_fields[body + name].value(record, base)
 
         kind = of("_feature_kind")
         if kind in ("plane", "none"):
@@ -154,13 +154,13 @@ class Touch:
         return f"{self.tool_feature} on {self.obstacle} {self.obstacle_feature}"
 
     def __repr__(self):
-        return f"<{self}, {100 * self.share:.0f} %>"
+        return f"<{self}, {100 * self.load_fraction:.0f} %>"
 
 
 class Tick:
-    """One tick of the servo loop. Every field of State.describe() is an attribute: a number or a tuple of numbers;
-    for states, faults and the like their name; for bits a list of names. touches: the contacts, those that carry
-    most first. tick["state"] is the bare number."""
+    """One tick of the servo loop. Every field of State.describe() is an attribute: a number or a tuple of numbers; the name
+    of a state, a fault or another enumerated value; a list of names for bits. contact_list: the contacts in descending
+    order of their load. tick["state"] is the number itself."""
 
     __slots__ = ("_layout", "_names", "_record")
 
@@ -183,34 +183,34 @@ class Tick:
         return [*super().__dir__(), *self._layout.fields]
 
     @property
-    def touches(self):
+    def contact_list(self):
         layout = self._layout
-        count = min(self.touch_count, layout.most_touches)
-        return [Touch(layout, self._names, self._record, layout.touches_offset + i * layout.touch_bytes) for i in range(count)]
+        count = min(self.contact_count, layout.max_contacts)
+        return [Contact(layout, self._names, self._record, layout.contacts_offset + i * layout.contact_bytes) for i in range(count)]
 
     def __repr__(self):
         return f"<tick {self.tick}: {self.state}>"
 
 
 class State:
-    """Reads the ticks. The daemon knows nothing of readers: one that is slow misses ticks, and is told how many.
-    Client.open_state() makes one; an object serves one thread."""
+    """Reads the ticks. The daemon does not wait for readers: a slow reader misses ticks, and `missed` counts them.
+    Client.open_state() creates the object. Each thread needs its own object."""
 
-    def __init__(self, layout, descriptor, is_there=lambda: True, ask_names=lambda: {}):
+    def __init__(self, layout, descriptor, is_connected=lambda: True, request_names=lambda: {}):
         try:
             self._layout = _Layout(layout)
-            self._names = _Names(layout, ask_names)
+            self._names = _Names(layout, request_names)
             seals = fcntl.fcntl(descriptor, _F_GET_SEALS)
             if not seals & _F_SEAL_SHRINK or os.fstat(descriptor).st_size < self._layout.bytes:
                 raise ProtocolError("the state's memory is not sealed, or too small")
             self._memory = mmap.mmap(descriptor, self._layout.bytes, mmap.MAP_SHARED, mmap.PROT_READ)
         finally:
             os.close(descriptor)
-        self._words = memoryview(self._memory).cast("Q")  # a word is read at once, not byte by byte
+        self._words = memoryview(self._memory).cast("Q")  # reads a word with one load, not byte by byte
         self._in_order = threading.Lock()
-        self._is_there = is_there
+        self._is_connected = is_connected
         self._next = self._written()
-        self.missed = 0  # ticks that were overwritten before they were taken
+        self.missed = 0  # ticks that the daemon overwrote before next() read them
 
     def close(self):
         self._words.release()
@@ -224,20 +224,20 @@ class State:
 
     @property
     def rate_Hz(self):
-        """Of the servo loop, as configured."""
+        """Configured rate of the servo loop."""
         return self._layout.rate_Hz
 
     @property
-    def behind(self):
-        """Ticks that were written and not taken yet."""
+    def unread(self):
+        """Number of ticks that next() has not read yet."""
         return self._written() - self._next
 
     def describe(self):
-        """What a tick has: {name: (unit, meaning)}."""
+        """Returns the fields of a tick: {name: (unit, meaning)}."""
         return {field.name: (field.unit, field.doc) for field in self._layout.fields.values()}
 
     def latest(self):
-        """The newest tick, whatever was taken before. None where there was none at all."""
+        """Returns the newest tick, independent of next(). None if there is no tick yet."""
         while True:
             written = self._written()
             if written == 0:
@@ -247,13 +247,13 @@ class State:
                 return Tick(self._layout, self._names, record)
 
     def next(self, timeout_s=1.0):
-        """Waits for the tick after the last one taken. None where none came in time. One that was overrun goes on
-        with newer ones, and `missed` grows. Raises Gone where the daemon is gone."""
+        """Waits for the next tick. Returns None if none came in time. If the daemon has overwritten ticks, continues
+        with newer ones, and `missed` grows. Raises Disconnected if the daemon is gone."""
         record = self._next_record(timeout_s)
         return None if record is None else Tick(self._layout, self._names, record)
 
     def ticks(self, count=None):
-        """The next ticks one after the other: so many, or until the daemon is gone, which raises Gone."""
+        """Yields the next `count` ticks; without `count`, until the daemon is gone, which raises Disconnected."""
         taken = 0
         while count is None or taken < count:
             tick = self.next()
@@ -262,7 +262,7 @@ class State:
                 yield tick
 
     def array(self, count):
-        """The next `count` ticks as a numpy structured array, a column a field: array["F_out"] is count x 6."""
+        """Returns the next `count` ticks as a numpy structured array with one column per field: array["F_out"] is count x 6."""
         import numpy
 
         out = numpy.empty(count, self._layout.dtype())
@@ -290,22 +290,22 @@ class State:
 
     def _next_record(self, timeout_s):
         end = time.monotonic() + timeout_s
-        look_around = time.monotonic() + _LOOK_AROUND_S
+        next_check = time.monotonic() + _CONNECTION_CHECK_S
         while True:
             while self._written() > self._next:
                 record = self._copy(self._next)
                 if record is not None:
                     self._next += 1
                     return record
-                # Overrun: goes on in the middle of what is there, so as not to be overrun again at once.
-                left_out = self._written() - self._next - self._layout.slots // 2
-                self.missed += max(left_out, 0)
-                self._next += max(left_out, 0)
+                # Overrun: continues in the middle of the available ticks, so that the next overrun is not immediate.
+                skipped = self._written() - self._next - self._layout.slots // 2
+                self.missed += max(skipped, 0)
+                self._next += max(skipped, 0)
             now = time.monotonic()
             if now >= end:
                 return None
-            if now >= look_around:
-                look_around = now + _LOOK_AROUND_S
-                if not self._is_there() and self._written() == self._next:
-                    raise Gone("the daemon is gone; connect again when it is back")
+            if now >= next_check:
+                next_check = now + _CONNECTION_CHECK_S
+                if not self._is_connected() and self._written() == self._next:
+                    raise Disconnected("the daemon is gone; connect again when wrenchd is running")
             time.sleep(0.25 / self._layout.rate_Hz)

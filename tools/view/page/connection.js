@@ -1,34 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The WebSocket to wrenchctl view: what comes in is handed on by its type, and a lost connection is tried again.
+// The WebSocket to wrenchctl view: passes messages to handlers by their type, and reconnects after a loss.
 
 const KIND_MESH = 1;
 const KIND_HISTORY = 2;
-const KIND_COARSE = 3;
+const KIND_SIMPLIFIED = 3;
 
-/** A mesh: its number, corners with normals, which of them are triangles, and lines; metres. */
+/** Decodes a mesh: its number, vertices with normals, triangle indices, and lines; lengths in metres. */
 function meshOf(buffer) {
-  const [kind, number, corners, triangles, points] = new Uint32Array(buffer, 0, 5);
-  const floats = 20, indices = floats + 24 * corners, lines = indices + 12 * triangles;
+  const [kind, number, vertices, triangles, points] = new Uint32Array(buffer, 0, 5);
+  const floats = 20, indices = floats + 24 * vertices, lines = indices + 12 * triangles;
   return {
     number,
-    coarse: kind === KIND_COARSE,
-    positions: new Float32Array(buffer, floats, 3 * corners),
-    normals: new Float32Array(buffer, floats + 12 * corners, 3 * corners),
+    simplified: kind === KIND_SIMPLIFIED,
+    positions: new Float32Array(buffer, floats, 3 * vertices),
+    normals: new Float32Array(buffer, floats + 12 * vertices, 3 * vertices),
     triangles: new Uint32Array(buffer, indices, 3 * triangles),
     lines: new Float32Array(buffer, lines, 3 * points),
   };
 }
 
-/** Stretches of time: rows of [time, least and greatest of each channel]. */
+/** Decodes history buckets: rows of [time, minimum and maximum of each channel]. */
 function historyOf(buffer) {
-  const [, anew, rows, width] = new Uint32Array(buffer, 0, 4);
-  return { anew: anew === 1, rows, width, numbers: new Float64Array(buffer, 16, rows * width) };
+  const [, reset, rows, width] = new Uint32Array(buffer, 0, 4);
+  return { reset: reset === 1, rows, width, numbers: new Float64Array(buffer, 16, rows * width) };
 }
 
 export class Connection {
-  /** hear: an object of functions by the type of the message; mesh, history, lost. */
-  constructor(hear) {
-    this.hear = hear;
+  /** handlers: functions by message type, and mesh, history, lost. */
+  constructor(handlers) {
+    this.handlers = handlers;
     this.open();
   }
 
@@ -39,7 +39,7 @@ export class Connection {
     this.socket.binaryType = "arraybuffer";
     this.socket.onmessage = (event) => this.take(event.data);
     this.socket.onclose = () => {
-      this.hear.lost();
+      this.handlers.lost();
       setTimeout(() => this.open(), 1000);
     };
   }
@@ -47,15 +47,15 @@ export class Connection {
   take(data) {
     if (typeof data !== "string") {
       const kind = new Uint32Array(data, 0, 1)[0];
-      if (kind === KIND_MESH || kind === KIND_COARSE) this.hear.mesh(meshOf(data));
-      if (kind === KIND_HISTORY) this.hear.history(historyOf(data));
+      if (kind === KIND_MESH || kind === KIND_SIMPLIFIED) this.handlers.mesh(meshOf(data));
+      if (kind === KIND_HISTORY) this.handlers.history(historyOf(data));
       return;
     }
     const message = JSON.parse(data);
-    this.hear[message.type]?.(message);
+    this.handlers[message.type]?.(message);
   }
 
-  say(type, more = {}) {
+  send(type, more = {}) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ type, ...more }));
   }
 }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page of wrenchctl view: what comes in is shown, what is pressed is said.
+// The page of wrenchctl view: shows incoming messages and sends the requests of the user.
 import { Connection } from "./connection.js";
 import { History, Plots } from "./plots.js";
 import { World } from "./world.js";
 
 const $ = (id) => document.getElementById(id);
 const root = document.documentElement;
-const PLOTS_EVERY_MS = 50;
-const ALIVE_EVERY_MS = 100;
-const DRAWN_WITHIN_MS = 2000;
+const PLOT_INTERVAL_MS = 50;
+const HEARTBEAT_INTERVAL_MS = 100;
+const DRAW_TIMEOUT_MS = 2000;
 const STATES = { gone: "connection lost" };
 const ARMED = ["waiting", "ramping", "active", "degraded"];
 
@@ -25,13 +25,13 @@ let rate_Hz = 0;
 let lastFault = null;
 let times = null;
 let connected = false;
-let given = 0;
+let sceneTriangles = 0;
 
 const set = (id, text) => {
   const element = $(id);
   if (element.textContent !== text) element.textContent = text;
 };
-/** The daemon's tables have no capitals and no full stops. */
+/** Makes a sentence of a table text, which has no capital and no full stop. */
 const sentence = (text) => (text === "" ? "" : text[0].toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : "."));
 const fixed = (x, digits) => (x === null || x === undefined ? "–" : x.toFixed(digits));
 const length3 = ([x, y, z]) => Math.hypot(x, y, z);
@@ -39,7 +39,7 @@ const ago = (s) => (s < 100 ? `${s.toFixed(0)} s` : s < 6000 ? `${(s / 60).toFix
 const running = (tick) => (rate_Hz > 0 ? `running for ${ago(tick / rate_Hz)}` : "–");
 const readable = (name) => name.replaceAll("_", " ");
 
-// --- what is shown ---
+// --- display ---
 
 function showState(state) {
   const chip = $("state");
@@ -55,47 +55,47 @@ function showFrame(now) {
   set("angle", now.angle_rad === null ? "–" : fixed((180 / Math.PI) * now.angle_rad, 2));
   set("energy", now.energy === null ? "–" : fixed(1e6 * now.energy, 3));
   set("authority", fixed(100 * now.authority, 0));
-  set("contacts", String(now.contacts));
+  set("contacts", String(now.contact_count));
   set("time", mode === "recording" ? `${now.t.toFixed(3)} s` : running(now.tick));
-  set("tick", String(now.tick) + (now.missed ? `, ${now.missed} not seen` : ""));
-  set("placing", readable(now.placing));
-  set("limits", now.limits === "" ? "nothing" : now.limits);
-  showTouches(now.touches);
-  $("untold").hidden = now.touches.length > 0 || now.contacts === 0;
+  set("tick", String(now.tick) + (now.missed ? `, ${now.missed} missed` : ""));
+  set("proxy-initialization", readable(now.proxy_initialization));
+  set("limits", now.limits === "" ? "none" : now.limits);
+  showContacts(now.contacts);
+  $("no-contact-list").hidden = now.contacts.length > 0 || now.contact_count === 0;
   if (mode === "recording" || connected) showState(now.state);
   showCause(now);
   if (mode === "recording") showPlayer(now);
 }
 
-function showTouches(touches) {
-  const body = $("touches").tBodies[0];
-  while (body.rows.length > touches.length) body.deleteRow(-1);
-  while (body.rows.length < touches.length) {
+function showContacts(contacts) {
+  const body = $("contacts-held").tBodies[0];
+  while (body.rows.length > contacts.length) body.deleteRow(-1);
+  while (body.rows.length < contacts.length) {
     const row = body.insertRow();
     for (let i = 0; i < 4; ++i) row.insertCell();
     const meter = document.createElement("meter");
     meter.max = 1;
     row.cells[0].append(meter, document.createElement("span"));
   }
-  touches.forEach(({ share, obstacle, tool, on }, i) => {
+  contacts.forEach(({ load_fraction, obstacle, tool, on }, i) => {
     const [cell, ...others] = body.rows[i].cells;
-    cell.firstChild.value = share ?? 0;
-    cell.lastChild.textContent = ` ${fixed(100 * (share ?? 0), 0)} %`;
+    cell.firstChild.value = load_fraction ?? 0;
+    cell.lastChild.textContent = ` ${fixed(100 * (load_fraction ?? 0), 0)} %`;
     [obstacle, tool, on].forEach((text, k) => {
       if (others[k].textContent !== text) others[k].textContent = text;
     });
   });
 }
 
-function showBanner(level, what, sentence, cure) {
+function showBanner(level, title, message, remedy) {
   $("banner").hidden = false;
   $("banner").dataset.level = level;
-  set("banner-what", what);
-  set("banner-sentence", sentence);
-  set("banner-cure", cure);
+  set("banner-title", title);
+  set("banner-message", message);
+  set("banner-remedy", remedy);
 }
 
-/** The fault that the loop stands in, or none. */
+/** Shows the present cause of a fault or stop, if any. */
 function showCause(now) {
   if (mode === "live" && !connected) return;
   const cause = now.cause;
@@ -106,16 +106,16 @@ function showCause(now) {
     const known = faults[cause] ?? link?.status?.cause ?? { sentence: "", cure: "" };
     const stopped = now.state === "stopped";
     const cure = sentence(known.cure) + (stopped && mode === "live" && !/cknowledge/.test(known.cure) ? " Then acknowledge." : "");
-    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.sentence), cure);
+    showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.message), cure);
   }
   if (mode === "live" && cause !== "none" && bad && lastFault?.cause !== cause) lastFault = { cause, t: now.t };
   if (mode === "recording") lastFault = lastFaultAt(now.t);
   if (lastFault) {
     const known = faults[lastFault.cause];
     const when = mode === "recording" ? `at ${lastFault.t.toFixed(2)} s` : `${ago(Math.max(now.t - lastFault.t, 0))} ago`;
-    set("last-fault", `${readable(lastFault.cause)}, ${when}` + (known ? `: ${known.sentence}; ${known.cure}` : ""));
+    set("last-fault", `${readable(lastFault.cause)}, ${when}` + (known ? `: ${known.message}; ${known.cure}` : ""));
   } else {
-    set("last-fault", mode === "recording" ? "none until now" : "none seen");
+    set("last-fault", mode === "recording" ? "none until now" : "none");
   }
 }
 
@@ -123,19 +123,19 @@ function showLink() {
   connected = link.connected;
   if (!connected) {
     showState("gone");
-    showBanner("bad", "No connection to wrenchd", link.why, frame ? "What is shown is the last that was heard." : "");
+    showBanner("bad", "No connection to wrenchd", link.error, frame ? "The page shows the last received data." : "");
     set("about", "");
   }
-  showButtons();  // now, and not with the next picture
+  showButtons();  // immediately, not with the next frame
   const status = link.status;
   if (!status) return;
-  const percent = status.limits.authority < 1 ? `, ${Math.round(100 * status.limits.authority)} % of them: no watchdog` : "";
+  const percent = status.limits.authority < 1 ? `, ${Math.round(100 * status.limits.authority)} % applied, because the device has no watchdog` : "";
   set("about", `${status.scene.file.split("/").pop().replace(/\.toml$/, "").replaceAll("_", " ")} · ` +
     `${status.device.profile}${status.device.simulated ? ", simulated" : ""} · ${status.rates.rate_Hz} Hz`);
   $("about").title = status.scene.file;
-  set("most", `${status.limits.max_force_N} N, ${status.limits.max_torque_Nm} N·m${percent}`);
-  set("armed-by", status.armed_by ?? "nobody");
-  set("device", status.device.present ? "present" : "not there");
+  set("force-limits", `${status.limits.max_force_N} N, ${status.limits.max_torque_Nm} N·m${percent}`);
+  set("armed-by", status.armed_by ?? "–");
+  set("device", status.device.present ? "present" : "absent");
 }
 
 function showButtons() {
@@ -148,15 +148,15 @@ function showButtons() {
 
 function showTimes() {
   const line = ({ p50_us, p99_9_us, max_us }) => `p50 ${p50_us.toFixed(0)} · p99.9 ${p99_9_us.toFixed(0)} · max ${max_us.toFixed(0)} us`;
-  set("times-took", line(times.took));
-  set("times-late", line(times.late));
+  set("times-duration", line(times.tick_duration));
+  set("times-late", line(times.wake_latency));
   plots.drawTimes(times, rate_Hz > 0 ? 1e6 / rate_Hz : 0);
 }
 
-function showGiven() {
-  if (given === 0) return;
+function showTriangleCount() {
+  if (sceneTriangles === 0) return;
   const shown = world.triangles();
-  set("note", shown < given ? `${given.toLocaleString("en")} triangles, drawn with ${shown.toLocaleString("en")}` : "");
+  set("note", shown < sceneTriangles ? `${sceneTriangles.toLocaleString("en")} triangles, drawn with ${shown.toLocaleString("en")}` : "");
 }
 
 let toastEnds = 0;
@@ -166,7 +166,7 @@ function toast(text) {
   toastEnds = performance.now() + 6000;
 }
 
-// --- a recording is played ---
+// --- playback of a recording ---
 
 const player = { duration: 0, t: 0, playing: false, asked: false, changes: [] };
 
@@ -193,17 +193,17 @@ function showPlayer() {
   if (document.activeElement !== $("scrub") || player.playing) $("scrub").value = player.t;
 }
 
-/** One moment is asked for at a time: a slow machine shows fewer, and never lags behind. */
+/** Requests one frame at a time, so that a slow machine skips frames and shows no delay. */
 function seek(t) {
   player.t = Math.min(Math.max(t, 0), player.duration);
   player.stale = true;
 }
 
-function askMoment() {
+function requestFrame() {
   if (player.asked || !player.stale) return;
   player.asked = true;
   player.stale = false;
-  connection.say("at", { t: player.t });
+  connection.send("at", { t: player.t });
 }
 
 function play(on) {
@@ -212,7 +212,7 @@ function play(on) {
   showPlayer();
 }
 
-// --- what comes in ---
+// --- incoming messages ---
 
 const connection = new Connection({
   hello(hello) {
@@ -238,15 +238,15 @@ const connection = new Connection({
   mesh: (mesh) => world.mesh(mesh),
   scene(scene) {
     world.show(scene);
-    given = scene.meshes.reduce((all, { triangles }) => all + triangles, 0);
+    sceneTriangles = scene.meshes.reduce((all, { triangles }) => all + triangles, 0);
     $("note").className = "";
-    showGiven();
+    showTriangleCount();
     if (frame) world.take(frame);
   },
-  no_scene({ why }) {
-    given = 0;
-    $("note").className = why === "" ? "" : "problem";
-    set("note", why === "" ? "" : `The scene cannot be shown: ${why}`);
+  no_scene({ error }) {
+    sceneTriangles = 0;
+    $("note").className = error === "" ? "" : "problem";
+    set("note", error === "" ? "" : `The scene cannot be shown: ${error}`);
   },
   history: (message) => history.add(message),
   frame(now) {
@@ -260,29 +260,29 @@ const connection = new Connection({
     showTimes();
   },
   event({ event }) {
-    if (event.name === "refused" || event.name === "reload") toast(event.text);
+    if (event.name === "arming_refused" || event.name === "reload") toast(event.text);
     if (event.name === "fault" && event.fault) lastFault = { cause: event.fault.name, t: 1e-9 * event.time_ns };
   },
-  told({ what, done, text }) {
-    if (!done && text !== "") toast(what === "lease" ? text : `${what}: ${text}`);
+  reply({ request, accepted, error }) {
+    if (!accepted && error !== "") toast(request === "lease" ? error : `${request}: ${error}`);
   },
   lost() {
     connected = false;
     player.asked = false;
     showState("gone");
-    showBanner("bad", "No connection to wrenchctl view", "The program that serves this page has ended, or does not answer.",
-      "Start wrenchctl view again and open the address that it prints. What is shown is the last that was heard.");
+    showBanner("bad", "No connection to wrenchctl view", "The program that serves this page has ended or does not respond.",
+      "Start wrenchctl view again and open the address that it prints. The page shows the last received data.");
     showButtons();
   },
 });
 
-// --- what is pressed ---
+// --- buttons and keys ---
 
-const wish = (what) => mode === "live" && connection.say(what);
-$("arm").onclick = () => wish("arm");
-$("disarm").onclick = () => wish("disarm");
-$("acknowledge").onclick = () => wish("acknowledge");
-$("stop").onclick = () => wish("stop");
+const request = (name) => mode === "live" && connection.send(name);
+$("arm").onclick = () => request("arm");
+$("disarm").onclick = () => request("disarm");
+$("acknowledge").onclick = () => request("acknowledge");
+$("stop").onclick = () => request("stop");
 $("fit").onclick = () => world.fit(frame?.p);
 $("help").onclick = () => $("keys").showModal();
 $("play").onclick = () => play(!player.playing);
@@ -298,7 +298,7 @@ function theme(name) {
   set("theme", `Theme: ${name}`);
   try {
     localStorage.setItem("theme", name);
-  } catch { /* a browser that keeps nothing */ }
+  } catch { /* the browser has no storage */ }
   world.recolour();
   plots.recolour();
 }
@@ -321,14 +321,14 @@ const common = {
   "?": () => ($("keys").open ? $("keys").close() : $("keys").showModal()),
 };
 const keys = {
-  live: { " ": () => wish("stop"), Escape: () => wish("stop"), a: () => !$("arm").disabled && wish("arm"),
-    d: () => wish("disarm"), k: () => !$("acknowledge").disabled && wish("acknowledge") },
+  live: { " ": () => request("stop"), Escape: () => request("stop"), a: () => !$("arm").disabled && request("arm"),
+    d: () => request("disarm"), k: () => !$("acknowledge").disabled && request("acknowledge") },
   recording: { " ": () => play(!player.playing), ArrowLeft: (e) => seek(player.t - (e.shiftKey ? 1 : 0.1)),
     ArrowRight: (e) => seek(player.t + (e.shiftKey ? 1 : 0.1)), ",": () => seek(player.t - 1 / rate_Hz),
     ".": () => seek(player.t + 1 / rate_Hz), Home: () => seek(0), End: () => seek(player.duration) },
   none: {},
 };
-// Before anything else hears of it: a stop is a stop wherever the focus is.
+// In the capture phase, so that the stop key works independent of the focus.
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -352,15 +352,15 @@ function draw(now) {
       seek(player.t + (Number($("speed").value) * (now - before)) / 1000);
       if (player.t >= player.duration) play(false);
     }
-    askMoment();
+    requestFrame();
   }
   before = now;
   drawnAt = now;
   if (frame) showFrame(frame);
   showButtons();
   world.draw(now);
-  showGiven();
-  if (now - plotted > PLOTS_EVERY_MS + 4 * (world.slow_ms ?? 0) && frame) {
+  showTriangleCount();
+  if (now - plotted > PLOT_INTERVAL_MS + 4 * (world.slow_ms ?? 0) && frame) {
     plotted = now;
     plots.draw(history, frame.t);
   }
@@ -371,13 +371,13 @@ function draw(now) {
 }
 requestAnimationFrame(draw);
 
-// A page says that it lives while it is drawn, however slowly, and can be seen.
+// The page sends heartbeats while it is visible and drawn.
 setInterval(() => {
-  const seen = document.visibilityState === "visible" && performance.now() - drawnAt < DRAWN_WITHIN_MS;
-  if (mode === "live" && seen) connection.say("alive");
-}, ALIVE_EVERY_MS);
+  const visible = document.visibilityState === "visible" && performance.now() - drawnAt < DRAW_TIMEOUT_MS;
+  if (mode === "live" && visible) connection.send("heartbeat");
+}, HEARTBEAT_INTERVAL_MS);
 
-/** For tests, and for the curious at the console. */
+/** Access for tests and for the browser console. */
 window.view = {
   frame: () => frame,
   page: () => page,

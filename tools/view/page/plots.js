@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Curves over the last ten seconds, and the histogram of what ticks take.
+// Plots of the last ten seconds, and the histogram of tick durations.
 import uPlot from "uplot";
 
 const SPAN_S = 10;
@@ -7,7 +7,7 @@ const CHANNELS = ["force_x", "force_y", "force_z", "force", "torque_x", "torque_
 
 export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-/** What was sent of the last ten seconds: two points a stretch, its least and its greatest value. */
+/** The received history of the last ten seconds: two points per bucket, its minimum and its maximum. */
 export class History {
   constructor() {
     this.clear();
@@ -18,16 +18,16 @@ export class History {
     this.values = CHANNELS.map(() => []);
   }
 
-  add({ anew, rows, width, numbers }) {
-    if (anew) this.clear();
+  add({ reset, rows, width, numbers }) {
+    if (reset) this.clear();
     for (let i = 0; i < rows; ++i) {
       const row = numbers.subarray(i * width, (i + 1) * width);
       const before = this.times.length > 0 ? this.times[this.times.length - 1] : row[0];
-      if (row[0] - before > 0.1) this.push(before + 0.001, () => null);  // nothing was told in between
+      if (row[0] - before > 0.1) this.push(before + 0.001, () => null);  // a gap in the data
       this.push(row[0], (k) => row[1 + 2 * k]);
       this.push(row[0] + 0.005, (k) => row[2 + 2 * k]);
     }
-    this.forget();
+    this.dropOld();
   }
 
   push(time, value) {
@@ -38,7 +38,7 @@ export class History {
     });
   }
 
-  forget() {
+  dropOld() {
     const oldest = this.times[this.times.length - 1] - SPAN_S;
     const first = this.times.findIndex((t) => t >= oldest);
     if (first < 500) return;
@@ -46,7 +46,7 @@ export class History {
     for (const values of this.values) values.splice(0, first);
   }
 
-  /** Times before `now`, and the channels by name, each times its factor. */
+  /** Returns the times relative to `now`, and the named channels multiplied by their factors. */
   columns(now, wanted) {
     return [
       this.times.map((t) => t - now),
@@ -56,9 +56,9 @@ export class History {
   }
 }
 
-/** A range that never shrinks below `least`, so that noise in free space does not look like force. */
-const range = (least) => (u, low, high) => {
-  const from = Math.min(low ?? 0, 0), to = Math.max(high ?? 0, least);
+/** Returns a range with a minimum height, so that noise in free space does not look like force. */
+const range = (minimum) => (u, low, high) => {
+  const from = Math.min(low ?? 0, 0), to = Math.max(high ?? 0, minimum);
   const room = 0.06 * (to - from);
   return [from < 0 ? from - room : 0, to + room];
 };
@@ -90,7 +90,7 @@ const COLOURS = { x: "--x", y: "--y", z: "--z", all: "--ink" };
 
 class Curve {
   /** series: [{label, channel, factor, colour}] */
-  constructor(id, series, least) {
+  constructor(id, series, minimum) {
     this.box = document.getElementById(id);
     this.wanted = series.map(({ channel, factor }) => [channel, factor]);
     legend(this.box, series);
@@ -99,7 +99,7 @@ class Curve {
       legend: { show: false },
       cursor: { show: false },
       padding: [6, 16, 0, 0],
-      scales: { x: { time: false, range: () => [-SPAN_S, 0] }, y: { range: range(least) } },
+      scales: { x: { time: false, range: () => [-SPAN_S, 0] }, y: { range: range(minimum) } },
       axes: [axis({ size: 20, gap: 5, values: (u, at) => at.map((t) => (t === 0 ? "now" : `${t} s`)) }), axis({ size: 44, gap: 3 })],
       series: [{}, ...series.map(({ label, colour }) => ({
         label, width: colour === "all" ? 1.6 : 1.2, stroke: () => css(COLOURS[colour]), points: { show: false },
@@ -112,7 +112,7 @@ class Curve {
   }
 }
 
-/** Bins equally wide in the logarithm, from a microsecond on; as many as the server sends, 12 a decade. */
+/** Histogram with logarithmic bins from 1 us, 12 per decade. */
 class Times {
   constructor(id) {
     this.box = document.getElementById(id);
@@ -153,10 +153,10 @@ class Times {
     u.ctx.restore();
   }
 
-  draw({ took, late }, deadline_us) {
+  draw({ tick_duration, wake_latency }, deadline_us) {
     this.deadline_us = deadline_us;
-    const height = (count) => Math.log10(1 + count);  // a single late tick is to be seen beside ten thousand
-    this.plot.setData([took.bins.map((_, i) => i), took.bins.map(height), late.bins.map(height)]);
+    const height = (count) => Math.log10(1 + count);  // a single late tick stays visible beside ten thousand others
+    this.plot.setData([tick_duration.bins.map((_, i) => i), tick_duration.bins.map(height), wake_latency.bins.map(height)]);
   }
 }
 
@@ -164,16 +164,16 @@ export class Plots {
   constructor() {
     const xyz = (name, factor) => ["x", "y", "z"].map((a) => ({ label: a, channel: `${name}_${a}`, factor, colour: a }));
     this.curves = [
-      new Curve("plot-force", [...xyz("force", 1), { label: "all", channel: "force", factor: 1, colour: "all" }], 1),
-      new Curve("plot-torque", [...xyz("torque", 1e3), { label: "all", channel: "torque", factor: 1e3, colour: "all" }], 10),
+      new Curve("plot-force", [...xyz("force", 1), { label: "norm", channel: "force", factor: 1, colour: "all" }], 1),
+      new Curve("plot-torque", [...xyz("torque", 1e3), { label: "norm", channel: "torque", factor: 1e3, colour: "all" }], 10),
       new Curve("plot-depth", [{ label: "mm", channel: "depth", factor: 1e3, colour: "all" },
                                { label: "°", channel: "angle", factor: 180 / Math.PI, colour: "z" }], 0.5),
       new Curve("plot-energy", [{ label: "T", channel: "energy", factor: 1e6, colour: "all" }], 0.05),
     ];
     this.times = new Times("plot-times");
     this.all = [...this.curves, this.times];
-    const watch = new ResizeObserver(() => this.all.forEach(({ plot, box }) => plot.setSize(sizeOf(box))));
-    this.all.forEach(({ box }) => watch.observe(box));
+    const observer = new ResizeObserver(() => this.all.forEach(({ plot, box }) => plot.setSize(sizeOf(box))));
+    this.all.forEach(({ box }) => observer.observe(box));
   }
 
   draw(history, now) {

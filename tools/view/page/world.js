@@ -6,31 +6,31 @@ import { css } from "./plots.js";
 
 const colour = (name) => new THREE.Color(css(name));
 
-/** A pose as records have it: x y z [m], qx qy qz qw. */
+/** Sets the pose of an object: x y z [m], qx qy qz qw. */
 function place(object, pose) {
   object.position.set(pose[0], pose[1], pose[2]);
   object.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
 }
 
-/** Of faces in one plane the lower number is seen; edges lie before all of them. */
+/** Offset for coplanar faces: faces with a lower number are drawn in front, edges in front of all faces. */
 const behind = (steps) => ({ polygonOffset: true, polygonOffsetFactor: steps, polygonOffsetUnits: steps });
 
-/** 1, 2 or 5 times a power of ten, just below x. */
+/** Returns the largest 1, 2 or 5 times a power of ten that does not exceed x. */
 function round125(x) {
   const decade = 10 ** Math.floor(Math.log10(x));
   return decade * (x / decade >= 5 ? 5 : x / decade >= 2 ? 2 : 1);
 }
 
 /**
- * A machine is slow when its frames usually take longer than this: the mean over some, for they are drawn elsewhere, and
- * only every other is waited for. What has not moved for a while is at rest.
+ * A machine counts as slow if the mean frame time exceeds SLOW_MS. The mean is necessary because the graphics processor
+ * draws asynchronously. The scene counts as static if nothing has moved for AT_REST_MS.
  */
 const SLOW_MS = 60, OVER_FRAMES = 8, AT_REST_MS = 400;
-const MOST_MS = 150;  // the first frames wait for shaders everywhere
+const MOST_MS = 150;  // clamps the first frames, which compile shaders
 
 const UP = new THREE.Vector3(0, 1, 0);
 
-/** An arrow of any length and thickness, along +Y before it is turned. */
+/** An arrow of any length and thickness, along +Y before its rotation. */
 class Arrow extends THREE.Group {
   constructor(material) {
     super();
@@ -40,7 +40,7 @@ class Arrow extends THREE.Group {
     this.renderOrder = 3;
   }
 
-  /** from, along: Vector3; along's length is the arrow's [m]. */
+  /** from, along: Vector3; the length of `along` is the arrow's length [m]. */
   point(from, along, thickness) {
     const length = along.length();
     this.visible = length > 1.5 * thickness;
@@ -54,14 +54,14 @@ class Arrow extends THREE.Group {
   }
 }
 
-/** Three quarters of a turn about an axis, with a head: a torque. */
+/** An arc of 270 degrees about an axis with an arrow head, which shows a torque. */
 class Turn extends THREE.Group {
   constructor(material) {
     super();
     const arc = 1.5 * Math.PI;
     this.ring = new THREE.Mesh(new THREE.TorusGeometry(1, 0.05, 10, 48, arc), material);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(0.16, 0.42, 20), material);
-    this.head.position.set(0, -1, 0);  // at the end of the arc; there it goes towards +X
+    this.head.position.set(0, -1, 0);  // at the end of the arc, pointing along +X
     this.head.rotation.z = -Math.PI / 2;
     this.add(this.ring, this.head);
   }
@@ -144,9 +144,9 @@ export class World {
     this.changed = true;
   }
 
-  /** A mesh of the scene that comes next. */
-  mesh({ number, coarse, positions, normals, triangles, lines }) {
-    if (number === 0 && !coarse) this.meshes.clear();
+  /** Stores a mesh of the scene message that follows. */
+  mesh({ number, simplified, positions, normals, triangles, lines }) {
+    if (number === 0 && !simplified) this.meshes.clear();
     const surface = new THREE.BufferGeometry();
     surface.setAttribute("position", new THREE.BufferAttribute(positions, 3));
     surface.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
@@ -154,27 +154,27 @@ export class World {
     surface.computeBoundingSphere();
     const edges = new THREE.BufferGeometry();
     edges.setAttribute("position", new THREE.BufferAttribute(lines, 3));
-    if (coarse) this.meshes.get(number).coarse = { surface, edges };
+    if (simplified) this.meshes.get(number).simplified = { surface, edges };
     else this.meshes.set(number, { surface, edges });
   }
 
-  /** Whether bodies are drawn with few triangles, where there are such. */
-  drawCoarsely(coarse) {
-    if (coarse === this.coarse) return;
-    this.coarse = coarse;
+  /** Selects the simplified meshes, where available. */
+  drawSimplified(simplified) {
+    if (simplified === this.simplified) return;
+    this.simplified = simplified;
     for (const body of this.bodies.children) {
       const mesh = this.meshes.get(body.userData.mesh);
-      if (!mesh?.coarse) continue;
-      const { surface, edges } = coarse ? mesh.coarse : mesh;
+      if (!mesh?.simplified) continue;
+      const { surface, edges } = simplified ? mesh.simplified : mesh;
       body.children[0].geometry = surface;
       body.children[1].geometry = edges;
     }
   }
 
-  /** Of all meshes, each once, as they are drawn now. */
+  /** Returns the number of triangles of all meshes, each counted once, at the present level of detail. */
   triangles() {
     let all = 0;
-    for (const mesh of this.meshes.values()) all += ((this.coarse && mesh.coarse) || mesh).surface.index.count / 3;
+    for (const mesh of this.meshes.values()) all += ((this.simplified && mesh.simplified) || mesh).surface.index.count / 3;
     return all;
   }
 
@@ -186,12 +186,12 @@ export class World {
     return body;
   }
 
-  /** Which mesh is whose. */
+  /** Builds tool and obstacles from their meshes. */
   show({ tool, obstacles, view }) {
     const elsewhere = JSON.stringify(view) !== JSON.stringify(this.view);
     this.view = view;
-    this.coarse = false;
-    this.told = (this.told ?? 0) + 1;
+    this.simplified = false;
+    this.sceneCount = (this.sceneCount ?? 0) + 1;
     this.bodies.clear();
     const radius = this.meshes.get(tool.mesh).surface.boundingSphere.radius;
     this.size = radius;
@@ -206,12 +206,12 @@ export class World {
       this.bodies.add(body);
       return body;
     });
-    // Who has turned the scene keeps his place when something in it changes.
+    // Keeps a camera that the user has moved when the scene changes.
     if (elsewhere || !this.touched) this.fitted = false;
     this.changed = true;
   }
 
-  /** A patch of the border of a half-space, with a grid that gives a measure. */
+  /** Returns a patch of the surface of a half-space with a grid as a scale. */
   plane({ normal, offset_m }) {
     const size = Math.max(6 * this.size, 0.1), step = round125(size / 8);
     const half = Math.ceil(size / step) * step;
@@ -228,7 +228,7 @@ export class World {
     return body;
   }
 
-  /** One moment. */
+  /** Shows one frame. */
   take(frame) {
     this.changed = true;
     if (this.tool) {
@@ -238,13 +238,13 @@ export class World {
       if (frame.q !== null) place(this.tool, frame.q);
     }
     for (const [number, pose] of frame.moved) if (this.obstacles[number]) place(this.obstacles[number], pose);
-    this.touch(frame.touches);
+    this.showContacts(frame.contacts);
     this.push(frame.wrench);
     if (!this.fitted && this.tool) this.fit(frame.p);
   }
 
-  touch(touches) {
-    while (this.contacts.length < touches.length) {
+  showContacts(contacts) {
+    while (this.contacts.length < contacts.length) {
       const point = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), this.materials.contact);
       const normal = new Arrow(this.materials.contact);
       point.renderOrder = normal.renderOrder = 3;
@@ -252,16 +252,16 @@ export class World {
       this.contacts.push({ point, normal });
     }
     this.contacts.forEach(({ point, normal }, i) => {
-      point.visible = normal.visible = i < touches.length;
-      if (i >= touches.length) return;
-      const { p, n, share } = touches[i];
+      point.visible = normal.visible = i < contacts.length;
+      if (i >= contacts.length) return;
+      const { p, n, load_fraction } = contacts[i];
       point.position.set(...p);
-      point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(share ?? 0)));
-      normal.point(point.position, new THREE.Vector3(...n).multiplyScalar(this.size * (0.15 + 1.1 * (share ?? 0))), 0.014 * this.size);
+      point.scale.setScalar(this.size * (0.025 + 0.035 * Math.sqrt(load_fraction ?? 0)));
+      normal.point(point.position, new THREE.Vector3(...n).multiplyScalar(this.size * (0.15 + 1.1 * (load_fraction ?? 0))), 0.014 * this.size);
     });
   }
 
-  /** 3 N are as long as the tool is large; a torque of 0.1 N.m has its radius. */
+  /** Draws the wrench: the arrow of 3 N has twice the tool radius; the arc of 0.1 N.m has about the tool radius. */
   push({ at, force, torque }) {
     const from = new THREE.Vector3(...at), f = new THREE.Vector3(...force), m = new THREE.Vector3(...torque);
     this.force.point(from, f.multiplyScalar((2 * this.size) / 3), 0.03 * this.size);
@@ -270,7 +270,7 @@ export class World {
     this.torque.about(from, strength > 0 ? m.divideScalar(strength) : UP, radius);
   }
 
-  /** Looks at the tool with its surroundings, from above and to the side. */
+  /** Moves the camera so that the tool and the obstacles around it are visible, from above and from the side. */
   fit(p) {
     const target = p ? new THREE.Vector3(p[0], p[1], p[2]) : this.ghost ? this.ghost.position.clone() : new THREE.Vector3();
     const box = new THREE.Box3();
@@ -283,12 +283,12 @@ export class World {
     }
     box.expandByPoint(target.clone().addScalar(1.2 * this.size)).expandByPoint(target.clone().addScalar(-1.2 * this.size));
     const sphere = box.getBoundingSphere(new THREE.Sphere());
-    const radius = Math.min(sphere.radius, 12 * this.size);  // a floor of ten metres is no reason to lose the tool
+    const radius = Math.min(sphere.radius, 12 * this.size);  // keeps the tool visible in large scenes
     const centre = radius < sphere.radius ? target : sphere.center;
     const distance = (0.95 * radius) / Math.sin((this.camera.fov * Math.PI) / 360);
     const aside = new THREE.Vector3(-0.62, -0.78, 0.55).normalize();
     this.camera.position.copy(centre).addScaledVector(aside, distance);
-    if (this.view) {  // whoever made the scene knows from where it is seen best
+    if (this.view) {  // the scene defines its own viewpoint
       this.camera.position.set(...this.view.eye_m);
       centre.set(...this.view.target_m);
     }
@@ -313,29 +313,29 @@ export class World {
   }
 
   /**
-   * A frame that took long is followed by as long a pause: where software draws, others have work to do. Where all
-   * take long, bodies are drawn coarsely while something moves.
+   * Draws a frame. A pause as long as the frame time follows a slow frame, to leave processor time to other programs. If
+   * most frames are slow, moving scenes are drawn with simplified meshes.
    */
   draw(now) {
     if (this.drawnAt !== undefined) {
       const took = now - this.drawnAt;
       this.slow_ms = took > 40 ? Math.min(took, 1000) : 0;
       this.rested = now + this.slow_ms;
-      if (!this.coarse) this.usual_ms = (this.usual_ms ?? 0) + (Math.min(took, MOST_MS) - (this.usual_ms ?? 0)) / OVER_FRAMES;
+      if (!this.simplified) this.usual_ms = (this.usual_ms ?? 0) + (Math.min(took, MOST_MS) - (this.usual_ms ?? 0)) / OVER_FRAMES;
       this.slow = this.slow || this.usual_ms > SLOW_MS;
       this.drawnAt = undefined;
     }
     if (this.changed) this.changedAt = now;
-    const atRest = this.coarse && now - this.changedAt > AT_REST_MS;
+    const atRest = this.simplified && now - this.changedAt > AT_REST_MS;
     if ((!this.changed && !atRest) || now < (this.rested ?? 0)) return;
-    this.drawCoarsely(this.slow === true && !atRest);
+    this.drawSimplified(this.slow === true && !atRest);
     this.changed = false;
     this.drawnAt = now;
     this.renderer.render(this.scene, this.camera);
     this.drawn = (this.drawn ?? 0) + 1;
   }
 
-  /** What stands where, for whoever wants to check it. */
+  /** Returns the drawn poses and camera, for tests. */
   inspect() {
     const pose = (body) => (body?.visible ? [...body.position.toArray(), ...body.quaternion.toArray()] : null);
     return {
@@ -344,8 +344,8 @@ export class World {
       obstacles: this.obstacles.map(pose),
       contacts: this.contacts.filter(({ point }) => point.visible).map(({ point }) => point.position.toArray()),
       force: this.force.visible ? new THREE.Vector3(0, 1, 0).applyQuaternion(this.force.quaternion).toArray() : null,
-      told: this.told,
-      coarse: this.coarse === true,
+      sceneCount: this.sceneCount,
+      simplified: this.simplified === true,
       eye: this.camera.position.toArray(),
       target: this.controls.target.toArray(),
       triangles: this.renderer.info.render.triangles,

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "collision/meshes/ply_reader.hpp"
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "collision/meshes/mesh_source.hpp"
-
-// PLY: a header that declares elements and their properties, then the values, as text or binary.
+// A PLY file has a header that declares elements with their properties, and then the values, as text or
+// binary.
 
 namespace wrenchd {
 namespace {
@@ -39,7 +44,7 @@ constexpr std::array<PlyTypeName, 16> kTypes = {{{"char", PlyType::int8},
 struct PlyProperty {
   std::string name;
   PlyType type = PlyType::float32;
-  std::optional<PlyType> size;  ///< of a list: type of its length
+  std::optional<PlyType> length_type;  ///< type of a list's length; empty: no list
 };
 
 struct PlyElement {
@@ -49,12 +54,12 @@ struct PlyElement {
 };
 
 struct PlyHeader {
-  bool text = true;
-  bool swapped = false;  ///< bytes in another order than this machine's
+  bool is_text = true;
+  bool is_swapped = false;  ///< the byte order differs from that of this machine
   std::vector<PlyElement> elements;
 };
 
-bool whole(PlyType type) {
+bool is_integer(PlyType type) {
   return type != PlyType::float32 && type != PlyType::float64;
 }
 
@@ -102,8 +107,8 @@ void read_format(const MeshSource& source, std::size_t line, const std::vector<s
     source.reject(
         line,
         "expected 'format ascii 1.0', 'binary_little_endian' or 'binary_big_endian'; export the mesh again");
-  header.text = format == "ascii";
-  header.swapped = little != (std::endian::native == std::endian::little);
+  header.is_text = format == "ascii";
+  header.is_swapped = little != (std::endian::native == std::endian::little);
 }
 
 void read_element(const MeshSource& source, std::size_t line, const std::vector<std::string_view>& words,
@@ -122,8 +127,8 @@ void read_property(const MeshSource& source, std::size_t line, const std::vector
         "expected 'property TYPE NAME' or 'property list TYPE TYPE NAME' below an element; export the "
         "mesh again");
   PlyProperty property{std::string(words.back()), type_of(source, line, words[words.size() - 2]), {}};
-  if (list) property.size = type_of(source, line, words[2]);
-  if (list && !whole(*property.size))
+  if (list) property.length_type = type_of(source, line, words[2]);
+  if (list && !is_integer(*property.length_type))
     source.reject(line,
                   "the length of a list cannot be a " + std::string(words[2]) + "; export the mesh again");
   header.elements.back().properties.push_back(property);
@@ -157,15 +162,14 @@ const PlyProperty* find(const PlyElement& element, std::string_view name) {
   return found == element.properties.end() ? nullptr : &*found;
 }
 
-/// CGAL takes a property of these names for a colour where one of them is an uchar, and then trusts that all
-/// are.
-void require_colours_alike(const MeshSource& source, const PlyElement& element) {
+/// Rejects colours whose components differ in type, because no exporter means them.
+void require_equal_colour_types(const MeshSource& source, const PlyElement& element) {
   const PlyProperty* first = nullptr;
   for (const char* name : {"red", "green", "blue", "r", "g", "b"}) {
     const PlyProperty* colour = find(element, name);
     if (colour == nullptr) continue;
     if (first == nullptr) first = colour;
-    if (colour->type != first->type || colour->size || first->size)
+    if (colour->type != first->type || colour->length_type || first->length_type)
       source.reject(
           0, "the colours of element '" + element.name + "' differ in type; save the mesh without colours");
   }
@@ -174,63 +178,85 @@ void require_colours_alike(const MeshSource& source, const PlyElement& element) 
 void require_vertices(const MeshSource& source, const PlyElement& element) {
   for (const char* name : {"x", "y", "z"}) {
     const PlyProperty* property = find(element, name);
-    if (property == nullptr || property->size || whole(property->type))
+    if (property == nullptr || property->length_type || is_integer(property->type))
       source.reject(0, std::string("element 'vertex' needs a property '") + name +
                            "' of type float or double; save the mesh with such coordinates");
   }
 }
 
-void require_faces(const MeshSource& source, const PlyElement& element) {
+/// Returns the list of a face's corners; null if there is none of a supported type.
+const PlyProperty* corner_list(const PlyElement& element) {
   for (const char* name : {"vertex_indices", "vertex_index"}) {
     const PlyProperty* property = find(element, name);
-    if (property != nullptr && property->size &&
+    if (property != nullptr && property->length_type &&
         (property->type == PlyType::int32 || property->type == PlyType::uint32))
-      return;
+      return property;
   }
-  source.reject(
-      0, "element 'face' needs a property list 'vertex_indices' of type int or uint; save the mesh so");
+  return nullptr;
+}
+
+void require_faces(const MeshSource& source, const PlyElement& element) {
+  if (corner_list(element) == nullptr)
+    source.reject(
+        0, "element 'face' needs a property list 'vertex_indices' of type int or uint; save the mesh so");
+}
+
+bool is_vertex(const PlyElement& element) {
+  return element.name == "vertex" || element.name == "vertices";
+}
+
+bool is_face(const PlyElement& element) {
+  return element.name == "face" || element.name == "faces";
 }
 
 void check_elements(const MeshSource& source, const PlyHeader& header) {
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty())
       source.reject(0, "element " + quote_word(element.name) + " has no properties; export the mesh again");
-    require_colours_alike(source, element);
-    if (element.name == "vertex" || element.name == "vertices") require_vertices(source, element);
-    if (element.name == "face" || element.name == "faces") require_faces(source, element);
+    require_equal_colour_types(source, element);
+    if (is_vertex(element)) require_vertices(source, element);
+    if (is_face(element)) require_faces(source, element);
     if (element.name == "halfedge")
-      source.reject(0, "holds half-edges; save the mesh with vertices and faces only");
+      source.reject(0, "contains half-edges; save the mesh with vertices and faces only");
   }
 }
 
-/// Walks the values behind the header.
-class Values {
+/// Reads the values behind the header.
+class ValueReader {
  public:
-  Values(std::string_view rest, const PlyHeader& header)
-      : rest_(rest), text_(header.text), swapped_(header.swapped) {}
+  ValueReader(std::string_view rest, const PlyHeader& header)
+      : rest_(rest), is_text_(header.is_text), is_swapped_(header.is_swapped) {}
 
-  /// The next value; nothing where the file ends, or where it is no number of that type.
-  std::optional<double> next(PlyType type) { return text_ ? next_word(type) : next_bytes(type); }
-
-  /// True when a property was there whole.
-  bool pass(const PlyProperty& property) {
-    if (!property.size) return next(property.type).has_value();
-    const auto length = next(*property.size);
-    if (!length || *length < 0.0 || *length > static_cast<double>(rest_.size())) return false;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(*length); ++i)
-      if (!next(property.type)) return false;
+  /// Reads a property: one value, or the values of a list. Returns false if the file ends, or if a value is
+  /// no number of the declared type.
+  bool read(const PlyProperty& property, std::vector<double>& values) {
+    values.clear();
+    std::size_t length = 1;
+    if (property.length_type) {
+      const auto declared = next(*property.length_type);
+      if (!declared || *declared < 0.0 || *declared > static_cast<double>(rest_.size())) return false;
+      length = static_cast<std::size_t>(*declared);
+    }
+    for (std::size_t i = 0; i < length; ++i) {
+      const auto value = next(property.type);
+      if (!value) return false;
+      values.push_back(*value);
+    }
     return true;
   }
 
   bool at_end() const { return rest_.find_first_not_of(" \t\r\n") == std::string_view::npos; }
 
  private:
+  std::optional<double> next(PlyType type) { return is_text_ ? next_word(type) : next_bytes(type); }
+
   std::optional<double> next_word(PlyType type) {
     rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
     const std::string_view word = rest_.substr(0, rest_.find_first_of(" \t\r\n"));
     rest_.remove_prefix(word.size());
+    if (type == PlyType::float32) return parse_single(word);
+    if (is_integer(type) && !parse_integer(word)) return {};
     std::optional<double> x = parse_number(word);
-    if (whole(type) && !parse_integer(word)) x.reset();
     if (x && !with_type(type, [&](auto t) { return fits<decltype(t)>(*x); })) x.reset();
     return x;
   }
@@ -240,7 +266,7 @@ class Values {
       if (rest_.size() < sizeof t) return {};
       std::array<char, sizeof t> bytes;
       std::memcpy(bytes.data(), rest_.data(), sizeof t);
-      if (swapped_) std::reverse(bytes.begin(), bytes.end());
+      if (is_swapped_) std::reverse(bytes.begin(), bytes.end());
       std::memcpy(&t, bytes.data(), sizeof t);
       rest_.remove_prefix(sizeof t);
       return static_cast<double>(t);
@@ -248,32 +274,69 @@ class Values {
   }
 
   std::string_view rest_;
-  bool text_;
-  bool swapped_;
+  bool is_text_;
+  bool is_swapped_;
 };
+
+/// The properties that a mesh needs, by their position in the element; empty for other elements.
+struct UsedProperties {
+  std::optional<std::size_t> x, y, z;
+  std::optional<std::size_t> corners;
+};
+
+std::optional<std::size_t> position_of(const PlyElement& element, const PlyProperty* property) {
+  if (property == nullptr) return {};
+  return static_cast<std::size_t>(property - element.properties.data());
+}
+
+UsedProperties used_properties(const PlyElement& element) {
+  UsedProperties used;
+  if (is_vertex(element)) {
+    used.x = position_of(element, find(element, "x"));
+    used.y = position_of(element, find(element, "y"));
+    used.z = position_of(element, find(element, "z"));
+  }
+  if (is_face(element)) used.corners = position_of(element, corner_list(element));
+  return used;
+}
+
+/// Reads one item of an element into the soup.
+void read_item(const MeshSource& source, const PlyElement& element, const UsedProperties& used,
+               std::size_t number, ValueReader& reader, std::vector<double>& values, PolygonSoup& soup) {
+  Vector3d p = Vector3d::Zero();
+  for (std::size_t k = 0; k < element.properties.size(); ++k) {
+    if (!reader.read(element.properties[k], values))
+      source.reject(0, element.name + " " + std::to_string(number) + " of " + std::to_string(element.count) +
+                           " is truncated, or its '" + element.properties[k].name +
+                           "' is no number of the declared type; export the mesh again");
+    if (k == used.x) p.x() = values[0];
+    if (k == used.y) p.y() = values[0];
+    if (k == used.z) p.z() = values[0];
+    if (k != used.corners) continue;
+    std::vector<std::size_t>& face = soup.faces.emplace_back();
+    face.reserve(values.size());
+    // A negative index wraps around, as in every other format; the mesh check reports it.
+    for (const double v : values) face.push_back(static_cast<std::size_t>(static_cast<std::int64_t>(v)));
+  }
+  if (used.x) soup.vertices.push_back(p);
+}
 
 }  // namespace
 
-std::string normalise_ply(MeshSource source) {
+PolygonSoup read_ply(const MeshSource& source) {
   LineReader lines(source.bytes);
   const PlyHeader header = read_header(source, lines);
   check_elements(source, header);
-  Values values(lines.rest(), header);
+  ValueReader reader(lines.rest(), header);
+  PolygonSoup soup;
+  std::vector<double> values;
   for (const PlyElement& element : header.elements) {
-    for (std::size_t i = 0; i < element.count; ++i) {
-      for (const PlyProperty& property : element.properties) {
-        if (values.pass(property)) continue;
-        source.reject(0, element.name + " " + std::to_string(i) + " of " + std::to_string(element.count) +
-                             " is cut short, or its '" + property.name +
-                             "' is no number of the type declared; export the mesh again");
-      }
-    }
+    const UsedProperties used = used_properties(element);
+    for (std::size_t i = 0; i < element.count; ++i) read_item(source, element, used, i, reader, values, soup);
   }
-  if (!values.at_end())
-    source.reject(0, "goes on behind the elements that its header counts; correct the counts");
-  const auto header_end = source.bytes.end() - static_cast<std::ptrdiff_t>(lines.rest().size());
-  source.bytes.erase(std::remove(source.bytes.begin(), header_end, '\r'), header_end);
-  return std::move(source.bytes);
+  if (!reader.at_end())
+    source.reject(0, "continues behind the elements that its header declares; correct the counts");
+  return soup;
 }
 
 }  // namespace wrenchd

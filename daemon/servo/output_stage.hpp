@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "core/limits.hpp"
+#include "core/thermal.hpp"
+#include "daemon/servo/authority.hpp"
+#include "daemon/servo/contact_stabilizer.hpp"
+#include "daemon/servo/renderer.hpp"
+#include "daemon/servo/tick_clock.hpp"
+
+namespace wrenchd {
+
+/// Turns the demand into a wrench that may go out: passive, within magnitude, slew, power and heat. All
+/// members but the constructor are RT-safe.
+class OutputStage {
+ public:
+  /// guard: of the first rendering. Not RT-safe: copies the profile's limits.
+  OutputStage(const LimitSettings& settings, const DeviceProfile& profile, const PassivityGuard& guard);
+
+  /// Replaces the passivity guard, after the delay of the loop was measured anew.
+  void set_guard(const PassivityGuard& guard) noexcept { stabilizer_.set_guard(guard); }
+  /// Changes the limits. While the loop is armed, values looser than those that hold are ignored. Returns the
+  /// limits that hold from now on, the profile's included.
+  LimitSettings set_limits(const LimitSettings& limits, bool armed) noexcept;
+
+  /// The contact wrench without the energy that nobody put into it. state: that the supervisor expects for
+  /// this tick.
+  Stabilized stabilize(const Demand& demand, const DeviceSample& sample, State state) noexcept;
+  /// The motors gave more than they can give continuously: their ceiling is lowered.
+  bool overheated() const noexcept { return heat_.folded_back(); }
+  /// The wrench to send: the stabilized wrench and the weight compensation, scaled by the authority, within
+  /// every limit.
+  Limited limit(const Stabilized& contact, const Demand& demand, const Authority& authority,
+                const DeviceSample& sample, const TickTime& t) noexcept;
+  /// The next wrench grows from zero.
+  void reset() noexcept { limits_.reset(); }
+
+  double max_force_N() const noexcept { return limits_.max_force_N(); }
+  double max_torque_Nm() const noexcept { return limits_.max_torque_Nm(); }
+  /// How fast one wrench may fade into another.
+  RenderingCrossfade::FadeLimits fade_limits() const noexcept {
+    return {max_force_N(), max_torque_Nm(), settings_.soft_start_s};
+  }
+  const ContactStabilizer& stabilizer() const noexcept { return stabilizer_; }
+
+ private:
+  const DeviceProfile& profile_;
+  LimitSettings settings_;
+  WrenchLimits limits_;
+  ThermalModel heat_;
+  ContactStabilizer stabilizer_;
+  Twist V_BH_;                          ///< Last finite twist of the handle.
+  Vector3d p_BH_m_ = Vector3d::Zero();  ///< Last finite position of the handle point.
+};
+
+}  // namespace wrenchd

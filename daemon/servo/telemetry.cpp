@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "daemon/servo/telemetry.hpp"
+
+#include <limits>
+
+namespace wrenchd {
+namespace {
+
+constexpr double kNotSet = std::numeric_limits<double>::quiet_NaN();
+
+std::array<double, 7> numbers(const Pose& X) noexcept {
+  const auto& [q, p] = X;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+std::array<double, 6> numbers(const Vector3d& a, const Vector3d& b) noexcept {
+  return {a.x(), a.y(), a.z(), b.x(), b.y(), b.z()};
+}
+
+std::int64_t nanoseconds(TimePoint t) noexcept {
+  return t.time_since_epoch().count();
+}
+
+void record_sample(const DeviceReading& reading, TickRecord& record) noexcept {
+  const DeviceSample& sample = reading.sample;
+  record.last_command_sent = reading.last_command_sent;
+  record.arrived_ns = nanoseconds(sample.arrived);
+  record.device_time_s = sample.device_time_s;
+  record.sequence = sample.sequence;
+  record.acknowledged_command = sample.acknowledged;
+  record.superseded = sample.superseded;
+  record.missing = sample.missing;
+  record.rejected = sample.rejected;
+  record.repeated = sample.repeated;
+  record.buttons = sample.buttons;
+  record.fresh = sample.fresh ? 1 : 0;
+  record.motors_on = sample.motors_on ? 1 : 0;
+  record.watchdog_tripped = sample.watchdog_tripped ? 1 : 0;
+  record.homed = sample.homed ? 1 : 0;
+  record.sample_fault = static_cast<std::uint8_t>(sample.fault);
+  record.X_BH = numbers(sample.X_BH);
+  record.V_BH = numbers(sample.V_BH.linear_m_per_s, sample.V_BH.angular_rad_per_s);
+}
+
+void record_contact(const ContactState& contact, TickRecord& record) noexcept {
+  record.X_WP = numbers(contact.X_WP);
+  record.X_WQ.fill(kNotSet);
+  if (contact.proxy_valid) record.X_WQ = numbers(contact.X_WQ);
+  record.eps.fill(kNotSet);
+  record.energy = record.kkt_residual = kNotSet;
+  if (contact.following()) {
+    record.eps = numbers(contact.eps.head<3>(), contact.eps.tail<3>());
+    record.energy = contact.energy;
+    record.kkt_residual = contact.kkt_residual;
+  }
+  record.contacts = contact.contacts;
+  record.iterations = contact.iterations;
+  record.projection_status = static_cast<std::uint8_t>(contact.status);
+  record.proxy_initialization = static_cast<std::uint8_t>(contact.initialization);
+  record.rendering_id = contact.rendering_id;
+  record.rendering_checksum = contact.rendering_checksum;
+}
+
+void record_demand(const Demand& demand, TickRecord& record) noexcept {
+  record_contact(demand.contact, record);
+  record.F_T = numbers(demand.F_T.force_N, demand.F_T.torque_Nm);
+  record.next_rendering_weight = demand.next_rendering_weight;
+  record.contact_gain = demand.contact_gain;
+  record.undriven_dofs = demand.undriven;
+}
+
+void record_state(const Supervisor& supervisor, TickRecord& record) noexcept {
+  record.state = static_cast<std::uint8_t>(supervisor.state());
+  record.state_cause = static_cast<std::uint8_t>(supervisor.cause());
+  record.faults = supervisor.faults();
+}
+
+void record_output(const TickResult& tick, TickRecord& record) noexcept {
+  const PassivityGuard& guard = tick.stabilizer.guard();
+  record.authority = tick.authority.scale;
+  record.stiffness_scale = tick.stabilizer.oscillation_gain() * tick.stiffness_scale.spring;
+  record.passivity_scale = guard.scale();
+  record.energy_in_J = guard.energy_in_J();
+  record.energy_out_J = guard.energy_out_J();
+  record.injected_J = guard.injected_J();
+  record.limit_causes = tick.limit_causes;
+  record.F_out = numbers(tick.written.F.force_N, tick.written.F.torque_Nm);
+  record.motors_commanded = tick.written.sent && tick.written.motors_on ? 1 : 0;
+  record.write_fault = static_cast<std::uint8_t>(tick.written.result);
+  record.released = tick.released ? 1 : 0;
+}
+
+TickRecord make_record(const TickResult& tick, const Supervisor& supervisor) noexcept {
+  TickRecord record;
+  record.tick = tick.time.tick;
+  record.now_ns = nanoseconds(tick.time.now);
+  record.wake_latency_ns = tick.time.wake_latency.count();
+  record.suspended_ns = tick.time.suspended.count();
+  record.wrench_ready_ns = nanoseconds(tick.wrench_ready);
+  record.stage_ns = tick.stage_ns;
+  record.commands = tick.commands;
+  record.change_count = tick.change_count;
+  record_sample(tick.reading, record);
+  record_demand(tick.demand, record);
+  record_state(supervisor, record);
+  record_output(tick, record);
+  return record;
+}
+
+}  // namespace
+
+void Telemetry::publish(const TickResult& tick, const Supervisor& supervisor,
+                        const Rendering& rendering) noexcept {
+  record_ = make_record(tick, supervisor);
+  emit_changes(supervisor, tick.demand, tick.time.now);
+  if (tick.released) events_.emit(tick.time.now, Event::Released{});
+  const ContactState& contact = tick.demand.contact;
+  if (tick.demand.sample_usable) handle_pose_.write({contact.X_WH, tick.time.scene_time_s, tick.time.now});
+  show(rendering, contact.crossfading);
+}
+
+void Telemetry::publish_release(TimePoint now, const Supervisor& supervisor, const Demand& demand,
+                                const Rendering& rendering) noexcept {
+  record_.commands = static_cast<CommandSet>(record_.commands | kReleasedExternally);
+  record_.released = 1;
+  record_.motors_commanded = 0;
+  record_.authority = 0.0;
+  record_.limit_causes = kNotLimited;
+  record_.F_out = {};
+  record_demand(demand, record_);
+  record_state(supervisor, record_);
+  emit_changes(supervisor, demand, now);
+  events_.emit(now, Event::Released{});
+  show(rendering, demand.contact.crossfading);
+}
+
+void Telemetry::show(const Rendering& rendering, bool crossfading) noexcept {
+  state_.store(static_cast<State>(record_.state), std::memory_order_relaxed);
+  cause_.store(static_cast<Fault>(record_.state_cause), std::memory_order_relaxed);
+  rendering_id_.store(record_.rendering_id, std::memory_order_relaxed);
+  crossfading_.store(crossfading, std::memory_order_relaxed);
+  latest_record_.write(record_);
+  if (shared_state_ != nullptr) shared_state_->write(record_, rendering.contacts());
+}
+
+void Telemetry::emit_changes(const Supervisor& supervisor, const Demand& demand, TimePoint now) noexcept {
+  if (supervisor.state() != reported_state_)
+    events_.emit(now, Event::StateChanged{supervisor.state(), supervisor.cause()});
+  reported_state_ = supervisor.state();
+  if (demand.proxy_invalidated) reported_search_failed_ = false;
+  emit_proxy_changes(demand.contact, now);
+}
+
+/// Each change once: the search starts, it ends, it fails, the projection is infeasible.
+void Telemetry::emit_proxy_changes(const ContactState& contact, TimePoint now) noexcept {
+  if (contact.proxy_valid && !reported_proxy_valid_)
+    events_.emit(now, Event::ProxyFound{(contact.X_WQ.translation_m - contact.X_WP.translation_m).norm()});
+  if (!contact.proxy_valid && reported_proxy_valid_) events_.emit(now, Event::ProxySearchStarted{});
+  reported_proxy_valid_ = contact.proxy_valid;
+  const bool failed = contact.initialization == ProxyInitialization::failed;
+  if (failed && !reported_search_failed_) events_.emit(now, Event::ProxySearchFailed{});
+  reported_search_failed_ = reported_search_failed_ || failed;
+  if (!contact.following()) return;
+  if (contact.infeasible() && reported_status_ != ProjectionStatus::infeasible)
+    events_.emit(now, Event::ProjectionInfeasible{});
+  reported_status_ = contact.status;
+}
+
+void Telemetry::count_times(const TickTime& time, const StageTimes& stage_ns, Duration elapsed) noexcept {
+  for (std::size_t i = 0; i < kStageCount; ++i) timing_.stage[i].add(Duration(stage_ns[i]));
+  timing_.wake_latency.add(time.wake_latency);
+  timing_.tick.add(elapsed);
+}
+
+void Telemetry::count_overrun(std::uint64_t skipped_ticks) noexcept {
+  timing_.overruns.fetch_add(1, std::memory_order_relaxed);
+  timing_.skipped_ticks.fetch_add(skipped_ticks, std::memory_order_relaxed);
+}
+
+}  // namespace wrenchd

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <cstdio>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
+
+#include "collision/meshes/make_mesh.hpp"
+#include "collision/meshes/mesh_check.hpp"
+#include "collision/meshes/mesh_file.hpp"
+#include "collision/meshes/mesh_loader.hpp"
+#include "collision/meshes/mesh_repair.hpp"
+#include "collision/meshes/mesh_size.hpp"
+#include "collision/meshes/mesh_source.hpp"
+#include "collision/tool_body.hpp"
+#include "core/inertia.hpp"
+#include "daemon/option_checks.hpp"
+#include "tools/commands/subcommand.hpp"
+#include "tools/output_file.hpp"
+
+namespace wrenchd {
+namespace {
+
+void print_row(const char* label, const Vector3d& v, const char* unit) {
+  std::printf("%-18s %.9g %.9g %.9g %s\n", label, v.x(), v.y(), v.z(), unit);
+}
+
+PolygonSoup read_soup(const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  MeshSource source = read_mesh_source(file);
+  const std::size_t size = source.bytes.size();
+  if (size >= MeshLoader::kLargeMeshBytes)
+    print_note(name + ": reading " + with_thousands_separators(size / 1'000'000) + " MB");
+  PolygonSoup soup = parse_mesh(std::move(source));
+  if (soup.faces.size() >= MeshLoader::kLargeMeshTriangles)
+    print_note(name + ": " + with_thousands_separators(soup.faces.size()) + " faces, checking");
+  return soup;
+}
+
+void print_solid(TriangleMesh mesh, const std::filesystem::path& file, double scale) {
+  const auto implausible = implausible_size(mesh, scale, kPlausibleToolSize);
+  for (Vector3d& p : mesh.vertices_m) p *= scale;
+  const SolidProperties solid = solid_properties(mesh, 1.0);
+  require_usable(solid, file, scale);
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : mesh.vertices_m) box.extend(p);
+  const Matrix3d& H = solid.inertia.H_kg_m2;
+  std::printf("%-18s %zu\n", "triangles", mesh.triangles.size());
+  print_row("size", box.sizes(), "m");
+  if (implausible) std::printf("%-18s as a tool, %s\n", "remark", implausible->c_str());
+  std::printf("%-18s %.9g m^3\n", "volume", solid.volume_m3);
+  print_row("centre of mass", solid.p_MT_m, "m");
+  print_row("inertia xx yy zz", H.diagonal(), "m^2 (per kg, uniform solid, about the centre of mass)");
+  print_row("inertia xy xz yz", {H(0, 1), H(0, 2), H(1, 2)}, "m^2");
+}
+
+class MeshCommand final : public Subcommand {
+ public:
+  void add_to(CLI::App& app) override {
+    CLI::App* mesh = app.add_subcommand("mesh",
+                                        "Show volume, inertia, repairs and defects of a mesh, or generate a\n"
+                                        "mesh for experiments");
+    auto* file = mesh->add_option("file", file_, "OFF, OBJ, STL or PLY file")->check(not_empty());
+    mesh->add_option("--scale", scale_, "metres per mesh unit")
+        ->check(number_in_range(1e-9, 1e6))
+        ->capture_default_str();
+    std::vector<std::string> kinds;
+    std::string list = "Kinds of generated meshes:\n";
+    for (const auto& [name, description] : mesh_kinds()) {
+      kinds.push_back(name);
+      list += "  " + name + std::string(10 - name.size(), ' ') + description + '\n';
+    }
+    auto* make = mesh->add_option("--make", generated_.kind, "generate a solid of this kind, in metres")
+                     ->check(CLI::IsMember(kinds))
+                     ->excludes(file);
+    mesh->add_option("--triangles", generated_.triangles, "approximate number of triangles")
+        ->check(CLI::Range(GeneratedMesh::kMinTriangles, GeneratedMesh::kMaxTriangles))
+        ->needs(make)
+        ->capture_default_str();
+    mesh->add_option("--seed", generated_.seed, "seed of the random shape of bumpy meshes")
+        ->needs(make)
+        ->capture_default_str();
+    mesh->add_option("-o,--output", output_, "OFF file to write; - writes standard output")
+        ->check(not_empty())
+        ->needs(make)
+        ->capture_default_str();
+    mesh->footer(list);
+    mesh->callback([this] { exit_code_ = run(); });
+  }
+
+ private:
+  int run() {
+    if (generated_.kind.empty()) return describe();
+    std::ostringstream text;
+    write_off(text, make_mesh(generated_));
+    write_output(output_, text.str());
+    return kExitDone;
+  }
+
+  int describe() {
+    if (file_.empty()) throw CLI::RequiredError("mesh: a file, or --make KIND,");
+    PolygonSoup soup = read_soup(file_);
+    std::printf("%-18s %zu\n%-18s %zu\n", "vertices", soup.vertices.size(), "faces", soup.faces.size());
+    TriangleMesh mesh;
+    const MeshReport report = repair_and_check_solid(soup, &mesh);
+    for (const std::string& repair : report.repairs) std::printf("%-18s %s\n", "repaired", repair.c_str());
+    std::printf("%-18s %s\n%-18s %s\n", "closed", report.closed ? "yes" : "no", "consistent",
+                report.consistent ? "yes" : "no");
+    if (!report.solid()) {
+      print_note(rejection_text(file_, soup, BodyKind::solid, report));
+      return kExitDefects;
+    }
+    print_solid(std::move(mesh), file_, scale_);
+    return kExitDone;
+  }
+
+  std::filesystem::path file_;
+  double scale_ = 1.0;
+  GeneratedMesh generated_;
+  std::string output_ = "-";
+};
+
+}  // namespace
+
+std::unique_ptr<Subcommand> make_mesh_command() {
+  return std::make_unique<MeshCommand>();
+}
+
+}  // namespace wrenchd
