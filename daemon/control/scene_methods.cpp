@@ -20,7 +20,7 @@ Vector3d vector_of(const Json& params, const char* name, const Vector3d& otherwi
   return {(*found)[0].get<double>(), (*found)[1].get<double>(), (*found)[2].get<double>()};
 }
 
-double parse_number(const Json& params, const char* name, double otherwise) {
+double number_or(const Json& params, const char* name, double otherwise) {
   const auto found = params.find(name);
   return found == params.end() ? otherwise : found->get<double>();
 }
@@ -120,13 +120,13 @@ LocalModel model_of(const Json& params) {
                    "There is no kind '" + kind + "' of local models; there are plane, spring, damping.");
   }
   model.normal_W = vector_of(params, "normal", Vector3d::UnitZ());
-  model.offset_m = parse_number(params, "offset_m", 0.0);
+  model.offset_m = number_or(params, "offset_m", 0.0);
   model.X_WA = {rotation_from(vector_of(params, "rotation_vector_rad", Vector3d::Zero())),
                 vector_of(params, "position_m", Vector3d::Zero())};
-  model.stiffness_N_per_m = parse_number(params, "stiffness_N_per_m", 0.0);
-  model.stiffness_Nm_per_rad = parse_number(params, "stiffness_Nm_per_rad", 0.0);
-  model.damping_N_s_per_m = parse_number(params, "damping_N_s_per_m", 0.0);
-  model.damping_Nm_s_per_rad = parse_number(params, "damping_Nm_s_per_rad", 0.0);
+  model.stiffness_N_per_m = number_or(params, "stiffness_N_per_m", 0.0);
+  model.stiffness_Nm_per_rad = number_or(params, "stiffness_Nm_per_rad", 0.0);
+  model.damping_N_s_per_m = number_or(params, "damping_N_s_per_m", 0.0);
+  model.damping_Nm_s_per_rad = number_or(params, "damping_Nm_s_per_rad", 0.0);
   return model;
 }
 

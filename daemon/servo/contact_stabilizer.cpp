@@ -6,8 +6,8 @@
 namespace wrenchd {
 namespace {
 
-/// An oscillation halves the stiffness. The third one since arming does not come from the stiffness: it is a
-/// fault.
+/// Factor on the wrench for each oscillation. The third oscillation after arming is a fault, because less
+/// stiffness did not help.
 constexpr double kOscillationFactor = 0.5;
 constexpr int kMaxOscillations = 3;
 
@@ -40,7 +40,7 @@ Stabilized ContactStabilizer::stabilize(const Wrench& requested, const DeviceSam
   return out;
 }
 
-/// Work that did not come from the hand may be given to it.
+/// Work on the springs that the hand did not do is credited, so that the loop may return it.
 void ContactStabilizer::credit(const ContactInput& contact) noexcept {
   if (!guard_active_) return;
   guard_.credit(contact.crossfade_work_J);
@@ -48,7 +48,8 @@ void ContactStabilizer::credit(const ContactInput& contact) noexcept {
   guard_.credit(contact.local_model_work_J);
 }
 
-/// Without force, and while it rises, the guard is idle. Arming restores the full stiffness.
+/// The guard is idle without force and during the ramp. State::waiting follows arming, and restores the full
+/// wrench.
 void ContactStabilizer::reset_guard(State state) noexcept {
   guard_.reset();
   guard_active_ = false;

@@ -10,24 +10,25 @@
 
 namespace wrenchd {
 
-/// Detects ticks that come late, a loop that stalls, a clock that runs backwards, and a machine that was
-/// suspended. All members are RT-safe.
+/// Detects late ticks, a stalled loop, a clock that runs backwards, and a machine that was suspended. All
+/// members are RT-safe.
 class PaceWatch {
  public:
-  /// stalled_after: a tick that is later than this is a stalled loop, not a late tick.
+  /// stalled_after: lateness from which a tick counts as a stall of the loop.
   PaceWatch(Duration period, Duration stalled_after) noexcept
       : period_(period), stalled_after_(stalled_after) {}
 
-  /// Faults of a tick that starts at `now`. suspended: how long the machine has been suspended since it was
-  /// switched on.
+  /// Returns the faults of a tick that starts at `now`. suspended: time that the machine has been suspended
+  /// since boot. Call once per tick.
   FaultSet check(TimePoint now, Duration suspended) noexcept;
 
-  /// Time since the previous tick: at least 0, and at most two periods, so that nothing that integrates over
-  /// time jumps after a gap.
+  /// Returns the time since the last tick [s], clamped to 0 ... 2 periods. The clamp keeps integrators and
+  /// ramps from jumping after a gap.
   double dt_s() const noexcept { return dt_s_; }
-  /// How late this tick is; 0 if it is on time.
+  /// Returns how late this tick is; 0 if it is on time.
   Duration lateness() const noexcept { return lateness_; }
-  /// True if a tick was late so recently that old reports are the fault of the loop and not of the device.
+  /// Returns true if a tick was late within the last kStaleSample. Old samples are then no fault of the
+  /// device.
   bool recently_late(TimePoint now) const noexcept {
     return last_late_tick_ && now - *last_late_tick_ <= kStaleSample;
   }
@@ -37,13 +38,13 @@ class PaceWatch {
   Duration stalled_after_;
   std::optional<TimePoint> last_tick_;       ///< Start of the previous tick.
   std::optional<TimePoint> last_late_tick_;  ///< Start of the last tick that was late.
-  Duration suspended_{};                     ///< Time suspended, as of the previous tick.
+  Duration suspended_{};                     ///< Value of `suspended` in the previous tick.
   double dt_s_ = 0.0;
   Duration lateness_{};
 };
 
-/// Watch for the pace of these settings. Without real-time priority a loop may stall for a moment: its ticks
-/// are late then, and nothing more. RT-safe.
+/// Returns the detector for these settings. Without required real-time priority a stall counts as a late tick
+/// only. RT-safe.
 PaceWatch make_pace_watch(const ServoSettings& settings) noexcept;
 
 }  // namespace wrenchd

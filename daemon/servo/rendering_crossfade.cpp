@@ -10,7 +10,7 @@ RenderingCrossfade::Change RenderingCrossfade::update(bool driving) noexcept {
     next_.reset(exchange_.take());
     if (!next_) return Change::none;
     next_weight_ = weight_rate_per_s_ = 0.0;
-    // With the same pose of the handle, so that the tool stays on its side of each wall.
+    // The guess keeps the handle pose of the active proxy, and so the tool on its side of each wall.
     if (active_->proxy_valid())
       next_->initialize_near(active_->X_WQ() * inverse(active_->X_HT()) * next_->X_HT());
     if (driving) return Change::next_arrived;
@@ -20,7 +20,8 @@ RenderingCrossfade::Change RenderingCrossfade::update(bool driving) noexcept {
   return Change::switched;
 }
 
-/// The exchange destroys the retired rendering on another thread.
+/// Retires the outgoing rendering. The building thread destroys it, because the servo thread must not free
+/// memory.
 void RenderingCrossfade::switch_to_next() noexcept {
   exchange_.retire(active_.release());
   active_ = std::move(next_);
@@ -37,13 +38,15 @@ void RenderingCrossfade::compute_wrench(double dt_s) noexcept {
   if (next_) next_->compute_wrench(dt_s);
 }
 
-/// A fade needs a result of the new rendering: its proxy follows, or the search for it has failed.
+/// The fade begins when the next proxy is initialised, or when its search failed. It then continues to its
+/// end.
 bool RenderingCrossfade::fading() const noexcept {
   return next_ &&
          (weight_rate_per_s_ > 0.0 || next_->proxy_initialization() == ProxyInitialization::complete ||
           next_->proxy_initialization() == ProxyInitialization::failed);
 }
 
+/// METHOD (71).
 Wrench RenderingCrossfade::blend(const Wrench& F_active, const Wrench& F_next, const FadeLimits& limits,
                                  double dt_s) noexcept {
   crossfade_work_J_ = 0.0;
@@ -51,13 +54,13 @@ Wrench RenderingCrossfade::blend(const Wrench& F_active, const Wrench& F_next, c
   if (weight_rate_per_s_ == 0.0) {
     const auto fraction = [](double part, double whole) { return whole > 0.0 ? part / whole : 0.0; };
     const Wrench change = F_next - F_active;
-    const double size = std::max(fraction(change.force_N.norm(), limits.max_force_N),
-                                 fraction(change.torque_Nm.norm(), limits.max_torque_Nm));
-    weight_rate_per_s_ = 1.0 / std::max(kMinFade_s, std::min(size, 1.0) * limits.rise_time_s);
+    const double relative_change = std::max(fraction(change.force_N.norm(), limits.max_force_N),
+                                            fraction(change.torque_Nm.norm(), limits.max_torque_Nm));
+    weight_rate_per_s_ = 1.0 / std::max(kMinFade_s, std::min(relative_change, 1.0) * limits.rise_time_s);
   }
-  const double previous = next_weight_;
+  const double last_weight = next_weight_;
   next_weight_ = std::min(next_weight_ + weight_rate_per_s_ * std::max(dt_s, 0.0), 1.0);
-  crossfade_work_J_ = (next_weight_ - previous) * (next_->stored_energy_J() - active_->stored_energy_J());
+  crossfade_work_J_ = (next_weight_ - last_weight) * (next_->stored_energy_J() - active_->stored_energy_J());
   return (1.0 - next_weight_) * F_active + next_weight_ * F_next;
 }
 
@@ -81,10 +84,10 @@ void RenderingCrossfade::reset_law() noexcept {
 }
 
 bool RenderingCrossfade::invalidate_proxy() noexcept {
-  const bool switches = next_ != nullptr;
-  if (switches) switch_to_next();
+  const bool changed = next_ != nullptr;
+  if (changed) switch_to_next();
   active_->invalidate_proxy();
-  return switches;
+  return changed;
 }
 
 }  // namespace wrenchd

@@ -9,65 +9,69 @@
 
 namespace wrenchd {
 
-/// The rendering that the hand feels, and for a moment a second one that replaces it.
+/// Holds the active rendering and, during a change, the next one, and cross-fades the wrench between the two.
 ///
-/// The new rendering searches for its proxy near that of the active one, whose wrench stays on the hand
-/// meanwhile. When both proxies follow the hand, the wrench moves from the first to the second along a
-/// straight line (core/METHOD.md, section 8.6): over kMinFade_s at least, and no faster than force rises
-/// after arming. If the tool fits nowhere in the new scene, the wrench fades to zero in the same way.
+/// The proxy of the next rendering is initialised near the active proxy while the active rendering continues.
+/// When the next proxy is complete, the weight of the next wrench rises linearly from 0 to 1 (METHOD (71)).
+/// If the search finds no feasible pose, the wrench fades to zero. The fade takes at least kMinFade_s and is
+/// no faster than the force rise after arming. daemon/servo/README.md, section "Renderings".
 ///
-/// Belongs to the servo thread. All members but constructor and destructor are RT-safe.
+/// Belongs to the servo thread. All members except constructor and destructor are RT-safe.
 class RenderingCrossfade {
  public:
   static constexpr double kMinFade_s = 0.100;
 
-  /// first: active from the start. exchange: where other threads offer renderings; it outlives this object.
-  /// Not RT-safe: destroys.
+  /// first: active from the start. exchange: where another thread offers renderings; it must outlive this
+  /// object. Not RT-safe: for set-up.
   RenderingCrossfade(std::unique_ptr<Rendering> first, RenderingExchange& exchange)
       : exchange_(exchange), active_(std::move(first)) {}
+  /// Destroys both renderings. Not RT-safe: frees memory.
   ~RenderingCrossfade() = default;
 
-  /// The rendering that the hand feels; during a fade, the one that fades out.
+  /// Returns the active rendering. During a cross-fade this is the outgoing one.
   Rendering& active() noexcept { return *active_; }
   const Rendering& active() const noexcept { return *active_; }
-  /// The rendering that fades in; null if there is none.
+  /// Returns the incoming rendering; null if no change is under way.
   Rendering* next() noexcept { return next_.get(); }
   const Rendering* next() const noexcept { return next_.get(); }
 
   enum class Change : std::uint8_t {
     none,
-    next_arrived,  ///< next() is new; its stiffness must be scaled.
-    switched       ///< active() is what was next() before.
+    next_arrived,  ///< next() is new. The caller must set its stiffness scale.
+    switched       ///< The former next() is now active().
   };
-  /// Takes a rendering that is offered, or ends a fade that is complete. driving: force may be on the hand;
-  /// if not, a new rendering becomes active at once.
+  /// Takes an offered rendering and completes a finished cross-fade. driving: true if force may act on the
+  /// hand; otherwise the change is immediate. Call once per tick, before project().
   Change update(bool driving) noexcept;
 
-  /// Rendering::project() of both renderings. Returns false if one of them lost its proxy.
+  /// Calls Rendering::project() for both renderings. Returns false if either proxy is trapped.
   bool project(const Pose& X_WH, TimePoint now, double scene_time_s) noexcept;
-  /// Rendering::compute_wrench() of both renderings.
+  /// Calls Rendering::compute_wrench() for both renderings.
   void compute_wrench(double dt_s) noexcept;
 
-  /// How fast one wrench may fade into another: a change by a maximum takes rise_time_s.
+  /// Bounds the rate of the cross-fade: a change of max_force_N or max_torque_Nm takes rise_time_s.
   struct FadeLimits {
-    double max_force_N, max_torque_Nm;
+    double max_force_N;
+    double max_torque_Nm;
     double rise_time_s;
   };
-  /// Blend of the wrenches of active() and next(), after one more step of the fade.
+  /// Advances the weight by dt_s and returns (1 - w) F_active + w F_next.
   Wrench blend(const Wrench& F_active, const Wrench& F_next, const FadeLimits& limits, double dt_s) noexcept;
-  /// Weight of next() in the blend, 0 to 1.
+  /// Returns w, the weight of next() in the blend, 0 to 1.
   double next_weight() const noexcept { return next_weight_; }
-  /// Energy that the contact springs hold, blended like the wrenches.
+  /// Returns the weighted sum of the energies stored in the springs [J].
   double stored_energy_J() const noexcept;
-  /// Work that the last step of the fade did on the springs.
+  /// Returns the change of stored energy that the weight change of the last blend() caused [J].
   double crossfade_work_J() const noexcept { return crossfade_work_J_; }
-  /// Work that moving obstacles did on the springs in this tick; negative if they took energy out.
+  /// Returns the weighted sum of the work of moving obstacles in this tick [J].
   double obstacle_work_J() const noexcept;
+  /// Returns true if a rendering with a weight above zero is in contact.
   bool in_contact() const noexcept;
 
-  /// The laws start anew: the time since their last sample is unknown.
+  /// Resets the wrench laws of both renderings, for use after a gap of unknown length.
   void reset_law() noexcept;
-  /// The proxy is unknown and is searched for. next() becomes active at once; returns true if there was one.
+  /// Ends a cross-fade at once, then invalidates the proxy of the active rendering. Returns true if the
+  /// active rendering changed.
   bool invalidate_proxy() noexcept;
 
  private:
@@ -78,8 +82,8 @@ class RenderingCrossfade {
   std::unique_ptr<Rendering> active_;
   std::unique_ptr<Rendering> next_;
   double next_weight_ = 0.0;
-  double weight_rate_per_s_ = 0.0;  ///< Speed of the fade; 0 until it starts.
-  double crossfade_work_J_ = 0.0;   ///< Work that the last step of the fade did on the springs.
+  double weight_rate_per_s_ = 0.0;  ///< Rate of next_weight_; 0 until the cross-fade begins.
+  double crossfade_work_J_ = 0.0;
 };
 
 }  // namespace wrenchd

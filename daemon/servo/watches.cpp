@@ -23,16 +23,16 @@ FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, co
   return faults | check_buttons(sample, state) | client.check(t.now);
 }
 
-/// Which fault of the loop follows from the fault that the device found in its reports.
+/// Maps a fault of the device driver to the fault that counts in this state.
 FaultSet Watches::classify_sample_fault(Fault fault, State state, bool recently_late) const noexcept {
   switch (fault) {
     case Fault::none:
-    case Fault::pose_not_a_rotation:  // PoseWatch::check() raises it after three samples in a row
+    case Fault::pose_not_a_rotation:  // PoseWatch raises it after three such poses in a row
       return 0;
-    case Fault::overspeed:  // a fast handle is harmless while no force is on it
+    case Fault::overspeed:  // a fast handle is harmless while no force acts
       return is_driving(state) ? bit(fault) : 0;
-    // If the loop itself was late, the report queue overflowed and the device was not silent. A device
-    // without motors cannot push: its pose stays where it was, and continues with the next report.
+    // After a late tick the driver's queue may have overflowed, so the sample is old but the device was not
+    // silent. A device without motors is harmless when silent: the pose stays constant.
     case Fault::sample_stale:
       return bit(recently_late || !has_motors ? Fault::sample_late : fault);
     default:

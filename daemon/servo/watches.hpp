@@ -13,10 +13,12 @@
 
 namespace wrenchd {
 
-/// Detectors of faults in the sample, its link, the buttons, the motors and the client. They report faults;
-/// the state machine decides what follows. All members but the constructor are RT-safe.
+/// Fault detectors for the sample, its link, the buttons, the motors and the client. A detector returns the
+/// faults it finds; the state machine decides how the loop reacts. daemon/servo/README.md, section "Fault
+/// detectors". All members except the constructor are RT-safe.
 struct Watches {
-  /// max_force_N, max_torque_Nm: the limits that hold. Not RT-safe: reads the profile.
+  /// max_force_N, max_torque_Nm: limits of the wrench; 0 if the device has no such motors. Not RT-safe: for
+  /// set-up.
   Watches(const DeviceProfile& profile, double max_force_N, double max_torque_Nm);
 
   LinkWatch link;
@@ -24,21 +26,20 @@ struct Watches {
   MotorWatch motors;
   MotorStallWatch motor_stall;
   ClientWatch client;
-  std::uint32_t
-      deadman_button;         ///< Bit of the button that must be held while force is on; 0 if there is none.
-  std::uint32_t stop_button;  ///< Bit of the emergency stop button; 0 if there is none.
-  bool has_motors;            ///< The device takes wrenches.
+  std::uint32_t deadman_button;  ///< Bit of the dead man's button; 0 if the profile names none.
+  std::uint32_t stop_button;     ///< Bit of the stop button; 0 if the profile names none.
+  bool has_motors;               ///< True if the device can output a wrench.
 
-  /// Faults of a sample. driven: the last command switched the motors on.
+  /// Returns the faults of this sample. driven: true if the last command enabled the motors.
   FaultSet check(const DeviceSample& sample, State state, bool driven, const TickTime& t) noexcept;
-  /// Forgets the device: another one may be opened next.
+  /// Resets the link, pose and motor detectors for a newly opened device.
   void reset() noexcept;
 
  private:
   FaultSet classify_sample_fault(Fault fault, State state, bool recently_late) const noexcept;
   FaultSet check_buttons(const DeviceSample& sample, State state) const noexcept;
 
-  bool was_homed_ = false;  ///< The previous sample said that the encoders are homed.
+  bool was_homed_ = false;  ///< True if the last report said that the encoders have their reference.
 };
 
 }  // namespace wrenchd

@@ -23,7 +23,7 @@ bool udev_runs() {
   return std::filesystem::exists("/run/udev/control", ignored);
 }
 
-const char* generated_mesh_name(HotplugMonitor::Source source) {
+const char* source_name(HotplugMonitor::Source source) {
   if (source == HotplugMonitor::Source::automatic)
     source = udev_runs() ? HotplugMonitor::Source::udev : HotplugMonitor::Source::kernel;
   return source == HotplugMonitor::Source::udev ? "udev" : "kernel";
@@ -86,7 +86,7 @@ struct HotplugMonitor::Watch {
 };
 
 HotplugMonitor::HotplugMonitor(Listener listener, Source source)
-    : watch_(std::make_unique<Watch>(std::move(listener), generated_mesh_name(source))),
+    : watch_(std::make_unique<Watch>(std::move(listener), source_name(source))),
       thread_([watch = watch_.get()] { watch->run(); }) {}
 
 HotplugMonitor::~HotplugMonitor() {

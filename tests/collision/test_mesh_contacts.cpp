@@ -20,7 +20,7 @@ Scene two(TriangleMesh tool, TriangleMesh obstacle, Pose X_WO = {}) {
   return Scene(mesh_tool(std::move(tool)), {}, {}, std::move(obstacles));
 }
 
-MeshContacts::SweepResult add_sample(const Scene& scene, const Pose& from, const Pose& to) {
+MeshContacts::SweepResult sweep_between(const Scene& scene, const Pose& from, const Pose& to) {
   MeshContacts contacts(scene);
   contacts.set_start(from);
   VisitBudget budget = {1000000};
@@ -35,7 +35,7 @@ TEST_CASE("a sweep of a cube meets a vertex, a face or an edge first", "[mesh_co
   const Scene scene = two(make_mesh({"cube", 12}), make_mesh({"table", 12}));
   const Vector3d on_corner(0.6, 0.5, 0.0), on_edge(0.785398163, 0.0, 0.0);
   SECTION("a corner on a face") {
-    const auto found = add_sample(scene, at(0, 0, 0.06, on_corner), at(0, 0, 0.04, on_corner));
+    const auto found = sweep_between(scene, at(0, 0, 0.06, on_corner), at(0, 0, 0.04, on_corner));
     REQUIRE(found.complete);
     REQUIRE(found.contacts.size() >= 1);
     CHECK(found.contacts[0].kind == ContactKind::vertex_face);
@@ -45,7 +45,7 @@ TEST_CASE("a sweep of a cube meets a vertex, a face or an edge first", "[mesh_co
   }
   SECTION("an edge over the table's edge") {
     const Vector3d across(0.785398163, 0.0, 0.0);  // the lowest edge runs along x
-    const auto found = add_sample(scene, at(0.15, 0, 0.06, across), at(0.15, 0, 0.04, across));
+    const auto found = sweep_between(scene, at(0.15, 0, 0.06, across), at(0.15, 0, 0.04, across));
     REQUIRE(found.contacts.size() >= 1);
     bool edges = false;
     for (const Contact& c : found.contacts) edges = edges || c.kind == ContactKind::edge_edge;
@@ -55,18 +55,18 @@ TEST_CASE("a sweep of a cube meets a vertex, a face or an edge first", "[mesh_co
   }
   SECTION("the other way round, the table's corner on a face") {
     const Scene other = two(make_mesh({"table", 12}), make_mesh({"cube", 12}), at(0, 0, 0, on_corner));
-    const auto found = add_sample(other, at(0, 0, 0.07), at(0, 0, 0.045));
+    const auto found = sweep_between(other, at(0, 0, 0.07), at(0, 0, 0.045));
     REQUIRE(found.contacts.size() >= 1);
     CHECK(found.contacts[0].kind == ContactKind::face_vertex);
     CHECK(normal_W(found.contacts[0], at(0, 0, 0.07)).isApprox(Vector3d::UnitZ(), 1e-9));
   }
   SECTION("nothing on a way that ends above") {
-    const auto found = add_sample(scene, at(0, 0, 0.06, on_edge), at(0.02, 0, 0.0456, on_edge));
+    const auto found = sweep_between(scene, at(0, 0, 0.06, on_edge), at(0.02, 0, 0.0456, on_edge));
     CHECK(found.contacts.empty());
     CHECK_FALSE(found.overlaps);
   }
   SECTION("a way through the whole table, in one step") {
-    const auto found = add_sample(scene, at(0, 0, 0.06), at(0.01, 0, -0.06));
+    const auto found = sweep_between(scene, at(0, 0, 0.06), at(0.01, 0, -0.06));
     REQUIRE(found.contacts.size() >= 1);
     for (const Contact& c : found.contacts) CHECK(c.n_W.isApprox(Vector3d::UnitZ(), 1e-9));
   }
@@ -77,7 +77,7 @@ TEST_CASE("a sweep along a flat face meets nothing", "[mesh_contacts]") {
   for (const std::size_t triangles : {12, 1000, 20000}) {
     const Scene scene = two(make_mesh({"cube", triangles}), make_mesh({"table", triangles}));
     const double z = 0.035 + kClearance_m;
-    const auto found = add_sample(scene, at(0.001, 0.002, z), at(0.03, 0.0, z));
+    const auto found = sweep_between(scene, at(0.001, 0.002, z), at(0.03, 0.0, z));
     INFO(triangles);
     CHECK(found.complete);
     CHECK(found.contacts.empty());
@@ -109,7 +109,7 @@ TEST_CASE("a sheet has two sides and stops the tool on both", "[mesh_contacts]")
   obstacles.push_back({"sheet", MeshBvh(sheet, MeshSurface::Kind::surface), Pose{}});
   const Scene scene(mesh_tool(make_mesh({"cube", 12})), {}, {}, std::move(obstacles));
   for (const double side : {1.0, -1.0}) {
-    const auto found = add_sample(scene, at(0, 0, side * 0.04), at(0, 0, side * 0.01));
+    const auto found = sweep_between(scene, at(0, 0, side * 0.04), at(0, 0, side * 0.01));
     REQUIRE(found.contacts.size() >= 1);
     for (const Contact& c : found.contacts) CHECK(c.n_W.isApprox(side * Vector3d::UnitZ(), 1e-12));
   }
@@ -156,7 +156,7 @@ TEST_CASE("a path with a large rotation is not free if its end overlaps", "[mesh
                    {0.049002937603635319, 0.030474385760468663, -0.019151829047996116}};
   REQUIRE_FALSE(exact.intersect(from));
   REQUIRE(exact.intersect(to));
-  const auto found = add_sample(scene, from, to);
+  const auto found = sweep_between(scene, from, to);
   CHECK(found.complete);
   CHECK((found.overlaps || !found.contacts.empty()));
 }

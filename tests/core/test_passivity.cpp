@@ -133,16 +133,16 @@ TEST_CASE("a spring that gives back what it took is left alone", "[passivity]") 
 
 TEST_CASE("a force that pushes along is damped, then cut to nothing", "[passivity]") {
   PassivityGuard guard(kDevice, with_delay(0));
-  double x = 0.0, most_J = 0.0;
+  double x = 0.0, scaling_end_J = 0.0;
   Wrench out;
   for (int n = 0; n < 500; ++n) {
     out = guard.limit(along_x(2.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
     if (out.force_N.x() > 0.0) x += 0.1 * kTick_s;  // the hand follows where it is pushed
-    most_J = std::max(most_J, guard.injected_J());
+    scaling_end_J = std::max(scaling_end_J, guard.injected_J());
   }
   CHECK(guard.intervened());
-  CHECK(most_J > 0.5e-3);
-  CHECK(most_J < 2.0e-3 + 2.0 * 0.1 * kTick_s);
+  CHECK(scaling_end_J > 0.5e-3);
+  CHECK(scaling_end_J < 2.0e-3 + 2.0 * 0.1 * kTick_s);
   CHECK(out.force_N.norm() < 0.2);
   CHECK_FALSE(guard.energy_runaway());
 }

@@ -126,7 +126,7 @@ void asks_for_all(const fs::path& path, const std::atomic<bool>& wanted) {
   const OwnedFd fd = connected(path);
   const std::string line =
       request("devices") + request("arm") + request("lease.heartbeat") + request("lease.release");
-  while (wanted && fd && push(fd.get(), line)) drain(fd.get());
+  while (wanted && fd && send_bytes(fd.get(), line)) drain(fd.get());
 }
 
 constexpr std::array<Abuse, 6> kAbuses = {floods_requests, never_reads, floods_rubbish,

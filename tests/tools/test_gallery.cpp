@@ -27,10 +27,6 @@ constexpr double kSeconds = 2.0;
 constexpr double kSeconds = 0.0;  // the whole script
 #endif
 
-Pose pose_of(const std::array<double, 7>& x) {
-  return {Quaterniond(x[6], x[3], x[4], x[5]), {x[0], x[1], x[2]}};
-}
-
 /// Checks in exact arithmetic that the tool overlaps no obstacle.
 class Admissible {
  public:

@@ -21,7 +21,7 @@ const Scene& bumpy_bodies() {
 }
 
 /// A tool that translates, rotates and accelerates slightly.
-Pose restrict_to_dofs(double t) {
+Pose pose_on_path(double t) {
   return {rotation_from(t * Vector3d(0.0, 5e-4, 2e-4)), {0.10, 1e-4 * t + 2e-7 * t * t, -5e-5 * t}};
 }
 
@@ -36,14 +36,14 @@ bool tick(PredictiveCandidateList& pairs, const Pose& from, const Pose& to) {
 
 TEST_CASE("uniform motion needs no immediate list", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   const std::uint32_t initially = pairs.immediate_lists();
   CHECK(initially >= 1);  // no motion was known
   CHECK(initially <= 6);
   int changes = 0;
   for (int i = 60; i < 160; ++i) {
     const CandidatePairs* before = &pairs.current();
-    REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+    REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
     changes += &pairs.current() != before;
   }
   CHECK(pairs.immediate_lists() == initially);
@@ -56,7 +56,7 @@ TEST_CASE("the work for prefetched lists is spread over the ticks", "[predictive
   const Scene scene =
       scene_of({"fine bodies", {"bumpy", 50'000}, {"boulder", 50'000}, HandMotion::slide, {}});
   const auto inside = [](int i) {  // many pairs are near
-    return Pose{restrict_to_dofs(i).rotation, restrict_to_dofs(i).translation_m - Vector3d(0.003, 0, 0)};
+    return Pose{pose_on_path(i).rotation, pose_on_path(i).translation_m - Vector3d(0.003, 0, 0)};
   };
   PredictiveCandidateList pairs(scene);
   std::uint32_t most = 0, all = 0;
@@ -80,9 +80,9 @@ TEST_CASE("spare work makes lists younger, and the prefetch uses no more than th
     for (int i = 1; i < 200; ++i) {
       const CandidatePairs* before = &pairs.current();
       VisitBudget budget = {kPlenty};
-      REQUIRE(pairs.ensure_covers(restrict_to_dofs(i - 1), restrict_to_dofs(i), budget));
+      REQUIRE(pairs.ensure_covers(pose_on_path(i - 1), pose_on_path(i), budget));
       const std::uint32_t left = budget.remaining;
-      pairs.prefetch(restrict_to_dofs(i), restrict_to_dofs(i), budget, 0.0, to_spare);
+      pairs.prefetch(pose_on_path(i), pose_on_path(i), budget, 0.0, to_spare);
       changes += i >= 60 && &pairs.current() != before ? 1 : 0;
       if (i >= 60 && to_spare >= 1000) CHECK(left - budget.remaining <= to_spare);
     }
@@ -93,11 +93,11 @@ TEST_CASE("spare work makes lists younger, and the prefetch uses no more than th
 
 TEST_CASE("a tool at rest builds no list, however much work is spare", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   for (int i = 0; i < 100; ++i) {
     VisitBudget budget = {kPlenty};
-    REQUIRE(pairs.ensure_covers(restrict_to_dofs(59), restrict_to_dofs(59), budget));
-    pairs.prefetch(restrict_to_dofs(59), restrict_to_dofs(59), budget, 0.0, 1000);
+    REQUIRE(pairs.ensure_covers(pose_on_path(59), pose_on_path(59), budget));
+    pairs.prefetch(pose_on_path(59), pose_on_path(59), budget, 0.0, 1000);
     if (i >= 50) CHECK(budget.remaining == kPlenty);
   }
 }
@@ -106,16 +106,16 @@ TEST_CASE("a late prefetched list is completed, and no immediate list is built",
           "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
   int i = 1;
-  for (; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   const std::uint32_t before = pairs.immediate_lists();
   int changes = 0;
   for (; i < 90 && changes < 2; ++i) {
     const CandidatePairs* last = &pairs.current();
     VisitBudget budget = {kPlenty}, starved = {1};
-    REQUIRE(pairs.ensure_covers(restrict_to_dofs(i - 1), restrict_to_dofs(i), budget));
+    REQUIRE(pairs.ensure_covers(pose_on_path(i - 1), pose_on_path(i), budget));
     changes += &pairs.current() != last ? 1 : 0;
     if (changes == 2) CHECK(budget.remaining < kPlenty);  // the first one may be complete, this one not
-    pairs.prefetch(restrict_to_dofs(i), restrict_to_dofs(i), starved);
+    pairs.prefetch(pose_on_path(i), pose_on_path(i), starved);
   }
   REQUIRE(changes == 2);
   CHECK(pairs.immediate_lists() == before);
@@ -124,15 +124,15 @@ TEST_CASE("a late prefetched list is completed, and no immediate list is built",
 // A sweep may go farther than the tool moves in the end. The rest of its list is not continued.
 TEST_CASE("a used list is not used again", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   int changes = 0;
   for (int i = 60; i < 160; ++i) {
     const CandidatePairs* before = &pairs.current();
     VisitBudget budget = {kPlenty};
-    REQUIRE(pairs.ensure_covers(restrict_to_dofs(i - 1), restrict_to_dofs(i + 2), budget));
+    REQUIRE(pairs.ensure_covers(pose_on_path(i - 1), pose_on_path(i + 2), budget));
     const bool changed = &pairs.current() != before;
-    pairs.prefetch(restrict_to_dofs(i), restrict_to_dofs(i), budget, 0.0, changed ? 1000 : 0);
-    CHECK(pairs.current().covers(restrict_to_dofs(i + 2)));
+    pairs.prefetch(pose_on_path(i), pose_on_path(i), budget, 0.0, changed ? 1000 : 0);
+    CHECK(pairs.current().covers(pose_on_path(i + 2)));
     changes += changed ? 1 : 0;
   }
   CHECK(changes > 5);
@@ -182,50 +182,49 @@ TEST_CASE("an immediate list takes precedence over a prefetched list that cannot
 
 TEST_CASE("after an immediate list the next list starts where it ends", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   const std::uint32_t before = pairs.immediate_lists();
   const auto aside = [&](int i) {
-    return Pose{restrict_to_dofs(i).rotation, restrict_to_dofs(i).translation_m + Vector3d(0, 0, 3e-4)};
+    return Pose{pose_on_path(i).rotation, pose_on_path(i).translation_m + Vector3d(0, 0, 3e-4)};
   };
   VisitBudget budget = {kPlenty};
-  REQUIRE(pairs.ensure_covers(restrict_to_dofs(59), aside(60), budget));
-  pairs.prefetch(aside(60), restrict_to_dofs(60), budget);
+  REQUIRE(pairs.ensure_covers(pose_on_path(59), aside(60), budget));
+  pairs.prefetch(aside(60), pose_on_path(60), budget);
   for (int i = 61; i < 90; ++i) {
     budget = {kPlenty};
     REQUIRE(pairs.ensure_covers(aside(i - 1), aside(i), budget));
-    pairs.prefetch(aside(i), restrict_to_dofs(i), budget);
+    pairs.prefetch(aside(i), pose_on_path(i), budget);
   }
   CHECK(pairs.immediate_lists() == before + 1);
 }
 
 TEST_CASE("a reversal of the motion causes an immediate list", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   const std::uint32_t before = pairs.immediate_lists();
-  const Pose aside = {restrict_to_dofs(59).rotation,
-                      restrict_to_dofs(59).translation_m + Vector3d(0, 0, 2e-3)};
-  REQUIRE(tick(pairs, restrict_to_dofs(59), aside));
+  const Pose aside = {pose_on_path(59).rotation, pose_on_path(59).translation_m + Vector3d(0, 0, 2e-3)};
+  REQUIRE(tick(pairs, pose_on_path(59), aside));
   CHECK(pairs.immediate_lists() == before + 1);
-  CHECK(pairs.current().covers(restrict_to_dofs(59)));
+  CHECK(pairs.current().covers(pose_on_path(59)));
   CHECK(pairs.current().covers(aside));
 }
 
 TEST_CASE("a path that exceeds the budget gets no list, and the current list remains",
           "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  REQUIRE(tick(pairs, restrict_to_dofs(0), restrict_to_dofs(1)));
+  REQUIRE(tick(pairs, pose_on_path(0), pose_on_path(1)));
   const CandidatePairs* before = &pairs.current();
   VisitBudget few = {20};
   const Pose far = {Quaterniond::Identity(), {-0.10, 0, 0}};
-  CHECK_FALSE(pairs.ensure_covers(restrict_to_dofs(1), far, few));
+  CHECK_FALSE(pairs.ensure_covers(pose_on_path(1), far, few));
   CHECK(&pairs.current() == before);
-  CHECK(pairs.current().covers(restrict_to_dofs(1)));
+  CHECK(pairs.current().covers(pose_on_path(1)));
   CHECK(few.remaining <= 20);
 }
 
 TEST_CASE("after a reset no motion is predicted", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 40; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 40; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   pairs.reset();
   const Pose put = {Quaterniond::Identity(), {0, 0.105, 0}};
   const auto near = [&](double s) {
@@ -241,40 +240,39 @@ TEST_CASE("after a reset no motion is predicted", "[predictive_candidate_list]")
 // Deferrable work uses no more of a tick than its budget. The current list remains in use.
 TEST_CASE("a deferrable list is built over several ticks and then used", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   const std::uint32_t before = pairs.immediate_lists();
-  const Pose aside = {restrict_to_dofs(59).rotation,
-                      restrict_to_dofs(59).translation_m + Vector3d(0, 0, 2e-3)};
+  const Pose aside = {pose_on_path(59).rotation, pose_on_path(59).translation_m + Vector3d(0, 0, 2e-3)};
   constexpr std::uint32_t kPart = 50;
   int late = 0;
   for (bool listed = false; !listed; ++late) {
     REQUIRE(late < 100);
     VisitBudget budget = {kPlenty, kPlenty - kPart};
-    listed = pairs.ensure_covers(restrict_to_dofs(59), aside, budget);
+    listed = pairs.ensure_covers(pose_on_path(59), aside, budget);
     CHECK(pairs.list_pending() == !listed);
     CHECK(kPlenty - budget.remaining <= kPart + 1);
-    CHECK(pairs.current().covers(restrict_to_dofs(59)));
-    CHECK(pairs.covered_fraction(restrict_to_dofs(59), aside) >= 0.0);
-    if (!listed) CHECK(pairs.covered_fraction(restrict_to_dofs(59), aside) < 1.0);
+    CHECK(pairs.current().covers(pose_on_path(59)));
+    CHECK(pairs.covered_fraction(pose_on_path(59), aside) >= 0.0);
+    if (!listed) CHECK(pairs.covered_fraction(pose_on_path(59), aside) < 1.0);
   }
   CHECK(late > 2);
   CHECK(pairs.immediate_lists() == before + 1);
   CHECK(pairs.current().covers(aside));
-  CHECK(pairs.covered_fraction(restrict_to_dofs(59), aside) == 1.0);
+  CHECK(pairs.covered_fraction(pose_on_path(59), aside) == 1.0);
 }
 
 TEST_CASE("a pending list is discarded if the path leads elsewhere", "[predictive_candidate_list]") {
   PredictiveCandidateList pairs(bumpy_bodies());
-  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, restrict_to_dofs(i - 1), restrict_to_dofs(i)));
+  for (int i = 1; i < 60; ++i) REQUIRE(tick(pairs, pose_on_path(i - 1), pose_on_path(i)));
   const auto aside = [&](double s) {
-    return Pose{restrict_to_dofs(59).rotation, restrict_to_dofs(59).translation_m + s * Vector3d(0, 0, 2e-3)};
+    return Pose{pose_on_path(59).rotation, pose_on_path(59).translation_m + s * Vector3d(0, 0, 2e-3)};
   };
   for (const double side : {1.0, -1.0, 1.0, -1.0}) {
     VisitBudget budget = {kPlenty, kPlenty - 33};
-    CHECK_FALSE(pairs.ensure_covers(restrict_to_dofs(59), aside(side), budget));
+    CHECK_FALSE(pairs.ensure_covers(pose_on_path(59), aside(side), budget));
   }
   VisitBudget budget = {kPlenty};
-  REQUIRE(pairs.ensure_covers(restrict_to_dofs(59), aside(1.0), budget));
+  REQUIRE(pairs.ensure_covers(pose_on_path(59), aside(1.0), budget));
   CHECK(pairs.current().covers(aside(1.0)));
   CHECK_FALSE(pairs.list_pending());
 }

@@ -2,7 +2,9 @@
 #include <catch2/catch.hpp>
 
 #include "core/watch_limits.hpp"
+#include "daemon/servo/pace_watch.hpp"
 #include "daemon/servo/watches.hpp"
+#include "daemon/servo/write_watch.hpp"
 
 // What tests/daemon/servo/test_fault_reactions.cpp does not see of the watches: where they must not find
 // anything.
