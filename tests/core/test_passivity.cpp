@@ -295,3 +295,114 @@ TEST_CASE("the guard allocates nothing", "[passivity][rt]") {
   guard.reset();
   CHECK(realtime.allocations() + realtime.locks() == 0);
 }
+
+TEST_CASE("the wrench is scaled by the energy delivered and the energy under way, each counted once",
+          "[passivity]") {
+  for (const std::size_t delay : {0u, 1u, 4u}) {
+    INFO("delay " << delay);
+    PassivityLimits limits = with_delay(delay);
+    limits.damping_N_s_per_m = limits.damping_Nm_s_per_rad = 0.0;  // scaling only
+    PassivityGuard guard(kFrictionless, limits);
+    constexpr double kForce_N = 1.0, kStep_m = 20e-6;
+    double net_J = 0.0, least_scale = 1.0;
+    for (std::size_t n = 0; n < 150; ++n) {
+      const double x = kStep_m * static_cast<double>(n);
+      guard.limit(along_x(kForce_N), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+      guard.record_sent(along_x(kForce_N));
+      if (n > delay) net_J += kForce_N * kStep_m;  // the first wrench acts in the interval after the delay
+      if (n > 0) net_J = std::max(net_J - PassivityGuard::kEnergyLeak_W * kTick_s, 0.0);
+      if (n < 2) continue;  // the speed is known from two steps on
+      const double under_way_J = kForce_N * kStep_m * static_cast<double>(std::min(n, delay));
+      const double share =
+          (net_J + under_way_J - limits.scaling_start_J) / (limits.scaling_end_J - limits.scaling_start_J);
+      CHECK(guard.scale() == Approx(1.0 - std::clamp(share, 0.0, 1.0)).margin(1e-9));
+      least_scale = std::min(least_scale, guard.scale());
+    }
+    CHECK(least_scale == 0.0);
+  }
+}
+
+TEST_CASE("the guard's damping takes the energy back within a tick, in force and torque alike",
+          "[passivity]") {
+  PassivityLimits limits = with_delay(0);
+  limits.scaling_start_J = 1.0;  // damping only
+  limits.scaling_end_J = 2.0;
+  for (const bool turning : {false, true}) {
+    INFO((turning ? "turning" : "moving"));
+    PassivityGuard guard(kDevice, limits);
+    const double step = turning ? 1e-3 : 1e-4;  // in each tick of 1 ms: 1 rad/s or 0.1 m/s
+    const Wrench push = turning ? Wrench{Vector3d::Zero(), {0.0, 0.01, 0.0}} : along_x(3.0);
+    Wrench added;
+    double energy_J = 0.0, alpha = 0.0;
+    for (int n = 0; n < 20; ++n) {
+      Pose X;
+      if (turning)
+        X.rotation = rotation_from(Vector3d(0.0, step * n, 0.0));
+      else
+        X.translation_m.x() = step * n;
+      const Wrench out = guard.limit(push, X, n == 0 ? 0.0 : kTick_s, true);
+      added = {out.force_N - push.force_N, out.torque_Nm - push.torque_Nm};
+      energy_J = guard.injected_J();
+      guard.record_sent(push);
+      const double b = turning ? kDevice.angular_Nm_s_per_rad : kDevice.linear_N_s_per_m;
+      const double speed = step / kTick_s;
+      alpha = std::min(1.0, energy_J / (b * speed * speed * kTick_s));
+      if (n < 2) continue;
+      const double brake = turning ? added.torque_Nm.y() : added.force_N.x();
+      CHECK(brake == Approx(-alpha * b * speed).epsilon(1e-6).margin(1e-12));
+    }
+    CHECK(alpha == 1.0);  // capped by the device's own friction in the end
+  }
+}
+
+TEST_CASE("energy from nowhere leaks away by a milliwatt, and no debt is made of it", "[passivity]") {
+  PassivityGuard guard(kFrictionless, with_delay(0));
+  double x = 0.0;
+  for (int n = 0; n < 5; ++n, x += 1e-4) {
+    guard.limit(along_x(1.0), at_x(x), n == 0 ? 0.0 : kTick_s, true);
+    guard.record_sent(along_x(1.0));
+  }
+  guard.limit({}, at_x(x - 1e-4), kTick_s, true);
+  guard.record_sent({});
+  const double start_J = guard.injected_J();
+  CHECK(start_J > 0.3e-3);
+  for (int n = 1; n <= 100; ++n) {
+    guard.limit({}, at_x(x - 1e-4), kTick_s, true);
+    guard.record_sent({});
+    CHECK(guard.injected_J() == Approx(start_J - n * PassivityGuard::kEnergyLeak_W * kTick_s));
+  }
+  for (int n = 0; n < 1000; ++n) {
+    guard.limit({}, at_x(x - 1e-4), kTick_s, true);
+    guard.record_sent({});
+  }
+  CHECK(guard.injected_J() == 0.0);
+}
+
+TEST_CASE("credit for obstacles that move: pushing gives rights, withdrawing takes them and makes no debt",
+          "[passivity]") {
+  PassivityGuard guard(kFrictionless, with_delay(0));
+  double x = 0.0;
+  const auto push = [&](double f_N, double step_m) {  // the energy that is then from nowhere
+    guard.limit(along_x(f_N), at_x(x), kTick_s, true);
+    guard.record_sent(along_x(f_N));
+    x += step_m;
+    guard.limit({}, at_x(x), kTick_s, true);
+    guard.record_sent({});
+    return guard.injected_J();
+  };
+  push(0.0, 0.0);
+  guard.credit_obstacle_work(5e-3);
+  CHECK(push(1.0, 4e-3) == 0.0);  // 4 mJ of the 5 that the obstacle gave
+  guard.credit_obstacle_work(-0.5e-3);
+  CHECK(push(1.0, 1e-3) == Approx(0.5e-3).epsilon(0.01));  // 0.5 mJ were left
+  const double debt_J = guard.injected_J();
+  guard.credit_obstacle_work(-1.0);
+  CHECK(guard.injected_J() == debt_J);
+  guard.credit(10e-3);
+  CHECK(guard.injected_J() == 0.0);
+  guard.credit_obstacle_work(-1.0);  // more than there is: nothing is left, and no debt
+  CHECK(guard.injected_J() == 0.0);
+  CHECK(push(1.0, 1e-3) == Approx(1e-3).epsilon(0.01));
+  guard.credit(-1.0);
+  CHECK(push(0.0, 0.0) <= 1e-3);
+}

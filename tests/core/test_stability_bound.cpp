@@ -202,3 +202,48 @@ TEST_CASE("the energy law's stiffness is its derivative where it rests", "[stabi
     CHECK((numbers - K * xi).norm() <= 1e-5 * numbers.norm());
   }
 }
+
+TEST_CASE("stiffness and damping along axes without motors do not change the bound", "[stability_bound]") {
+  RandomValues random(13);
+  const LoopDelay loop{1e-3, 1e-3};
+  const auto without = [](Matrix6d K, DofMask driven) {
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j)
+        if ((driven >> i & 1) == 0 || (driven >> j & 1) == 0) K(i, j) = 0.0;
+    return K;
+  };
+  for (const DofMask driven : {kLinearDofs, kAngularDofs, static_cast<DofMask>(0b011010)})
+    for (int n = 0; n < 20; ++n) {
+      const Matrix6d A = 20.0 * Matrix6d::NullaryExpr([&] { return random.normal(); });
+      const Matrix6d C = 0.3 * Matrix6d::NullaryExpr([&] { return random.normal(); });
+      const Coupling all{A * A.transpose(), C * C.transpose()};
+      const Coupling block{without(all.stiffness, driven), without(all.damping, driven)};
+      const StabilityBound a = stability_bound(kDevice, loop, all, {}, driven, {100e-6, 1e-3});
+      const StabilityBound b = stability_bound(kDevice, loop, block, {}, driven, {100e-6, 1e-3});
+      CHECK(a.scale == Approx(b.scale).epsilon(1e-9));
+      CHECK(a.scale_undamped == Approx(b.scale_undamped).epsilon(1e-9));
+      CHECK(a.scale < 1.0);
+      CHECK(a.max_stiffness_N_per_m == b.max_stiffness_N_per_m);
+      CHECK(a.max_stiffness_Nm_per_rad == b.max_stiffness_Nm_per_rad);
+    }
+}
+
+TEST_CASE("the stiffest spring beside a damper just passes the inequality", "[stability_bound]") {
+  RandomValues random(14);
+  const LoopDelay loop{1e-3, 1.5e-3};  // T/2 + tau = 2 ms
+  for (int n = 0; n < 20; ++n) {
+    const Pose X_HT = random.pose(0.02);
+    Coupling coupling = spring(0.0, 0.0);
+    coupling.damping = WrenchGains::blockwise(random.uniform(0.0, 0.2), random.uniform(0.0, 5e-4));
+    const StabilityBound bound = stability_bound(kDevice, loop, coupling, X_HT);
+    for (const bool linear : {true, false}) {
+      const double most = linear ? bound.max_stiffness_N_per_m : bound.max_stiffness_Nm_per_rad;
+      REQUIRE(most > 0.0);
+      for (const double share : {0.999, 1.001}) {
+        coupling.stiffness =
+            linear ? spring(share * most, 0.0).stiffness : spring(0.0, share * most).stiffness;
+        CHECK((stability_bound(kDevice, loop, coupling, X_HT).scale == 1.0) == (share < 1.0));
+      }
+    }
+  }
+}
