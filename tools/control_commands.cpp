@@ -183,7 +183,7 @@ void run_request(const std::string& method, const ControlOptions& options) {
   if (options.json) return print(pretty(result));
   if (!result.contains("requested")) return print(result.empty() ? "done\n" : pretty(result));
   std::this_thread::sleep_for(150ms);  // duration of the fade and a margin for the event
-  print(fmt::format("asked: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
+  print(fmt::format("requested: {}; state {}\n", method, call(client, "status")["state"].get<std::string>()));
 }
 
 void list_recordings(const ControlOptions& options) {

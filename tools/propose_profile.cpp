@@ -418,9 +418,8 @@ std::string makers_own(const DescriptorSource& source, const ReportDescriptor& d
                          wrench->id == 2 && wrench->length == 32;
   if (reference)
     text +=
-        "\n# GUESSED: ids and lengths are those of the wrenchd reference report layout. If the device uses "
-        "it,\n"
-        "# copy both tables below from profiles/loopback.toml.\n";
+        "\n# GUESSED: ids and lengths are those of the wrenchd reference report layout.\n"
+        "# If the device uses it, copy both tables below from profiles/loopback.toml.\n";
   return text +
          vendor_table("pose_report", pose,
                       "motors_on, watchdog_tripped, sequence, device_time, position, orientation, checksum") +
@@ -435,7 +434,7 @@ std::string propose_profile(const DescriptorSource& source) {
   if (axes.controller) return head(source, descriptor) + multi_axis(source, *axes.controller, descriptor);
   if (std::none_of(descriptor.reports.begin(), descriptor.reports.end(), of_maker))
     throw std::runtime_error(source.file + ": nothing to propose: " + axes.rejection +
-                             ", and has no vendor-defined report; name another device");
+                             ", and no report is vendor-defined; name another device");
   return head(source, descriptor) + makers_own(source, descriptor);
 }
 

@@ -172,7 +172,7 @@ Json MethodTable::describe() const {
           {"methods", methods},
           {"events", events},
           {"errors",
-           {error(RpcCode::parse_error, "The line is no valid JSON."),
+           {error(RpcCode::parse_error, "The line is not valid JSON."),
             error(RpcCode::invalid_request, "The line is valid JSON, but no request."),
             error(RpcCode::method_not_found, "There is no such method."),
             error(RpcCode::invalid_params, "A parameter is unknown, missing, or of the wrong type."),

@@ -122,7 +122,7 @@ void EventFeed::publish(const Event& event) {
       raised != nullptr && is_severe(raised->fault) && record_fault_) {
     if (const std::string recording = record_fault_(raised->fault, event.at); !recording.empty()) {
       description.fields["recording"] = recording;
-      description.text += "; the ticks before it are in " + recording;
+      description.text += "; recorded in " + recording;
     }
   }
   const std::scoped_lock lock(mutex_);

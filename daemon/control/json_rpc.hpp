@@ -55,7 +55,7 @@ struct RpcRequest {
   bool wants_reply = false;      ///< true: the request has an id; false: no reply, not even an error
 };
 
-/// A line that is no valid request.
+/// A line that is not a valid request.
 struct InvalidRequest {
   Json id;  ///< id of the request if the line has a readable one; else null
   RpcError error;

@@ -64,7 +64,7 @@ void check_directory(const fs::path& directory) {
   struct stat status {};
   if (::stat(directory.c_str(), &status) != 0) throw path_error(directory, reason());
   if (!S_ISDIR(status.st_mode))
-    throw path_error(directory, "is no directory; name another path with --control");
+    throw path_error(directory, "is not a directory; name another path with --control");
   if (status.st_uid != geteuid() && status.st_uid != 0)
     throw path_error(directory, "belongs to uid " + std::to_string(status.st_uid) +
                                     ", who could replace the socket; name a path in a directory of your own");
@@ -148,7 +148,7 @@ void ListeningSocket::remove_stale_socket() {
   struct stat status {};
   if (::lstat(path_.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw path_error(path_, "is there, and is no socket; move it away, or name another path with --control");
+    throw path_error(path_, "exists and is not a socket; move it away, or name another path with --control");
   const sockaddr_un address = address_of(path_);
   const OwnedFd probe = stream_socket();
   const bool lives =

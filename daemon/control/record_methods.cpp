@@ -11,7 +11,7 @@ Json written_json(const Recordings::Summary& written) {
 MethodResult start(Recordings& recordings, const Json& params, const Caller& caller) {
   if (const auto running = recordings.status().running)
     throw RpcError(RpcCode::invalid_state,
-                   "A recording runs already: " + running->file.string() + "; 'record.stop' ends it.",
+                   "A recording is already running: " + running->file.string() + "; 'record.stop' ends it.",
                    {{"file", running->file.string()}});
   try {
     const auto file =

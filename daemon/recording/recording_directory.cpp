@@ -71,7 +71,7 @@ fs::path recording_path(const std::string& asked, const fs::path& directory, boo
   if (anywhere && name.is_absolute()) return name.lexically_normal();
   if (!is_plain(asked))
     throw RecordingError(
-        "'" + printable(asked, 60) + "' is no valid name of a recording: use letters, digits, -, _ " +
+        "'" + printable(asked, 60) + "' is not a valid name of a recording: use letters, digits, -, _ " +
         "and dots, without a directory; recordings are stored in " + directory.string() +
         (anywhere ? "; or use an absolute path" : "; only administrators may use another directory"));
   if (name.extension() != ".h5") name += ".h5";

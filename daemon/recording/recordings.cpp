@@ -92,7 +92,8 @@ void Recordings::begin(const std::filesystem::path& file, const std::filesystem:
   const RecordingHeader header = runtime_.recording_header();
   collect_ticks();
   const std::scoped_lock lock(write_mutex_);
-  if (running_) throw RecordingError(running_->file().string() + ": a recording runs already; end it first");
+  if (running_)
+    throw RecordingError(running_->file().string() + ": a recording is already running; stop it first");
   std::error_code ignored;
   if (std::filesystem::is_directory(directory, ignored)) check_free_space(directory, settings_);
   running_ = std::make_unique<Recorder>(history_, file, header, history_.stored_range().end);

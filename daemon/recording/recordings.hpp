@@ -49,7 +49,7 @@ class Recordings {
 
   /// Starts to write every tick to a file, and returns the file. requested: a name in the recordings
   /// directory; empty: a name with the present time. If `anywhere` is set, an absolute path is permitted too.
-  /// Throws RecordingError, also if a recording runs already.
+  /// Throws RecordingError, also if a recording is already running.
   std::filesystem::path start(const std::string& requested, bool anywhere);
   /// Starts to write every tick to this file. A relative path starts at the working directory.
   void start_file(const std::filesystem::path& file);

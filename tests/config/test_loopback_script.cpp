@@ -119,7 +119,7 @@ TEST_CASE("a stop, a stall, a client that falls silent: each as it should end", 
   const fs::path file = dir.write("lease.toml", "[[command]]\nat_s = 1.0\ncommand = \"arm_with_lease\"\n");
   const auto alone =
       run_program("wrenchd", {"--virtual-time", "--seconds", "4", "--loopback-script", file.string()});
-  CHECK(says(alone, "heartbeat_missing: whoever armed never said"));
+  CHECK(says(alone, "heartbeat_missing: the client that armed has never sent a heartbeat"));
   CHECK(alone.exit_code == 0);
 }
 

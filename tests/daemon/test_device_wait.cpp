@@ -12,18 +12,18 @@
 namespace wrenchd {
 namespace {
 
-/// What is logged while it lives.
-class Heard {
+/// Captures the log during its lifetime.
+class LogCapture {
  public:
-  Heard() : before_(spdlog::default_logger()) {
+  LogCapture() : before_(spdlog::default_logger()) {
     const auto logger =
-        std::make_shared<spdlog::logger>("heard", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_));
+        std::make_shared<spdlog::logger>("log", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_));
     logger->set_pattern("%v");
     spdlog::set_default_logger(logger);
   }
-  ~Heard() { spdlog::set_default_logger(before_); }
-  Heard(const Heard&) = delete;
-  Heard& operator=(const Heard&) = delete;
+  ~LogCapture() { spdlog::set_default_logger(before_); }
+  LogCapture(const LogCapture&) = delete;
+  LogCapture& operator=(const LogCapture&) = delete;
   std::string text() const { return text_.str(); }
 
  private:
@@ -31,42 +31,43 @@ class Heard {
   std::shared_ptr<spdlog::logger> before_;
 };
 
-TEST_CASE("waiting tries at once, then again without news, until it succeeds", "[device_wait]") {
+TEST_CASE("waiting tries at once, then repeatedly without an event, until an attempt succeeds",
+          "[device_wait]") {
   DeviceWait wait;
   int attempts = 0;
   CHECK(wait.until([&] { return ++attempts == 3; }, [] { return false; }));
   CHECK(attempts == 3);
 }
 
-TEST_CASE("waiting ends when it is time to stop, and tries no more", "[device_wait]") {
+TEST_CASE("waiting ends on a stop request, without another attempt", "[device_wait]") {
   DeviceWait wait;
-  int attempts = 0, asked = 0;
+  int attempts = 0, stop_checks = 0;
   CHECK_FALSE(wait.until(
       [&] {
         ++attempts;
         return false;
       },
-      [&] { return ++asked > 3; }));
+      [&] { return ++stop_checks > 3; }));
   CHECK(attempts == 1);
 }
 
-TEST_CASE("what an attempt throws ends the waiting", "[device_wait]") {
+TEST_CASE("an exception of an attempt ends the waiting", "[device_wait]") {
   DeviceWait wait;
   CHECK_THROWS_WITH(wait.until([]() -> bool { throw std::runtime_error("no node"); }, [] { return false; }),
                     "no node");
 }
 
-TEST_CASE("what is plugged in instead is told once, and again when it comes again", "[device_wait]") {
+TEST_CASE("each rejected device is logged once, and once more after it is connected again", "[device_wait]") {
   DeviceWait wait;
-  const Heard heard;
+  const LogCapture log;
   wait.log_rejected({"a", "b"});
   wait.log_rejected({"a", "b"});
-  CHECK(heard.text() == "a\nb\n");
+  CHECK(log.text() == "a\nb\n");
   wait.log_rejected({"b"});
   wait.log_rejected({"a", "b"});
-  CHECK(heard.text() == "a\nb\na\n");
+  CHECK(log.text() == "a\nb\na\n");
   wait.log_rejected({"\x1b[2J\nmine"});
-  CHECK(heard.text() == "a\nb\na\n?[2J?mine\n");
+  CHECK(log.text() == "a\nb\na\n?[2J?mine\n");
 }
 
 }  // namespace

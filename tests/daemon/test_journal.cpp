@@ -23,7 +23,7 @@ JournalFieldList one(const std::string& name, const std::string& value) {
   return {std::pair(name, value)};
 }
 
-TEST_CASE("standard error is the journal where it is the file that the journal names", "[journal]") {
+TEST_CASE("standard error is the journal if JOURNAL_STREAM names its file", "[journal]") {
   struct stat status {};
   REQUIRE(::fstat(STDERR_FILENO, &status) == 0);
   const std::string here = std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino);
@@ -31,12 +31,12 @@ TEST_CASE("standard error is the journal where it is the file that the journal n
   CHECK_FALSE(stderr_is_journal());
   ::setenv("JOURNAL_STREAM", here.c_str(), 1);
   CHECK(stderr_is_journal());
-  ::setenv("JOURNAL_STREAM", (here + "1").c_str(), 1);  // inherited, and standard error redirected since
+  ::setenv("JOURNAL_STREAM", (here + "1").c_str(), 1);  // inherited, but standard error is redirected
   CHECK_FALSE(stderr_is_journal());
   ::unsetenv("JOURNAL_STREAM");
 }
 
-TEST_CASE("fields hold for what is logged while they live, the innermost alone", "[journal]") {
+TEST_CASE("journal fields apply during their lifetime; the innermost replace the outer", "[journal]") {
   CHECK(JournalFields::current().empty());
   {
     const JournalFields outer(one("A", "1"));
@@ -51,7 +51,7 @@ TEST_CASE("fields hold for what is logged while they live, the innermost alone",
   CHECK(JournalFields::current().empty());
 }
 
-TEST_CASE("an event can be asked for by its state, its fault and its time", "[journal]") {
+TEST_CASE("an event has journal fields for its state, its fault and its time", "[journal]") {
   Event event;
   event.at = TimePoint(std::chrono::nanoseconds(1234));
   event.data = Event::FaultRaised{Fault::overspeed, 0.0};
@@ -71,7 +71,7 @@ TEST_CASE("an event can be asked for by its state, its fault and its time", "[jo
   CHECK(field(journal_fields(event), "MESSAGE_ID") == kRenderingMessageId);
 }
 
-TEST_CASE("ids of messages are 128 bits, and three", "[journal]") {
+TEST_CASE("the three message ids have 128 bits and differ", "[journal]") {
   for (const std::string id : {kStateMessageId, kFaultMessageId, kRenderingMessageId}) {
     CHECK(id.size() == 32);
     CHECK(id.find_first_not_of("0123456789abcdef") == std::string::npos);

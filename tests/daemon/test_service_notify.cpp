@@ -24,7 +24,7 @@ std::optional<LoopStatus> loop(State state, std::uint64_t ticks, Fault cause = F
   return LoopStatus{state, cause, ticks};
 }
 
-TEST_CASE("the service is ready when the self-test is over, and not before", "[service_notify]") {
+TEST_CASE("the service is ready after the self-test, not before", "[service_notify]") {
   ServiceReport report;
   CHECK(report.next_message({}) == "STATUS=starting\n");
   report.running("loopback");
@@ -36,7 +36,7 @@ TEST_CASE("the service is ready when the self-test is over, and not before", "[s
   CHECK(report.next_message(loop(State::disarmed, 40)) == "WATCHDOG=1\n");
 }
 
-TEST_CASE("a self-test that fails makes it ready all the same, with the fault and its cure as status",
+TEST_CASE("after a failed self-test the service is ready, with the fault and its cure as status",
           "[service_notify]") {
   ServiceReport report;
   report.running("loopback");
@@ -47,14 +47,14 @@ TEST_CASE("a self-test that fails makes it ready all the same, with the fault an
             std::string(row.cure) + "; device loopback\n");
 }
 
-TEST_CASE("what waits for a device is ready and alive", "[service_notify]") {
+TEST_CASE("a service that waits for a device is ready and alive", "[service_notify]") {
   ServiceReport report;
   report.waiting("no device is\nplugged in");
   CHECK(report.next_message({}) == "READY=1\nWATCHDOG=1\nSTATUS=waiting: no device is plugged in\n");
   CHECK(report.next_message({}) == "WATCHDOG=1\n");
 }
 
-TEST_CASE("a loop that does not tick gives no sign of life, until it ticks again", "[service_notify]") {
+TEST_CASE("without ticks of the loop the service sends no watchdog message", "[service_notify]") {
   ServiceReport report;
   report.running("loopback");
   report.next_message(loop(State::disarmed, 7));
@@ -63,7 +63,7 @@ TEST_CASE("a loop that does not tick gives no sign of life, until it ticks again
   CHECK(report.next_message(loop(State::disarmed, 8)) == "WATCHDOG=1\n");
 }
 
-TEST_CASE("a device that comes back has its loop watched anew, and readiness is told once",
+TEST_CASE("after a reconnection the service watches the new loop, and reports readiness only once",
           "[service_notify]") {
   ServiceReport report;
   report.running("a");
@@ -76,7 +76,7 @@ TEST_CASE("a device that comes back has its loop watched anew, and readiness is 
   CHECK(report.next_message(loop(State::disarmed, 9)) == "WATCHDOG=1\nSTATUS=disarmed; device a\n");
 }
 
-TEST_CASE("reading a configuration anew and stopping are told once each", "[service_notify]") {
+TEST_CASE("reloading and stopping are reported once each", "[service_notify]") {
   ServiceReport report;
   report.running("a");
   report.next_message(loop(State::disarmed, 7));
@@ -91,7 +91,7 @@ TEST_CASE("reading a configuration anew and stopping are told once each", "[serv
   CHECK(report.next_message({}) == "WATCHDOG=1\nSTATUS=refused: x.toml:1:1: no\n");
 }
 
-/// Stands in for the service manager: a socket, and what was sent to it.
+/// Replaces the service manager: a socket and the messages sent to it.
 class Manager {
  public:
   Manager() : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
@@ -111,18 +111,18 @@ class Manager {
   Manager(const Manager&) = delete;
   Manager& operator=(const Manager&) = delete;
 
-  /// All that has come since the last time, a line each.
-  std::string heard() {
+  /// Returns the messages since the previous call, one per line.
+  std::string received() {
     std::string text;
     char message[4096];
     for (ssize_t n; (n = ::recv(socket_, message, sizeof(message), 0)) > 0;)
       text.append(message, static_cast<std::size_t>(n));
     return text;
   }
-  /// Waits for it.
-  bool hears(const std::string& text) {
+  /// Waits up to 20 s for the text. Returns true if it arrived.
+  bool receives(const std::string& text) {
     for (const auto end = std::chrono::steady_clock::now() + 20s; std::chrono::steady_clock::now() < end;) {
-      all_ += heard();
+      all_ += received();
       if (all_.find(text) != std::string::npos) return true;
       std::this_thread::sleep_for(5ms);
     }
@@ -130,7 +130,7 @@ class Manager {
   }
   const std::string& all() const { return all_; }
   void forget() {
-    heard();
+    received();
     all_.clear();
   }
 
@@ -140,79 +140,79 @@ class Manager {
   std::string all_;
 };
 
-TEST_CASE("the manager hears of it by its socket, and no more of life once the ticks stand still",
+TEST_CASE("the manager gets the messages on its socket, and no watchdog message without ticks",
           "[service_notify]") {
   Manager manager;
   std::atomic<std::uint64_t> ticks{0};
   std::atomic<bool> ticking{true};
   ServiceNotify service;
-  CHECK(manager.hears("STATUS=starting\n"));
+  CHECK(manager.receives("STATUS=starting\n"));
   service.running(
       [&] {
         return LoopStatus{State::disarmed, Fault::none, ticking ? ++ticks : ticks.load()};
       },
       "loopback");
-  CHECK(manager.hears("READY=1\n"));
+  CHECK(manager.receives("READY=1\n"));
   manager.forget();
-  CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\nWATCHDOG=1\n"));
+  CHECK(manager.receives("WATCHDOG=1\nWATCHDOG=1\nWATCHDOG=1\n"));
   ticking = false;
   service.running([&] { return LoopStatus{State::disarmed, Fault::none, ticks.load()}; }, "loopback");
   std::this_thread::sleep_for(150ms);
   manager.forget();
   std::this_thread::sleep_for(300ms);
-  CHECK(manager.heard() == "");
+  CHECK(manager.received() == "");
   service.waiting("nothing is plugged in");
-  CHECK(manager.hears("WATCHDOG=1\nSTATUS=waiting: nothing is plugged in\n"));
+  CHECK(manager.receives("WATCHDOG=1\nSTATUS=waiting: nothing is plugged in\n"));
 }
 
-TEST_CASE("nobody asked: nothing is said and no thread runs", "[service_notify]") {
+TEST_CASE("without a service manager no message is sent and no thread runs", "[service_notify]") {
   ::unsetenv("NOTIFY_SOCKET");
   ServiceNotify service;
-  bool asked = false;
+  bool status_read = false;
   service.running(
       [&] {
-        asked = true;
+        status_read = true;
         return LoopStatus{};
       },
       "loopback");
   std::this_thread::sleep_for(150ms);
   service.loop_ended();
-  CHECK_FALSE(asked);
+  CHECK_FALSE(status_read);
 }
 
-TEST_CASE("wrenchd tells its manager: ready after the self-test, alive, stopping",
+TEST_CASE("wrenchd reports to its manager: ready after the self-test, alive, stopping",
           "[service_notify][wall_time]") {
   Manager manager;
   RunningProgram wrenchd("wrenchd", {"--simulate", "loopback", "--realtime", "best_effort"});
-  CHECK(manager.hears("READY=1\n"));
+  CHECK(manager.receives("READY=1\n"));
   CHECK_THAT(manager.all(), Contains("STATUS=self-test; device loopback, simulated\n"));
-  CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
+  CHECK(manager.receives("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
-  CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\n"));
+  CHECK(manager.receives("WATCHDOG=1\nWATCHDOG=1\n"));
   wrenchd.signal(SIGUSR1);
-  CHECK(manager.hears("STATUS=stopped: stop_requested: "));
+  CHECK(manager.receives("STATUS=stopped: stop_requested: "));
   wrenchd.signal(SIGUSR2);
-  CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
+  CHECK(manager.receives("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
   wrenchd.signal(SIGTERM);
   CHECK(wrenchd.wait().exit_code == 0);
-  CHECK(manager.hears("STOPPING=1\n"));
+  CHECK(manager.receives("STOPPING=1\n"));
 }
 
-TEST_CASE("wrenchd that refuses to start leaves its reason as status, and was never ready",
+TEST_CASE("wrenchd that does not start reports the reason as status, and is never ready",
           "[service_notify]") {
   Manager manager;
   const TemporaryDirectory dir;
   const std::string file = dir.write("typo.toml", "[servo]\nrat_Hz = 1000\n").string();
   CHECK(run_program("wrenchd", {"--config", file}).exit_code == 1);
-  CHECK(manager.hears("STATUS=refused: " + file + ":2:1: key 'servo.rat_Hz' is not known"));
+  CHECK(manager.receives("STATUS=refused: " + file + ":2:1: key 'servo.rat_Hz' is not known"));
   CHECK_THAT(manager.all(), !Contains("READY=1"));
 }
 
-TEST_CASE("wrenchd without a device is ready, and says what it waits for", "[service_notify]") {
+TEST_CASE("wrenchd without a device is ready, and reports what it waits for", "[service_notify]") {
   Manager manager;
   RunningProgram wrenchd("wrenchd", {"--profile", "reference_full_speed", "--realtime", "best_effort"});
-  CHECK(manager.hears("STATUS=waiting: "));
+  CHECK(manager.receives("STATUS=waiting: "));
   CHECK_THAT(manager.all(),
              Contains("READY=1\n") && Contains("no device of profile reference_full_speed is connected\n"));
   wrenchd.signal(SIGTERM);

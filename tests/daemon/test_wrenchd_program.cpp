@@ -12,7 +12,7 @@ using namespace test;
 
 constexpr const char* kReleased = "the hand is released: zero wrench, motors off";
 
-/// In virtual time: no clock, no scheduler, the same on every machine.
+/// Runs wrenchd in virtual time, so that the result is the same on every machine.
 ProgramResult run_virtual(std::vector<std::string> more) {
   more.insert(more.begin(), {"--virtual-time", "--seconds", "5"});
   return run_program("wrenchd", more);
@@ -43,7 +43,7 @@ TEST_CASE("wrenchd shows contact and a plausible force on the simulated device")
       continue;
     const bool contact = line.find("| 0 contacts |") == std::string::npos;
     ++(contact ? in_contact : free);
-    // F x y z: the table pushes up, and only while it is touched.
+    // F x y z: the table pushes up, and only in contact.
     double x = 0, y = 0, z = 0;
     REQUIRE(std::sscanf(line.c_str() + line.find("| F ") + 4, "%lf %lf %lf", &x, &y, &z) == 3);
     CHECK((contact ? z > 0.0 : std::abs(x) + std::abs(y) + std::abs(z) == 0.0));
@@ -53,15 +53,15 @@ TEST_CASE("wrenchd shows contact and a plausible force on the simulated device")
   CHECK(in_contact > 3);
   CHECK(most_force_N > 0.5);    // the hand presses
   CHECK(most_force_N <= 10.0);  // the profile's limit
-  CHECK(result.out.find("5000 ticks in 5.00 s (1000.0 Hz); in contact at ") != std::string::npos);
-  CHECK(result.out.find("overruns 0, ticks left out 0") != std::string::npos);
+  CHECK(result.out.find("5000 ticks in 5.00 s (1000.0 Hz); in contact in ") != std::string::npos);
+  CHECK(result.out.find("overruns 0, skipped ticks 0") != std::string::npos);
   CHECK(result.err.find("device loopback, tool of 8 hull vertices, 1 obstacles, 1000 Hz") !=
         std::string::npos);
   CHECK(result.err.find("state: active") != std::string::npos);
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
-TEST_CASE("wrenchd simulates the device of a profile that is for a real one") {
+TEST_CASE("wrenchd simulates the device of a real device's profile") {
   const ProgramResult result = run_virtual({"--arm", "--live", "--simulate", "reference_full_speed"});
   CHECK(result.exit_code == 0);
   CHECK(result.err.find("device reference_full_speed,") != std::string::npos);
@@ -69,7 +69,7 @@ TEST_CASE("wrenchd simulates the device of a profile that is for a real one") {
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
-TEST_CASE("wrenchd simulates devices of every kind, and their hands feel what their motors can do") {
+TEST_CASE("wrenchd simulates devices of every kind, and renders with the motors they have") {
   for (const std::string profile : {"polhem", "falcon"}) {
     const ProgramResult result = run_program(
         "wrenchd", {"--arm", "--live", "--simulate", profile, "--virtual-time", "--seconds", "6"});
@@ -82,20 +82,20 @@ TEST_CASE("wrenchd simulates devices of every kind, and their hands feel what th
   const ProgramResult mouse = run_program(
       "wrenchd", {"--arm", "--live", "--simulate", "spacemouse_split", "--virtual-time", "--seconds", "6"});
   CHECK(mouse.exit_code == 0);
-  CHECK(mouse.out.find("in contact at 0 of") == std::string::npos);
+  CHECK(mouse.out.find("in contact in 0 of") == std::string::npos);
   CHECK(mouse.err.find("the device has no motors") != std::string::npos);
   CHECK(mouse.out.find(" mN.m on the tool (no motors) | tick ") != std::string::npos);
   CHECK(mouse.out.find("largest force 0.00 N") == std::string::npos);
   CHECK(mouse.out.find(" on the tool, not sent: no motors\n") != std::string::npos);
 }
 
-TEST_CASE("wrenchd in virtual time says the same every time") {
+TEST_CASE("two runs of wrenchd in virtual time print the same") {
   const ProgramResult one = run_virtual({"--arm", "--live"}), two = run_virtual({"--arm", "--live"});
   CHECK(one.exit_code == 0);
   CHECK(one.out == two.out);
 }
 
-TEST_CASE("wrenchd that is not armed measures, and gives no force") {
+TEST_CASE("wrenchd measures and sends zero force while it is not armed") {
   const ProgramResult result = run_virtual({"--live"});
   CHECK(result.exit_code == 0);
   CHECK(result.out.find(" s disarmed ") != std::string::npos);
@@ -104,13 +104,13 @@ TEST_CASE("wrenchd that is not armed measures, and gives no force") {
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
-TEST_CASE("wrenchd is silent on standard output unless asked") {
+TEST_CASE("wrenchd prints nothing on standard output without --live") {
   const ProgramResult result = run_virtual({"--arm"});
   CHECK(result.exit_code == 0);
   CHECK(result.out == "");
 }
 
-TEST_CASE("wrenchd takes another scene, configuration and profile") {
+TEST_CASE("wrenchd accepts another scene, configuration and profile") {
   const TemporaryDirectory dir;
   dir.write("body.obj", as_obj(box({-0.02, -0.02, -0.02}, {0.02, 0.02, 0.02})));
   const fs::path scene = dir.write("scene.toml", "[tool]\nmesh = \"body.obj\"\nmass = 0.1\n");
@@ -120,11 +120,11 @@ TEST_CASE("wrenchd takes another scene, configuration and profile") {
   INFO(result.err);
   CHECK(result.exit_code == 0);
   CHECK(result.err.find("tool of 8 hull vertices, 0 obstacles, 2000 Hz") != std::string::npos);
-  CHECK(result.out.find("10000 ticks in 5.00 s (2000.0 Hz); in contact at 0 of 50 looks") !=
+  CHECK(result.out.find("10000 ticks in 5.00 s (2000.0 Hz); in contact in 0 of 50 samples") !=
         std::string::npos);
 }
 
-TEST_CASE("wrenchd refuses what it cannot use, with its place, and starts nothing") {
+TEST_CASE("wrenchd rejects invalid files with their location, and starts nothing") {
   const TemporaryDirectory dir;
   const std::string box_off = as_off(box({0, 0, 0}, {1, 1, 1}));
   dir.write("body.off", box_off);
@@ -136,7 +136,7 @@ TEST_CASE("wrenchd refuses what it cannot use, with its place, and starts nothin
   const std::string missing = (dir.path() / "missing.toml").string();
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string reason;
   } const table[] = {
       {{"--config", missing}, "missing.toml: no such file"},
       {{"--config", dir.path().string()}, ": is a directory; name a file in it"},
@@ -164,29 +164,29 @@ TEST_CASE("wrenchd refuses what it cannot use, with its place, and starts nothin
        "limits.toml:"},
       {{"--profile", file("empty.toml", "")}, "empty.toml:1:1: key 'limits' is missing"},
       {{"--profile", "reference_full_speed"},
-       "--virtual-time: a real device lives in real time; simulate one, as with --simulate "
+       "--virtual-time: a real device runs in real time; simulate a device, for example with --simulate "
        "reference_full_speed"},
-      {{"--profile", "auto"}, "simulate one, as with --simulate loopback"},
+      {{"--profile", "auto"}, "simulate a device, for example with --simulate loopback"},
       {{"--simulate", "gone"}, "gone.toml: no such file"},
       {{"--simulate", "auto"}, "--simulate auto: name the profile to simulate, as in --simulate loopback"},
       {{"--record", (dir.path() / "gone/run.h5").string()},
        "run.h5: cannot be created; check that the directory exists"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, reason] : table) {
     const ProgramResult result = run_virtual(arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(reason << "\ngot " << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
     CHECK(result.err.find("wrenchd: ") != std::string::npos);
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(reason) != std::string::npos);
     CHECK(result.err.find("state: ") == std::string::npos);
   }
 }
 
-TEST_CASE("wrenchd refuses a command line that it does not understand") {
+TEST_CASE("wrenchd rejects an invalid command line") {
   struct {
     std::vector<std::string> arguments;
-    std::string told;
+    std::string reason;
   } const table[] = {
       {{"--virtual-time"}, "--seconds"},
       {{"--seconds", "0"}, "--seconds: expected a number from 0.001 to 1e+09, found '0'"},
@@ -201,12 +201,12 @@ TEST_CASE("wrenchd refuses a command line that it does not understand") {
       {{"stray"}, "stray"},
       {{"--simulate", "loopback", "--profile", "loopback"}, "--profile excludes --simulate"},
   };
-  for (const auto& [arguments, told] : table) {
+  for (const auto& [arguments, reason] : table) {
     const ProgramResult result = run_program("wrenchd", arguments);
-    INFO(told << "\ngot " << result.err);
+    INFO(reason << "\ngot " << result.err);
     CHECK(result.exit_code > 100);
     CHECK(result.out == "");
-    CHECK(result.err.find(told) != std::string::npos);
+    CHECK(result.err.find(reason) != std::string::npos);
   }
 }
 
@@ -246,7 +246,7 @@ TEST_CASE("a signal ends wrenchd, and the hand is released") {
   }
 }
 
-TEST_CASE("wrenchd stops by itself after the seconds given, in wall time too") {
+TEST_CASE("wrenchd stops by itself after --seconds in wall time") {
   const auto start = std::chrono::steady_clock::now();
   const ProgramResult result = run_program("wrenchd", {"--realtime", "off", "--seconds", "0.5", "--live"});
   const auto took = std::chrono::steady_clock::now() - start;
@@ -256,7 +256,7 @@ TEST_CASE("wrenchd stops by itself after the seconds given, in wall time too") {
   CHECK(result.err.find(kReleased) != std::string::npos);
 }
 
-TEST_CASE("wrenchd explains itself") {
+TEST_CASE("wrenchd prints help and version") {
   const ProgramResult help = run_program("wrenchd", {"--help"});
   CHECK(help.exit_code == 0);
   CHECK(help.err == "");

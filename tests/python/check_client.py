@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Holds the Python package against a daemon at WRENCHD_SOCKET that ticks, has a cube in the hand above a table, and
-lets everybody do everything."""
+"""Checks the Python package against a daemon at WRENCHD_SOCKET. The daemon ticks, has a cube in the hand above a table,
+and gives every client all permissions."""
 
 import gc
 import math
@@ -15,6 +15,7 @@ import wrenchd
 
 
 def soon(done):
+    """Waits up to 30 s for done() to return True. Returns whether it did."""
     end = time.monotonic() + 30
     while time.monotonic() < end:
         if done():
@@ -23,34 +24,35 @@ def soon(done):
     return False
 
 
-def insist_on_arming(client):
-    """A busy machine may make the loop late, which is a fault to it."""
+def keep_arming(client):
+    """Arms, also after a fault: a busy machine may make the loop late, which is a fault."""
     state = client.status()["state"]
     if state == "fault":
         client.acknowledge()
     if state == "disarmed":
         try:
             client.arm()
-        except wrenchd.Rejected as refused:  # so busy that a beat came too late
-            assert refused.code == wrenchd.Rejected.INVALID_STATE, refused
+        except wrenchd.Rejected as rejected:  # the machine is so busy that a heartbeat came too late
+            assert rejected.code == wrenchd.Rejected.INVALID_STATE, rejected
             client.call("lease.acquire")
 
 
-def rests(client):
+def becomes_disarmed(client):
+    """Disarms and acknowledges. Returns True if the loop is disarmed."""
     client.disarm()
     if client.status()["state"] in ("fault", "stopped"):
         client.acknowledge()
     return client.status()["state"] == "disarmed"
 
 
-class Answers(threading.Thread):
-    """A daemon that sends what it is told to, and ends."""
+class ScriptedDaemon(threading.Thread):
+    """A daemon that sends one scripted response for each request, then closes the connection."""
 
-    def __init__(self, *answers):
+    def __init__(self, *responses):
         super().__init__(daemon=True)
         self.directory = tempfile.TemporaryDirectory()
         self.path = os.path.join(self.directory.name, "control.sock")
-        self.answers = answers
+        self.responses = responses
         self.listening = socket.socket(socket.AF_UNIX)
         self.listening.bind(self.path)
         self.listening.listen()
@@ -58,10 +60,10 @@ class Answers(threading.Thread):
 
     def run(self):
         peer, _ = self.listening.accept()
-        for answer in self.answers:
+        for response in self.responses:
             peer.recv(65536)
-            for i in range(0, len(answer), 5):
-                peer.sendall(answer[i:i + 5])
+            for i in range(0, len(response), 5):
+                peer.sendall(response[i:i + 5])
         peer.close()
 
 
@@ -69,19 +71,19 @@ class Commands(unittest.TestCase):
     def setUp(self):
         self.client = wrenchd.Client()
         self.addCleanup(self.client.close)
-        self.assertTrue(soon(lambda: rests(self.client)))
+        self.assertTrue(soon(lambda: becomes_disarmed(self.client)))
 
     def test_lease_arm_and_stop(self):
-        with self.assertRaises(wrenchd.Rejected) as refused:
+        with self.assertRaises(wrenchd.Rejected) as rejected:
             self.client.arm()
-        self.assertEqual(refused.exception.code, wrenchd.Rejected.INVALID_STATE)
+        self.assertEqual(rejected.exception.code, wrenchd.Rejected.INVALID_STATE)
         with self.client.lease():
-            with wrenchd.Client() as other, self.assertRaises(wrenchd.Rejected) as refused:
+            with wrenchd.Client() as other, self.assertRaises(wrenchd.Rejected) as rejected:
                 other.lease()
-            self.assertEqual(refused.exception.code, wrenchd.Rejected.LEASE_HELD)
+            self.assertEqual(rejected.exception.code, wrenchd.Rejected.LEASE_HELD)
 
             def active():
-                insist_on_arming(self.client)
+                keep_arming(self.client)
                 return self.client.status()["state"] == "active"
 
             self.assertTrue(soon(active))
@@ -90,7 +92,7 @@ class Commands(unittest.TestCase):
                 tick = state.latest()
             self.client.stop()
             self.assertTrue(soon(lambda: self.client.status()["state"] in ("stopped", "fault")))
-        self.assertTrue(soon(lambda: rests(self.client)))
+        self.assertTrue(soon(lambda: becomes_disarmed(self.client)))
         if tick.contact_list:
             self.assertAlmostEqual(sum(contact.load_fraction for contact in tick.contact_list), 1.0)
 
@@ -108,7 +110,7 @@ class Commands(unittest.TestCase):
 
         self.assertTrue(soon(free))
 
-    def test_refusals_have_a_sentence(self):
+    def test_rejections_have_a_message(self):
         with self.assertRaisesRegex(wrenchd.Rejected, "dance"):
             self.client.call("dance")
         self.assertIn("state", self.client.status())
@@ -119,14 +121,14 @@ class Commands(unittest.TestCase):
         self.client.unsubscribe()
 
 
-class ReadsState(unittest.TestCase):
+class StateReading(unittest.TestCase):
     def setUp(self):
         self.client = wrenchd.Client()
         self.addCleanup(self.client.close)
         self.state = self.client.open_state()
         self.addCleanup(self.state.close)
 
-    def test_ticks_have_all_that_is_described(self):
+    def test_ticks_have_all_described_fields(self):
         described = self.state.describe()
         self.assertIn("X_WQ", described)
         tick = self.state.next()
@@ -150,7 +152,7 @@ class ReadsState(unittest.TestCase):
         tick = self.state.next()
         self.assertGreaterEqual(self.state.latest().tick, tick.tick)
 
-    def test_a_slow_reader_is_told_what_it_missed(self):
+    def test_a_slow_reader_gets_the_number_of_missed_records(self):
         first = self.state.next().tick
         written = self.state._written
         slots = self.state._layout.slots
@@ -161,32 +163,32 @@ class ReadsState(unittest.TestCase):
         self.assertLess(self.state.unread, slots)
         self.assertGreater(written(), slots)
 
-    def test_a_record_that_is_written_over_while_it_is_copied_is_not_taken(self):
+    def test_a_record_that_is_overwritten_during_the_copy_is_rejected(self):
         state = self.state
-        memory, words, late = state._memory, state._words, []
+        memory, words, copies = state._memory, state._words, []
 
         class Memory:
             def __getitem__(self, where):
-                late.append(where)
+                copies.append(where)
                 return memory[where]
 
         class Words:
             def __getitem__(self, word):
-                return words[word] + len(late)
+                return words[word] + len(copies)
 
         newest = state._written() - 1
         self.assertIsNotNone(state._copy(newest))
         state._memory, state._words = Memory(), Words()
-        taken = state._copy(newest)
+        copied = state._copy(newest)
         state._memory, state._words = memory, words
-        self.assertEqual(len(late), 1)
-        self.assertIsNone(taken)
+        self.assertEqual(len(copies), 1)
+        self.assertIsNone(copied)
 
     def test_contacts_name_features_and_obstacle(self):
-        def touched():
+        def in_contact():
             return bool(self.state.latest().contact_list)
 
-        self.assertTrue(soon(touched))
+        self.assertTrue(soon(in_contact))
         for tick in self.state.ticks(5000):
             if tick.contact_list:
                 break
@@ -208,35 +210,36 @@ class ReadsState(unittest.TestCase):
         numpy.testing.assert_allclose(numpy.linalg.norm(array["X_WP"][:, 3:], axis=1), 1.0)
 
 
-class Names(unittest.TestCase):
-    def test_each_rendering_has_its_own_and_the_daemon_is_asked_once(self):
-        answers = [{"rendering_id": 4, "obstacles": ["bolt"]}, wrenchd.Disconnected("gone"), {"rendering_id": 7, "obstacles": []}]
-        asked = []
+class ObstacleNames(unittest.TestCase):
+    def test_each_rendering_has_its_own_names_requested_once(self):
+        responses = [{"rendering_id": 4, "obstacles": ["bolt"]}, wrenchd.Disconnected("gone"),
+                     {"rendering_id": 7, "obstacles": []}]
+        requested = []
 
-        def ask():
-            asked.append(answers.pop(0))
-            if isinstance(asked[-1], Exception):
-                raise asked[-1]
-            return asked[-1]
+        def request():
+            requested.append(responses.pop(0))
+            if isinstance(requested[-1], Exception):
+                raise requested[-1]
+            return requested[-1]
 
-        names = wrenchd.state._Names({"rendering_id": 3, "obstacles": ["table", "nut"]}, ask)
+        names = wrenchd.state._Names({"rendering_id": 3, "obstacles": ["table", "nut"]}, request)
         self.assertEqual(names.of(3, 1), "nut")
-        self.assertEqual(asked, [])
+        self.assertEqual(requested, [])
         self.assertEqual([names.of(4, 0), names.of(4, 1), names.of(3, 0)], ["bolt", "obstacle 1", "table"])
-        self.assertEqual(len(asked), 1)
+        self.assertEqual(len(requested), 1)
         self.assertEqual([names.of(5, 0), names.of(7, 0), names.of(6, 0)], ["obstacle 0"] * 3)
-        self.assertEqual(answers, [])
+        self.assertEqual(responses, [])
         with self.assertRaises(wrenchd.ProtocolError):
-            wrenchd.state._Names({"rendering_id": 3}, ask)
+            wrenchd.state._Names({"rendering_id": 3}, request)
 
 
-class Unhappy(unittest.TestCase):
+class Failures(unittest.TestCase):
     def test_no_daemon(self):
         with self.assertRaisesRegex(wrenchd.NoDaemon, "/nowhere/s: No such file.*start it"):
             wrenchd.Client("/nowhere/s")
 
-    def test_a_daemon_that_ends_is_an_error_and_no_wait(self):
-        client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"result":{"state":"disarmed"}}\n').path)
+    def test_a_daemon_that_ends_is_an_error_without_a_wait(self):
+        client = wrenchd.Client(ScriptedDaemon(b'{"jsonrpc":"2.0","id":1,"result":{"state":"disarmed"}}\n').path)
         self.assertEqual(client.status(), {"state": "disarmed"})
         for _ in range(3):
             with self.assertRaises(wrenchd.Disconnected):
@@ -245,28 +248,28 @@ class Unhappy(unittest.TestCase):
             client.event()
         self.assertFalse(client.is_connected())
 
-    def test_half_a_line_is_no_answer(self):
-        client = wrenchd.Client(Answers(b'{"jsonrpc":"2.0","id":1,"res').path, 1.0)
+    def test_half_a_line_is_not_a_response(self):
+        client = wrenchd.Client(ScriptedDaemon(b'{"jsonrpc":"2.0","id":1,"res').path, 1.0)
         with self.assertRaises((wrenchd.Disconnected, wrenchd.Timeout)):
             client.status()
 
-    def test_a_daemon_that_hangs(self):
-        client = wrenchd.Client(Answers(b"", b"").path, 0.1)
+    def test_a_daemon_that_does_not_respond(self):
+        client = wrenchd.Client(ScriptedDaemon(b"", b"").path, 0.1)
         with self.assertRaises(wrenchd.Timeout):
             client.status()
 
-    def test_nonsense(self):
-        client = wrenchd.Client(Answers(b"[1]\n").path)
+    def test_an_invalid_response(self):
+        client = wrenchd.Client(ScriptedDaemon(b"[1]\n").path)
         with self.assertRaises(wrenchd.ProtocolError):
             client.status()
 
-    def test_events_between_answers_are_kept(self):
+    def test_events_between_responses_are_kept(self):
         event = b'{"jsonrpc":"2.0","method":"event","params":{"name":"fault","sequence":%d}}\n'
-        client = wrenchd.Client(Answers(event % 1 + event % 2 + b'{"jsonrpc":"2.0","id":1,"result":{}}\n').path)
+        client = wrenchd.Client(ScriptedDaemon(event % 1 + event % 2 + b'{"jsonrpc":"2.0","id":1,"result":{}}\n').path)
         client.status()
         self.assertEqual([client.event()["sequence"], client.event()["sequence"]], [1, 2])
 
-    def test_memory_that_is_not_sealed_is_refused(self):
+    def test_memory_that_is_not_sealed_is_rejected(self):
         with wrenchd.Client() as client:
             layout = client.call("state.open")["layout"]
         unsealed = os.memfd_create("unsealed", os.MFD_ALLOW_SEALING)
@@ -276,7 +279,7 @@ class Unhappy(unittest.TestCase):
         with self.assertRaises(wrenchd.ProtocolError):
             wrenchd.State({**layout, "version": 99}, os.memfd_create("x"))
 
-    def test_no_descriptor_is_left(self):
+    def test_no_descriptor_leaks(self):
         def count():
             gc.collect()
             return len(os.listdir("/proc/self/fd"))
@@ -284,11 +287,11 @@ class Unhappy(unittest.TestCase):
         before = count()
         for _ in range(10):
             with wrenchd.Client() as client:
-                client.call("state.open")  # its descriptor is nobody's
+                client.call("state.open")  # the client closes this descriptor
                 client.status()
                 with client.open_state() as state:
                     state.next()
-        self.assertLessEqual(count(), before)  # those of the test before may close only now
+        self.assertLessEqual(count(), before)  # descriptors of the previous test may close only now
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opens a recording as a scientist would: with h5py alone, and none of our code. Usage: check_recording.py FILE"""
+"""Checks a recording with h5py alone, without wrenchd's package. Usage: check_recording.py FILE"""
 import datetime
 import hashlib
 import sys
@@ -20,7 +20,7 @@ UNITS = {
 
 def check(what, good):
     if not good:
-        sys.exit("not so: " + what)
+        sys.exit("failed: " + what)
 
 
 with h5py.File(sys.argv[1], "r") as file:
@@ -36,46 +36,47 @@ with h5py.File(sys.argv[1], "r") as file:
     check("states have names", names[5] == "active")
 
     fields = file["fields"]
-    check("a row a column", len(fields) == len(ticks.dtype.names) + len(contacts.dtype.names))
+    check("one row per column", len(fields) == len(ticks.dtype.names) + len(contacts.dtype.names))
     rows = {(row["table"].decode(), row["name"].decode()): row for row in fields}
     check("the table of fields has units", rows[("ticks", "F_out")]["unit"].decode() == UNITS["F_out"])
-    check("and counts", rows[("ticks", "F_out")]["count"] == 6)
+    check("the table of fields has counts", rows[("ticks", "F_out")]["count"] == 6)
 
-    # Columns, as numbers.
+    # The columns are numbers.
     force = ticks["F_out"]
-    check("six numbers a tick", force.shape == (len(ticks), 6))
+    check("F_out has six numbers per tick", force.shape == (len(ticks), 6))
     state = ticks["state"]
-    check("it was active", np.any(state == names.index("active")))
-    check("it pushed", np.max(force[:, 2]) > 0.5)
-    check("every tick is there", np.all(np.diff(ticks["tick"].astype(np.int64)) <= 1))
-    check("times rise", np.all(np.diff(ticks["now_ns"]) >= 0))
+    check("the loop was active", np.any(state == names.index("active")))
+    check("the force exceeded 0.5 N", np.max(force[:, 2]) > 0.5)
+    check("no tick is missing", np.all(np.diff(ticks["tick"].astype(np.int64)) <= 1))
+    check("times increase", np.all(np.diff(ticks["now_ns"]) >= 0))
     rate = 1e9 / np.median(np.diff(ticks["now_ns"]))
-    check("the rate is told", abs(rate - file.attrs["rate_Hz"]) < 0.02 * rate)
+    check("the rate attribute matches the ticks", abs(rate - file.attrs["rate_Hz"]) < 0.02 * rate)
 
-    # Contacts: those of a tick are rows of the other table, their normals are unit, their shares add up.
+    # The contacts of a tick are rows of the other table. Their normals have unit length, and their load fractions sum
+    # to 1.
     some = np.flatnonzero(ticks["contact_count"] > 0)
-    check("it touched", len(some) > 100)
+    check("the tool was in contact", len(some) > 100)
     for row in ticks[some[:: max(len(some) // 50, 1)]]:
-        mine = contacts[row["first_contact"] : row["first_contact"] + row["contact_count"]]
-        check("as many as there are", len(mine) == min(row["contacts"], 16))
-        check("unit normals", np.allclose(np.linalg.norm(mine["normal_W"], axis=1), 1.0))
-        carried = np.sum(mine["load_fraction"])
-        check("shares add up", carried == 0.0 or abs(carried - 1.0) < 1e-6)
+        of_tick = contacts[row["first_contact"] : row["first_contact"] + row["contact_count"]]
+        check("the number of contacts matches", len(of_tick) == min(row["contacts"], 16))
+        check("unit normals", np.allclose(np.linalg.norm(of_tick["normal_W"], axis=1), 1.0))
+        load = np.sum(of_tick["load_fraction"])
+        check("load fractions sum to 1", load == 0.0 or abs(load - 1.0) < 1e-6)
 
-    # What it ran with.
+    # The configuration of the run.
     check("the settings", "[servo]" in file["config/settings"][()].decode())
     check("the scene", "[tool]" in file["config/scene"][()].decode())
     check("the profile", "name" in file["config/profile"][()].decode())
     mesh = file["meshes/tool"]
     check("the tool is embedded", mesh.attrs["embedded"] == 1)
-    check("and is what it says", hashlib.sha256(bytes(mesh[:])).hexdigest() == mesh.attrs["sha256"])
+    check("the mesh matches its SHA-256", hashlib.sha256(bytes(mesh[:])).hexdigest() == mesh.attrs["sha256"])
     for name in ("format", "wrenchd_version", "kernel", "realtime", "clock"):
-        check(name + " is told", len(file.attrs[name]) > 0)
+        check(name + " has a value", len(file.attrs[name]) > 0)
 
     # UTC of a tick.
     started = datetime.datetime.fromisoformat(file.attrs["started_utc"].replace("Z", "+00:00"))
-    check("both say the same", abs(started.timestamp() - 1e-9 * file.attrs["started_unix_ns"]) < 1e-5)
+    check("both start times agree", abs(started.timestamp() - 1e-9 * file.attrs["started_unix_ns"]) < 1e-5)
     if file.attrs["clock"] == "CLOCK_MONOTONIC":
         first = 1e-9 * (file.attrs["started_unix_ns"] + ticks["now_ns"][0] - file.attrs["started_ns"])
-        check("it began just now", 0 <= datetime.datetime.now().timestamp() - first < 600)
+        check("the recording started within the last 600 s", 0 <= datetime.datetime.now().timestamp() - first < 600)
     print(len(ticks), "ticks,", len(contacts), "contacts")

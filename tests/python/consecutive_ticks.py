@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads 1,000 consecutive ticks while two processes keep the machine busy beside it. Ends with 1 where one is
-missing. Usage: consecutive_ticks.py [HOW MANY]"""
+"""Reads 1,000 consecutive ticks while two other processes load the machine. Exits with 1 if a tick is missing.
+Usage: consecutive_ticks.py [COUNT]"""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ import wrenchd
 wanted = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
 busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
 try:
-    time.sleep(0.2)  # they have started
+    time.sleep(0.2)  # until both run
     with wrenchd.Client() as client, client.open_state() as state:
         farthest_behind = 0
         numbers = []
@@ -22,7 +22,8 @@ try:
         seconds = time.monotonic() - start
         assert all(process.poll() is None for process in busy)
     gaps = sum(after != before + 1 for before, after in zip(numbers, numbers[1:]))
-    print(f"{len(numbers)} ticks in {seconds:.2f} s, {gaps} gaps, {state.missed} missed, at most {farthest_behind} behind")
+    print(f"{len(numbers)} ticks in {seconds:.2f} s, {gaps} gaps, {state.missed} missed, "
+          f"at most {farthest_behind} behind")
     sys.exit(1 if gaps or state.missed or len(numbers) != wanted else 0)
 finally:
     for process in busy:

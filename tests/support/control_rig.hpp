@@ -118,7 +118,7 @@ class RigClient {
     const Json reply = request(method, params);
     return reply.is_object() && reply.contains("error") ? reply["error"]["code"].get<int>() : 0;
   }
-  void heartbeat() { send("{\"jsonrpc\":\"2.0\",\"method\":\"beat\"}\n"); }
+  void heartbeat() { send("{\"jsonrpc\":\"2.0\",\"method\":\"lease.heartbeat\"}\n"); }
   /// Returns the next event with this name; null if none came in time.
   Json next_event(const std::string& name, std::chrono::milliseconds limit = std::chrono::seconds(5)) {
     while (true) {

@@ -22,7 +22,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Refusal {
+struct Rejection {
   int code;
   std::string message;
 };
@@ -57,16 +57,16 @@ void send_line(int peer, const std::string& line, int descriptor = -1) {
   sendmsg(peer, &message, MSG_NOSIGNAL);
 }
 
-RunConfig shown_plan() {
-  RunConfig plan = shipped_config();
-  plan.settings.servo.realtime = Realtime::best_effort;
-  return plan;
+RunConfig stub_config() {
+  RunConfig config = shipped_config();
+  config.settings.servo.realtime = Realtime::best_effort;
+  return config;
 }
 
 }  // namespace
 
 StubDaemon::StubDaemon()
-    : simulated_(shown_plan()),
+    : simulated_(stub_config()),
       state_(simulated_.runtime.enable_shared_state()),
       listening_(listen_at(socket())) {
   servo_ = std::thread([this] {
@@ -175,8 +175,8 @@ void StubDaemon::answer(int peer, const std::string& line) {
   int descriptor = -1;
   try {
     reply["result"] = result_of(peer, method, request.at("params"), descriptor);
-  } catch (const Refusal& refusal) {
-    reply["error"] = {{"code", refusal.code}, {"message", refusal.message}};
+  } catch (const Rejection& rejection) {
+    reply["error"] = {{"code", rejection.code}, {"message", rejection.message}};
   }
   send_line(peer, reply.dump() + "\n", descriptor);
 }
@@ -189,14 +189,14 @@ json StubDaemon::status() {
 }
 
 json StubDaemon::result_of(int peer, const std::string& method, const json& params, int& descriptor) {
-  const auto ask = [&](CommandSet commands) {
+  const auto request = [&](CommandSet commands) -> json {
     loop().requests().request(commands);
-    return json::object();
+    return {{"requested", method}};
   };
-  if (method == "describe") return {{"protocol", 1}, {"methods", json::array()}};
+  if (method == "describe") return {{"protocol", 2}, {"methods", json::array()}};
   if (method == "status") return status();
   if (method == "devices") return json::array();
-  if (method == "reload") throw Refusal{-32004, "wrenchd.toml:3: no such key; delete it"};
+  if (method == "reload") throw Rejection{-32004, "wrenchd.toml:3: no such key; delete it"};
   if (method == "subscribe") {
     peers_[peer].subscribed = true;
     peers_[peer].names = params.value("events", std::vector<std::string>());
@@ -206,36 +206,37 @@ json StubDaemon::result_of(int peer, const std::string& method, const json& para
     peers_[peer].subscribed = false;
     return json::object();
   }
-  if (method == "lease.take") {
+  if (method == "lease.acquire") {
     int no_holder = -1;
     if (!holder_.compare_exchange_strong(no_holder, peer) && no_holder != peer)
-      throw Refusal{-32003, "another client has the lease; wait until it gives it back"};
+      throw Rejection{-32003, "another client holds the lease; wait until it releases the lease"};
     return {{"heartbeat_timeout_s", 0.1}};
   }
   if (method == "lease.release") {
     int held = peer;
-    if (!holder_.compare_exchange_strong(held, -1)) throw Refusal{-32002, "you do not hold the lease"};
+    if (!holder_.compare_exchange_strong(held, -1)) throw Rejection{-32002, "you do not hold the lease"};
     loop().requests().disarm();
     return json::object();
   }
   if (method == "arm") {
-    if (holder_.load() != peer) throw Refusal{-32002, "only who has the lease may arm; take it first"};
-    return ask(kArm | kLease | kHeartbeat);
+    if (holder_.load() != peer)
+      throw Rejection{-32002, "you do not hold the lease; acquire it with 'lease.acquire'"};
+    return request(kArm | kLease | kHeartbeat);
   }
-  if (method == "disarm") return ask(kDisarm);
-  if (method == "stop") return ask(kStop);
-  if (method == "acknowledge") return ask(kAcknowledge);
-  if (method == "reinitialize_proxy") return ask(kReinitialize);
+  if (method == "disarm") return request(kDisarm);
+  if (method == "stop") return request(kStop);
+  if (method == "acknowledge") return request(kAcknowledge);
+  if (method == "reinitialize_proxy") return request(kReinitialize);
   if (method == "state.open") {
     json answer;
     open_state(state_, simulated_.runtime.reconfigurator().obstacle_names(),
-               [&](const json& result, int handed_over) {
+               [&](const json& result, int memory) {
                  answer = result;
-                 descriptor = handed_over;
+                 descriptor = memory;
                });
     return answer;
   }
-  throw Refusal{-32601, "there is no method '" + method + "'; describe lists them"};
+  throw Rejection{-32601, "there is no method '" + method + "'; describe lists them"};
 }
 
 }  // namespace wrenchd::test

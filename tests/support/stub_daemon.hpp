@@ -18,9 +18,9 @@
 
 namespace wrenchd::test {
 
-/// The daemon's side for tests of the client libraries: a control socket with the methods that clients need,
-/// and behind it the real loop with the simulated device in wall time and its real shared memory. It has no
-/// roles; it refuses clients only because of the lease.
+/// A stub of the daemon for tests of the client libraries. Its control socket offers the methods that clients
+/// need. Behind the socket runs the real loop, with the simulated device, in wall time, and with the real
+/// shared memory. The stub has no roles; it rejects requests only because of the lease.
 class StubDaemon {
  public:
   StubDaemon();

@@ -11,33 +11,34 @@ namespace {
 using namespace test;
 using Catch::Contains;
 
-/// A simulated person who follows the instructions, given only their text.
-struct Obedient {
+/// A simulated operator who follows the instructions and knows only their text.
+struct ObedientOperator {
   PolhemInHand polhem;
-  std::vector<std::string> heard;
+  std::vector<std::string> instructions;
   int ms_left = 60000;
   bool unplugs = false;
 
   OperatorInterface person() {
-    return {[this](const std::string& words) {
-              heard.push_back(words);
-              const std::array<std::string, 6> asks = {
+    return {[this](const std::string& instruction) {
+              instructions.push_back(instruction);
+              const std::array<std::string, 6> axis_phrases = {
                   "away from you.",       "straight to the left",   "straight up",
                   "top of the handle to", "top of the handle away", "Turn"};
-              HomingState asked;
-              asked.step = words.find("into its rest") != std::string::npos ? HomingStep::reference
-                                                                            : HomingStep::holding_still;
+              HomingState requested;
+              requested.step = instruction.find("into its reference pose") != std::string::npos
+                                   ? HomingStep::reference
+                                   : HomingStep::holding_still;
               for (std::size_t axis = 0; axis < 6; ++axis) {
-                if (words.find(asks[axis]) == std::string::npos) continue;
-                asked.step = HomingStep::moving;
-                asked.axis = axis;
+                if (instruction.find(axis_phrases[axis]) == std::string::npos) continue;
+                requested.step = HomingStep::moving;
+                requested.axis = axis;
               }
-              polhem.follow_instructions(asked);
+              polhem.follow_instructions(requested);
             },
             [this] { return (polhem.X_BH.translation_m - polhem.target.translation_m).norm() < 1e-9; },
             [this] {
               polhem.step();
-              if (unplugs && heard.size() == 3) polhem.unplug();
+              if (unplugs && instructions.size() == 3) polhem.unplug();
               return --ms_left <= 0;
             }};
   }
@@ -50,7 +51,7 @@ struct Obedient {
 }  // namespace
 
 TEST_CASE("a calibration instructs the operator and returns the offsets", "[calibrate]") {
-  Obedient bench;
+  ObedientOperator bench;
   const Calibration found = bench.calibrated();
   CHECK(found.profile == "polhem");
   CHECK(found.serial == "A1");
@@ -61,23 +62,24 @@ TEST_CASE("a calibration instructs the operator and returns the offsets", "[cali
     const double missing = bench.polhem.at_power_on[k.report_index[i]] * k.rad_per_count[i];
     CHECK(found.offsets[i].offset == Approx(-missing).margin(0.01));
   }
-  CHECK(bench.heard.back() == "Homed: the device may be armed.");
+  CHECK(bench.instructions.back() == "Homed: the device may be armed.");
 }
 
 TEST_CASE("a failed calibration states the reason and returns nothing", "[calibrate]") {
-  Obedient bench;
+  ObedientOperator bench;
   bench.polhem.swapped_axis = 1;
   CHECK_THROWS_WITH(bench.calibrated(), Contains("Homing failed. That moved z, not y.") &&
-                                            Contains("look at their order in the profile"));
+                                            Contains("check their order in the profile"));
 }
 
 TEST_CASE("a calibration ends if the operator cancels or the device is disconnected", "[calibrate]") {
-  Obedient stopping;
-  stopping.ms_left = 2000;
-  CHECK_THROWS_WITH(stopping.calibrated(), Contains("nothing was stored"));
-  Obedient losing;
-  losing.unplugs = true;
-  CHECK_THROWS_WITH(losing.calibrated(), Contains("was unplugged"));
+  ObedientOperator cancelling;
+  cancelling.ms_left = 2000;
+  CHECK_THROWS_WITH(cancelling.calibrated(), Contains("no calibration was stored"));
+  ObedientOperator unplugging;
+  unplugging.unplugs = true;
+  CHECK_THROWS_WITH(unplugging.calibrated(),
+                    Contains("the device was disconnected; connect it and start again"));
 }
 
 TEST_CASE("wrenchctl calibrate rejects devices that it cannot calibrate") {

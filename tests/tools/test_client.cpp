@@ -38,13 +38,13 @@ int code_of(const Act& act) {
 }
 
 /// A busy machine may delay the loop, which then raises a fault.
-void insist_on_arming(Client& client) {
+void arm_despite_faults(Client& client) {
   const std::string state = client.state();
   if (state == "fault") client.acknowledge();
   if (state == "disarmed") client.arm();
 }
 
-bool rests(Client& client) {
+bool is_disarmed(Client& client) {
   if (client.state() == "fault") client.acknowledge();
   return client.state() == "disarmed";
 }
@@ -70,7 +70,7 @@ TEST_CASE("a client acquires the lease, arms, and reads the wrench on the hand",
     REQUIRE(state.next(tick));
     if (i > 0) CHECK(tick.tick() == last + 1);
     last = tick.tick();
-    if (last % 100 == 0) insist_on_arming(client);
+    if (last % 100 == 0) arm_despite_faults(client);
     pushed = tick.state() == "active" && tick.wrench()[2] > 0.1 && tick.contacts().size() == 4;
   }
   CHECK(pushed);
@@ -78,7 +78,7 @@ TEST_CASE("a client acquires the lease, arms, and reads the wrench on the hand",
   CHECK(daemon.heartbeats() > 10);
   CHECK(soon([&] {
     client.disarm();
-    return rests(client);
+    return is_disarmed(client);
   }));
   client.stop();
   CHECK(soon([&] { return client.state() == "stopped"; }));
@@ -86,18 +86,18 @@ TEST_CASE("a client acquires the lease, arms, and reads the wrench on the hand",
   CHECK(soon([&] { return client.state() == "disarmed"; }));
   client.release_lease();
   CHECK_FALSE(daemon.leased());
-  const int beats = daemon.heartbeats();
+  const int heartbeats = daemon.heartbeats();
   std::this_thread::sleep_for(100ms);
-  CHECK(daemon.heartbeats() == beats);
+  CHECK(daemon.heartbeats() == heartbeats);
 }
 
-TEST_CASE("a client that dies fades out: its lease ends with its connection", "[client]") {
+TEST_CASE("if a client dies, its lease ends with its connection and the force fades", "[client]") {
   StubDaemon daemon;
   {
     Client client(daemon.socket());
     client.acquire_lease();
     REQUIRE(soon([&] {
-      insist_on_arming(client);
+      arm_despite_faults(client);
       return client.state() == "active";
     }));
   }
@@ -167,11 +167,11 @@ TEST_CASE("a daemon that ends, hangs or sends invalid data is an error after a b
     daemon.stop_answering();
     CHECK(code_of([&] { client.status(); }) == ClientError::kTimeout);
   }
-  SECTION("talks nonsense") {
+  SECTION("sends invalid data") {
     daemon.send_raw("[1]\n");
     CHECK(code_of([&] { client.status(); }) == ClientError::kProtocol);
   }
-  SECTION("goes") {
+  SECTION("ends") {
     daemon.disconnect_all();
     CHECK(code_of([&] { client.status(); }) == ClientError::kDisconnected);
     CHECK(code_of([&] { client.status(); }) == ClientError::kDisconnected);

@@ -76,7 +76,7 @@ TEST_CASE("wrenchctl status prints text for a user and JSON for a program", "[co
 
 TEST_CASE("wrenchctl status reports that a device without motors applies no force", "[control_commands]") {
   const Daemon daemon("spacemouse_split");
-  has(daemon.ctl({"status"}).out, "limits     0 N, 0 N.m: it has no motors, and nothing is felt\n");
+  has(daemon.ctl({"status"}).out, "limits     0 N, 0 N.m: the device has no motors and applies no force\n");
 }
 
 TEST_CASE("wrenchctl arm keeps the force until a signal, while other clients watch",
@@ -92,9 +92,9 @@ TEST_CASE("wrenchctl arm keeps the force until a signal, while other clients wat
 
   const ProgramResult second = daemon.ctl({"disarm"});
   CHECK(second.exit_code == 0);
-  const ProgramResult taken = arm.wait();
-  CHECK(taken.exit_code == 1);
-  has(taken.err, "the daemon has disarmed");
+  const ProgramResult disarmed = arm.wait();
+  CHECK(disarmed.exit_code == 1);
+  has(disarmed.err, "the daemon has disarmed");
 
   RunningProgram again("wrenchctl", {"arm", "--socket", daemon.socket});
   REQUIRE(daemon.comes_to("active"));
@@ -145,11 +145,11 @@ TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 1);
   const ProgramResult stop = daemon.ctl({"stop"});
   CHECK(stop.exit_code == 0);
-  has(stop.out, "asked: stop; state stopped");
+  has(stop.out, "requested: stop; state stopped");
   has(daemon.ctl({"status"}).out, "cause      stop_requested: ");
   const ProgramResult arm = daemon.ctl({"arm"});
   CHECK(arm.exit_code == 1);
-  has(arm.err, "The loop cannot be armed in state 'stopped': acknowledge what happened first.");
+  has(arm.err, "The loop cannot be armed in state 'stopped': acknowledge the fault or stop first.");
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 0);
   CHECK(daemon.comes_to("disarmed"));
 }
@@ -196,7 +196,8 @@ TEST_CASE("a second daemon does not start on an occupied socket, and states the 
   const ProgramResult group = run_program("wrenchd", {"--realtime", "off", "--seconds", "0.1", "--config",
                                                       config.string(), "--control", daemon.socket + "2"});
   CHECK(group.exit_code == 1);
-  has(group.err, "key 'control.operators': this machine has no group 'no-such-group-here'; make it with");
+  has(group.err,
+      "key 'control.operators': this machine has no group 'no-such-group-here'; create it with: groupadd");
 }
 
 TEST_CASE("any operator can disarm a daemon that its command line armed", "[control_commands]") {

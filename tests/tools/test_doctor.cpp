@@ -17,7 +17,7 @@ const KnownProfiles kShipped = known_profiles(SearchPath({WRENCHD_SOURCE_DIR "/c
 /// A machine without problems. Each test changes one property.
 struct Healthy {
   TemporaryDirectory dir;
-  MachineState patient;
+  MachineState machine;
 
   Healthy() {
     dir.write("proc/sys/kernel/osrelease", "6.1.0-rt\n");
@@ -30,22 +30,22 @@ struct Healthy {
     dir.write("lib/udev/rules.d/70-wrenchd.rules", udev_rules(kShipped.profiles));
     dir.write("etc/group", "root:x:0:\nwrenchd:x:990:\nwrench:x:991:ann\n");
     dir.write("sys/bus/usb/devices/3-1/power/control", "on\n");
-    patient.root = dir.path();
-    patient.user = "ann";
-    patient.groups = {"ann", "wrench"};
-    patient.rtprio_limit = 49;
-    patient.memlock_limit_bytes = ~std::uint64_t{0};
-    patient.nodes = {{"polhem", "/dev/hidraw3", "3-1", "wrenchd", 0660}};
-    patient.profiles = kShipped.profiles;
-    patient.wake_latency = WakeLatency{true, 5us, 40us, 90us};
+    machine.root = dir.path();
+    machine.user = "ann";
+    machine.groups = {"ann", "wrench"};
+    machine.rtprio_limit = 49;
+    machine.memlock_limit_bytes = ~std::uint64_t{0};
+    machine.nodes = {{"polhem", "/dev/hidraw3", "3-1", "wrenchd", 0660}};
+    machine.profiles = kShipped.profiles;
+    machine.wake_latency = WakeLatency{true, 5us, 40us, 90us};
   }
 
   /// Returns the only finding that is not ok.
   Finding worst() const {
     Finding found;
-    for (const Finding& f : check_machine(patient)) {
+    for (const Finding& f : check_machine(machine)) {
       if (f.health == Health::ok) continue;
-      INFO(text(check_machine(patient)));
+      INFO(text(check_machine(machine)));
       CHECK(found.summary == "");  // no other finding changes
       found = f;
     }
@@ -57,7 +57,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Returns true if the finding has this severity, and its summary and remedy contain these texts.
+/// Checks that the finding has this severity and that its summary and remedy contain these texts.
 void check(const Finding& found, Health health, const std::string& what, const std::string& cure) {
   INFO(found.summary << " -> " << found.cure);
   CHECK(found.health == health);
@@ -67,7 +67,7 @@ void check(const Finding& found, Health health, const std::string& what, const s
 
 TEST_CASE("a machine without problems has only ok findings", "[doctor]") {
   const Healthy h;
-  const auto findings = check_machine(h.patient);
+  const auto findings = check_machine(h.machine);
   INFO(text(findings));
   CHECK(findings.size() == 13);
   for (const Finding& f : findings) {
@@ -91,27 +91,27 @@ TEST_CASE("kernel and processors cause warnings; a throttled real-time share is 
   SECTION("boot options") {
     Healthy h;
     h.dir.write("proc/cmdline", "quiet\n");
-    check(h.worst(), Health::warning, "no processor is kept", "isolcpus=N");
+    check(h.worst(), Health::warning, "no processor is reserved for the servo thread", "isolcpus=N");
   }
   SECTION("share") {
     Healthy h;
     h.dir.write("proc/sys/kernel/sched_rt_runtime_us", "100000\n");
     check(h.worst(), Health::failure, "only 10 %", "sched_rt_runtime_us=950000");
-    CHECK(has_failure(check_machine(h.patient)));
+    CHECK(has_failure(check_machine(h.machine)));
   }
 }
 
 TEST_CASE("limits of the user cause warnings, limits of the service cause errors", "[doctor]") {
   SECTION("priority") {
     Healthy h;
-    h.patient.rtprio_limit = 0;
+    h.machine.rtprio_limit = 0;
     check(h.worst(), Health::warning, "real-time priority of ann: up to 0", "ann - rtprio 49");
-    h.patient.is_root = true;
+    h.machine.is_root = true;
     CHECK(h.worst().summary == "");
   }
   SECTION("memory") {
     Healthy h;
-    h.patient.memlock_limit_bytes = std::uint64_t{8} << 20U;
+    h.machine.memlock_limit_bytes = std::uint64_t{8} << 20U;
     check(h.worst(), Health::warning, "ann may lock: 8 MiB", "ann - memlock unlimited");
   }
   SECTION("unit") {
@@ -122,17 +122,17 @@ TEST_CASE("limits of the user cause warnings, limits of the service cause errors
 }
 
 TEST_CASE("groups determine access to devices and arming", "[doctor]") {
-  SECTION("an onlooker") {
+  SECTION("a user outside the operators' group") {
     Healthy h;
-    h.patient.groups = {"ann"};
+    h.machine.groups = {"ann"};
     check(h.worst(), Health::warning, "ann is not in wrench", "usermod -aG wrench ann");
   }
-  SECTION("somebody who gets past all limits") {
+  SECTION("a user in the service's group") {
     Healthy h;
-    h.patient.groups = {"ann", "wrench", "wrenchd"};
+    h.machine.groups = {"ann", "wrench", "wrenchd"};
     check(h.worst(), Health::failure, "ann is in wrenchd", "gpasswd -d ann wrenchd");
   }
-  SECTION("a group that is missing") {
+  SECTION("a missing group") {
     Healthy h;
     h.dir.write("etc/group", "root:x:0:\nwrenchds:x:1:\n");
     check(h.worst(), Health::failure, "no group wrenchd", "groupadd --system wrenchd");
@@ -144,9 +144,9 @@ TEST_CASE("missing or outdated udev rules are errors", "[doctor]") {
   SECTION("none") {
     Healthy h;
     std::filesystem::remove(h.dir.path() / "lib/udev/rules.d/70-wrenchd.rules");
-    check(h.worst(), Health::failure, "there are none", cure);
+    check(h.worst(), Health::failure, "udev rules: none, so only root can open a device", cure);
   }
-  SECTION("an administrator's, of before") {
+  SECTION("outdated rules of an administrator") {
     Healthy h;
     h.dir.write("etc/udev/rules.d/70-wrenchd.rules", udev_rules(std::span(kShipped.profiles).first(2)));
     check(h.worst(), Health::failure, "/etc/udev/rules.d/70-wrenchd.rules lacks ", cure);
@@ -155,29 +155,29 @@ TEST_CASE("missing or outdated udev rules are errors", "[doctor]") {
 
 TEST_CASE("inaccessible nodes, world-accessible nodes and autosuspend are errors", "[doctor]") {
   Healthy h;
-  SECTION("root's") {
-    h.patient.nodes[0].group = "root";
+  SECTION("group root") {
+    h.machine.nodes[0].group = "root";
     check(h.worst(), Health::failure, "/dev/hidraw3 is of group root, mode 0660: the service cannot open it",
           "udevadm trigger");
   }
-  SECTION("everybody's") {
-    h.patient.nodes[0].mode = 0666;
-    check(h.worst(), Health::failure, "mode 0666: anybody may push", "0666");
+  SECTION("world-accessible") {
+    h.machine.nodes[0].mode = 0666;
+    check(h.worst(), Health::failure, "mode 0666: any user can apply force beyond all limits", "0666");
   }
-  SECTION("sleepy") {
+  SECTION("autosuspend") {
     h.dir.write("sys/bus/usb/devices/3-1/power/control", "auto\n");
-    check(h.worst(), Health::failure, "polhem in 3-1: it may fall asleep", "power/control");
+    check(h.worst(), Health::failure, "polhem in 3-1: autosuspend is on", "power/control");
   }
 }
 
 TEST_CASE("wake latency is compared with the tick period only if real time was granted", "[doctor]") {
   Healthy h;
-  h.patient.wake_latency = WakeLatency{true, 5us, 300us, 2ms};
-  check(h.worst(), Health::warning, "p50 5 us, p99.9 300 us, at most 2000 us late, with SCHED_FIFO", "heavy");
-  h.patient.wake_latency = WakeLatency{true, 5us, 1500us, 2ms};
+  h.machine.wake_latency = WakeLatency{true, 5us, 300us, 2ms};
+  check(h.worst(), Health::warning, "p50 5 us, p99.9 300 us, at most 2000 us, with SCHED_FIFO", "heavy");
+  h.machine.wake_latency = WakeLatency{true, 5us, 1500us, 2ms};
   check(h.worst(), Health::failure, "p99.9 1500 us", "heavy");
-  h.patient.wake_latency = WakeLatency{false, 5us, 1500us, 2ms};
-  check(h.worst(), Health::warning, "without SCHED_FIFO", "run it as root");
+  h.machine.wake_latency = WakeLatency{false, 5us, 1500us, 2ms};
+  check(h.worst(), Health::warning, "without SCHED_FIFO", "run as root, or raise the limits above");
 }
 
 TEST_CASE("the wake latency is measured", "[doctor]") {

@@ -37,7 +37,7 @@ std::vector<std::string> lines_of(const ExportSettings& settings) {
 
 }  // namespace
 
-TEST_CASE("columns are exported with their units, and read back as they were", "[export]") {
+TEST_CASE("columns are exported with their units, and read back with equal values", "[export]") {
   const auto lines = lines_of({.columns = {"F_out", "state", "tick"}});
   REQUIRE(lines.size() == 1001);
   CHECK(lines[0] ==
@@ -47,7 +47,7 @@ TEST_CASE("columns are exported with their units, and read back as they were", "
   CHECK(lines[1000].starts_with("0.999"));
 }
 
-TEST_CASE("all columns are exported where none is named, each with as many headings as cells", "[export]") {
+TEST_CASE("without column names all columns are exported, each with as many headings as cells", "[export]") {
   const auto lines = lines_of({});
   std::size_t cells = 1;
   for (const RecordField& field : tick_fields()) cells += field.count;

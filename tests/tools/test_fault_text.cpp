@@ -28,5 +28,6 @@ TEST_CASE("an unknown fault name is rejected with the list of names", "[fault_te
 TEST_CASE("the state machine is printed row by row", "[fault_text]") {
   const std::string text = state_machine_text();
   CHECK(std::count(text.begin(), text.end(), '\n') == static_cast<long>(transitions().size()) + 1);
-  CHECK_THAT(text, Contains("hard fault") && Contains("somebody has to look at it"));
+  CHECK_THAT(text,
+             Contains("hard fault") && Contains("a user must acknowledge before force is possible again"));
 }

@@ -32,13 +32,14 @@ class Admissible {
  public:
   explicit Admissible(const SceneSettings& settings) : scene_(settings) {
     for (const MeshObstacle& obstacle : scene_.meshes())
-      meetings_.push_back(std::make_unique<ExactIntersection>(scene_.tool_mesh()->surface.mesh(),
-                                                              obstacle.mesh->surface.mesh()));
+      intersections_.push_back(std::make_unique<ExactIntersection>(scene_.tool_mesh()->surface.mesh(),
+                                                                   obstacle.mesh->surface.mesh()));
   }
 
   bool at(const Pose& X_WT, double scene_time_s) const {
-    for (std::size_t k = 0; k < meetings_.size(); ++k)
-      if (meetings_[k]->intersect(inverse(scene_.meshes()[k].X_WO_at(scene_time_s)) * X_WT)) return false;
+    for (std::size_t k = 0; k < intersections_.size(); ++k)
+      if (intersections_[k]->intersect(inverse(scene_.meshes()[k].X_WO_at(scene_time_s)) * X_WT))
+        return false;
     for (const HalfSpaceSettings& half_space : scene_.half_spaces())
       for (const Vector3d& p : scene_.tool().hull.vertices_T_m)
         if (half_space.normal_W.dot(X_WT * p) < half_space.offset_m - kRounding_m) return false;
@@ -48,13 +49,13 @@ class Admissible {
  private:
   static constexpr double kRounding_m = 1e-12;  ///< tolerance of half-spaces, which have no clearance
   Scene scene_;
-  std::vector<std::unique_ptr<ExactIntersection>> meetings_;
+  std::vector<std::unique_ptr<ExactIntersection>> intersections_;
 };
 
 std::vector<std::string> names() {
   std::vector<std::string> all;
-  for (const GalleryScene& exhibit : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"})))
-    all.push_back(exhibit.name);
+  for (const GalleryScene& scene : gallery(SearchPath({WRENCHD_SOURCE_DIR "/config"})))
+    all.push_back(scene.name);
   return all;
 }
 
@@ -65,17 +66,17 @@ std::size_t poses_of(const Scene& scene) {
   return triangles > 50'000 ? 60 : 400;
 }
 
-void check_exhibit(const std::string& name) {
+void check_scene(const std::string& name) {
   INFO(name);
   const GalleryRun run = run_gallery_scene(name, kSeconds);
 
-  std::size_t placed = 0;
+  std::size_t proxy_complete = 0;
   for (const TickRecord& tick : run.ticks) {
     if (tick.faults != 0) FAIL("tick " << tick.tick << ": faults " << tick.faults);
-    placed +=
+    proxy_complete +=
         static_cast<ProxyInitialization>(tick.proxy_initialization) == ProxyInitialization::complete ? 1 : 0;
   }
-  CHECK(placed + 10 > run.ticks.size());
+  CHECK(proxy_complete + 10 > run.ticks.size());
   CHECK(static_cast<State>(run.ticks.back().state) == State::active);
 
   const Admissible admissible(run.config.scene);
@@ -107,31 +108,31 @@ void check_exhibit(const std::string& name) {
 }
 
 TEST_CASE("gallery: the cube of the paper", "[gallery]") {
-  check_exhibit("paper_cube");
+  check_scene("paper_cube");
 }
 TEST_CASE("gallery: a peg in its hole", "[gallery]") {
-  check_exhibit("peg_in_hole");
+  check_scene("peg_in_hole");
 }
 TEST_CASE("gallery: a key in its lock", "[gallery]") {
-  check_exhibit("key_in_lock");
+  check_scene("key_in_lock");
 }
 TEST_CASE("gallery: a pair of gears", "[gallery]") {
-  check_exhibit("gear_pair");
+  check_scene("gear_pair");
 }
 TEST_CASE("gallery: a bolt and its nut", "[gallery]") {
-  check_exhibit("bolt_and_nut");
+  check_scene("bolt_and_nut");
 }
 TEST_CASE("gallery: two hares", "[gallery]") {
-  check_exhibit("hares");
+  check_scene("hares");
 }
 TEST_CASE("gallery: a thin plate", "[gallery]") {
-  check_exhibit("thin_plate");
+  check_scene("thin_plate");
 }
 TEST_CASE("gallery: a staircase", "[gallery]") {
-  check_exhibit("staircase");
+  check_scene("staircase");
 }
 TEST_CASE("gallery: an obstacle that moves", "[gallery]") {
-  check_exhibit("moving_obstacle");
+  check_scene("moving_obstacle");
 }
 
 TEST_CASE("a recording of a scene with generated meshes replays without other files", "[gallery][program]") {

@@ -82,7 +82,7 @@ TEST_CASE("a SpaceNavigator is listed with profile, degrees of freedom and rejec
         "  /dev/hidraw2 can be opened\n"
         "  profile spacemouse_split: 3Dconnexion SpaceMouse family, translation and rotation in two reports: "
         "steers a tool, no force\n"
-        "  senses x y z rx ry rz; drives none: it moves a tool, and every wrench is dropped\n"
+        "  senses x y z rx ry rz; drives none: the device moves a tool, and wrenchd drops every wrench\n"
         "  the report descriptor agrees with the profile\n"
         "  the other profiles:\n"
         "    example, falcon, polhem, polhem_lpc1768, reference_full_speed, reference_high_speed: its ids do "
@@ -106,7 +106,7 @@ TEST_CASE("serial numbers distinguish two equal devices", "[list_devices]") {
   CHECK(holds(text, "3-2, interface 0: 1209:0001 \"handle\", serial number A1\n"));
   CHECK(holds(text, "\n  senses x y z rx ry rz; drives x y z rx ry rz\n"));
   CHECK(holds(text,
-              "\n\n2 devices have the profile reference_full_speed: for one of them alone write a profile "
+              "\n\n2 devices have the profile reference_full_speed: to select one of them, write a profile "
               "with inherits = \"reference_full_speed\" and its serial in [match]: \"A1\" \"B2\"\n"));
 
   const std::string cure = ", and no serial numbers to distinguish them: connect only the intended device\n";
@@ -142,9 +142,9 @@ TEST_CASE("a profile that states the serial number goes to that device", "[list_
 TEST_CASE("devices with fewer degrees of freedom list the missing ones", "[list_devices]") {
   const std::string polhem = list({hid(4, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID")});
   CHECK(holds(polhem, "\n  profile polhem: "));
-  CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; of a wrench rx ry rz is dropped\n"));
+  CHECK(holds(polhem, "\n  senses x y z rx ry rz; drives x y z; wrenchd drops rx ry rz of every wrench\n"));
   CHECK(holds(polhem, "\n  the report descriptor agrees with the profile\n"));
-  CHECK(holds(polhem, "\n    woodenhaptics: it is used only where the configuration names it\n"));
+  CHECK(holds(polhem, "\n    woodenhaptics: it is used only if the configuration names it\n"));
 
   UsbDevice falcon = hid(5, {0x0403, 0xcb48, 0, 0}, {}, "FALCON HAPTIC");
   falcon.hidraw_node.clear();
@@ -164,9 +164,8 @@ TEST_CASE("closed devices are named and rejected, without advice to open them", 
   second.interface = 1;
   CHECK(list({touch, second}, false, open_to_root) ==
         "3-3, interface 0: 2988:0304 \"Touch\", no serial number\n"
-        "  3D Systems Touch (HID) (2988:0304): its protocol is not public; use it with its maker's driver, "
-        "or ask "
-        "the maker to publish the reports\n"
+        "  3D Systems Touch (HID) (2988:0304): its protocol is not public; use the manufacturer's driver, "
+        "or ask the manufacturer to publish the protocol\n"
         "  wrenchd does not open this device, independent of profiles\n");
 }
 
@@ -203,7 +202,8 @@ TEST_CASE("a device without access is listed with the udev rule", "[list_devices
 
   UsbDevice without = space_navigator_in(2);
   without.hidraw_node.clear();
-  CHECK(holds(list({without}), "\n  it has no hidraw node: "));
+  CHECK(holds(list({without}),
+              "\n  the device has no hidraw node because no HID driver handles it; reconnect it, "));
   UsbDevice high_speed = hid(1, {0x1209, 0x0002, 0xff00, 1}, reference_descriptor(), "handle");
   CHECK(holds(list({high_speed}, false, open_to_root), R"(SUBSYSTEM=="usb", ATTR{idVendor}=="1209")"));
 }
@@ -240,7 +240,7 @@ TEST_CASE("only the relevant interfaces of a device are listed", "[list_devices]
   CHECK(holds(list({keys, axes}, true),
               "spacemouse_combined, spacemouse_split: the usage is 0006, the profile requires 0008"));
 
-  // The Teensy's other interface has the ids of the profile too, and comes first.
+  // The Teensy's other interface comes first and also has the ids of the profile.
   UsbDevice console = hid(3, {0x16c0, 0x0486, 0xffc9, 4}, teensy_rawhid(), "RawHID");
   UsbDevice raw = hid(3, {0x16c0, 0x0486, 0xffab, 0x0200}, teensy_rawhid(), "RawHID");
   raw.interface = 1;
@@ -256,7 +256,7 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
   const std::string text = list({device});
   CHECK(text.find("/dev/hidraw9 (not on USB): 256f:c63a ") == 0);
   CHECK(holds(text, "\n  profile spacemouse_combined: "));
-  UsbDevice other = device;  // two of them are two devices, though neither has a socket
+  UsbDevice other = device;  // two nodes are two devices, although neither has a port path
   CHECK(holds(list({device, other}), "2 devices have the profile spacemouse_combined"));
   UsbDevice keys = keyboard_in(9);
   keys.port_path.clear();
@@ -269,7 +269,7 @@ TEST_CASE("invalid profiles are listed below the devices", "[list_devices]") {
   const std::string text = device_list(std::vector{space_navigator_in(1)}, known, false, open_to_all);
   CHECK(holds(text, "\n  profile spacemouse_split: "));
   CHECK(
-      text.ends_with("\n\nProfiles that were refused, and not asked:\n"
+      text.ends_with("\n\nInvalid profiles, which were ignored:\n"
                      "  profiles/mine.toml:3:1: key 'x' is not known\n"));
   CHECK(holds(device_list({}, {}, false, open_to_all), "There are no profiles.\n"));
 }
@@ -291,7 +291,7 @@ TEST_CASE("control characters from devices are not printed", "[list_devices]") {
 // --- the program ------------------------------------------------------------------------------------------
 
 #if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // umockdev must be loaded first, and so must they
+    !defined(__SANITIZE_THREAD__)  // umockdev and the sanitizers must both be loaded first
 std::string hex_of(const Bytes& bytes) {
   std::string text;
   for (const std::uint8_t byte : bytes)
@@ -299,7 +299,7 @@ std::string hex_of(const Bytes& bytes) {
   return text;
 }
 
-/// A HID device as umockdev-record writes it down: the USB device, its interface, the HID device, its node.
+/// Returns a HID device in the format of umockdev-record: USB device, interface, HID device and node.
 std::string mock_hid(int port, const std::string& vendor, const std::string& product, const std::string& name,
                      const std::string& serial, const Bytes& descriptor) {
   const std::string n = std::to_string(port);
@@ -329,7 +329,7 @@ std::string printed(const std::string& devices, const std::string& options = {})
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-TEST_CASE("wrenchctl devices lists what udev knows", "[list_devices]") {
+TEST_CASE("wrenchctl devices lists the devices of udev", "[list_devices]") {
   const std::string devices = mock_hid(1, "046d", "c626", "SpaceNavigator", "", space_navigator()) +
                               mock_hid(2, "1209", "0001", "handle", "A1", reference_descriptor()) +
                               mock_hid(3, "04d9", "1702", "USB Keyboard", "", boot_keyboard());
@@ -346,9 +346,9 @@ TEST_CASE("wrenchctl devices lists what udev knows", "[list_devices]") {
 }
 
 TEST_CASE("wrenchctl devices without a connected device", "[list_devices]") {
-  const std::string one_that_is_nothing =
+  const std::string unrelated_device =
       "P: /devices/virtual/mem/null\nN: null\nE: SUBSYSTEM=mem\nE: DEVNAME=/dev/null\n";
-  CHECK(printed(one_that_is_nothing).find("No device is connected: ") == 0);
+  CHECK(printed(unrelated_device).find("No device is connected: ") == 0);
 }
 #endif
 

@@ -39,7 +39,7 @@ std::vector<double> numbers_of(const std::string& line) {
 
 }  // namespace
 
-TEST_CASE("five figures and what they show are written", "[paper]") {
+TEST_CASE("five figures are written, each with a table of its values", "[paper]") {
   const test::TemporaryDirectory files;
   const std::filesystem::path directory = files.path() / "new" / "figures";
   write_paper_figures(directory);
@@ -49,7 +49,7 @@ TEST_CASE("five figures and what they show are written", "[paper]") {
     CHECK(lines_of(directory / (name + ".csv")).size() == 121);
     const std::string png = bytes_of(directory / (name + ".png"));
     CHECK(png.substr(0, 8) == "\x89PNG\r\n\x1a\n");
-    CHECK(png.size() > 20000);  // an empty frame takes a tenth of that
+    CHECK(png.size() > 20000);  // an empty frame has a tenth of this size
   }
   const auto steps = simulate_example_4_2(Method::planar);
   const auto forces = lines_of(directory / "fig14.csv");
@@ -59,7 +59,7 @@ TEST_CASE("five figures and what they show are written", "[paper]") {
     CHECK(numbers_of(forces[i + 1]).at(1) == steps[i].F_W.force_N.y());
     CHECK(numbers_of(torques[i + 1]).at(1) == steps[i].F_W.torque_Nm.z());
   }
-  // Fig. 13: contact holds at the start, ends and starts again: a cross each.
+  // Fig. 13 marks with a cross where contact starts, ends and starts again.
   int crosses = 0;
   const auto centres = lines_of(directory / "fig13.csv");
   for (std::size_t i = 1; i < centres.size(); ++i) crosses += static_cast<int>(numbers_of(centres[i]).at(3));
@@ -71,7 +71,8 @@ TEST_CASE("figures that cannot be written or drawn are rejected with a remedy", 
   const auto file = files.write("file", "not a directory");
   CHECK_THROWS_WITH(write_paper_figures(file),
                     Contains("file: is not a directory") && Contains("name another"));
-  CHECK_THROWS_WITH(write_paper_figures(file / "below"), Contains("cannot be made one"));
+  CHECK_THROWS_WITH(write_paper_figures(file / "below"),
+                    Contains("is not a directory and cannot be created; name another directory"));
 
   const std::string path = std::getenv("PATH");
   setenv("PATH", "/nowhere", 1);

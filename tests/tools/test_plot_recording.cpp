@@ -48,7 +48,7 @@ Recording pressed() {
 
 }  // namespace
 
-TEST_CASE("a recording becomes figures, and the tables that they show", "[plot]") {
+TEST_CASE("a recording is drawn as figures, each with a table of its values", "[plot]") {
   const TemporaryDirectory files;
   const auto pictures = plot_recording(pressed(), files.path() / "new/figures");
   CHECK(pictures.size() == 6);
@@ -56,7 +56,7 @@ TEST_CASE("a recording becomes figures, and the tables that they show", "[plot]"
     INFO(picture);
     const std::string svg = contents(picture);
     CHECK(svg.find("<svg") != std::string::npos);
-    CHECK(svg.size() > 8000);  // an empty frame takes less
+    CHECK(svg.size() > 8000);  // an empty frame is smaller
   }
   CHECK(contents(files.path() / "new/figures/force.svg").find("force on the hand [N]") != std::string::npos);
   const std::string run = contents(files.path() / "new/figures/run.csv");

@@ -33,7 +33,7 @@ bool holds(const std::string& text, const std::string& part) {
 std::string rejection_text(const std::string& text) {
   const TemporaryDirectory dir;
   const auto file = dir.write("proposed.toml", text);
-  CHECK_NOTHROW(read_toml_file(file));  // good TOML it is
+  CHECK_NOTHROW(read_toml_file(file));  // the text is valid TOML
   try {
     load_profile(file);
   } catch (const ConfigError& error) {
@@ -67,7 +67,7 @@ DeviceProfile loaded(const std::string& text) {
   return load_profile(dir.write("proposed.toml", text));
 }
 
-/// Six bytes with the range 0 to 255 and the rest count in the middle.
+/// Returns the descriptor of six unsigned bytes from 0 to 255, at rest at the middle count.
 Bytes unsigned_axes() {
   return from_hex(
       "05 01 09 08 a1 01 85 07 15 00 26 ff 00 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 c0");
@@ -107,7 +107,7 @@ TEST_CASE("limits are never guessed, and no proposal loads before its completion
     for (const char* key : {"watchdog_s", "limits.max_force_N", "limits.max_torque_Nm"})
       CHECK(holds(why, "key '" + std::string(key) + "' is missing") !=
             holds(text, "\nwrench_report = \"none\" "));
-    CHECK_FALSE(holds(why, "not known"));  // what is there already, the format knows
+    CHECK_FALSE(holds(why, "not known"));  // the format knows every key that the proposal writes
   }
 }
 
@@ -133,7 +133,7 @@ TEST_CASE("a completed proposal of a multi-axis controller loads, and agrees wit
   }
 }
 
-TEST_CASE("the end of a cap's way means the same speed whatever the device counts", "[propose_profile]") {
+TEST_CASE("full deflection gives the same speed for every range of counts", "[propose_profile]") {
   struct Expected {
     Bytes bytes;
     double counts;
@@ -156,7 +156,8 @@ TEST_CASE("the end of a cap's way means the same speed whatever the device count
   }
 }
 
-TEST_CASE("fields of any width at any bit, and the middle of unsigned axes", "[propose_profile]") {
+TEST_CASE("fields may have any width and start at any bit; unsigned axes get an offset",
+          "[propose_profile]") {
   const std::string text = proposal(ten_bit_axes());
   CHECK(holds(text, "The device's reports, without ids:\n"));
   CHECK(holds(text, "id = \"none\"\nlength = 8\n"));
@@ -171,7 +172,7 @@ TEST_CASE("fields of any width at any bit, and the middle of unsigned axes", "[p
   CHECK(pose.rotation.step * 128 + pose.rotation.offset == Approx(0.0).margin(1e-12));
 }
 
-TEST_CASE("axes that no field can hold are left open, not changed", "[propose_profile]") {
+TEST_CASE("axes that no field can represent are left open", "[propose_profile]") {
   // Z before Y.
   const std::string text = proposal(
       from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 32 09 31 09 33 09 34 09 35 81 02 c0"));
@@ -181,24 +182,25 @@ TEST_CASE("axes that no field can hold are left open, not changed", "[propose_pr
   CHECK(holds(text, "\nrotation = { byte = 3, type = \"i8\""));
 }
 
-TEST_CASE("three numbers are one field only with one width, sign, step and middle", "[propose_profile]") {
+TEST_CASE("three axes form one field only if width, sign, step and middle count are equal",
+          "[propose_profile]") {
   const auto three = [](const std::string& x, const std::string& y_and_z) {
     return proposal(from_hex("05 01 09 08 a1 01 75 08 95 01" + x + "09 30 81 02" + y_and_z +
                              "09 31 81 02 09 32 81 02 15 81 25 7f 09 33 81 02 09 34 81 02 09 35 81 02 c0"));
   };
   const auto left_open = [](const std::string& text) { return holds(text, "# FILL IN: translation. X "); };
-  const std::string whole_byte = "15 00 26 ff 00", half_of_it = "15 00 25 64", with_sign = "15 81 25 7f";
+  const std::string whole_byte = "15 00 26 ff 00", half_range = "15 00 25 64", with_sign = "15 81 25 7f";
   CHECK_FALSE(left_open(three(whole_byte, whole_byte)));
   CHECK_FALSE(left_open(three(with_sign, with_sign)));
-  CHECK_FALSE(left_open(three(with_sign, "15 9c 25 64")));  // a shorter way, but the same middle
-  CHECK(left_open(three(whole_byte, half_of_it)));
+  CHECK_FALSE(left_open(three(with_sign, "15 9c 25 64")));  // a smaller range, but the same middle count
+  CHECK(left_open(three(whole_byte, half_range)));
   CHECK(left_open(three(with_sign, whole_byte)));
   CHECK(left_open(three(with_sign, "75 10")));
-  CHECK(left_open(three(with_sign + "55 0e 65 11", "35 00 45 01")));  // another step
-  CHECK(left_open(three(with_sign + "55 0e 65 11", "65 00")));        // none
+  CHECK(left_open(three(with_sign + "55 0e 65 11", "35 00 45 01")));  // different steps
+  CHECK(left_open(three(with_sign + "55 0e 65 11", "65 00")));        // one step, and no step
 }
 
-TEST_CASE("steps of the widest axes are steps that a profile may have", "[propose_profile]") {
+TEST_CASE("a profile accepts the steps of 32-bit axes", "[propose_profile]") {
   const Bytes bytes = from_hex(
       "05 01 09 08 a1 01 17 00 00 00 80 27 ff ff ff 7f 75 20 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02 "
       "c0");
@@ -213,7 +215,8 @@ TEST_CASE("buttons become a mask of 32, or are left open if other fields lie bet
       "05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02";
   const std::string bit = "05 09 15 00 25 01 75 01";
   const Bytes many = from_hex(axes + bit + "19 01 29 28 95 28 81 02 c0");
-  CHECK(holds(proposal(many), "# Buttons: 40 bits from byte 6. The first 32 of them"));
+  CHECK(
+      holds(proposal(many), "# Buttons: 40 bits from byte 6. Only the first 32, the capacity of a mask.\n"));
   CHECK(loaded(completed(proposal(many))).pose_report.buttons.bits == 32);
   // A button, seven bits of a dial, a button, padding.
   const std::string apart = proposal(from_hex(axes + bit + "09 01 95 01 81 02 05 01 09 37 75 07 81 02" + bit +
@@ -232,7 +235,8 @@ TEST_CASE("a report that is too long for a profile is reported", "[propose_profi
   CHECK(holds(text, "\nwrench_report = \"none\" "));
 }
 
-TEST_CASE("a multi-axis controller with an output of its maker's own may have motors", "[propose_profile]") {
+TEST_CASE("a multi-axis controller with a vendor-defined output report may have motors",
+          "[propose_profile]") {
   const std::string text =
       proposal(from_hex("05 01 09 08 a1 01 15 81 25 7f 75 08 95 06 09 30 09 31 09 32 09 33 09 34 09 35 81 02"
                         "06 00 ff 09 01 95 0c 91 02 c0"));
@@ -242,25 +246,25 @@ TEST_CASE("a multi-axis controller with an output of its maker's own may have mo
     CHECK(holds(text, "# FILL IN: " + std::string(key) + " ="));
 }
 
-TEST_CASE("a device that does not say its ids leaves them open", "[propose_profile]") {
+TEST_CASE("unknown device ids are left open", "[propose_profile]") {
   const std::string text = propose_profile({space_navigator(), "a test", {}, {}});
   CHECK(holds(text, "[match]\n# FILL IN: usb ="));
   CHECK(loaded(completed(text)).match.usb == std::vector<UsbId>{{0x1209, 0x0003}});
 }
 
-TEST_CASE("reports of a maker's own are given with what is known: ids and lengths", "[propose_profile]") {
+TEST_CASE("vendor-defined reports are proposed with their ids and lengths only", "[propose_profile]") {
   const std::string text = proposal(teensy_rawhid());
   CHECK(holds(text, "\n[pose_report]\nid = \"none\""));
   CHECK(holds(text, "\nlength = 64\n"));
   CHECK_FALSE(holds(text, "reference report layout"));
   const std::string reference = proposal(from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0"));
-  CHECK(holds(reference, "take both tables below from profiles/loopback.toml"));
+  CHECK(holds(reference, "copy both tables below from profiles/loopback.toml"));
   CHECK(holds(reference, "\n[wrench_report]\nid = 0x02"));
 }
 
 TEST_CASE("a completed proposal of the reference layout loads", "[propose_profile]") {
-  // As the text asks: the limits and timing filled in, the report tables taken from profiles/loopback.toml.
+  // The limits and timing are filled in; the report tables come from profiles/loopback.toml.
   std::string text = proposal(from_hex(
       "06 00 ff 09 01 a1 01 15 00 26 ff 00 75 08 85 01 09 02 95 3f 81 02 85 02 09 03 95 1f 91 02 c0"));
   text = completed(text);
@@ -290,15 +294,14 @@ TEST_CASE("for any descriptor a proposal is valid TOML without limits", "[propos
       ++proposed;
     } catch (const ConfigError& error) {
       FAIL(error.what());
-    } catch (const std::runtime_error& refused) {
-      if (!holds(refused.what(), "a test: ")) FAIL(refused.what());
+    } catch (const std::runtime_error& rejection) {
+      if (!holds(rejection.what(), "a test: ")) FAIL(rejection.what());
     }
   }
   CHECK(proposed > cases / 20);
 }
 
-TEST_CASE("whatever six axes a device has, a proposal with nothing left open loads and agrees with it",
-          "[propose_profile]") {
+TEST_CASE("for any six axes a complete proposal loads and agrees with the descriptor", "[propose_profile]") {
   RandomValues random(22);
   const int cases = case_count(20'000);
   int complete = 0;
@@ -320,16 +323,16 @@ TEST_CASE("whatever six axes a device has, a proposal with nothing left open loa
   CHECK(complete > cases / 50);
 }
 
-TEST_CASE("what is no device for wrenchd gets no proposal", "[propose_profile]") {
+TEST_CASE("a device without six axes or vendor-defined reports is rejected", "[propose_profile]") {
   CHECK_THROWS_WITH(
       proposal(boot_keyboard()),
-      "a test: nothing to propose: it is no multi-axis controller (01:08); it wants to be 01:06 "
-      "(keyboard), and has no vendor-defined report; name another device");
+      "a test: nothing to propose: it is no multi-axis controller (01:08); its applications are 01:06 "
+      "(keyboard), and no report is vendor-defined; name another device");
   CHECK_THROWS_WITH(proposal(from_hex("05 01 c0")),
                     "a test: report descriptor, byte 2: ends a collection, but none is open");
 }
 
-TEST_CASE("hexadecimal text in the forms people write it", "[propose_profile]") {
+TEST_CASE("hexadecimal text is parsed in all usual notations", "[propose_profile]") {
   const Bytes expected = {0x05, 0x01, 0x09, 0x08};
   for (const char* text :
        {"05 01 09 08", "0x05, 0x01,\n0X09, 0x08,\n", "05010908", "\t05 01 # usage page\r\n09 08",
@@ -362,11 +365,12 @@ TEST_CASE("wrenchctl profile reads bytes and hexadecimal text alike", "[propose_
   CHECK(b.out.empty());
   std::ifstream written(dir.path() / "p");
   const std::string proposed{std::istreambuf_iterator<char>(written), {}};
-  CHECK(proposed.substr(proposed.find("# What the device")) == a.out.substr(a.out.find("# What the device")));
+  CHECK(proposed.substr(proposed.find("# The device's reports")) ==
+        a.out.substr(a.out.find("# The device's reports")));
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)  // umockdev must be loaded first, and so must they
+    !defined(__SANITIZE_THREAD__)  // umockdev and the sanitizers must both be loaded first
 std::string hex_of(const Bytes& bytes) {
   std::string text;
   for (const std::uint8_t byte : bytes)
@@ -374,7 +378,7 @@ std::string hex_of(const Bytes& bytes) {
   return text;
 }
 
-/// A number as it lies in the memory of this machine.
+/// Returns the number as four bytes, little-endian.
 Bytes four_bytes(std::size_t x) {
   return {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(x >> 8U), 0, 0};
 }
@@ -402,12 +406,12 @@ TEST_CASE("wrenchctl profile reads the report descriptor of a hidraw device from
   std::ifstream stream(out);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   CHECK(holds(text, "# Made from /dev/hidraw0\n# Device: usb 046d:c626, \"3Dconnexion SpaceNavigator\"\n"));
-  CHECK(text.substr(text.find("# What the device")) ==
-        proposal(descriptor).substr(proposal(descriptor).find("# What the device")));
+  CHECK(text.substr(text.find("# The device's reports")) ==
+        proposal(descriptor).substr(proposal(descriptor).find("# The device's reports")));
 }
 #endif
 
-TEST_CASE("wrenchctl profile refuses bad sources with their place and the cure", "[propose_profile]") {
+TEST_CASE("wrenchctl profile rejects invalid sources with location and remedy", "[propose_profile]") {
   const TemporaryDirectory dir;
   const auto rejects = [&](const std::string& from, const std::string& why) {
     const ProgramResult result = run_program("wrenchctl", {"profile", "--from", from});

@@ -67,7 +67,7 @@ std::string contents(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// The input files of a solve, and the call of wrenchctl.
+/// The input files of wrenchctl solve, and a function that runs it.
 struct Bench {
   TemporaryDirectory dir;
   fs::path scene = dir.write("scene.toml", kScene);
@@ -123,7 +123,7 @@ TEST_CASE("wrenchctl solve reproduces example 4.1") {
   check_vector(row, "eps_w", kEpsW, 1e-8);
   CHECK(row.at("solve_ns") > 0);
 
-  // k_P = 1: the body wrench is eps. W_S = Ad_(p^-1)' W_T: turned into world axes, about the world's origin.
+  // k_P = 1: the body wrench is eps. W_S = Ad_(p^-1)' W_T: in world axes, about the origin of the world.
   check_vector(row, "body_f", kEpsV, 1e-8);
   check_vector(row, "body_t", kEpsW, 1e-8);
   const Quaterniond R(Eigen::AngleAxisd(-0.2, Vector3d::UnitZ()));
@@ -168,7 +168,7 @@ TEST_CASE("poses refer to the mesh frame, independent of its position in the bod
   check_vector(row, "eps_v", kEpsV, 1e-8);  // of the body frame, at the centre of mass
 }
 
-TEST_CASE("every format of mesh and every way to write the plane give the same answer") {
+TEST_CASE("every mesh format and every notation of the plane give the same result") {
   for (const auto& [name, text] : std::map<std::string, std::string>{
            {"body.obj", as_obj(box({-25, -25, -25}, {25, 25, 25}))},
            {"body.stl", as_binary_stl(triangulated(box({-25, -25, -25}, {25, 25, 25})))},
@@ -182,7 +182,7 @@ TEST_CASE("every format of mesh and every way to write the plane give the same a
   }
 }
 
-TEST_CASE("each method of wrenchctl solve answers") {
+TEST_CASE("each method of wrenchctl solve returns its closest pose") {
   const Bench bench;
   CHECK(std::abs(bench.solved({"--method", "exact"}).at(0).at("energy") - kEnergy) < 1e-9);
   // The optimum rotates about z, and one plane of the family contains that rotation.
@@ -233,7 +233,7 @@ TEST_CASE("one row per pose in input order, each without history") {
   CHECK(bench.solved().empty());
 }
 
-TEST_CASE("a dash stands for the standard streams") {
+TEST_CASE("a dash selects standard input or standard output") {
   const Bench bench;
   const std::string table = kPoseHeader + tilted_pose(1);
   const ProgramResult result =
@@ -259,24 +259,29 @@ TEST_CASE("wrenchctl solve: more planes are nearer the optimum, and the energy l
   const Row exact = bench.solved({"--law", "energy", "--energy-stiffness", "2"}).at(0);
   CHECK(many <= one);
   CHECK(exact.at("energy") <= many * (1.0 + 1e-12));
-  // f = k m (x_q - x_p) in the axes of p, which is turned by -0.2 about z: world y is (sin -0.2, cos -0.2).
-  const double lift = exact.at("py") - 25.0;
-  CHECK(exact.at("body_fy") == Approx(2.0 * lift * std::cos(0.2)).epsilon(1e-9));
-  CHECK(exact.at("body_fx") == Approx(-2.0 * lift * std::sin(0.2)).epsilon(1e-9));
+  // f = k m (x_q - x_p) in the axes of p, which is rotated by -0.2 about z: world y is (sin -0.2, cos -0.2).
+  const double rise = exact.at("py") - 25.0;
+  CHECK(exact.at("body_fy") == Approx(2.0 * rise * std::cos(0.2)).epsilon(1e-9));
+  CHECK(exact.at("body_fx") == Approx(-2.0 * rise * std::sin(0.2)).epsilon(1e-9));
 }
 
 TEST_CASE("wrenchctl replay rejects files that are not recordings") {
   const TemporaryDirectory dir;
   const std::string signature("\x89HDF\r\n\x1a\n", 8);
-  for (const fs::path& file :
-       {dir.path() / "none.h5", dir.write("text.h5", "px,py,pz\n"), dir.write("empty.h5", ""),
-        dir.write("cut.h5", signature + std::string(40, '\0'))}) {
+  const std::string cure = "name a recording of wrenchd";
+  const std::vector<std::pair<fs::path, std::string>> files = {
+      {dir.path() / "none.h5", cure},
+      {dir.write("text.h5", "px,py,pz\n"), cure},
+      {dir.write("empty.h5", ""), cure},
+      {dir.write("cut.h5", signature + std::string(40, '\0')),
+       "is truncated or damaged; use a complete copy"}};
+  for (const auto& [file, expected] : files) {
     const ProgramResult result = run_program("wrenchctl", {"replay", file.string()});
     INFO(result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
     CHECK(result.err.find("wrenchctl: " + file.string() + ": ") == 0);
-    CHECK(result.err.find("name a recording of wrenchd") != std::string::npos);
+    CHECK(result.err.find(expected) != std::string::npos);
   }
 }
 
@@ -304,7 +309,7 @@ TEST_CASE("the output replaces a file, follows a link, and can be a pipe") {
 
 TEST_CASE("wrenchctl solve reports a pose without an admissible pose near it and solves the other poses") {
   Bench bench;
-  // A slot of 10 between two walls, for a cube of 50; the other poses are no better.
+  // A slot of 10 between two walls for a cube of 50: no pose is admissible.
   bench.scene = bench.dir.write(
       "scene.toml", kScene + "[[obstacle]]\nhalf_space = { normal = [0, -1, 0], offset = -10 }\n");
   for (const char* method : {"exact", "planar", "descent", "translational"}) {
@@ -329,7 +334,7 @@ struct Bad {
   std::string cure;
 };
 
-void check_refused(const std::vector<Bad>& table) {
+void check_rejected(const std::vector<Bad>& table) {
   for (const Bad& bad : table) {
     const Bench bench;
     bench.dir.write("out.csv", "untouched");
@@ -350,7 +355,7 @@ void check_refused(const std::vector<Bad>& table) {
 TEST_CASE("wrenchctl solve rejects invalid scenes") {
   const std::string plane = "\n[[obstacle]]\nhalf_space = { normal = [0, 1, 0], offset = 0 }\n";
   const auto tool = [&](const std::string& lines) { return "[tool]\n" + lines + plane; };
-  check_refused({
+  check_rejected({
       {"empty", "scene.toml", "", ":1:1", "key 'tool' is missing"},
       {"not TOML", "scene.toml", "tool = = 3\n", ":1:8", "is not valid TOML"},
       {"typo", "scene.toml", tool("mesh = \"body.off\"\nscal = 2.0"), ":3:1", "did you mean 'scale'?"},
@@ -390,7 +395,7 @@ TEST_CASE("wrenchctl solve rejects invalid meshes") {
     std::string text = cube;
     return text.replace(text.find(from), from.size(), to);
   };
-  check_refused({
+  check_rejected({
       {"empty", "body.off", "", "", "is empty; export the mesh again"},
       {"no OFF", "body.off", "solid box\nendsolid\n", ":1", "expected OFF"},
       {"cut short", "body.off", cube.substr(0, cube.size() - 20), "", "export the mesh again"},
@@ -427,10 +432,10 @@ TEST_CASE("wrenchctl accepts an open mesh as an obstacle of kind surface") {
   dir.write("sheet.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n");
   const std::string obstacle = "[tool]\nmesh = \"body.off\"\n[[obstacle]]\nmesh = \"sheet.obj\"\n";
   const fs::path solid = dir.write("solid.toml", obstacle);
-  const ProgramResult refused = run_program("wrenchctl", {"check", solid.string()});
-  CHECK(refused.exit_code == 1);
-  CHECK(refused.err.find("the surface is open") != std::string::npos);
-  CHECK(refused.err.find("kind = \"surface\"") != std::string::npos);
+  const ProgramResult rejected = run_program("wrenchctl", {"check", solid.string()});
+  CHECK(rejected.exit_code == 1);
+  CHECK(rejected.err.find("the surface is open") != std::string::npos);
+  CHECK(rejected.err.find("kind = \"surface\"") != std::string::npos);
 
   const fs::path scene = dir.write("scene.toml", obstacle + "kind = \"surface\"\n");
   const ProgramResult checked = run_program("wrenchctl", {"check", scene.string()});
@@ -496,7 +501,7 @@ TEST_CASE("wrenchctl reports the progress of a large mesh and caches the result"
 
 TEST_CASE("wrenchctl solve rejects invalid poses") {
   const auto row = [](const std::string& text) { return kPoseHeader + "0,0,0,0,0,0,1\n" + text + "\n"; };
-  check_refused({
+  check_rejected({
       {"empty", "poses.csv", "", ":1:1", "is empty; expected the header"},
       {"no header", "poses.csv", "0,0,0,0,0,0,1\n", ":1:1", "expected the header 'px,py,pz,qx,qy,qz,qw'"},
       {"scalar first", "poses.csv", "px,py,pz,qw,qx,qy,qz\n", ":1:1", "expected the header"},
@@ -620,9 +625,9 @@ TEST_CASE("wrenchctl paper prints the paper's examples and draws its figures") {
   CHECK(result.out.find("Example 4.2") != std::string::npos);
   CHECK(fs::file_size(dir.path() / "figures" / "fig13.png") > 20000);
 
-  const ProgramResult refused = run_program("wrenchctl", {"paper", "-o", "/dev/null/figures"});
-  CHECK(refused.exit_code == 1);
-  CHECK(refused.err.find("wrenchctl: /dev/null/figures: is not a directory") == 0);
+  const ProgramResult rejected = run_program("wrenchctl", {"paper", "-o", "/dev/null/figures"});
+  CHECK(rejected.exit_code == 1);
+  CHECK(rejected.err.find("wrenchctl: /dev/null/figures: is not a directory") == 0);
 }
 
 /// Removes the progress lines of large meshes that are not in the cache.
@@ -708,24 +713,24 @@ TEST_CASE("wrenchctl decode and encode reject an empty text with an example") {
 }
 
 TEST_CASE("wrenchctl decode and encode reject invalid input with location and remedy") {
-  const auto refuses = [](std::vector<std::string> arguments, const std::string& expected) {
+  const auto rejects = [](std::vector<std::string> arguments, const std::string& expected) {
     const ProgramResult result = run_program("wrenchctl", arguments);
     INFO(expected << "\n" << result.err);
     CHECK(result.exit_code == 1);
     CHECK(result.out == "");
     CHECK(result.err.find(expected) != std::string::npos);
   };
-  refuses({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
-  refuses({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', stands alone");
-  refuses({"decode", "loopback", "--hex", "01 02"},
+  rejects({"decode", "loopback", "--hex", "01 0x 02"}, "--hex: character 6, ' ', is not a hexadecimal digit");
+  rejects({"decode", "loopback", "--hex", "01 0"}, "--hex: character 4, '0', is a single digit");
+  rejects({"decode", "loopback", "--hex", "01 02"},
           "these 2 bytes match no report of loopback:\n  report 0x01 has 64 bytes");
-  refuses({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
-  refuses({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
-  refuses({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
-  refuses({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "expected six numbers, found 7");
-  refuses({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split accepts no wrench");
-  refuses({"encode", "falcon", "--wrench", "1,0,0,0,0,0", "--at", "3c"},
+  rejects({"decode", "nobody", "--hex", "01"}, "no such file; searched ");
+  rejects({"encode", "loopback", "--wrench", "1,2,3"}, "--wrench: expected six numbers, found 3");
+  rejects({"encode", "loopback", "--wrench", "1,2,3,4,5,x"}, "--wrench: number 6 of 6 is invalid, at 'x'");
+  rejects({"encode", "loopback", "--wrench", "1,2,nan,4,5,6"}, "number 3 of 6");
+  rejects({"encode", "loopback", "--wrench", "1,2,3,4,5,6,7"}, "expected six numbers, found 7");
+  rejects({"encode", "spacemouse_split", "--wrench", "1,2,3,4,5,6"}, "spacemouse_split accepts no wrench");
+  rejects({"encode", "falcon", "--wrench", "1,0,0,0,0,0", "--at", "3c"},
           "--at: these 1 bytes match no report of falcon");
 }
 
@@ -816,7 +821,7 @@ TEST_CASE("wrenchctl solve --proxy follows a trajectory and does not jump throug
     const double top = tool == std::string("cube") ? 0.0255 : 0.0055;
     CHECK(std::stod(column(2, 4)) == Approx(top).margin(1e-8));
     CHECK(std::stod(column(2, 4)) > top);
-    // Without history the other side is equally close.
+    // Without history the opposite side is equally close.
     const ProgramResult alone =
         run_program("wrenchctl", {"solve", scene.string(), "--poses", table.string()});
     CHECK(alone.exit_code == 0);
@@ -904,7 +909,7 @@ TEST_CASE("wrenchctl solve --proxy moves obstacles at the given rate", "[moving]
   const auto height_m = [&](std::size_t i) { return std::stod(split(rows.at(1 + i), ',').at(4)); };
   CHECK(height_m(0) == Approx(-0.005).margin(1e-6));
   CHECK(height_m(100) == Approx(0.0).margin(1e-6));
-  CHECK(height_m(200) == Approx(0.005).margin(1e-6));  // turns back
+  CHECK(height_m(200) == Approx(0.005).margin(1e-6));  // the lift reverses
   CHECK(height_m(300) == Approx(0.0).margin(1e-6));
   CHECK(height_m(400) == Approx(-0.005).margin(1e-6));
 }

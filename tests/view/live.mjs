@@ -30,10 +30,10 @@ test(async () => {
   const { frame, world } = await until("a force is shown", async () => {
     await armed();
     const now = await page.evaluate(() => ({ frame: window.view.frame(), world: window.view.world() }));
-    return Number(await text(page, "force")) > 0.5 && now.frame.touches.length > 0 && now;
+    return Number(await text(page, "force")) > 0.5 && now.frame.contacts.length > 0 && now;
   });
   frame.p.forEach((x, i) => assert.ok(Math.abs(world.ghost[i] - x) < 1e-6));
-  assert.equal(frame.touches[0].obstacle, "table");
+  assert.equal(frame.contacts[0].obstacle, "table");
 
   // A disarm by the user is no fault. On a busy machine a slow page may lose its lease before; then the test arms again.
   await until("it is disarmed without a cause", async () => {

@@ -11,7 +11,7 @@ namespace {
 
 using namespace test;
 
-/// All methods of the daemon, on a station that nobody ticks.
+/// All methods of the daemon, on a runtime that does not tick.
 struct Table {
   VirtualRuntime s{resting_config()};
   EventFeed feed{s.runtime.loop()};
@@ -33,7 +33,7 @@ bool says(const RpcError& error, const std::string& text) {
   return std::string(error.what()).find(text) != std::string::npos;
 }
 
-/// A value of that type.
+/// Returns a value of the type.
 Json value_of(ParamType type) {
   switch (type) {
     case ParamType::boolean:
@@ -56,14 +56,15 @@ Json value_of(ParamType type) {
 
 const std::vector<Json> kWrongForAll = {nullptr, Json::array({1, "a"}), Json::array({1.0, 2.0})};
 
-/// Every parameter, with a value that it takes.
+/// Returns every parameter with a value of its type.
 Json good_params(const MethodRow& row) {
   Json params = Json::object();
   for (const ParamRow& param : row.params) params[param.name] = value_of(param.type);
   return params;
 }
 
-TEST_CASE("every method is documented, and takes its parameters and no other", "[control_methods]") {
+TEST_CASE("every method is documented, accepts its own parameters and rejects all others",
+          "[control_methods]") {
   const Table t;
   REQUIRE(t.methods.methods().size() >= 13);
   for (const auto& [name, row] : t.methods.methods()) {
@@ -99,7 +100,7 @@ TEST_CASE("every method is documented, and takes its parameters and no other", "
   }
 }
 
-TEST_CASE("every method refuses each role below its own, whatever the parameters are", "[control_methods]") {
+TEST_CASE("every method rejects each role below its minimum role, with any parameters", "[control_methods]") {
   const Table t;
   int refusals = 0;
   for (const auto& [name, row] : t.methods.methods())
@@ -117,7 +118,7 @@ TEST_CASE("every method refuses each role below its own, whatever the parameters
   CHECK(refusals >= 10);
 }
 
-TEST_CASE("anybody may stop and look, operators may arm, and nobody below", "[control_methods]") {
+TEST_CASE("observers may stop and read; arming requires the role operator", "[control_methods]") {
   const Table t;
   for (const char* open : {"describe", "status", "subscribe", "unsubscribe", "stop", "devices"})
     CHECK(t.methods.methods().at(open).min_role == Role::observer);
@@ -126,9 +127,9 @@ TEST_CASE("anybody may stop and look, operators may arm, and nobody below", "[co
     CHECK(t.methods.methods().at(closed).min_role == Role::operator_);
 }
 
-TEST_CASE("what does not exist is told with what is nearest", "[control_methods]") {
+TEST_CASE("an unknown method or parameter is rejected with the nearest known name", "[control_methods]") {
   const Table t;
-  const RpcError error = refused(t.methods, "lease_take", Json::object(), Role::observer);
+  const RpcError error = refused(t.methods, "lease_acquire", Json::object(), Role::observer);
   CHECK(error.code() == RpcCode::method_not_found);
   CHECK(says(error, "did you mean 'lease.acquire'?"));
   CHECK(says(refused(t.methods, "subscribe", {{"event", Json::array()}}, Role::observer),
@@ -137,31 +138,31 @@ TEST_CASE("what does not exist is told with what is nearest", "[control_methods]
         RpcCode::method_not_found);
 }
 
-TEST_CASE("describe tells all of the table", "[control_methods]") {
+TEST_CASE("describe returns every method, event, error and role", "[control_methods]") {
   const Table t;
-  const Json told = t.methods.describe();
-  CHECK(told["protocol"] == 1);
-  CHECK(told["methods"].size() == t.methods.methods().size());
-  for (const Json& method : told["methods"]) {
+  const Json described = t.methods.describe();
+  CHECK(described["protocol"] == 2);
+  CHECK(described["methods"].size() == t.methods.methods().size());
+  for (const Json& method : described["methods"]) {
     const MethodRow& row = t.methods.methods().at(method["name"].get<std::string>());
     CHECK(method["min_role"] == name(row.min_role));
     CHECK(method["doc"] == row.doc);
     CHECK(method["params"].size() == row.params.size());
   }
   std::set<std::string> events;
-  for (const Json& event : told["events"]) {
+  for (const Json& event : described["events"]) {
     events.insert(event["name"].get<std::string>());
     CHECK(event["doc"].get<std::string>().size() > 10);
   }
   for (const char* name :
        {"state", "fault", "device", "lease", "stiffness", "proxy_initialization", "events_lost"})
     CHECK(events.count(name) == 1);
-  CHECK(told["errors"].size() == 9);
-  for (const Json& error : told["errors"]) CHECK(error["code"].get<int>() < 0);
-  CHECK(told["roles"]["administrator"].get<std::string>().find("group 'daemon'") != std::string::npos);
+  CHECK(described["errors"].size() == 9);
+  for (const Json& error : described["errors"]) CHECK(error["code"].get<int>() < 0);
+  CHECK(described["roles"]["administrator"].get<std::string>().find("group 'daemon'") != std::string::npos);
 }
 
-TEST_CASE("a method that fails is answered, and its error has a kind", "[control_methods]") {
+TEST_CASE("each exception of a method becomes an error response with a code", "[control_methods]") {
   const auto thrown = [](const auto& error) {
     MethodTable table;
     table.add(
@@ -170,8 +171,8 @@ TEST_CASE("a method that fails is answered, and its error has a kind", "[control
                   }});
     try {
       MethodTable::run(table.methods().at("fail"), Json::object(), {});
-    } catch (const RpcError& told) {
-      return told;
+    } catch (const RpcError& rejection) {
+      return rejection;
     }
     throw std::logic_error("nothing was thrown");
   };
@@ -184,7 +185,7 @@ TEST_CASE("a method that fails is answered, and its error has a kind", "[control
   CHECK(says(internal, "the disk is full"));
 }
 
-TEST_CASE("a row that is there already is not added again", "[control_methods]") {
+TEST_CASE("a method or event cannot be added twice", "[control_methods]") {
   Table t;
   CHECK_THROWS_AS(t.control.methods().add(MethodRow{"stop", Role::observer, {}, "Again.", {}}),
                   std::logic_error);

@@ -14,7 +14,7 @@
 namespace wrenchd {
 namespace {
 
-/// A sanitizer keeps memory that was freed, and makes the socket's thread too slow for a heart that beats.
+/// A sanitizer keeps freed memory, and makes the socket's thread too slow for heartbeats.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kSanitized = true;
 #else
@@ -33,15 +33,15 @@ std::string request(const std::string& method, const std::string& params = "{}",
   return R"({"jsonrpc":"2.0","id":)" + id + R"(,"method":")" + method + R"(","params":)" + params + "}\n";
 }
 
-/// The code of the error in the next line; 0: it is none; -1: no line came.
+/// Returns the error code in the next line; 0 if the line has no error, -1 if no line came.
 int next_code(RigClient& client) {
   const auto line = client.read_line();
   if (!line) return -1;
-  const Json told = Json::parse(*line, nullptr, false);
-  return told.is_object() && told.contains("error") ? told["error"]["code"].get<int>() : 0;
+  const Json reply = Json::parse(*line, nullptr, false);
+  return reply.is_object() && reply.contains("error") ? reply["error"]["code"].get<int>() : 0;
 }
 
-bool hangs_up(RigClient& client) {
+bool disconnects(RigClient& client) {
   while (client.read_line(2000ms)) {
   }
   return client.closed_by_peer();
@@ -60,7 +60,7 @@ double resident_MB() {
   return resident * static_cast<double>(getpagesize()) / 1e6;
 }
 
-/// Bytes with open files and credentials beside them.
+/// Sends a request with open files attached.
 void send_files(const RigClient& client, int count) {
   const OwnedFd file(::open("/dev/null", O_RDONLY | O_CLOEXEC));
   std::vector<char> control(CMSG_SPACE(static_cast<std::size_t>(count) * sizeof(int)));
@@ -82,6 +82,7 @@ void send_files(const RigClient& client, int count) {
   ::sendmsg(client.fd(), &message, MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
+/// Sends a request with the credentials of root attached.
 void claim_root(const RigClient& client) {
   std::array<char, CMSG_SPACE(sizeof(ucred))> control{};
   std::string bytes = request("lease.acquire");
@@ -100,25 +101,25 @@ void claim_root(const RigClient& client) {
   ::sendmsg(client.fd(), &message, MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-/// What somebody may try, and what has to come of it besides: nothing.
+/// An attempt to misuse the socket, which must have no effect on others.
 struct Abuse {
   std::string name;
   std::function<void(ControlRig&)> run;
 };
 
-/// One line from an observer, and the code of its answer.
+/// Sends one line and checks the error code of its response.
 Abuse line_of(const std::string& name, const std::string& line, RpcCode code,
               TestUser who = TestUser::observer) {
   return {name, [=](ControlRig& rig) {
             RigClient client = rig.connect(who);
             client.send(line);
             CHECK(next_code(client) == code_of(code));
-            CHECK(client.error_code("status") == 0);  // and the connection goes on
+            CHECK(client.error_code("status") == 0);  // the connection stays open
           }};
 }
 
 Abuse forbidden(const std::string& method) {
-  return line_of("observer asks for " + method, request(method), RpcCode::permission_denied);
+  return line_of("observer requests " + method, request(method), RpcCode::permission_denied);
 }
 
 void flood(RigClient& client, const std::string& line, int lines) {
@@ -146,11 +147,11 @@ std::vector<Abuse> abuses() {
               "\n",
               RpcCode::invalid_request),
       line_of("operator arms without the lease", request("arm"), RpcCode::invalid_state, TestUser::operator_),
-      line_of("operator beats without the lease", request("lease.heartbeat"), RpcCode::invalid_state,
-              TestUser::operator_),
-      line_of("operator gives what it has not", request("lease.release"), RpcCode::invalid_state,
-              TestUser::operator_),
-      line_of("operator takes the lease from another", request("lease.acquire", R"({"preempt":true})"),
+      line_of("operator sends a heartbeat without the lease", request("lease.heartbeat"),
+              RpcCode::invalid_state, TestUser::operator_),
+      line_of("operator releases a lease that it does not hold", request("lease.release"),
+              RpcCode::invalid_state, TestUser::operator_),
+      line_of("operator preempts the lease", request("lease.acquire", R"({"preempt":true})"),
               RpcCode::permission_denied, TestUser::operator_),
       line_of("a batch with stop in it", "[" + request("stop").substr(0, request("stop").size() - 1) + "]\n",
               RpcCode::invalid_request),
@@ -170,29 +171,30 @@ std::vector<Abuse> abuses() {
               RpcCode::parse_error),
       line_of("a zero byte behind the request", request("stop").insert(request("stop").size() - 1, 1, '\0'),
               RpcCode::parse_error),
-      line_of("bytes that are no UTF-8", request("stop", "{\"a\":\"\xff\xfe\"}"), RpcCode::parse_error),
+      line_of("bytes that are not UTF-8", request("stop", "{\"a\":\"\xff\xfe\"}"), RpcCode::parse_error),
       line_of("surrogates", request("stop", R"({"a":"\ud800"})"), RpcCode::parse_error),
-      line_of("30,000 arrays in each other", request("stop", "{\"a\":" + nested), RpcCode::parse_error),
+      line_of("30,000 nested arrays", request("stop", "{\"a\":" + nested), RpcCode::parse_error),
       line_of("a huge id", request("stop", "{}", "99999999999999999999999"), RpcCode::invalid_request),
       line_of("an id of 60 kB", request("stop", "{}", '"' + std::string(60000, 'i') + '"'),
               RpcCode::invalid_request),
       line_of("an id that is an object", request("stop", "{}", "{}"), RpcCode::invalid_request),
-      line_of("a number beyond all numbers", request("stop", R"({"a":1e999})"), RpcCode::parse_error),
+      line_of("a number outside the range of double", request("stop", R"({"a":1e999})"),
+              RpcCode::parse_error),
       line_of("parameters without names", request("stop", "[1]"), RpcCode::invalid_params),
       line_of("parameters that stop does not have", request("stop", R"({"softly":true})"),
               RpcCode::invalid_params),
       line_of("an empty line", "\n", RpcCode::parse_error),
       line_of("60 kB of blanks", std::string(60000, ' ') + "\n", RpcCode::parse_error),
       line_of("another protocol", "GET / HTTP/1.1\r\n", RpcCode::parse_error),
-      line_of("no event of that name", request("subscribe", R"({"events":["everything"]})"),
+      line_of("an unknown event name", request("subscribe", R"({"events":["everything"]})"),
               RpcCode::invalid_params),
-      {"half a line, and hangs up",
+      {"half a line, then disconnects",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
          client.send(request("lease.acquire").substr(0, 40));
          client.disconnect();
        }},
-      {"a request without its end, and hangs up",
+      {"a request without its end, then disconnects",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          std::string stop = request("stop");
@@ -215,7 +217,7 @@ std::vector<Abuse> abuses() {
          RigClient client = rig.connect(TestUser::observer);
          client.send(std::string(kMaxLineBytes + 4096, 'x'));
          CHECK(next_code(client) == code_of(RpcCode::parse_error));
-         CHECK(hangs_up(client));
+         CHECK(disconnects(client));
        }},
       {"a line of 100 MB",
        [](ControlRig& rig) {
@@ -227,7 +229,7 @@ std::vector<Abuse> abuses() {
          CHECK(pieces < 100);
          if (!kSanitized) CHECK(resident_MB() - before_MB < 20.0);
        }},
-      {"requests before the line of 100 MB still count for nothing",
+      {"a forbidden request before an endless line",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          client.send(request("arm") + std::string(200000, 'y'));
@@ -240,31 +242,31 @@ std::vector<Abuse> abuses() {
            client.send(request("stop"));
            if (i > 0) continue;
            CHECK(next_code(client) == code_of(RpcCode::permission_denied));
-           CHECK(hangs_up(client));
+           CHECK(disconnects(client));
          }
        }},
       {"a thousand connections",
        [](ControlRig& rig) {
          for (int i = 0; i < 1000; ++i) rig.connect(TestUser::observer);
        }},
-      {"more connections than there are places, all kept",
+      {"more open connections of one user than the limit",
        [](ControlRig& rig) {
          RigClient same(rig.path(), 7000U), other = rig.connect(TestUser::observer);
          CHECK(same.error_code("status") == 0);
          std::vector<RigClient> kept;
          for (int i = 0; i < 100; ++i) kept.emplace_back(rig.path(), 7000U);
          CHECK(kept.back().error_code("status") == 0);
-         CHECK(same.error_code("status") == 0);   // who makes use of his place keeps it
-         CHECK(other.error_code("status") == 0);  // and who is not the one who crowds, in any case
+         CHECK(same.error_code("status") == 0);   // a connection in use is kept
+         CHECK(other.error_code("status") == 0);  // so is every connection of another user
          CHECK(rig.connect(TestUser::operator_).error_code("status") == 0);
        }},
-      {"a flood of requests whose answers nobody reads",
+      {"a flood of requests whose responses are not read",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          flood(client, request("describe"), 3000);
          CHECK(rig.connect(TestUser::observer).error_code("status") == 0);
        }},
-      {"a flood of rubbish",
+      {"a flood of invalid lines",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          flood(client, "\x01\x02}{][\"\\\n", 20000);
@@ -284,7 +286,7 @@ std::vector<Abuse> abuses() {
            rig.feed().emit("log", EventLevel::info, "noise " + std::string(200, 'n'));
          if (!kSanitized) CHECK(resident_MB() - before_MB < 20.0);
        }},
-      {"subscribes and does not, again and again",
+      {"subscribes and unsubscribes repeatedly",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          flood(client, request("subscribe") + request("unsubscribe"), 300);
@@ -297,13 +299,13 @@ std::vector<Abuse> abuses() {
          client.send(request("subscribe", "{\"events\":[" + names + "]}"));
          CHECK(next_code(client) == 0);
        }},
-      {"open files beside the request",
+      {"open files attached to the request",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          for (int i = 0; i < 20; ++i) send_files(client, 100);
          for (int i = 0; i < 20; ++i) CHECK(next_code(client) == 0);
        }},
-      {"credentials beside the request",
+      {"credentials attached to the request",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          claim_root(client);
@@ -317,7 +319,7 @@ std::vector<Abuse> abuses() {
            client.send(request("status"));
          }
        }},
-      {"shuts down what it reads, and asks on",
+      {"shuts down its reading side, and sends more requests",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::observer);
          ::shutdown(client.fd(), SHUT_RD);
@@ -344,16 +346,16 @@ std::vector<Abuse> abuses() {
          }
          CHECK(rig.connect(TestUser::observer).error_code("status") == 0);
        }},
-      {"takes and gives the lease without end",
+      {"acquires and releases the lease repeatedly",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
          flood(client, request("lease.acquire") + request("lease.release"), 200);
        }},
-      {"two want the lease",
+      {"two clients request the lease",
        [](ControlRig& rig) {
          RigClient first = rig.connect(TestUser::operator_), second = rig.connect(TestUser::operator_);
          for (const char* method : {"lease.acquire", "arm", "lease.heartbeat", "lease.release"}) {
-           CHECK(first.error_code("lease.acquire") == 0);  // and counts as a sign of life
+           CHECK(first.error_code("lease.acquire") == 0);  // counts as a heartbeat
            CHECK(second.error_code(method) == code_of(RpcCode::lease_held));
          }
          CHECK(second.error_code("lease.acquire", {{"preempt", true}}) ==
@@ -369,12 +371,12 @@ std::vector<Abuse> abuses() {
            ::pause();
            ::_exit(0);
          }
-         client.disconnect();  // it is still open over there
+         client.disconnect();  // the child process still has it open
          CHECK(rig.wait_for_state(State::disarmed, 2000ms));
          ::kill(child, SIGKILL);
          ::waitpid(child, nullptr, 0);
        }},
-      {"the holder hangs up in the middle of a line",
+      {"the holder disconnects in the middle of a line",
        [](ControlRig& rig) {
          RigClient client = rig.connect(TestUser::operator_);
          client.send(request("lease.acquire") + request("arm"));
@@ -388,14 +390,14 @@ std::vector<Abuse> abuses() {
   return table;
 }
 
-/// Nothing was done that nobody may do, and the daemon is well: it ticks, and answers soon.
-void check_well(ControlRig& rig) {
+/// Checks that the loop is disarmed, no client has the lease, the loop ticks, and status responds within 2 s.
+void check_unaffected(ControlRig& rig) {
   CHECK(rig.wait_for_state(State::disarmed, 2000ms));
   RigClient client = rig.connect(TestUser::observer);
-  const auto asked = std::chrono::steady_clock::now();
+  const auto requested_at = std::chrono::steady_clock::now();
   const Json before = client.result("status");
-  CHECK(std::chrono::steady_clock::now() - asked < 2s);
-  const auto end = asked + 3s;
+  CHECK(std::chrono::steady_clock::now() - requested_at < 2s);
+  const auto end = requested_at + 3s;
   Json status = before;
   while ((status["tick"] == before["tick"] || !status["lease"].is_null()) &&
          std::chrono::steady_clock::now() < end) {
@@ -405,30 +407,29 @@ void check_well(ControlRig& rig) {
   CHECK(status["tick"] > before["tick"]);
   CHECK(status["lease"].is_null());
   CHECK(status["armed_by"].is_null());
-  // A busy machine may have made a fault of its own; no client can.
+  // A busy machine may cause a fault; no client can.
   const std::string state = status["state"];
   INFO(state);
   CHECK((state == "disarmed" || state == "fault" || state == "self-test"));
 }
 
-TEST_CASE("whatever is done to the socket, the daemon lives and nobody gets what is not his",
-          "[control_socket]") {
+TEST_CASE("no misuse of the socket stops the daemon or gains a permission", "[control_socket]") {
   ControlRig rig;
-  check_well(rig);
+  check_unaffected(rig);
   const std::size_t descriptors = open_descriptors();
   const auto table = abuses();
   CHECK(table.size() >= 60);
   for (const Abuse& abuse : table) {
     INFO(abuse.name);
     abuse.run(rig);
-    check_well(rig);
+    check_unaffected(rig);
   }
-  // All that they held is closed again.
+  // The daemon has closed all descriptors of these clients.
   for (int i = 0; i < 200 && open_descriptors() > descriptors; ++i) std::this_thread::sleep_for(10ms);
   CHECK(open_descriptors() <= descriptors);
 }
 
-TEST_CASE("anybody who may connect can stop, and only operators take it back", "[control_socket]") {
+TEST_CASE("every client that may connect can stop, and only operators can acknowledge", "[control_socket]") {
   ControlRig rig;
   RigClient observer = rig.connect(TestUser::observer), operating = rig.connect(TestUser::operator_);
   CHECK(operating.error_code("acknowledge") == code_of(RpcCode::invalid_state));
@@ -442,7 +443,8 @@ TEST_CASE("anybody who may connect can stop, and only operators take it back", "
   CHECK(rig.wait_for_state(State::disarmed));
 }
 
-TEST_CASE("stop and another's beats get through while many flood", "[control_socket]") {
+TEST_CASE("stop and the holder's heartbeats get through while other clients flood the socket",
+          "[control_socket]") {
   ControlRig rig;
   RigClient holder = rig.connect(TestUser::operator_);
   std::atomic<bool> over{false};
@@ -455,28 +457,28 @@ TEST_CASE("stop and another's beats get through while many flood", "[control_soc
           if (!client.send(i % 2 == 0 ? request("describe") : std::string(3000, '{') + '\n')) break;
       }
     });
-  // Twelve floods on a busy machine may keep the socket's thread itself from running: that is no rule of
-  // ours.
-  bool holds = false;
-  for (int attempt = 0; attempt < 5 && !holds; ++attempt) {
+  // On a busy machine twelve flooding threads may keep the socket's thread from running, so the test tries
+  // again.
+  bool held = false;
+  for (int attempt = 0; attempt < 5 && !held; ++attempt) {
     REQUIRE(holder.error_code("lease.acquire") == 0);
-    for (int beats = 0; beats < 40; ++beats) {
+    for (int heartbeats = 0; heartbeats < 40; ++heartbeats) {
       holder.heartbeat();
       std::this_thread::sleep_for(20ms);
     }
-    holds = holder.error_code("lease.heartbeat") == 0;
+    held = holder.error_code("lease.heartbeat") == 0;
   }
-  if (!kSanitized) CHECK(holds);
+  if (!kSanitized) CHECK(held);
   RigClient observer = rig.connect(TestUser::observer);
-  const auto asked = std::chrono::steady_clock::now();
+  const auto requested_at = std::chrono::steady_clock::now();
   observer.send(request("stop"));
   CHECK(rig.wait_for_state(State::stopped, 2000ms));
-  if (!kSanitized) CHECK(std::chrono::steady_clock::now() - asked < 1s);
+  if (!kSanitized) CHECK(std::chrono::steady_clock::now() - requested_at < 1s);
   over = true;
   for (std::thread& flood : floods) flood.join();
 }
 
-TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releases it by hanging up",
+TEST_CASE("a client with the lease arms, stays armed by heartbeats, and releases the hand by disconnecting",
           "[control_socket]") {
   ControlRig rig;
   RigClient watcher = rig.connect(TestUser::observer);
@@ -489,7 +491,7 @@ TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releas
       std::this_thread::sleep_for(10ms);
     }
   });
-  // Where the machine lets a beat wait for too long it is tried again.
+  // If the machine delays a heartbeat for too long, the test tries again.
   for (int attempt = 0; attempt < 5 && rig.state() != State::active; ++attempt) {
     CHECK(holder->result("lease.acquire")["heartbeat_timeout_s"] == 0.1);
     CHECK(holder->error_code("arm") == 0);
@@ -513,7 +515,7 @@ TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releas
     } else {
       watcher.events.pop_front();
     }
-    CHECK(event["sequence"] == next++);  // none is missing
+    CHECK(event["sequence"] == next++);  // no event is missing
     if (event["name"] == "state") states.push_back(event["state"]);
   }
   REQUIRE(states.size() >= 5);
@@ -521,7 +523,7 @@ TEST_CASE("a client with the lease arms, keeps the hand by its beats, and releas
   CHECK(states == std::vector<std::string>{"waiting", "ramping", "active", "releasing", "disarmed"});
 }
 
-TEST_CASE("an administrator takes the lease from another, who is told", "[control_socket]") {
+TEST_CASE("an administrator preempts the lease, and the previous holder gets an event", "[control_socket]") {
   ControlRig rig;
   RigClient holder = rig.connect(TestUser::operator_), administrator = rig.connect(TestUser::administrator);
   holder.result("subscribe", {{"events", {"lease"}}});
@@ -534,17 +536,17 @@ TEST_CASE("an administrator takes the lease from another, who is told", "[contro
   CHECK(holder.next_event("lease")["holder"].get<std::string>().find("uid 60004") != std::string::npos);
 }
 
-TEST_CASE("events come in their order, and what a slow reader loses is counted", "[control_socket]") {
+TEST_CASE("events arrive in order, and the events that a slow reader loses are counted", "[control_socket]") {
   ControlRig rig;
   RigClient slow = rig.connect(TestUser::observer), chosen = rig.connect(TestUser::observer);
   const auto from = slow.result("subscribe")["sequence"].get<std::uint64_t>();
   chosen.result("subscribe", {{"events", {"lease"}}});
-  constexpr int kTold = 20000;
-  for (int i = 0; i < kTold; ++i)
+  constexpr int kEvents = 20000;
+  for (int i = 0; i < kEvents; ++i)
     rig.feed().emit("log", EventLevel::info, "event " + std::string(100, '.'), {{"i", i}});
   rig.feed().emit("lease", EventLevel::info, "the last", {{"holder", nullptr}});
   std::uint64_t got = 0, lost = 0, last = from;
-  while (last < from + kTold + 1) {
+  while (last < from + kEvents + 1) {
     const auto line = slow.read_line();
     REQUIRE(line);
     const Json event = Json::parse(*line)["params"];
@@ -559,15 +561,15 @@ TEST_CASE("events come in their order, and what a slow reader loses is counted",
     last = sequence;
   }
   CHECK(lost > 0);
-  CHECK(got + lost == kTold + 1);
+  CHECK(got + lost == kEvents + 1);
   CHECK(chosen.next_event("lease")["text"] == "the last");
   CHECK(slow.error_code("unsubscribe") == 0);
   slow.events.clear();
-  rig.feed().emit("log", EventLevel::info, "nobody hears");
+  rig.feed().emit("log", EventLevel::info, "no subscriber");
   CHECK(slow.next_event("log", 100ms).is_null());
 }
 
-TEST_CASE("who has said its last word still gets its answers", "[control_socket]") {
+TEST_CASE("a client that has shut down its sending side still gets its responses", "[control_socket]") {
   ControlRig rig;
   RigClient client = rig.connect(TestUser::observer);
   client.send(request("status") + request("devices", "{}", "2") + request("status", "{}", "3"));
@@ -578,12 +580,12 @@ TEST_CASE("who has said its last word still gets its answers", "[control_socket]
   CHECK(client.closed_by_peer());
 }
 
-TEST_CASE("what takes long keeps nobody waiting, and is answered when it is done", "[control_socket]") {
+TEST_CASE("a slow method blocks no other client, and its response follows when it ends", "[control_socket]") {
   std::atomic<bool> go{false};
   const MethodRow slow{"test.wait",
                        Role::observer,
                        {},
-                       "Waits until the test lets it go.",
+                       "Waits until the test ends it.",
                        [&go](const Json&, const Caller& caller) {
                          while (!go) std::this_thread::sleep_for(1ms);
                          return MethodResult(Json{{"client", caller.client}});
@@ -609,7 +611,7 @@ TEST_CASE("what takes long keeps nobody waiting, and is answered when it is done
   CHECK(next_code(others[1]) == 0);
 }
 
-TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
+TEST_CASE("a descriptor is sent with its response", "[control_socket]") {
   std::array<int, 2> ends{};
   REQUIRE(::pipe2(ends.data(), O_CLOEXEC) == 0);
   const OwnedFd read_end(ends[0]);
@@ -636,7 +638,7 @@ TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
     REQUIRE(received > 0);
     text.append(bytes.data(), static_cast<std::size_t>(received));
     if (cmsghdr* header = CMSG_FIRSTHDR(&message); header && header->cmsg_type == SCM_RIGHTS) {
-      CHECK(text.find("\"id\":2") != std::string::npos);  // with its reply, and not before
+      CHECK(text.find("\"id\":2") != std::string::npos);  // with its response, not before
       int fd = -1;
       std::memcpy(&fd, CMSG_DATA(header), sizeof fd);
       got = OwnedFd(fd);
@@ -649,7 +651,7 @@ TEST_CASE("a descriptor goes with its reply", "[control_socket]") {
   CHECK(byte == 'x');
 }
 
-TEST_CASE("a daemon that ends tells those who listen, and hangs up", "[control_socket]") {
+TEST_CASE("a daemon that ends sends an event to its subscribers, and disconnects", "[control_socket]") {
   auto rig = std::make_optional<ControlRig>();
   RigClient client = rig->connect(TestUser::operator_);
   CHECK(client.error_code("lease.acquire") == 0);
@@ -661,11 +663,11 @@ TEST_CASE("a daemon that ends tells those who listen, and hangs up", "[control_s
   CHECK(std::find(names.begin(), names.end(), "lease") != names.end());
 }
 
-TEST_CASE("an idle socket costs no time", "[control_socket]") {
+TEST_CASE("the thread of an idle socket sleeps", "[control_socket]") {
   ControlRig rig;
   RigClient client = rig.connect(TestUser::observer);
-  const auto told_before = client.result("status")["sequence"].get<std::uint64_t>();
-  // How often the thread, found by its name, went to sleep by itself: a busy machine does not count.
+  const auto events_before = client.result("status")["sequence"].get<std::uint64_t>();
+  // Counts how often the thread, found by its name, slept voluntarily; preemption does not count.
   const auto sleeps = [] {
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
       std::string line;
@@ -680,9 +682,9 @@ TEST_CASE("an idle socket costs no time", "[control_socket]") {
   const auto before = sleeps();
   std::this_thread::sleep_for(300ms);
   REQUIRE(before > 0);
-  // Each event of the loop, which may tell of a busy machine, wakes it once.
-  const auto told = client.result("status")["sequence"].get<std::uint64_t>() - told_before;
-  CHECK(sleeps() - before <= 4 + told);
+  // Each event of the loop wakes the thread once.
+  const auto events = client.result("status")["sequence"].get<std::uint64_t>() - events_before;
+  CHECK(sleeps() - before <= 4 + events);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ std::string text(const Event::Data& data) {
 
 }  // namespace
 
-TEST_CASE("an event becomes a line that names the cure", "[events]") {
+TEST_CASE("each event is described by one line, a fault with its cure", "[events]") {
   CHECK(text(Event::FaultRaised{Fault::device_lost, 0.0}) ==
         "device_lost: " + std::string(fault_row(Fault::device_lost).message) + "; " +
             std::string(fault_row(Fault::device_lost).cure));
@@ -30,7 +30,7 @@ TEST_CASE("an event becomes a line that names the cure", "[events]") {
   CHECK(text(Event::StiffnessScaled{0.25}).find("25 %") != std::string::npos);
 }
 
-TEST_CASE("a program reads the same event as fields", "[events]") {
+TEST_CASE("each event has the same content in fields for programs", "[events]") {
   const EventDescription state =
       describe({TimePoint{}, Event::StateChanged{State::degraded, Fault::sample_late}});
   CHECK(state.name == "state");
@@ -44,7 +44,7 @@ TEST_CASE("a program reads the same event as fields", "[events]") {
   CHECK(describe({TimePoint{}, Event::RenderingChanged{7}}).fields["rendering_id"] == 7);
 }
 
-TEST_CASE("a fault that latches is an error in the log, one that passes is a warning", "[events]") {
+TEST_CASE("a latched fault is logged as an error, a passing fault as a warning", "[events]") {
   CHECK(describe({TimePoint{}, Event::FaultRaised{Fault::sample_stale, 0.0}}).level == EventLevel::error);
   CHECK(describe({TimePoint{}, Event::FaultRaised{Fault::sample_late, 0.0}}).level == EventLevel::warning);
   CHECK(describe({TimePoint{}, Event::Released{}}).level == EventLevel::info);

@@ -17,8 +17,7 @@ std::vector<Json> events_of(const EventFeed& feed, std::uint64_t next,
   return events;
 }
 
-TEST_CASE("events of the loop get numbers without a gap, their names, levels, times and fields",
-          "[event_feed]") {
+TEST_CASE("events of the loop have consecutive numbers, names, levels, times and fields", "[event_feed]") {
   VirtualRuntime s{resting_config()};
   EventFeed feed(s.runtime.loop());
   s.run(0.05);
@@ -52,11 +51,11 @@ TEST_CASE("events of the loop get numbers without a gap, their names, levels, ti
   CHECK(now.proxy_initialization == "found");
 }
 
-TEST_CASE("a snapshot and the events after it are the whole story, while the loop runs", "[event_feed]") {
+TEST_CASE("a snapshot and the events after it give every state of a running loop", "[event_feed]") {
   VirtualRuntime s{resting_config()};
   EventFeed feed(s.runtime.loop());
   std::atomic<bool> stop{false};
-  // The loop comes to new states, its events are drained by a thread, and snapshots are taken by this one.
+  // One thread changes the state of the loop, one drains the events, and this one takes snapshots.
   std::thread life([&] {
     while (!stop) {
       s.runtime.loop().requests().arm();
@@ -93,7 +92,7 @@ TEST_CASE("a snapshot and the events after it are the whole story, while the loo
   CHECK(compared > 5);
 }
 
-TEST_CASE("who asks too late is told how many events it lost, and gets those that are left", "[event_feed]") {
+TEST_CASE("a late reader gets the number of lost events and all events that remain", "[event_feed]") {
   VirtualRuntime s{resting_config()};
   EventFeed feed(s.runtime.loop());
   for (std::size_t i = 0; i < EventFeed::kHistorySize + 100; ++i)
@@ -109,7 +108,7 @@ TEST_CASE("who asks too late is told how many events it lost, and gets those tha
   CHECK(some.lines.size() == 5);
   CHECK(some.next == last + 1);
 
-  // In pieces it is the same.
+  // Read in pieces, the events are the same.
   std::vector<std::string> pieces;
   for (std::uint64_t next = last - 99; next <= last;) {
     const auto piece = feed.events_since(next, {}, 1000);

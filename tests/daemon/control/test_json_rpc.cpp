@@ -18,7 +18,8 @@ std::string nested(std::size_t depth) {
          std::string(depth, ']') + "}}";
 }
 
-TEST_CASE("a line is a request: method, named parameters, and an id where a reply is wanted", "[json_rpc]") {
+TEST_CASE("a line is one request: method, named parameters, and an id if it expects a response",
+          "[json_rpc]") {
   const RpcRequest full =
       request_of(R"( {"jsonrpc":"2.0","id":7,"method":"scene.move","params":{"name":"a"}} )");
   CHECK(full.method == "scene.move");
@@ -26,7 +27,7 @@ TEST_CASE("a line is a request: method, named parameters, and an id where a repl
   CHECK(full.id == 7);
   CHECK(full.wants_reply);
 
-  const RpcRequest notification = request_of("{\"method\":\"beat\",\"jsonrpc\":\"2.0\"}\r");
+  const RpcRequest notification = request_of("{\"method\":\"lease.heartbeat\",\"jsonrpc\":\"2.0\"}\r");
   CHECK_FALSE(notification.wants_reply);
   CHECK(notification.params == Json::object());
 
@@ -36,12 +37,13 @@ TEST_CASE("a line is a request: method, named parameters, and an id where a repl
   CHECK(request_of(nested(kMaxDepth - 2)).method == "stop");
 }
 
-TEST_CASE("what is no request is refused, with what is wrong and its id where it has one", "[json_rpc]") {
+TEST_CASE("a line that is not a valid request is rejected with the reason, and with its id if known",
+          "[json_rpc]") {
   const std::string head = R"({"jsonrpc":"2.0","id":5,"method":"stop")";
   struct {
     std::string line;
     RpcCode code;
-    std::string told;
+    std::string reason;
     bool has_id = false;
   } const table[] = {
       {"", RpcCode::parse_error, "it is empty; send one object a line"},
@@ -62,8 +64,8 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
       {head + std::string("}\0", 2), RpcCode::parse_error, "it contains a zero byte"},
       {head + ",\"params\":{\"a\":\"x\\u0000y\"}}", RpcCode::parse_error, "contains the character zero"},
       {head + ",\"params\":{\"a\\u0000\":1}}", RpcCode::parse_error, "contains the character zero"},
-      {head + ",\"id\":6}", RpcCode::parse_error, "the name 'id' stands twice in one object"},
-      {head + ",\"params\":{\"a\":[{\"b\":1,\"b\":2}]}}", RpcCode::parse_error, "the name 'b' stands twice"},
+      {head + ",\"id\":6}", RpcCode::parse_error, "the name 'id' occurs twice in one object"},
+      {head + ",\"params\":{\"a\":[{\"b\":1,\"b\":2}]}}", RpcCode::parse_error, "the name 'b' occurs twice"},
       {nested(kMaxDepth - 1), RpcCode::parse_error, "deeper than 16"},
       {nested(30000), RpcCode::parse_error, "deeper than 16"},
       {head + ",\"params\":{\"a\":\"" + std::string(kMaxLineBytes, 'x') + "\"}}", RpcCode::parse_error,
@@ -96,19 +98,19 @@ TEST_CASE("what is no request is refused, with what is wrong and its id where it
       {R"({"jsonrpc":"2.0","method":"stop","id":")" + std::string(kMaxIdBytes + 1, 'i') + "\"}",
        RpcCode::invalid_request, "The id must be"},
   };
-  for (const auto& [line, code, told, has_id] : table) {
+  for (const auto& [line, code, reason, has_id] : table) {
     INFO(line.substr(0, 200));
     const auto read = parse_request(line);
     const auto* refused = std::get_if<InvalidRequest>(&read);
     REQUIRE(refused);
     CHECK(refused->error.code() == code);
     INFO(refused->error.what());
-    CHECK(std::string(refused->error.what()).find(told) != std::string::npos);
+    CHECK(std::string(refused->error.what()).find(reason) != std::string::npos);
     CHECK(refused->id == (has_id ? Json(5) : Json(nullptr)));
   }
 }
 
-TEST_CASE("replies are one line of JSON-RPC each, whatever stands in them", "[json_rpc]") {
+TEST_CASE("each response is one line of JSON-RPC, with any content", "[json_rpc]") {
   CHECK(reply_line(3, {{"state", "disarmed"}}) ==
         "{\"jsonrpc\":\"2.0\",\"id\":3,\"result\":{\"state\":\"disarmed\"}}\n");
   CHECK(error_line(nullptr, RpcError(RpcCode::lease_held, "Two\nlines.")) ==

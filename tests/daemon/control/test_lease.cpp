@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 const Lease::Holder kA{2, "A"}, kB{3, "B"};
 
-/// In virtual time, with the hand at rest.
+/// A loop in virtual time with the hand at rest, and a lease.
 struct Rig {
   VirtualRuntime s{resting_config()};
   EventFeed feed{s.runtime.loop()};
@@ -22,16 +22,16 @@ struct Rig {
   void arm_by(const Lease::Holder& holder) {
     lease.acquire(holder, s.clock.now());
     lease.arm(s.clock.now());
-    for (int i = 0; i < 1000 && s.state() != State::active; ++i) beat_and_tick();
+    for (int i = 0; i < 1000 && s.state() != State::active; ++i) heartbeat_and_tick();
     REQUIRE(s.state() == State::active);
   }
-  void beat_and_tick() {
+  void heartbeat_and_tick() {
     lease.heartbeat(s.clock.now());
     s.tick();
   }
 };
 
-TEST_CASE("who holds the lease and lives keeps the hand armed", "[lease]") {
+TEST_CASE("the loop stays armed while the holder of the lease sends heartbeats", "[lease]") {
   Rig r;
   r.arm_by(kA);
   CHECK(r.lease.armed());
@@ -44,10 +44,8 @@ TEST_CASE("who holds the lease and lives keeps the hand armed", "[lease]") {
   CHECK(r.lease.held_by(kA.client));
 }
 
-TEST_CASE(
-    "a holder in silence loses the lease and the hand; the loop sees to it even where nobody looks at the "
-    "lease",
-    "[lease]") {
+TEST_CASE("a holder without heartbeats loses the lease, and the loop releases the hand without a lease check",
+          "[lease]") {
   Rig r;
   r.arm_by(kA);
   const TimePoint last = r.s.clock.now();
@@ -61,7 +59,7 @@ TEST_CASE(
   CHECK_FALSE(r.lease.armed());
 }
 
-TEST_CASE("a lease that was not used to arm ends in silence too", "[lease]") {
+TEST_CASE("a lease that did not arm also ends without heartbeats", "[lease]") {
   Rig r;
   CHECK(r.lease.next_check_at() == TimePoint::max());
   r.lease.acquire(kA, r.s.clock.now());
@@ -72,7 +70,7 @@ TEST_CASE("a lease that was not used to arm ends in silence too", "[lease]") {
   CHECK_FALSE(r.lease.holder());
 }
 
-TEST_CASE("a holder that hangs up releases the hand in the next tick", "[lease]") {
+TEST_CASE("a holder that disconnects releases the hand in the next tick", "[lease]") {
   Rig r;
   r.arm_by(kA);
   r.lease.client_lost(kB.client);
@@ -85,7 +83,7 @@ TEST_CASE("a holder that hangs up releases the hand in the next tick", "[lease]"
   CHECK(r.s.cause() == Fault::heartbeat_lost);
 }
 
-TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
+TEST_CASE("a loop that was armed without the lease stays armed when the lease ends", "[lease]") {
   Rig r;
   r.s.runtime.loop().requests().arm();
   r.s.run(1.0);
@@ -102,13 +100,13 @@ TEST_CASE("what was armed without the lease does not end with it", "[lease]") {
   CHECK(r.s.state() == State::active);
 }
 
-TEST_CASE("who takes the lease over disarms what the other armed, and can arm itself", "[lease]") {
+TEST_CASE("a preempting client disarms what the previous holder armed, and can arm", "[lease]") {
   Rig r;
   r.arm_by(kA);
   r.lease.preempt(kB, r.s.clock.now());
   CHECK(r.lease.held_by(kB.client));
   CHECK_FALSE(r.lease.armed());
-  for (int i = 0; i < 200; ++i) r.beat_and_tick();
+  for (int i = 0; i < 200; ++i) r.heartbeat_and_tick();
   CHECK(r.s.state() == State::disarmed);
   r.arm_by(kB);
   r.lease.client_lost(kA.client);
@@ -119,11 +117,11 @@ TEST_CASE("who takes the lease over disarms what the other armed, and can arm it
   CHECK(r.s.state() == State::releasing);
 }
 
-TEST_CASE("every change of the lease is told", "[lease]") {
+TEST_CASE("every change of the lease is an event", "[lease]") {
   Rig r;
   const std::uint64_t before = r.feed.snapshot().sequence;
   r.lease.acquire(kA, r.s.clock.now());
-  r.lease.acquire(kA, r.s.clock.now());  // it has it
+  r.lease.acquire(kA, r.s.clock.now());  // it already holds the lease
   r.lease.preempt(kB, r.s.clock.now());
   r.lease.client_lost(kB.client);
   r.lease.acquire(kA, r.s.clock.now());

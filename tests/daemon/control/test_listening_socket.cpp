@@ -34,7 +34,7 @@ bool connects(const fs::path& path) {
   return ::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
 }
 
-/// What a dead program leaves behind.
+/// Leaves a socket file without a listener, as a killed program does.
 void leave_socket(const fs::path& path) {
   const OwnedFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_un address{};
@@ -58,7 +58,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("a socket is made with its directory, for those who may connect, and goes with its daemon",
+TEST_CASE("a socket is created with its directory, with the mode of the roles, and removed with its daemon",
           "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path path = dir.path() / "made" / "control.sock";
@@ -80,8 +80,7 @@ TEST_CASE("a socket is made with its directory, for those who may connect, and g
   CHECK(mode_of(path) == 0666);
 }
 
-TEST_CASE("whatever the umask is, a socket is never open to others before it is meant to be",
-          "[listening_socket]") {
+TEST_CASE("the mode of a socket does not depend on the umask", "[listening_socket]") {
   const TemporaryDirectory dir;
   const mode_t before = ::umask(0);
   {
@@ -96,7 +95,7 @@ TEST_CASE("whatever the umask is, a socket is never open to others before it is 
   ::umask(before);
 }
 
-TEST_CASE("what a dead daemon left is replaced, what lives is not", "[listening_socket]") {
+TEST_CASE("the socket of a dead daemon is replaced, that of a live daemon is not", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path path = dir.path() / "control.sock";
   leave_socket(path);
@@ -112,7 +111,7 @@ TEST_CASE("what a dead daemon left is replaced, what lives is not", "[listening_
   CHECK(connects(path));
 }
 
-TEST_CASE("another program's socket, and what is no socket, stay as they are", "[listening_socket]") {
+TEST_CASE("another program's socket, and a file that is not a socket, stay unchanged", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path path = dir.path() / "control.sock";
   {
@@ -127,25 +126,25 @@ TEST_CASE("another program's socket, and what is no socket, stay as they are", "
   }
   fs::remove(path);
   dir.write("control.sock", "mine");
-  CHECK(has(rejection_text(path), "is there, and is no socket; move it away"));
+  CHECK(has(rejection_text(path), "exists and is not a socket; move it away"));
   CHECK(fs::file_size(path) == 4);
   fs::remove(path);
   fs::create_symlink(dir.path() / "elsewhere", path);
-  CHECK(has(rejection_text(path), "is no socket"));
+  CHECK(has(rejection_text(path), "exists and is not a socket"));
   CHECK_FALSE(fs::exists(dir.path() / "elsewhere"));
 }
 
-TEST_CASE("a directory in which others could put another socket is refused", "[listening_socket]") {
+TEST_CASE("a directory in which other users could replace the socket is rejected", "[listening_socket]") {
   const TemporaryDirectory dir;
   fs::create_directory(dir.path() / "open");
   fs::permissions(dir.path() / "open", fs::perms::all);
   CHECK(has(rejection_text(dir.path() / "open/control.sock"), "other users can write there"));
-  ::chmod((dir.path() / "open").c_str(), 01777);  // as /tmp: nobody can replace what is another's
+  ::chmod((dir.path() / "open").c_str(), 01777);  // as /tmp: no user can replace another user's file
   CHECK(rejection_text(dir.path() / "open/control.sock") == "");
   CHECK(has(rejection_text(dir.path() / "gone/on/control.sock"),
             "gone/on: cannot be created: No such file or directory"));
   dir.write("file", "");
-  CHECK(has(rejection_text(dir.path() / "file/control.sock"), "file: is no directory"));
+  CHECK(has(rejection_text(dir.path() / "file/control.sock"), "file: is not a directory"));
   CHECK(has(rejection_text(dir.path() / std::string(120, 'x')), "is longer than the 107 bytes"));
   if (geteuid() != 0) return;
   fs::create_directory(dir.path() / "others");
@@ -153,7 +152,7 @@ TEST_CASE("a directory in which others could put another socket is refused", "[l
   CHECK(has(rejection_text(dir.path() / "others/control.sock"), "belongs to uid 65534"));
 }
 
-TEST_CASE("a lock that is a link is not followed", "[listening_socket]") {
+TEST_CASE("a lock file that is a symbolic link is not followed", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path victim = dir.write("victim", "kept");
   fs::create_symlink(victim, dir.path() / "control.sock.lock");
@@ -161,7 +160,7 @@ TEST_CASE("a lock that is a link is not followed", "[listening_socket]") {
   CHECK(fs::file_size(victim) == 4);
 }
 
-TEST_CASE("of many daemons that start at once exactly one listens", "[listening_socket]") {
+TEST_CASE("of several daemons that start at once exactly one listens", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path path = dir.path() / "control.sock";
   for (int round = 0; round < 20; ++round) {
@@ -199,7 +198,7 @@ TEST_CASE("of many daemons that start at once exactly one listens", "[listening_
   }
 }
 
-TEST_CASE("what systemd passes is taken, and stays where it is", "[listening_socket]") {
+TEST_CASE("a socket passed by systemd is used, and its file stays", "[listening_socket]") {
   const TemporaryDirectory dir;
   const fs::path path = dir.path() / "control.sock";
   // In a child: descriptor 3 may be in use here.
@@ -234,7 +233,8 @@ TEST_CASE("what systemd passes is taken, and stays where it is", "[listening_soc
   CHECK(passed(false) == 3);
 }
 
-TEST_CASE("the place of the socket: command line, environment, configuration, system", "[listening_socket]") {
+TEST_CASE("the socket path is taken from command line, environment, configuration, system, in this order",
+          "[listening_socket]") {
   struct Environment {
     std::string socket = std::getenv("WRENCHD_SOCKET") ? std::getenv("WRENCHD_SOCKET") : "";
     ~Environment() {

@@ -22,7 +22,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// wrenchd with a hand that presses, and its own places for socket and recordings.
+/// wrenchd with a simulated hand in contact, and its own paths for socket and recordings.
 struct Daemon {
   TemporaryDirectory files;
   std::string socket = (files.path() / "control.sock").string();
@@ -60,7 +60,7 @@ std::string bytes_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// What Debian's Python says; its own, for it is the one with Debian's h5py.
+/// Runs /usr/bin/python3, which has Debian's h5py. Appends its output to out and returns the exit code.
 int run_python(const std::string& arguments, std::string& out) {
   FILE* const pipe = popen(("/usr/bin/python3 -W error " + arguments + " 2>&1").c_str(), "r");
   REQUIRE(pipe != nullptr);
@@ -73,7 +73,7 @@ int run_python(const std::string& arguments, std::string& out) {
 
 }  // namespace
 
-TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Python",
+TEST_CASE("wrenchctl starts and stops a recording, which opens in plain Python",
           "[recording][program][wall_time]") {
   const Daemon daemon;
   CHECK(daemon.ctl({"record", "stop"}).err.find("No recording runs; 'record.start' starts one.") !=
@@ -83,7 +83,7 @@ TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Py
   REQUIRE(started.exit_code == 0);
   const auto file = daemon.recordings / "mine.h5";
   CHECK(started.out == "recording " + file.string() + "\n");
-  CHECK(daemon.ctl({"record", "start"}).err.find("A recording runs already: " + file.string()) !=
+  CHECK(daemon.ctl({"record", "start"}).err.find("A recording is already running: " + file.string()) !=
         std::string::npos);
   CHECK(daemon.ctl({"status"}).out.find("recording  " + file.string()) != std::string::npos);
   std::this_thread::sleep_for(4s);
@@ -92,12 +92,12 @@ TEST_CASE("a recording is begun and ended from a terminal, and opens in plain Py
   CHECK(ended.out.ends_with(" ticks, 0 missing\n"));
   CHECK(read_recording(file).ticks.size() > 3500);
   CHECK(is_gapless(read_recording(file)));
-  std::string said;
-  CHECK(run_python(WRENCHD_SOURCE_DIR "/tests/python/check_recording.py " + file.string(), said) == 0);
-  INFO(said);
-  CHECK(said.find(" ticks, ") != std::string::npos);
+  std::string printed;
+  CHECK(run_python(WRENCHD_SOURCE_DIR "/tests/python/check_recording.py " + file.string(), printed) == 0);
+  INFO(printed);
+  CHECK(printed.find(" ticks, ") != std::string::npos);
 
-  // Whoever may not read the daemon's files is handed them.
+  // The daemon passes a recording to a client that cannot read the daemon's files.
   CHECK(daemon.ctl({"record", "list"}).out.starts_with("mine.h5 "));
   const auto copy = daemon.files.path() / "copy.h5";
   CHECK(daemon.ctl({"record", "get", "mine", "-o", copy.string()}).out == copy.string() + "\n");
@@ -113,7 +113,7 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
   CHECK(run_python(script.string() + " " WRENCHD_SOURCE_DIR "/tools/python " + daemon.socket, rows) == 0);
   CHECK(rows == std::to_string(read_recording(file).ticks.size()) + "\n");
   CHECK(daemon.ctl({"record", "get", "yours"}).err.find("there are: mine.h5") != std::string::npos);
-  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is no valid name of a recording") !=
+  CHECK(daemon.ctl({"record", "get", "../mine"}).err.find("is not a valid name of a recording") !=
         std::string::npos);
   CHECK(daemon.ctl({"record", "get"}).err.find("record list") != std::string::npos);
   CHECK(daemon.ctl({"record", "list", "-o", "x"}).err.find("accepts no -o") != std::string::npos);
@@ -123,14 +123,14 @@ with wrenchd.Client(sys.argv[2]) as client, client.open_recording("mine.h5") as 
   CHECK(daemon.ctl({"record", "stop"}).exit_code == 0);
   CHECK(daemon.ctl({"record", "list"}).out.find("\nnext.h5 ") != std::string::npos);
 
-  // An administrator may name a place, as it is from here.
+  // An administrator may give a path, relative to the directory of wrenchctl.
   const auto elsewhere = daemon.files.path() / "elsewhere.h5";
   CHECK(daemon.ctl({"record", "start", elsewhere.string()}).exit_code == 0);
   CHECK(daemon.ctl({"record", "stop"}).exit_code == 0);
   CHECK(std::filesystem::exists(elsewhere));
   CHECK(daemon.ctl({"record", "start", "no/such/directory/x.h5"}).err.find("cannot be created") !=
         std::string::npos);
-  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is no valid name of a recording") !=
+  CHECK(daemon.ctl({"record", "start", "a b"}).err.find("is not a valid name of a recording") !=
         std::string::npos);
   CHECK(daemon.ctl({"record", "stop", "x"}).err.find("accepts no file") != std::string::npos);
 }
@@ -139,7 +139,7 @@ TEST_CASE("an emergency stop leaves a flight recording, which status and the eve
           "[recording][flight][program]") {
   const Daemon daemon;
   CHECK(daemon.ctl({"stop"}).exit_code == 0);
-  REQUIRE(daemon.wrenchd.wait_for_output("what led to stop_requested is in "));
+  REQUIRE(daemon.wrenchd.wait_for_output("flight recorder: the ticks before stop_requested are in "));
   const std::string err = daemon.wrenchd.err();
   CHECK(err.find("; recorded in " + (daemon.recordings / "flight-").string()) != std::string::npos);
   const ProgramResult status = daemon.ctl({"status", "--json"});
@@ -148,11 +148,11 @@ TEST_CASE("an emergency stop leaves a flight recording, which status and the eve
   CHECK(last.ends_with("-stop_requested.h5"));
   CHECK(daemon.ctl({"status"}).out.find("last fault " + last) != std::string::npos);
   const Recording recording = read_recording(last);
-  CHECK(recording.ticks.front().tick == 0);  // it had not run for a minute
+  CHECK(recording.ticks.front().tick == 0);  // the run is shorter than the flight recorder's minute
   CHECK(is_gapless(recording));
 }
 
-TEST_CASE("a recording can be read after its daemon was killed, but for the last seconds",
+TEST_CASE("a recording of a killed daemon can be read, except for its last 2 s",
           "[recording][program][wall_time]") {
   RandomValues random(7);
   for (int i = 0; i < 4; ++i) {
@@ -175,7 +175,7 @@ TEST_CASE("a recording can be read after its daemon was killed, but for the last
   }
 }
 
-TEST_CASE("a recording of wrenchd is replayed, exported and drawn by wrenchctl", "[recording][program]") {
+TEST_CASE("wrenchctl replays, exports and plots a recording of wrenchd", "[recording][program]") {
   const TemporaryDirectory files;
   const std::string file = (files.path() / "run.h5").string();
   const ProgramResult run =
@@ -201,12 +201,12 @@ TEST_CASE("a recording of wrenchd is replayed, exported and drawn by wrenchctl",
   CHECK(std::count(csv.out.begin(), csv.out.end(), '\n') == 8);
   const ProgramResult wrong = run_program("wrenchctl", {"export", file, "--columns", "force"});
   CHECK(wrong.exit_code == 1);
-  CHECK(wrong.err.find("there is no column 'force'") != std::string::npos);
+  CHECK(wrong.err.find("the recording has no column 'force'") != std::string::npos);
   const ProgramResult plot = run_program("wrenchctl", {"plot", file});
   INFO(plot.err);
   CHECK(plot.exit_code == 0);
   CHECK(std::filesystem::exists(files.path() / "run/force.svg"));
   const ProgramResult none = run_program("wrenchctl", {"plot", (files.path() / "none.h5").string()});
   CHECK(none.exit_code == 1);
-  CHECK(none.err.find("none.h5: is not there") != std::string::npos);
+  CHECK(none.err.find("none.h5: does not exist") != std::string::npos);
 }

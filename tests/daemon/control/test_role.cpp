@@ -14,7 +14,7 @@ namespace {
 
 constexpr gid_t kObservers = 101, kOperators = 102, kAdministrators = 103, kOthers = 65534;
 
-TEST_CASE("a role is that of the highest group, the group of login or a supplementary one", "[role]") {
+TEST_CASE("the highest of a user's primary and supplementary groups determines the role", "[role]") {
   const RoleRules rules{999, false, kObservers, kOperators, kAdministrators};
   struct {
     Peer peer;
@@ -38,16 +38,16 @@ TEST_CASE("a role is that of the highest group, the group of login or a suppleme
   }
 }
 
-TEST_CASE("where no group is set only root and the daemon's own user have a role", "[role]") {
-  const RoleRules nobody{999, false, {}, {}, {}};
-  CHECK_FALSE(role_of({1000, kObservers, {kOperators, kAdministrators, 0}}, nobody));
-  CHECK((role_of({999, kOthers, {}}, nobody) == Role::administrator));
-  const RoleRules everybody{999, true, {}, kOperators, {}};
-  CHECK((role_of({1000, kOthers, {}}, everybody) == Role::observer));
-  CHECK((role_of({1000, kOthers, {kOperators}}, everybody) == Role::operator_));
+TEST_CASE("if no group is set, only root and the daemon's own user have a role", "[role]") {
+  const RoleRules no_groups{999, false, {}, {}, {}};
+  CHECK_FALSE(role_of({1000, kObservers, {kOperators, kAdministrators, 0}}, no_groups));
+  CHECK((role_of({999, kOthers, {}}, no_groups) == Role::administrator));
+  const RoleRules anyone_observes{999, true, {}, kOperators, {}};
+  CHECK((role_of({1000, kOthers, {}}, anyone_observes) == Role::observer));
+  CHECK((role_of({1000, kOthers, {kOperators}}, anyone_observes) == Role::operator_));
 }
 
-TEST_CASE("groups are looked up by name, and one that does not exist is told with its cure", "[role]") {
+TEST_CASE("groups are looked up by name, and an unknown group is rejected with the remedy", "[role]") {
   ControlSettings settings;
   settings.observers = "*";
   settings.operators = "daemon";
@@ -61,10 +61,10 @@ TEST_CASE("groups are looked up by name, and one that does not exist is told wit
   CHECK_THROWS_WITH(
       load_role_rules(settings, "wrenchd.toml"),
       "wrenchd.toml: key 'control.administrators': this machine has no group 'no-such-group-here'; "
-      "make it with: groupadd --system no-such-group-here");
+      "create it with: groupadd --system no-such-group-here");
 }
 
-TEST_CASE("the kernel says who is at the other end", "[role]") {
+TEST_CASE("the kernel identifies the peer of a connection", "[role]") {
   std::array<int, 2> ends{};
   REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0);
   const OwnedFd a(ends[0]), b(ends[1]);

@@ -6,19 +6,20 @@
 #include "daemon/control/scene_methods.hpp"
 #include "tests/support/shipped_config.hpp"
 
-// What is rendered, asked for and changed as a client does: looked up in the table, by a role, with JSON.
+// Clients read and change the rendering: each request is looked up in the method table, with a role and
+// parameters in JSON.
 
 namespace wrenchd {
 namespace {
 
 using namespace test;
 
-struct Asked {
+struct Rig {
   VirtualRuntime s;
   MethodTable table;
   int reloads = 0;
 
-  explicit Asked(const RunConfig& plan = shipped_config()) : s(plan) {
+  explicit Rig(const RunConfig& plan = shipped_config()) : s(plan) {
     add_scene_methods(table, s.runtime.reconfigurator(), [this] {
       ++reloads;
       return ReloadResult{{"limits"}, {"servo.rate_Hz"}, {}};
@@ -30,7 +31,7 @@ struct Asked {
     const RpcRequest request{method, params, 1, true};
     return MethodTable::run(table.look_up(request, role), params, {}).result;
   }
-  /// What was answered in the place of a result.
+  /// Returns the error that the request is answered with.
   RpcError refused(const std::string& method, const Json& params, Role role = Role::administrator) const {
     try {
       const Json result = ask(method, params, role);
@@ -61,7 +62,7 @@ Json a_block() {
 }
 
 TEST_CASE("obstacles are added, listed, moved and removed by name", "[scene_methods]") {
-  const Asked a;
+  const Rig a;
   CHECK(a.obstacles() == std::vector<std::string>{"table"});
   const Json added = a.ask("scene.add", {{"obstacle", a_block()}});
   CHECK(added["name"] == "block");
@@ -76,8 +77,8 @@ TEST_CASE("obstacles are added, listed, moved and removed by name", "[scene_meth
   CHECK(a.obstacles() == std::vector<std::string>{"table"});
 }
 
-TEST_CASE("a scene file is looked for, and taken whole", "[scene_methods]") {
-  const Asked a;
+TEST_CASE("scene.load finds the file on the search path and replaces the whole scene", "[scene_methods]") {
+  const Rig a;
   CHECK(a.ask("scene.load",
               {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}})["rendering_id"] == 1);
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
@@ -87,19 +88,19 @@ TEST_CASE("a scene file is looked for, and taken whole", "[scene_methods]") {
   CHECK(a.obstacles() == std::vector<std::string>{"table", "plunger"});
 }
 
-TEST_CASE("the scene is told with the place from where it is seen best, one that a client loads with none",
+TEST_CASE("scene.geometry has the configured viewpoint, and none for a scene that a client loads",
           "[scene_methods][view]") {
   RunConfig plan = shipped_config();
   plan.settings.view = {{0.1, -0.2, 0.3}, {0.0, 0.0, 0.05}};
-  const Asked a(plan);
+  const Rig a(plan);
   CHECK(a.ask("scene.geometry")["view"] == Json{{"eye_m", {0.1, -0.2, 0.3}}, {"target_m", {0.0, 0.0, 0.05}}});
   a.ask("scene.load", {{"file", WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml"}});
   CHECK(a.ask("scene.geometry")["view"].is_null());
-  CHECK(Asked().ask("scene.geometry")["view"].is_null());
+  CHECK(Rig().ask("scene.geometry")["view"].is_null());
 }
 
-TEST_CASE("what a scene cannot be is refused with its place, and nothing changes", "[scene_methods]") {
-  const Asked a;
+TEST_CASE("an invalid change is rejected with its location, and nothing changes", "[scene_methods]") {
+  const Rig a;
   const Json before = a.ask("scene.get");
   const auto add = [&](const char* key, const Json& value) {
     Json block = a_block();
@@ -127,20 +128,20 @@ TEST_CASE("what a scene cannot be is refused with its place, and nothing changes
   CHECK(a.ask("scene.get") == before);
 }
 
-TEST_CASE("a workspace is changed all at once or not at all", "[scene_methods]") {
-  const Asked a;
-  const Json as_it_is = a.ask("workspace.set");
-  CHECK(as_it_is == Json({{"scale", 1.0}, {"clutched", false}}));
+TEST_CASE("workspace.set applies all values or none", "[scene_methods]") {
+  const Rig a;
+  const Json unchanged = a.ask("workspace.set");
+  CHECK(unchanged == Json({{"scale", 1.0}, {"clutched", false}}));
   const RpcError error = a.refused("workspace.set", {{"scale", 100.0}, {"clutched", true}});
   CHECK(error.code() == RpcCode::rejected);
   has(error, "0.1 to 10");
-  CHECK(a.ask("workspace.set") == as_it_is);
+  CHECK(a.ask("workspace.set") == unchanged);
   CHECK(a.ask("workspace.set", {{"scale", 2.0}, {"clutched", true}}) ==
         Json({{"scale", 2.0}, {"clutched", true}}));
 }
 
-TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
-  const Asked a;
+TEST_CASE("a local model requires its kind, its parameters and a lifetime", "[scene_methods]") {
+  const Rig a;
   const Json plane = {{"id", 7},           {"kind", "plane"},
                       {"lifetime_s", 1.0}, {"normal", {0, 0, 1}},
                       {"offset_m", 0.005}, {"stiffness_N_per_m", 200.0}};
@@ -164,8 +165,8 @@ TEST_CASE("a local model says what it is and when it ends", "[scene_methods]") {
   CHECK(with("lifetime_s", nullptr).code() == RpcCode::invalid_params);
 }
 
-TEST_CASE("who only looks on changes nothing, and only an administrator reloads", "[scene_methods]") {
-  Asked a;
+TEST_CASE("an observer can change nothing, and only an administrator can reload", "[scene_methods]") {
+  Rig a;
   for (const auto& [name, row] : a.table.methods()) {
     if (row.min_role == Role::observer) continue;
     INFO(name);

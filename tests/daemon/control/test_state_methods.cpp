@@ -12,7 +12,7 @@ namespace {
 
 using namespace test;
 
-TEST_CASE("obstacles are named by the rendering that they are of, also when the scene has changed",
+TEST_CASE("obstacle names come with the number of their rendering, also after a change of the scene",
           "[state_methods]") {
   VirtualRuntime s(shipped_config());
   MethodTable table;

@@ -19,7 +19,7 @@ namespace {
 
 const std::string kHeader = "time_s,px,py,pz,qx,qy,qz,qw\n";
 
-/// From above the table down into it, 5 mm deep.
+/// Returns a pose table from above the table to 5 mm deep inside it.
 std::string pressing() {
   std::string text = kHeader;
   for (int i = 0; i <= 300; ++i) {
@@ -29,7 +29,7 @@ std::string pressing() {
   return text;
 }
 
-/// The shipped station with that path, in the mode given.
+/// Returns the shipped configuration with this path and playback mode.
 RunConfig plan_of(const std::filesystem::path& file, PlaybackMode mode) {
   RunConfig plan = shipped_config();
   SimulationSettings& simulation = plan.settings.simulation;
@@ -39,7 +39,8 @@ RunConfig plan_of(const std::filesystem::path& file, PlaybackMode mode) {
   return plan;
 }
 
-/// Armed from the first tick on; returns how far the handle was from the path at most [m], once it pushed.
+/// Runs 3.5 s, armed after 5 ms. Returns the greatest distance of the handle from the path [m]; pushed_N is
+/// the greatest force.
 double farthest_m(const RunConfig& plan, double& pushed_N) {
   VirtualRuntime s(plan);
   double farthest = 0.0;
@@ -56,7 +57,7 @@ double farthest_m(const RunConfig& plan, double& pushed_N) {
 
 }  // namespace
 
-TEST_CASE("led by a table of poses the handle is on it, whatever pushes; else the hand wants it there",
+TEST_CASE("open playback holds the handle on the table of poses; closed playback pulls it towards the poses",
           "[playback]") {
   const TemporaryDirectory files;
   const auto file = files.write("pressing.csv", pressing());
@@ -67,7 +68,7 @@ TEST_CASE("led by a table of poses the handle is on it, whatever pushes; else th
   CHECK(pushed_N > 0.5);
 }
 
-TEST_CASE("a led handle takes from the hand what the motors and friction take", "[playback]") {
+TEST_CASE("in open playback the hand supplies the energy that the motors and friction absorb", "[playback]") {
   const TemporaryDirectory files;
   VirtualRuntime s(plan_of(files.write("pressing.csv", pressing()), PlaybackMode::open));
   const SimulatedEnergy& energy = s.simulated.handle().energy();
@@ -84,7 +85,7 @@ TEST_CASE("a led handle takes from the hand what the motors and friction take", 
   CHECK(energy.hand_J > 1e-3);
 }
 
-TEST_CASE("a recording is played back: the hand does again what it did", "[playback]") {
+TEST_CASE("a played-back recording repeats the motion of the hand", "[playback]") {
   const TemporaryDirectory files;
   const auto file = files.path() / "run.h5";
   {
@@ -113,7 +114,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
   CHECK(compared > 200);
   CHECK(farthest_m < 1e-8);
 
-  // The same contact force again, as nearly as the encoders tell where the hand was.
+  // The contact force is the same within the resolution of the encoders.
   double then_N = 0.0, now_N = 0.0;
   for (const TickRecord& tick : before.ticks) then_N = std::max(then_N, std::abs(tick.F_T[2]));
   for (int i = 0; i < 5000; ++i) {
@@ -125,7 +126,7 @@ TEST_CASE("a recording is played back: the hand does again what it did", "[playb
   CHECK(now_N == Approx(then_N).epsilon(0.05));
 }
 
-TEST_CASE("what cannot be played back is refused", "[playback]") {
+TEST_CASE("a file that cannot be played back is rejected", "[playback]") {
   const TemporaryDirectory files;
   CHECK_THROWS_WITH(read_playback(files.path() / "none.csv"), Contains("cannot be read; name a recording"));
   CHECK_THROWS_WITH(read_playback(files.path()), Contains("cannot be read"));
@@ -151,7 +152,7 @@ TEST_CASE("what cannot be played back is refused", "[playback]") {
   CHECK_THROWS_WITH(read_playback(recorded("gap.h5")), Contains("before tick 6 there is a gap of 3.00"));
 }
 
-TEST_CASE("wrenchd plays back what its command line names", "[playback][program]") {
+TEST_CASE("wrenchd plays back the file of its command line", "[playback][program]") {
   const TemporaryDirectory files;
   const auto csv = files.write("pressing.csv", pressing());
   const std::vector<std::string> run = {

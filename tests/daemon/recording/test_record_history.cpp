@@ -7,13 +7,13 @@ using namespace wrenchd;
 
 namespace {
 
-/// Tick i at i milliseconds with so many contacts, which say whose they are.
-StateRecord record(std::uint64_t i, std::uint64_t touches) {
+/// Returns tick i at i ms with this many contacts; each contact encodes its tick and index.
+StateRecord record(std::uint64_t i, std::uint64_t contact_count) {
   StateRecord made;
   made.tick.tick = i;
   made.tick.now_ns = static_cast<std::int64_t>(i) * 1'000'000;
-  made.contact_count = touches;
-  for (std::uint64_t k = 0; k < touches; ++k)
+  made.contact_count = contact_count;
+  for (std::uint64_t k = 0; k < contact_count; ++k)
     made.contacts[k].obstacle = static_cast<std::uint32_t>(100 * i + k);
   return made;
 }
@@ -51,7 +51,9 @@ TEST_CASE("the history holds the newest ticks with their contacts", "[recording]
   CHECK(history.first_at_or_after(1'000'000'000) == 250);
 }
 
-TEST_CASE("where contacts are many, those of the oldest ticks go first and the ticks stay", "[recording]") {
+TEST_CASE(
+    "if contacts exceed the memory, the contacts of the oldest ticks are dropped first and the ticks stay",
+    "[recording]") {
   RecordHistory history(100);
   for (std::uint64_t i = 0; i < 100; ++i) history.append(record(i, kMaxTouches));
   RecordBatch batch;

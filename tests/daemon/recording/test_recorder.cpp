@@ -20,7 +20,7 @@ void append(RecordHistory& history, std::uint64_t from, std::uint64_t to) {
 
 }  // namespace
 
-TEST_CASE("what the history held no more when its turn came is counted as lost", "[recording]") {
+TEST_CASE("ticks that the history overwrote before they were written are counted as lost", "[recording]") {
   const TemporaryDirectory files;
   RecordHistory history(100);
   {
@@ -40,7 +40,7 @@ TEST_CASE("what the history held no more when its turn came is counted as lost",
   for (std::size_t i = 0; i < 110; ++i) REQUIRE(recording.ticks[i].tick == 150 + i);
 }
 
-TEST_CASE("as long as more may come whole chunks are written, and up to the end they wait", "[recording]") {
+TEST_CASE("until the end only whole chunks are written; the end writes the rest", "[recording]") {
   constexpr std::uint64_t kChunk = RecordingWriter::kChunkTicks;
   const TemporaryDirectory files;
   RecordHistory history(20 * kChunk);

@@ -31,7 +31,7 @@ RecordingSettings keeping_free(double MB) {
 
 }  // namespace
 
-TEST_CASE("a recording is named by a plain name, or by an administrator's path", "[recording]") {
+TEST_CASE("a recording is named by a plain name, or by a path if an administrator gives it", "[recording]") {
   const std::filesystem::path there = "/var/lib/wrenchd/recordings";
   CHECK(recording_path("run", there, false) == there / "run.h5");
   CHECK(recording_path("run-2.h5", there, false) == there / "run-2.h5");
@@ -40,15 +40,15 @@ TEST_CASE("a recording is named by a plain name, or by an administrator's path",
   for (const char* name :
        {"/data/x.h5", "../x", "a/b", "", ".", "..", ".hidden", "a b", "a\nb", "\xC3\xA4"}) {
     INFO(name);
-    CHECK_THROWS_WITH(recording_path(name, there, false), Contains("no valid name of a recording") &&
+    CHECK_THROWS_WITH(recording_path(name, there, false), Contains("is not a valid name of a recording") &&
                                                               Contains("only administrators") &&
                                                               Contains(there.string()));
   }
-  CHECK_THROWS_WITH(recording_path("../x", there, true), Contains("give an absolute path"));
+  CHECK_THROWS_WITH(recording_path("../x", there, true), Contains("or use an absolute path"));
   CHECK_THROWS_AS(recording_path(std::string(101, 'a'), there, false), RecordingError);
 }
 
-TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]") {
+TEST_CASE("only recordings are opened, by their names", "[recording]") {
   const TemporaryDirectory files;
   CHECK(stored_recordings(files.path() / "none").empty());
   files.write("there/b.h5", "of b");
@@ -75,10 +75,11 @@ TEST_CASE("a recording is opened by its name, and nothing else is", "[recording]
   for (const char* name : {"link", "directory", "pipe", "c"})
     CHECK_THROWS_WITH(open_recording(there, name), Contains("there are: b.h5, a.h5"));
   for (const char* name : {"../secret", "/etc/passwd", ""})
-    CHECK_THROWS_WITH(open_recording(there, name), Contains("no valid name of a recording"));
+    CHECK_THROWS_WITH(open_recording(there, name), Contains("is not a valid name of a recording"));
 }
 
-TEST_CASE("recordings go where the settings say, else where the system keeps state", "[recording]") {
+TEST_CASE("recordings are stored in the configured directory, else in the system's state directory",
+          "[recording]") {
   const auto before = [](const char* name) {
     const char* value = std::getenv(name);
     return value == nullptr ? std::string() : std::string(value);
@@ -101,7 +102,7 @@ TEST_CASE("recordings go where the settings say, else where the system keeps sta
     if (!value.empty()) setenv(name, value.c_str(), 1);
 }
 
-TEST_CASE("a directory for recordings is made, or refused with a cure", "[recording]") {
+TEST_CASE("the directory of recordings is created, or rejected with a remedy", "[recording]") {
   const TemporaryDirectory files;
   make_recordings_directory(files.path() / "a/b");
   CHECK(std::filesystem::is_directory(files.path() / "a/b"));
@@ -113,7 +114,7 @@ TEST_CASE("a directory for recordings is made, or refused with a cure", "[record
                     Contains("cannot be created") && Contains("set directory in [recording]"));
 }
 
-TEST_CASE("nothing is recorded where the disk has less room than is to stay free", "[recording]") {
+TEST_CASE("recording requires more free disk space than keep_free_MB", "[recording]") {
   const TemporaryDirectory files;
   const double left_MB = free_MB(files.path());
   CHECK(left_MB > 0.0);
@@ -123,7 +124,7 @@ TEST_CASE("nothing is recorded where the disk has less room than is to stay free
   CHECK_THROWS_AS(free_MB(files.path() / "none"), RecordingError);
 }
 
-TEST_CASE("the flight recorder's files are named by time and fault, and the oldest go", "[recording]") {
+TEST_CASE("flight recordings are named by time and fault, and the oldest are removed", "[recording]") {
   const TemporaryDirectory files;
   CHECK(utc_stamp(1795356901) == "20261122T141501Z");
   const auto first = flight_path(files.path(), 1795356901, "overspeed");
@@ -132,15 +133,15 @@ TEST_CASE("the flight recorder's files are named by time and fault, and the olde
   CHECK(flight_path(files.path(), 1795356901, "overspeed") ==
         files.path() / "flight-20261122T141501Z-overspeed-2.h5");
   files.write("flight-20261122T141500Z-stop_requested.h5", "2");
-  files.write("flight-20261122T141502Z-pinned.h5", "3");
+  files.write("flight-20261122T141502Z-motors_stalled.h5", "3");
   files.write("run-1.h5", "4");
   files.write("flight-plan.txt", "5");
   prune_flights(files.path(), 2);
   const auto there = [&](const char* name) { return std::filesystem::exists(files.path() / name); };
   CHECK_FALSE(there("flight-20261122T141500Z-stop_requested.h5"));
   CHECK(there("flight-20261122T141501Z-overspeed.h5"));
-  CHECK(there("flight-20261122T141502Z-pinned.h5"));
+  CHECK(there("flight-20261122T141502Z-motors_stalled.h5"));
   CHECK(there("run-1.h5"));
   CHECK(there("flight-plan.txt"));
-  prune_flights(files.path() / "none", 2);  // nothing there is nothing to remove
+  prune_flights(files.path() / "none", 2);  // a directory that does not exist is no error
 }

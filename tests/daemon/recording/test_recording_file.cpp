@@ -71,7 +71,7 @@ TEST_CASE("a recording reads back as it was written, bit for bit", "[recording]"
     REQUIRE(std::memcmp(&recording.ticks[i], &records[i], sizeof(TickRecord)) == 0);
 }
 
-TEST_CASE("a recording of another format is refused, with its version", "[recording]") {
+TEST_CASE("a recording of another format is rejected with its version", "[recording]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   RecordingHeader header;
@@ -105,24 +105,25 @@ TEST_CASE("a recording of another format is refused, with its version", "[record
           Catch::Contains("replay or export it with the version that wrote it"));
 }
 
-TEST_CASE("the contacts of each tick are in a recording, whatever pieces it was written in", "[recording]") {
+TEST_CASE("a recording contains the contacts of each tick, independent of the pieces it was written in",
+          "[recording]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   RandomValues random(2);
   RecordBatch all;
   std::vector<RecordBatch> pieces(1);
   for (int i = 0; i < 3000; ++i) {
-    std::vector<Touch> touches(random.bits() % 5);
-    for (Touch& touch : touches) {
-      for (double& x : touch.point_W_m) x = random.normal();
-      touch.load_fraction = random.normal();
-      touch.obstacle = static_cast<std::uint32_t>(random.bits());
-      touch.obstacle_feature_kind = 7;
+    std::vector<Touch> contacts(random.bits() % 5);
+    for (Touch& contact : contacts) {
+      for (double& x : contact.point_W_m) x = random.normal();
+      contact.load_fraction = random.normal();
+      contact.obstacle = static_cast<std::uint32_t>(random.bits());
+      contact.obstacle_feature_kind = 7;
     }
     const TickRecord tick = random_record(random);
-    all.add(tick, touches);
+    all.add(tick, contacts);
     if (i % 7 == 0) pieces.emplace_back();
-    pieces.back().add(tick, touches);
+    pieces.back().add(tick, contacts);
   }
   {
     RecordingWriter writer(file, {});
@@ -132,14 +133,14 @@ TEST_CASE("the contacts of each tick are in a recording, whatever pieces it was 
   REQUIRE(recording.ticks.size() == 3000);
   REQUIRE(recording.contacts.size() == all.contacts.size());
   for (std::size_t i = 0; i < 3000; ++i) {
-    const auto touches = recording.contacts_of(i);
-    REQUIRE(touches.size() == all.contact_ranges[i].count);
-    for (std::size_t k = 0; k < touches.size(); ++k)
-      REQUIRE(std::memcmp(&touches[k], &all.contacts[all.contact_ranges[i].first + k], sizeof(Touch)) == 0);
+    const auto contacts = recording.contacts_of(i);
+    REQUIRE(contacts.size() == all.contact_ranges[i].count);
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      REQUIRE(std::memcmp(&contacts[k], &all.contacts[all.contact_ranges[i].first + k], sizeof(Touch)) == 0);
   }
 }
 
-TEST_CASE("what a recording says of itself reads back", "[recording]") {
+TEST_CASE("the header of a recording reads back as it was written", "[recording]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   RecordingHeader header;
@@ -176,8 +177,7 @@ TEST_CASE("what a recording says of itself reads back", "[recording]") {
   }
 }
 
-TEST_CASE("a recording that is cut short anywhere, or lacks a column, is refused and never read wrong",
-          "[recording]") {
+TEST_CASE("a recording that is cut short, or lacks a column, is rejected", "[recording]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   RandomValues random(3);
@@ -200,7 +200,7 @@ TEST_CASE("a recording that is cut short anywhere, or lacks a column, is refused
   H5Fclose(id);
   CHECK_THROWS_WITH(read_recording(other), Catch::Contains("has no table 'ticks'"));
 
-  // A column renamed: all others are as they were.
+  // One column is renamed; all others are unchanged.
   std::ifstream in(file, std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(in), {}};
   const auto at = bytes.find("kkt_residual");
@@ -210,7 +210,7 @@ TEST_CASE("a recording that is cut short anywhere, or lacks a column, is refused
   CHECK_THROWS_WITH(read_recording(renamed), Catch::Contains("column 'kkt_residual' of table 'ticks' is"));
 }
 
-TEST_CASE("a recording with wrong bytes is read or refused, and no more", "[recording]") {
+TEST_CASE("a recording with wrong bytes is read or rejected, without a crash", "[recording]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   RandomValues random(6);
@@ -240,7 +240,7 @@ TEST_CASE("a recording with wrong bytes is read or refused, and no more", "[reco
   CHECK(refused > 20);
 }
 
-TEST_CASE("recordings are refused with the file and the cure", "[recording]") {
+TEST_CASE("recordings are rejected with the file and the remedy", "[recording]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   { const RecordingWriter writer(file, {}); }

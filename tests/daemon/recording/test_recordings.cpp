@@ -28,8 +28,8 @@ RunConfig plan_with(const std::filesystem::path& directory) {
   return plan;
 }
 
-/// Events `recording` so far.
-std::vector<Json> told(EventFeed& feed, const std::string& name = "recording") {
+/// Returns all events of this name so far.
+std::vector<Json> events_named(EventFeed& feed, const std::string& name = "recording") {
   std::vector<Json> events;
   feed.drain();
   for (const std::string& line : feed.events_since(1, {name}, 1 << 20).lines)
@@ -37,7 +37,7 @@ std::vector<Json> told(EventFeed& feed, const std::string& name = "recording") {
   return events;
 }
 
-/// A loop in wall time, with its recordings.
+/// A loop in wall time with its recordings.
 struct LiveRun {
   SimulatedRuntime<WallClock> s;
   EventFeed feed;
@@ -63,7 +63,7 @@ struct LiveRun {
   }
 };
 
-/// Every tick once, in order.
+/// Returns true if the recording has every tick once, in order.
 bool is_gapless(const Recording& recording) {
   for (std::size_t i = 1; i < recording.ticks.size(); ++i)
     if (recording.ticks[i].tick != recording.ticks[i - 1].tick + 1 && recording.ticks[i].released == 0)
@@ -73,7 +73,7 @@ bool is_gapless(const Recording& recording) {
 
 }  // namespace
 
-TEST_CASE("a recording begins and ends in mid-run, with every tick in between", "[recording]") {
+TEST_CASE("a recording starts and stops during a run, and has every tick between", "[recording]") {
   const TemporaryDirectory files;
   VirtualRuntime s(plan_with(files.path()));
   EventFeed feed(s.runtime.loop());
@@ -89,7 +89,8 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK_FALSE(recordings.stop());
   const auto file = recordings.start("mine", false);
   CHECK(file == files.path() / "mine.h5");
-  CHECK_THROWS_WITH(recordings.start("other", false), Contains("mine.h5: a recording runs already"));
+  CHECK_THROWS_WITH(recordings.start("other", false),
+                    Contains("mine.h5: a recording is already running; stop it first"));
   run(5000);
   CHECK(recordings.status().running->ticks > 3000);
   const auto written = recordings.stop();
@@ -107,14 +108,15 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK_THROWS_WITH(recordings.start("mine", false), Contains("never overwrites"));
   CHECK(recordings.start("", false).filename().string().starts_with("run-20"));
   CHECK(recordings.stop()->ticks == 0);
-  const auto events = told(feed);
+  const auto events = events_named(feed);
   REQUIRE(events.size() == 4);
   CHECK(events[0]["phase"] == "started");
   CHECK(events[1]["phase"] == "ended");
   CHECK(events[1]["ticks"] == 5000);
 }
 
-TEST_CASE("ticks that nobody took in time are counted, and the recording goes on", "[recording]") {
+TEST_CASE("ticks that the recorder did not read in time are counted, and the recording continues",
+          "[recording]") {
   const TemporaryDirectory files;
   VirtualRuntime s(plan_with(files.path()));
   EventFeed feed(s.runtime.loop());
@@ -125,11 +127,11 @@ TEST_CASE("ticks that nobody took in time are counted, and the recording goes on
   REQUIRE(written);
   CHECK(written->lost > 2000);
   CHECK(written->ticks + written->lost == 5000);
-  CHECK(told(feed).back()["lost"] == written->lost);
+  CHECK(events_named(feed).back()["lost"] == written->lost);
   CHECK(read_recording(file).ticks.back().tick == 4999);
 }
 
-TEST_CASE("a directory that cannot be written to, and a disk without room, are refused", "[recording]") {
+TEST_CASE("a directory that is not writable, and a disk without space, are rejected", "[recording]") {
   const TemporaryDirectory files;
   RunConfig plan = plan_with(files.write("file", "") / "below");
   {
@@ -149,16 +151,16 @@ TEST_CASE("a directory that cannot be written to, and a disk without room, are r
   CHECK_FALSE(std::filesystem::exists(files.path() / "mine.h5"));
 }
 
-TEST_CASE("a recording on a disk that fills up ends with an event, and what is in it can be read",
-          "[recording][root]") {
+TEST_CASE("a recording on a full disk ends with an event, and its ticks can be read", "[recording][root]") {
   const TemporaryDirectory files;
   const auto disk = files.path() / "disk";
   std::filesystem::create_directory(disk);
   if (mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=3m") != 0) {
-    WARN("no small disk could be made (this takes root): not tried");
+    WARN("the test could not mount a small disk, which requires root; it did not run");
     return;
   }
-  const double keep_free_MB = GENERATE(0.0, 1.0);  // the disk itself says no; we stop before it does
+  const double keep_free_MB =
+      GENERATE(0.0, 1.0);  // 0: the disk rejects the write; 1: wrenchd stops before the disk is full
   INFO("keep_free_MB " << keep_free_MB);
   std::string failed;
   {
@@ -175,7 +177,7 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
     }
     failed = recordings.status().failed;
     CHECK_FALSE(recordings.status().running);
-    CHECK(told(feed).back()["phase"] == "failed");
+    CHECK(events_named(feed).back()["phase"] == "failed");
     CHECK_FALSE(recordings.stop());
   }
   INFO(failed);
@@ -183,12 +185,13 @@ TEST_CASE("a recording on a disk that fills up ends with an event, and what is i
     CHECK(failed.find("MB are free") != std::string::npos);
     CHECK(read_recording(disk / "mine.h5").ticks.size() > 500);
   } else {
-    CHECK(failed.find("is the disk full, ") != std::string::npos);
+    CHECK(failed.find("check that the disk is connected and not full") != std::string::npos);
   }
   umount(disk.c_str());
 }
 
-TEST_CASE("the flight recorder writes what led to a fault, and the second after", "[recording][flight]") {
+TEST_CASE("the flight recorder writes the ticks before a fault, and the second after it",
+          "[recording][flight]") {
   const TemporaryDirectory files;
   RunConfig plan = plan_with(files.path());
   plan.settings.recording.flight_s = 1.5;
@@ -222,9 +225,9 @@ TEST_CASE("the flight recorder writes what led to a fault, and the second after"
       stopped = stopped || (tick.faults & bit(Fault::stop_requested)) != 0;
     CHECK(stopped);
     run.s.runtime.loop().requests().acknowledge();
-    std::this_thread::sleep_for(1100ms);  // a name of another second
+    std::this_thread::sleep_for(1100ms);  // the next flight gets another second in its name
   }
-  const auto faults = told(run.feed, "fault");
+  const auto faults = events_named(run.feed, "fault");
   bool named = false;
   for (const Json& fault : faults)
     named = named || (fault.contains("recording") && fault["recording"] == last);
@@ -237,22 +240,24 @@ TEST_CASE("the flight recorder writes what led to a fault, and the second after"
   CHECK(kept == 2);
 }
 
-TEST_CASE("a flight that cannot be written is told, and the loop goes on", "[recording][flight]") {
+TEST_CASE("a flight recording that cannot be written is reported, and the loop continues",
+          "[recording][flight]") {
   const TemporaryDirectory files;
   RunConfig plan = plan_with(files.write("file", "") / "below");
   LiveRun run(plan);
   REQUIRE(run.comes_true([&] { return run.s.runtime.loop().telemetry().state() == State::disarmed; }));
   run.s.runtime.loop().requests().stop();
   REQUIRE(run.comes_true([&] {
-    const auto events = told(run.feed);
+    const auto events = events_named(run.feed);
     return !events.empty() && events.back()["phase"] == "failed";
   }));
-  CHECK(told(run.feed).back()["reason"].get<std::string>().find("cannot be created") != std::string::npos);
+  CHECK(events_named(run.feed).back()["reason"].get<std::string>().find("cannot be created") !=
+        std::string::npos);
   CHECK(run.recordings.status().flights == 0);
   CHECK(run.s.runtime.loop().telemetry().state() == State::stopped);
 }
 
-TEST_CASE("what was going on when the loop ended is in the file", "[recording][flight]") {
+TEST_CASE("recordings contain the ticks up to the end of the loop", "[recording][flight]") {
   const TemporaryDirectory files;
   {
     LiveRun run(plan_with(files.path()));
@@ -260,7 +265,7 @@ TEST_CASE("what was going on when the loop ended is in the file", "[recording][f
     run.recordings.start("mine", false);
     std::this_thread::sleep_for(300ms);
     run.s.runtime.loop().requests().stop();
-    REQUIRE(run.comes_true([&] { return !told(run.feed, "fault").empty(); }));
+    REQUIRE(run.comes_true([&] { return !events_named(run.feed, "fault").empty(); }));
     run.stop = true;
     run.servo.join();
   }

@@ -14,7 +14,7 @@ using namespace wrenchd::test;
 
 namespace {
 
-/// A run of the shipped station with everything in it that a tick can do, recorded to a file.
+/// Records a run of this configuration with faults, disarming and arming, and at its end an unplugging.
 void record_run(const RunConfig& plan, const std::filesystem::path& file, double duration_s) {
   VirtualRuntime s(plan);
   s.inject(SimulatedFault::Kind::corrupt, 3.0, 0.003);
@@ -55,7 +55,7 @@ TEST_CASE("a replayed recording gives the same bits", "[replay]") {
   CHECK_FALSE(difference.has_value());
 }
 
-TEST_CASE("a replay rubs as the loop did", "[replay][friction]") {
+TEST_CASE("a replay applies friction as the loop did", "[replay][friction]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   RunConfig plan = recording_plan(Method::exact);
@@ -70,21 +70,22 @@ TEST_CASE("a replay rubs as the loop did", "[replay][friction]") {
   }
   CHECK(stuck > 100);
   CHECK_FALSE(replay(recording, plan).has_value());
-  // The configuration that it is replayed with says how it rubs.
+  // The friction of the replay is that of its configuration.
   plan.settings.rendering.friction = {0.5, 0.4};
   CHECK(replay(recording, plan).has_value());
 }
 
-TEST_CASE("a replay places the proxy at the ticks at which it was placed, where it was placed",
-          "[replay][placing]") {
-  // Inside, out, and back against the boulder; started over on the way.
+TEST_CASE("a replay initializes the proxy at the recorded ticks and poses",
+          "[replay][proxy_initialization]") {
+  // Inside the boulder, out of it, and back against it, with two reinitializations of the proxy.
   BuriedTool buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
-  int seeking = 0;
-  int placed = 0;
+  int searching = 0;
+  int found = 0;
   {
-    VirtualRuntime s(buried.config, ProxySearchMode::background);  // a thread's answers come when they come
+    VirtualRuntime s(buried.config,
+                     ProxySearchMode::background);  // a thread's results arrive at arbitrary ticks
     RunRecorder recorder(s.runtime, file);
     for (int i = 0; i < 4000; ++i) {
       if (i == 5) s.runtime.loop().requests().arm();
@@ -92,20 +93,20 @@ TEST_CASE("a replay places the proxy at the ticks at which it was placed, where 
       wait_for_proxy_search(s);
       REQUIRE(s.tick() == Fault::none);
       recorder.append_new_ticks();
-      seeking += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
-      placed += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;
+      searching += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
+      found += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;
     }
     s.runtime.loop().release(s.clock.now());
   }
-  CHECK(seeking > 2);
-  CHECK(placed >= 2);
+  CHECK(searching > 2);
+  CHECK(found >= 2);
   const Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 4001);
   auto difference = replay(recording, buried.config);
   if (difference) INFO("tick " << difference->tick << ' ' << difference->field);
   CHECK_FALSE(difference.has_value());
 
-  // Another answer, and all that follows is another.
+  // Another initial pose changes all following ticks.
   Recording changed = recording;
   for (TickRecord& tick : changed.ticks)
     if (static_cast<ProxyInitialization>(tick.proxy_initialization) == ProxyInitialization::found)
@@ -115,7 +116,7 @@ TEST_CASE("a replay places the proxy at the ticks at which it was placed, where 
   CHECK(difference->field.rfind("X_WQ[", 0) == 0);
 }
 
-TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]") {
+TEST_CASE("a replay has moving obstacles at their recorded poses", "[replay][moving]") {
   BuriedTool buried({{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.078}}});
   buried.config.scene.meshes[0].motion = {{0.0, 0.0, 0.01}, {0.0, 0.3, 0.0}, 0.7};
   const TemporaryDirectory directory;
@@ -139,7 +140,7 @@ TEST_CASE("a replay has obstacles that move where they were", "[replay][moving]"
   CHECK_FALSE(difference.has_value());
 }
 
-TEST_CASE("a recording without its beginning is refused", "[replay]") {
+TEST_CASE("a recording without its beginning is rejected", "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   const RunConfig plan = recording_plan(Method::exact);
@@ -158,7 +159,7 @@ TEST_CASE("a recording without its beginning is refused", "[replay]") {
   CHECK_FALSE(replay(recording, plan).has_value());
 }
 
-TEST_CASE("where there was no place, there is none in the replay", "[replay][placing]") {
+TEST_CASE("a search without a feasible pose fails in the replay as well", "[replay][proxy_initialization]") {
   RunConfig plan = recording_plan(Method::exact);
   plan.scene.half_spaces = closed_box(0.02);
   const TemporaryDirectory directory;
@@ -187,7 +188,7 @@ TEST_CASE("a replay names the first tick and field that differ", "[replay]") {
   CHECK(difference->field.rfind("F_T[", 0) == 0);
 }
 
-TEST_CASE("a recording in which something was changed from outside is replayed up to there, and says so",
+TEST_CASE("a replay stops at a change by a client that the recording does not contain, and reports it",
           "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
@@ -206,12 +207,13 @@ TEST_CASE("a recording in which something was changed from outside is replayed u
   }
   Recording recording = read_recording(file);
   REQUIRE(recording.ticks.size() == 3000);
-  CHECK_THROWS_WITH(replay(recording, plan), Catch::Contains("at tick 2000 the scene"));
+  CHECK_THROWS_WITH(replay(recording, plan),
+                    Catch::Contains("at tick 2000 a client changed the scene, the workspace or a limit"));
   recording.ticks.resize(2000);
   CHECK_FALSE(replay(recording, plan).has_value());
 }
 
-TEST_CASE("a recording in which ticks are missing is replayed up to there, and says so", "[replay]") {
+TEST_CASE("a replay stops at missing ticks, and reports them", "[replay]") {
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   const RunConfig plan = recording_plan(Method::exact);
@@ -223,8 +225,9 @@ TEST_CASE("a recording in which ticks are missing is replayed up to there, and s
   CHECK_FALSE(replay(recording, plan).has_value());
 }
 
-TEST_CASE("a recording is replayed with what is in it alone", "[replay]") {
-  // Copies of all files, which are gone afterwards; the scene has a mesh obstacle, the profile a parent.
+TEST_CASE("a replay needs no file but the recording", "[replay]") {
+  // The run uses copies of all files, which the test deletes before the replay. The scene has a mesh
+  // obstacle, and the profile inherits from another.
   const TemporaryDirectory directory;
   const auto file = directory.path() / "run.h5";
   const auto there = std::filesystem::path(WRENCHD_SOURCE_DIR) / "config";
@@ -255,7 +258,7 @@ TEST_CASE("a recording is replayed with what is in it alone", "[replay]") {
   RecordingHeader lacking = recording.header;
   std::erase_if(lacking.files, [](const RecordedFile& f) { return f.role == "tool"; });
   CHECK_THROWS_WITH(unpack_run_config(lacking, directory.path() / "lacking"),
-                    Catch::Contains("has no mesh 'tool'") && Catch::Contains("--scene"));
+                    Catch::Contains("does not contain the mesh 'tool'") && Catch::Contains("--scene"));
   RecordingHeader outside = recording.header;
   for (RecordedFile& f : outside.files)
     if (f.role == "tool") f.embedded = false;

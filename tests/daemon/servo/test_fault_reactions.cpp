@@ -6,14 +6,14 @@
 #include "tests/support/expected_machine.hpp"
 #include "tests/support/fault_rig.hpp"
 
-// Every fault, in every state, with the hand in the air, in contact and at the limits: found in time,
-// answered as the safety requirements (tests/support/expected_machine.hpp) state, and no invariant broken in
-// any tick on the way.
+// Every fault, in every state, with the hand in the air, in contact and at the limits. The loop raises the
+// fault in time and reacts as the safety requirements (tests/support/expected_machine.hpp) state. No tick
+// breaks an invariant.
 
 namespace wrenchd::test {
 namespace {
 
-/// Until when the force has to be gone, from the tick in which the fault was found.
+/// Returns the number of ticks after which the force must be zero, from the tick that raises the fault.
 int ticks_to_zero(const FaultRow& row, State from) {
   const Transition& t = transition(row.trigger, from);
   const Reaction reaction = std::max(t.reaction, t.changes_state ? row.reaction : Reaction::none);
@@ -21,25 +21,25 @@ int ticks_to_zero(const FaultRow& row, State from) {
          (reaction < Reaction::zero ? 1 : 0);
 }
 
-/// The force has to go, from that state.
-bool takes_force(const FaultRow& row, State from) {
+/// Returns true if the fault must remove the force in this state.
+bool removes_force(const FaultRow& row, State from) {
   return row.trigger != Trigger::info && is_driving(from);
 }
 
 std::string run(const Injection& injection, State state, Phase phase) {
   FaultRig rig(phase);
-  if (!rig.bring_to(state)) return std::string("does not come to ") + name(state);
+  if (!rig.bring_to(state)) return std::string("does not reach the state ") + name(state);
   injection.begin(rig);
   State before = rig.state();
   int tick = 0;
   do {
     before = rig.state();
-    if (++tick > injection.within_ticks) return "not found in time";
+    if (++tick > injection.within_ticks) return "not raised in time";
     rig.tick();
     if (injection.each_tick) injection.each_tick(rig);
   } while (!rig.raised(injection.expected));
   const FaultRow& row = fault_row(injection.expected);
-  // Others may have come before it, or with it; harder ones decide.
+  // Other faults may be raised before this one or in the same tick. The most severe fault decides the state.
   State wanted = expected_after(row.trigger, before);
   bool harder = false;
   for (const FaultRow& other : fault_rows()) {
@@ -53,7 +53,7 @@ std::string run(const Injection& injection, State state, Phase phase) {
            name(wanted);
   if (row.trigger == Trigger::hard_fault && is_latched(wanted) && !is_latched(rig.state()))
     return "is not latched";
-  if (takes_force(row, before)) {
+  if (removes_force(row, before)) {
     for (int i = 0; i < ticks_to_zero(row, before); ++i) rig.tick();
     const bool back = rig.state() == State::ramping || rig.state() == State::active;
     if (rig.force_N() != 0.0 && !back) return "force after the deadline: " + std::to_string(rig.force_N());
@@ -61,7 +61,7 @@ std::string run(const Injection& injection, State state, Phase phase) {
   return rig.violation();
 }
 
-TEST_CASE("every fault in every state and phase is found in time and answered as it should be", "[faults]") {
+TEST_CASE("every fault is raised in time in every state and phase, with the required reaction", "[faults]") {
   int combinations = 0;
   std::set<Fault> faults;
   for (const Injection& injection : injections())
@@ -80,9 +80,9 @@ TEST_CASE("every fault in every state and phase is found in time and answered as
   CHECK(faults.size() >= 30);
 }
 
-// Those that take a plan of their own.
+// Faults that require a configuration of their own.
 
-TEST_CASE("motors that are warm give less, and say so", "[faults]") {
+TEST_CASE("warm motors lower the force limit, and the loop reports it", "[faults]") {
   FaultRig rig(Phase::contact, [](RunConfig& plan) {
     plan.profile.continuous_force_N = 0.5;
     plan.profile.continuous_torque_Nm = 0.2;
@@ -100,19 +100,19 @@ TEST_CASE("motors that are warm give less, and say so", "[faults]") {
   CHECK(rig.violation() == "");
 }
 
-TEST_CASE("a contact that buzzes loses half its stiffness, twice, and then the force", "[faults]") {
+TEST_CASE("an oscillating contact halves the stiffness twice, and then sets the force to zero", "[faults]") {
   FaultRig rig(Phase::contact);
   REQUIRE(rig.bring_to(State::active));
   rig.inject(SimulatedFault::Kind::vibrate, 2.0, 0.0005);
-  double share = rig.last().stiffness_scale;
+  double scale = rig.last().stiffness_scale;
   for (const int time : {1, 2}) {
     int ticks = 0;
     for (; ticks < 200 && !rig.raised(Fault::oscillating); ++ticks) rig.tick();
     INFO("time " << time << " after " << ticks << " ticks");
     CHECK(ticks <= 55);
-    CHECK(rig.last().stiffness_scale == Approx(0.5 * share));
+    CHECK(rig.last().stiffness_scale == Approx(0.5 * scale));
     CHECK(rig.state() == State::active);
-    share = rig.last().stiffness_scale;
+    scale = rig.last().stiffness_scale;
     rig.tick();
   }
   for (int i = 0; i < 200 && rig.state() == State::active; ++i) rig.tick();
@@ -122,9 +122,9 @@ TEST_CASE("a contact that buzzes loses half its stiffness, twice, and then the f
   CHECK(rig.violation() == "");
 }
 
-TEST_CASE("energy from nowhere, more than the guard can take back, is a fault", "[faults]") {
-  // A wall far beyond what the device bears, at the limit of force; then the handle is said to be farther
-  // out, along the force, than the spring had been pressed.
+TEST_CASE("generated energy beyond what the guard can remove is a fault", "[faults]") {
+  // The wall is stiffer than the stability bound allows, and the force is at its limit. Then the samples
+  // report the handle farther out, along the force, than the compression of the spring.
   FaultRig rig(Phase::contact, [](RunConfig& plan) {
     plan.settings.servo.self_test_s = 0.0;
     plan.settings.wrench.energy_stiffness_per_s2 *= 20.0;

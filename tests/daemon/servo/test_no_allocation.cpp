@@ -17,10 +17,10 @@
 using namespace wrenchd;
 using namespace wrenchd::test;
 
-TEST_CASE("the guard sees what it is there to see", "[realtime]") {
+TEST_CASE("the guard counts allocations and locks", "[realtime]") {
   std::mutex mutex;
   const RealtimeGuard guard;
-  static void* volatile escaped;  // an allocation that nobody can see may be left out by the compiler
+  static void* volatile escaped;  // the compiler may remove an allocation that does not escape
   escaped = std::malloc(8);
   std::free(escaped);
   escaped = std::make_unique<int>(1).release();
@@ -32,8 +32,7 @@ TEST_CASE("the guard sees what it is there to see", "[realtime]") {
 #endif
 }
 
-TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neither allocate nor lock",
-          "[realtime]") {
+TEST_CASE("ten thousand ticks with contact, saturation and a fault neither allocate nor lock", "[realtime]") {
   const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
   RunConfig plan = shipped_config();
   plan.settings.rendering.method = method;
@@ -68,8 +67,7 @@ TEST_CASE("ten thousand ticks with contact, saturation and a fault in them neith
   CHECK(locks == 0);
 }
 
-TEST_CASE("no fault on its way through the loop allocates, locks or touches a page for the first time",
-          "[realtime][faults]") {
+TEST_CASE("no fault makes the loop allocate, lock or touch a page for the first time", "[realtime][faults]") {
   std::uint64_t allocations = 0, locks = 0;
   long page_faults = 0;
   for (const Injection& injection : injections())
@@ -99,31 +97,31 @@ TEST_CASE("no fault on its way through the loop allocates, locks or touches a pa
 #endif
 }
 
-TEST_CASE("to be placed, to start over and to be armed neither allocates nor locks in the servo thread",
-          "[realtime][placing]") {
+TEST_CASE("proxy initialization, its repetition and arming neither allocate nor lock in the servo thread",
+          "[realtime][proxy_initialization]") {
   const bool boulder_moves = GENERATE(false, true);
   BuriedTool buried({{0.0, {0, 0, 0.03}}, {0.5, {0, 0, 0.08}}});
   if (boulder_moves) buried.config.scene.meshes[0].motion = {{0.0, 0.0, 0.005}, {0.0, 0.2, 0.0}, 0.3};
   VirtualRuntime s(buried.config, ProxySearchMode::background);
-  int seeking = 0;
-  int placed = 0;
+  int searching = 0;
+  int found = 0;
   std::uint64_t allocations = 0;
   std::uint64_t locks = 0;
-  for (int ticks = 0; placed < 3 && ticks < 100000; ++ticks) {
+  for (int ticks = 0; found < 3 && ticks < 100000; ++ticks) {
     wait_for_proxy_search(s);
     const RealtimeGuard guard;
-    if (proxy_initialization(s) == ProxyInitialization::complete && placed == 1)
+    if (proxy_initialization(s) == ProxyInitialization::complete && found == 1)
       s.runtime.loop().requests().reinitialize_proxy();
-    if (proxy_initialization(s) == ProxyInitialization::complete && placed == 2)
+    if (proxy_initialization(s) == ProxyInitialization::complete && found == 2)
       s.runtime.loop().requests().arm();
     s.tick();
-    seeking += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
-    placed += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;
+    searching += proxy_initialization(s) == ProxyInitialization::searching ? 1 : 0;
+    found += proxy_initialization(s) == ProxyInitialization::found ? 1 : 0;
     allocations += guard.allocations();
     locks += guard.locks();
   }
-  CHECK(placed == 3);
-  CHECK(seeking >= 3);
+  CHECK(found == 3);
+  CHECK(searching >= 3);
   CHECK(allocations == 0);
   CHECK(locks == 0);
 }

@@ -24,7 +24,7 @@ namespace {
 /// When the shipped hand is deep in the table, in seconds after power-on.
 constexpr double kPressing_s = 2.4;
 
-/// A handle that lies where it is, and says so at every tick.
+/// A device whose handle stays at one pose and which delivers a new sample at every tick.
 class StillDevice final : public Device {
  public:
   void open() override {}
@@ -46,39 +46,37 @@ class StillDevice final : public Device {
   std::uint64_t sequence_ = 0;
 };
 
-/// Never finds a place, and keeps what it was asked.
-class Listener final : public ProxyInitializer {
+/// Finds no feasible pose for any request, and stores the requests.
+class RequestStore final : public ProxyInitializer {
  public:
-  std::vector<ProxyInitializationRequest> questions;
+  std::vector<ProxyInitializationRequest> requests;
 
-  void request(const ProxyInitializationRequest& question) noexcept override {
-    questions.push_back(question);
-  }
-  bool take_result(ProxyInitializationResult& answer) noexcept override {
-    answer = {questions.back().id, false, Pose{}, questions.back().scene_time_s};
+  void request(const ProxyInitializationRequest& request) noexcept override { requests.push_back(request); }
+  bool take_result(ProxyInitializationResult& result) noexcept override {
+    result = {requests.back().id, false, Pose{}, requests.back().scene_time_s};
     return true;
   }
 };
 
 }  // namespace
 
-TEST_CASE("after every start the loop is disarmed: it measures and projects, and the hand feels nothing",
+TEST_CASE("after every start the loop is disarmed: it measures and projects, and sends zero wrench",
           "[servo]") {
   VirtualRuntime s;
   double most_N = 0.0;
-  bool touched = false;
+  bool contact = false;
   for (int i = 0; i < 5000; ++i) {
     REQUIRE(s.tick() == Fault::none);
     most_N = std::max({most_N, s.force_N(), s.torque_Nm()});
-    touched = touched || s.last.contacts > 0;
+    contact = contact || s.last.contacts > 0;
     CHECK(s.state() == State::disarmed);
   }
-  CHECK(touched);
+  CHECK(contact);
   CHECK(most_N == 0.0);
   CHECK(s.simulated.motor_wrench().force_N.norm() == 0.0);
 }
 
-TEST_CASE("armed, the simulated hand presses the cube into the table and the table holds it", "[servo]") {
+TEST_CASE("an armed loop renders the table: the simulated hand presses the cube onto it", "[servo]") {
   VirtualRuntime s;
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
@@ -93,7 +91,7 @@ TEST_CASE("armed, the simulated hand presses the cube into the table and the tab
   CHECK(pose_from_numbers(s.last.X_WQ).translation_m.z() == Approx(0.025).margin(1e-12));
 }
 
-TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the base's axes", "[servo]") {
+TEST_CASE("the wrench sent is that of Eq. (16), about the handle in the axes of the base", "[servo]") {
   RunConfig plan = shipped_config();
   plan.settings.device.base_in_world = {{0.0, 0.0, 0.0}, {0.0, 0.0, 1.2}};
   plan.settings.device.tool_in_handle = {{0.01, -0.02, 0.0}, {0.0, 0.3, 0.0}};
@@ -122,35 +120,36 @@ TEST_CASE("the wrench that goes out is that of Eq. (16), about the handle in the
   CHECK(compared > 1000);
 }
 
-TEST_CASE("a device that cannot turn the hand is armed and pushes, and the torque is dropped and told",
+TEST_CASE("a device without rotational motors renders force; the loop drops the torque and reports it",
           "[servo]") {
   RunConfig plan = shipped_config();
   plan.profile = load_profile(WRENCHD_SOURCE_DIR "/config/profiles/polhem.toml",
                               SearchPath({WRENCHD_SOURCE_DIR "/config"}));
   VirtualClock clock;
   const auto link = make_simulated_link(plan.profile, plan.settings.simulation, clock);
-  Runtime station(plan, *link, clock, ProxySearchMode::in_tick);
-  station.open();
-  station.loop().requests().arm();
+  Runtime runtime(plan, *link, clock, ProxySearchMode::in_tick);
+  runtime.open();
+  runtime.loop().requests().arm();
   TickRecord last;
-  bool pushed = false, told = false;
+  bool pushed = false, reported = false;
   for (int i = 0; i < 5000; ++i) {
     clock.sleep_until(clock.now() + std::chrono::milliseconds(1));
-    REQUIRE(station.loop().tick(clock.now(), clock.now()) == Fault::none);
-    station.loop().telemetry().latest_record().read(last);
+    REQUIRE(runtime.loop().tick(clock.now(), clock.now()) == Fault::none);
+    runtime.loop().telemetry().latest_record().read(last);
     CHECK(Vector3d(last.F_out[3], last.F_out[4], last.F_out[5]).norm() == 0.0);
     CHECK((last.limit_causes & kTorqueMagnitude) == 0);
     CHECK((last.undriven_dofs & ~kAngularDofs) == 0);
     pushed = pushed || last.F_out[2] > 0.5;
-    told = told || live_line(last, station.loop().telemetry().timing()).find("(no motor: rx ry rz)") !=
-                       std::string::npos;
+    reported =
+        reported || live_line(last, runtime.loop().telemetry().timing()).find("(no motor: rx ry rz)") !=
+                        std::string::npos;
   }
   CHECK(static_cast<State>(last.state) == State::active);
   CHECK(pushed);
-  CHECK(told);
+  CHECK(reported);
 }
 
-TEST_CASE("armed, the motors hold the weight of the handle, however the base stands", "[servo]") {
+TEST_CASE("an armed loop compensates the weight of the handle at every tilt of the base", "[servo]") {
   const double tilt_rad = GENERATE(0.0, 0.7);
   RunConfig plan = shipped_config();
   plan.settings.simulation.hand_path = {{0.0, {0, 0, 0.06}, {0, 0.4, 0}}};  // far from the table
@@ -171,7 +170,7 @@ TEST_CASE("armed, the motors hold the weight of the handle, however the base sta
   CHECK(weight.torque_Nm.norm() > 0.01);
 }
 
-TEST_CASE("a profile may ask for the paper's spatial wrench about the world origin", "[servo]") {
+TEST_CASE("a profile can select the paper's spatial wrench about the world origin", "[servo]") {
   RunConfig plan = shipped_config();
   plan.profile.wrench_point = WrenchPoint::world_origin;
   plan.settings.wrench.gains.damping.setZero();
@@ -186,7 +185,7 @@ TEST_CASE("a profile may ask for the paper's spatial wrench about the world orig
   CHECK((W_S.torque_Nm - Vector3d(s.last.F_out[3], s.last.F_out[4], s.last.F_out[5])).norm() < 1e-9);
 }
 
-TEST_CASE("arming in contact waits: no push until the hand has moved out and is calm", "[servo]") {
+TEST_CASE("arming in contact waits: no force until the hand has left the contact and is at rest", "[servo]") {
   VirtualRuntime s;
   REQUIRE(s.run(kPressing_s) == Fault::none);
   REQUIRE(s.last.contacts > 0);
@@ -198,7 +197,7 @@ TEST_CASE("arming in contact waits: no push until the hand has moved out and is 
   }
 }
 
-TEST_CASE("authority rises over the soft start, and the force never faster than the slew limit", "[servo]") {
+TEST_CASE("authority rises over the soft start, and the slew limit bounds the rise of the force", "[servo]") {
   RunConfig plan = shipped_config();
   plan.settings.limits.force_slew_N_per_s = 100.0;
   VirtualRuntime s(plan);
@@ -214,7 +213,7 @@ TEST_CASE("authority rises over the soft start, and the force never faster than 
   }
 }
 
-TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]") {
+TEST_CASE("a wrench above the limits is scaled to them and keeps its direction", "[servo]") {
   RunConfig plan = shipped_config();
   plan.settings.limits.max_force_N = 0.5;
   VirtualRuntime s(plan);
@@ -226,7 +225,7 @@ TEST_CASE("a wrench above the limits is cut to them, direction kept", "[servo]")
   CHECK(s.last.F_out[2] > 0.499);
 }
 
-TEST_CASE("a device that leaves ends the loop, and the hand is released", "[servo]") {
+TEST_CASE("an unplugged device ends the loop, and the hand is released", "[servo]") {
   VirtualRuntime s;
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
@@ -239,8 +238,7 @@ TEST_CASE("a device that leaves ends the loop, and the hand is released", "[serv
   CHECK(seconds(s.clock.now() - TimePoint{}) < kPressing_s + 0.003);
 }
 
-TEST_CASE("an old pose fades the force before it is one to look at, and what passes comes back by a ramp",
-          "[servo]") {
+TEST_CASE("a late sample fades the force to zero; when samples return, the force ramps up", "[servo]") {
   VirtualRuntime s;
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
@@ -261,7 +259,7 @@ TEST_CASE("an old pose fades the force before it is one to look at, and what pas
   CHECK(s.force_N() > 0.5);
 }
 
-TEST_CASE("a gap in time takes the force: no kick after a stall", "[servo]") {
+TEST_CASE("after a stall of the loop the force is zero, without a kick", "[servo]") {
   const bool required = GENERATE(true, false);
   RunConfig plan = shipped_config();
   plan.settings.servo.realtime = required ? Realtime::required : Realtime::best_effort;
@@ -276,24 +274,24 @@ TEST_CASE("a gap in time takes the force: no kick after a stall", "[servo]") {
   CHECK(s.force_N() == 0.0);
 }
 
-TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is out, and then no kick",
-          "[servo][placing]") {
-  // Inside, drawn out to the side, and back against the boulder.
+TEST_CASE("a hand that starts deep inside an obstacle gets zero force until it has left, and then no kick",
+          "[servo][proxy_initialization]") {
+  // Inside the boulder, out of it, and back against it.
   const BuriedTool buried(
       {{0.0, {0, 0, 0.03}}, {0.4, {0, 0, 0.03}}, {1.2, {0, 0, 0.12}}, {1.8, {0, 0, 0.075}}});
-  const ProxySearchMode place_in = GENERATE(ProxySearchMode::in_tick, ProxySearchMode::background);
-  VirtualRuntime s(buried.config, place_in);
-  FeasiblePoseSearch placement(s.runtime.scene());
+  const ProxySearchMode search_mode = GENERATE(ProxySearchMode::in_tick, ProxySearchMode::background);
+  VirtualRuntime s(buried.config, search_mode);
+  FeasiblePoseSearch search(s.runtime.scene());
   const double slew_N = buried.config.settings.limits.force_slew_N_per_s * 1e-3;
   const double most_N = buried.config.profile.max_force_N;
   s.runtime.loop().requests().arm();
   REQUIRE(s.tick() == Fault::none);
   CHECK(proxy_initialization(s) == ProxyInitialization::searching);
-  int seeking = 0;
+  int searching_ticks = 0;
   double last_N = 0.0, last_authority = 0.0;
   bool waited = false, ramped = false;
   for (const TimePoint end = s.clock.now() + from_seconds(4.0); s.clock.now() < end;) {
-    if (place_in == ProxySearchMode::background) wait_for_proxy_search(s);
+    if (search_mode == ProxySearchMode::background) wait_for_proxy_search(s);
     REQUIRE(s.tick() == Fault::none);
     if (proxy_initialization(s) != ProxyInitialization::complete) {
       CHECK(s.force_N() == 0.0);
@@ -304,10 +302,10 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
     if (proxy_initialization(s) == ProxyInitialization::searching) {
       CHECK(std::isnan(s.last.X_WQ[0]));
       CHECK(std::isnan(s.last.energy));
-      ++seeking;
+      ++searching_ticks;
       continue;
     }
-    if (s.last.tick % 10 == 0) CHECK(placement.admissible(pose_from_numbers(s.last.X_WQ)));
+    if (s.last.tick % 10 == 0) CHECK(search.admissible(pose_from_numbers(s.last.X_WQ)));
     waited = waited || s.state() == State::waiting;
     ramped = ramped || s.state() == State::ramping;
     CHECK(s.force_N() <= last_N + slew_N + 1e-9);
@@ -316,7 +314,7 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
     last_N = s.force_N();
     last_authority = s.last.authority;
   }
-  CHECK(seeking >= 1);
+  CHECK(searching_ticks >= 1);
   CHECK(waited);
   CHECK(ramped);
   CHECK(s.state() == State::active);
@@ -324,8 +322,8 @@ TEST_CASE("a hand that starts deep inside an obstacle gets nothing until it is o
   CHECK(s.last.F_out[2] > 0.5);
 }
 
-TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, and does not push",
-          "[servo][placing]") {
+TEST_CASE("while the hand stays inside an obstacle, the proxy is at a feasible pose and the force is zero",
+          "[servo][proxy_initialization]") {
   const BuriedTool buried({{0.0, {0, 0, 0.03}}});
   VirtualRuntime s(buried.config);
   s.runtime.loop().requests().arm();
@@ -338,13 +336,13 @@ TEST_CASE("while the hand stays inside, the proxy stands where the tool fits, an
   CHECK(s.force_N() == 0.0);
 }
 
-TEST_CASE("where the tool fits nowhere there is no force, it is said once, and tried again",
-          "[servo][placing]") {
+TEST_CASE("if the tool does not fit, the force is zero; the failure is reported once and the search repeats",
+          "[servo][proxy_initialization]") {
   RunConfig plan = shipped_config();
   plan.scene.half_spaces = closed_box(0.02);  // the cube's half edge is 25 mm
   VirtualRuntime s(plan);
   s.runtime.loop().requests().arm();
-  int answers = 0;
+  int failed_searches = 0;
   for (int i = 0; i < 1000; ++i) {
     const ProxyInitialization before = proxy_initialization(s);
     REQUIRE(s.tick() == Fault::none);
@@ -353,13 +351,13 @@ TEST_CASE("where the tool fits nowhere there is no force, it is said once, and t
     CHECK(std::isnan(s.last.X_WQ[0]));
     CHECK(s.force_N() == 0.0);
     CHECK(s.state() == State::waiting);
-    answers +=
+    failed_searches +=
         before == ProxyInitialization::searching && proxy_initialization(s) == ProxyInitialization::failed
             ? 1
             : 0;
   }
-  CHECK(answers >= 9);  // ten times a second
-  CHECK(answers <= 11);
+  CHECK(failed_searches >= 9);  // ten times a second
+  CHECK(failed_searches <= 11);
   int failures = 0;
   for (Event event; s.runtime.loop().telemetry().events().pop(event);) {
     failures += std::holds_alternative<Event::ProxySearchFailed>(event.data) ? 1 : 0;
@@ -369,7 +367,8 @@ TEST_CASE("where the tool fits nowhere there is no force, it is said once, and t
   CHECK(failures == 1);
 }
 
-TEST_CASE("starting over drops the force at once and comes back by the soft start", "[servo][placing]") {
+TEST_CASE("reinitialization of the proxy sets the force to zero at once; the soft start restores it",
+          "[servo][proxy_initialization]") {
   VirtualRuntime s;
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
@@ -397,8 +396,9 @@ TEST_CASE("starting over drops the force at once and comes back by the soft star
   }
 }
 
-TEST_CASE("to be armed while a place is looked for does not begin the search anew", "[servo][placing]") {
-  const auto ticks_until_placed = [](int armed_at) {
+TEST_CASE("arming during the search for a feasible pose does not restart the search",
+          "[servo][proxy_initialization]") {
+  const auto ticks_until_found = [](int armed_at) {
     VirtualRuntime s;
     int ticks = 0;
     for (; ticks < 100 && proxy_initialization(s) != ProxyInitialization::found; ++ticks) {
@@ -407,19 +407,19 @@ TEST_CASE("to be armed while a place is looked for does not begin the search ane
     }
     return ticks;
   };
-  const int without = ticks_until_placed(-1);
+  const int without = ticks_until_found(-1);
   CHECK(without < 10);
-  CHECK(ticks_until_placed(without - 1) == without);
+  CHECK(ticks_until_found(without - 1) == without);
 }
 
-TEST_CASE("what a hand goes through while it feels nothing does not hold it once it is armed",
-          "[servo][placing]") {
-  // From above the boulder right through it, disarmed.
+TEST_CASE("obstacles that the hand passes through while disarmed do not hold the tool after arming",
+          "[servo][proxy_initialization]") {
+  // Disarmed, from above the boulder through it.
   const BuriedTool buried({{0.0, {0, 0, 0.12}}, {1.0, {0, 0, -0.12}}});
   VirtualRuntime s(buried.config);
   REQUIRE(s.run(1.5) == Fault::none);
   CHECK(s.last.X_WP[2] < -0.11);
-  CHECK(s.last.X_WQ[2] > 0.05);  // it followed, and never through the boulder
+  CHECK(s.last.X_WQ[2] > 0.05);  // the proxy stays on its side of the boulder
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(1.5) == Fault::none);
   CHECK(s.state() == State::active);
@@ -427,7 +427,8 @@ TEST_CASE("what a hand goes through while it feels nothing does not hold it once
   CHECK(s.last.X_WQ == s.last.X_WP);
 }
 
-TEST_CASE("a stop while the proxy is being placed ends the loop and the search", "[servo][placing]") {
+TEST_CASE("a stop during proxy initialization ends the loop and the search",
+          "[servo][proxy_initialization]") {
   const BuriedTool buried({{0.0, {0, 0, 0.03}}}, 100000);
   auto s = std::make_unique<SimulatedRuntime<WallClock>>(buried.config);
   WallClock& clock = s->clock;
@@ -447,7 +448,8 @@ TEST_CASE("a stop while the proxy is being placed ends the loop and the search",
   CHECK(WallClock().now() - stopped < std::chrono::seconds(1));  // milliseconds on an idle machine
 }
 
-TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
+TEST_CASE("without a new sample the progress of the proxy initialization does not change",
+          "[servo][proxy_initialization]") {
   const BuriedTool buried({{0.0, {0, 0, 0.03}}});
   VirtualRuntime s(buried.config);
   REQUIRE(s.run(0.1) == Fault::none);
@@ -464,7 +466,7 @@ TEST_CASE("without a sample the last placing stands", "[servo][placing]") {
   CHECK(proxy_initialization(s) == ProxyInitialization::complete);
 }
 
-TEST_CASE("who stops, acknowledges and arms in one breath has stopped", "[servo]") {
+TEST_CASE("stop, acknowledge and arm requested for the same tick have the effect of stop", "[servo]") {
   VirtualRuntime s;
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
@@ -474,7 +476,7 @@ TEST_CASE("who stops, acknowledges and arms in one breath has stopped", "[servo]
   CHECK(s.force_N() == 0.0);
 }
 
-TEST_CASE("release may be called at any time, and again", "[servo]") {
+TEST_CASE("release() may be called at any time, and repeatedly", "[servo]") {
   VirtualRuntime s;
   s.runtime.loop().release(s.clock.now());
   s.runtime.loop().requests().arm();
@@ -489,16 +491,16 @@ TEST_CASE("release may be called at any time, and again", "[servo]") {
   CHECK(s.state() == State::disarmed);
 }
 
-TEST_CASE("scene time begins at the first tick and goes by the times of the ticks, whatever the loop does",
+TEST_CASE("scene time begins at the first tick and advances with the tick times in every state",
           "[servo][moving]") {
   const RunConfig plan = shipped_config();
   StillDevice device;
   VirtualClock clock;
   const auto scene = std::make_shared<const Scene>(plan.scene);
-  const auto listener = std::make_shared<Listener>();
+  const auto initializer = std::make_shared<RequestStore>();
   ServoLoop loop(plan.settings, plan.profile, device,
-                 std::make_unique<Rendering>(0, plan.settings, plan.profile, scene, listener), clock);
-  const TimePoint first{from_seconds(123456.789)};  // a machine that has been on for days
+                 std::make_unique<Rendering>(0, plan.settings, plan.profile, scene, initializer), clock);
+  const TimePoint first{from_seconds(123456.789)};  // 34 h after the machine started
   std::vector<double> expected_s;
   TimePoint now = first;
   for (int i = 0; i < 3000; ++i) {
@@ -508,18 +510,18 @@ TEST_CASE("scene time begins at the first tick and goes by the times of the tick
     if (i == 2000) loop.release(now);
     const Fault fault = loop.tick(now, now);
     REQUIRE((fault == Fault::none || (i == 1001 && fault == Fault::loop_stalled)));
-    if (listener->questions.size() > expected_s.size()) expected_s.push_back(seconds(now - first));
+    if (initializer->requests.size() > expected_s.size()) expected_s.push_back(seconds(now - first));
     now += i == 1000 ? std::chrono::seconds(5) : from_seconds(0.00098 + 0.00001 * (i % 5));
   }
   REQUIRE(expected_s.size() > 20);
   CHECK(expected_s.front() == 0.0);
   CHECK(expected_s.back() == Approx(8.0).margin(0.2));
-  REQUIRE(listener->questions.size() == expected_s.size());
+  REQUIRE(initializer->requests.size() == expected_s.size());
   for (std::size_t i = 0; i < expected_s.size(); ++i)
-    CHECK(listener->questions[i].scene_time_s == expected_s[i]);
+    CHECK(initializer->requests[i].scene_time_s == expected_s[i]);
 }
 
-TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the hand", "[servo][moving]") {
+TEST_CASE("a plunger that rises from the table lifts and tilts the cube", "[servo][moving]") {
   RunConfig plan = shipped_config();
   plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
   VirtualRuntime s(plan);
@@ -529,7 +531,7 @@ TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the 
     REQUIRE(s.tick() == Fault::none);
     if (proxy_initialization(s) != ProxyInitialization::complete) continue;
     const Pose X_WQ = pose_from_numbers(s.last.X_WQ);
-    const double down = X_WQ.translation_m.z() - 0.025;  // of a cube that lies on the table
+    const double down = X_WQ.translation_m.z() - 0.025;  // height above a cube on the table
     if (s.last.contacts > 0) most_lift_m = std::max(most_lift_m, down);
     most_tilt = std::max(most_tilt, std::abs(X_WQ.rotation.y()));
   }
@@ -537,29 +539,30 @@ TEST_CASE("a plunger that comes out of the table lifts the cube, and pushes the 
   CHECK(most_tilt > 0.02);
 }
 
-// The guard knows the hand's work alone: to it this would be energy from nowhere.
-TEST_CASE("a plunger that presses against a hand at rest pushes with all its force", "[servo][moving]") {
+// The passivity guard credits the work of a moving obstacle. Without the credit it would remove this energy.
+TEST_CASE("the guard does not scale the force of a plunger that presses against a hand at rest",
+          "[servo][moving]") {
   RunConfig plan = shipped_config();
   plan.scene = load_scene(WRENCHD_SOURCE_DIR "/config/scenes/cube_over_plunger.toml");
   plan.settings.simulation.hand_path = {{0.0, {0.0, 0.0, 0.026}, {}}};
   plan.settings.simulation.hand_repeats = false;
   VirtualRuntime s(plan);
   s.runtime.loop().requests().arm();
-  double least_share = 1.0, most_N = 0.0, worst_J = 0.0, gave_J = 0.0;
+  double min_scale = 1.0, most_N = 0.0, worst_J = 0.0, gave_J = 0.0;
   for (int i = 0; i < 20000; ++i) {
     REQUIRE(s.tick() == Fault::none);
-    least_share = std::min(least_share, s.last.passivity_scale);
+    min_scale = std::min(min_scale, s.last.passivity_scale);
     most_N = std::max(most_N, s.force_N());
     worst_J = std::max(worst_J, s.last.injected_J);
     gave_J = s.last.energy_out_J;
   }
   CHECK(most_N > 1.0);
   CHECK(gave_J > 1e-3);
-  CHECK(least_share == 1.0);
+  CHECK(min_scale == 1.0);
   CHECK(worst_J < 1e-5);
 }
 
-TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
+TEST_CASE("two runs in virtual time are equal bit for bit", "[servo]") {
   VirtualRuntime a;
   VirtualRuntime b;
   a.runtime.loop().requests().arm();
@@ -568,44 +571,44 @@ TEST_CASE("two runs in virtual time are the same, bit for bit", "[servo]") {
     REQUIRE(a.tick() == Fault::none);
     REQUIRE(b.tick() == Fault::none);
     REQUIRE(a.last.F_out == b.last.F_out);
-    REQUIRE(std::memcmp(&a.last.X_WQ, &b.last.X_WQ, sizeof a.last.X_WQ) == 0);  // NaN where there is none
+    REQUIRE(std::memcmp(&a.last.X_WQ, &b.last.X_WQ, sizeof a.last.X_WQ) == 0);  // NaN if there is no proxy
   }
 }
 
-TEST_CASE("all three methods hold the cube", "[servo]") {
+TEST_CASE("all methods render the force of the table", "[servo]") {
   const Method method = GENERATE(Method::exact, Method::planar, Method::descent, Method::translational);
   RunConfig plan = shipped_config();
   plan.settings.rendering.method = method;
   VirtualRuntime s(plan);
   s.runtime.loop().requests().arm();
   REQUIRE(s.run(kPressing_s) == Fault::none);
-  // The traditional penalty gives energy from nowhere as the cube tips onto its face, and the guard takes it
-  // back.
+  // The traditional penalty generates energy while the cube tips onto its face, and the guard removes the
+  // energy.
   const bool gives_energy = method == Method::translational || method == Method::planar;
   if (gives_energy) CHECK((s.last.F_out[2] > 0.5 || (s.last.limit_causes & kPassivity) != 0));
   if (!gives_energy) CHECK(s.last.F_out[2] > 0.5);
   REQUIRE(s.run(1.0) == Fault::none);
 }
 
-TEST_CASE("in wall time the loop runs at its rate, by the clock or by the device, and stops when told",
+TEST_CASE("in wall time the loop runs at its rate, paced by the clock or by the device, and stops on request",
           "[servo]") {
   const Pacing pacing = GENERATE(Pacing::clock, Pacing::device);
   RunConfig plan = shipped_config();
   plan.settings.servo.pacing = pacing;
   SimulatedRuntime<WallClock> s(plan);
   WallClock& clock = s.clock;
-  Runtime& station = s.runtime;
-  station.loop().requests().arm();
+  Runtime& runtime = s.runtime;
+  runtime.loop().requests().arm();
   std::atomic<bool> stop{false};
   Fault fault = Fault::none;
-  std::thread servo([&] { fault = station.loop().run(clock, stop); });
+  std::thread servo([&] { fault = runtime.loop().run(clock, stop); });
   std::this_thread::sleep_for(std::chrono::milliseconds(400));
   stop.store(true);
   servo.join();
   TickRecord last;
-  REQUIRE(station.loop().telemetry().latest_record().read(last));
+  REQUIRE(runtime.loop().telemetry().latest_record().read(last));
   CHECK(fault == Fault::none);
   CHECK(last.released == 1);
-  CHECK(station.loop().telemetry().timing().tick.count() > 10);
-  CHECK(station.loop().telemetry().timing().tick.count() <= 600);  // with the fade
+  CHECK(runtime.loop().telemetry().timing().tick.count() > 10);
+  CHECK(runtime.loop().telemetry().timing().tick.count() <= 600);  // with the fade
 }

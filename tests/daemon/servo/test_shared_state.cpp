@@ -257,11 +257,11 @@ TEST_CASE("the layout describes every field, within a line of the protocol", "[s
 TEST_CASE("contacts have the obstacle names of their rendering, requested from the daemon once per rendering",
           "[shared_state]") {
   SharedState state(4.0);
-  int asked = 0;
+  int requests = 0;
   std::string answer = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
   StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
                      [&] {
-                       ++asked;
+                       ++requests;
                        if (answer.empty()) throw ClientError(ClientError::kDisconnected, "gone");
                        return answer;
                      });
@@ -276,11 +276,11 @@ TEST_CASE("contacts have the obstacle names of their rendering, requested from t
     return tick.contacts().at(0).obstacle;
   };
   CHECK(touched_in(3) == "table");
-  CHECK(asked == 0);
+  CHECK(requests == 0);
   CHECK(touched_in(4) == "bolt");
   CHECK(touched_in(4) == "bolt");
   CHECK(touched_in(3) == "table");  // a tick that is read late
-  CHECK(asked == 1);
+  CHECK(requests == 1);
   CHECK(touched_in(5) == "obstacle 0");  // not known yet
   answer = R"({"rendering_id": 7, "obstacles": ["nut"]})";
   CHECK(touched_in(6) == "obstacle 0");  // not known any more

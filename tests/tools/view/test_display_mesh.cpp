@@ -26,7 +26,7 @@ Vector3d third(const std::vector<float>& xs, std::size_t i) {
   return {xs[3 * i], xs[3 * i + 1], xs[3 * i + 2]};
 }
 
-/// Returns the normal at a triangle's corner.
+/// Returns the normal at a corner of a triangle.
 Vector3d position(const DisplayMesh& mesh, std::size_t i) {
   return third(mesh.positions, mesh.indices[i]);
 }
@@ -79,12 +79,12 @@ TEST_CASE("a large mesh is drawn with fewer triangles, and keeps its shape", "[v
     const bool round = std::string(kind) == "sphere";
     const double lines_a_triangle =
         static_cast<double>(coarse.lines.size()) / 6.0 / static_cast<double>(coarse.triangles());
-    CHECK((lines_a_triangle < 0.001) == round);  // and its edges
+    CHECK((lines_a_triangle < 0.001) == round);  // a round body has nearly no edges
     CHECK(drawn(fine, fine.triangles.size()).triangles() == fine.triangles.size());
   }
 }
 
-TEST_CASE("a triangle without its vertex is refused", "[view]") {
+TEST_CASE("a triangle that names a missing vertex is rejected", "[view]") {
   const std::vector<float> vertices(9, 0.0F);
   const std::vector<std::array<std::uint32_t, 3>> triangles = {{0, 1, 3}};
   CHECK_THROWS_AS(display_mesh(vertices, triangles, 10), std::invalid_argument);

@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-using Wish = PageLease::Request;
+using Request = PageLease::Request;
 
 template <class Done>
 bool soon(const Done& done) {
@@ -26,7 +26,7 @@ bool soon(const Done& done) {
   return false;
 }
 
-/// A daemon, and the replies of the lease to its pages.
+/// A daemon, a page lease, and the replies that the lease sends to its pages.
 struct Rig {
   StubDaemon daemon;
   std::mutex mutex;
@@ -39,16 +39,16 @@ struct Rig {
   Rig() {
     soon([this] { return daemon.loop().telemetry().state() == State::disarmed; });
   }
-  bool was_told(std::uint64_t page, const std::string& what, bool done) {
+  bool was_replied(std::uint64_t page, const std::string& request, bool accepted) {
     return soon([&] {
       const std::scoped_lock lock(mutex);
       for (const PageLease::Reply& one : replies)
-        if (one.page == page && one.request == what && one.accepted == done) return true;
+        if (one.page == page && one.request == request && one.accepted == accepted) return true;
       return false;
     });
   }
   /// Sends heartbeats at the frame rate for this duration.
-  void live(std::uint64_t page, std::chrono::milliseconds time) {
+  void send_heartbeats(std::uint64_t page, std::chrono::milliseconds time) {
     for (const auto end = std::chrono::steady_clock::now() + time; std::chrono::steady_clock::now() < end;) {
       lease.heartbeat(page);
       lease.set_loop_state(name(daemon.loop().telemetry().state()));
@@ -61,23 +61,23 @@ struct Rig {
 
 TEST_CASE("a page holds the lease as long as it sends heartbeats", "[view]") {
   Rig rig;
-  rig.lease.submit(1, Wish::arm);
-  REQUIRE(rig.was_told(1, "arm", true));
-  rig.live(1, 2 * PageLease::kPageTimeout);
+  rig.lease.submit(1, Request::arm);
+  REQUIRE(rig.was_replied(1, "arm", true));
+  rig.send_heartbeats(1, 2 * PageLease::kPageTimeout);
   CHECK(rig.daemon.leased());
   CHECK(rig.daemon.heartbeats() > 20);
   CHECK(rig.lease.holder() == 1);
   const auto silent = std::chrono::steady_clock::now();
   CHECK(soon([&] { return !rig.daemon.leased(); }));
   CHECK(std::chrono::steady_clock::now() - silent > PageLease::kPageTimeout / 2);
-  CHECK(rig.was_told(1, "lease", false));
+  CHECK(rig.was_replied(1, "lease", false));
   CHECK(rig.lease.holder() == 0);
 }
 
 TEST_CASE("a closed page releases the lease immediately", "[view]") {
   Rig rig;
-  rig.lease.submit(1, Wish::arm);
-  REQUIRE(rig.was_told(1, "arm", true));
+  rig.lease.submit(1, Request::arm);
+  REQUIRE(rig.was_replied(1, "arm", true));
   rig.lease.heartbeat(1);
   const auto closed = std::chrono::steady_clock::now();
   rig.lease.page_closed(1);
@@ -87,27 +87,27 @@ TEST_CASE("a closed page releases the lease immediately", "[view]") {
 
 TEST_CASE("only the page that armed keeps it armed, and any page disarms", "[view]") {
   Rig rig;
-  rig.lease.submit(1, Wish::arm);
-  REQUIRE(rig.was_told(1, "arm", true));
-  rig.live(1, 200ms);
-  rig.lease.submit(2, Wish::arm);
-  CHECK(rig.was_told(2, "arm", false));
+  rig.lease.submit(1, Request::arm);
+  REQUIRE(rig.was_replied(1, "arm", true));
+  rig.send_heartbeats(1, 200ms);
+  rig.lease.submit(2, Request::arm);
+  CHECK(rig.was_replied(2, "arm", false));
   CHECK(rig.lease.holder() == 1);
   rig.lease.page_closed(2);  // this page holds no lease
-  rig.live(1, 200ms);
+  rig.send_heartbeats(1, 200ms);
   CHECK(rig.daemon.leased());
-  rig.lease.submit(3, Wish::disarm);
-  CHECK(rig.was_told(3, "disarm", true));
-  CHECK(rig.was_told(1, "lease", false));
+  rig.lease.submit(3, Request::disarm);
+  CHECK(rig.was_replied(3, "disarm", true));
+  CHECK(rig.was_replied(1, "lease", false));
   CHECK(soon([&] { return !rig.daemon.leased(); }));
 }
 
 TEST_CASE("every page can stop, with or without the lease", "[view]") {
   Rig rig;
-  rig.lease.submit(7, Wish::stop);
-  CHECK(rig.was_told(7, "stop", true));
-  const auto asked = rig.daemon.requested_methods();
-  CHECK(std::find(asked.begin(), asked.end(), "stop") != asked.end());
+  rig.lease.submit(7, Request::stop);
+  CHECK(rig.was_replied(7, "stop", true));
+  const auto requested = rig.daemon.requested_methods();
+  CHECK(std::find(requested.begin(), requested.end(), "stop") != requested.end());
 }
 
 TEST_CASE("the page that sent a request receives an error if the daemon is absent", "[view]") {
@@ -118,7 +118,7 @@ TEST_CASE("the page that sent a request receives an error if the daemon is absen
     const std::scoped_lock lock(mutex);
     replies.push_back(one);
   });
-  for (const Wish wish : {Wish::arm, Wish::stop}) lost.submit(1, wish);
+  for (const Request request : {Request::arm, Request::stop}) lost.submit(1, request);
   CHECK(soon([&] {
     const std::scoped_lock lock(mutex);
     return replies.size() == 2;

@@ -18,7 +18,7 @@ TEST_CASE("times are counted in bins of equal width in the logarithm", "[view]")
   for (int i = 0; i < 999; ++i) times.add(i, 10'500);  // just above 10 us
   times.add(1'000, 3'000'000);
   times.add(1'001, 0);             // shorter than the first bin
-  times.add(1'002, 20 * kSecond);  // longer than the last
+  times.add(1'002, 20 * kSecond);  // longer than the last bin
   const RollingHistogram::Summary sum = times.summary();
   CHECK(sum.count == 1002);
   CHECK(std::accumulate(sum.bins.begin(), sum.bins.end(), std::uint64_t{0}) == 1002);

@@ -103,7 +103,7 @@ function showCause(now) {
   if (cause === "none" || !bad) {
     $("banner").hidden = true;
   } else {
-    const known = faults[cause] ?? link?.status?.cause ?? { sentence: "", cure: "" };
+    const known = faults[cause] ?? link?.status?.cause ?? { message: "", cure: "" };
     const stopped = now.state === "stopped";
     const cure = sentence(known.cure) + (stopped && mode === "live" && !/cknowledge/.test(known.cure) ? " Then acknowledge." : "");
     showBanner(now.state === "degraded" ? "warn" : "bad", stopped ? "Stopped" : `Fault: ${readable(cause)}`, sentence(known.message), cure);
@@ -168,7 +168,7 @@ function toast(text) {
 
 // --- playback of a recording ---
 
-const player = { duration: 0, t: 0, playing: false, asked: false, changes: [] };
+const player = { duration: 0, t: 0, playing: false, requested: false, changes: [] };
 
 function lastFaultAt(t) {
   let last = null;
@@ -200,8 +200,8 @@ function seek(t) {
 }
 
 function requestFrame() {
-  if (player.asked || !player.stale) return;
-  player.asked = true;
+  if (player.requested || !player.stale) return;
+  player.requested = true;
   player.stale = false;
   connection.send("at", { t: player.t });
 }
@@ -223,7 +223,7 @@ const connection = new Connection({
     if (mode !== "recording") return;
     connected = true;
     rate_Hz = hello.rate_Hz;
-    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, asked: false });
+    Object.assign(player, { duration: hello.duration_s, changes: hello.changes, requested: false });
     $("scrub").max = hello.duration_s;
     set("play-end", `${hello.duration_s.toFixed(3)} s`);
     set("about", `${hello.name} · recorded by wrenchd ${hello.recorded_by} · ${Math.round(rate_Hz)} Hz`);
@@ -251,7 +251,7 @@ const connection = new Connection({
   history: (message) => history.add(message),
   frame(now) {
     frame = now;
-    player.asked = false;
+    player.requested = false;
     if (mode === "recording" && !player.playing) player.t = Math.min(player.t, player.duration);
     world.take(now);
   },
@@ -268,7 +268,7 @@ const connection = new Connection({
   },
   lost() {
     connected = false;
-    player.asked = false;
+    player.requested = false;
     showState("gone");
     showBanner("bad", "No connection to wrenchctl view", "The program that serves this page has ended or does not respond.",
       "Start wrenchctl view again and open the address that it prints. The page shows the last received data.");
