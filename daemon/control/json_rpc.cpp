@@ -41,7 +41,7 @@ class LineCheck final : public nlohmann::json_sax<Json> {
   }
   bool parse_error(std::size_t position, const std::string& token, const Json::exception&) override {
     return refuse("at byte " + std::to_string(position) + ", after '" + printable(token) +
-                  "', it is no JSON");
+                  "', it is not JSON");
   }
 
  private:
@@ -112,7 +112,7 @@ std::variant<RpcRequest, InvalidRequest> parse_request(std::string_view line) {
   Json object = Json::parse(line, nullptr, false);
   if (object.is_array())
     return InvalidRequest{nullptr, RpcError(RpcCode::invalid_request,
-                                            "Batches are not taken; send each request on its own line.")};
+                                            "Batches are not supported; send each request on its own line.")};
   if (!object.is_object())
     return InvalidRequest{nullptr, RpcError(RpcCode::invalid_request,
                                             "A request is an object, as in "

@@ -2,12 +2,12 @@
 // Linked into the test programs that tools/mutate traces: notes which basic blocks run, and writes their
 // addresses to the file that WRENCHD_TRACE names, followed by the process number.
 
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+
+#include <sys/mman.h>
+#include <unistd.h>
 
 extern "C" {
 extern const char __executable_start;
@@ -18,7 +18,8 @@ void __sanitizer_cov_trace_pc() noexcept;
 
 namespace {
 
-/// One byte for each byte of code: 1 if the block that returns there has run. Pages nobody writes cost nothing.
+/// One byte for each byte of code: 1 if the block that returns there has run. Pages nobody writes cost
+/// nothing.
 unsigned char* ran() noexcept {
   static unsigned char* const bytes = [] {
     const auto size = static_cast<std::size_t>(&etext - &__executable_start);

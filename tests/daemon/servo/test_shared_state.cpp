@@ -258,14 +258,14 @@ TEST_CASE("contacts have the obstacle names of their rendering, requested from t
           "[shared_state]") {
   SharedState state(4.0);
   int requests = 0;
-  std::string answer = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
+  std::string response = R"({"rendering_id": 4, "obstacles": ["bolt"]})";
   StateReader reader(state_layout(state, kTable).dump(), fcntl(state.descriptor(), F_DUPFD_CLOEXEC, 0), {},
                      [&] {
                        ++requests;
-                       if (answer.empty()) throw ClientError(ClientError::kDisconnected, "gone");
-                       return answer;
+                       if (response.empty()) throw ClientError(ClientError::kDisconnected, "gone");
+                       return response;
                      });
-  const auto touched_in = [&](std::uint32_t rendering) {
+  const auto obstacle_in = [&](std::uint32_t rendering) {
     TickRecord record;
     record.rendering_id = rendering;
     Touches contacts;
@@ -275,19 +275,19 @@ TEST_CASE("contacts have the obstacle names of their rendering, requested from t
     REQUIRE(reader.latest(tick));
     return tick.contacts().at(0).obstacle;
   };
-  CHECK(touched_in(3) == "table");
+  CHECK(obstacle_in(3) == "table");
   CHECK(requests == 0);
-  CHECK(touched_in(4) == "bolt");
-  CHECK(touched_in(4) == "bolt");
-  CHECK(touched_in(3) == "table");  // a tick that is read late
+  CHECK(obstacle_in(4) == "bolt");
+  CHECK(obstacle_in(4) == "bolt");
+  CHECK(obstacle_in(3) == "table");  // a late read of an earlier rendering
   CHECK(requests == 1);
-  CHECK(touched_in(5) == "obstacle 0");  // not known yet
-  answer = R"({"rendering_id": 7, "obstacles": ["nut"]})";
-  CHECK(touched_in(6) == "obstacle 0");  // not known any more
-  CHECK(touched_in(7) == "nut");
+  CHECK(obstacle_in(5) == "obstacle 0");  // unknown
+  response = R"({"rendering_id": 7, "obstacles": ["nut"]})";
+  CHECK(obstacle_in(6) == "obstacle 0");  // not known any more
+  CHECK(obstacle_in(7) == "nut");
   for (const char* bad : {"", "no JSON", "{}", R"({"rendering_id": 8, "obstacles": 1})"}) {
-    answer = bad;
-    CHECK(touched_in(8) == "obstacle 0");
+    response = bad;
+    CHECK(obstacle_in(8) == "obstacle 0");
   }
 }
 
