@@ -5,7 +5,11 @@
 #include <catch2/catch.hpp>
 #include <spdlog/spdlog.h>
 
+#include "tests/support/rate_check.hpp"
 #include "tests/support/temporary_directory.hpp"
+
+using SkipReporter = wrenchd::test::SkipReporter;
+CATCH_REGISTER_LISTENER(SkipReporter)
 
 /// Daemons in tests have no socket unless the test gives them one, because the default path is for one daemon
 /// and may belong to the machine's own. Flight recordings go to a directory that is removed after the tests.

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "daemon/service_notify.hpp"
+#include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
 namespace wrenchd {
@@ -182,17 +183,18 @@ TEST_CASE("nobody asked: nothing is said and no thread runs", "[service_notify]"
 
 TEST_CASE("wrenchd tells its manager: ready after the self-test, alive, stopping",
           "[service_notify][wall_time]") {
+  const MachineLoad load;
   Manager manager;
   RunningProgram wrenchd("wrenchd", {"--simulate", "loopback", "--realtime", "best_effort"});
-  CHECK(manager.hears("READY=1\n"));
+  REQUIRE_RATE(load, manager.hears("READY=1\n"));
   CHECK_THAT(manager.all(), Contains("STATUS=self-test; device loopback, simulated\n"));
-  CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
+  REQUIRE_RATE(load, manager.hears("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
-  CHECK(manager.hears("WATCHDOG=1\nWATCHDOG=1\n"));
+  REQUIRE_RATE(load, manager.hears("WATCHDOG=1\nWATCHDOG=1\n"));
   wrenchd.signal(SIGUSR1);
-  CHECK(manager.hears("STATUS=stopped: stop_requested: "));
+  REQUIRE_RATE(load, manager.hears("STATUS=stopped: stop_requested: "));
   wrenchd.signal(SIGUSR2);
-  CHECK(manager.hears("STATUS=disarmed; device loopback, simulated\n"));
+  REQUIRE_RATE(load, manager.hears("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
   wrenchd.signal(SIGTERM);
   CHECK(wrenchd.wait().exit_code == 0);
