@@ -227,12 +227,13 @@ TEST_CASE("a second daemon does not start on an occupied socket, and states the 
 TEST_CASE("any operator can disarm a daemon that its command line armed", "[control_commands]") {
   const TemporaryDirectory dir;
   const std::string socket = (dir.path() / "control.sock").string();
+  const MachineLoad load;
   const RunningProgram program("wrenchd", {"--realtime", "off", "--arm", "--control", socket});
-  REQUIRE(program.wait_for_output("state: waiting"));
+  REQUIRE_RATE(load, program.wait_for_output("state: waiting"));
   const Json status = Json::parse(run_program("wrenchctl", {"status", "--json", "--socket", socket}).out);
   CHECK(status["armed_by"] == "command line");
   CHECK(run_program("wrenchctl", {"disarm", "--socket", socket}).exit_code == 0);
-  CHECK(program.wait_for_output("state: disarmed"));
+  REQUIRE_RATE(load, program.wait_for_output("state: disarmed"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "daemon/servo/realtime_watch.hpp"
+#include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
 namespace wrenchd {

@@ -9,6 +9,7 @@
 #include "devices/simulation/reference_profile.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/devices/usb/mock_device.hpp"
+#include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
 // The complete daemon as a process, with a device that is connected and disconnected.
@@ -97,6 +98,7 @@ const char* const kLenient = "[servo]\nself_test_s = 0\n";
 }  // namespace
 
 TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unplugging", "[usb]") {
+  const MachineLoad load;
   MockMachine machine;
   const TemporaryDirectory files;
   const std::string profile = files.write("patient.toml", kPatient).string();
@@ -107,7 +109,7 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
 
   std::optional<LiveHandle> handle(std::in_place, machine, MockIdentity{});
   REQUIRE(wrenchd.wait_for_output("device 1209:6d0f serial A1 in 1-1, interface 0 (hidraw)"));
-  REQUIRE(soon([&] { return handle->was_pushed(); }));  // --arm armed it
+  REQUIRE_RATE(load, soon([&] { return handle->was_pushed(); }));  // --arm armed it
   handle->unplug();
   REQUIRE(wrenchd.wait_for_output("device_lost: "));
   handle.reset();
@@ -121,7 +123,7 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   handle.emplace(machine, MockIdentity{.place = "1-4", .number = 6});
   REQUIRE(
       wrenchd.wait_for_output("the device is connected again, and is disarmed: 1209:6d0f serial A1 in 1-4"));
-  REQUIRE(soon([&] { return handle->commands() > 300; }));
+  REQUIRE_RATE(load, soon([&] { return handle->commands() > 300; }));
   CHECK_FALSE(handle->was_pushed());
 
   wrenchd.signal(SIGTERM);
@@ -132,16 +134,18 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
 }
 
 TEST_CASE("without a profile's name wrenchd takes the one that the device has", "[usb]") {
+  const MachineLoad load;
   MockMachine machine;
   const LiveHandle handle(machine, {.vendor = "1209", .product = "0001"});
   RunningProgram wrenchd("wrenchd", {"--profile", "auto", "--realtime", "best_effort"});
   CHECK(wrenchd.wait_for_output("device reference_full_speed"));
-  CHECK(soon([&] { return handle.commands() > 10; }));
+  REQUIRE_RATE(load, soon([&] { return handle.commands() > 10; }));
   wrenchd.signal(SIGTERM);
   CHECK_THAT(wrenchd.wait().err, Contains("senses x y z rx ry rz, drives x y z rx ry rz"));
 }
 
 TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]") {
+  const MachineLoad load;
   MockMachine machine;
   const TemporaryDirectory files;
   const std::string profile =
@@ -156,10 +160,10 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
                          {"--config", config, "--profile", profile, "--realtime", "best_effort", "--arm"});
   unsetenv("STATE_DIRECTORY");
   if (calibrated) {
-    CHECK(soon([&] { return handle.was_pushed(); }));
+    REQUIRE_RATE(load, soon([&] { return handle.was_pushed(); }));
   } else {
     CHECK(wrenchd.wait_for_output("cannot be armed: it is not calibrated; run wrenchctl calibrate patient"));
-    CHECK(soon([&] { return handle.commands() > 300; }));
+    REQUIRE_RATE(load, soon([&] { return handle.commands() > 300; }));
     CHECK_FALSE(handle.was_pushed());
   }
   wrenchd.signal(SIGTERM);
@@ -167,6 +171,7 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
 }
 
 TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing", "[usb]") {
+  const MachineLoad load;
   MockMachine machine;
   const TemporaryDirectory files;
   const std::string profile = files.write("patient.toml", kPatient).string();
@@ -174,8 +179,9 @@ TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing"
   const LiveHandle handle(machine, {});
   RunningProgram wrenchctl("wrenchctl", {"calibrate", profile});
   unsetenv("STATE_DIRECTORY");
-  CHECK(soon(
-      [&] { return wrenchctl.out().find("Push the handle straight away from you.") != std::string::npos; }));
+  REQUIRE_RATE(load, soon([&] {
+                 return wrenchctl.out().find("Push the handle straight away from you.") != std::string::npos;
+               }));
   wrenchctl.signal(SIGINT);
   const ProgramResult result = wrenchctl.wait();
   CHECK(result.exit_code == 1);
