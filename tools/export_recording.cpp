@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "config/nearest_key.hpp"
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <hdf5.h>
 
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
 namespace {
@@ -542,7 +542,7 @@ std::vector<Row> read_table(const OpenFile& open_file, const TableKind& table) {
     open_file.reject("table '" + std::string(table.name) + "' is not one-dimensional; the file is damaged");
   if (rows > open_file.bytes * kMaxExpansion / table.row_bytes + 1)
     open_file.reject("table '" + std::string(table.name) + "' cannot have the " + std::to_string(rows) +
-                     " rows that it says; the file is damaged");
+                     " rows that its header states; the file is damaged");
   std::vector<Row> read(rows);
   const Handle row(row_type(table), H5Tclose);
   if (rows > 0 && H5Dread(set, row, H5S_ALL, H5S_ALL, H5P_DEFAULT, read.data()) < 0)

@@ -15,7 +15,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
 namespace {

@@ -49,7 +49,7 @@ StabilityAnalysis::StabilityAnalysis(const Settings& settings, const DeviceProfi
 }
 
 /// With x_W = s x_H the linear stiffness at the handle is s^2 K. That equals a device with 1 / s^2 of its
-/// damping, METHOD (83).
+/// damping, METHOD (82a).
 StiffnessScale StabilityAnalysis::compute_scale(const LoopDelay& loop, double workspace_scale) const {
   const double square = workspace_scale * workspace_scale;
   const Matrix6d& K = coupling_.stiffness;

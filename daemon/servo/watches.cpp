@@ -18,7 +18,7 @@ FaultSet Watches::check(const DeviceSample& sample, State state, bool driven, co
   faults |= classify_sample_fault(sample.fault, state, t.recently_late);
   if (!is_finite(sample.X_BH) || !is_finite(sample.V_BH)) faults |= bit(Fault::pose_not_finite);
   if (was_homed_ && !sample.homed) faults |= bit(Fault::not_homed);
-  const bool report_received = sample.arrived != TimePoint{};  // before that `homed` says nothing
+  const bool report_received = sample.arrived != TimePoint{};  // `homed` is not valid before the first report
   if (report_received) was_homed_ = sample.homed;
   return faults | check_buttons(sample, state) | client.check(t.now);
 }

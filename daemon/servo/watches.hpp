@@ -39,7 +39,7 @@ struct Watches {
   FaultSet classify_sample_fault(Fault fault, State state, bool recently_late) const noexcept;
   FaultSet check_buttons(const DeviceSample& sample, State state) const noexcept;
 
-  bool was_homed_ = false;  ///< True if the last report said that the encoders have their reference.
+  bool was_homed_ = false;  ///< True if the last report showed that the encoders have their reference.
 };
 
 }  // namespace wrenchd

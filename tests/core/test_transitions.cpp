@@ -19,7 +19,8 @@ State after(Trigger trigger, State from) {
 
 }  // namespace
 
-TEST_CASE("every trigger in every state leads where safety wants it", "[transitions]") {
+TEST_CASE("every trigger in every state leads to the state that the safety requirements name",
+          "[transitions]") {
   int pairs = 0;
   for (std::size_t t = 0; t < kTriggerCount; ++t)
     for (std::size_t s = 0; s < kStateCount; ++s, ++pairs) {

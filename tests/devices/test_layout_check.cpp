@@ -198,7 +198,7 @@ TEST_CASE("wrenchctl check --against prints the required changes", "[layout_chec
   const ProgramResult bad = check(profile, shorter);
   CHECK(bad.exit_code == 1);
   CHECK(bad.err == "wrenchctl: " + profile + ": disagrees with the report descriptor of " + source +
-                       " says of its reports; change the profile, or name the device it is for:\n"
+                       "; change the profile, or name the device that it belongs to:\n"
                        "  input report 0x01: the profile has 64 bytes, the device 63\n"
                        "  input report 0x01, checksum: the profile has 16 bits, unsigned, from byte 62; the "
                        "device's report ends with byte 62\n");

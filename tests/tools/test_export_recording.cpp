@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/state.hpp"
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 #include "tools/export_recording.hpp"
 
 using namespace wrenchd;

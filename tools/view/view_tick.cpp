@@ -11,7 +11,7 @@
 #include "core/spatial.hpp"
 #include "core/state.hpp"
 #include "daemon/control/scene_geometry.hpp"
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 #include "daemon/servo/proxy_initializer.hpp"
 
 namespace wrenchd {

@@ -245,12 +245,12 @@ TEST_CASE("recordings are refused with the file and the cure", "[recording]") {
   const auto file = directory.path() / "run.h5";
   { const RecordingWriter writer(file, {}); }
   CHECK(read_recording(file).ticks.empty());
-  CHECK_THROWS_WITH(RecordingWriter(file, {}), Catch::Contains("never overwritten"));
+  CHECK_THROWS_WITH(RecordingWriter(file, {}), Catch::Contains("never overwrites"));
   CHECK_THROWS_WITH(RecordingWriter(directory.path() / "no" / "run.h5", {}),
                     Catch::Contains("cannot be created"));
   std::filesystem::create_symlink(directory.path() / "nowhere.h5", directory.path() / "link.h5");
-  CHECK_THROWS_WITH(RecordingWriter(directory.path() / "link.h5", {}), Catch::Contains("never overwritten"));
-  CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("is not there"));
+  CHECK_THROWS_WITH(RecordingWriter(directory.path() / "link.h5", {}), Catch::Contains("never overwrites"));
+  CHECK_THROWS_WITH(read_recording(directory.path() / "none.h5"), Catch::Contains("does not exist"));
   std::ofstream(directory.path() / "text.h5") << "not HDF5";
   CHECK_THROWS_WITH(read_recording(directory.path() / "text.h5"), Catch::Contains("is not an HDF5 file"));
 }

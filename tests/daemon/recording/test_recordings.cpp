@@ -104,7 +104,7 @@ TEST_CASE("a recording begins and ends in mid-run, with every tick in between", 
   CHECK(recording.header.virtual_time);
   // The same moment by two clocks.
   CHECK(recording.header.started_ns == recording.ticks.front().now_ns - 1'000'000);
-  CHECK_THROWS_WITH(recordings.start("mine", false), Contains("never overwritten"));
+  CHECK_THROWS_WITH(recordings.start("mine", false), Contains("never overwrites"));
   CHECK(recordings.start("", false).filename().string().starts_with("run-20"));
   CHECK(recordings.stop()->ticks == 0);
   const auto events = told(feed);

@@ -7,7 +7,8 @@
 #include "tests/support/fault_rig.hpp"
 
 // Every fault, in every state, with the hand in the air, in contact and at the limits: found in time,
-// answered as safety wants it, and no invariant broken in any tick on the way.
+// answered as the safety requirements (tests/support/expected_machine.hpp) state, and no invariant broken in
+// any tick on the way.
 
 namespace wrenchd::test {
 namespace {

@@ -8,7 +8,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// A device of 1 kHz with a watchdog of 8 ms, and the test that looks at it, a millisecond a tick.
+/// A device with 1 kHz reports and a watchdog of 8 ms, and its self-test. Each tick takes 1 ms.
 struct Bench {
   DeviceProfile profile;
   SelfTest test;

@@ -14,7 +14,7 @@
 #include <wrenchd/state_reader.hpp>
 
 #include "daemon/control/state_layout.hpp"
-#include "daemon/recording/record_fields.hpp"
+#include "daemon/servo/record_fields.hpp"
 #include "daemon/servo/shared_state.hpp"
 #include "tests/support/no_allocation.hpp"
 #include "tests/support/random_values.hpp"

@@ -134,7 +134,7 @@ TEST_CASE("an invalid hand path is rejected") {
   CHECK_THROWS_WITH(HandPath({at_time(0.0), at_time(0.0)}, false), Contains("waypoint 2"));
   CHECK_THROWS_WITH(HandPath({at_time(0.0), at_time(nan)}, false), Contains("not finite"));
   const std::vector<Waypoint> open_path = {{0.0, {0, 0, 0}, {0, 0, 0}}, {1.0, {0, 0, 1e-6}, {0, 0, 0}}};
-  CHECK_THROWS_WITH(HandPath(open_path, true), Contains("end where it began"));
+  CHECK_THROWS_WITH(HandPath(open_path, true), Contains("end at its start"));
   CHECK_NOTHROW(HandPath(open_path, false));
 }
 
