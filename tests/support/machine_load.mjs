@@ -2,7 +2,7 @@
 // Measures whether the machine gives programs a rate of 1 kHz, by the rule of machine_load.hpp.
 const PERIOD_MS = 1;
 const LATE_MS = 2;
-const BUSY_SHARE = 0.01;
+const BUSY_SHARE = 0.003;
 const INSTANTS = 1000;
 
 /** Returns "machine too busy to judge: ..." with the measured figures, or null if the machine gives the rate. Takes 1 s. */

@@ -4,7 +4,7 @@ import time
 
 PERIOD_S = 1e-3
 LATE_S = 2e-3
-BUSY_SHARE = 0.01
+BUSY_SHARE = 0.003
 INSTANTS = 1000
 
 

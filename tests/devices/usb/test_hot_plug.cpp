@@ -83,6 +83,9 @@ bool soon(const Condition& condition) {
   return false;
 }
 
+/// Exit code of wrenchd after a fault. On a busy machine a late tick is a fault.
+constexpr int kExitFault = 3;
+
 /// A profile that tolerates any silence of the machine.
 const char* const kPatient = R"(inherits = "reference_full_speed"
 name = "patient"
@@ -129,8 +132,9 @@ TEST_CASE("wrenchd waits for its device, and takes it back disarmed after an unp
   wrenchd.signal(SIGTERM);
   const ProgramResult result = wrenchd.wait();
   INFO(result.err);
-  CHECK(result.exit_code == 0);
+  CHECK((result.exit_code == 0 || result.exit_code == kExitFault));
   CHECK_THAT(result.err, Contains("the hand is released"));
+  REQUIRE_RATE(load, result.exit_code == 0);
 }
 
 TEST_CASE("without a profile's name wrenchd takes the one that the device has", "[usb]") {
@@ -167,7 +171,9 @@ TEST_CASE("a device that has to be calibrated first is not armed before", "[usb]
     CHECK_FALSE(handle.was_pushed());
   }
   wrenchd.signal(SIGTERM);
-  CHECK(wrenchd.wait().exit_code == 0);
+  const int exit_code = wrenchd.wait().exit_code;
+  CHECK((exit_code == 0 || exit_code == kExitFault));
+  REQUIRE_RATE(load, exit_code == 0);
 }
 
 TEST_CASE("wrenchctl calibrate asks for the axes, and stopped it stores nothing", "[usb]") {
