@@ -98,4 +98,4 @@ test(async () => {
   console.log("view " + Object.entries(line).flat().join(" "));
   if (frames === 0) throw new TooSlow("nothing was drawn: there was nothing to measure");
   if (difference > options["most-us"]) throw new TooSlow(`p99.9 of a tick is ${difference.toFixed(1)} us longer while it is looked at`);
-});
+}, null);

@@ -136,10 +136,14 @@ async function end(code) {
 }
 
 /** Runs a test, ends all programs that it started, and exits with its result. If the test was too slow and the machine
- * is too busy without these programs, exits with 77. */
-export async function test(run) {
+ * is too busy without these programs, exits with 77. limit_s: the test is too slow after this time, which is less than the
+ * time that ctest allows; null: no limit. */
+export async function test(run, limit_s = 240) {
   try {
-    await run();
+    const limit = limit_s === null ? [] : [sleep(1000 * limit_s).then(() => {
+      throw new TooSlow(`the test does not end within ${limit_s} s`);
+    })];
+    await Promise.race([run(), ...limit]);
     await end(0);
   } catch (error) {
     console.error(error);
