@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "daemon/service_notify.hpp"
+#include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
 namespace wrenchd {
@@ -182,21 +183,23 @@ TEST_CASE("without a service manager no message is sent and no thread runs", "[s
 
 TEST_CASE("wrenchd reports to its manager: ready after the self-test, alive, stopping",
           "[service_notify][wall_time]") {
+  const MachineLoad load;
   Manager manager;
   RunningProgram wrenchd("wrenchd", {"--simulate", "loopback", "--realtime", "best_effort"});
-  CHECK(manager.receives("READY=1\n"));
+  REQUIRE_RATE(load, manager.receives("READY=1\n"));
   CHECK_THAT(manager.all(), Contains("STATUS=self-test; device loopback, simulated\n"));
-  CHECK(manager.receives("STATUS=disarmed; device loopback, simulated\n"));
+  REQUIRE_RATE(load, manager.receives("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
-  CHECK(manager.receives("WATCHDOG=1\nWATCHDOG=1\n"));
+  REQUIRE_RATE(load, manager.receives("WATCHDOG=1\nWATCHDOG=1\n"));
   wrenchd.signal(SIGUSR1);
-  CHECK(manager.receives("STATUS=stopped: stop_requested: "));
+  REQUIRE_RATE(load, manager.receives("STATUS=stopped: stop_requested: "));
   wrenchd.signal(SIGUSR2);
-  CHECK(manager.receives("STATUS=disarmed; device loopback, simulated\n"));
+  REQUIRE_RATE(load, manager.receives("STATUS=disarmed; device loopback, simulated\n"));
   manager.forget();
   wrenchd.signal(SIGTERM);
-  CHECK(wrenchd.wait().exit_code == 0);
+  const int exit_code = wrenchd.wait().exit_code;
   CHECK(manager.receives("STOPPING=1\n"));
+  REQUIRE_RATE(load, exit_code == 0);
 }
 
 TEST_CASE("wrenchd that does not start reports the reason as status, and is never ready",

@@ -30,6 +30,7 @@
 #include "daemon/control/json_rpc.hpp"
 #include "daemon/control/listening_socket.hpp"
 #include "daemon/recording/recording_file.hpp"
+#include "tests/support/machine_load.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // Measures how abuse of the control socket affects the servo loop. The real daemon runs, armed by a client
@@ -367,6 +368,10 @@ int main(int argc, char** argv) {
     for (int i = 0; i < 500 && !connected(socket); ++i) std::this_thread::sleep_for(10ms);
     Client watcher(socket);
     for (int i = 0; i < 500 && watcher.state() != "disarmed"; ++i) std::this_thread::sleep_for(10ms);
+    if (watcher.state() != "disarmed") {
+      test::MachineLoad().throw_if_busy();
+      throw std::runtime_error("the daemon is not disarmed 5 s after its start");
+    }
     constexpr uid_t kNobody = 65534;
     const Decoy decoy(files.path() / "decoy.sock");
     Abusers busy(files.path() / "decoy.sock", threads, kNobody);
@@ -417,8 +422,13 @@ int main(int argc, char** argv) {
     abusers.end();
     std::this_thread::sleep_for(100ms);
     if (watcher.state() != "stopped") violation("stop did not stop it");
-    if (holder.lost_in_time() > 0) violation("a holder with timely heartbeats lost the lease");
     if (daemon.end() == -1) violation("the daemon ended by a signal");
+    // The daemon shares the machine, so it may receive a timely heartbeat late. The abusers are idle by now,
+    // so the measurement does not include their load.
+    if (holder.lost_in_time() > 0) {
+      if (violations == 0) test::MachineLoad().throw_if_busy();
+      violation("a holder with timely heartbeats lost the lease");
+    }
 
     std::array<Times, kKinds> times;
     for (const TickRecord& record : read_recording(recording).ticks)
@@ -443,6 +453,9 @@ int main(int argc, char** argv) {
         slowest_answer_ms, stop_ms, holder.worst_ms(), holder.lost(), violations,
         static_cast<unsigned long long>(seed));
     return violations == 0 ? 0 : 1;
+  } catch (const test::TooBusy& busy) {
+    std::printf("%s\n", busy.what());
+    return test::kExitTooBusy;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "prove_abuse: %s\n", error.what());
     return 1;

@@ -23,6 +23,7 @@
 #include "devices/links/loopback_link.hpp"
 #include "devices/simulation/simulated_device.hpp"
 #include "tests/support/invariants.hpp"
+#include "tests/support/machine_load.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 // Changes the rendering thousands of times, half of the changes invalid, while the real loop runs in wall
@@ -138,6 +139,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", seed)->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
+  const test::MachineLoad load;
   const test::TemporaryDirectory directory;
   const RunConfig plan = plan_of();
   for (const RealtimeGrant& grant : lock_memory(plan.settings.servo.realtime))
@@ -253,5 +255,9 @@ int main(int argc, char** argv) {
       number(missed), number(seed));
   with.print("swaps_with");
   without.print("swaps_without");
-  return torn == 0 && unknown == 0 && broken == 0 && applied > 0 && rejected > 0 && pushed > 0 ? 0 : 1;
+  if (torn > 0 || unknown > 0 || broken > 0 || applied == 0 || rejected == 0) return 1;
+  if (pushed > 0) return 0;
+  if (!load.busy()) return 1;
+  std::printf("%s\n", load.busy_text().c_str());
+  return test::kExitTooBusy;
 }

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/json_rpc.hpp"
+#include "tests/support/rate_check.hpp"
 #include "tests/support/run_program.hpp"
 
 // wrenchctl and the daemon as two processes.
@@ -29,17 +30,25 @@ struct Daemon {
   RunningProgram program;
 
   explicit Daemon(const std::string& profile = "loopback") : program("wrenchd", arguments(profile)) {
-    const bool runs =
-        program.wait_for_output("control socket: " + socket) && program.wait_for_output("state: disarmed");
     INFO(program.err());
-    REQUIRE(runs);
+    REQUIRE(program.wait_for_output("control socket: " + socket));
   }
+  /// Returns true after the self-test.
+  bool starts() const { return program.wait_for_output("state: disarmed"); }
 
   ProgramResult ctl(std::vector<std::string> words) const {
     words.insert(words.begin() + 1, {"--socket", socket});
     return run_program("wrenchctl", words);
   }
   std::string state() const { return Json::parse(ctl({"status", "--json"}).out)["state"]; }
+  /// Returns true when the daemon is in another state.
+  bool leaves(const std::string& state) const {
+    for (int i = 0; i < 200; ++i) {
+      if (this->state() != state) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return false;
+  }
   bool comes_to(const std::string& state) const {
     for (int i = 0; i < 200; ++i) {
       if (this->state() == state) return true;
@@ -59,7 +68,9 @@ struct Daemon {
 };
 
 TEST_CASE("wrenchctl status prints text for a user and JSON for a program", "[control_commands]") {
+  const MachineLoad load;
   const Daemon daemon;
+  REQUIRE_RATE(load, daemon.starts());
   const ProgramResult text = daemon.ctl({"status"});
   CHECK(text.exit_code == 0);
   for (const char* part :
@@ -75,18 +86,22 @@ TEST_CASE("wrenchctl status prints text for a user and JSON for a program", "[co
 }
 
 TEST_CASE("wrenchctl status reports that a device without motors applies no force", "[control_commands]") {
+  const MachineLoad load;
   const Daemon daemon("spacemouse_split");
+  REQUIRE_RATE(load, daemon.starts());
   has(daemon.ctl({"status"}).out, "limits     0 N, 0 N.m: the device has no motors and applies no force\n");
 }
 
 TEST_CASE("wrenchctl arm keeps the force until a signal, while other clients watch",
           "[control_commands][wall_time]") {
+  const MachineLoad load;
   const Daemon daemon;
+  REQUIRE_RATE(load, daemon.starts());
   RunningProgram watch("wrenchctl", {"watch", "--socket", daemon.socket, "--json"});
   for (int i = 0; i < 500 && watch.out().empty(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   RunningProgram arm("wrenchctl", {"arm", "--socket", daemon.socket});
-  REQUIRE(daemon.comes_to("active"));
+  REQUIRE_RATE(load, daemon.comes_to("active"));
   const Json status = Json::parse(daemon.ctl({"status", "--json"}).out);
   has(status["armed_by"], "process ");
 
@@ -97,7 +112,7 @@ TEST_CASE("wrenchctl arm keeps the force until a signal, while other clients wat
   has(disarmed.err, "the daemon has disarmed");
 
   RunningProgram again("wrenchctl", {"arm", "--socket", daemon.socket});
-  REQUIRE(daemon.comes_to("active"));
+  REQUIRE_RATE(load, daemon.comes_to("active"));
   const ProgramResult other = daemon.ctl({"arm"});
   CHECK(other.exit_code == 1);
   has(other.err, "wrenchctl: The lease is held by process ");
@@ -125,23 +140,29 @@ TEST_CASE("wrenchctl arm keeps the force until a signal, while other clients wat
 }
 
 TEST_CASE("a wrenchctl that is killed releases the hand", "[control_commands][wall_time]") {
+  const MachineLoad load;
   const Daemon daemon;
+  REQUIRE_RATE(load, daemon.starts());
   RunningProgram arm("wrenchctl", {"arm", "--socket", daemon.socket});
-  REQUIRE(daemon.comes_to("active"));
+  REQUIRE_RATE(load, daemon.comes_to("active"));
   SECTION("killed") {
     arm.signal(SIGKILL);
-    CHECK(daemon.program.wait_for_output("disconnected", std::chrono::seconds(5)));
+    CHECK(daemon.leaves("active"));  // whatever the load
+    REQUIRE_RATE(load, daemon.program.wait_for_output("disconnected", std::chrono::seconds(5)));
   }
   SECTION("stopped") {
     arm.signal(SIGSTOP);
-    CHECK(daemon.program.wait_for_output("sends no heartbeat", std::chrono::seconds(5)));
+    CHECK(daemon.leaves("active"));  // whatever the load
+    REQUIRE_RATE(load, daemon.program.wait_for_output("sends no heartbeat", std::chrono::seconds(5)));
   }
-  CHECK(daemon.program.wait_for_output("heartbeat_lost: ", std::chrono::seconds(5)));
-  CHECK(daemon.comes_to("disarmed"));
+  REQUIRE_RATE(load, daemon.program.wait_for_output("heartbeat_lost: ", std::chrono::seconds(5)));
+  REQUIRE_RATE(load, daemon.comes_to("disarmed"));
 }
 
 TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
+  const MachineLoad load;
   const Daemon daemon;
+  REQUIRE_RATE(load, daemon.starts());
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 1);
   const ProgramResult stop = daemon.ctl({"stop"});
   CHECK(stop.exit_code == 0);
@@ -151,11 +172,13 @@ TEST_CASE("wrenchctl stops, and acknowledges", "[control_commands]") {
   CHECK(arm.exit_code == 1);
   has(arm.err, "The loop cannot be armed in state 'stopped': acknowledge the fault or stop first.");
   CHECK(daemon.ctl({"acknowledge"}).exit_code == 0);
-  CHECK(daemon.comes_to("disarmed"));
+  REQUIRE_RATE(load, daemon.comes_to("disarmed"));
 }
 
 TEST_CASE("wrenchctl describe lists methods and roles", "[control_commands]") {
+  const MachineLoad load;
   const Daemon daemon;
+  REQUIRE_RATE(load, daemon.starts());
   const ProgramResult all = daemon.ctl({"describe"});
   CHECK(all.exit_code == 0);
   for (const char* part : {"lease.acquire  (operator)\n", "stop  (observer)\n", "\nevents\n", "\nroles\n",
@@ -183,7 +206,9 @@ TEST_CASE("wrenchctl names the searched sockets and the remedy", "[control_comma
 
 TEST_CASE("a second daemon does not start on an occupied socket, and states the reason",
           "[control_commands]") {
+  const MachineLoad load;
   const Daemon daemon;
+  REQUIRE_RATE(load, daemon.starts());
   const ProgramResult second =
       run_program("wrenchd", {"--realtime", "off", "--seconds", "0.1", "--control", daemon.socket});
   CHECK(second.exit_code == 1);
@@ -203,12 +228,13 @@ TEST_CASE("a second daemon does not start on an occupied socket, and states the 
 TEST_CASE("any operator can disarm a daemon that its command line armed", "[control_commands]") {
   const TemporaryDirectory dir;
   const std::string socket = (dir.path() / "control.sock").string();
+  const MachineLoad load;
   const RunningProgram program("wrenchd", {"--realtime", "off", "--arm", "--control", socket});
-  REQUIRE(program.wait_for_output("state: waiting"));
+  REQUIRE_RATE(load, program.wait_for_output("state: waiting"));
   const Json status = Json::parse(run_program("wrenchctl", {"status", "--json", "--socket", socket}).out);
   CHECK(status["armed_by"] == "command line");
   CHECK(run_program("wrenchctl", {"disarm", "--socket", socket}).exit_code == 0);
-  CHECK(program.wait_for_output("state: disarmed"));
+  REQUIRE_RATE(load, program.wait_for_output("state: disarmed"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@ import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
+import { busyText } from "../support/machine_load.mjs";
 
 const binaries = process.env.WRENCHD_BINARY_DIR;
 export const source = process.env.WRENCHD_SOURCE_DIR;
@@ -13,13 +14,27 @@ const SKIPPED = 77;
 
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
-/** Waits until the condition is true; otherwise fails with the given text. */
-export async function until(what, holds, limit_ms = 60000) {
+/** A condition that needs a rate in wall time does not hold. On a machine that is too busy the test then skips. */
+export class TooSlow extends Error {}
+
+async function poll(holds, limit_ms) {
   for (const end = Date.now() + limit_ms; Date.now() < end; await sleep(50)) {
     const value = await holds();
     if (value) return value;
   }
-  throw new Error(`it never came to this: ${what}`);
+  return null;
+}
+
+/** Waits until the condition is true; otherwise throws TooSlow with the given text. */
+export async function until(what, holds, limit_ms = 60000) {
+  const value = await poll(holds, limit_ms);
+  if (value) return value;
+  throw new TooSlow(`not within ${limit_ms} ms: ${what}`);
+}
+
+/** Waits until the condition is true; otherwise the test fails whatever the load. For what wrenchd guarantees. */
+export async function must(what, holds, limit_ms) {
+  if (!await poll(holds, limit_ms)) throw new Error(`violation, not within ${limit_ms} ms: ${what}`);
 }
 
 const running = [];
@@ -106,23 +121,36 @@ export async function open(url, options = {}) {
 
 export const text = (page, id) => page.locator(`#${id}`).textContent();
 
-async function end(code) {
+async function endPrograms() {
   await browser?.close();
+  browser = undefined;
   for (const { child } of running) if (child.exitCode === null) child.kill("SIGTERM");
   await Promise.race([Promise.all(running.map(({ ended }) => ended)), sleep(5000)]);
   for (const { child } of running) if (child.exitCode === null) child.kill("SIGKILL");
+}
+
+async function end(code) {
+  await endPrograms();
   rmSync(directory, { recursive: true, force: true });
   process.exit(code);
 }
 
-/** Runs a test, ends all programs that it started, and exits with its result. */
-export async function test(run) {
+/** Runs a test, ends all programs that it started, and exits with its result. If the test was too slow and the machine
+ * is too busy without these programs, exits with 77. limit_s: the test is too slow after this time, which is less than the
+ * time that ctest allows; null: no limit. */
+export async function test(run, limit_s = 240) {
   try {
-    await run();
+    const limit = limit_s === null ? [] : [sleep(1000 * limit_s).then(() => {
+      throw new TooSlow(`the test does not end within ${limit_s} s`);
+    })];
+    await Promise.race([run(), ...limit]);
     await end(0);
   } catch (error) {
     console.error(error);
     for (const { err } of running) if (err !== "") console.error(err.trimEnd().split("\n").slice(-12).join("\n"));
-    await end(1);
+    await endPrograms();  // their load is not measured
+    const busy = error instanceof TooSlow || error.name === "TimeoutError" ? await busyText() : null;
+    if (busy) console.log(busy);
+    await end(busy ? SKIPPED : 1);
   }
 }

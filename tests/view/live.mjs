@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A running daemon: the page shows it and arms it; the lease depends on the page's heartbeats.
 import assert from "node:assert/strict";
-import { daemon, open, sleep, test, text, until, view } from "./browser.mjs";
+import { daemon, must, open, sleep, test, text, until, view } from "./browser.mjs";
 
 const ARMED = ["waiting", "ramping", "active", "degraded"];
 
@@ -50,7 +50,7 @@ test(async () => {
     const hung = page.evaluate(() => {
       for (const end = performance.now() + 4000; performance.now() < end;);
     });
-    await until("it is disarmed while the page hangs", async () => !ARMED.includes(await state()), 3900);
+    await must("it is disarmed while the page hangs", async () => !ARMED.includes(await state()), 3900);
     await hung;
     await sleep(500);
     return /this page was hidden or unresponsive/.test(await text(page, "toast"));
@@ -68,7 +68,7 @@ test(async () => {
   await armed();
   assert.deepEqual(page.complaints(), []);
   await page.close();
-  await until("it is disarmed when the tab is closed", async () => !ARMED.includes(await state()), 3000);
+  await must("it is disarmed when the tab is closed", async () => !ARMED.includes(await state()), 3000);
 
   // The page shows that the daemon has ended, and shows a restarted daemon again.
   const again = await open(server.url, small);

@@ -11,8 +11,8 @@
 #include "core/spatial.hpp"
 #include "core/state.hpp"
 #include "daemon/control/scene_geometry.hpp"
-#include "daemon/servo/record_fields.hpp"
 #include "daemon/servo/proxy_initializer.hpp"
+#include "daemon/servo/record_fields.hpp"
 
 namespace wrenchd {
 namespace {

@@ -267,6 +267,12 @@ void MockHidraw::send(const Bytes& report) {
     throw std::runtime_error("the pseudo terminal is full");
 }
 
+bool MockHidraw::report_waits() const {
+  pollfd waiting{slave_, POLLIN,
+                 0};  // poll() also delivers the bytes that are still on their way to the node
+  return poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0;
+}
+
 Bytes MockHidraw::receive(std::size_t length) {
   Bytes bytes(length);
   for (std::size_t done = 0; done < length;) {

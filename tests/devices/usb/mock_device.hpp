@@ -58,8 +58,11 @@ class MockHidraw {
   MockHidraw& operator=(const MockHidraw&) = delete;
 
   std::string node() const;
-  /// A report to the host.
+  /// Sends a report to the host. The node is a byte stream: if the host reads two reports at once, it gets
+  /// them as one report that is too long. A real hidraw node keeps them apart.
   void send(const Bytes& report);
+  /// Returns true while the host has not read all that send() wrote.
+  bool report_waits() const;
   /// The next bytes the host wrote; waits for them.
   Bytes receive(std::size_t length);
   /// Bytes that wait to be received.
