@@ -9,27 +9,28 @@
 
 namespace wrenchd {
 
-/// A solid to try things with, so that no model has to be downloaded.
+/// Describes a solid that make_mesh() generates (collision/meshes/make_mesh.hpp), so that a scene needs no
+/// model file.
 struct GeneratedMesh {
-  static constexpr std::size_t kMinTriangles = 8,
-                               kMaxTriangles = 20'000'000;  ///< triangles that may be asked for
+  static constexpr std::size_t kMinTriangles = 8;           ///< Fewest triangles that may be requested.
+  static constexpr std::size_t kMaxTriangles = 20'000'000;  ///< Most triangles that may be requested.
 
-  std::string kind;
-  std::size_t triangles = 20000;               ///< about so many
-  std::uint32_t seed = 1;                      ///< of `bumpy` and `boulder`: which one of the many
-  Vector3d size_m = Vector3d::Constant(0.05);  ///< of `box`: its sides
+  std::string kind;                            ///< One of mesh_kinds().
+  std::size_t triangles = 20000;               ///< Approximate number of triangles.
+  std::uint32_t seed = 1;                      ///< Selects the shape of `bumpy` and `boulder`.
+  Vector3d size_m = Vector3d::Constant(0.05);  ///< Sides of `box`, along x, y and z.
 };
 
 struct MeshKind {
   std::string name;
-  std::string description;  ///< one line, with its measures
+  std::string description;  ///< One line, with its dimensions.
 };
 
 /// The kinds of mesh that make_mesh() generates (collision/meshes/make_mesh.hpp).
 const std::vector<MeshKind>& mesh_kinds();
 
-/// "made gear, 5000 triangles": what stands in the place of a file's name. Different meshes have different
-/// ones.
+/// Returns a name such as "made gear, 5000 triangles", which stands in the place of a file name. Different
+/// meshes have different names. Not RT-safe: allocates.
 std::string generated_mesh_name(const GeneratedMesh& made);
 
 }  // namespace wrenchd

@@ -23,8 +23,8 @@ class OutputStage {
   /// limits that hold from now on, the profile's included.
   LimitSettings set_limits(const LimitSettings& limits, bool armed) noexcept;
 
-  /// The contact wrench without the energy that nobody put into it. state: that the supervisor expects for
-  /// this tick.
+  /// The contact wrench without energy that the contact generates by itself. state: that the supervisor
+  /// expects for this tick.
   Stabilized stabilize(const Demand& demand, const DeviceSample& sample, State state) noexcept;
   /// The motors gave more than they can give continuously: their ceiling is lowered.
   bool overheated() const noexcept { return heat_.folded_back(); }

@@ -21,8 +21,8 @@ struct Requests {
   std::optional<LimitSettings> limits;
 };
 
-/// Where other threads put requests, and where each tick takes them. Nobody waits: commands accumulate as
-/// bits, of everything else the newest value counts.
+/// Where other threads put requests, and where each tick takes them. No thread ever waits: commands
+/// accumulate as bits, of everything else the newest value counts.
 ///
 /// Commands may come from any thread. Each set_...() and renderings() belongs to one thread at a time. All
 /// members are RT-safe.

@@ -68,7 +68,7 @@ void Supervisor::run_self_test(const DeviceSample& sample, Verdict& verdict, con
 }
 
 /// The safest command first: stop and arm in one tick stop. Arming invalidates the proxy, because a hand that
-/// felt nothing may have moved through walls while the proxy stayed behind.
+/// had no force on it may have moved through walls while the proxy stayed behind.
 void Supervisor::apply_commands(CommandSet commands, bool proxy_valid, Verdict& verdict,
                                 const TickTime& t) noexcept {
   if ((commands & kStop) != 0) raise(Fault::stop_requested, t.now);

@@ -89,7 +89,7 @@ class Explained:
             raise Stale("\n".join(wrong))
 
     def reason_of(self, mutant, lines):
-        """Why no test can see the mutant; empty if nobody says so. lines: of its source."""
+        """Why no test can see the mutant; empty if it has no entry. lines: of its source."""
         for entry in self.by_file.get(mutant.file, []):
             if self._matches(entry, mutant, lines):
                 return entry.reason
