@@ -352,7 +352,7 @@ void read_section(TomlTable& table, const Section& section, const Context& conte
 
 TomlValue read_subsection(TomlTable& parent, std::string_view key, const Section& section,
                           const Context& context, Settings& settings) {
-  const TomlValue value = parent.optional(key);
+  TomlValue value = parent.optional(key);
   const auto read = [&](TomlTable& table) { read_section(table, section, context, settings); };
   if (section.read_if_absent)
     value.table_or_empty(read);
