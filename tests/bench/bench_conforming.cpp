@@ -163,8 +163,8 @@ int main(int argc, char** argv) {
   std::printf(
       "%zu ticks, 1 ms apart. behind: differs by more than %g um from the coarse mesh's proxy with unlimited\n"
       "work; lag: longest run of such ticks; diff: largest difference of a pose. dFmax: largest force to the\n"
-      "reference's; dF: largest difference at one tick, in %% of the reference's largest force. Time: minimum\n"
-      "of up to %d passes; one core only: %s.\n\n%s\n",
+      "reference's; dF: largest difference at one tick, in %% of the reference's largest force. us: processor\n"
+      "time of a tick, minimum of up to %d passes; one core only: %s.\n\n%s\n",
       options.ticks, options.tolerance_um, options.passes, pinned_to_one_core() ? "yes" : "no", kHeader);
   try {
     for (const ConformingCase& of : conforming_cases())

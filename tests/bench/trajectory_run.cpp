@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+#include <ctime>
 #include <limits>
 
 #include "core/energy_law.hpp"
@@ -13,8 +13,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double us_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::micro>(Clock::now() - begin).count();
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Returns the processor time of this thread [us]. Other programs on the same core do not count.
+double thread_time_us() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
 }
 
 void follow_once(const Scene& scene, const Proxy::WorkLimit& limit, const std::vector<Pose>& X_WP,
@@ -23,10 +30,10 @@ void follow_once(const Scene& scene, const Proxy::WorkLimit& limit, const std::v
   Pose X_WQ = X_WP.front();
   for (std::size_t i = 0; i < X_WP.size(); ++i) {
     ProxyTick& tick = ticks[i];
-    const auto begin = Clock::now();
+    const double begin_us = thread_time_us();
     const Projection q = proxy.follow(X_WP[i], X_WQ, 1e-3 * static_cast<double>(i));
     const Wrench F_T = energy_wrench(scene.tool().solid.inertia, kStiffness_per_s2, X_WP[i], q.X_WQ);
-    tick.us = std::min(tick.us, us_since(begin));
+    tick.us = std::min(tick.us, thread_time_us() - begin_us);
     if (q.status != ProjectionStatus::infeasible) X_WQ = q.X_WQ;
     tick.X_WQ = X_WQ;
     tick.status = q.status;
@@ -42,7 +49,7 @@ std::vector<ProxyTick> follow_trajectory(const Scene& scene, const Proxy::WorkLi
   std::vector<ProxyTick> ticks(X_WP.size());
   for (ProxyTick& tick : ticks) tick.us = std::numeric_limits<double>::infinity();
   const auto begin = Clock::now();
-  for (int pass = 0; pass < passes && us_since(begin) < 1e6 * max_s; ++pass)
+  for (int pass = 0; pass < passes && seconds_since(begin) < max_s; ++pass)
     follow_once(scene, limit, X_WP, ticks);
   return ticks;
 }

@@ -19,7 +19,7 @@ struct ProxyTick {
   ProjectionStatus status = ProjectionStatus::free;
   Vector3d force_W_N = Vector3d::Zero();
   std::uint32_t node_visits = 0;
-  double us = 0.0;  ///< time of the tick, the minimum over the passes
+  double us = 0.0;  ///< processor time of the tick, the minimum over the passes
 };
 
 /// Follows a trajectory of the tool's body frame. The first pose must be admissible. passes: number of runs,
