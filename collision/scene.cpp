@@ -23,7 +23,8 @@ struct LoadedObstacle {
   std::optional<ConvexBody> hull;  ///< in file units; empty if the mesh is not convex
 };
 
-LoadedObstacle make(const MeshObstacleSettings& obstacle, bool all_convex, MeshLoader& loader) {
+LoadedObstacle make(const MeshObstacleSettings& obstacle, double surface_tolerance_m, bool all_convex,
+                    MeshLoader& loader) {
   LoadedObstacle loaded_obstacle;
   loaded_obstacle.loaded = loader.load(obstacle.mesh, obstacle.kind, obstacle.generated);
   loader.check_size(*loaded_obstacle.loaded, obstacle.scale, kPlausibleObstacleSize);
@@ -34,7 +35,8 @@ LoadedObstacle make(const MeshObstacleSettings& obstacle, bool all_convex, MeshL
     if (is_convex(mesh, hull)) loaded_obstacle.hull = std::move(hull);
   }
   for (Vector3d& p : mesh.vertices_m) p *= obstacle.scale;
-  loaded_obstacle.bvh = loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh);
+  loaded_obstacle.bvh = 
+      loader.build_bvh(std::move(mesh), obstacle.kind, obstacle.mesh, surface_tolerance_m);
   return loaded_obstacle;
 }
 
@@ -54,7 +56,7 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
   for (const MeshObstacleSettings& obstacle : settings.meshes) {
     const auto [at, is_new] = loaded_obstacles.try_emplace({obstacle.mesh, obstacle.scale, obstacle.kind});
     LoadedObstacle& loaded_obstacle = at->second;
-    if (is_new) loaded_obstacle = make(obstacle, all_convex, loader);
+    if (is_new) loaded_obstacle = make(obstacle, settings.surface_tolerance_m, all_convex, loader);
     meshes.emplace_back(obstacle.name, loaded_obstacle.bvh, obstacle.X_WM, obstacle.motion,
                         obstacle.scheduled);
     all_convex = all_convex && loaded_obstacle.hull;
@@ -64,7 +66,8 @@ Scene load(const SceneSettings& settings, MeshLoader& loader) {
     convex.push_back(convex_obstacle(obstacle.name, std::move(hull)));
   }
   if (!all_convex) convex.clear();
-  auto tool_mesh = loader.build_bvh(tool.mesh, BodyKind::solid, settings.tool.mesh);
+  auto tool_mesh = 
+      loader.build_bvh(tool.mesh, BodyKind::solid, settings.tool.mesh, settings.surface_tolerance_m);
   return Scene(std::move(tool), settings.half_spaces, std::move(convex), std::move(meshes),
                std::move(tool_mesh));
 }
@@ -126,6 +129,8 @@ Scene::Scene(ToolBody tool, std::vector<HalfSpaceSettings> half_spaces, std::vec
       has_moving_obstacles_(any_moves(meshes_)) {
   if (has_moving_obstacles_) convex_.clear();
   if (!meshes_.empty() && !tool_mesh_) tool_mesh_ = std::make_shared<const MeshBvh>(tool_.mesh);
+  // A simplified mesh encloses the hull.
+  if (tool_mesh_) tool_radius_m_ = std::max(tool_radius_m_, tool_mesh_->surface.radius_m());
 }
 
 Scene::Scene(const Scene& other, const std::vector<MeshObstacleSettings>& meshes) : Scene(other) {

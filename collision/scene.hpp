@@ -100,7 +100,7 @@ class Scene {
 
  private:
   ToolBody tool_;
-  double tool_radius_m_;  ///< largest distance of a hull vertex from the centre of mass [m]
+  double tool_radius_m_;  ///< largest distance of a point of the tool from the centre of mass [m]
   std::vector<HalfSpaceSettings> half_spaces_;
   std::vector<ConvexObstacle> convex_;
   std::vector<MeshObstacle> meshes_;

@@ -31,8 +31,9 @@ Feature hull_face(const ConvexBody& hull, std::uint32_t vertex, const Vector3d& 
   return {FeatureKind::hull_vertex, vertex, 0};
 }
 
-Feature mesh_edge(const MeshSurface& surface, std::uint32_t edge) noexcept {
-  const auto& [a, b] = surface.convex_edges()[edge].vertices;
+Feature mesh_edge(const MeshBvh& mesh, std::uint32_t edge) noexcept {
+  const auto& vertices = mesh.surface.convex_edges()[edge].vertices;
+  const std::uint32_t a = mesh.loaded_vertex(vertices[0]), b = mesh.loaded_vertex(vertices[1]);
   return {FeatureKind::edge, std::min(a, b), std::max(a, b)};
 }
 
@@ -78,14 +79,15 @@ Feature tool_feature(const Contact& contact, const Scene& scene, bool of_meshes)
   const bool mesh = of_meshes && contact.obstacle >= scene.first_mesh();
   switch (contact.kind) {
     case ContactKind::vertex_face:
-      return {mesh ? FeatureKind::vertex : FeatureKind::hull_vertex, contact.tool_feature, 0};
+      if (mesh) return {FeatureKind::vertex, scene.tool_mesh()->loaded_vertex(contact.tool_feature), 0};
+      return {FeatureKind::hull_vertex, contact.tool_feature, 0};
     case ContactKind::face_vertex:
-      if (mesh) return {FeatureKind::face, contact.tool_feature, 0};
+      if (mesh) return {FeatureKind::face, scene.tool_mesh()->loaded_triangle(contact.tool_feature), 0};
       return hull_face(scene.tool().hull, contact.tool_feature, -contact.d_T);
     case ContactKind::edge_edge:
       break;
   }
-  return mesh ? mesh_edge(scene.tool_mesh()->surface, contact.tool_feature)
+  return mesh ? mesh_edge(*scene.tool_mesh(), contact.tool_feature)
               : hull_edge(scene.tool().hull, contact.tool_feature, contact.d_T);
 }
 
@@ -94,9 +96,12 @@ Feature obstacle_feature(const Contact& contact, const Scene& scene, bool of_mes
   const std::size_t k = contact.obstacle - scene.half_spaces().size();
   const std::uint32_t feature = contact.obstacle_feature;
   if (of_meshes && contact.obstacle >= scene.first_mesh()) {
-    if (contact.kind == ContactKind::vertex_face) return {FeatureKind::face, feature, 0};
-    if (contact.kind == ContactKind::face_vertex) return {FeatureKind::vertex, feature, 0};
-    return mesh_edge(scene.meshes()[k].mesh->surface, feature);
+    const MeshBvh& mesh = *scene.meshes()[k].mesh;
+    if (contact.kind == ContactKind::vertex_face)
+      return {FeatureKind::face, mesh.loaded_triangle(feature), 0};
+    if (contact.kind == ContactKind::face_vertex)
+      return {FeatureKind::vertex, mesh.loaded_vertex(feature), 0};
+    return mesh_edge(mesh, feature);
   }
   const ConvexBody& hull = scene.convex()[k].body;
   if (contact.kind == ContactKind::vertex_face) return hull_face(hull, feature, contact.n_W);

@@ -19,6 +19,7 @@ constexpr Range kMass = {1e-6, 1e6};
 constexpr Range kSide = {1e-6, 100.0};
 constexpr Range kAny = {-1e9, 1e9};
 constexpr Range kRotation = {-10.0, 10.0};
+constexpr Range kSurfaceTolerance_m = {0.0, 1e-3};
 constexpr Range kReversal_s = {0.0, 86400.0};
 
 /// A shorter normal is a typing mistake.
@@ -164,6 +165,7 @@ void read_obstacle(TomlTable& table, SceneSettings& scene, const std::string& pl
 
 void read_scene(TomlTable& table, SceneSettings& scene) {
   const TomlValue mass = table.optional("mass", "kg");
+  table.optional("surface_tolerance_m").number(scene.surface_tolerance_m, kSurfaceTolerance_m);
   table.mandatory("tool").table(read_tool, scene, mass);
   for (const TomlValue& obstacle : table.optional("obstacle").elements("tables, each headed [[obstacle]]")) {
     obstacle.table(read_obstacle, scene, obstacle.name());

@@ -2,6 +2,7 @@
 #include "collision/meshes/mesh_loader.hpp"
 
 #include <algorithm>
+#include <iomanip>
 #include <locale>
 #include <sstream>
 #include <system_error>
@@ -19,6 +20,15 @@ namespace {
 template <class T>
 std::string_view bytes_of(const std::vector<T>& list) {
   return {reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T)};
+}
+
+/// Returns an upper bound in micrometres: "at most 0.98 um", or "less than 1 nm".
+std::string bound_text(double length_m) {
+  if (length_m < 1e-9) return "less than 1 nm";
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << "at most " << std::setprecision(2) << 1e6 * length_m << " um";
+  return text.str();
 }
 
 /// Adds a text once, although thousands of bodies may share a file.
@@ -40,7 +50,7 @@ void visit_parts(ConvexBody& hull, const Use& use) {
 }
 template <class Use>
 void visit_parts(MeshBvh& mesh_bvh, const Use& use) {
-  mesh_bvh.surface.visit_members(use), mesh_bvh.bvh.visit_members(use);
+  mesh_bvh.visit_members(use);
 }
 
 }  // namespace
@@ -158,14 +168,31 @@ ConvexBody MeshLoader::hull(const LoadedMesh& loaded) {
 }
 
 std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind kind,
-                                                     const std::filesystem::path& file) {
+                                                     const std::filesystem::path& file,
+                                                     double surface_tolerance_m) {
   const std::size_t triangles = mesh.triangles.size();
-  const std::vector<std::string_view> made_from = {"bvh", body_kind_name(kind), bytes_of(mesh.vertices_m),
-                                                   bytes_of(mesh.triangles)};
-  return std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
+  const double tolerance_m =
+      kind == BodyKind::solid ? simplification_tolerance_m(mesh, surface_tolerance_m) : 0.0;
+  const std::string_view tolerance_bytes(reinterpret_cast<const char*>(&tolerance_m), sizeof tolerance_m);
+  const std::vector<std::string_view> made_from = {"bvh", body_kind_name(kind), tolerance_bytes,
+                                                   bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
+  auto bvh = std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
+    if (tolerance_m > 0.0) {
+      report_progress(file, triangles, "finding the enclosing surface for contacts");
+      SimplifiedMesh simplified = simplify_enclosing(mesh, tolerance_m);
+      if (simplified.mesh.triangles.size() < triangles || simplified.distance_m > 0.0)
+        return MeshBvh(std::move(simplified), mesh);
+    }
     report_progress(file, triangles, "finding its edges and building its BVH");
     return MeshBvh(mesh, kind);
   }));
+  const std::size_t used = bvh->surface.triangles().size();
+  if (used < triangles || bvh->surface_tolerance_m > 0.0)
+    add_once(simplifications_, file.string() + ": contacts use an enclosing surface of " +
+                                   with_thousands_separators(used) + " of " +
+                                   with_thousands_separators(triangles) + " triangles, " +
+                                   bound_text(bvh->surface_tolerance_m) + " outside the mesh");
+  return bvh;
 }
 
 void MeshLoader::check_size(const LoadedMesh& loaded, double scale, PlausibleSize likely) {

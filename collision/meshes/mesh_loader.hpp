@@ -54,9 +54,10 @@ class MeshLoader {
   /// Returns the convex hull in file units.
   ConvexBody hull(const LoadedMesh& loaded);
 
-  /// Returns the surface and its BVH. mesh: the mesh of `file`, placed and scaled.
-  std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind,
-                                           const std::filesystem::path& file);
+  /// Returns the surface for contacts and its BVH. mesh: the mesh of `file`, placed and scaled. A solid is
+  /// simplified within surface_tolerance_m [m] (mesh_simplifier.hpp); 0: not at all.
+  std::shared_ptr<const MeshBvh> build_bvh(TriangleMesh mesh, BodyKind kind, const std::filesystem::path& file,
+                                           double surface_tolerance_m);
 
   /// Adds a warning if the size of a mesh is implausible.
   void check_size(const LoadedMesh& loaded, double scale, PlausibleSize likely);
@@ -64,6 +65,8 @@ class MeshLoader {
   /// The differences between the loaded meshes and their files, each as "FILE: ...": repairs, and use as a
   /// surface.
   const std::vector<std::string>& changes() const noexcept { return changes_; }
+  /// The surfaces that contacts use in place of loaded meshes, each as "FILE: ...".
+  const std::vector<std::string>& simplifications() const noexcept { return simplifications_; }
   /// Warnings for the user: implausible sizes, and the reason why the cache cannot be written.
   const std::vector<std::string>& warnings() const noexcept { return warnings_; }
 
@@ -79,6 +82,7 @@ class MeshLoader {
   MeshCache cache_;
   Progress progress_;
   std::vector<std::string> changes_;
+  std::vector<std::string> simplifications_;
   std::vector<std::string> warnings_;
   std::map<std::pair<std::filesystem::path, BodyKind>, std::shared_ptr<const LoadedMesh>> loaded_;
 };

@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kWidth = TriangleBvh::kWidth;
 /// Boxes grow by this fraction of the mesh's extent, to contain the rounding to single precision.
 constexpr double kRounding = 4e-7;
+/// Other axes than those of the mesh's frame are taken if they reduce the bounds of triangles to this fraction.
+constexpr double kWorthwhile = 0.9;
 
 /// A box in double precision, and the centroid of the surface in it.
 struct Fitted {
@@ -43,15 +45,78 @@ std::uint16_t features_of(const MeshSurface::Features& features) {
                                     (some(features.edges) ? TriangleBvh::kEdges : 0));
 }
 
+/// Returns the sum of half the surface areas of the bounds of all triangles, along the rows of `axes`.
+double bounds_area(const TriangleMesh& mesh, const Matrix3d& axes) {
+  double sum = 0.0;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vector3d a = axes * mesh.vertices_m[i], b = axes * mesh.vertices_m[j], c = axes * mesh.vertices_m[k];
+    const Vector3d size = a.cwiseMax(b).cwiseMax(c) - a.cwiseMin(b).cwiseMin(c);
+    sum += size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+  }
+  return sum;
+}
+
+/// For each side of the largest triangle, returns orthonormal rows: the side's direction and the normal last.
+std::array<Matrix3d, 3> axes_of_largest_triangle(const TriangleMesh& mesh) {
+  std::array<Matrix3d, 3> axes;
+  axes.fill(Matrix3d::Identity());
+  double largest = 0.0;
+  for (const auto& corners : mesh.triangles) {
+    std::array<Vector3d, 3> sides;
+    for (std::size_t i = 0; i < 3; ++i)
+      sides[i] = mesh.vertices_m[corners[(i + 1) % 3]] - mesh.vertices_m[corners[i]];
+    const Vector3d area = sides[0].cross(sides[1]);
+    if (!(area.squaredNorm() > largest)) continue;
+    largest = area.squaredNorm();
+    for (std::size_t i = 0; i < 3; ++i) {
+      axes[i].row(0) = sides[i].normalized();
+      axes[i].row(2) = area.normalized();
+      axes[i].row(1) = axes[i].row(2).cross(axes[i].row(0));
+    }
+  }
+  return axes;
+}
+
+/// Returns the axes of the covariance of the sides, which weights long sides most.
+Matrix3d axes_of_sides(const TriangleMesh& mesh) {
+  Matrix3d sum = Matrix3d::Zero();
+  for (const auto& corners : mesh.triangles)
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector3d side = mesh.vertices_m[corners[(i + 1) % 3]] - mesh.vertices_m[corners[i]];
+      sum += side * side.transpose();
+    }
+  Matrix3d axes = Eigen::SelfAdjointEigenSolver<Matrix3d>(sum).eigenvectors().transpose();
+  if (axes.determinant() < 0.0) axes.row(2) *= -1.0;
+  return axes;
+}
+
+Quaterniond best_orientation(const TriangleMesh& mesh) {
+  Quaterniond best = Quaterniond::Identity();
+  double least = kWorthwhile * bounds_area(mesh, Matrix3d::Identity());
+  const auto [first, second, third] = axes_of_largest_triangle(mesh);
+  for (const Matrix3d& axes : {first, second, third, axes_of_sides(mesh)}) {
+    const double area = bounds_area(mesh, axes);
+    if (!(area < least)) continue;
+    least = area;
+    best = Quaterniond(axes).normalized();
+  }
+  return best;
+}
+
 class Builder {
  public:
-  explicit Builder(const MeshSurface& surface)
-      : surface_(surface), mesh_(surface.mesh()), order_(mesh_.triangles.size()) {
+  Builder(const MeshSurface& surface, const Quaterniond& R_SM)
+      : surface_(surface),
+        mesh_(surface.mesh()),
+        vertices_S_m_(mesh_.vertices_m),
+        order_(mesh_.triangles.size()) {
+    const Matrix3d R = R_SM.toRotationMatrix();
+    for (Vector3d& p : vertices_S_m_) p = R * p;
     std::iota(order_.begin(), order_.end(), 0U);
     middle_.reserve(order_.size());
     for (std::uint32_t t = 0; t < order_.size(); ++t)
       middle_.push_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3.0);
-    for (const Vector3d& p : mesh_.vertices_m) extent_m_ = std::max(extent_m_, p.lpNorm<Eigen::Infinity>());
+    for (const Vector3d& p : vertices_S_m_) extent_m_ = std::max(extent_m_, p.lpNorm<Eigen::Infinity>());
     branches_.reserve(order_.size() / 2 + 1);
     split();
   }
@@ -65,13 +130,14 @@ class Builder {
 
  private:
   const Vector3d& corner(std::uint32_t triangle, std::size_t i) const {
-    return mesh_.vertices_m[mesh_.triangles[triangle][i]];
+    return vertices_S_m_[mesh_.triangles[triangle][i]];
   }
   Fitted fit(std::uint32_t begin, std::uint32_t end) const;
   void split();
 
   const MeshSurface& surface_;
   const TriangleMesh& mesh_;
+  std::vector<Vector3d> vertices_S_m_;
   std::vector<std::uint32_t> order_;
   std::vector<Vector3d> middle_;
   std::vector<Branch> branches_;
@@ -264,7 +330,9 @@ std::vector<std::uint32_t> opened(const std::vector<Branch>& branches, std::uint
 
 TriangleBvh::TriangleBvh(const MeshSurface& surface) {
   if (surface.triangles().empty()) return;
-  const Builder builder(surface);
+  const Quaterniond R_SM = best_orientation(surface.mesh());
+  R_SM_ = {R_SM.w(), R_SM.x(), R_SM.y(), R_SM.z()};
+  const Builder builder(surface, R_SM);
   const std::vector<Branch>& branches = builder.branches();
   extent_m_ = static_cast<float>(builder.extent_m());
   const double rounding_m = kRounding * builder.extent_m();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -15,6 +16,9 @@ namespace wrenchd {
 ///
 /// Boxes and triangles state whether they contain convex vertices and convex edges (mesh_surface.hpp). Two
 /// that contain none cannot meet first.
+///
+/// The data are in a frame S of their own, which has the origin of the mesh's frame M and the axes of most of its
+/// triangles. There the bounds of long triangles are small, however the file is oriented.
 ///
 /// The data are in single precision with a margin for rounding. The caller tests the remaining pairs in
 /// double precision. Immutable after construction. Construction is not RT-safe: it may take seconds.
@@ -60,20 +64,23 @@ class TriangleBvh {
   const std::vector<Box>& boxes() const noexcept { return boxes_; }
   const std::vector<Node>& nodes() const noexcept { return nodes_; }
   const std::vector<Leaf>& leaves() const noexcept { return leaves_; }
-  /// Bound of the coordinates [m]. Single precision rounds them by at most 6e-8 of it.
+  /// Rotation from the mesh's frame M to the frame S.
+  Quaterniond R_SM() const noexcept { return {R_SM_[0], R_SM_[1], R_SM_[2], R_SM_[3]}; }
+  /// Bound of the coordinates in S [m]. Single precision rounds them by at most 6e-8 of it.
   float extent_m() const noexcept { return extent_m_; }
   std::size_t bytes() const noexcept;
 
   /// Calls use(member) for each data member, for the mesh cache (mesh_cache.hpp).
   template <class Use>
   void visit_members(const Use& use) {
-    use(boxes_), use(nodes_), use(leaves_), use(extent_m_);
+    use(boxes_), use(nodes_), use(leaves_), use(R_SM_), use(extent_m_);
   }
 
  private:
   std::vector<Box> boxes_;
   std::vector<Node> nodes_;
   std::vector<Leaf> leaves_;
+  std::array<double, 4> R_SM_ = {1.0, 0.0, 0.0, 0.0};  ///< quaternion w, x, y, z
   float extent_m_ = 0.0F;
 };
 

@@ -51,6 +51,11 @@ simd::RelativeMotion motion_of(const Sweep& sweep, double least_radius_a_m, doub
   return motion;
 }
 
+/// Returns the pose of A's data relative to B's data, for a pose of mesh A in the frame of mesh B.
+Pose between_data(const TriangleBvh& a, const TriangleBvh& b, const Pose& X_BA) noexcept {
+  return {b.R_SM() * X_BA.rotation * a.R_SM().conjugate(), b.R_SM() * X_BA.translation_m};
+}
+
 simd::BvhArrays arrays_of(const TriangleBvh& tree) noexcept {
   return {tree.boxes().data(), tree.nodes().data(), tree.leaves().data()};
 }
@@ -67,9 +72,11 @@ BvhTraversal::BvhTraversal(simd::TraversalKernel kernel)
       moved_leaves_(simd::kMovedLeavesBytes / sizeof(CacheLine)) {}
 
 void BvhTraversal::start(const TriangleBvh& a, const TriangleBvh& b, const Sweep& sweep) noexcept {
+  const Sweep of_data = {between_data(a, b, sweep.X_BA_start), between_data(a, b, sweep.X_BA_end), sweep.reach_m,
+                         sweep.all_pairs, sweep.classify};
   job_ = {arrays_of(a),
           arrays_of(b),
-          motion_of(sweep, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),
+          motion_of(of_data, a.extent_m(), std::sqrt(3.0) * a.extent_m() + b.extent_m()),
           pairs_.data(),
           static_cast<std::uint32_t>(pairs_.size()),
           stack_.data(),

@@ -69,7 +69,7 @@ SceneGeometry::SceneGeometry(std::shared_ptr<const Scene> scene) : scene_(std::m
   for (const MeshObstacle& obstacle : scene_->meshes()) {
     if (std::find(meshes_.begin(), meshes_.end(), obstacle.mesh.get()) != meshes_.end()) continue;
     meshes_.push_back(obstacle.mesh.get());
-    all.push_back(&obstacle.mesh->surface.mesh());
+    all.push_back(&obstacle.mesh->loaded_mesh());
   }
   for (const TriangleMesh* mesh : all) {
     const std::size_t vertices = mesh->vertices_m.size(), triangles = mesh->triangles.size();

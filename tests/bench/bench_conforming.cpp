@@ -33,6 +33,7 @@ struct Options {
   int passes = 2;
   std::uint64_t seed = 1;
   double tolerance_um = 2.0;
+  double surface_tolerance_um = 1.0;
   std::filesystem::path cache;
   bool list = false;
   bool fine_reference = false;
@@ -50,7 +51,8 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 }
 
 /// Writes the meshes and loads them as wrenchd does: from an STL file in float, else from an OFF file.
-LoadedCase load(const ConformingCase& of, const MeshesOfCase& meshes, MeshLoader& loader) {
+LoadedCase load(const ConformingCase& of, const MeshesOfCase& meshes, double surface_tolerance_m,
+                MeshLoader& loader) {
   const TemporaryDirectory directory;
   const Quaterniond R_FC = file_rotation(of);
   const Pose X_WF = {R_FC.conjugate(), Vector3d::Zero()};
@@ -68,6 +70,7 @@ LoadedCase load(const ConformingCase& of, const MeshesOfCase& meshes, MeshLoader
   settings.tool.mass_kg = kToolMass_kg;
   settings.meshes.push_back({"obstacle", write("obstacle", meshes.obstacle), scale, X_WF});
   const auto begin = std::chrono::steady_clock::now();
+  settings.surface_tolerance_m = surface_tolerance_m;
   LoadedCase loaded = {Scene(settings, loader), {}, 0.0};
   loaded.load_s = seconds_since(begin);
   loaded.X_TC = inverse(loaded.scene.tool().X_MT()) * Pose{R_FC, Vector3d::Zero()};
@@ -110,12 +113,12 @@ void print_row(const std::string& name, double load_s, const std::vector<ProxyTi
 
 void run_case(const ConformingCase& of, const Options& options) {
   MeshLoader loader(options.cache, {});
-  const LoadedCase fine = load(of, fine_meshes(of), loader);
+  const LoadedCase fine = load(of, fine_meshes(of), 1e-6 * options.surface_tolerance_um, loader);
   ConformingCase plain = of;
   plain.in_float = plain.rotated = false;
   MeshLoader coarse_loader;
   const MeshesOfCase coarse_of = coarse_meshes(of);
-  const LoadedCase coarse = load(plain, coarse_of, coarse_loader);
+  const LoadedCase coarse = load(plain, coarse_of, 0.0, coarse_loader);
   const std::vector<Pose> X_WC = conforming_trajectory(of, options.ticks, options.seed);
   const auto run = follow_trajectory(fine.scene, {}, body_poses(X_WC, fine.X_TC), options.passes);
   const auto reference = options.fine_reference
@@ -124,6 +127,8 @@ void run_case(const ConformingCase& of, const Options& options) {
   const LagReport lag = compare(run, fine.X_TC, reference, options.fine_reference ? fine.X_TC : coarse.X_TC,
                                 box_corners(coarse_of.tool), 1e-6 * options.tolerance_um);
   print_row(of.name, fine.load_s, run, lag);
+  for (const std::string& text : loader.simplifications())
+    std::printf("  %s\n", text.substr(text.rfind('/') + 1).c_str());
   const double unfinished = share_of(reference, ProjectionStatus::budget_spent);
   if (unfinished > 0.0)
     std::printf("  the reference did not converge at %.1f %% of the ticks\n", 100.0 * unfinished);
@@ -142,6 +147,10 @@ int main(int argc, char** argv) {
   CLI::App app{"Conforming contact of fine meshes: time, lag and force of the proxy on each tick."};
   app.add_option("--cases", options.cases, "runs only cases whose name contains one of these texts");
   app.add_flag("--list", options.list, "lists the cases");
+  app.add_option("--surface-tolerance-um", options.surface_tolerance_um,
+                 "surface tolerance of the fine meshes; 0: as they are")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
   app.add_option("--ticks", options.ticks, "number of ticks, 1 ms apart")
       ->check(CLI::Range(10, 1000000))
       ->capture_default_str();

@@ -20,8 +20,8 @@ constexpr double kTeeth = 20.0;
 constexpr std::uint32_t kShaftFacets = 64, kGearFacets = 160;
 
 std::string short_number(std::size_t n) {
-  if (n >= 1'000'000) return std::to_string(n / 1'000'000) + "M";
-  return n >= 1000 ? std::to_string(n / 1000) + "k" : std::to_string(n);
+  if (n >= 1'000'000) return std::to_string(n / 1'000'000).append("M");
+  return n >= 1000 ? std::to_string(n / 1000).append("k") : std::to_string(n);
 }
 
 std::vector<ConformingCase> all_cases() {
@@ -56,7 +56,7 @@ std::vector<ConformingCase> all_cases() {
         }
   for (const double clearance_m : {10e-6, 50e-6})
     for (const std::size_t n : {50'000, 200'000})
-      add(std::string("shaft inserted ") + (clearance_m < 20e-6 ? "10" : "50") + " um",
+      add(clearance_m < 20e-6 ? "shaft inserted 10 um" : "shaft inserted 50 um",
           {"", shaft_inserted, n, n, clearance_m, Profile::faceted, true, true});
   for (const Profile profile : {Profile::faceted, Profile::smooth})
     for (const std::size_t n : {50'000, 200'000, 1'000'000})

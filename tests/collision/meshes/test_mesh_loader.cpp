@@ -117,7 +117,7 @@ TEST_CASE("a large mesh is reported and cached, and the cached result is equal",
     const ConvexBody hull = loader.hull(*loaded);
     CHECK(loader.warnings().empty());
     CHECK(loader.changes().empty());
-    return std::tuple(loaded, hull, loader.build_bvh(loaded->mesh, BodyKind::solid, file));
+    return std::tuple(loaded, hull, loader.build_bvh(loaded->mesh, BodyKind::solid, file, 0.0));
   };
   const auto [cold, cold_hull, cold_tree] = load();
   const std::string size = with_thousands_separators(made.triangles.size());
@@ -186,12 +186,42 @@ TEST_CASE("a cache that cannot be written causes a warning", "[mesh_loader]") {
   CHECK(loader.warnings()[0].find("; results for large meshes are not cached") != std::string::npos);
 }
 
+TEST_CASE("contacts use a simplified solid, and the loader says so", "[mesh_loader]") {
+  const TemporaryDirectory dir;
+  const TriangleMesh cube = make_mesh({"cube", 60000});
+  const fs::path file = dir.write("cube.off", off_of(cube));
+  const auto load = [&](BodyKind kind, double tolerance_m) {
+    MeshLoader loader(dir.path() / "cache", {});
+    const auto bvh = loader.build_bvh(loader.load(file, kind)->mesh, kind, file, tolerance_m);
+    return std::pair(bvh, loader.simplifications());
+  };
+  for (int cold_and_warm = 0; cold_and_warm < 2; ++cold_and_warm) {
+    const auto [bvh, said] = load(BodyKind::solid, 1e-6);
+    CHECK(bvh->surface.triangles().size() == 12);
+    CHECK(bvh->loaded_mesh().triangles.size() == cube.triangles.size());
+    CHECK(bvh->surface_tolerance_m < 1e-9);
+    for (std::uint32_t v = 0; v < 8; ++v)
+      CHECK((bvh->loaded_mesh().vertices_m[bvh->loaded_vertex(v)] - bvh->surface.vertices_m()[v]).norm() < 1e-9);
+    REQUIRE(said.size() == 1);
+    CHECK(said[0] == file.string() + ": contacts use an enclosing surface of 12 of " +
+                         with_thousands_separators(cube.triangles.size()) +
+                         " triangles, less than 1 nm outside the mesh");
+  }
+  for (const auto& [kind, tolerance_m] : {std::pair(BodyKind::solid, 0.0), {BodyKind::surface, 1e-6}}) {
+    const auto [bvh, said] = load(kind, tolerance_m);
+    CHECK(bvh->surface.triangles().size() == cube.triangles.size());
+    CHECK(bvh->loaded_mesh().triangles.size() == cube.triangles.size());
+    CHECK(bvh->loaded_triangle(7) == 7);
+    CHECK(said.empty());
+  }
+}
+
 TEST_CASE("a small mesh is neither reported nor cached", "[mesh_loader]") {
   const TemporaryDirectory dir;
   const fs::path file = dir.write("box.off", as_off(kBox)), cache = dir.path() / "cache";
   MeshLoader loader(cache, [](const std::string& what) { FAIL(what); });
   const auto loaded = loader.load(file, BodyKind::solid);
-  loader.build_bvh(loaded->mesh, BodyKind::solid, file);
+  loader.build_bvh(loaded->mesh, BodyKind::solid, file, 1e-6);
   CHECK_FALSE(fs::exists(cache));
 }
 

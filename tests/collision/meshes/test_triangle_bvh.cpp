@@ -34,7 +34,7 @@ void descend(const TriangleBvh& bvh, const MeshSurface& surface, std::uint32_t n
         const Vector3d u(axis[0][0], axis[0][1], axis[0][2]), v(axis[1][0], axis[1][1], axis[1][2]);
         const std::array<Vector3d, 3> axes = {u, v, u.cross(v)};
         for (int k = 0; k < 3; ++k) {
-          const Vector3d d = surface.corner_m(t, k) - Vector3d(centre[0], centre[1], centre[2]);
+          const Vector3d d = bvh.R_SM() * surface.corner_m(t, k) - Vector3d(centre[0], centre[1], centre[2]);
           for (std::size_t j = 0; j < 3; ++j)
             count.worst_outside_m = std::max(count.worst_outside_m, std::abs(d.dot(axes[j])) - half[j]);
         }
@@ -62,6 +62,30 @@ TEST_CASE("a BVH contains every triangle once, inside all boxes above it", "[tri
       CHECK(static_cast<double>(bvh.leaves().size()) <=
             1.05 * static_cast<double>(surface.triangles().size()) / 8.0 + 1.0);
     }
+}
+
+TEST_CASE("the data are oriented as most triangles are", "[triangle_bvh]") {
+  const Quaterniond tilt = Quaterniond(0.8, 0.3, -0.2, 0.47).normalized();
+  const auto bounds = [&](const char* kind, const Quaterniond& R) {
+    TriangleMesh mesh = make_mesh({kind, 600});
+    for (Vector3d& p : mesh.vertices_m) p = R * p;
+    const TriangleBvh bvh(MeshSurface(mesh, Kind::solid));
+    double sum = 0.0;
+    for (const TriangleBvh::Leaf& leaf : bvh.leaves())
+      for (int lane = 0; lane < TriangleBvh::kWidth; ++lane) {
+        if (leaf.low[0][lane] > leaf.high[0][lane]) continue;
+        const Vector3d size(leaf.high[0][lane] - leaf.low[0][lane], leaf.high[1][lane] - leaf.low[1][lane],
+                            leaf.high[2][lane] - leaf.low[2][lane]);
+        sum += size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+      }
+    return sum;
+  };
+  for (const char* kind : {"cube", "dowel", "gear", "plate"}) {
+    INFO(kind);
+    CHECK(bounds(kind, tilt) < 1.05 * bounds(kind, Quaterniond::Identity()));
+  }
+  CHECK(TriangleBvh(MeshSurface(make_mesh({"cube", 600}), Kind::solid)).R_SM().coeffs() ==
+        Quaterniond::Identity().coeffs());
 }
 
 TEST_CASE("a BVH without triangles is empty", "[triangle_bvh]") {
