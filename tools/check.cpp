@@ -41,6 +41,7 @@ std::string about(const SceneSettings& settings, MeshLoader& meshes) {
        << " m^3, mass " << settings.tool.mass_kg << " kg, " << tool.hull.vertices_T_m.size()
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
        << " mesh obstacle(s)" << (scene.has_moving_obstacles() ? ", moving" : "") << '\n';
+  for (const std::string& simplification : meshes.simplifications()) text << "  " << simplification << '\n';
   for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';
   for (const std::string& remark : meshes.warnings()) text << "  remark: " << remark << '\n';
   return text.str();

@@ -70,6 +70,11 @@ std::string rejection_text(const std::filesystem::path& file, const PolygonSoup&
   return text;
 }
 
+std::string contact_surface_text(std::size_t used, std::size_t triangles, double distance_m) {
+  return with_thousands_separators(used) + " of " + with_thousands_separators(triangles) + " triangles, " +
+         bound_text(distance_m) + " outside the mesh";
+}
+
 std::string with_thousands_separators(std::size_t number) {
   std::string text = std::to_string(number);
   for (std::size_t at = text.size(); at > 3; at -= 3) text.insert(at - 3, ",");
@@ -189,9 +194,7 @@ std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind
   const std::size_t used = bvh->surface.triangles().size();
   if (used < triangles || bvh->surface_tolerance_m > 0.0)
     add_once(simplifications_, file.string() + ": contacts use an enclosing surface of " +
-                                   with_thousands_separators(used) + " of " +
-                                   with_thousands_separators(triangles) + " triangles, " +
-                                   bound_text(bvh->surface_tolerance_m) + " outside the mesh");
+                                   contact_surface_text(used, triangles, bvh->surface_tolerance_m));
   return bvh;
 }
 

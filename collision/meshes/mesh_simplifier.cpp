@@ -93,7 +93,7 @@ struct Placement {
   double high_m, low_m;
 };
 
-/// Simplifies one mesh: METHOD, section 14.8.
+/// Simplifies one mesh: core/METHOD.md, section 14.8.
 class Simplifier {
  public:
   Simplifier(TriangleMesh mesh, double tolerance_m)
@@ -387,7 +387,7 @@ class Simplifier {
 
   /// Returns the largest height of the new faces above the old ones, along the mean normal. Both surfaces are
   /// graphs of piecewise linear functions over the same polygon. So the largest difference occurs at the new
-  /// vertex, at a removed vertex, or where a new edge crosses an old one: METHOD (98).
+  /// vertex, at a removed vertex, or where a new edge crosses an old one: METHOD (97).
   double largest_rise_m(const Vector3d& p) const {
     constexpr double kUnknown = std::numeric_limits<double>::infinity();
     const Vector3d& n = star_.mean_normal;

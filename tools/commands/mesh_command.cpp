@@ -13,10 +13,12 @@
 #include "collision/meshes/mesh_file.hpp"
 #include "collision/meshes/mesh_loader.hpp"
 #include "collision/meshes/mesh_repair.hpp"
+#include "collision/meshes/mesh_simplifier.hpp"
 #include "collision/meshes/mesh_size.hpp"
 #include "collision/meshes/mesh_source.hpp"
 #include "collision/tool_body.hpp"
 #include "core/inertia.hpp"
+#include "core/scene_settings.hpp"
 #include "daemon/option_checks.hpp"
 #include "tools/commands/subcommand.hpp"
 #include "tools/output_file.hpp"
@@ -55,6 +57,11 @@ void print_solid(TriangleMesh mesh, const std::filesystem::path& file, double sc
   print_row("centre of mass", solid.p_MT_m, "m");
   print_row("inertia xx yy zz", H.diagonal(), "m^2 (per kg, uniform solid, about the centre of mass)");
   print_row("inertia xy xz yz", {H(0, 1), H(0, 2), H(1, 2)}, "m^2");
+  const std::size_t triangles = mesh.triangles.size();
+  const double tolerance_m = simplification_tolerance_m(mesh, SceneSettings{}.surface_tolerance_m);
+  const SimplifiedMesh simplified = simplify_enclosing(std::move(mesh), tolerance_m);
+  std::printf("%-18s %s\n", "contact surface",
+              contact_surface_text(simplified.mesh.triangles.size(), triangles, simplified.distance_m).c_str());
 }
 
 class MeshCommand final : public Subcommand {
