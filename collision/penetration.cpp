@@ -58,7 +58,7 @@ PenetrationDepth::PenetrationDepth(const Scene& scene, Options options)
   if (scene.meshes().empty()) return;
   const bool convex = !scene.convex().empty();
   if (options.method != Method::exact && !convex) throw std::invalid_argument(only_exact_reason(scene));
-  if (options.method == Method::exact) proxy_.emplace(scene);
+  if (options.method == Method::exact) proxy_.emplace(scene, options.work_limit);
   if (!convex) pose_search_.emplace(scene);
 }
 

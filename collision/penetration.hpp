@@ -44,6 +44,7 @@ class PenetrationDepth {
     /// a proxy that is admissible to the last digit. A scene of meshes always uses Proxy::kClearance_m.
     double clearance_m = 0.0;
     FrictionSettings friction = {};  ///< friction of a followed proxy; method exact only
+    Proxy::WorkLimit work_limit = {};  ///< work limit of one tick of a followed proxy
   };
 
   /// Keeps a reference to the scene, which must outlive this object. Throws std::invalid_argument if the

@@ -132,6 +132,9 @@ void Rendering::compute_wrench(double dt_s) noexcept {
              ? law_.update(depth_.spring_displacement, in_contact(), dt_s)
              : law_.update_damping(energy_wrench(M_, spring_scale_ * energy_stiffness_per_s2_, X_WP_, X_WQ_),
                                    depth_.spring_displacement, in_contact(), dt_s);
+  const double scale = lag_limiter_.scale(depth_.projection.energy,
+                                          depth_.projection.status == ProjectionStatus::budget_spent);
+  F_T_ = {scale * F_T_.force_N, scale * F_T_.torque_Nm};
 }
 
 void Rendering::invalidate_proxy() noexcept {
@@ -143,6 +146,7 @@ void Rendering::invalidate_proxy() noexcept {
   depth_.projection.status = ProjectionStatus::infeasible;
   F_T_ = Wrench{};
   law_.reset();
+  lag_limiter_.reset();
 }
 
 void Rendering::initialize_near(const Pose& X_WT) noexcept {

@@ -10,6 +10,7 @@
 #include "config/settings.hpp"
 #include "core/clock.hpp"
 #include "core/device_profile.hpp"
+#include "core/lag_limiter.hpp"
 #include "core/wrench_law.hpp"
 #include "daemon/servo/proxy_initializer.hpp"
 #include "daemon/servo/stability_analysis.hpp"
@@ -96,6 +97,7 @@ class Rendering {
 
   PenetrationDepth penetration_;
   WrenchLaw law_;
+  LagLimiter lag_limiter_;
   double spring_scale_ = 1.0;
 
   ProxyInitialization proxy_initialization_ = ProxyInitialization::searching;

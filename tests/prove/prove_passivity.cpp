@@ -15,6 +15,7 @@
 #include "collision/scene.hpp"
 #include "collision/scene_contacts.hpp"
 #include "core/energy_law.hpp"
+#include "core/lag_limiter.hpp"
 #include "core/limits.hpp"
 #include "core/loop_measurement.hpp"
 #include "core/passivity.hpp"
@@ -58,8 +59,17 @@ struct Options {
   bool guarded = false;
   bool pid = false;
   std::vector<double> friction;  ///< viscous friction of the device [N.s/m, N.m.s/rad]; empty: as shipped
+  double work_share = 1.0;       ///< work limit of the proxy as a fraction of the daemon's
   double angular_share = 1.0;    ///< only for law pid: angular stiffness relative to the metric's
 };
+
+/// Returns the work limit for --work-share. Small meshes reach the limit of sweeps only.
+Proxy::WorkLimit work_limit(const Options& options) {
+  Proxy::WorkLimit limit;
+  limit.sweeps = static_cast<std::uint16_t>(std::max(1.0, options.work_share * limit.sweeps));
+  limit.node_visits = static_cast<std::uint32_t>(options.work_share * limit.node_visits);
+  return limit;
+}
 
 /// All random parameters of a trajectory except the hand's path.
 struct Circumstances {
@@ -191,7 +201,7 @@ Vector3d rounded(const Vector3d& v, double quantum) {
 class Host {
  public:
   Host(const Scene& scene, const Circumstances& c, const Options& options, const Pose& X_WP_start)
-      : depth_(scene, {}),
+      : depth_(scene, {.work_limit = work_limit(options)}),
         M_(scene.tool().solid.inertia),
         circumstances_(c),
         options_(options),
@@ -251,9 +261,12 @@ class Host {
     const Penetration depth = depth_.follow(X_WP, X_WQ_);
     X_WQ_ = depth.projection.X_WQ;
     in_contact_ = depth.contacts > 0;
-    const Wrench F_T = options_.pid ? law_.update(depth.spring_displacement, in_contact_, dt_s)
+    Wrench F_T = options_.pid ? law_.update(depth.spring_displacement, in_contact_, dt_s)
                                     : law_.update_damping(energy_wrench(M_, stiffness_per_s2_, X_WP, X_WQ_),
                                                           depth.spring_displacement, in_contact_, dt_s);
+    const double scale = lag_limiter_.scale(depth.projection.energy,
+                                            depth.projection.status == ProjectionStatus::budget_spent);
+    F_T = {scale * F_T.force_N, scale * F_T.torque_Nm};
     F_ = wrench_about(X_WH.translation_m, X_WP, F_T);
   }
 
@@ -263,6 +276,7 @@ class Host {
   const Options& options_;
   LoopMeasurement measured_;
   WrenchLaw law_;
+  LagLimiter lag_limiter_;
   WrenchLimits limits_;
   PassivityGuard guard_;
   double stiffness_per_s2_ = 0.0;
@@ -449,6 +463,10 @@ int main(int argc, char** argv) {
                  "viscous friction of the device [N.s/m, N.m.s/rad]; default: the shipped simulated device")
       ->expected(2)
       ->check(CLI::Range(0.01, 100.0) | CLI::Range(0.0001, 1.0));
+  app.add_option("--work-share", options.work_share,
+                 "work limit of the proxy as a fraction of the daemon's, to make it lag")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
   app.add_option("--angular-share", options.angular_share,
                  "with --pid: angular stiffness relative to the one of the tool's inertia")
       ->check(CLI::Range(0.0, 100.0))
