@@ -156,6 +156,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   app.add_option("--seed", options.seeds, "seeds of the hand's motion, one row each")->capture_default_str();
+  app.add_flag_callback(
+      "--axis", [&] { options.hand.approach = ContactSeekingHand::Approach::axis; },
+      "presses down along z onto the middle of the obstacle, as a knob on its nut");
   app.add_option("--speed", options.hand.speed_m_per_s, "speed of the hand [m/s]")->capture_default_str();
   app.add_option("--exact", options.exact_poses, "number of poses in contact to check in exact arithmetic")
       ->capture_default_str();
