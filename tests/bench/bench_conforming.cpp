@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
-#include "collision/meshes/make_mesh.hpp"
 #include "tests/bench/statistics.hpp"
 #include "tests/bench/stopwatch.hpp"
 #include "tests/bench/trajectory_run.hpp"
-#include "tests/support/conforming_case.hpp"
-#include "tests/support/conforming_mesh.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/conforming_scene.hpp"
 
 // Conforming contact of fine meshes: the proxy of each fine mesh is compared on every tick with the proxy of a
 // coarse mesh of the same shape, which has unlimited work.
@@ -38,51 +33,6 @@ struct Options {
   bool list = false;
   bool fine_reference = false;
 };
-
-/// A scene and the pose of the shape's frame C in the tool's body frame T.
-struct LoadedCase {
-  Scene scene;
-  Pose X_TC;
-  double load_s = 0.0;
-};
-
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-/// Writes the meshes and loads them as wrenchd does: from an STL file in float, else from an OFF file.
-LoadedCase load(const ConformingCase& of, const MeshesOfCase& meshes, double surface_tolerance_m,
-                MeshLoader& loader) {
-  const TemporaryDirectory directory;
-  const Quaterniond R_FC = file_rotation(of);
-  const Pose X_WF = {R_FC.conjugate(), Vector3d::Zero()};
-  const auto write = [&](const std::string& name, const TriangleMesh& mesh) {
-    const std::filesystem::path file = directory.path() / (name + (of.in_float ? ".stl" : ".off"));
-    std::ofstream out(file, std::ios::binary);
-    const TriangleMesh in_file = of.rotated ? rotated(mesh, R_FC) : mesh;
-    of.in_float ? write_binary_stl(out, in_file) : write_off(out, in_file);
-    return file;
-  };
-  const double scale = of.in_float ? 0.001 : 1.0;
-  SceneSettings settings;
-  settings.tool.mesh = write("tool", meshes.tool);
-  settings.tool.scale = scale;
-  settings.tool.mass_kg = kToolMass_kg;
-  settings.meshes.push_back({"obstacle", write("obstacle", meshes.obstacle), scale, X_WF});
-  const auto begin = std::chrono::steady_clock::now();
-  settings.surface_tolerance_m = surface_tolerance_m;
-  LoadedCase loaded = {Scene(settings, loader), {}, 0.0};
-  loaded.load_s = seconds_since(begin);
-  loaded.X_TC = inverse(loaded.scene.tool().X_MT()) * Pose{R_FC, Vector3d::Zero()};
-  return loaded;
-}
-
-std::vector<Pose> body_poses(const std::vector<Pose>& X_WC, const Pose& X_TC) {
-  std::vector<Pose> X_WP;
-  const Pose X_CT = inverse(X_TC);
-  for (const Pose& X : X_WC) X_WP.push_back(X * X_CT);
-  return X_WP;
-}
 
 constexpr const char* kHeader =
     "case                                            load s  spent % behind % lag ms   lag mm  diff um "
@@ -113,19 +63,15 @@ void print_row(const std::string& name, double load_s, const std::vector<ProxyTi
 
 void run_case(const ConformingCase& of, const Options& options) {
   MeshLoader loader(options.cache, {});
-  const LoadedCase fine = load(of, fine_meshes(of), 1e-6 * options.surface_tolerance_um, loader);
-  ConformingCase plain = of;
-  plain.in_float = plain.rotated = false;
-  MeshLoader coarse_loader;
-  const MeshesOfCase coarse_of = coarse_meshes(of);
-  const LoadedCase coarse = load(plain, coarse_of, 0.0, coarse_loader);
+  const ConformingScene fine = load_scene(of, fine_meshes(of), loader);
+  const ConformingScene coarse = load_coarse_scene(of);
+  const ConformingScene& reference_scene = options.fine_reference ? fine : coarse;
   const std::vector<Pose> X_WC = conforming_trajectory(of, options.ticks, options.seed);
-  const auto run = follow_trajectory(fine.scene, {}, body_poses(X_WC, fine.X_TC), options.passes);
-  const auto reference = options.fine_reference
-                             ? follow_trajectory(fine.scene, unlimited_work(), body_poses(X_WC, fine.X_TC))
-                             : follow_trajectory(coarse.scene, unlimited_work(), body_poses(X_WC, coarse.X_TC));
-  const LagReport lag = compare(run, fine.X_TC, reference, options.fine_reference ? fine.X_TC : coarse.X_TC,
-                                box_corners(coarse_of.tool), 1e-6 * options.tolerance_um);
+  const auto run = follow_trajectory(fine.scene, {}, body_poses(fine, X_WC), options.passes);
+  const auto reference =
+      follow_trajectory(reference_scene.scene, unlimited_work(), body_poses(reference_scene, X_WC));
+  const LagReport lag = compare(run, fine.X_TC, reference, reference_scene.X_TC,
+                                box_corners(coarse.tool_F), 1e-6 * options.tolerance_um);
   print_row(of.name, fine.load_s, run, lag);
   for (const std::string& text : loader.simplifications())
     std::printf("  %s\n", text.substr(text.rfind('/') + 1).c_str());

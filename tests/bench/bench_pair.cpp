@@ -25,6 +25,8 @@ using namespace wrenchd;
 using namespace wrenchd::bench;
 using namespace wrenchd::test;
 
+constexpr double kToolMass_kg = 0.2;  ///< that of the shipped scene
+
 struct Options {
   std::vector<std::filesystem::path> files;
   double scale = 0.001;

@@ -11,7 +11,7 @@
 namespace wrenchd::bench {
 
 /// The stiffness of the shipped scene: 600 N/m for a tool of 0.2 kg.
-constexpr double kToolMass_kg = 0.2, kStiffness_per_s2 = 3000.0;
+constexpr double kStiffness_per_s2 = 3000.0;
 
 /// One tick of the proxy, as `wrenchctl solve --proxy --law energy` computes it.
 struct ProxyTick {

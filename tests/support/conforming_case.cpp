@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
+#include <stdexcept>
 
 #include "collision/meshes/make_mesh.hpp"
 #include "tests/support/conforming_mesh.hpp"
@@ -243,6 +243,12 @@ Pose pose_at(const ConformingCase& of, const Phases& phases, double t_s) {
 const std::vector<ConformingCase>& conforming_cases() {
   static const std::vector<ConformingCase> all = all_cases();
   return all;
+}
+
+const ConformingCase& conforming_case(const std::string& name) {
+  for (const ConformingCase& of : conforming_cases())
+    if (of.name == name) return of;
+  throw std::invalid_argument("no conforming case is named '" + name + "'");
 }
 
 MeshesOfCase fine_meshes(const ConformingCase& of) {

@@ -38,6 +38,9 @@ struct ConformingCase {
 /// The cases: cube, shaft and gears at 10k to 1M triangles, exact and in float, axis-parallel and rotated.
 const std::vector<ConformingCase>& conforming_cases();
 
+/// Returns the case of this name. Throws std::invalid_argument if there is none.
+const ConformingCase& conforming_case(const std::string& name);
+
 struct MeshesOfCase {
   TriangleMesh tool, obstacle;  ///< in metres, in the frames C and W
 };
