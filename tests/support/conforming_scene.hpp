@@ -12,7 +12,7 @@ struct ConformingScene {
   Scene scene;
   Pose X_TC;                       ///< pose of C in the tool's body frame
   Pose X_WF;                       ///< pose of the obstacle's file frame
-  TriangleMesh tool_F, obstacle_F; ///< triangles of the files, in metres
+  TriangleMesh tool_F, obstacle_F;  ///< triangles of the files, in metres
   double load_s = 0.0;             ///< time that the scene took to load
 
   /// Pose of the tool's body frame in the frame of its file.
@@ -23,8 +23,10 @@ struct ConformingScene {
 TriangleMesh mesh_in_file(const ConformingCase& of, const TriangleMesh& mesh);
 
 /// Writes the meshes to a temporary directory, as binary STL in millimetres if the case is in float, else as
-/// OFF, and loads the scene. Throws MeshError if a mesh cannot be used. Not RT-safe: may take seconds.
-ConformingScene load_scene(const ConformingCase& of, const MeshesOfCase& meshes, MeshLoader& loader);
+/// OFF, and loads the scene. motion: that of the obstacle. Throws MeshError if a mesh cannot be used. Not
+/// RT-safe: may take seconds.
+ConformingScene load_scene(const ConformingCase& of, const MeshesOfCase& meshes, MeshLoader& loader,
+                           const ObstacleMotion& motion = {});
 
 /// The same for the coarse meshes of a case, exact and not rotated. Not RT-safe: may take seconds.
 ConformingScene load_coarse_scene(const ConformingCase& of);
