@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 
 #include "collision/meshes/make_mesh.hpp"
@@ -22,6 +23,12 @@ constexpr std::uint32_t kShaftFacets = 64, kGearFacets = 160;
 std::string short_number(std::size_t n) {
   if (n >= 1'000'000) return std::to_string(n / 1'000'000).append("M");
   return n >= 1000 ? std::to_string(n / 1000).append("k") : std::to_string(n);
+}
+
+std::string with_clearance(const char* body, const char* what, double clearance_m) {
+  std::ostringstream name;
+  name << body << what << ' ' << std::lround(1e6 * clearance_m) << " um";
+  return name.str();
 }
 
 std::vector<ConformingCase> all_cases() {
@@ -50,14 +57,12 @@ std::vector<ConformingCase> all_cases() {
     for (const Profile profile : {Profile::faceted, Profile::smooth})
       for (const std::size_t n : {10'000, 50'000, 200'000, 1'000'000})
         for (const bool turned_float : {false, true}) {
-          const std::string name = std::string(profile == Profile::faceted ? "faceted" : "smooth") +
-                                   " shaft in bore " + (clearance_m < 20e-6 ? "10" : "50") + " um";
-          add(name, {"", shaft_in_bore, n, n, clearance_m, profile, turned_float, turned_float});
+          const char* const shaft = profile == Profile::faceted ? "faceted shaft" : "smooth shaft";
+          add(with_clearance(shaft, " in bore", clearance_m), {"", shaft_in_bore, n, n, clearance_m, profile, turned_float, turned_float});
         }
   for (const double clearance_m : {10e-6, 50e-6})
     for (const std::size_t n : {50'000, 200'000})
-      add(clearance_m < 20e-6 ? "shaft inserted 10 um" : "shaft inserted 50 um",
-          {"", shaft_inserted, n, n, clearance_m, Profile::faceted, true, true});
+      add(with_clearance("shaft", " inserted", clearance_m), {"", shaft_inserted, n, n, clearance_m, Profile::faceted, true, true});
   for (const Profile profile : {Profile::faceted, Profile::smooth})
     for (const std::size_t n : {10'000, 50'000, 200'000, 1'000'000})
       for (const bool turned_float : {false, true})
