@@ -20,8 +20,7 @@ namespace {
 /// One small case of each shape and profile.
 std::vector<ConformingCase> small_cases() {
   using enum ConformingShape;
-  std::vector<ConformingCase> all = {{"cube", cube_on_slab, 5000, 3000},
-                                     {"peg", peg_in_hole, 2000, 4000}};
+  std::vector<ConformingCase> all = {{"cube", cube_on_slab, 5000, 3000}, {"peg", peg_in_hole, 2000, 4000}};
   for (const Profile profile : {Profile::faceted, Profile::smooth})
     for (const auto shape : {shaft_in_bore, shaft_inserted, gears})
       for (const double clearance_m : {10e-6, 50e-6})

@@ -37,10 +37,14 @@ void explain(const Effort& effort, const CounterScale& scale) {
       << "and have no projection. They are the packaged binaries without a broad phase; Bullet works in\n"
       << "centimetres; CGAL stops at the first pair. wrong at: number of poses with a number of pairs that\n"
       << "differs from exact arithmetic; peers may report one contact for several pairs. overlapping at q:\n"
-      << "also in exact arithmetic.\n\n"
-      << "work: a node visit reads a box and a node or leaf of the BVH; touched: an upper bound of the bytes, "
+      << "also in exact arithmetic. Where meshes conform (flat, bore, gears), the peers solve only some of "
+         "the "
+         "poses.\n\n"
+      << "work: a node visit reads a box and a node or leaf of the BVH; touched: an upper bound of the "
+         "bytes, "
          "every\n"
-      << "visit reading a leaf that no other visit reads; read rate: touched bytes by time, beside what this\n"
+      << "visit reading a leaf that no other visit reads; read rate: touched bytes by time, beside what "
+         "this\n"
       << "machine reads from memory in sequence. Far below it, arithmetic is the limit, not memory.\n";
 }
 

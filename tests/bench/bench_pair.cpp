@@ -113,8 +113,8 @@ int measure(const Options& options) {
   const TriangleMesh tool = triangles_of(options.files[0], options.scale);
   const TriangleMesh obstacle = triangles_of(options.files[1], options.scale);
   std::printf("%s: %zu triangles on %s: %zu triangles; loaded in %.2f s\n",
-              options.files[0].filename().c_str(), tool.triangles.size(),
-              options.files[1].filename().c_str(), obstacle.triangles.size(), load_s);
+              options.files[0].filename().c_str(), tool.triangles.size(), options.files[1].filename().c_str(),
+              obstacle.triangles.size(), load_s);
   std::printf(
       "  seed    ticks in contact  spent %%   p50 us  contact   p99 us  contact   max us  >1ms %%  F max N   "
       "visits overlaps%s\n",
@@ -147,8 +147,12 @@ int measure(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"Presses, slides and rotates one mesh on another: time of the ticks, and overlaps in exact arithmetic."};
-  app.add_option("files", options.files, "mesh of the tool and mesh of the obstacle")->required()->expected(2);
+  CLI::App app{
+      "Presses, slides and rotates one mesh on another: time of the ticks, and overlaps in exact "
+      "arithmetic."};
+  app.add_option("files", options.files, "mesh of the tool and mesh of the obstacle")
+      ->required()
+      ->expected(2);
   app.add_option("--scale", options.scale, "metres per mesh unit")->capture_default_str();
   app.add_flag("--surface", options.surface, "the obstacle is a surface, which may be open");
   app.add_option("--ticks", options.ticks, "number of ticks per seed, 1 ms apart")
@@ -164,7 +168,8 @@ int main(int argc, char** argv) {
   app.add_option("--speed", options.hand.speed_m_per_s, "speed of the hand [m/s]")->capture_default_str();
   app.add_option("--exact", options.exact_poses, "number of poses in contact to check in exact arithmetic")
       ->capture_default_str();
-  app.add_flag("--reference", options.reference, "compares each tick with the proxy that has unlimited work; slow");
+  app.add_flag("--reference", options.reference,
+               "compares each tick with the proxy that has unlimited work; slow");
   app.add_option("--tolerance-um", options.tolerance_um, "difference from which a tick is behind [um]")
       ->capture_default_str();
   app.add_option("--cache", options.cache, "directory of the mesh cache");

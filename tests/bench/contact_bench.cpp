@@ -172,7 +172,8 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& 
   // Accuracy is checked before speed is measured.
   const test::ExactIntersection exact(pair.tool_T->surface.mesh(), pair.obstacle_O->surface.mesh());
   const std::size_t looked_at = std::min(kExactPoses, (pair.X_WP.size() + peers_every - 1) / peers_every);
-  const std::size_t stride = std::max<std::size_t>(1, pair.X_WP.size() / looked_at / peers_every) * peers_every;
+  const std::size_t stride =
+      std::max<std::size_t>(1, pair.X_WP.size() / looked_at / peers_every) * peers_every;
   std::vector<double> truth;
   for (std::size_t k = 0; k < looked_at; ++k)
     truth.push_back(static_cast<double>(exact.intersecting_pairs(pair.X_OW * pair.X_WP[k * stride])));
@@ -181,9 +182,9 @@ void bench_pair(const MeshPair& pair, const Effort& effort, const CounterScale& 
     std::size_t wrong = 0;
     for (std::size_t k = 0; k < looked_at; ++k) wrong += result.answers[k * stride].value != truth[k] ? 1 : 0;
     const auto [contacts_per_pose, count] = mean(result);
-    tables.answers.add(pair.name, result.name,
-                       {whole(count), fixed(contacts_per_pose, 1), whole(wrong), whole(looked_at),
-                        "-", "-", "-"});
+    tables.answers.add(
+        pair.name, result.name,
+        {whole(count), fixed(contacts_per_pose, 1), whole(wrong), whole(looked_at), "-", "-", "-"});
   }
   std::size_t overlapping = 0, unconverged = 0, looked = 0;
   double worst = 0.0;
@@ -249,8 +250,7 @@ std::vector<Table> bench_meshes(const Effort& effort, const CounterScale& scale,
     conforming("flat 200k x 12", "cube 200k / 12, exact");
     conforming("flat 200k x 200k", "cube 200k / 200k, exact");
     conforming("flat 200k x 200k, float", "cube 200k / 200k, float, rotated");
-    conforming("bore 10 um 200k x 200k, float",
-               "faceted shaft in bore 10 um 200k / 200k, float, rotated");
+    conforming("bore 10 um 200k x 200k, float", "faceted shaft in bore 10 um 200k / 200k, float, rotated");
     conforming("gears 200k x 200k, float", "faceted gears 200k / 200k, float, rotated");
   }
   return {tables.times, tables.ratios, tables.work, tables.answers};

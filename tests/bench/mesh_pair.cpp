@@ -17,7 +17,8 @@ MeshPair made_pair(const GeneratedMesh& tool, const GeneratedMesh& obstacle) {
   const auto tool_T = std::make_shared<const MeshBvh>(body.mesh);
   const auto obstacle_O = std::make_shared<const MeshBvh>(make_mesh(obstacle));
   std::vector<MeshObstacle> obstacles = {{obstacle.kind, obstacle_O, Pose{}}};
-  return {"", Scene(std::move(body), {}, {}, std::move(obstacles), tool_T), tool_T, obstacle_O, {}, {}, {}, {}};
+  return {"", Scene(std::move(body), {}, {}, std::move(obstacles), tool_T), tool_T, obstacle_O, {}, {}, {},
+          {}};
 }
 
 /// Returns the pair of a scene that was loaded from files, without poses.
@@ -74,9 +75,7 @@ MeshPair sliding_bumps(std::size_t tool_triangles, std::size_t obstacle_triangle
     const Vector3d axis = Vector3d(0.3 + 0.2 * std::sin(t), 1.0, 0.5 * std::cos(t)).normalized();
     const Quaterniond R = rotation_from((t + 0.15 * std::sin(9.0 * t)) * axis);
     const auto at = [&](double away_m) { return Pose{R, away_m * out}; };
-    const auto overlap = [&](double away_m) {
-      return intersecting_pair_count(pairs, pair, at(away_m)) > 0;
-    };
+    const auto overlap = [&](double away_m) { return intersecting_pair_count(pairs, pair, at(away_m)) > 0; };
     double free_m = last_m + 0.002, overlapping_m = free_m;
     while (!overlap(overlapping_m)) {
       free_m = overlapping_m;
@@ -147,9 +146,7 @@ Approach approach_at(const test::ConformingCase& of, double t) {
     }
     default: {
       const Vector3d aside(std::cos(4.0 * t), std::sin(4.0 * t), 0.0);
-      return {tilt * about_z(0.8 * t),
-              0.001 * aside + Vector3d(0.0, 0.0, 0.010 * std::sin(5.0 * t)),
-              -aside,
+      return {tilt * about_z(0.8 * t), 0.001 * aside + Vector3d(0.0, 0.0, 0.010 * std::sin(5.0 * t)), -aside,
               0.001};
     }
   }

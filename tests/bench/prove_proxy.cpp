@@ -18,9 +18,9 @@
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-// Twenty scenes with rough manipulation, and scenes of fine meshes that touch face to face. The program checks every pose of the proxy in exact arithmetic,
-// which takes minutes to hours; a test does the same for a few hundred poses. With --moving the obstacles
-// also move, as fast as hands do.
+// Twenty scenes with rough manipulation, and scenes of fine meshes that touch face to face. The program
+// checks every pose of the proxy in exact arithmetic, which takes minutes to hours; a test does the same for
+// a few hundred poses. With --moving the obstacles also move, as fast as hands do.
 
 namespace {
 
@@ -195,10 +195,11 @@ int main(int argc, char** argv) {
       const ObstacleMotion motion = moving ? random_motion(100 * seed + i) : ObstacleMotion{};
       const Bodies bodies =
           is_loose ? bodies_of(handling, motion) : bodies_of(conforming[i - loose.size()], motion);
-      const Tally t = handle(handling, bodies, poses, seed, motion, [&](const Pose& before, const Pose& after) {
-        return is_loose ? jumped(handling, before, after)
-                        : jumped(conforming_case(conforming[i - loose.size()].of), before, after);
-      });
+      const Tally t =
+          handle(handling, bodies, poses, seed, motion, [&](const Pose& before, const Pose& after) {
+            return is_loose ? jumped(handling, before, after)
+                            : jumped(conforming_case(conforming[i - loose.size()].of), before, after);
+          });
       const auto times = bench::quantiles(t.tick_us);
       const std::lock_guard lock(printing);
       std::printf("%-42s %9ld %8ld %5ld %9ld %9ld %7ld %7ld %6u %8.1f %8.1e %8.1f %8.0f\n",

@@ -58,11 +58,13 @@ std::vector<ConformingCase> all_cases() {
       for (const std::size_t n : {10'000, 50'000, 200'000, 1'000'000})
         for (const bool turned_float : {false, true}) {
           const char* const shaft = profile == Profile::faceted ? "faceted shaft" : "smooth shaft";
-          add(with_clearance(shaft, " in bore", clearance_m), {"", shaft_in_bore, n, n, clearance_m, profile, turned_float, turned_float});
+          add(with_clearance(shaft, " in bore", clearance_m),
+              {"", shaft_in_bore, n, n, clearance_m, profile, turned_float, turned_float});
         }
   for (const double clearance_m : {10e-6, 50e-6})
     for (const std::size_t n : {50'000, 200'000})
-      add(with_clearance("shaft", " inserted", clearance_m), {"", shaft_inserted, n, n, clearance_m, Profile::faceted, true, true});
+      add(with_clearance("shaft", " inserted", clearance_m),
+          {"", shaft_inserted, n, n, clearance_m, Profile::faceted, true, true});
   for (const Profile profile : {Profile::faceted, Profile::smooth})
     for (const std::size_t n : {10'000, 50'000, 200'000, 1'000'000})
       for (const bool turned_float : {false, true})
@@ -125,8 +127,7 @@ MeshesOfCase shaft_and_bore(const ConformingCase& of, bool coarse) {
   const FacetParts parts = cells(of, {perimeter_m, kShaftLength_m, kShaftFacets}, of.tool_triangles, shaft);
 
   Prism tube;
-  FacetParts inside =
-      cells(of, {perimeter_m, kBoreLength_m, kShaftFacets}, of.obstacle_triangles, tube);
+  FacetParts inside = cells(of, {perimeter_m, kBoreLength_m, kShaftFacets}, of.obstacle_triangles, tube);
   inside.along_bore = inside.along;
   inside.along = 1;
   // The facets of the bore, not its corners, keep the clearance.

@@ -12,11 +12,11 @@ namespace wrenchd::test {
 
 /// Two bodies that touch face to face. C: frame of the tool's shape, with its origin in the middle.
 enum class ConformingShape : std::uint8_t {
-  cube_on_slab,   ///< cube of 50 mm on a slab of 300 x 300 x 20 mm, top at z = 0
-  shaft_in_bore,  ///< shaft of radius 9.9 mm and length 60 mm in a bore of length 50 mm
-  shaft_inserted, ///< the same bodies with chamfers; the shaft goes into the bore and out again
-  gears,          ///< two gears with 20 teeth, radius 23 mm, 10 mm thick
-  peg_in_hole,    ///< the bumpy peg and hole of tools/bench
+  cube_on_slab,    ///< cube of 50 mm on a slab of 300 x 300 x 20 mm, top at z = 0
+  shaft_in_bore,   ///< shaft of radius 9.9 mm and length 60 mm in a bore of length 50 mm
+  shaft_inserted,  ///< the same bodies with chamfers; the shaft goes into the bore and out again
+  gears,           ///< two gears with 20 teeth, radius 23 mm, 10 mm thick
+  peg_in_hole,     ///< the bumpy peg and hole of tools/bench
 };
 
 /// The tessellation of curved bodies.

@@ -44,7 +44,8 @@ ConformingScene load_scene(const ConformingCase& of, const MeshesOfCase& meshes,
   settings.tool.mesh = write("tool", tool_F);
   settings.tool.scale = scale;
   settings.tool.mass_kg = kToolMass_kg;
-  settings.meshes.push_back({"obstacle", write("obstacle", obstacle_F), scale, X_WF, BodyKind::solid, motion});
+  settings.meshes.push_back(
+      {"obstacle", write("obstacle", obstacle_F), scale, X_WF, BodyKind::solid, motion});
   const auto begin = std::chrono::steady_clock::now();
   ConformingScene loaded = {Scene(settings, loader), {}, X_WF, std::move(tool_F), std::move(obstacle_F)};
   loaded.load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

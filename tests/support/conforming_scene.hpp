@@ -10,10 +10,10 @@ namespace wrenchd::test {
 /// of both mesh files. W is the frame of the obstacle's shape.
 struct ConformingScene {
   Scene scene;
-  Pose X_TC;                       ///< pose of C in the tool's body frame
-  Pose X_WF;                       ///< pose of the obstacle's file frame
+  Pose X_TC;                        ///< pose of C in the tool's body frame
+  Pose X_WF;                        ///< pose of the obstacle's file frame
   TriangleMesh tool_F, obstacle_F;  ///< triangles of the files, in metres
-  double load_s = 0.0;             ///< time that the scene took to load
+  double load_s = 0.0;              ///< time that the scene took to load
 
   /// Pose of the tool's body frame in the frame of its file.
   Pose X_FT() const { return scene.tool().X_MT(); }

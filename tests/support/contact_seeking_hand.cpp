@@ -96,8 +96,8 @@ const Pose& ContactSeekingHand::next(const Pose& X_WQ) {
   X_target_.translation_m += kTick_s * slide_m_per_s_;
   const Pose wanted = moved_towards(X_WP_, X_target_, step_m, step_rad);
   // A hand that is held back stays near the proxy, but moves no faster than before.
-  X_WP_ = moved_towards(X_WP_, moved_towards(X_WQ, wanted, limits_.reach_m, limits_.reach_rad), step_m,
-                        step_rad);
+  X_WP_ =
+      moved_towards(X_WP_, moved_towards(X_WQ, wanted, limits_.reach_m, limits_.reach_rad), step_m, step_rad);
   return X_WP_;
 }
 

@@ -27,7 +27,8 @@ class ContactSeekingHand {
   };
 
   /// tool: in T. obstacle: in W. Keeps references to both, which must outlive this object.
-  ContactSeekingHand(const TriangleMesh& tool, const TriangleMesh& obstacle, std::uint64_t seed, Limits limits);
+  ContactSeekingHand(const TriangleMesh& tool, const TriangleMesh& obstacle, std::uint64_t seed,
+                     Limits limits);
 
   /// Returns a pose at which the bounding spheres of the bodies are apart.
   const Pose& start() const { return X_WP_; }
@@ -47,9 +48,10 @@ class ContactSeekingHand {
   const TriangleMesh& obstacle_;
   RandomValues random_;
   Limits limits_;
-  Vector3d tool_middle_m_, middle_m_;  ///< middles of the bounding boxes of the tool, in T, and of the obstacle
-  double away_m_;                      ///< distance of the start from the obstacle's middle
-  Quaterniond R_upright_;              ///< orientation for Approach::axis
+  Vector3d tool_middle_m_,
+      middle_m_;           ///< middles of the bounding boxes of the tool, in T, and of the obstacle
+  double away_m_;          ///< distance of the start from the obstacle's middle
+  Quaterniond R_upright_;  ///< orientation for Approach::axis
   Pose X_WP_, X_target_;
   Vector3d slide_m_per_s_ = Vector3d::Zero();
   int ticks_left_ = 0;
