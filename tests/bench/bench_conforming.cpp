@@ -28,7 +28,7 @@ struct Options {
   std::size_t ticks = 2200;
   int passes = 2;
   std::uint64_t seed = 1;
-  double tolerance_um = 2.0;
+  double tolerance_um = 2.0, surface_tolerance_um = 1.0;
   std::filesystem::path cache, csv;
   bool list = false;
   bool fine_reference = false;
@@ -79,7 +79,7 @@ std::vector<std::string> cells_of(double load_s, const std::vector<ProxyTick>& r
 
 void run_case(const ConformingCase& of, const Options& options, Table& table) {
   MeshLoader loader(options.cache, {});
-  const ConformingScene fine = load_scene(of, fine_meshes(of), loader);
+  const ConformingScene fine = load_scene(of, fine_meshes(of), loader, 1e-6 * options.surface_tolerance_um);
   const ConformingScene coarse = load_coarse_scene(of);
   const ConformingScene& reference_scene = options.fine_reference ? fine : coarse;
   const std::vector<Pose> X_WC = conforming_trajectory(of, options.ticks, options.seed);
@@ -91,6 +91,8 @@ void run_case(const ConformingCase& of, const Options& options, Table& table) {
   const std::vector<std::string> cells = cells_of(fine.load_s, run, lag);
   print_cells(of.name, cells);
   table.add(of.name, "whole tick", cells);
+  for (const std::string& text : loader.simplifications())
+    std::printf("  %s\n", text.substr(text.rfind('/') + 1).c_str());
   const double infeasible = share_of(run, ProjectionStatus::infeasible);
   if (infeasible > 0.0) std::printf("  infeasible: %.1f %% of the ticks\n", 100.0 * infeasible);
   const double unfinished = share_of(reference, ProjectionStatus::budget_spent);

@@ -34,7 +34,7 @@ struct Options {
   int passes = 2;
   std::vector<std::uint64_t> seeds = {1};
   std::size_t exact_poses = 100;
-  double tolerance_um = 2.0;
+  double tolerance_um = 2.0, surface_tolerance_um = 1.0;
   bool surface = false, reference = false;
   std::filesystem::path cache;
   ContactSeekingHand::Limits hand;
@@ -101,6 +101,7 @@ std::pair<std::size_t, std::size_t> overlaps(const std::vector<ProxyTick>& run, 
 
 int measure(const Options& options) {
   SceneSettings settings;
+  settings.surface_tolerance_m = 1e-6 * options.surface_tolerance_um;
   settings.tool = {options.files[0], options.scale, kToolMass_kg};
   settings.meshes.push_back({"obstacle", options.files[1], options.scale, Pose{},
                              options.surface ? BodyKind::surface : BodyKind::solid});
@@ -109,6 +110,8 @@ int measure(const Options& options) {
   const Scene scene(settings, loader);
   const double load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   for (const std::string& change : loader.changes()) std::cerr << "note: " << change << '\n';
+  for (const std::string& text : loader.simplifications())
+    std::cout << text.substr(text.rfind('/') + 1) << '\n';
 
   const TriangleMesh tool = triangles_of(options.files[0], options.scale);
   const TriangleMesh obstacle = triangles_of(options.files[1], options.scale);
@@ -171,6 +174,9 @@ int main(int argc, char** argv) {
   app.add_flag("--reference", options.reference,
                "compares each tick with the proxy that has unlimited work; slow");
   app.add_option("--tolerance-um", options.tolerance_um, "difference from which a tick is behind [um]")
+      ->capture_default_str();
+  app.add_option("--surface-tolerance-um", options.surface_tolerance_um,
+                 "surface tolerance of the scene [um]; 0: the meshes as they are")
       ->capture_default_str();
   app.add_option("--cache", options.cache, "directory of the mesh cache");
   CLI11_PARSE(app, argc, argv);

@@ -95,7 +95,8 @@ const std::vector<ConformingManipulation>& conforming_manipulations() {
 Bodies bodies_of(const ConformingManipulation& conforming, const ObstacleMotion& motion) {
   const ConformingCase& of = conforming_case(conforming.of);
   MeshLoader loader;
-  ConformingScene loaded = load_scene(of, fine_meshes(of), loader, motion);
+  ConformingScene loaded =
+      load_scene(of, fine_meshes(of), loader, SceneSettings{}.surface_tolerance_m, motion);
   const Pose X_TF = inverse(loaded.X_FT());
   return {std::move(loaded.scene), std::move(loaded.tool_F), std::move(loaded.obstacle_F), loaded.X_TC, X_TF};
 }

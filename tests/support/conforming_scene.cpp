@@ -29,7 +29,7 @@ TriangleMesh mesh_in_file(const ConformingCase& of, const TriangleMesh& mesh) {
 }
 
 ConformingScene load_scene(const ConformingCase& of, const MeshesOfCase& meshes, MeshLoader& loader,
-                           const ObstacleMotion& motion) {
+                           double surface_tolerance_m, const ObstacleMotion& motion) {
   const TemporaryDirectory directory;
   const auto write = [&](const std::string& name, const TriangleMesh& mesh) {
     const std::filesystem::path file = directory.path() / (name + (of.in_float ? ".stl" : ".off"));
@@ -41,6 +41,7 @@ ConformingScene load_scene(const ConformingCase& of, const MeshesOfCase& meshes,
   TriangleMesh tool_F = mesh_in_file(of, meshes.tool), obstacle_F = mesh_in_file(of, meshes.obstacle);
   const Pose X_WF = inverse(X_FC(of));
   SceneSettings settings;
+  settings.surface_tolerance_m = surface_tolerance_m;
   settings.tool.mesh = write("tool", tool_F);
   settings.tool.scale = scale;
   settings.tool.mass_kg = kToolMass_kg;
@@ -57,7 +58,7 @@ ConformingScene load_coarse_scene(const ConformingCase& of) {
   ConformingCase plain = of;
   plain.in_float = plain.rotated = false;
   MeshLoader loader;
-  return load_scene(plain, coarse_meshes(of), loader);
+  return load_scene(plain, coarse_meshes(of), loader, 0.0);
 }
 
 std::vector<Pose> body_poses(const ConformingScene& scene, const std::vector<Pose>& X_WC) {

@@ -23,12 +23,13 @@ struct ConformingScene {
 TriangleMesh mesh_in_file(const ConformingCase& of, const TriangleMesh& mesh);
 
 /// Writes the meshes to a temporary directory, as binary STL in millimetres if the case is in float, else as
-/// OFF, and loads the scene. motion: that of the obstacle. Throws MeshError if a mesh cannot be used. Not
-/// RT-safe: may take seconds.
+/// OFF, and loads the scene. surface_tolerance_m: that of the scene. motion: that of the obstacle. Throws
+/// MeshError if a mesh cannot be used. Not RT-safe: may take seconds.
 ConformingScene load_scene(const ConformingCase& of, const MeshesOfCase& meshes, MeshLoader& loader,
+                           double surface_tolerance_m = SceneSettings{}.surface_tolerance_m,
                            const ObstacleMotion& motion = {});
 
-/// The same for the coarse meshes of a case, exact and not rotated. Not RT-safe: may take seconds.
+/// Loads the coarse meshes of a case: exact, not rotated and not simplified. Not RT-safe: may take seconds.
 ConformingScene load_coarse_scene(const ConformingCase& of);
 
 /// Returns the poses X_WP of the tool's body frame for the poses X_WC of its shape.
