@@ -1,25 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
-#include "collision/meshes/make_mesh.hpp"
 #include "tests/bench/statistics.hpp"
 #include "tests/bench/stopwatch.hpp"
+#include "tests/bench/table.hpp"
 #include "tests/bench/trajectory_run.hpp"
-#include "tests/support/conforming_case.hpp"
-#include "tests/support/conforming_mesh.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/conforming_scene.hpp"
 
-// Conforming contact of fine meshes: the proxy of each fine mesh is compared on every tick with the proxy of a
-// coarse mesh of the same shape, which has unlimited work.
+// Conforming contact of fine meshes: the proxy of each fine mesh is compared on every tick with the proxy of
+// a coarse mesh of the same shape, which has unlimited work.
 
 namespace {
 
@@ -32,64 +28,29 @@ struct Options {
   std::size_t ticks = 2200;
   int passes = 2;
   std::uint64_t seed = 1;
-  double tolerance_um = 2.0;
-  double surface_tolerance_um = 1.0;
-  std::filesystem::path cache;
+  double tolerance_um = 2.0, surface_tolerance_um = 1.0;
+  std::filesystem::path cache, csv;
   bool list = false;
   bool fine_reference = false;
 };
 
-/// A scene and the pose of the shape's frame C in the tool's body frame T.
-struct LoadedCase {
-  Scene scene;
-  Pose X_TC;
-  double load_s = 0.0;
-};
-
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+const std::vector<std::string>& columns() {
+  static const std::vector<std::string> all = {"load s",  "spent %", "behind %", "lag ms", "lag mm",
+                                               "diff um", "p50 us",  "p99 us",   "max us", ">1ms %",
+                                               "F max N", "dFmax %", "dF %",     "visits"};
+  return all;
 }
 
-/// Writes the meshes and loads them as wrenchd does: from an STL file in float, else from an OFF file.
-LoadedCase load(const ConformingCase& of, const MeshesOfCase& meshes, double surface_tolerance_m,
-                MeshLoader& loader) {
-  const TemporaryDirectory directory;
-  const Quaterniond R_FC = file_rotation(of);
-  const Pose X_WF = {R_FC.conjugate(), Vector3d::Zero()};
-  const auto write = [&](const std::string& name, const TriangleMesh& mesh) {
-    const std::filesystem::path file = directory.path() / (name + (of.in_float ? ".stl" : ".off"));
-    std::ofstream out(file, std::ios::binary);
-    const TriangleMesh in_file = of.rotated ? rotated(mesh, R_FC) : mesh;
-    of.in_float ? write_binary_stl(out, in_file) : write_off(out, in_file);
-    return file;
-  };
-  const double scale = of.in_float ? 0.001 : 1.0;
-  SceneSettings settings;
-  settings.tool.mesh = write("tool", meshes.tool);
-  settings.tool.scale = scale;
-  settings.tool.mass_kg = kToolMass_kg;
-  settings.meshes.push_back({"obstacle", write("obstacle", meshes.obstacle), scale, X_WF});
-  const auto begin = std::chrono::steady_clock::now();
-  settings.surface_tolerance_m = surface_tolerance_m;
-  LoadedCase loaded = {Scene(settings, loader), {}, 0.0};
-  loaded.load_s = seconds_since(begin);
-  loaded.X_TC = inverse(loaded.scene.tool().X_MT()) * Pose{R_FC, Vector3d::Zero()};
-  return loaded;
+constexpr int kNameWidth = 58, kCellWidth = 9;
+
+void print_cells(const std::string& name, const std::vector<std::string>& cells) {
+  std::printf("%-*s", kNameWidth, name.c_str());
+  for (const std::string& cell : cells) std::printf("%*s", kCellWidth, cell.c_str());
+  std::printf("\n");
+  std::fflush(stdout);
 }
 
-std::vector<Pose> body_poses(const std::vector<Pose>& X_WC, const Pose& X_TC) {
-  std::vector<Pose> X_WP;
-  const Pose X_CT = inverse(X_TC);
-  for (const Pose& X : X_WC) X_WP.push_back(X * X_CT);
-  return X_WP;
-}
-
-constexpr const char* kHeader =
-    "case                                            load s  spent % behind % lag ms   lag mm  diff um "
-    "  p50 us   p99 us   max us  >1ms %  F max N  dFmax %     dF %   visits max";
-
-void print_row(const std::string& name, double load_s, const std::vector<ProxyTick>& run,
-               const LagReport& lag) {
+std::vector<std::string> cells_of(double load_s, const std::vector<ProxyTick>& run, const LagReport& lag) {
   std::vector<double> us;
   std::uint32_t visits = 0;
   std::size_t late = 0;
@@ -100,35 +61,40 @@ void print_row(const std::string& name, double load_s, const std::vector<ProxyTi
   }
   const Quantiles times = quantiles(us);
   const double per_force = lag.reference_force_N > 0.0 ? 100.0 / lag.reference_force_N : 0.0;
-  std::printf("%-46s %7.2f %8.1f %8.1f %6zu %8.2f %8.1f %8.0f %8.0f %8.0f %7.1f %8.3f %8.2f %8.2f %12u\n",
-              name.c_str(), load_s, 100.0 * share_of(run, ProjectionStatus::budget_spent),
-              100.0 * lag.behind_share, lag.longest_ticks, 1e3 * lag.longest_run_m, 1e6 * lag.largest_m,
-              times.p50, times.p99, times.max,
-              100.0 * static_cast<double>(late) / static_cast<double>(run.size()), lag.force_N,
-              per_force * (lag.force_N - lag.reference_force_N), per_force * lag.force_difference_N, visits);
-  const double infeasible = share_of(run, ProjectionStatus::infeasible);
-  if (infeasible > 0.0) std::printf("  infeasible: %.1f %% of the ticks\n", 100.0 * infeasible);
-  std::fflush(stdout);
+  return {fixed(load_s, 2),
+          fixed(100.0 * share_of(run, ProjectionStatus::budget_spent), 1),
+          fixed(100.0 * lag.behind_share, 1),
+          whole(lag.longest_ticks),
+          fixed(1e3 * lag.longest_run_m, 2),
+          fixed(1e6 * lag.largest_m, 1),
+          fixed(times.p50, 0),
+          fixed(times.p99, 0),
+          fixed(times.max, 0),
+          fixed(100.0 * static_cast<double>(late) / static_cast<double>(run.size()), 1),
+          fixed(lag.force_N, 3),
+          fixed(per_force * (lag.force_N - lag.reference_force_N), 2),
+          fixed(per_force * lag.force_difference_N, 2),
+          whole(visits)};
 }
 
-void run_case(const ConformingCase& of, const Options& options) {
+void run_case(const ConformingCase& of, const Options& options, Table& table) {
   MeshLoader loader(options.cache, {});
-  const LoadedCase fine = load(of, fine_meshes(of), 1e-6 * options.surface_tolerance_um, loader);
-  ConformingCase plain = of;
-  plain.in_float = plain.rotated = false;
-  MeshLoader coarse_loader;
-  const MeshesOfCase coarse_of = coarse_meshes(of);
-  const LoadedCase coarse = load(plain, coarse_of, 0.0, coarse_loader);
+  const ConformingScene fine = load_scene(of, fine_meshes(of), loader, 1e-6 * options.surface_tolerance_um);
+  const ConformingScene coarse = load_coarse_scene(of);
+  const ConformingScene& reference_scene = options.fine_reference ? fine : coarse;
   const std::vector<Pose> X_WC = conforming_trajectory(of, options.ticks, options.seed);
-  const auto run = follow_trajectory(fine.scene, {}, body_poses(X_WC, fine.X_TC), options.passes);
-  const auto reference = options.fine_reference
-                             ? follow_trajectory(fine.scene, unlimited_work(), body_poses(X_WC, fine.X_TC))
-                             : follow_trajectory(coarse.scene, unlimited_work(), body_poses(X_WC, coarse.X_TC));
-  const LagReport lag = compare(run, fine.X_TC, reference, options.fine_reference ? fine.X_TC : coarse.X_TC,
-                                box_corners(coarse_of.tool), 1e-6 * options.tolerance_um);
-  print_row(of.name, fine.load_s, run, lag);
+  const auto run = follow_trajectory(fine.scene, {}, body_poses(fine, X_WC), options.passes);
+  const auto reference =
+      follow_trajectory(reference_scene.scene, unlimited_work(), body_poses(reference_scene, X_WC));
+  const LagReport lag = compare(run, fine.X_TC, reference, reference_scene.X_TC, box_corners(coarse.tool_F),
+                                1e-6 * options.tolerance_um);
+  const std::vector<std::string> cells = cells_of(fine.load_s, run, lag);
+  print_cells(of.name, cells);
+  table.add(of.name, "whole tick", cells);
   for (const std::string& text : loader.simplifications())
     std::printf("  %s\n", text.substr(text.rfind('/') + 1).c_str());
+  const double infeasible = share_of(run, ProjectionStatus::infeasible);
+  if (infeasible > 0.0) std::printf("  infeasible: %.1f %% of the ticks\n", 100.0 * infeasible);
   const double unfinished = share_of(reference, ProjectionStatus::budget_spent);
   if (unfinished > 0.0)
     std::printf("  the reference did not converge at %.1f %% of the ticks\n", 100.0 * unfinished);
@@ -161,7 +127,9 @@ int main(int argc, char** argv) {
   app.add_option("--tolerance-um", options.tolerance_um,
                  "a tick is behind if its pose differs from the reference by more [um]")
       ->capture_default_str();
-  app.add_option("--cache", options.cache, "directory of the mesh cache; without it each mesh is prepared anew");
+  app.add_option("--csv", options.csv, "also write the table to this file");
+  app.add_option("--cache", options.cache,
+                 "directory of the mesh cache; without it each mesh is prepared anew");
   app.add_flag("--same-mesh", options.fine_reference,
                "the reference is the fine mesh itself with unlimited work; slow");
   CLI11_PARSE(app, argc, argv);
@@ -170,14 +138,20 @@ int main(int argc, char** argv) {
     return 0;
   }
   std::printf(
-      "%zu ticks, 1 ms apart. behind: differs by more than %g um from the coarse mesh's proxy with unlimited\n"
-      "work; lag: longest run of such ticks; diff: largest difference of a pose. dFmax: largest force to the\n"
-      "reference's; dF: largest difference at one tick, in %% of the reference's largest force. us: processor\n"
-      "time of a tick, minimum of up to %d passes; one core only: %s.\n\n%s\n",
-      options.ticks, options.tolerance_um, options.passes, pinned_to_one_core() ? "yes" : "no", kHeader);
+      "%zu ticks, 1 ms apart. behind: differs by more than %g um from the coarse mesh's proxy with "
+      "unlimited\n"
+      "work; lag: longest run of such ticks; diff: largest difference of a pose. dFmax: largest force to "
+      "the\n"
+      "reference's; dF: largest difference at one tick, in %% of the reference's largest force. us: "
+      "processor\n"
+      "time of a tick, minimum of up to %d passes; one core only: %s.\n\n",
+      options.ticks, options.tolerance_um, options.passes, pinned_to_one_core() ? "yes" : "no");
+  print_cells("case", columns());
+  Table table("conforming contact", columns());
   try {
     for (const ConformingCase& of : conforming_cases())
-      if (selected(of, options.cases)) run_case(of, options);
+      if (selected(of, options.cases)) run_case(of, options, table);
+    if (!options.csv.empty()) write_csv(options.csv, {table});
   } catch (const std::exception& error) {
     std::cerr << "bench_conforming: " << error.what() << '\n';
     return 1;

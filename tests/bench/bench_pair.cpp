@@ -25,6 +25,8 @@ using namespace wrenchd;
 using namespace wrenchd::bench;
 using namespace wrenchd::test;
 
+constexpr double kToolMass_kg = 0.2;  ///< that of the shipped scene
+
 struct Options {
   std::vector<std::filesystem::path> files;
   double scale = 0.001;
@@ -32,7 +34,7 @@ struct Options {
   int passes = 2;
   std::vector<std::uint64_t> seeds = {1};
   std::size_t exact_poses = 100;
-  double tolerance_um = 2.0;
+  double tolerance_um = 2.0, surface_tolerance_um = 1.0;
   bool surface = false, reference = false;
   std::filesystem::path cache;
   ContactSeekingHand::Limits hand;
@@ -99,6 +101,7 @@ std::pair<std::size_t, std::size_t> overlaps(const std::vector<ProxyTick>& run, 
 
 int measure(const Options& options) {
   SceneSettings settings;
+  settings.surface_tolerance_m = 1e-6 * options.surface_tolerance_um;
   settings.tool = {options.files[0], options.scale, kToolMass_kg};
   settings.meshes.push_back({"obstacle", options.files[1], options.scale, Pose{},
                              options.surface ? BodyKind::surface : BodyKind::solid});
@@ -107,12 +110,14 @@ int measure(const Options& options) {
   const Scene scene(settings, loader);
   const double load_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   for (const std::string& change : loader.changes()) std::cerr << "note: " << change << '\n';
+  for (const std::string& text : loader.simplifications())
+    std::cout << text.substr(text.rfind('/') + 1) << '\n';
 
   const TriangleMesh tool = triangles_of(options.files[0], options.scale);
   const TriangleMesh obstacle = triangles_of(options.files[1], options.scale);
   std::printf("%s: %zu triangles on %s: %zu triangles; loaded in %.2f s\n",
-              options.files[0].filename().c_str(), tool.triangles.size(),
-              options.files[1].filename().c_str(), obstacle.triangles.size(), load_s);
+              options.files[0].filename().c_str(), tool.triangles.size(), options.files[1].filename().c_str(),
+              obstacle.triangles.size(), load_s);
   std::printf(
       "  seed    ticks in contact  spent %%   p50 us  contact   p99 us  contact   max us  >1ms %%  F max N   "
       "visits overlaps%s\n",
@@ -145,8 +150,12 @@ int measure(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"Presses, slides and rotates one mesh on another: time of the ticks, and overlaps in exact arithmetic."};
-  app.add_option("files", options.files, "mesh of the tool and mesh of the obstacle")->required()->expected(2);
+  CLI::App app{
+      "Presses, slides and rotates one mesh on another: time of the ticks, and overlaps in exact "
+      "arithmetic."};
+  app.add_option("files", options.files, "mesh of the tool and mesh of the obstacle")
+      ->required()
+      ->expected(2);
   app.add_option("--scale", options.scale, "metres per mesh unit")->capture_default_str();
   app.add_flag("--surface", options.surface, "the obstacle is a surface, which may be open");
   app.add_option("--ticks", options.ticks, "number of ticks per seed, 1 ms apart")
@@ -156,11 +165,18 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   app.add_option("--seed", options.seeds, "seeds of the hand's motion, one row each")->capture_default_str();
+  app.add_flag_callback(
+      "--axis", [&] { options.hand.approach = ContactSeekingHand::Approach::axis; },
+      "presses down along z onto the middle of the obstacle, as a knob on its nut");
   app.add_option("--speed", options.hand.speed_m_per_s, "speed of the hand [m/s]")->capture_default_str();
   app.add_option("--exact", options.exact_poses, "number of poses in contact to check in exact arithmetic")
       ->capture_default_str();
-  app.add_flag("--reference", options.reference, "compares each tick with the proxy that has unlimited work; slow");
+  app.add_flag("--reference", options.reference,
+               "compares each tick with the proxy that has unlimited work; slow");
   app.add_option("--tolerance-um", options.tolerance_um, "difference from which a tick is behind [um]")
+      ->capture_default_str();
+  app.add_option("--surface-tolerance-um", options.surface_tolerance_um,
+                 "surface tolerance of the scene [um]; 0: the meshes as they are")
       ->capture_default_str();
   app.add_option("--cache", options.cache, "directory of the mesh cache");
   CLI11_PARSE(app, argc, argv);

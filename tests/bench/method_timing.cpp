@@ -8,17 +8,19 @@
 namespace wrenchd::bench {
 namespace {
 
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
 /// On an idle machine the passes of one method differ by a few per cent.
 constexpr double kInconclusive = 0.1;
 
 std::vector<double> timed_pass(const TimedMethod& runner, std::size_t poses, const CounterScale& scale) {
-  std::vector<double> ns(poses);
+  std::vector<double> ns;
   volatile double answer = 0.0;  // keeps the compiler from removing the solve
   runner.restart();
-  for (std::size_t i = 0; i < poses; ++i) {
+  for (std::size_t i = 0; i < poses; i += runner.every) {
     const std::int64_t before = counter();
     answer = runner.solve(i).value;
-    ns[i] = scale.ns(counter() - before);
+    ns.push_back(scale.ns(counter() - before));
   }
   static_cast<void>(answer);
   return ns;
@@ -32,16 +34,18 @@ std::vector<MethodTiming> time_methods(const std::vector<TimedMethod>& runners, 
   for (std::size_t r = 0; r < runners.size(); ++r) {
     results[r].name = runners[r].name;
     runners[r].restart();
-    for (std::size_t i = 0; i < poses; ++i) results[r].answers.push_back(runners[r].solve(i));
+    for (std::size_t i = 0; i < poses; ++i)
+      results[r].answers.push_back(i % runners[r].every == 0 ? runners[r].solve(i) : Answer{kNaN});
   }
 
-  std::vector least_ns(runners.size(), std::vector(poses, std::numeric_limits<double>::infinity()));
+  std::vector<std::vector<double>> least_ns(runners.size());
   std::vector<std::vector<double>> p50_ns(runners.size());
   for (int pass = 0; pass < passes; ++pass)
     for (std::size_t r = 0; r < runners.size(); ++r) {
       const std::vector<double> ns = timed_pass(runners[r], poses, scale);
       p50_ns[r].push_back(quantile(ns, 0.5));
-      for (std::size_t i = 0; i < poses; ++i) least_ns[r][i] = std::min(least_ns[r][i], ns[i]);
+      if (pass == 0) least_ns[r] = ns;
+      for (std::size_t i = 0; i < ns.size(); ++i) least_ns[r][i] = std::min(least_ns[r][i], ns[i]);
     }
   for (std::size_t r = 0; r < runners.size(); ++r) {
     results[r].ns = quantiles(least_ns[r]);

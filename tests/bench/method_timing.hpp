@@ -20,7 +20,8 @@ struct Effort {
 
 /// The result of one method at one pose. A method fills the fields that it computes.
 struct Answer {
-  double value = 0.0;  ///< energy or depth, depending on the table; NaN if the method found nothing
+  /// energy or depth, depending on the table; NaN if the method found nothing or did not solve the pose
+  double value = 0.0;
   double kkt_residual = 0.0;
   std::size_t active = 0;  ///< number of active contacts at q
   bool converged = true;
@@ -31,12 +32,13 @@ struct TimedMethod {
   std::string name;
   std::function<void()> restart;             ///< restores the state before the first pose; not timed
   std::function<Answer(std::size_t)> solve;  ///< solves the pose with this index; poses come in order
+  std::size_t every = 1;  ///< solves only the poses whose index is a multiple; the others have no answer
 };
 
 struct MethodTiming {
   std::string name;
   std::vector<Answer> answers;
-  Quantiles ns;            ///< quantiles over the poses of the minimum time over the passes
+  Quantiles ns;            ///< quantiles over the solved poses of the minimum time over the passes
   double relative_spread;  ///< relative spread of the p50 of the single passes
 };
 

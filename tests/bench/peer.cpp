@@ -67,6 +67,11 @@ const std::vector<std::string>& mesh_peers() {
   return names;
 }
 
+const std::vector<std::string>& unpackaged_mesh_peers() {
+  static const std::vector<std::string> names = {"PQP", "PhysX BV4"};
+  return names;
+}
+
 std::vector<PeerModule> load_peers(const std::vector<std::string>& names, std::vector<std::string>& missing) {
   const auto directory = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   std::vector<PeerModule> peers;

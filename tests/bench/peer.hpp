@@ -58,5 +58,8 @@ std::vector<PeerModule> load_peers(const std::vector<std::string>& names, std::v
 /// Names of the peers for convex bodies, and of those for arbitrary meshes.
 const std::vector<std::string>& convex_peers();
 const std::vector<std::string>& mesh_peers();
+/// Mesh libraries that no package provides. Somebody who has built one can name its module (bench_contact
+/// --peer); the tables tell the others as not run.
+const std::vector<std::string>& unpackaged_mesh_peers();
 
 }  // namespace wrenchd::bench

@@ -2,22 +2,25 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "collision/proxy.hpp"
 #include "tests/bench/statistics.hpp"
+#include "tests/support/conforming_scene.hpp"
 #include "tests/support/exact_intersection.hpp"
 #include "tests/support/manipulation_case.hpp"
 
-// Twenty scenes with rough manipulation. The program checks every pose of the proxy in exact arithmetic,
-// which takes minutes to hours; a test does the same for a few hundred poses. With --moving the obstacles
-// also move, as fast as hands do.
+// Twenty scenes with rough manipulation, and scenes of fine meshes that touch face to face. The program
+// checks every pose of the proxy in exact arithmetic, which takes minutes to hours; a test does the same for
+// a few hundred poses. With --moving the obstacles also move, as fast as hands do.
 
 namespace {
 
@@ -54,18 +57,85 @@ bool jumped(const ManipulationCase& handling, const Pose& X_OT_before, const Pos
          before.z() * after.z() < 0.0 && before.head<2>().norm() < wide_m && after.head<2>().norm() < wide_m;
 }
 
-Tally handle(const ManipulationCase& handling, long poses, std::uint64_t seed, const ObstacleMotion& motion) {
-  const Scene scene = scene_of(handling, motion);
+/// A scene to manipulate. C: frame of the tool that the hand moves. S: frame of the obstacle at scene time 0
+/// in which the hand moves. E: frame of the tool's triangles in the exact test.
+struct Bodies {
+  Scene scene;
+  TriangleMesh tool_E, obstacle_O;
+  Pose X_TC, X_TE;
+};
+
+Bodies bodies_of(const ManipulationCase& handling, const ObstacleMotion& motion) {
+  Scene scene = scene_of(handling, motion);
+  TriangleMesh tool = scene.tool_mesh()->surface.mesh(), obstacle = scene.meshes()[0].mesh->surface.mesh();
+  return {std::move(scene), std::move(tool), std::move(obstacle), {}, {}};
+}
+
+/// Fine meshes that touch face to face. The exact test uses the triangles of their files.
+struct ConformingManipulation {
+  ManipulationCase handling;  ///< motion of the hand; its meshes are not used
+  std::string of;             ///< name of the conforming case
+};
+
+const std::vector<ConformingManipulation>& conforming_manipulations() {
+  using enum HandMotion;
+  static const std::vector<ConformingManipulation> all = {
+      {{"flat cube on a flat slab", {}, {}, slide, {0, 0, 0.026}}, "cube 10k / 10k, exact"},
+      {{"flat cube on a flat slab, float", {}, {}, slide, {0, 0, 0.026}}, "cube 10k / 10k, float, rotated"},
+      {{"fine cube on a coarse slab, float", {}, {}, slide, {0, 0, 0.026}}, "cube 50k / 12, float, rotated"},
+      {{"shaft pressed into its bore, 10 um", {}, {}, press, {0, 0, 0}},
+       "faceted shaft in bore 10 um 10k / 10k, float, rotated"},
+      {{"smooth shaft shaken in its bore, 50 um", {}, {}, shake, {0, 0, 0}},
+       "smooth shaft in bore 50 um 10k / 10k, exact"},
+      {{"flat gears", {}, {}, shake, {0.05, 0, 0}}, "faceted gears 10k / 10k, float, rotated"},
+  };
+  return all;
+}
+
+Bodies bodies_of(const ConformingManipulation& conforming, const ObstacleMotion& motion) {
+  const ConformingCase& of = conforming_case(conforming.of);
+  MeshLoader loader;
+  ConformingScene loaded =
+      load_scene(of, fine_meshes(of), loader, SceneSettings{}.surface_tolerance_m, motion);
+  const Pose X_TF = inverse(loaded.X_FT());
+  return {std::move(loaded.scene), std::move(loaded.tool_F), std::move(loaded.obstacle_F), loaded.X_TC, X_TF};
+}
+
+/// Returns true if the tool passed through the slab or through the wall of the bore between two ticks.
+bool jumped(const ConformingCase& of, const Pose& X_SC_before, const Pose& X_SC_after) {
+  const Vector3d &before = X_SC_before.translation_m, &after = X_SC_after.translation_m;
+  const auto aside_m = [](const Vector3d& p) { return p.head<2>().norm(); };
+  switch (of.shape) {
+    case ConformingShape::cube_on_slab: {
+      constexpr double kMiddle_m = -0.01, kWide_m = 0.1;
+      return (before.z() > kMiddle_m) != (after.z() > kMiddle_m) && aside_m(before) < kWide_m &&
+             aside_m(after) < kWide_m;
+    }
+    case ConformingShape::shaft_in_bore: {
+      constexpr double kInside_m = 0.02, kWall_m = 0.01;  // the shaft cannot leave the bore this far inside
+      return std::abs(before.z()) < kInside_m && std::abs(after.z()) < kInside_m &&
+             (aside_m(before) < kWall_m) != (aside_m(after) < kWall_m);
+    }
+    default:
+      return false;
+  }
+}
+
+template <class Jumped>
+Tally handle(const ManipulationCase& handling, const Bodies& bodies, long poses, std::uint64_t seed,
+             const ObstacleMotion& motion, const Jumped& jumped) {
+  const Scene& scene = bodies.scene;
   const MeshObstacle& obstacle = scene.meshes()[0];
-  const ExactIntersection exact(scene.tool_mesh()->surface.mesh(), obstacle.mesh->surface.mesh());
+  const ExactIntersection exact(bodies.tool_E, bodies.obstacle_O);
+  const Pose X_CT = inverse(bodies.X_TC), X_SO = obstacle.X_WO, X_OS = inverse(X_SO);
   Proxy proxy(scene);
   HandTrajectory hand(handling, seed);
-  const Pose X_OT_start = {Quaterniond::Identity(), handling.start_m};
+  const Pose X_OT_start = X_OS * Pose{Quaterniond::Identity(), handling.start_m} * X_CT;
   Pose X_WQ = obstacle.X_WO * X_OT_start, X_OQ = X_OT_start;
   Tally tally;
   for (long n = 1; n <= poses; ++n) {
     const double time_s = static_cast<double>(n) * kTick_s;
-    const Pose X_WP = hand.next();
+    const Pose X_WP = hand.next() * X_CT;
     const auto begin = std::chrono::steady_clock::now();
     const Projection q = proxy.follow(X_WP, X_WQ, time_s);
     tally.tick_us.push_back(
@@ -81,8 +151,8 @@ Tally handle(const ManipulationCase& handling, long poses, std::uint64_t seed, c
     X_WQ = q.X_WQ;
     const Pose X_OQ_last = X_OQ;
     X_OQ = inverse(obstacle.X_WO_at(proxy.admissible_time_s())) * X_WQ;
-    tally.jumps += jumped(handling, X_OQ_last, X_OQ) ? 1 : 0;
-    tally.overlaps += exact.intersect(X_OQ) ? 1 : 0;
+    tally.jumps += jumped(X_SO * X_OQ_last * bodies.X_TC, X_SO * X_OQ * bodies.X_TC) ? 1 : 0;
+    tally.overlaps += exact.intersect(X_OQ * bodies.X_TE) ? 1 : 0;
     tally.free += q.status == ProjectionStatus::free ? 1 : 0;
     tally.budget_spent += q.status == ProjectionStatus::budget_spent ? 1 : 0;
     if (motion.moves()) tally.latest_s = std::max(tally.latest_s, time_s - proxy.admissible_time_s());
@@ -116,12 +186,21 @@ int main(int argc, char** argv) {
   std::mutex printing;
   std::atomic<std::size_t> next = 0;
   std::atomic<long> faults = 0;
+  const auto& loose = manipulation_cases();
+  const auto& conforming = conforming_manipulations();
   const auto work = [&] {
-    for (std::size_t i = next++; i < manipulation_cases().size(); i = next++) {
-      const ManipulationCase& handling = manipulation_cases()[i];
+    for (std::size_t i = next++; i < loose.size() + conforming.size(); i = next++) {
+      const bool is_loose = i < loose.size();
+      const ManipulationCase& handling = is_loose ? loose[i] : conforming[i - loose.size()].handling;
       if (handling.name.find(only) == std::string::npos) continue;
+      const ObstacleMotion motion = moving ? random_motion(100 * seed + i) : ObstacleMotion{};
+      const Bodies bodies =
+          is_loose ? bodies_of(handling, motion) : bodies_of(conforming[i - loose.size()], motion);
       const Tally t =
-          handle(handling, poses, seed, moving ? random_motion(100 * seed + i) : ObstacleMotion{});
+          handle(handling, bodies, poses, seed, motion, [&](const Pose& before, const Pose& after) {
+            return is_loose ? jumped(handling, before, after)
+                            : jumped(conforming_case(conforming[i - loose.size()].of), before, after);
+          });
       const auto times = bench::quantiles(t.tick_us);
       const std::lock_guard lock(printing);
       std::printf("%-42s %9ld %8ld %5ld %9ld %9ld %7ld %7ld %6u %8.1f %8.1e %8.1f %8.0f\n",

@@ -11,7 +11,7 @@
 namespace wrenchd::bench {
 
 /// The stiffness of the shipped scene: 600 N/m for a tool of 0.2 kg.
-constexpr double kToolMass_kg = 0.2, kStiffness_per_s2 = 3000.0;
+constexpr double kStiffness_per_s2 = 3000.0;
 
 /// One tick of the proxy, as `wrenchctl solve --proxy --law energy` computes it.
 struct ProxyTick {
@@ -48,8 +48,8 @@ double pose_difference_m(const Pose& X_WA, const Pose& X_WB, const std::vector<V
 /// Returns the corners of the axis-parallel bounding box of the mesh.
 std::vector<Vector3d> box_corners(const TriangleMesh& mesh);
 
-/// Compares two runs of equal length. X_TC: pose of a frame C in the tool's body frame, which is equal in both
-/// runs; corners_m: points in C.
+/// Compares two runs of equal length. X_TC: pose of a frame C in the tool's body frame, which is equal in
+/// both runs; corners_m: points in C.
 LagReport compare(const std::vector<ProxyTick>& run, const Pose& X_TC,
                   const std::vector<ProxyTick>& reference, const Pose& X_RC,
                   const std::vector<Vector3d>& corners_m, double tolerance_m);

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
+#include <sstream>
+#include <stdexcept>
 
 #include "collision/meshes/make_mesh.hpp"
 #include "tests/support/conforming_mesh.hpp"
@@ -22,6 +23,12 @@ constexpr std::uint32_t kShaftFacets = 64, kGearFacets = 160;
 std::string short_number(std::size_t n) {
   if (n >= 1'000'000) return std::to_string(n / 1'000'000).append("M");
   return n >= 1000 ? std::to_string(n / 1000).append("k") : std::to_string(n);
+}
+
+std::string with_clearance(const char* body, const char* what, double clearance_m) {
+  std::ostringstream name;
+  name << body << what << ' ' << std::lround(1e6 * clearance_m) << " um";
+  return name.str();
 }
 
 std::vector<ConformingCase> all_cases() {
@@ -48,18 +55,18 @@ std::vector<ConformingCase> all_cases() {
     add_variants("cube", {"", cube_on_slab, n, n});
   for (const double clearance_m : {10e-6, 50e-6})
     for (const Profile profile : {Profile::faceted, Profile::smooth})
-      for (const std::size_t n : {50'000, 200'000, 1'000'000})
+      for (const std::size_t n : {10'000, 50'000, 200'000, 1'000'000})
         for (const bool turned_float : {false, true}) {
-          const std::string name = std::string(profile == Profile::faceted ? "faceted" : "smooth") +
-                                   " shaft in bore " + (clearance_m < 20e-6 ? "10" : "50") + " um";
-          add(name, {"", shaft_in_bore, n, n, clearance_m, profile, turned_float, turned_float});
+          const char* const shaft = profile == Profile::faceted ? "faceted shaft" : "smooth shaft";
+          add(with_clearance(shaft, " in bore", clearance_m),
+              {"", shaft_in_bore, n, n, clearance_m, profile, turned_float, turned_float});
         }
   for (const double clearance_m : {10e-6, 50e-6})
     for (const std::size_t n : {50'000, 200'000})
-      add(clearance_m < 20e-6 ? "shaft inserted 10 um" : "shaft inserted 50 um",
+      add(with_clearance("shaft", " inserted", clearance_m),
           {"", shaft_inserted, n, n, clearance_m, Profile::faceted, true, true});
   for (const Profile profile : {Profile::faceted, Profile::smooth})
-    for (const std::size_t n : {50'000, 200'000, 1'000'000})
+    for (const std::size_t n : {10'000, 50'000, 200'000, 1'000'000})
       for (const bool turned_float : {false, true})
         add(profile == Profile::faceted ? "faceted gears" : "smooth gears",
             {"", gears, n, n, 0.0, profile, turned_float, turned_float});
@@ -120,8 +127,7 @@ MeshesOfCase shaft_and_bore(const ConformingCase& of, bool coarse) {
   const FacetParts parts = cells(of, {perimeter_m, kShaftLength_m, kShaftFacets}, of.tool_triangles, shaft);
 
   Prism tube;
-  FacetParts inside =
-      cells(of, {perimeter_m, kBoreLength_m, kShaftFacets}, of.obstacle_triangles, tube);
+  FacetParts inside = cells(of, {perimeter_m, kBoreLength_m, kShaftFacets}, of.obstacle_triangles, tube);
   inside.along_bore = inside.along;
   inside.along = 1;
   // The facets of the bore, not its corners, keep the clearance.
@@ -243,6 +249,12 @@ Pose pose_at(const ConformingCase& of, const Phases& phases, double t_s) {
 const std::vector<ConformingCase>& conforming_cases() {
   static const std::vector<ConformingCase> all = all_cases();
   return all;
+}
+
+const ConformingCase& conforming_case(const std::string& name) {
+  for (const ConformingCase& of : conforming_cases())
+    if (of.name == name) return of;
+  throw std::invalid_argument("no conforming case is named '" + name + "'");
 }
 
 MeshesOfCase fine_meshes(const ConformingCase& of) {

@@ -12,11 +12,11 @@ namespace wrenchd::test {
 
 /// Two bodies that touch face to face. C: frame of the tool's shape, with its origin in the middle.
 enum class ConformingShape : std::uint8_t {
-  cube_on_slab,   ///< cube of 50 mm on a slab of 300 x 300 x 20 mm, top at z = 0
-  shaft_in_bore,  ///< shaft of radius 9.9 mm and length 60 mm in a bore of length 50 mm
-  shaft_inserted, ///< the same bodies with chamfers; the shaft goes into the bore and out again
-  gears,          ///< two gears with 20 teeth, radius 23 mm, 10 mm thick
-  peg_in_hole,    ///< the bumpy peg and hole of tools/bench
+  cube_on_slab,    ///< cube of 50 mm on a slab of 300 x 300 x 20 mm, top at z = 0
+  shaft_in_bore,   ///< shaft of radius 9.9 mm and length 60 mm in a bore of length 50 mm
+  shaft_inserted,  ///< the same bodies with chamfers; the shaft goes into the bore and out again
+  gears,           ///< two gears with 20 teeth, radius 23 mm, 10 mm thick
+  peg_in_hole,     ///< the bumpy peg and hole of tools/bench
 };
 
 /// The tessellation of curved bodies.
@@ -37,6 +37,9 @@ struct ConformingCase {
 
 /// The cases: cube, shaft and gears at 10k to 1M triangles, exact and in float, axis-parallel and rotated.
 const std::vector<ConformingCase>& conforming_cases();
+
+/// Returns the case of this name. Throws std::invalid_argument if there is none.
+const ConformingCase& conforming_case(const std::string& name);
 
 struct MeshesOfCase {
   TriangleMesh tool, obstacle;  ///< in metres, in the frames C and W

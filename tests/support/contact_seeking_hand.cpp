@@ -40,10 +40,14 @@ ContactSeekingHand::ContactSeekingHand(const TriangleMesh& tool, const TriangleM
       obstacle_(obstacle),
       random_(seed),
       limits_(limits),
-      tool_radius_m_(radius_m(tool, Vector3d::Zero())),
-      middle_m_(middle_of(obstacle)) {
-  away_m_ = tool_radius_m_ + radius_m(obstacle, middle_m_) + 0.001;
-  X_WP_ = {random_.rotation(), middle_m_ + away_m_ * random_.unit<3>()};
+      tool_middle_m_(middle_of(tool)),
+      middle_m_(middle_of(obstacle)),
+      away_m_(radius_m(tool, Vector3d::Zero()) + radius_m(obstacle, middle_m_) + 0.001),
+      R_upright_(seed % 2 == 0 ? Quaterniond(0.0, 1.0, 0.0, 0.0) : Quaterniond::Identity()) {
+  if (limits.approach == Approach::axis)
+    X_WP_ = {R_upright_, middle_m_ - R_upright_ * tool_middle_m_ + away_m_ * Vector3d::UnitZ()};
+  else
+    X_WP_ = {random_.rotation(), middle_m_ + away_m_ * random_.unit<3>()};
 }
 
 /// Picks a triangle in proportion to the square root of its area at least: the largest of some random ones.
@@ -73,14 +77,27 @@ void ContactSeekingHand::choose_target() {
   ticks_left_ = random_.integer(300, 1200);
 }
 
+/// Chooses a pose below the obstacle; the hand presses towards it. Sometimes the hand lifts the tool.
+void ContactSeekingHand::choose_axial_target() {
+  constexpr double kAside_m = 0.001, kTilt_rad = 0.04, kTurn_rad = 1.5;
+  const Quaterniond R = rotation_from({0, 0, random_.uniform(-kTurn_rad, kTurn_rad)}) *
+                        rotation_from(random_.uniform(0.0, kTilt_rad) *
+                                      Vector3d(random_.normal(), random_.normal(), 0.0).normalized()) *
+                        R_upright_;
+  const Vector3d aside_m = random_.uniform(0.0, kAside_m) * random_.unit<3>();
+  X_target_ = {R, middle_m_ + aside_m - R * tool_middle_m_ - away_m_ * Vector3d::UnitZ()};
+  if (random_.chance(0.1)) X_target_.translation_m.z() = X_WP_.translation_m.z() + 0.003;
+  ticks_left_ = random_.integer(100, 600);
+}
+
 const Pose& ContactSeekingHand::next(const Pose& X_WQ) {
-  if (--ticks_left_ < 0) choose_target();
+  if (--ticks_left_ < 0) limits_.approach == Approach::axis ? choose_axial_target() : choose_target();
   const double step_m = limits_.speed_m_per_s * kTick_s, step_rad = limits_.turn_rad_per_s * kTick_s;
   X_target_.translation_m += kTick_s * slide_m_per_s_;
   const Pose wanted = moved_towards(X_WP_, X_target_, step_m, step_rad);
   // A hand that is held back stays near the proxy, but moves no faster than before.
-  X_WP_ = moved_towards(X_WP_, moved_towards(X_WQ, wanted, limits_.reach_m, limits_.reach_rad), step_m,
-                        step_rad);
+  X_WP_ =
+      moved_towards(X_WP_, moved_towards(X_WQ, wanted, limits_.reach_m, limits_.reach_rad), step_m, step_rad);
   return X_WP_;
 }
 

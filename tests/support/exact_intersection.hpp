@@ -10,7 +10,8 @@
 namespace wrenchd::test {
 
 /// Tests whether two meshes have a common point. Uses CGAL with exact arithmetic and no code of wrenchd: the
-/// numbers of the pose are exact fractions, and the rotation is q v q* / |q|^2.
+/// numbers of the pose are exact fractions, and the rotation is q v q* / |q|^2. Pairs that are apart by far
+/// more than rounding along a normal are decided in double precision.
 class ExactIntersection {
  public:
   /// a: the moving mesh. b: the static mesh.
