@@ -2,9 +2,11 @@
 #include "tools/check.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 
+#include "collision/query_cost.hpp"
 #include "collision/scene.hpp"
 #include "config/load_hand_script.hpp"
 #include "config/load_profile.hpp"
@@ -33,7 +35,25 @@ Kind kind_of(const std::filesystem::path& file) {
   return Kind::settings;
 }
 
-std::string about(const SceneSettings& settings, MeshLoader& meshes) {
+/// Time that the estimate of the query cost may take [s].
+constexpr double kEstimate_s = 2.0;
+/// Part of a tick that the proxy may take. The rest of the tick is for the device and the other stages.
+constexpr double kShareOfTick = 0.8;
+
+/// Returns what contact queries cost, and a remark if a tick is too short for them.
+std::string cost_text(const Scene& scene, double rate_Hz) {
+  const QueryCost cost = estimate_query_cost(scene, kEstimate_s);
+  if (cost.ticks == 0) return {};
+  std::ostringstream text;
+  text << "  contact queries: " << wrenchd::text(cost) << '\n';
+  if (cost.p99_s > kShareOfTick / rate_Hz)
+    text << "  remark: a tick of " << std::lround(1e6 / rate_Hz)
+         << " us is too short for the meshes of this scene; lower [servo] rate_Hz, raise surface_tolerance_m in the "
+            "scene, or use coarser meshes\n";
+  return text.str();
+}
+
+std::string about(const SceneSettings& settings, double rate_Hz, MeshLoader& meshes) {
   const Scene scene(settings, meshes);
   const ToolBody& tool = scene.tool();
   std::ostringstream text;
@@ -42,6 +62,7 @@ std::string about(const SceneSettings& settings, MeshLoader& meshes) {
        << " hull vertices\n  " << scene.half_spaces().size() << " half-space(s), " << scene.meshes().size()
        << " mesh obstacle(s)" << (scene.has_moving_obstacles() ? ", moving" : "") << '\n';
   for (const std::string& simplification : meshes.simplifications()) text << "  " << simplification << '\n';
+  text << cost_text(scene, rate_Hz);
   for (const std::string& change : meshes.changes()) text << "  changed: " << change << '\n';
   for (const std::string& remark : meshes.warnings()) text << "  remark: " << remark << '\n';
   return text.str();
@@ -62,7 +83,7 @@ std::string about(const DeviceProfile& profile) {
 std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
   switch (kind_of(file)) {
     case Kind::scene:
-      return file.string() + ": valid scene\n" + about(load_scene(file), meshes);
+      return file.string() + ": valid scene\n" + about(load_scene(file), ServoSettings{}.rate_Hz, meshes);
     case Kind::profile:
       return file.string() + ": valid device profile\n" + about(load_profile(file));
     case Kind::hand_script: {
@@ -77,7 +98,7 @@ std::string check_file(const std::filesystem::path& file, MeshLoader& meshes) {
   const RunConfig plan = load_run_config({file, {}, {}, false}, SearchPath());
   return file.string() + ": valid configuration\n" +
          (plan.profile.name.empty() ? "profile: that of the connected device\n" : about(plan.profile)) +
-         about(plan.scene, meshes);
+         about(plan.scene, plan.settings.servo.rate_Hz, meshes);
 }
 
 std::string check_against_descriptor(const std::filesystem::path& profile, const DescriptorSource& device) {

@@ -183,7 +183,7 @@ std::shared_ptr<const MeshBvh> MeshLoader::build_bvh(TriangleMesh mesh, BodyKind
                                                    bytes_of(mesh.vertices_m), bytes_of(mesh.triangles)};
   auto bvh = std::make_shared<const MeshBvh>(cached<MeshBvh>(made_from, triangles >= kLargeMeshTriangles, [&] {
     if (tolerance_m > 0.0) {
-      report_progress(file, triangles, "finding the enclosing surface for contacts");
+      report_progress(file, triangles, "finding its contact surface");
       SimplifiedMesh simplified = simplify_enclosing(mesh, tolerance_m);
       if (simplified.mesh.triangles.size() < triangles || simplified.distance_m > 0.0)
         return MeshBvh(std::move(simplified), mesh);

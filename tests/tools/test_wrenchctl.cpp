@@ -654,6 +654,18 @@ TEST_CASE("wrenchctl check accepts every file that is shipped") {
   CHECK(count >= 5);  // configuration, scene, two profiles, hand script
 }
 
+TEST_CASE("wrenchctl check says what contact queries cost") {
+  const Bench bench;
+  const auto check = [&](std::size_t triangles) {
+    const std::string mesh = "mesh = { make = \"bumpy\", triangles = " + std::to_string(triangles) + " }\n";
+    const fs::path scene = bench.dir.write("scene.toml", "surface_tolerance_m = 0.0\n[tool]\n" + mesh + "[[obstacle]]\n" + mesh);
+    return run_program("wrenchctl", {"check", scene.string()}).out;
+  };
+  const std::string coarse = check(80);
+  CHECK(coarse.find("contact queries: 99 % within ") != std::string::npos);
+  CHECK(coarse.find("remark") == std::string::npos);
+}
+
 TEST_CASE("wrenchctl check rejects the files that the daemon rejects") {
   const Bench bench;
   const auto bad = [&](const std::string& name, const std::string& text, const std::string& expected) {

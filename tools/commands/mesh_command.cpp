@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -16,6 +17,8 @@
 #include "collision/meshes/mesh_simplifier.hpp"
 #include "collision/meshes/mesh_size.hpp"
 #include "collision/meshes/mesh_source.hpp"
+#include "collision/query_cost.hpp"
+#include "collision/scene.hpp"
 #include "collision/tool_body.hpp"
 #include "core/inertia.hpp"
 #include "core/scene_settings.hpp"
@@ -42,6 +45,15 @@ PolygonSoup read_soup(const std::filesystem::path& file) {
   return soup;
 }
 
+/// Returns what queries cost while the solid is pressed onto a copy of itself. mesh: in metres.
+std::string self_contact_text(TriangleMesh mesh) {
+  constexpr double kEstimate_s = 2.0;
+  ToolBody tool = tool_body(std::move(mesh), 1.0, 1.0);
+  const auto bvh = std::make_shared<const MeshBvh>(tool.mesh);
+  const Scene scene(std::move(tool), {}, {}, {MeshObstacle("copy", bvh, Pose{})}, bvh);
+  return text(estimate_query_cost(scene, kEstimate_s)) + ", on a copy of itself";
+}
+
 void print_solid(TriangleMesh mesh, const std::filesystem::path& file, double scale) {
   const auto implausible = implausible_size(mesh, scale, kPlausibleToolSize);
   for (Vector3d& p : mesh.vertices_m) p *= scale;
@@ -59,9 +71,10 @@ void print_solid(TriangleMesh mesh, const std::filesystem::path& file, double sc
   print_row("inertia xy xz yz", {H(0, 1), H(0, 2), H(1, 2)}, "m^2");
   const std::size_t triangles = mesh.triangles.size();
   const double tolerance_m = simplification_tolerance_m(mesh, SceneSettings{}.surface_tolerance_m);
-  const SimplifiedMesh simplified = simplify_enclosing(std::move(mesh), tolerance_m);
+  SimplifiedMesh simplified = simplify_enclosing(std::move(mesh), tolerance_m);
   std::printf("%-18s %s\n", "contact surface",
               contact_surface_text(simplified.mesh.triangles.size(), triangles, simplified.distance_m).c_str());
+  std::printf("%-18s %s\n", "contact queries", self_contact_text(std::move(simplified.mesh)).c_str());
 }
 
 class MeshCommand final : public Subcommand {
