@@ -156,7 +156,7 @@ MethodResult list_devices() {
          {"profile", selected ? Json(known.profiles[choice.selection->profile].name) : Json(nullptr)},
          {"rejection_reason", choice.rejections[i]}});
   }
-  return Json{{"devices", list}, {"invalid_profiles", known.refused}};
+  return Json{{"devices", list}, {"invalid_profiles", known.rejected}};
 }
 
 void add_status_methods(MethodTable& table, const DaemonContext& context) {
@@ -248,7 +248,7 @@ void add_state_machine_methods(MethodTable& table, const DaemonContext& context)
                 Role::operator_,
                 {},
                 "Requests force; only the holder of the lease may. The force rises when the hand is calm. "
-                "Event 'state' or 'arming_refused' reports the result.",
+                "Event 'state' or 'arming_rejected' reports the result.",
                 [context](const Json&, const Caller& caller) { return arm(context, caller); }});
   table.add(
       MethodRow{"disarm",

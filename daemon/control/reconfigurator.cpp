@@ -40,7 +40,7 @@ std::string names(const SceneSettings& scene) {
   return all.empty() ? "none" : all;
 }
 
-[[noreturn]] void refuse_unknown(const std::string& name, const SceneSettings& scene) {
+[[noreturn]] void reject_unknown(const std::string& name, const SceneSettings& scene) {
   throw std::invalid_argument("there is no obstacle '" + name + "' in the scene; there are: " + names(scene));
 }
 
@@ -168,7 +168,7 @@ void Reconfigurator::remove_obstacle(const std::string& name) {
   SceneSettings scene = config_.scene;
   const auto is_it = [&name](const auto& obstacle) { return obstacle.name == name; };
   if (std::erase_if(scene.half_spaces, is_it) + std::erase_if(scene.meshes, is_it) == 0)
-    refuse_unknown(name, scene);
+    reject_unknown(name, scene);
   for (MeshObstacleSettings& mesh : scene.meshes) finish_motion(mesh, scene_time_s());
   auto scene_built = build_scene(scene);
   auto rendering = build_rendering(config_.settings, scene_built);
@@ -207,7 +207,7 @@ void Reconfigurator::move_obstacle(const std::string& name, const Pose& X_WO, do
     if (std::any_of(scene.half_spaces.begin(), scene.half_spaces.end(), is_it))
       throw std::invalid_argument("'" + name +
                                   "' is a half_space, which cannot move; use a mesh for a moving obstacle");
-    refuse_unknown(name, scene);
+    reject_unknown(name, scene);
   }
   if (!is_finite(X_WO)) throw std::invalid_argument("the pose of '" + name + "' is not finite");
   if (!(duration_s > 0.0) || !(duration_s <= 86400.0))

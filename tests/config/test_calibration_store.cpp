@@ -55,8 +55,8 @@ struct Bench {
     const auto read = store.read(calibration.profile, calibration.serial);
     return read && same(*read, calibration);
   }
-  /// Why the file is refused; empty where it is not.
-  std::string refusal() const {
+  /// Why the file is rejected; empty where it is not.
+  std::string rejection() const {
     try {
       store.read("polhem", "A-0017");
     } catch (const ConfigError& error) {
@@ -113,20 +113,20 @@ TEST_CASE("a person can read the file, and anybody may", "[calibration]") {
   CHECK(std::distance(fs::directory_iterator(bench.place), {}) == 1);  // nothing is left beside it
 }
 
-TEST_CASE("every truncation of a file is refused", "[calibration]") {
+TEST_CASE("every truncation of a file is rejected", "[calibration]") {
   Bench bench;
   const std::string whole = to_text(kOld);
   bench.put(whole);
   REQUIRE(bench.holds(kOld));
   for (std::size_t length = 0; length < whole.size(); ++length) {
     bench.put(whole.substr(0, length));
-    CHECK_FALSE(bench.refusal().empty());
+    CHECK_FALSE(bench.rejection().empty());
   }
 }
 
-TEST_CASE("every change of one byte is refused, and every byte more", "[calibration]") {
+TEST_CASE("every change of one byte is rejected, and every byte more", "[calibration]") {
   const std::string whole = to_text(kOld);
-  const auto refused = [](const std::string& text) {
+  const auto rejected = [](const std::string& text) {
     try {
       parse_calibration(text, "a file");
     } catch (const ConfigError&) {
@@ -134,27 +134,27 @@ TEST_CASE("every change of one byte is refused, and every byte more", "[calibrat
     }
     return false;
   };
-  REQUIRE_FALSE(refused(whole));
+  REQUIRE_FALSE(rejected(whole));
   int accepted = 0;
   for (std::size_t i = 0; i < whole.size(); ++i)
     for (int byte = 0; byte < 256; ++byte) {
       std::string changed = whole;
       changed[i] = static_cast<char>(byte);
-      accepted += changed != whole && !refused(changed);
+      accepted += changed != whole && !rejected(changed);
     }
   for (std::size_t i = 0; i <= whole.size(); ++i)
     for (const char more : {'0', '\n', ' ', '\0'}) {
       std::string longer = whole;
       longer.insert(i, 1, more);
-      accepted += longer != whole && !refused(longer);
+      accepted += longer != whole && !rejected(longer);
       std::string shorter = whole;
       shorter.erase(i, 1);
-      accepted += i < whole.size() && !refused(shorter);
+      accepted += i < whole.size() && !rejected(shorter);
     }
   CHECK(accepted == 0);
 }
 
-TEST_CASE("foreign files and those of another format are refused with the cure", "[calibration]") {
+TEST_CASE("foreign files and those of another format are rejected with the cure", "[calibration]") {
   struct Bad {
     std::string text;
     std::string message;
@@ -190,24 +190,25 @@ TEST_CASE("foreign files and those of another format are refused with the cure",
        }) {
     INFO(bad.text.substr(0, 200));
     bench.put(bad.text);
-    const std::string message = bench.refusal();
+    const std::string message = bench.rejection();
     INFO(message);
     CHECK(message.find(bench.file.string()) == 0);
     CHECK(message.find(bad.message) != std::string::npos);
   }
 }
 
-TEST_CASE("what is no regular file is refused", "[calibration]") {
+TEST_CASE("what is no regular file is rejected", "[calibration]") {
   Bench bench;
   fs::create_directories(bench.file);
-  CHECK(bench.refusal().find("is not a regular file") != std::string::npos);
+  CHECK(bench.rejection().find("is not a regular file") != std::string::npos);
   fs::remove(bench.file);
   const auto elsewhere = bench.dir.write("elsewhere", to_text(kOld));
   fs::create_symlink(elsewhere, bench.file);
-  CHECK(bench.refusal().find("cannot be opened") != std::string::npos);
+  CHECK(bench.rejection().find("cannot be opened") != std::string::npos);
   fs::remove(bench.file);
   REQUIRE(mkfifo(bench.file.c_str(), 0600) == 0);
-  CHECK(bench.refusal().find("is not a regular file") != std::string::npos);  // and nobody waits for a writer
+  CHECK(bench.rejection().find("is not a regular file") !=
+        std::string::npos);  // and nobody waits for a writer
   // Writing replaces whatever has the name, and follows nothing.
   fs::remove(bench.file);
   fs::create_symlink(elsewhere, bench.file);

@@ -72,7 +72,7 @@ TEST_CASE("the administrator's file may inherit the package's of the same name",
   CHECK(std::count(files.begin(), files.end(), kLoopback) == 0);
 }
 
-TEST_CASE("profiles that inherit each other are refused with the whole way", "[inherited_toml]") {
+TEST_CASE("profiles that inherit each other are rejected with the whole way", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path()});
   dir.write("profiles/a.toml", inheriting("b"));
@@ -84,7 +84,7 @@ TEST_CASE("profiles that inherit each other are refused with the whole way", "[i
   CHECK_THAT(rejection_text(self, search), Contains("self.toml:1:12: ") && Contains("must not inherit"));
 }
 
-TEST_CASE("a parent that is not there, or has no name, is refused", "[inherited_toml]") {
+TEST_CASE("a parent that is not there, or has no name, is rejected", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path()});
   const auto file = dir.write("profiles/a.toml", "\n" + inheriting("nobody"));

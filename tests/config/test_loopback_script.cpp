@@ -55,7 +55,7 @@ command = "arm"
   CHECK(script.commands[1].at == std::chrono::seconds(3));
 }
 
-TEST_CASE("a script that cannot be is refused with its place and the cure", "[loopback_script]") {
+TEST_CASE("a script that cannot be is rejected with its place and the cure", "[loopback_script]") {
   const TemporaryDirectory dir;
   const auto told = [&](const std::string& text) -> std::string {
     try {

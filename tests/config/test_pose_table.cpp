@@ -17,7 +17,7 @@ std::vector<Pose> poses(const std::string& text) {
   return read_poses(in, "p.csv");
 }
 
-/// What the table is refused with; empty when it is read.
+/// What the table is rejected with; empty when it is read.
 std::string rejection_text(const std::string& text) {
   try {
     poses(text);
@@ -93,7 +93,7 @@ TEST_CASE("numbers have a decimal point in every locale") {
   CHECK(message.find("p.csv:2:1: expected 7 numbers") == 0);
 }
 
-TEST_CASE("a bad table is refused at its line and column, with the cure") {
+TEST_CASE("a bad table is rejected at its line and column, with the cure") {
   const std::vector<std::pair<std::string, std::string>> bad = {
       {"", "p.csv:1:1: is empty; expected the header 'px,py,pz,qx,qy,qz,qw'"},
       {"\n\n", "p.csv:1:1: is empty; expected the header 'px,py,pz,qx,qy,qz,qw'"},
@@ -160,7 +160,7 @@ TEST_CASE("poses with times come back as counted from the first", "[playback]") 
   CHECK(poses[2].X.translation_m.x() == 0.02);
 }
 
-TEST_CASE("what a hand cannot do, and what is no table of times, is refused with its line", "[playback]") {
+TEST_CASE("what a hand cannot do, and what is no table of times, is rejected with its line", "[playback]") {
   const std::string header = "time_s,px,py,pz,qx,qy,qz,qw\n", first = "0,0,0,0,0,0,0,1\n";
   const std::vector<std::pair<std::string, std::string>> bad = {
       {"", "t.csv:1:1: is empty; expected the header 'time_s,px"},

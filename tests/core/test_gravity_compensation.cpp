@@ -152,7 +152,7 @@ TEST_CASE("a handle that would fall stays where it is put, and coasts when it is
   }
 }
 
-TEST_CASE("masses that cannot be are refused", "[gravity]") {
+TEST_CASE("masses that cannot be are rejected", "[gravity]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Quaterniond level = Quaterniond::Identity();
   CHECK_NOTHROW(GravityCompensation({}, level));

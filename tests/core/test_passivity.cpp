@@ -271,17 +271,17 @@ TEST_CASE("what is not finite neither harms the guard nor is hidden by it", "[pa
   CHECK(guard.energy_out_J() == 0.0);
 }
 
-TEST_CASE("the guard refuses caps that cannot be", "[passivity]") {
-  const auto refused = [](const std::function<void(PassivityLimits&)>& spoil) {
+TEST_CASE("the guard rejects caps that cannot be", "[passivity]") {
+  const auto rejected = [](const std::function<void(PassivityLimits&)>& spoil) {
     PassivityLimits caps;
     spoil(caps);
     CHECK_THROWS_AS(PassivityGuard(kDevice, caps), std::invalid_argument);
   };
-  refused([](auto& c) { c.damping_N_s_per_m = -1.0; });
-  refused([](auto& c) { c.damping_Nm_s_per_rad = std::nan(""); });
-  refused([](auto& c) { c.scaling_end_J = c.scaling_start_J; });
-  refused([](auto& c) { c.scaling_start_J = -1.0; });
-  refused([](auto& c) { c.delay_ticks = PassivityGuard::kMaxDelay_ticks + 1; });
+  rejected([](auto& c) { c.damping_N_s_per_m = -1.0; });
+  rejected([](auto& c) { c.damping_Nm_s_per_rad = std::nan(""); });
+  rejected([](auto& c) { c.scaling_end_J = c.scaling_start_J; });
+  rejected([](auto& c) { c.scaling_start_J = -1.0; });
+  rejected([](auto& c) { c.delay_ticks = PassivityGuard::kMaxDelay_ticks + 1; });
 }
 
 TEST_CASE("the guard allocates nothing", "[passivity][rt]") {

@@ -176,7 +176,7 @@ TEST_CASE("a coarse encoder bounds a wall that rate and delay would bear", "[sta
                     Catch::Contains("encoder's step"));
 }
 
-TEST_CASE("the bound refuses what cannot be, and names it", "[stability_bound]") {
+TEST_CASE("the bound rejects what cannot be, and names it", "[stability_bound]") {
   const LoopDelay loop{1e-3, 1e-3};
   CHECK_THROWS_WITH(stability_bound({}, loop, spring(1.0, 1.0), {}), Catch::Contains("damping_N_s_per_m"));
   CHECK_THROWS_WITH(stability_bound({-0.1, 0.1}, loop, spring(1.0, 1.0), {}), Catch::Contains("0 or more"));

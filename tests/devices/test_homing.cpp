@@ -480,7 +480,7 @@ TEST_CASE("homing asks only for sensed axes", "[homing]") {
 }
 
 TEST_CASE("an invalid homing plan is rejected", "[homing]") {
-  const auto refused = [](const std::function<void(HomingPlan&)>& spoil) {
+  const auto rejected = [](const std::function<void(HomingPlan&)>& spoil) {
     HomingPlan plan;
     spoil(plan);
     try {
@@ -491,16 +491,16 @@ TEST_CASE("an invalid homing plan is rejected", "[homing]") {
     return false;
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  CHECK_FALSE(refused([](HomingPlan&) {}));
-  CHECK(refused([](HomingPlan& p) { p.sensed = {}; }));
-  CHECK(refused([](HomingPlan& p) { p.travel_m = 0.0; }));
-  CHECK(refused([=](HomingPlan& p) { p.travel_m = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.travel_rad = 3.0; }));
-  CHECK(refused([](HomingPlan& p) { p.workspace_max_m.y() = -1.0; }));
-  CHECK(refused([=](HomingPlan& p) { p.workspace_min_m.x() = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.max_rotation_rad = 0.1; }));
-  CHECK(refused([=](HomingPlan& p) { p.max_offset_m = nan; }));
-  CHECK(refused([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
+  CHECK_FALSE(rejected([](HomingPlan&) {}));
+  CHECK(rejected([](HomingPlan& p) { p.sensed = {}; }));
+  CHECK(rejected([](HomingPlan& p) { p.travel_m = 0.0; }));
+  CHECK(rejected([=](HomingPlan& p) { p.travel_m = nan; }));
+  CHECK(rejected([](HomingPlan& p) { p.travel_rad = 3.0; }));
+  CHECK(rejected([](HomingPlan& p) { p.workspace_max_m.y() = -1.0; }));
+  CHECK(rejected([=](HomingPlan& p) { p.workspace_min_m.x() = nan; }));
+  CHECK(rejected([](HomingPlan& p) { p.max_rotation_rad = 0.1; }));
+  CHECK(rejected([=](HomingPlan& p) { p.max_offset_m = nan; }));
+  CHECK(rejected([](HomingPlan& p) { p.X_BR.rotation.w() = 2.0; }));
 }
 
 TEST_CASE("homing is real-time safe for arbitrary samples", "[homing]") {

@@ -418,7 +418,7 @@ class Proof {
   int signal_ = 0;
 };
 
-/// Requests a real-time priority, because a device does not wait for other programs. If the system refuses
+/// Requests a real-time priority, because a device does not wait for other programs. If the system rejects
 /// it, some attempts fail without an effect on the result.
 void ask_for_realtime() {
   const sched_param priority{48};  // above the daemon's priority of 45

@@ -267,13 +267,13 @@ void falcon() {
   const UsbDevice listed = await_listed(identity, false);
   DeviceProfile profile = profile_of(listed);
   CHECK_THAT(row, profile.name == "falcon");
-  std::string refusal;
+  std::string rejection;
   try {
     make_link(Backend::libusb, listed, kPriority, link_settings(profile))->open();
   } catch (const std::runtime_error& e) {
-    refusal = e.what();
+    rejection = e.what();
   }
-  CHECK_THAT(row, refusal.find("it runs no firmware, and none is named") != std::string::npos);
+  CHECK_THAT(row, rejection.find("it runs no firmware, and none is named") != std::string::npos);
 
   profile.endpoints.firmware = "/tmp/firmware";
   std::vector<std::uint8_t> firmware(1000);

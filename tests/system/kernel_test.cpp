@@ -269,8 +269,8 @@ void steady(const Budget& budget) {
   const Duration p50 = quantile(turn_around, 0.5), p999 = quantile(turn_around, 0.999);
   const Duration work50 = quantile(seen.work, 0.5), work999 = quantile(seen.work, 0.999);
   row.saw(summary(seen));
-  row.saw(format("%" PRIu64 " commands taken, %" PRIu64 " refused", after.commands - before.commands,
-                 after.refused - before.refused));
+  row.saw(format("%" PRIu64 " commands taken, %" PRIu64 " rejected", after.commands - before.commands,
+                 after.rejected - before.rejected));
   row.saw(format("pose to command on the wire p50 %.3f p99.9 %.3f max %.3f us", us(p50), us(p999),
                  us(quantile(turn_around, 1.0))));
   row.saw(format("read to write p50 %.3f p99.9 %.3f max %.3f us", us(work50), us(work999),
@@ -283,7 +283,7 @@ void steady(const Budget& budget) {
   CHECK_THAT(row, seen.allocations == 0 && seen.locks == 0);
   CHECK_THAT(row, after.unprepared == before.unprepared);
   CHECK_THAT(row, after.late_ticks == before.late_ticks);
-  CHECK_THAT(row, after.refused == 0);
+  CHECK_THAT(row, after.rejected == 0);
   CHECK_THAT(row, after.motors_on && !after.watchdog_tripped);
   // The first or the last may be on its way as the ticks begin and end.
   const auto commands = static_cast<std::int64_t>(after.commands - before.commands);
@@ -512,7 +512,7 @@ void unplugged_in_a_write(Backend backend) {
 /// The link that knew the device is opened again and finds another in its place.
 void another_device(Backend backend, const char* what, const UsbipDevice::Identity& other) {
   Row row(backend, format("%s back in the same port", what),
-          "refused by name, and not one byte is written to it");
+          "rejected by name, and not one byte is written to it");
   Session s(backend, 1000.0);
   s.arm();
   s.far.unplug();
@@ -521,18 +521,18 @@ void another_device(Backend backend, const char* what, const UsbipDevice::Identi
   UsbipDevice stranger(other, 1000.0, kPriority);
   stranger.plug(kPort);
   const UsbDevice found = await_listed(other);
-  std::string refusal;
+  std::string rejection;
   try {
     s.device.open();
   } catch (const std::runtime_error& e) {
-    refusal = e.what();
+    rejection = e.what();
   }
   s.servo.arm();
   const Seen seen = s.servo.run_for(20ms);
   std::this_thread::sleep_for(20ms);
-  row.saw(refusal.empty() ? "opened" : refusal);
+  row.saw(rejection.empty() ? "opened" : rejection);
   CHECK_THAT(row, found.port_path == s.listed.port_path);
-  CHECK_THAT(row, refusal.find("nothing was written") != std::string::npos);
+  CHECK_THAT(row, rejection.find("nothing was written") != std::string::npos);
   CHECK_THAT(row, seen.fault == Fault::device_lost);
   CHECK_THAT(row, stranger.record().out_reports == 0);
   CHECK_THAT(row, stranger.record().made > 0);

@@ -151,7 +151,7 @@ void UsbipDevice::take_command(std::span<const std::uint8_t> data) {
   const auto [outcome, report] = decode(profile_.wrench_report, data);
   if (outcome == Decoding::ok) record_.last = report;
   if (!firmware_.take_command(now, data)) {
-    ++record_.refused;
+    ++record_.rejected;
     return;
   }
   ++record_.commands;

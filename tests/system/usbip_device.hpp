@@ -25,7 +25,7 @@ enum class Trouble : std::uint8_t {
   silent,         ///< no reports; poses are taken all the same, so that their numbers go on
   stalled_once,   ///< the IN endpoint halts until the host clears it; then it works again
   stalled,        ///< it halts, and clearing does not help
-  deaf,           ///< NAKs its OUT endpoint: a command is neither taken nor refused
+  deaf,           ///< NAKs its OUT endpoint: a command is neither taken nor rejected
 };
 
 /// What the far side saw: the truth that the host is held against.
@@ -36,7 +36,7 @@ struct DeviceRecord {
   std::uint64_t late_ticks = 0;   ///< of the device itself: then the machine is too slow for the test
   std::uint64_t out_reports = 0;  ///< everything written to it, good or bad, by either way
   std::uint64_t commands = 0;     ///< commands its firmware took
-  std::uint64_t refused = 0;      ///< commands its firmware did not take
+  std::uint64_t rejected = 0;     ///< commands its firmware did not take
   std::uint64_t halts_cleared = 0;
   bool motors_on = false;
   bool watchdog_tripped = false;

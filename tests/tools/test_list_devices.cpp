@@ -265,7 +265,7 @@ TEST_CASE("a device that is not on USB is found by its node", "[list_devices]") 
 
 TEST_CASE("invalid profiles are listed below the devices", "[list_devices]") {
   KnownProfiles known = kShipped;
-  known.refused = {"profiles/mine.toml:3:1: key 'x' is not known"};
+  known.rejected = {"profiles/mine.toml:3:1: key 'x' is not known"};
   const std::string text = device_list(std::vector{space_navigator_in(1)}, known, false, open_to_all);
   CHECK(holds(text, "\n  profile spacemouse_split: "));
   CHECK(

@@ -13,7 +13,7 @@ import subprocess
 
 
 class CannotBuild(Exception):
-    """The compiler or the linker refused; says what it wrote."""
+    """The compiler or the linker rejected the source; contains its output."""
 
 
 def read_ninja(directory, *arguments):

@@ -36,7 +36,7 @@ LIST = "tests/mutants_explained.txt"
 
 @dataclasses.dataclass
 class Verdict:
-    kind: str  # seen, survived, refused
+    kind: str  # seen, survived, rejected
     words: str = ""  # the test that saw it, or why it could not be built
     tests: int = 0
     seconds: float = 0.0
@@ -168,7 +168,7 @@ class Judge:
             objects = self._compile(mutant, scratch)
             verdict = self._show(mutant, tests, objects, scratch)
         except CannotBuild as error:
-            verdict = Verdict("refused", str(error))
+            verdict = Verdict("rejected", str(error))
         verdict.seconds = time.monotonic() - started
         if verdict.kind == "survived" and not reached:
             verdict.words = "no test runs the line"
@@ -308,7 +308,7 @@ def run(judge, order, count, explained, jobs, place):
                 index, scratch = in_flight.pop(future)
                 free.append(scratch)
                 verdict = results[index] = future.result()
-                judged += verdict.kind != "refused"
+                judged += verdict.kind != "rejected"
                 mutant = order[index]
                 log(f"[{judged}/{min(count, len(order))}, {time.monotonic() - started:.0f} s] {verdict.kind:8} "
                     f"{mutant.file}:{mutant.line} {mutant.operator} {mutant.shown[:70]} "
@@ -322,7 +322,7 @@ def report(order, results, reasons, arguments, seconds):
     """Prints the table of survivors and the rate. Returns the exit code."""
     survivors = [(order[i], v) for i, v in sorted(results.items()) if v.kind == "survived"]
     seen = sum(v.kind == "seen" for v in results.values())
-    refused = sum(v.kind == "refused" for v in results.values())
+    rejected = sum(v.kind == "rejected" for v in results.values())
     if survivors:
         rows = [(f"{m.file}:{m.line}", m.function or m.declares, m.shown, v.words) for m, v in survivors]
         widths = [max(len(row[i]) for row in rows) for i in range(2)]
@@ -333,7 +333,7 @@ def report(order, results, reasons, arguments, seconds):
     rate = 100.0 * seen / total if total else 100.0
     dead = sum(bool(v.words) for _, v in survivors)
     print(f"\nseen {seen} of {total} mutants: {rate:.1f} %; {len(survivors)} survived, {dead} of them where no test runs")
-    print(f"left out: {len(reasons)} that {LIST} explains, {refused} that the compiler refuses; "
+    print(f"left out: {len(reasons)} that {LIST} explains, {rejected} that the compiler rejects; "
           f"seed {arguments.seed}, {seconds / 60:.1f} minutes")  # fmt: skip
     if arguments.at_least is not None and rate < arguments.at_least:
         print(f"fewer than the {arguments.at_least:g} % asked for")

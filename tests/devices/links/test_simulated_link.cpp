@@ -270,7 +270,7 @@ TEST_CASE("if the host hangs, the device's watchdog releases the hand", "[simula
 
 TEST_CASE("transport faults appear on every shipped profile as on the simulated device", "[simulation]") {
   const Kind kind = GENERATE(Kind::unplug, Kind::silence, Kind::freeze, Kind::corrupt, Kind::short_report,
-                             Kind::refuse_commands);
+                             Kind::reject_commands);
   for (const DeviceProfile& profile : all_shipped()) {
     INFO(profile.name << ", fault " << static_cast<int>(kind));
     SimulationSettings settings = moving();
@@ -308,7 +308,7 @@ TEST_CASE("transport faults appear on every shipped profile as on the simulated 
       case Kind::short_report:
         CHECK((rejected > 25) == (report.length / 2 < least));
         break;
-      case Kind::refuse_commands:
+      case Kind::reject_commands:
         CHECK((written == Fault::write_failed) == profile.has_output);
         break;
       default:

@@ -529,9 +529,9 @@ TEST_CASE("an injected jump appears at its start and its end") {
   CHECK(teleports == 2);
 }
 
-TEST_CASE("a device that refuses commands trips its watchdog") {
+TEST_CASE("a device that rejects commands trips its watchdog") {
   Rig rig(still_hand());
-  rig.simulation.inject({Kind::refuse_commands, 50ms, 50ms});
+  rig.simulation.inject({Kind::reject_commands, 50ms, 50ms});
   DeviceSample sample;
   for (int i = 1; i < 50; ++i) {
     sample = rig.read_after(1ms);

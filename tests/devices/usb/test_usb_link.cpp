@@ -162,7 +162,7 @@ TEST_CASE("libusb: reports are cut out of what a serial chip sends, whole, in tw
   CHECK(read_one(bench.link).second == Bytes{'<', 8, 9, '>'});
 }
 
-TEST_CASE("libusb: the endpoints that the settings name are taken, or the link is refused", "[usb]") {
+TEST_CASE("libusb: the endpoints that the settings name are taken, or the link is rejected", "[usb]") {
   MockMachine machine;
   MockUsb mock(machine, {});
   LinkSettings settings = patient();
@@ -257,7 +257,7 @@ TEST_CASE("libusb: an unplugged device is gone, whatever still waits", "[usb]") 
   CHECK_THROWS_WITH(bench.link.open(), Contains("no longer connected"));
 }
 
-TEST_CASE("libusb: another device in the same place is refused, and nothing is written to it", "[usb]") {
+TEST_CASE("libusb: another device in the same place is rejected, and nothing is written to it", "[usb]") {
   MockMachine machine;
   MockIdentity identity{.serial = "MINE"};
   auto mock = std::make_unique<MockUsb>(machine, identity);
@@ -288,7 +288,7 @@ TEST_CASE("libusb: two equal devices are each read for themselves", "[usb]") {
   CHECK(read_one(l).second == numbered(64, 1));
 }
 
-TEST_CASE("libusb: a device that is not on USB is refused with the alternative", "[usb]") {
+TEST_CASE("libusb: a device that is not on USB is rejected with the alternative", "[usb]") {
   UsbDevice device;
   device.hidraw_node = "/dev/hidraw0";
   CHECK_THROWS_WITH(UsbLink(device).open(), Contains("use hidraw"));
