@@ -145,7 +145,7 @@ void Supervisor::set_limits(const LimitSettings& limits) noexcept {
 }
 
 void Supervisor::raise(FaultSet faults, TimePoint now, double value) noexcept {
-  for (; faults != 0; faults &= faults - 1) raise(static_cast<Fault>(std::countr_zero(faults)), now, value);
+  for (; faults != 0; faults &= faults - 1) raise(first_fault(faults), now, value);
 }
 
 /// The log gets a fault that lasts once, and again if it changes the state.

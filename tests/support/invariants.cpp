@@ -65,7 +65,7 @@ std::optional<std::string> Invariants::check(const TickRecord& r) {
     return violation_text(r, "I4 from ", last_F, " to ", F, " N, ", last_T, " to ", T, " N.m");
   // The ramp ends in the first tick of `active`. A tick whose write was rejected ends in another state.
   const bool rose =
-      state == kRamping || (before.state == kRamping && (state == kActive || r.write_fault != 0));
+      state == kRamping || (before.state == kRamping && (state == kActive || r.write_fault != Fault::none));
   if (r.authority > before.authority && !rose)
     return violation_text(r, "I6 authority from ", before.authority, " to ", r.authority);
   const bool latched = before.state == kFault || before.state == kStopped;
