@@ -373,9 +373,9 @@ void read_homing(TomlTable& table, DeviceProfile& p) {
                                {"once", ReferenceSchedule::once},
                                {"each_start", ReferenceSchedule::each_start}});
   table.optional("check_axes").boolean(p.check_axes);
-  const TomlValue position = table.optional("rest_position_m");
-  const TomlValue rotation = table.optional("rest_rotation_vector_rad");
-  p.has_rest_pose = position || rotation;
+  const TomlValue position = table.optional("reference_position_m");
+  const TomlValue rotation = table.optional("reference_rotation_vector_rad");
+  p.has_reference_pose = position || rotation;
   position.vector(plan.X_BR.translation_m, {-2, 2});
   Vector3d turn = Vector3d::Zero();
   if (rotation.vector(turn, {-3.2, 3.2})) plan.X_BR.rotation = rotation_from(turn);

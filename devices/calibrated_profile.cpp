@@ -34,7 +34,7 @@ void shift_joint(DeviceProfile& profile, const AxisOffset& offset) {
 
 JointAngles angles_in_rest(const DeviceProfile& profile) {
   const Kinematics& k = profile.kinematics;
-  if (!profile.has_rest_pose) return joint_angles(k, k.home_counts);
+  if (!profile.has_reference_pose) return joint_angles(k, k.home_counts);
   const auto angles = inverse(k, inverse(profile.X_BD) * profile.homing.X_BR * inverse(profile.X_EH));
   if (angles) return *angles;
   throw std::invalid_argument(
@@ -74,7 +74,7 @@ HomingPlan homing_plan(const DeviceProfile& profile) {
   HomingPlan plan = profile.homing;
   const DofMask sensed = sensed_dofs(profile);
   for (unsigned i = 0; i < 6; ++i) plan.sensed[i] = (sensed >> i & 1u) != 0;
-  if (!has_joints(profile) || profile.has_rest_pose) return plan;
+  if (!has_joints(profile) || profile.has_reference_pose) return plan;
   if (const auto X_DE = home_pose(profile.kinematics)) plan.X_BR = profile.X_BD * *X_DE * profile.X_EH;
   return plan;
 }
