@@ -164,7 +164,7 @@ void add_status_methods(MethodTable& table, const DaemonContext& context) {
                       Role::observer,
                       {},
                       "Returns version and protocol, each method with its role and parameters, each event, "
-                      "and each error.",
+                      "each setting with the effect of its reload, and each error.",
                       [&table](const Json&, const Caller&) { return MethodResult(table.describe()); }});
   table.add(
       MethodRow{"status",

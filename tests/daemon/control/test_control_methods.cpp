@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cctype>
+#include <set>
 
 #include <catch2/catch.hpp>
 
 #include "config/config_error.hpp"
+#include "config/setting_table.hpp"
 #include "tests/support/control_rig.hpp"
 
 namespace wrenchd {
@@ -136,6 +138,21 @@ TEST_CASE("an unknown method or parameter is rejected with the nearest known nam
              "there is no parameter 'event'; did you mean 'events'?"));
   CHECK(rejected(t.methods, std::string(60000, 'x'), Json::object(), Role::observer).code() ==
         RpcCode::method_not_found);
+}
+
+TEST_CASE("describe returns each key of the setting table once, with the effect of its reload",
+          "[control_methods]") {
+  const Table t;
+  const Json description = t.methods.describe();
+  std::set<std::string> described;
+  for (const Json& setting : description["settings"]) {
+    CHECK(described.insert(setting["name"]).second);
+    CHECK(setting["on_reload"].get<std::string>().size() > 5);
+  }
+  std::set<std::string> keys;
+  for (const Setting& setting : setting_table())
+    if (setting.read != nullptr) keys.insert(setting.name());
+  CHECK(described == keys);
 }
 
 TEST_CASE("describe returns every method, event, error and role", "[control_methods]") {
