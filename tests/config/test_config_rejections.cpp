@@ -104,7 +104,7 @@ std::string point(const std::string& time_s, const std::string& position_m) {
 
 }  // namespace
 
-TEST_CASE("bad settings are rejected at their place, with the cure", "[config]") {
+TEST_CASE("invalid settings are rejected with location and remedy", "[config]") {
   const std::vector<Bad> table = {
       {"[servo]\nrate_hz = 1000", "2:1", "key 'servo.rate_hz' is not known; did you mean 'rate_Hz'?"},
       {"[servo]\nrate_kHz = 1", "2:1", "key 'servo.rate_kHz' is not known; give it in Hz as 'rate_Hz'"},
@@ -216,7 +216,7 @@ TEST_CASE("bad settings are rejected at their place, with the cure", "[config]")
   check_rejected(as_settings, table);
 }
 
-TEST_CASE("bad scenes are rejected at their place, with the cure", "[config]") {
+TEST_CASE("invalid scenes are rejected with location and remedy", "[config]") {
   const std::string plane = kTool + "[[obstacle]]\nhalf_space = ";
   const std::string mesh = kTool + "[[obstacle]]\nmesh = 'cube.off'\n";
   const std::vector<Bad> table = {
@@ -300,7 +300,7 @@ TEST_CASE("bad scenes are rejected at their place, with the cure", "[config]") {
   check_rejected(as_scene, table);
 }
 
-TEST_CASE("a velocity that is rejected does not have its turning back rejected as well", "[config]") {
+TEST_CASE("a rejected velocity is not also reported for its reversal", "[config]") {
   const TemporaryDirectory dir;
   dir.write("cube.off", "");
   const auto file = dir.write("s.toml", kTool +
@@ -311,7 +311,7 @@ TEST_CASE("a velocity that is rejected does not have its turning back rejected a
   CHECK(message.find('\n') == std::string::npos);
 }
 
-TEST_CASE("bad profiles are rejected at their place, with the cure", "[config]") {
+TEST_CASE("invalid profiles are rejected with location and remedy", "[config]") {
   const auto changed = [](const std::string& from, const std::string& to) {
     return with(kProfile, from, to);
   };
@@ -360,7 +360,7 @@ TEST_CASE("bad profiles are rejected at their place, with the cure", "[config]")
   check_rejected(as_profile, table);
 }
 
-TEST_CASE("bad hand scripts are rejected at their place, with the cure", "[config]") {
+TEST_CASE("invalid hand scripts are rejected with location and remedy", "[config]") {
   const std::string start = point("0", "[0, 0, 0]");
   const std::vector<Bad> table = {
       {"", "1:1", "key 'waypoint' is missing"},
@@ -380,7 +380,7 @@ TEST_CASE("bad hand scripts are rejected at their place, with the cure", "[confi
   check_rejected(as_hand_script, table);
 }
 
-TEST_CASE("everything wrong with a file is told at once, in its order", "[config]") {
+TEST_CASE("all defects of a file are reported together, in file order", "[config]") {
   const TemporaryDirectory dir;
   const auto file = dir.write("w.toml", "[servo]\nrate_Hz = 1\nprioriti = 3\n[limits]\nsoft_start_s = 9\n");
   try {
@@ -394,14 +394,14 @@ TEST_CASE("everything wrong with a file is told at once, in its order", "[config
   }
 }
 
-TEST_CASE("a misspelt mandatory key is told once", "[config]") {
+TEST_CASE("a misspelt mandatory key is reported once", "[config]") {
   const TemporaryDirectory dir;
   const auto file = dir.write("p.toml", with(kProfile, "max_force_N = 10.0", "max_force_mN = 10000"));
   const std::string message = rejection_text(as_profile, file);
   CHECK(message.find('\n') == std::string::npos);
 }
 
-TEST_CASE("what is not a readable file of sensible size is rejected", "[config]") {
+TEST_CASE("unreadable files and files that are too large are rejected", "[config]") {
   const TemporaryDirectory dir;
   const fs::path absent = dir.path() / "absent.toml";
   CHECK(rejection_text(as_scene, absent) == absent.string() + ": no such file; searched " + absent.string());
@@ -436,7 +436,7 @@ TEST_CASE("deep nesting through many lines of dotted keys does not overflow the 
                          "deep.toml:", "is nested more than 16 deep"));
 }
 
-TEST_CASE("mutated files load or are rejected, and nothing else", "[config]") {
+TEST_CASE("mutated files load or are rejected", "[config]") {
   const std::vector<std::pair<Load, std::string>> sources = {
       {as_settings, text_of(kConfig / "wrenchd.toml")},
       {as_scene, text_of(kConfig / "scenes/cube_on_table.toml")},

@@ -27,9 +27,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Answer = std::pair<int, int>;  ///< what the ioctl returns, and errno where that is -1
+using Answer = std::pair<int, int>;  ///< result of the ioctl, and errno if it is -1
 
-/// What answers ioctls: GLib's object system wants a class for it, and this is one for all.
+/// GLib class that answers all ioctls.
 class IoctlHandler {
  public:
   virtual ~IoctlHandler() = default;
@@ -75,7 +75,7 @@ void attach(UMockdevTestbed* testbed, const std::string& node, IoctlHandler* han
     throw std::runtime_error("umockdev: " + std::string(error->message));
 }
 
-/// The bytes at an ioctl's argument, `length` of them; valid until the ioctl ends.
+/// Returns `length` bytes of an ioctl's argument; valid until the ioctl ends.
 std::uint8_t* bytes_at(UMockdevIoctlData* argument, std::size_t offset, std::size_t length) {
   UMockdevIoctlData* const data = umockdev_ioctl_data_resolve(argument, offset, length, nullptr);
   if (data == nullptr) throw std::runtime_error("umockdev: an ioctl without its argument");
@@ -109,7 +109,8 @@ std::string add(UMockdevTestbed* testbed, const char* subsystem, const std::stri
   return result;
 }
 
-/// A device and all below it. umockdev leaves the links to those below, and minds them when they come again.
+/// Removes a device and its children. umockdev leaves the links of the children, which are errors when the
+/// children are added again.
 void remove(UMockdevTestbed* testbed, const std::string& path, std::vector<std::string> of) {
   umockdev_testbed_remove_device(testbed, path.c_str());
   gchar* const root = umockdev_testbed_get_root_dir(testbed);
@@ -201,7 +202,7 @@ Bytes report_descriptor(bool numbered) {
 
 // --- hidraw -----------------------------------------------------------------------------------------------
 
-/// hidraw's ioctls, as far as hidapi asks.
+/// The hidraw ioctls that hidapi uses.
 struct MockHidraw::Ioctls final : IoctlHandler {
   explicit Ioctls(Bytes of) : descriptor(std::move(of)) {}
 
@@ -268,8 +269,7 @@ void MockHidraw::send(const Bytes& report) {
 }
 
 bool MockHidraw::report_waits() const {
-  pollfd waiting{slave_, POLLIN,
-                 0};  // poll() also delivers the bytes that are still on their way to the node
+  pollfd waiting{slave_, POLLIN, 0};  // poll() also delivers pending bytes to the node
   return poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0;
 }
 
@@ -303,8 +303,8 @@ void MockHidraw::unplug() {
 
 // --- usbfs ------------------------------------------------------------------------------------------------
 
-/// usbfs's ioctls, as far as libusb asks. What a finished transfer looks like to poll() is a FIFO that is
-/// kept full and has room only while one waits to be reaped.
+/// The usbfs ioctls that libusb uses. A FIFO reports finished transfers to poll(): it is full, and has room
+/// only while a finished transfer waits for its reap ioctl.
 struct MockUsb::Ioctls final : IoctlHandler {
   struct Urb {
     UMockdevIoctlData* urb = nullptr;
@@ -379,7 +379,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
     return {0, 0};
   }
 
-  /// The strings of the device, which is all that is asked for.
+  /// Returns the strings of the device; libusb requests no other descriptors.
   int control(std::uint8_t* setup) const {
     if (setup[0] != 0x80 || setup[1] != 6 || setup[3] != 3) return -EPIPE;
     Bytes text{4, 3, 0x09, 0x04};
