@@ -455,7 +455,7 @@ void read_profile(TomlTable& table, DeviceProfile& p) {
       p.transport == Transport::libusb ? table.mandatory("endpoints") : table.optional("endpoints");
   endpoints.table(read_endpoints, p.endpoints);
   if (endpoints && p.transport != Transport::libusb)
-    endpoints.reject("only transport = \"libusb\" speaks to endpoints; choose it, or leave this out");
+    endpoints.reject("only transport = \"libusb\" uses endpoints; select it, or leave this out");
   table.optional("frames").table(read_frames, p);
   table.mandatory("limits").table(read_limits, p, capabilities);
   table.optional("closed_loop").table(read_closed_loop, p);

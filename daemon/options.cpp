@@ -15,7 +15,7 @@ namespace {
 
 void add_file_options(CLI::App& app, Options& options) {
   app.add_option("-c,--config", options.files.config,
-                 "wrenchd.toml; wrenchd looks for a plain name in /etc/wrenchd, /usr/share/wrenchd, then the "
+                 "wrenchd.toml; wrenchd searches for a plain name in /etc/wrenchd, /usr/share/wrenchd, then the "
                  "source tree")
       ->capture_default_str()
       ->check(not_empty());

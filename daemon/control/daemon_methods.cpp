@@ -250,15 +250,15 @@ void add_state_machine_methods(MethodTable& table, const DaemonContext& context)
                 "Requests force; only the holder of the lease may. The force rises when the hand is calm. "
                 "Event 'state' or 'arming_rejected' reports the result.",
                 [context](const Json&, const Caller& caller) { return arm(context, caller); }});
-  table.add(
-      MethodRow{"disarm",
-                Role::operator_,
-                {},
-                "The force fades out within 100 ms, whichever client armed. The lease keeps its holder.",
-                [context](const Json&, const Caller&) {
-                  context.runtime.loop().requests().disarm();
-                  return MethodResult(Json{{"requested", "disarm"}});
-                }});
+  table.add(MethodRow{
+      "disarm",
+      Role::operator_,
+      {},
+      "The force fades out within 100 ms, no matter which client armed. The lease keeps its holder.",
+      [context](const Json&, const Caller&) {
+        context.runtime.loop().requests().disarm();
+        return MethodResult(Json{{"requested", "disarm"}});
+      }});
   table.add(MethodRow{"acknowledge",
                       Role::operator_,
                       {},

@@ -33,7 +33,7 @@ void apply(FeedSnapshot& snapshot, const Event& event, const EventDescription& d
   if (const auto* state = std::get_if<Event::StateChanged>(&event.data)) {
     snapshot.state = state->state;
     snapshot.cause = state->cause;
-    if (state->state == State::self_test) snapshot.stiffness_scale = 1.0;  // the self-test measures it anew
+    if (state->state == State::self_test) snapshot.stiffness_scale = 1.0;  // the self-test measures it again
   }
   if (const auto* stiffness = std::get_if<Event::StiffnessScaled>(&event.data))
     snapshot.stiffness_scale = stiffness->scale;

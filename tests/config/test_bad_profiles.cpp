@@ -215,7 +215,7 @@ const std::vector<Bad> kTable = {
     {kWhole, "name = \"p\"", "nmae = \"p\"", "nmae", "did you mean 'name'?"},
     {kWhole, "\"hidraw\"", "\"hid\"", "\"hid\"", R"(expected "loopback", "hidraw" or "libusb")"},
     {kWhole, "transport = \"hidraw\"", "transport = \"libusb\"", "", "key 'endpoints' is missing"},
-    {kDelta, "\"libusb\"", "\"hidraw\"", "[endpoints]", "only transport = \"libusb\" speaks to endpoints"},
+    {kDelta, "\"libusb\"", "\"hidraw\"", "[endpoints]", "only transport = \"libusb\" uses endpoints"},
     {kDelta, "in = 0x81", "in = 0x01", "0x01", "from 129 to 143, found 1"},
     {kDelta, "out = 0x02", "out = 0x82", "0x82", "from 1 to 15, found 130"},
     {kDelta, "out = 0x02\n", "", "[endpoints]", "key 'endpoints.out' is missing"},

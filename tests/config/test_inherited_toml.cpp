@@ -87,10 +87,10 @@ TEST_CASE("profiles that inherit each other are rejected with the whole chain", 
 TEST_CASE("a missing or unnamed parent is rejected", "[inherited_toml]") {
   const TemporaryDirectory dir;
   const SearchPath search({dir.path()});
-  const auto file = dir.write("profiles/a.toml", "\n" + inheriting("nobody"));
+  const auto file = dir.write("profiles/a.toml", "\n" + inheriting("missing"));
   CHECK_THAT(rejection_text(file, search),
              Contains("a.toml:2:12: key 'inherits': no profile of this name; searched ") &&
-                 Contains("profiles/nobody.toml"));
+                 Contains("profiles/missing.toml"));
   CHECK_THAT(rejection_text(dir.write("profiles/a.toml", "inherits = 3\n"), search),
              Contains("a.toml:1:12: key 'inherits': expected the name of a profile"));
   CHECK_THAT(rejection_text(dir.write("profiles/a.toml", "inherits = \"\"\n"), search), Contains(":1:12: "));

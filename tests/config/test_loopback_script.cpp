@@ -57,7 +57,7 @@ command = "arm"
 
 TEST_CASE("an invalid script is rejected with location and remedy", "[loopback_script]") {
   const TemporaryDirectory dir;
-  const auto told = [&](const std::string& text) -> std::string {
+  const auto rejection = [&](const std::string& text) -> std::string {
     try {
       load_loopback_script(dir.write("s.toml", text));
     } catch (const ConfigError& error) {
@@ -66,15 +66,16 @@ TEST_CASE("an invalid script is rejected with location and remedy", "[loopback_s
     return "nothing";
   };
   using Catch::Matchers::Contains;
-  CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silense\"\n"),
+  CHECK_THAT(rejection("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silense\"\n"),
              Contains("4:8") && Contains("silence"));
-  CHECK_THAT(told("[[fault]]\nat_s = -1\nfor_s = 1\nkind = \"silence\"\n"), Contains("2:8"));
-  CHECK_THAT(told("[[fault]]\nat_s = 1\nkind = \"silence\"\n"), Contains("fault[0].for_s"));
-  CHECK_THAT(told("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silence\"\nvalue = 3\n"),
+  CHECK_THAT(rejection("[[fault]]\nat_s = -1\nfor_s = 1\nkind = \"silence\"\n"), Contains("2:8"));
+  CHECK_THAT(rejection("[[fault]]\nat_s = 1\nkind = \"silence\"\n"), Contains("fault[0].for_s"));
+  CHECK_THAT(rejection("[[fault]]\nat_s = 1\nfor_s = 1\nkind = \"silence\"\nvalue = 3\n"),
              Contains("5:9") && Contains("leave it out"));
-  CHECK_THAT(told("[[command]]\nat_s = 1\ncommand = \"jump\"\n"), Contains("3:11") && Contains("disarm"));
-  CHECK_THAT(told("[[fualt]]\nat_s = 1\n"), Contains("fualt") && Contains("fault"));
-  CHECK_THAT(told("fault = 3\n"), Contains("[[fault]]"));
+  CHECK_THAT(rejection("[[command]]\nat_s = 1\ncommand = \"jump\"\n"),
+             Contains("3:11") && Contains("disarm"));
+  CHECK_THAT(rejection("[[fualt]]\nat_s = 1\n"), Contains("fualt") && Contains("fault"));
+  CHECK_THAT(rejection("fault = 3\n"), Contains("[[fault]]"));
 }
 
 TEST_CASE("a short silence degrades the loop, which recovers; the exit code is 0", "[loopback_script]") {

@@ -222,7 +222,7 @@ TEST_CASE("two solids side by side are one: the parallel axis theorem", "[inerti
   }
 }
 
-TEST_CASE("an inertia is symmetric, positive, and obeys the triangle inequality", "[inertia]") {
+TEST_CASE("an inertia is symmetric, positive, and satisfies the triangle inequality", "[inertia]") {
   RandomValues random(8);
   for (int i = 0; i < 500; ++i) {
     const Matrix3d H = solid_properties(random_tetrahedron(random), 1.0).inertia.H_kg_m2;

@@ -155,7 +155,7 @@ TEST_CASE("mass times c: T times c, and no configuration becomes nearer than ano
   }
 }
 
-TEST_CASE("T = 0 if p = q, whichever sign the quaternion has", "[metric]") {
+TEST_CASE("T = 0 if p = q, for both signs of the quaternion", "[metric]") {
   RandomValues random(9);
   for (int i = 0; i < 2'000; ++i) {
     const auto [M, p, q] = random_case(random);

@@ -26,16 +26,16 @@ double energy_of_rotation(const Scene& scene, const Pose& X_WP, const Quaternion
 double brute_force(const Scene& scene, const Pose& X_WP, RandomValues& random) {
   double best = std::numeric_limits<double>::infinity();
   Quaterniond best_E = Quaterniond::Identity();
-  const auto look = [&](const Quaterniond& E) {
+  const auto try_rotation = [&](const Quaterniond& E) {
     const double T = energy_of_rotation(scene, X_WP, E);
     if (T >= best) return false;
     best = T;
     best_E = E;
     return true;
   };
-  for (int i = 0; i < 3000; ++i) look(random.rotation(random.uniform(0.0, 2.0)));
+  for (int i = 0; i < 3000; ++i) try_rotation(random.rotation(random.uniform(0.0, 2.0)));
   double step_rad = 0.2;
-  for (int i = 0; i < 6000; ++i) step_rad *= look(best_E * random.rotation(step_rad)) ? 1.2 : 0.99;
+  for (int i = 0; i < 6000; ++i) step_rad *= try_rotation(best_E * random.rotation(step_rad)) ? 1.2 : 0.99;
   return best;
 }
 

@@ -63,11 +63,11 @@ TEST_CASE("from cold, full force is reduced after -T ln(1 - (continuous / max)^2
 TEST_CASE("the heat is the first-order response to a constant force", "[thermal]") {
   for (const double force_N : {0.5, 2.0, 3.9}) {
     ThermalModel model(motors(), 10.0, 0.5);
-    const double settles = force_N * force_N / 16.0;
+    const double final_heat = force_N * force_N / 16.0;
     for (int tick = 1; tick <= 40'000; ++tick) {
       model.advance(push(force_N), kTick_s);
       if (tick % 10'000 == 0)
-        CHECK(model.force_heat() == Approx(settles * -std::expm1(-tick * kTick_s / 20.0)).epsilon(1e-9));
+        CHECK(model.force_heat() == Approx(final_heat * -std::expm1(-tick * kTick_s / 20.0)).epsilon(1e-9));
     }
     CHECK_FALSE(model.folded_back());
     CHECK(model.force_ceiling_N() == 10.0);
@@ -196,12 +196,12 @@ TEST_CASE("an invalid time step adds no heat, and a force that is not a number c
   CHECK(model.force_heat() == 0.0);
   CHECK(model.force_ceiling_N() == 10.0);
   for (const double bad : {nan, inf, 50.0, 1e100, 1e200, 1e308}) {
-    ThermalModel same(motors(), 10.0, 0.5), spoilt(motors(), 10.0, 0.5);
+    ThermalModel same(motors(), 10.0, 0.5), disturbed(motors(), 10.0, 0.5);
     for (int tick = 0; tick < 100; ++tick) {
       same.advance(push(10.0), kTick_s);
-      spoilt.advance({{bad, 0.0, 0.0}, {0.0, 0.0, 0.0}}, kTick_s);
+      disturbed.advance({{bad, 0.0, 0.0}, {0.0, 0.0, 0.0}}, kTick_s);
     }
-    CHECK(spoilt.force_heat() == Approx(same.force_heat()).epsilon(1e-12));
+    CHECK(disturbed.force_heat() == Approx(same.force_heat()).epsilon(1e-12));
   }
   model.advance(push(10.0), 1e300);  // a very long time at full force: maximum heat, limit at the rating
   CHECK(model.force_heat() == Approx(6.25));

@@ -192,7 +192,7 @@ class Daemon {
     over_ = true;
   }
   /// Checks the child without waiting.
-  void look() {
+  void poll_exit() {
     int status = 0;
     if (over_ || waitpid(pid_, &status, WNOHANG | WUNTRACED) != pid_) return;
     stopped_ = WIFSTOPPED(status);
@@ -294,7 +294,7 @@ class Proof {
       if (wall_now() >= end) return false;
       std::this_thread::sleep_for(kLook);
       device.live();
-      daemon.look();
+      daemon.poll_exit();
     }
     return true;
   }
@@ -326,12 +326,12 @@ class Proof {
   }
 
   void expect_silence(FarSide& device, TimePoint signalled) {
-    const long heard = device.received();
+    const long received = device.received();
     for (const TimePoint end = device.now() + bound_ + 50ms; device.now() < end;) {
       std::this_thread::sleep_for(kLook);
       device.live();
     }
-    if (device.received() != heard) violation("commands arrive from a killed daemon");
+    if (device.received() != received) violation("commands arrive from a killed daemon");
     if (device.push_N() != 0.0) violation("the motors push on");
     const Duration held = device.last_push() - device.last_command();
     if (held > bound_)
@@ -346,12 +346,12 @@ class Proof {
     if (!daemon.hold_servo_thread()) return violation("the servo thread cannot be held");
     device.live();
     const TimePoint held = device.now();
-    const long heard = device.received();
+    const long received = device.received();
     for (const TimePoint end = device.now() + bound_ + 50ms; device.now() < end;) {
       std::this_thread::sleep_for(kLook);
       device.live();
     }
-    if (device.received() == heard) violation("the writer thread sends no zero wrench for a hung loop");
+    if (device.received() == received) violation("the writer thread sends no zero wrench for a hung loop");
     if (device.push_N() != 0.0 || device.last_push() - held > bound_)
       violation("force for " + std::to_string(milliseconds(device.last_push() - held)) +
                 " ms after the loop was stuck");
@@ -377,7 +377,7 @@ class Proof {
   void restart(FarSide& device) {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
       Daemon daemon = start(device, {});
-      const bool speaks = until(device, daemon, 20s, [&] { return daemon.over() || device.received() > 0; });
+      const bool sends = until(device, daemon, 20s, [&] { return daemon.over() || device.received() > 0; });
       // The whole hand path: an armed daemon would see a calm hand within it and apply force.
       const TimePoint end = device.now() + from_seconds(kPath_s);
       until(device, daemon, 5s, [&] { return daemon.over() || device.now() > end; });
@@ -387,7 +387,7 @@ class Proof {
         count_fault();
         continue;
       }
-      if (!speaks || daemon.over())
+      if (!sends || daemon.over())
         return violation("the restarted daemon sends no command, or ends without a signal");
       daemon.signal(SIGTERM);
       if (!until(device, daemon, 5s, [&] { return daemon.over(); }))

@@ -52,14 +52,14 @@ constexpr int kPort = 0;
 // --- hot plug ---------------------------------------------------------------------------------------------
 
 /// Events of the hot-plug monitor; the test waits for them.
-class Told {
+class HotplugEvents {
  public:
-  void hear(const HotplugEvent& event) {
+  void record(const HotplugEvent& event) {
     const std::lock_guard lock(mutex_);
     events_.push_back(event);
     changed_.notify_all();
   }
-  void forget() {
+  void clear() {
     const std::lock_guard lock(mutex_);
     events_.clear();
   }
@@ -449,22 +449,22 @@ void closed(Backend backend) {
   CHECK_THAT(row, again.is_same_device(s.listed));
 }
 
-void unplugged(Backend backend, Told& told) {
+void unplugged(Backend backend, HotplugEvents& events) {
   Row row(
       backend, "unplugged, then plugged in",
       "device_lost within two ticks, reported by the monitor; found again, disarmed, motors off until armed");
   Session s(backend, 1000.0);
   s.arm();
-  told.forget();
+  events.clear();
   std::thread hand([&] {
     std::this_thread::sleep_for(10500us);
     s.far.unplug();
   });
   const Seen seen = s.servo.run_for(1s);
   hand.join();
-  CHECK_THAT(row, told.await(HotplugEvent::Kind::disconnected, "usb", s.listed.port_path));
+  CHECK_THAT(row, events.await(HotplugEvent::Kind::disconnected, "usb", s.listed.port_path));
   if (backend == Backend::hidraw)  // libusb detached the kernel driver, so the node is gone
-    CHECK_THAT(row, told.await(HotplugEvent::Kind::disconnected, "hidraw", s.listed.port_path));
+    CHECK_THAT(row, events.await(HotplugEvent::Kind::disconnected, "hidraw", s.listed.port_path));
   const Duration took = s.close();
   row.saw(summary(seen));
   row.saw(format("closed in %.3f ms", ms(took)));
@@ -473,10 +473,10 @@ void unplugged(Backend backend, Told& told) {
   CHECK_THAT(row, took < 600ms);
 
   UsbipDevice back(s.identity, 1000.0, kPriority);
-  told.forget();
+  events.clear();
   back.plug(kPort);
-  CHECK_THAT(row, told.await(HotplugEvent::Kind::connected, "usb", s.listed.port_path));
-  CHECK_THAT(row, told.await(HotplugEvent::Kind::connected, "hidraw", s.listed.port_path));
+  CHECK_THAT(row, events.await(HotplugEvent::Kind::connected, "usb", s.listed.port_path));
+  CHECK_THAT(row, events.await(HotplugEvent::Kind::connected, "hidraw", s.listed.port_path));
   const UsbDevice found = await_listed(s.identity);
   CHECK_THAT(row, found.is_same_device(s.listed) && found.port_path == s.listed.port_path);
   CHECK_THAT(row, back.record().out_reports == 0);
@@ -539,7 +539,7 @@ void another_device(Backend backend, const char* what, const UsbipDevice::Identi
   CHECK_THAT(row, stranger.record().made > 0);
 }
 
-void all_of(Backend backend, Told& told) {
+void all_of(Backend backend, HotplugEvents& events) {
   for (const Budget& budget : kBudgets)
     if (budget.backend == backend) steady(budget);
   bad_reports(backend, Trouble::short_reports, "short reports", true);
@@ -553,7 +553,7 @@ void all_of(Backend backend, Told& told) {
   blocked_output(backend);
   closed(backend);
   deaf_for_ever(backend);
-  unplugged(backend, told);
+  unplugged(backend, events);
   unplugged_in_a_write(backend);
   another_device(backend, "another product", {0x1209, 0x0001, "A1"});
   another_device(backend, "an equal one", {0x1209, 0x6d0f, "B2"});
@@ -565,9 +565,9 @@ int main() {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   mlockall(MCL_CURRENT | MCL_FUTURE);
   try {
-    Told told;
-    const HotplugMonitor monitor([&told](const HotplugEvent& event) { told.hear(event); });
-    for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, told);
+    HotplugEvents events;
+    const HotplugMonitor monitor([&events](const HotplugEvent& event) { events.record(event); });
+    for (const Backend backend : {Backend::hidraw, Backend::libusb}) all_of(backend, events);
     for (const Backend backend : {Backend::hidraw, Backend::libusb}) emulated_devices(backend);
   } catch (const std::exception& e) {
     std::printf("kernel test: %s\n", e.what());

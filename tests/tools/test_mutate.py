@@ -120,7 +120,7 @@ class Operators(unittest.TestCase):
 
 
 class Explanations(unittest.TestCase):
-    ENTRY = "file: sample.cpp\nfunction: limited\nline: if (!on) return 0.0;\nmutation: {}\nreason: nobody asks\n"
+    ENTRY = "file: sample.cpp\nfunction: limited\nline: if (!on) return 0.0;\nmutation: {}\nreason: unused\n"
 
     def check(self, text):
         lines = SAMPLE.splitlines()
@@ -184,7 +184,7 @@ TREE = {
         target_link_libraries(toy toy_core)
         add_test(NAME toy COMMAND toy)
         """,
-    # hidden() is called, but what it returns is looked at loosely.
+    # hidden() is called, but its result is checked loosely.
     "tests/toy.cpp": """\
         #include "core/toy.hpp"
         int main() {

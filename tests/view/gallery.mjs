@@ -92,7 +92,7 @@ test(async () => {
       const blank = await (await page.context().browser().newContext()).newPage();
       const count = await differing(blank, [picture, readFileSync(pictureOf(name))]);
       console.log(`${name}: ${count} blocks differ`);
-      assert.ok(count <= MOST_BLOCKS, `${name} looks different: ${count} blocks of ${BLOCK_px} pixels`);
+      assert.ok(count <= MOST_BLOCKS, `${name} differs: ${count} blocks of ${BLOCK_px} pixels`);
       await blank.close();
     }
     assert.deepEqual(page.complaints(), []);
