@@ -229,6 +229,9 @@ MockHidraw::MockHidraw(MockMachine& machine, MockIdentity identity)
       ioctls_(std::make_unique<Ioctls>(report_descriptor(identity_.numbered_reports))) {
   UMockdevTestbed* const testbed = machine_.testbed();
   const std::string number = std::to_string(identity_.number);
+  // Before the device is listed: a program that opens the node while umockdev's socket is bound but does not
+  // listen yet is ended by umockdev's preloaded library.
+  attach(testbed, node(), ioctls_.get());
   usb_path_ = add_usb(testbed, identity_);
   const std::string interface = add_interface(testbed, identity_, usb_path_);
   const std::string hid_name = "0003:" + identity_.vendor + ":" + identity_.product + ".000" + number;
@@ -252,7 +255,6 @@ MockHidraw::MockHidraw(MockMachine& machine, MockIdentity identity)
   cfmakeraw(&raw);
   tcsetattr(slave_, TCSANOW, &raw);
   fs::create_symlink(slave, node_in(testbed, node()));
-  attach(testbed, node(), ioctls_.get());
 }
 
 MockHidraw::~MockHidraw() {
@@ -407,7 +409,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
   }
 
   void drain() {
-    for (; !deaf && !out.empty(); out.pop_front()) {
+    for (; !blocked && !out.empty(); out.pop_front()) {
       const std::uint8_t* data = out.front().buffer->data;
       int length = out.front().head().buffer_length;
       if (out.front().head().type == USBDEVFS_URB_TYPE_CONTROL) {
@@ -468,7 +470,7 @@ struct MockUsb::Ioctls final : IoctlHandler {
   std::deque<Urb> in, out, finished;
   std::deque<Bytes> reports, received;
   std::pair<int, int> set_report{-1, -1};
-  bool halted = false, deaf = false, gone = false, claimed = false, kernel_driver = true;
+  bool halted = false, blocked = false, gone = false, claimed = false, kernel_driver = true;
   int halts_cleared = 0;
 };
 
@@ -476,6 +478,7 @@ MockUsb::MockUsb(MockMachine& machine, MockIdentity identity)
     : machine_(machine), identity_(std::move(identity)), ioctls_(std::make_unique<Ioctls>()) {
   UMockdevTestbed* const testbed = machine_.testbed();
   ioctls_->serial = identity_.serial;
+  attach(testbed, usb_node_of(identity_), ioctls_.get());  // before the device is listed, as for hidraw
   usb_path_ = add_usb(testbed, identity_);
   interface_path_ = add_interface(testbed, identity_, usb_path_);
   const auto id = [](const std::string& hex) { return std::stoul(hex, nullptr, 16); };
@@ -503,7 +506,6 @@ MockUsb::MockUsb(MockMachine& machine, MockIdentity identity)
   ioctls_->fifo = open(node.c_str(), O_RDWR | O_NONBLOCK);
   fcntl(ioctls_->fifo, F_SETPIPE_SZ, 4096);
   ioctls_->fill();
-  attach(testbed, usb_node_of(identity_), ioctls_.get());
 }
 
 MockUsb::~MockUsb() {
@@ -534,9 +536,9 @@ Bytes MockUsb::receive() {
   return report;
 }
 
-void MockUsb::set_deaf(bool deaf) {
+void MockUsb::set_blocked(bool blocked) {
   const std::lock_guard lock(ioctls_->mutex);
-  ioctls_->deaf = deaf;
+  ioctls_->blocked = blocked;
   ioctls_->drain();
 }
 

@@ -95,7 +95,7 @@ class MockUsb {
   /// Waits for a report of the host and returns it.
   Bytes receive();
   /// Selects whether the device accepts reports of the host.
-  void set_deaf(bool deaf);
+  void set_blocked(bool blocked);
   void unplug();
 
   /// wValue and wIndex of the last SET_REPORT; receive() returns its report.

@@ -119,12 +119,12 @@ TEST_CASE("libusb: reports to a HID interface without an OUT endpoint are sent a
     CHECK(mock.receive() == numbered(32, id));
     CHECK(mock.set_report() == std::pair(0x200 + (has_ids ? id : 0), 0));  // output report, interface 0
   }
-  mock.set_deaf(true);
+  mock.set_blocked(true);
   link.write(now(), Bytes(32, 1));
   link.write(now(), Bytes(32, 0));
   std::thread closing([&] { link.close(); });
   std::this_thread::sleep_for(20ms);
-  mock.set_deaf(false);
+  mock.set_blocked(false);
   Bytes last;
   do last = mock.receive();
   while (last != Bytes(32, 0));
@@ -173,11 +173,11 @@ TEST_CASE("libusb: the configured endpoints are used, or the link is rejected", 
 
 TEST_CASE("libusb: while the device accepts nothing, the newest report waits", "[usb]") {
   Bench bench;
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.write(now(), Bytes(32, 2));
   bench.link.write(now(), Bytes(32, 3));
-  bench.mock.set_deaf(false);
+  bench.mock.set_blocked(false);
   Bytes report;
   do report = bench.mock.receive();
   while (report != Bytes(32, 3));
@@ -186,13 +186,13 @@ TEST_CASE("libusb: while the device accepts nothing, the newest report waits", "
 
 TEST_CASE("libusb: a report that is not accepted by its deadline is replaced by the newest", "[usb]") {
   Bench bench({}, {.write_deadline = 2ms, .close_timeout = 10s});
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   while (bench.link.slot()->failed() == 0) std::this_thread::yield();
   CHECK(bench.link.write(now(), Bytes(32, 2)) ==
         LinkStatus::not_ready);  // reports the failure of the previous write
   while (bench.link.slot()->failed() < 2) std::this_thread::yield();
-  bench.mock.set_deaf(false);
+  bench.mock.set_blocked(false);
   bench.link.write(now(), Bytes(32, 3));
   CHECK(bench.mock.receive() == Bytes(32, 3));
 }
@@ -212,12 +212,12 @@ TEST_CASE("libusb: the last submitted report is written before the link closes",
 
 TEST_CASE("libusb: closing waits for a device that accepts the last report late", "[usb]") {
   Bench bench;
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.write(now(), Bytes(32, 0));
   std::thread closing([&] { bench.link.close(); });
   std::this_thread::sleep_for(20ms);  // then it waits; otherwise the test covers less
-  bench.mock.set_deaf(false);
+  bench.mock.set_blocked(false);
   Bytes last;
   do last = bench.mock.receive();
   while (last != Bytes(32, 0));
@@ -226,7 +226,7 @@ TEST_CASE("libusb: closing waits for a device that accepts the last report late"
 
 TEST_CASE("libusb: closing does not wait for a device that accepts nothing", "[usb]") {
   Bench bench({}, {.write_deadline = 1h, .close_timeout = 1ms});
-  bench.mock.set_deaf(true);
+  bench.mock.set_blocked(true);
   bench.link.write(now(), Bytes(32, 1));
   bench.link.close();
   CHECK_FALSE(bench.mock.claimed());
